@@ -1,0 +1,1 @@
+"""Where frames come from: webcam, video file, folder of photos, virtual hand."""

@@ -1,0 +1,53 @@
+"""What every camera offers."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True)
+class Frame:
+    """One camera image.
+
+    Attributes:
+        image: (height, width, 3) uint8, BGR, as the camera saw it (not mirrored).
+        captured_s: When it was captured, in seconds of the graph's monotonic clock.
+    """
+
+    image: NDArray[np.uint8]
+    captured_s: float
+
+
+class Camera(Protocol):
+    """A source of frames.
+
+    Attributes:
+        name: What it is, for people: ``webcam 0``, ``virtual hand``, a path.
+        period_s: Time between two frames that the reader must keep, or None when :meth:`read` itself waits for
+            the device.
+    """
+
+    @property
+    def name(self) -> str: ...  # noqa: D102
+
+    @property
+    def period_s(self) -> float | None: ...  # noqa: D102
+
+    def read(self) -> Frame | None:
+        """Return the newest frame, or None when there is none now (a file that ended and holds).
+
+        Raises:
+            CameraLost: The device stopped giving frames; reading again may bring it back.
+            EndOfStream: A file has ended and shall end the run.
+        """
+        ...
+
+    def close(self) -> None:
+        """Release the device; may be called twice."""
+        ...
+
+
+class EndOfStream(Exception):  # noqa: N818 - not an error
+    """The last frame of a file has been read."""

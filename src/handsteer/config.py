@@ -1,0 +1,185 @@
+"""Every parameter of handsteer: type, unit, range, default and a line of why.
+
+The YAML file, the command line and the settings of the page all come from these models. Names are as ROS nodes
+have them, units are SI (REP 103) and stand in brackets in each description.
+"""
+
+from pathlib import Path
+from typing import Any, Literal, TypeVar
+
+import yaml
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from handsteer.errors import ConfigError
+
+S = TypeVar("S", bound="Section")
+
+
+class Section(BaseModel):
+    """A group of parameters; unknown names and values out of range are refused."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, validate_default=True)
+
+
+class CameraConfig(Section):
+    """Where frames come from."""
+
+    source: str = Field(
+        "auto",
+        description="auto, virtual, a webcam's index or /dev/videoN, an address (rtsp, http), a video file or a folder",
+    )
+    width: int = Field(640, ge=64, le=4096, description="Width asked of a webcam or drawn by the virtual hand [px]")
+    height: int = Field(480, ge=48, le=4096, description="Height asked of a webcam or drawn by the virtual hand [px]")
+    fps: float = Field(30.0, gt=0, le=240, description="Frames a second asked of a webcam or drawn [1/s]")
+    at_end: Literal["loop", "hold", "end"] = Field(
+        "loop", description="When a file ends: start again, hold (no frames, so NONE), or end the run"
+    )
+    photo_duration: float = Field(1.0, gt=0, le=3600, description="How long each photo of a folder is shown [s]")
+
+
+class VirtualHandConfig(Section):
+    """The rendered hand that stands in for a webcam."""
+
+    script: str = Field(
+        "Forward:3 Turn Left:2 Forward:2 Turn Right:2 Go:1 Backward:3 Stop:2 NONE:1",
+        description="Signs to show with their durations in seconds, over and over; NONE lowers the hand",
+    )
+    handedness: Literal["Left", "Right"] = Field("Right", description="Which hand")
+    skin: Literal["light", "medium", "dark"] = Field("medium", description="Skin tone")
+    background: Literal["plain", "cluttered"] = Field("plain", description="What is behind the hand")
+    sleeve: bool = Field(True, description="Whether the forearm wears a sleeve")
+    seed: int = Field(0, ge=0, description="Seed of the background and of the hand's small movements")
+
+
+class LandmarksConfig(Section):
+    """How the hand is found in a frame."""
+
+    model: Literal["full", "lite"] = Field("full", description="full is more accurate; lite takes about 40 % less time")
+    max_hands: int = Field(1, ge=1, le=2, description="How many hands are looked for in a frame")
+    min_detection_confidence: float = Field(0.5, ge=0, le=1, description="Score from which a palm counts as found")
+    min_presence: float = Field(0.5, ge=0, le=1, description="Score below which a followed hand counts as lost")
+    threads: int = Field(1, ge=1, le=64, description="CPU threads of the landmark model")
+
+
+class SignsConfig(Section):
+    """How the sign is told from the landmarks, and when it counts."""
+
+    min_confidence: float = Field(0.5, ge=0, le=1, description="Confidence from which a sign counts")
+    confirm_time: float = Field(
+        0.1, ge=0, le=2, description="How long a sign must be seen before it counts; Stop counts at once [s]"
+    )
+    bridge_time: float = Field(0.1, ge=0, le=2, description="How long a lost hand keeps its sign [s]")
+    max_frame_age: float = Field(0.5, gt=0, le=10, description="An older frame counts as no frame [s]")
+
+
+class ControlConfig(Section):
+    """How a sign becomes a velocity."""
+
+    ramp: Literal["per_message", "per_second"] = Field(
+        "per_message",
+        description="per_message grows by a step a message, as the tutorial does; per_second whatever the frame rate",
+    )
+    linear_step: float = Field(0.01, gt=0, le=1, description="Growth of forward speed a message [m/s]")
+    angular_step: float = Field(0.1, gt=0, le=5, description="Growth of turning speed a message [rad/s]")
+    linear_acceleration: float = Field(0.3, gt=0, le=10, description="Growth of forward speed if per_second [m/s²]")
+    angular_acceleration: float = Field(3.0, gt=0, le=50, description="Growth of turning speed if per_second [rad/s²]")
+    max_linear: float = Field(1.0, gt=0, le=10, description="Highest forward and backward speed [m/s]")
+    max_angular: float = Field(2.0, gt=0, le=20, description="Highest turning speed [rad/s]")
+    sign_timeout: float = Field(0.5, gt=0, le=5, description="Without a sign for this long, the robot is stopped [s]")
+    steering_timeout: float = Field(
+        0.5, gt=0, le=5, description="Steering by hand keeps the signs out for this long after its last command [s]"
+    )
+
+
+class RobotConfig(Section):
+    """The robot and the world it is simulated in."""
+
+    kind: Literal["sim"] = Field("sim", description="sim is the simulated diff-drive robot")
+    world: str = Field("obstacles", description="Name of a shipped world, or a YAML file")
+    wheel_separation: float = Field(0.45, gt=0, le=10, description="Distance between left and right wheels [m]")
+    wheel_radius: float = Field(0.06, gt=0, le=2, description="Radius of the wheels [m]")
+    max_linear: float = Field(2.0, gt=0, le=20, description="Limit of the controller [m/s]")
+    max_linear_acceleration: float = Field(1.0, gt=0, le=50, description="Limit of the controller [m/s²]")
+    max_angular: float = Field(8.0, gt=0, le=50, description="Limit of the controller [rad/s]")
+    max_angular_acceleration: float = Field(2.0, gt=0, le=50, description="Limit of the controller [rad/s²]")
+    cmd_vel_timeout: float = Field(0.5, gt=0, le=10, description="Without a command for this long, it brakes [s]")
+
+
+class DashboardConfig(Section):
+    """The web page."""
+
+    port: int = Field(8080, ge=0, le=65535, description="Port on 127.0.0.1; 0 takes a free one")
+    open_browser: bool = Field(True, description="Whether run opens the page in a browser")
+
+
+class Config(Section):
+    """Everything that can be set."""
+
+    camera: CameraConfig = CameraConfig()
+    virtual_hand: VirtualHandConfig = VirtualHandConfig()
+    landmarks: LandmarksConfig = LandmarksConfig()
+    signs: SignsConfig = SignsConfig()
+    control: ControlConfig = ControlConfig()
+    robot: RobotConfig = RobotConfig()
+    dashboard: DashboardConfig = DashboardConfig()
+
+
+def load(path: Path | None = None, overrides: dict[str, Any] | None = None) -> Config:
+    """Return the defaults, changed by the YAML file at ``path``, changed by ``overrides``.
+
+    Args:
+        path: A YAML file with some of the fields of :class:`Config`, or None.
+        overrides: Nested dictionary of fields, as ``{"control": {"linear_step": 0.02}}``.
+
+    Raises:
+        ConfigError: The file cannot be read, or a field is unknown or out of range; the message names it.
+    """
+    values = _read_yaml(path) if path else {}
+    where = f" in {path}" if path else ""
+    return validate(Config, _merge(values, overrides or {}), where)
+
+
+def validate(section: type[S], values: Any, where: str = "") -> S:
+    """Return ``section`` built from ``values``; ``where`` is added to the message of an error.
+
+    Raises:
+        ConfigError: A field is unknown, of a wrong type or out of range.
+    """
+    try:
+        return section.model_validate(values)
+    except ValidationError as error:
+        raise ConfigError(describe(error) + where) from None
+
+
+def describe(error: ValidationError) -> str:
+    """Return the first problem of ``error`` in one line: the field, the value, what is allowed."""
+    problem = error.errors(include_url=False)[0]
+    field = ".".join(str(part) for part in problem["loc"]) or "configuration"
+    if problem["type"] == "extra_forbidden":
+        return f"{field}: there is no such parameter"
+    reason = problem["msg"].removeprefix("Input ").removeprefix("Value error, ")
+    return f"{field}: {problem['input']!r} {reason}"
+
+
+def _read_yaml(path: Path) -> dict[str, Any]:
+    try:
+        values = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ConfigError(f"cannot read the configuration {path}: {error.strerror}") from None
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        line = getattr(getattr(error, "problem_mark", None), "line", None)
+        at = f", line {line + 1}" if line is not None else ""
+        raise ConfigError(f"{path}{at}: not valid YAML") from None
+    if values is None:
+        return {}
+    if not isinstance(values, dict):
+        raise ConfigError(f"{path}: expected sections such as 'control:' at the top, found {type(values).__name__}")
+    return values
+
+
+def _merge(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
+    merged = dict(base)
+    for key, value in changes.items():
+        below = merged.get(key)
+        merged[key] = _merge(below, value) if isinstance(value, dict) and isinstance(below, dict) else value
+    return merged

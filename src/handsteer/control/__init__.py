@@ -1,0 +1,1 @@
+"""From signs to safe velocities: pure `step(input, dt)`, no clock, no I/O."""

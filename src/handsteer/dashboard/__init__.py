@@ -1,0 +1,1 @@
+"""The web page: it imports the graph, never the reverse."""

@@ -1,0 +1,83 @@
+"""Every error that handsteer raises on purpose.
+
+::
+
+    HandsteerError
+    ├── ConfigError            a configuration value or file is wrong
+    ├── CameraError            a camera cannot be used
+    │   ├── CameraNotFound     there is no such device, file, folder or address
+    │   ├── CameraInUse        the device exists, but another program holds it
+    │   ├── CameraUnreadable   it opens, but gives no picture
+    │   └── CameraLost         it gave pictures and stopped; worth trying again
+    ├── FrameError             an image has a shape or type that cannot be used
+    ├── ModelError             a landmark model file cannot be used
+    │   ├── ModelMissing       the file is not on this machine
+    │   └── ModelCorrupt       the file is not the one that was expected
+    ├── PoseError              a hand pose or a script of signs is wrong
+    ├── WorldError             a world file or robot description is wrong
+    ├── TransportError         a topic cannot be published or subscribed to
+    └── DashboardError         the web page cannot be served
+
+A message is one line that says what was wrong, where, and what would be right.
+Only :mod:`handsteer.cli` prints one and exits (with code 2).
+"""
+
+
+class HandsteerError(Exception):
+    """Root of all errors raised by handsteer."""
+
+
+class ConfigError(HandsteerError):
+    """A configuration value or file is wrong."""
+
+
+class CameraError(HandsteerError):
+    """A camera cannot be used."""
+
+
+class CameraNotFound(CameraError):  # noqa: N818 - reads as the tree above
+    """There is no such device, file, folder or address."""
+
+
+class CameraInUse(CameraError):  # noqa: N818
+    """The device exists, but another program holds it."""
+
+
+class CameraUnreadable(CameraError):  # noqa: N818
+    """The source opens, but gives no picture."""
+
+
+class CameraLost(CameraError):  # noqa: N818
+    """The camera gave pictures and stopped; trying again may help."""
+
+
+class FrameError(HandsteerError):
+    """An image has a shape or type that cannot be used."""
+
+
+class ModelError(HandsteerError):
+    """A landmark model file cannot be used."""
+
+
+class ModelMissing(ModelError):  # noqa: N818
+    """A landmark model file is not on this machine."""
+
+
+class ModelCorrupt(ModelError):  # noqa: N818
+    """A landmark model file is not the one that was expected."""
+
+
+class PoseError(HandsteerError):
+    """A hand pose or a script of signs is wrong."""
+
+
+class WorldError(HandsteerError):
+    """A world file or robot description is wrong."""
+
+
+class TransportError(HandsteerError):
+    """A topic cannot be published or subscribed to."""
+
+
+class DashboardError(HandsteerError):
+    """The web page cannot be served."""

@@ -1,0 +1,1 @@
+"""From a frame to the 21 landmarks of a hand."""

@@ -1,0 +1,66 @@
+"""What every landmarker offers."""
+
+from dataclasses import dataclass
+from typing import Literal, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+Handedness = Literal["Left", "Right"]
+
+CONNECTIONS: tuple[tuple[int, int], ...] = (
+    *((0, 1), (1, 2), (2, 3), (3, 4)),
+    *((0, 5), (5, 6), (6, 7), (7, 8)),
+    *((5, 9), (9, 10), (10, 11), (11, 12)),
+    *((9, 13), (13, 14), (14, 15), (15, 16)),
+    *((0, 17), (13, 17), (17, 18), (18, 19), (19, 20)),
+)
+"""The bones to draw between landmarks 0 (wrist) to 20 (tip of the little finger)."""
+
+
+@dataclass(frozen=True)
+class Hand:
+    """One hand in one frame.
+
+    Attributes:
+        points: (21, 3) float32 landmarks, image-normalised: x / width, y / height, and depth z (0 at the wrist,
+            towards the camera negative) in the scale of x. Order: wrist, then thumb, index, middle, ring and little
+            finger, each from its base to its tip.
+        world: (21, 3) float32 landmarks in metres about the hand's centre, axes as ``points``.
+        handedness: Which hand of the person it is (the frame is not mirrored).
+        handedness_score: 0.5 to 1, how sure that is.
+        presence: 0 to 1, how sure it is that there is a hand.
+        image_size: Width and height of the frame in pixels.
+    """
+
+    points: NDArray[np.float32]
+    world: NDArray[np.float32]
+    handedness: Handedness
+    handedness_score: float
+    presence: float
+    image_size: tuple[int, int]
+
+    @property
+    def pixels(self) -> NDArray[np.float32]:
+        """(21, 3) float32 landmarks in pixels; z in the scale of x."""
+        width, height = self.image_size
+        return self.points * np.array([width, height, width], np.float32)
+
+
+class Landmarker(Protocol):
+    """Finds hands in frames; follows them from one frame to the next."""
+
+    def detect(self, image: NDArray[np.uint8]) -> list[Hand]:
+        """Return the hands in ``image``, the surest first; an empty list when there is none.
+
+        Args:
+            image: (height, width, 3) uint8, BGR, not mirrored.
+
+        Raises:
+            FrameError: The image has another shape or type.
+        """
+        ...
+
+    def reset(self) -> None:
+        """Forget the hands of the last frame."""
+        ...

@@ -1,0 +1,99 @@
+"""The ROS messages that the graph speaks, and its topics.
+
+The message classes are the typed dataclasses of ``rosbags``: the same definitions as ROS 2's own, no ROS needed.
+They are used as values: once published, a message is not changed any more.
+"""
+
+from dataclasses import dataclass
+from typing import Generic, TypeVar
+
+from rosbags.typesys.stores.ros2_jazzy import builtin_interfaces__msg__Time as Time
+from rosbags.typesys.stores.ros2_jazzy import diagnostic_msgs__msg__DiagnosticArray as DiagnosticArray
+from rosbags.typesys.stores.ros2_jazzy import diagnostic_msgs__msg__DiagnosticStatus as DiagnosticStatus
+from rosbags.typesys.stores.ros2_jazzy import diagnostic_msgs__msg__KeyValue as KeyValue
+from rosbags.typesys.stores.ros2_jazzy import geometry_msgs__msg__Point as Point
+from rosbags.typesys.stores.ros2_jazzy import geometry_msgs__msg__Pose as Pose
+from rosbags.typesys.stores.ros2_jazzy import geometry_msgs__msg__PoseWithCovariance as PoseWithCovariance
+from rosbags.typesys.stores.ros2_jazzy import geometry_msgs__msg__Quaternion as Quaternion
+from rosbags.typesys.stores.ros2_jazzy import geometry_msgs__msg__Transform as Transform
+from rosbags.typesys.stores.ros2_jazzy import geometry_msgs__msg__TransformStamped as TransformStamped
+from rosbags.typesys.stores.ros2_jazzy import geometry_msgs__msg__Twist as Twist
+from rosbags.typesys.stores.ros2_jazzy import geometry_msgs__msg__TwistWithCovariance as TwistWithCovariance
+from rosbags.typesys.stores.ros2_jazzy import geometry_msgs__msg__Vector3 as Vector3
+from rosbags.typesys.stores.ros2_jazzy import nav_msgs__msg__Odometry as Odometry
+from rosbags.typesys.stores.ros2_jazzy import rosgraph_msgs__msg__Clock as ClockMessage
+from rosbags.typesys.stores.ros2_jazzy import sensor_msgs__msg__CompressedImage as CompressedImage
+from rosbags.typesys.stores.ros2_jazzy import sensor_msgs__msg__Image as Image
+from rosbags.typesys.stores.ros2_jazzy import sensor_msgs__msg__JointState as JointState
+from rosbags.typesys.stores.ros2_jazzy import std_msgs__msg__ColorRGBA as ColorRGBA
+from rosbags.typesys.stores.ros2_jazzy import std_msgs__msg__Header as Header
+from rosbags.typesys.stores.ros2_jazzy import std_msgs__msg__String as String
+from rosbags.typesys.stores.ros2_jazzy import tf2_msgs__msg__TFMessage as TFMessage
+from rosbags.typesys.stores.ros2_jazzy import visualization_msgs__msg__Marker as Marker
+from rosbags.typesys.stores.ros2_jazzy import visualization_msgs__msg__MarkerArray as MarkerArray
+
+__all__ = [
+    "ClockMessage",
+    "ColorRGBA",
+    "CompressedImage",
+    "DiagnosticArray",
+    "DiagnosticStatus",
+    "Header",
+    "Image",
+    "JointState",
+    "KeyValue",
+    "Marker",
+    "MarkerArray",
+    "Odometry",
+    "Point",
+    "Pose",
+    "PoseWithCovariance",
+    "Quaternion",
+    "String",
+    "TFMessage",
+    "Time",
+    "Topic",
+    "Transform",
+    "TransformStamped",
+    "Twist",
+    "TwistWithCovariance",
+    "Vector3",
+    "twist",
+]
+
+M = TypeVar("M")
+
+
+@dataclass(frozen=True)
+class Topic(Generic[M]):
+    """A named stream of messages of one type.
+
+    Attributes:
+        name: Full ROS name, such as ``/image_raw``.
+        type: The message class.
+        latched: A late subscriber gets the last message at once (ROS 2: transient local).
+    """
+
+    name: str
+    type: type[M]
+    latched: bool = False
+
+
+IMAGE_RAW = Topic("/image_raw", Image)
+IMAGE_COMPRESSED = Topic("/image_raw/compressed", CompressedImage)
+HAND_SIGN = Topic("/gesture/hand_sign", String)
+IMAGE_ANNOTATED = Topic("/gesture/image_annotated", Image)
+CMD_VEL = Topic("/robot_diff_drive_controller/cmd_vel", Twist)
+STEERING_CMD_VEL = Topic("/steering/cmd_vel", Twist)
+ODOM = Topic("/robot_diff_drive_controller/odom", Odometry)
+TF = Topic("/tf", TFMessage)
+JOINT_STATES = Topic("/joint_states", JointState)
+CLOCK = Topic("/clock", ClockMessage)
+ROBOT_DESCRIPTION = Topic("/robot_description", String, latched=True)
+WORLD_MARKERS = Topic("/world/markers", MarkerArray)
+DIAGNOSTICS = Topic("/diagnostics", DiagnosticArray)
+
+
+def twist(linear_mps: float, angular_radps: float) -> Twist:
+    """Return the twist of a robot on a plane: forward in m/s, left turn in rad/s (REP 103)."""
+    return Twist(linear=Vector3(linear_mps, 0.0, 0.0), angular=Vector3(0.0, 0.0, angular_radps))

@@ -1,0 +1,1 @@
+"""The nodes of the graph: thin, one file each."""

@@ -1,0 +1,1 @@
+"""What is driven: a simulated robot, or one behind a topic."""

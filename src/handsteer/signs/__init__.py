@@ -1,0 +1,1 @@
+"""From 21 landmarks to the name of a sign."""

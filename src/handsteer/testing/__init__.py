@@ -1,0 +1,1 @@
+"""Fakes for tests: cameras with faults, and helpers to run a graph step by step."""
