@@ -1,0 +1,106 @@
+"""From signs to velocities: the tutorial's rule, with limits and a watchdog."""
+
+import math
+from dataclasses import dataclass
+
+from handsteer.config import ControlConfig
+from handsteer.signs.vocabulary import BACKWARD, FORWARD, NONE, STOP, TURN_LEFT, TURN_RIGHT
+
+
+@dataclass(frozen=True)
+class Velocity:
+    """Forward velocity in m/s and turning velocity in rad/s, left positive (REP 103)."""
+
+    linear_mps: float = 0.0
+    angular_radps: float = 0.0
+
+    @property
+    def is_zero(self) -> bool:
+        """Whether the robot is to stand still."""
+        return self.linear_mps == 0.0 and self.angular_radps == 0.0
+
+    @property
+    def is_finite(self) -> bool:
+        """Whether both parts are numbers that a robot can follow."""
+        return math.isfinite(self.linear_mps) and math.isfinite(self.angular_radps)
+
+    def clamped(self, max_linear_mps: float, max_angular_radps: float) -> "Velocity":
+        """Return the nearest velocity within the limits."""
+        return Velocity(
+            max(-max_linear_mps, min(self.linear_mps, max_linear_mps)),
+            max(-max_angular_radps, min(self.angular_radps, max_angular_radps)),
+        )
+
+
+ZERO = Velocity()
+
+
+class SignControl:
+    """Keeps the commanded velocity and changes it by one step a sign.
+
+    ``Forward`` and ``Backward`` change the linear velocity and end turning; ``Turn Left`` and ``Turn Right`` change
+    the angular velocity and keep the linear one; ``Stop`` and ``NONE`` set both to zero; ``Go`` and unknown words
+    change nothing (the rule of the ROS 101 course, chapter 12). The velocity itself is clamped, so that it does not
+    wind up beyond the limits.
+
+    Attributes:
+        velocity: What was commanded last.
+        silent: True after a timeout: nothing is commanded until a sign comes.
+    """
+
+    def __init__(self, config: ControlConfig) -> None:
+        self._config = config
+        self._since_sign_s = 0.0
+        self.velocity = ZERO
+        self.silent = True
+
+    def step(self, sign: str | None, dt_s: float) -> Velocity | None:
+        """Let ``dt_s`` pass, then take ``sign``.
+
+        Args:
+            sign: The sign of one message, or None when no message came and only time has passed.
+            dt_s: Seconds since the last step, >= 0; anything else counts as a fault.
+
+        Returns:
+            The velocity to command now; None to command nothing. Exactly one velocity a sign; after
+            ``sign_timeout`` without a sign, or at a fault, one zero and then None.
+        """
+        if not (math.isfinite(dt_s) and dt_s >= 0):
+            return self.halt()
+        self._since_sign_s += dt_s
+        if sign is None:
+            timed_out = not self.silent and self._since_sign_s >= self._config.sign_timeout
+            return self.halt() if timed_out else None
+        # How long a sign has lasted is not known when it comes after a silence: it then starts to grow from now.
+        interval_s = 0.0 if self.silent else self._since_sign_s
+        self._since_sign_s = 0.0
+        self.silent = False
+        self.velocity = self._next(sign, interval_s)
+        return self.velocity if self.velocity.is_finite else self.halt()
+
+    def halt(self) -> Velocity | None:
+        """Forget the velocity; return one zero, or None when that has been said already."""
+        was_silent = self.silent
+        self.velocity = ZERO
+        self.silent = True
+        self._since_sign_s = 0.0
+        return None if was_silent else ZERO
+
+    def _next(self, sign: str, interval_s: float) -> Velocity:
+        now = self.velocity
+        linear, angular = self._growth(interval_s)
+        after = {
+            FORWARD: Velocity(now.linear_mps + linear, 0.0),
+            BACKWARD: Velocity(now.linear_mps - linear, 0.0),
+            TURN_LEFT: Velocity(now.linear_mps, now.angular_radps + angular),
+            TURN_RIGHT: Velocity(now.linear_mps, now.angular_radps - angular),
+            STOP: ZERO,
+            NONE: ZERO,
+        }.get(sign, now)
+        return after.clamped(self._config.max_linear, self._config.max_angular)
+
+    def _growth(self, interval_s: float) -> tuple[float, float]:
+        config = self._config
+        if config.ramp == "per_message":
+            return config.linear_step, config.angular_step
+        return config.linear_acceleration * interval_s, config.angular_acceleration * interval_s

@@ -1,0 +1,75 @@
+"""The node ``hand_sign_control``: signs in, one velocity command out for each."""
+
+from handsteer.clock import Clock
+from handsteer.config import ControlConfig
+from handsteer.control.driver import Driver
+from handsteer.control.sign_control import Velocity
+from handsteer.messages import CMD_VEL, HAND_SIGN, STEERING_CMD_VEL, String, Twist, twist
+from handsteer.nodes.latency import LatencyLog
+from handsteer.nodes.node import OK, Node
+from handsteer.transports.protocol import Received, Transport
+
+_WATCHDOG_PERIOD_S = 0.02
+_DIAGNOSE_PERIOD_S = 0.1
+
+
+class HandSignControlNode(Node):
+    """Publishes one Twist a sign, one zero when signs stop, and one zero at the end, whatever ends it.
+
+    Attributes:
+        latency: From the capture of a frame to the Twist that it led to.
+    """
+
+    def __init__(self, transport: Transport, clock: Clock, config: ControlConfig) -> None:
+        super().__init__("hand_sign_control", transport, clock)
+        self.latency = LatencyLog()
+        self._config = config
+        self._driver = Driver(config)
+        self._last_step_s = clock.now()
+        self._cmd_vel = self.publisher(CMD_VEL)
+        self.subscribe(HAND_SIGN, self._on_sign)
+        self.subscribe(STEERING_CMD_VEL, self._on_steering)
+        self.every(_WATCHDOG_PERIOD_S, self._watch)
+        self.every(_DIAGNOSE_PERIOD_S, self._report)
+
+    def on_stop(self) -> None:
+        """Leave the robot standing."""
+        self._driver.halt()
+        self._cmd_vel.publish(twist(0.0, 0.0))
+
+    def _on_sign(self, received: Received[String]) -> None:
+        captured_s = received.captured_s
+        if captured_s is not None and self.clock.now() - captured_s > self._config.sign_timeout:
+            return  # a stale frame is no frame: the watchdog goes on counting
+        self._publish(self._driver.step(self._elapsed(), sign=received.message.data), captured_s)
+
+    def _on_steering(self, received: Received[Twist]) -> None:
+        wanted = Velocity(received.message.linear.x, received.message.angular.z)
+        self._publish(self._driver.step(self._elapsed(), steering=wanted))
+
+    def _watch(self) -> None:
+        self._publish(self._driver.step(self._elapsed()))
+
+    def _publish(self, velocity: Velocity | None, captured_s: float | None = None) -> None:
+        if velocity is None:
+            return
+        self._cmd_vel.publish(twist(velocity.linear_mps, velocity.angular_radps), captured_s)
+        if captured_s is not None:
+            self.latency.add(self.clock.now() - captured_s)
+
+    def _elapsed(self) -> float:
+        now = self.clock.now()
+        elapsed_s, self._last_step_s = now - self._last_step_s, now
+        return elapsed_s
+
+    def _report(self) -> None:
+        velocity = self._driver.velocity
+        self.diagnose(
+            OK,
+            self._driver.reason,
+            source=self._driver.source,
+            linear_mps=f"{velocity.linear_mps:.3f}",
+            angular_radps=f"{velocity.angular_radps:.3f}",
+            latency_median_ms=f"{self.latency.percentile_ms(50):.1f}",
+            latency_p99_ms=f"{self.latency.percentile_ms(99):.1f}",
+        )

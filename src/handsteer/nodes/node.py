@@ -1,0 +1,172 @@
+"""What all nodes share: inboxes that keep the newest message, timers, and one thread that serves both."""
+
+import logging
+import threading
+from collections.abc import Callable, Hashable
+from dataclasses import dataclass, field
+from typing import Any, Generic, TypeVar
+
+from handsteer.clock import Clock
+from handsteer.messages import DIAGNOSTICS, DiagnosticArray, DiagnosticStatus, Header, KeyValue, Topic
+from handsteer.transports.protocol import Publisher, Received, Subscription, Transport
+
+M = TypeVar("M")
+log = logging.getLogger(__name__)
+
+OK, WARN, ERROR = 0, 1, 2
+"""Levels of ``diagnostic_msgs/DiagnosticStatus``."""
+
+
+class Node:
+    """A named part of the graph; its callbacks and timers run one at a time, never side by side.
+
+    Run it on a thread of its own (:meth:`start`, :meth:`stop`), or let the caller turn the crank (:meth:`spin_once`,
+    :attr:`next_due_s`) on a :class:`~handsteer.clock.SteppedClock`.
+
+    A callback that raises is logged with its topic and counted in :attr:`callback_errors`; the node goes on.
+
+    Args:
+        name: ROS node name.
+        transport: Carries the messages.
+        clock: The graph's clock; timers follow it.
+    """
+
+    def __init__(self, name: str, transport: Transport, clock: Clock) -> None:
+        self.name = name
+        self.clock = clock
+        self.callback_errors = 0
+        self._transport = transport
+        self._inboxes: list[_Inbox[Any]] = []
+        self._timers: list[_Timer] = []
+        self._subscriptions: list[Subscription] = []
+        self._wake = threading.Condition()
+        self._running = False
+        self._thread: threading.Thread | None = None
+        self._diagnostics = transport.advertise(name, DIAGNOSTICS)
+
+    def publisher(self, topic: Topic[M]) -> Publisher[M]:
+        """Return the sending end of ``topic``."""
+        return self._transport.advertise(self.name, topic)
+
+    def subscribe(
+        self,
+        topic: Topic[M],
+        callback: Callable[[Received[M]], None],
+        key: Callable[[M], Hashable] | None = None,
+    ) -> None:
+        """Call ``callback`` with the newest message of ``topic``; older ones that were not served are dropped.
+
+        Args:
+            topic: What to listen to.
+            callback: Runs on this node's thread.
+            key: For a topic that several nodes publish to: keeps the newest message for each value of ``key(message)``.
+        """
+        inbox = _Inbox(topic.name, callback, key)
+        self._inboxes.append(inbox)
+
+        def deliver(received: Received[M]) -> None:
+            with self._wake:
+                inbox.put(received)
+                self._wake.notify()
+
+        self._subscriptions.append(self._transport.subscribe(self.name, topic, deliver))
+
+    def every(self, period_s: float, callback: Callable[[], None]) -> None:
+        """Call ``callback`` every ``period_s`` seconds; a beat that is missed is left out, not made up for."""
+        self._timers.append(_Timer(period_s, callback, self.clock.now()))
+
+    def diagnose(self, level: int, message: str, **values: object) -> None:
+        """Publish this node's state on ``/diagnostics``: a level, a sentence for people, and named values."""
+        if self._diagnostics.wanted:
+            pairs = [KeyValue(key, str(value)) for key, value in values.items()]
+            status = DiagnosticStatus(level=level, name=self.name, message=message, hardware_id="", values=pairs)
+            header = Header(stamp=self.clock.stamp(self.clock.now()), frame_id="")
+            self._diagnostics.publish(DiagnosticArray(header=header, status=[status]))
+
+    @property
+    def next_due_s(self) -> float | None:
+        """When the next timer is due, on the graph's clock; None when there is no timer."""
+        return min((timer.due_s for timer in self._timers), default=None)
+
+    def spin_once(self) -> bool:
+        """Run the callbacks whose message has come and the timers that are due; return whether there were any."""
+        with self._wake:
+            work = [(inbox, received) for inbox in self._inboxes for received in inbox.take()]
+        for inbox, received in work:
+            self._guard(inbox.topic, inbox.callback, received)
+        now = self.clock.now()
+        due = [timer for timer in self._timers if timer.due_s <= now]
+        for timer in due:
+            timer.schedule_next(now)
+            self._guard("timer", timer.callback)
+        return bool(work or due)
+
+    def start(self) -> None:
+        """Serve callbacks and timers on a thread of its own."""
+        self._running = True
+        self._thread = threading.Thread(target=self._run, name=self.name, daemon=True)
+        self._thread.start()
+
+    def stop(self, timeout_s: float = 1.0) -> None:
+        """Receive no more, end the thread, then :meth:`on_stop`; may be called twice."""
+        for subscription in self._subscriptions:
+            subscription.close()
+        with self._wake:
+            self._running = False
+            self._wake.notify()
+        if self._thread is not None and self._thread is not threading.current_thread():
+            self._thread.join(timeout_s)
+        self._guard("stop", self.on_stop)
+
+    def on_stop(self) -> None:
+        """Leave things as they should be left; called last, also after an exception."""
+
+    def _run(self) -> None:
+        while self._running:
+            if not self.spin_once():
+                self._wait()
+
+    def _wait(self) -> None:
+        with self._wake:
+            if self._running and not any(inbox.filled for inbox in self._inboxes):
+                due = self.next_due_s
+                self._wake.wait(None if due is None else max(0.0, due - self.clock.now()))
+
+    def _guard(self, source: str, callback: Callable[..., None], *args: object) -> None:
+        try:
+            callback(*args)
+        except Exception:
+            self.callback_errors += 1
+            log.exception("%s: callback of %s failed", self.name, source)
+
+
+@dataclass
+class _Inbox(Generic[M]):
+    topic: str
+    callback: Callable[[Received[M]], None]
+    key: Callable[[M], Hashable] | None
+    _newest: dict[Hashable, Received[M]] = field(default_factory=dict)
+
+    @property
+    def filled(self) -> bool:
+        return bool(self._newest)
+
+    def put(self, received: Received[M]) -> None:
+        self._newest[self.key(received.message) if self.key else None] = received
+
+    def take(self) -> list[Received[M]]:
+        taken = list(self._newest.values())
+        self._newest.clear()
+        return taken
+
+
+@dataclass
+class _Timer:
+    period_s: float
+    callback: Callable[[], None]
+    due_s: float
+
+    def schedule_next(self, now_s: float) -> None:
+        self.due_s += self.period_s
+        if self.due_s <= now_s:
+            self.due_s = now_s + self.period_s

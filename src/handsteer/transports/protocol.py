@@ -1,0 +1,77 @@
+"""What every transport offers: topics to publish to and to subscribe to."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Generic, Protocol, TypeVar
+
+from handsteer.messages import Topic
+
+M = TypeVar("M")
+M_contra = TypeVar("M_contra", contravariant=True)
+
+
+@dataclass(frozen=True)
+class Received(Generic[M]):
+    """A message as a subscriber gets it.
+
+    Attributes:
+        message: The message; it is shared with other subscribers, so it is not to be changed.
+        captured_s: When the frame that led to this message was captured, in seconds of the graph's clock; None when
+            there was no frame, or when the transport cannot carry it.
+    """
+
+    message: M
+    captured_s: float | None = None
+
+
+class Publisher(Protocol[M_contra]):
+    """The sending end of a topic."""
+
+    @property
+    def wanted(self) -> bool:
+        """Whether anybody listens: what is made on demand is made only then."""
+        ...
+
+    def publish(self, message: M_contra, captured_s: float | None = None) -> None:
+        """Send ``message`` to whoever listens; returns at once, whatever they do.
+
+        Raises:
+            TransportError: The message is of another type than the topic.
+        """
+        ...
+
+
+class Subscription(Protocol):
+    """The receiving end of a topic."""
+
+    def close(self) -> None:
+        """Receive no more; may be called twice."""
+        ...
+
+
+class Transport(Protocol):
+    """Carries messages between nodes.
+
+    ``deliver`` is called on a thread of the transport's choice and must return at once: nodes put the message into
+    an inbox that keeps the newest only (:class:`handsteer.nodes.node.Node`).
+    """
+
+    def advertise(self, node: str, topic: Topic[M]) -> Publisher[M]:
+        """Return the sending end of ``topic`` for the node named ``node``.
+
+        Raises:
+            TransportError: The topic is in use with another type.
+        """
+        ...
+
+    def subscribe(self, node: str, topic: Topic[M], deliver: Callable[[Received[M]], None]) -> Subscription:
+        """Call ``deliver`` for each message on ``topic`` from now on; a latched topic gives its last one at once.
+
+        Raises:
+            TransportError: The topic is in use with another type.
+        """
+        ...
+
+    def close(self) -> None:
+        """End all publishing and receiving; may be called twice."""
+        ...
