@@ -17,6 +17,31 @@ OK, WARN, ERROR = 0, 1, 2
 """Levels of ``diagnostic_msgs/DiagnosticStatus``."""
 
 
+@dataclass
+class Timer:
+    """A callback that is due again and again.
+
+    Attributes:
+        period_s: Time from one beat to the next; 0 means at once.
+        callback: What to call.
+        due_s: When the next beat is due, on the graph's clock.
+    """
+
+    period_s: float
+    callback: Callable[[], None]
+    due_s: float
+
+    def schedule_next(self, now_s: float) -> None:
+        """Set the beat after the one of ``now_s``."""
+        self.due_s += self.period_s
+        if self.due_s <= now_s:
+            self.due_s = now_s + self.period_s
+
+    def delay_until(self, time_s: float) -> None:
+        """Leave out all beats before ``time_s``."""
+        self.due_s = max(self.due_s, time_s)
+
+
 class Node:
     """A named part of the graph; its callbacks and timers run one at a time, never side by side.
 
@@ -37,7 +62,7 @@ class Node:
         self.callback_errors = 0
         self._transport = transport
         self._inboxes: list[_Inbox[Any]] = []
-        self._timers: list[_Timer] = []
+        self._timers: list[Timer] = []
         self._subscriptions: list[Subscription] = []
         self._wake = threading.Condition()
         self._running = False
@@ -71,9 +96,11 @@ class Node:
 
         self._subscriptions.append(self._transport.subscribe(self.name, topic, deliver))
 
-    def every(self, period_s: float, callback: Callable[[], None]) -> None:
+    def every(self, period_s: float, callback: Callable[[], None]) -> "Timer":
         """Call ``callback`` every ``period_s`` seconds; a beat that is missed is left out, not made up for."""
-        self._timers.append(_Timer(period_s, callback, self.clock.now()))
+        timer = Timer(period_s, callback, self.clock.now())
+        self._timers.append(timer)
+        return timer
 
     def diagnose(self, level: int, message: str, **values: object) -> None:
         """Publish this node's state on ``/diagnostics``: a level, a sentence for people, and named values."""
@@ -158,15 +185,3 @@ class _Inbox(Generic[M]):
         taken = list(self._newest.values())
         self._newest.clear()
         return taken
-
-
-@dataclass
-class _Timer:
-    period_s: float
-    callback: Callable[[], None]
-    due_s: float
-
-    def schedule_next(self, now_s: float) -> None:
-        self.due_s += self.period_s
-        if self.due_s <= now_s:
-            self.due_s = now_s + self.period_s

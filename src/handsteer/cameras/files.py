@@ -1,0 +1,161 @@
+"""Frames from a video file or a folder of photos."""
+
+from pathlib import Path
+from typing import Literal
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from handsteer.cameras.protocol import EndOfStream, Frame
+from handsteer.clock import Clock
+from handsteer.errors import CameraNotFound, CameraUnreadable
+
+AtEnd = Literal["loop", "hold", "end"]
+PHOTO_SUFFIXES = frozenset({".jpg", ".jpeg", ".png", ".bmp", ".webp", ".tif", ".tiff"})
+
+_DEFAULT_FPS = 30.0
+_HIGHEST_FPS = 240.0
+
+
+class VideoFile:
+    """Shows a video file at its own pace.
+
+    Args:
+        path: The file.
+        clock: Stamps the frames.
+        at_end: What happens after the last frame.
+
+    Attributes:
+        period_s: Time between two frames, as the file says; 1/30 s when it does not.
+
+    Raises:
+        CameraNotFound: There is no such file.
+        CameraUnreadable: It is not a video that can be decoded.
+    """
+
+    def __init__(self, path: Path, clock: Clock, at_end: AtEnd = "loop") -> None:
+        self.name = str(path)
+        self._path = path
+        self._clock = clock
+        self._at_end = at_end
+        if not path.is_file():
+            raise CameraNotFound(f"there is no video file {path}")
+        self._capture = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG)
+        fps = self._capture.get(cv2.CAP_PROP_FPS)
+        self.period_s = 1.0 / (fps if 0 < fps <= _HIGHEST_FPS else _DEFAULT_FPS)
+        self._next = self._decode()
+        if self._next is None:
+            raise CameraUnreadable(f"{path} is not a video that can be decoded: try an mp4, avi or webm file")
+
+    def read(self) -> Frame | None:
+        """Return the next frame; None after the last one when the end holds.
+
+        Raises:
+            EndOfStream: After the last one, when it ends the run.
+        """
+        if self._next is None:
+            if self._at_end == "end":
+                raise EndOfStream
+            if self._at_end == "hold":
+                return None
+            self._capture.set(cv2.CAP_PROP_POS_FRAMES, 0)
+            self._next = self._decode()
+        image, self._next = self._next, self._decode()
+        return None if image is None else Frame(image, self._clock.now())
+
+    def close(self) -> None:
+        """Release the file; may be called twice."""
+        self._capture.release()
+
+    def _decode(self) -> NDArray[np.uint8] | None:
+        done, image = self._capture.read()
+        return np.asarray(image, np.uint8) if done else None
+
+
+class PhotoFolder:
+    """Shows the photos of a folder, or one photo, each for a while; sorted by name, folders within included.
+
+    Args:
+        path: The folder, or a photo.
+        clock: Stamps the frames.
+        photo_duration_s: How long each photo is shown, in seconds.
+        fps: Frames a second: a photo is repeated, as a camera would see it.
+        at_end: What happens after the last photo.
+
+    Raises:
+        CameraNotFound: There is no such folder, or there are no photos in it.
+        CameraUnreadable: A photo cannot be decoded.
+    """
+
+    def __init__(
+        self, path: Path, clock: Clock, *, photo_duration_s: float = 1.0, fps: float = 30.0, at_end: AtEnd = "loop"
+    ) -> None:
+        self.name = str(path)
+        self.period_s = 1.0 / fps
+        self._clock = clock
+        self._at_end = at_end
+        self._photos = find_photos(path)
+        self._repeats = max(1, round(photo_duration_s * fps))
+        self._shown = 0
+        self._image = read_photo(self._photos[0])
+
+    def read(self) -> Frame | None:
+        """Return the next frame; None after the last one when the end holds.
+
+        Raises:
+            EndOfStream: After the last one, when it ends the run.
+            CameraUnreadable: The next photo cannot be decoded; reading again goes on with the one after it.
+        """
+        index, repeat = divmod(self._shown, self._repeats)
+        if index == len(self._photos):
+            if self._at_end == "end":
+                raise EndOfStream
+            if self._at_end == "hold":
+                return None
+            self._shown = index = repeat = 0
+        if repeat == 0:
+            self._load(index)
+        self._shown += 1
+        return Frame(self._image, self._clock.now())
+
+    def close(self) -> None:
+        """Nothing is held."""
+
+    def _load(self, index: int) -> None:
+        try:
+            self._image = read_photo(self._photos[index])
+        except CameraUnreadable:
+            self._shown = (index + 1) * self._repeats
+            raise
+
+
+def find_photos(path: Path) -> list[Path]:
+    """Return the photo ``path``, or the photos in folder ``path`` and below, sorted.
+
+    Raises:
+        CameraNotFound: There is none.
+    """
+    if path.is_file():
+        return [path]
+    if not path.is_dir():
+        raise CameraNotFound(f"there is no photo or folder {path}")
+    photos = sorted(file for file in path.rglob("*") if file.suffix.lower() in PHOTO_SUFFIXES)
+    if not photos:
+        raise CameraNotFound(f"there are no photos in {path}: expected files such as .jpg or .png")
+    return photos
+
+
+def read_photo(path: Path) -> NDArray[np.uint8]:
+    """Return a photo as (height, width, 3) uint8, BGR.
+
+    Raises:
+        CameraUnreadable: The file cannot be decoded.
+    """
+    try:
+        image = cv2.imread(str(path), cv2.IMREAD_COLOR)
+    except cv2.error:  # a picture beyond OpenCV's limit of pixels
+        image = None
+    if image is None:
+        raise CameraUnreadable(f"{path} is not a photo that can be decoded: try a jpg or png file")
+    return np.asarray(image, np.uint8)

@@ -1,0 +1,189 @@
+"""A webcam, or any address that OpenCV can open."""
+
+import os
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Protocol
+
+import cv2
+
+from handsteer.cameras.protocol import Frame
+from handsteer.clock import Clock
+from handsteer.errors import CameraError, CameraInUse, CameraLost, CameraNotFound, CameraUnreadable
+
+_OPEN_TIMEOUT_MS = 5000
+_READ_TIMEOUT_MS = 2000
+_FIRST_FRAME_TRIES = 10
+
+
+class Capture(Protocol):
+    """The part of ``cv2.VideoCapture`` that is used."""
+
+    def isOpened(self) -> bool: ...  # noqa: D102, N802 - OpenCV's name
+    def read(self) -> tuple[bool, Any]: ...  # noqa: D102
+    def set(self, prop: int, value: float) -> bool: ...  # noqa: D102
+    def release(self) -> None: ...  # noqa: D102
+
+
+class Webcam:
+    """A :class:`~handsteer.cameras.protocol.Camera` that waits for its device.
+
+    A device that stops is closed; each further :meth:`read` tries once to open it again.
+
+    Args:
+        source: Index (``0``), device (``/dev/video0``) or address (``rtsp://…``, ``http://…``).
+        clock: Stamps the frames.
+        width: Width to ask the device for, in pixels; it may give another.
+        height: Height to ask the device for, in pixels.
+        fps: Frames a second to ask the device for.
+        open_capture: Opens the device; tests put faults here.
+
+    Raises:
+        CameraNotFound: There is no such device, or the address does not answer.
+        CameraInUse: Another program holds the device.
+        CameraUnreadable: The device opens, but gives no picture.
+    """
+
+    period_s = None
+
+    def __init__(
+        self,
+        source: str,
+        clock: Clock,
+        *,
+        width: int = 640,
+        height: int = 480,
+        fps: float = 30.0,
+        open_capture: Callable[[str], Capture] | None = None,
+    ) -> None:
+        self.name = f"webcam {source}" if source.isdigit() else source
+        self._source = source
+        self._clock = clock
+        self._settings = {
+            cv2.CAP_PROP_FRAME_WIDTH: width,
+            cv2.CAP_PROP_FRAME_HEIGHT: height,
+            cv2.CAP_PROP_FPS: fps,
+            # One buffer: a frame that waited in a queue is a stale frame.
+            cv2.CAP_PROP_BUFFERSIZE: 1,
+        }
+        self._open_capture = open_capture or _open_capture
+        self._capture: Capture | None = None
+        self._first: Frame | None = None
+        self._first = self._open()
+
+    def read(self) -> Frame | None:
+        """Wait for the next frame and return it.
+
+        Raises:
+            CameraLost: The device gives no frames (any more).
+        """
+        if self._first is not None:
+            first, self._first = self._first, None
+            return first
+        if self._capture is None:
+            try:
+                return self._open()
+            except CameraError as error:
+                raise CameraLost(str(error)) from None
+        frame = self._grab()
+        if frame is None:
+            self.close()
+            raise CameraLost(f"{self.name} gives no more frames: is it still plugged in?")
+        return frame
+
+    def close(self) -> None:
+        """Release the device; may be called twice."""
+        if self._capture is not None:
+            self._capture.release()
+            self._capture = None
+
+    def _open(self) -> Frame:
+        if self._open_capture is _open_capture:
+            _check_device(self._source)
+        capture = self._open_capture(self._source)
+        if not capture.isOpened():
+            capture.release()
+            raise _why_closed(self._source)
+        for prop, value in self._settings.items():
+            capture.set(prop, value)
+        self._capture = capture
+        for _ in range(_FIRST_FRAME_TRIES):  # some webcams give empty frames while they warm up
+            frame = self._grab()
+            if frame is not None:
+                return frame
+            time.sleep(0.02)
+        self.close()
+        raise _why_closed(self._source)
+
+    def _grab(self) -> Frame | None:
+        assert self._capture is not None
+        try:
+            done, image = self._capture.read()
+        except cv2.error:
+            return None
+        return Frame(image, self._clock.now()) if done and image is not None and image.size else None
+
+
+def is_address(source: str) -> bool:
+    """Return whether ``source`` is a network address such as ``rtsp://…``."""
+    return "://" in source
+
+
+def is_device(source: str) -> bool:
+    """Return whether ``source`` names a webcam: an index or a device file."""
+    return source.isdigit() or source.startswith("/dev/")
+
+
+def webcams() -> list[str]:
+    """Return the webcams that this machine seems to have, as sources; on other systems than Linux, the first two."""
+    devices = sorted(Path("/dev").glob("video*"), key=lambda path: (len(path.name), path.name))
+    if devices or os.uname().sysname == "Linux":
+        return [str(path) for path in devices]
+    return ["0", "1"]
+
+
+def _open_capture(source: str) -> Capture:
+    if is_address(source):
+        timeouts = [cv2.CAP_PROP_OPEN_TIMEOUT_MSEC, _OPEN_TIMEOUT_MS, cv2.CAP_PROP_READ_TIMEOUT_MSEC, _READ_TIMEOUT_MS]
+        return cv2.VideoCapture(source, cv2.CAP_FFMPEG, timeouts)
+    return cv2.VideoCapture(int(source)) if source.isdigit() else cv2.VideoCapture(source)
+
+
+def _device_path(source: str) -> Path:
+    return Path(f"/dev/video{source}") if source.isdigit() else Path(source)
+
+
+def _check_device(source: str) -> None:
+    """Say what can be said about a device before OpenCV is asked, whose own answer is only yes or no."""
+    if is_address(source) or os.uname().sysname != "Linux":
+        return
+    path = _device_path(source)
+    if not path.exists():
+        found = ", ".join(webcams())
+        there = f"there is {found}" if found else "this machine has no webcam; --camera virtual needs none"
+        raise CameraNotFound(f"there is no webcam {path}: {there}")
+    if not os.access(path, os.R_OK | os.W_OK):
+        raise CameraUnreadable(f"no permission to use {path}: add yourself to the group 'video' and log in again")
+
+
+def _why_closed(source: str) -> CameraError:
+    if is_address(source):
+        return CameraNotFound(f"no picture comes from {source}: check the address, and that the camera is on")
+    path = _device_path(source)
+    holder = _holder(path)
+    if holder:
+        return CameraInUse(f"{path} is in use by {holder}: close that program, or choose another camera")
+    return CameraUnreadable(f"{path} gives no picture: unplug it and plug it in again, or choose another camera")
+
+
+def _holder(device: Path) -> str | None:
+    """Return the name of another program that has ``device`` open, where the system tells (Linux)."""
+    for link in Path("/proc").glob("[0-9]*/fd/*"):
+        process = link.parent.parent
+        try:
+            if process.name != str(os.getpid()) and link.readlink() == device:
+                return f"{(process / 'comm').read_text().strip()} (process {process.name})"
+        except OSError:
+            continue  # the process has ended, or belongs to somebody else
+    return None

@@ -1,0 +1,78 @@
+"""The node ``my_camera``: frames out, whatever the camera does."""
+
+import logging
+import threading
+
+from handsteer.cameras.protocol import Camera, EndOfStream, Frame
+from handsteer.clock import Clock
+from handsteer.errors import CameraError
+from handsteer.images import image_message, jpeg_message
+from handsteer.messages import IMAGE_COMPRESSED, IMAGE_RAW, Header
+from handsteer.nodes.node import ERROR, OK, Node
+from handsteer.transports.protocol import Transport
+
+_DIAGNOSE_PERIOD_S = 0.5
+_FIRST_RETRY_S = 0.5
+_LONGEST_RETRY_S = 8.0
+
+log = logging.getLogger(__name__)
+
+
+class CameraNode(Node):
+    """Publishes each frame of a camera with its capture time; a camera that is lost is tried again and again.
+
+    Attributes:
+        ended: Set when a file has ended and shall end the run.
+        frames: How many frames were published.
+    """
+
+    def __init__(self, transport: Transport, clock: Clock, camera: Camera) -> None:
+        super().__init__("my_camera", transport, clock)
+        self.ended = threading.Event()
+        self.frames = 0
+        self._camera = camera
+        self._retry_s = _FIRST_RETRY_S
+        self._state = (OK, f"{camera.name}: waiting for the first frame")
+        self._image = self.publisher(IMAGE_RAW)
+        self._compressed = self.publisher(IMAGE_COMPRESSED)
+        self._reading = self.every(camera.period_s or 0.0, self._read)
+        self.every(_DIAGNOSE_PERIOD_S, self._report)
+
+    def on_stop(self) -> None:
+        """Release the device."""
+        self._camera.close()
+
+    def _read(self) -> None:
+        if self.ended.is_set():
+            return
+        try:
+            frame = self._camera.read()
+        except EndOfStream:
+            self.ended.set()
+            self._reading.delay_until(self.clock.now() + _LONGEST_RETRY_S)
+        except CameraError as error:
+            self._lose(error)
+        else:
+            if frame is not None:
+                self._publish(frame)
+
+    def _publish(self, frame: Frame) -> None:
+        if self._retry_s > _FIRST_RETRY_S:
+            log.warning("%s is back", self._camera.name)
+        self._retry_s = _FIRST_RETRY_S
+        self.frames += 1
+        self._state = (OK, f"{self._camera.name}: delivers frames")
+        header = Header(stamp=self.clock.stamp(frame.captured_s), frame_id="camera")
+        self._image.publish(image_message(frame.image, header), frame.captured_s)
+        if self._compressed.wanted:
+            self._compressed.publish(jpeg_message(frame.image, header), frame.captured_s)
+
+    def _lose(self, error: CameraError) -> None:
+        log.warning("%s; trying again in %g s", error, self._retry_s)
+        self._state = (ERROR, str(error))
+        self._reading.delay_until(self.clock.now() + self._retry_s)
+        self._retry_s = min(2 * self._retry_s, _LONGEST_RETRY_S)
+
+    def _report(self) -> None:
+        level, message = self._state
+        self.diagnose(level, message, frames=self.frames)

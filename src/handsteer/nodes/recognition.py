@@ -1,0 +1,105 @@
+"""The node ``hand_sign_recognition``: a frame in, the name of a sign out."""
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from handsteer.clock import Clock
+from handsteer.config import SignsConfig
+from handsteer.images import bgr_image, image_message
+from handsteer.messages import HAND_SIGN, IMAGE_ANNOTATED, IMAGE_RAW, Image, String
+from handsteer.nodes.latency import LatencyLog
+from handsteer.nodes.node import OK, WARN, Node
+from handsteer.signs.recognizer import Recognition, Recognizer
+from handsteer.signs.vocabulary import NONE
+from handsteer.transports.protocol import Received, Transport
+
+_SILENCE_PERIOD_S = 0.1
+_DIAGNOSE_PERIOD_S = 0.1
+
+Annotate = Callable[[NDArray[np.uint8], Recognition], NDArray[np.uint8]]
+
+
+class HandSignRecognitionNode(Node):
+    """Publishes one sign a frame, and ``NONE`` while no frames come.
+
+    Args:
+        transport: Carries the messages.
+        clock: The graph's clock.
+        recognizer: Does the work.
+        config: Holds the greatest age of a frame.
+        annotate: Draws what was understood into a copy of the frame, when anybody looks.
+
+    Attributes:
+        counts: How many frames each sign counted for.
+        processing: How long each frame took.
+    """
+
+    def __init__(
+        self, transport: Transport, clock: Clock, recognizer: Recognizer, config: SignsConfig, annotate: Annotate
+    ) -> None:
+        super().__init__("hand_sign_recognition", transport, clock)
+        self.counts: dict[str, int] = {}
+        self.processing = LatencyLog()
+        self._recognizer = recognizer
+        self._config = config
+        self._annotate = annotate
+        self._last_captured_s: float | None = None
+        self._last_frame_s = clock.now()
+        self._recognition: Recognition | None = None
+        self._sign = self.publisher(HAND_SIGN)
+        self._annotated = self.publisher(IMAGE_ANNOTATED)
+        self.subscribe(IMAGE_RAW, self._on_image)
+        self.every(_SILENCE_PERIOD_S, self._watch)
+        self.every(_DIAGNOSE_PERIOD_S, self._report)
+
+    def _on_image(self, received: Received[Image]) -> None:
+        began_s = self.clock.now()
+        captured_s = received.captured_s if received.captured_s is not None else began_s
+        if began_s - captured_s > self._config.max_frame_age:
+            return  # a stale frame is no frame: the watch publishes NONE
+        try:
+            image = bgr_image(received.message)
+            recognition = self._recognizer.step(image, self._since_last_frame(captured_s))
+        except Exception:
+            self._lose()
+            raise
+        self._last_frame_s = began_s
+        self._recognition = recognition
+        self.counts[recognition.sign] = self.counts.get(recognition.sign, 0) + 1
+        self._sign.publish(String(data=recognition.sign), received.captured_s)
+        self.processing.add(self.clock.now() - began_s)
+        if self._annotated.wanted:
+            picture = self._annotate(image, recognition)
+            self._annotated.publish(image_message(picture, received.message.header), received.captured_s)
+
+    def _since_last_frame(self, captured_s: float) -> float:
+        last_s = captured_s if self._last_captured_s is None else self._last_captured_s
+        self._last_captured_s = captured_s
+        return max(0.0, captured_s - last_s)
+
+    def _watch(self) -> None:
+        if self.clock.now() - self._last_frame_s > self._config.max_frame_age:
+            self._lose()
+
+    def _lose(self) -> None:
+        self._recognizer.reset()
+        self._recognition = None
+        self._sign.publish(String(data=NONE))
+
+    def _report(self) -> None:
+        seen = self._recognition
+        if seen is None:
+            self.diagnose(WARN, f"no frame for {self.clock.now() - self._last_frame_s:.1f} s", sign=NONE)
+            return
+        self.diagnose(
+            OK,
+            seen.reason,
+            sign=seen.sign,
+            seen=seen.seen,
+            confidence=f"{seen.confidence:.2f}",
+            progress=f"{seen.progress:.2f}",
+            handedness=seen.hand.handedness if seen.hand else "",
+            processing_ms=f"{self.processing.percentile_ms(50):.1f}",
+        )

@@ -1,0 +1,55 @@
+"""What was understood, drawn into the picture for people: mirrored, as they see themselves."""
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from handsteer.landmarks.protocol import CONNECTIONS
+from handsteer.signs.recognizer import Recognition
+from handsteer.signs.vocabulary import NONE
+
+_BONE = (255, 255, 255)
+_JOINT = (60, 160, 255)
+_COUNTS = (90, 200, 90)
+_WAITS = (60, 180, 250)
+
+
+def annotate(image: NDArray[np.uint8], recognition: Recognition) -> NDArray[np.uint8]:
+    """Return a mirrored copy of ``image`` with the hand's skeleton and the sign.
+
+    Args:
+        image: (height, width, 3) uint8, BGR, not mirrored.
+        recognition: What was understood of it.
+
+    Returns:
+        (height, width, 3) uint8, BGR, mirrored.
+    """
+    picture = np.asarray(cv2.flip(image, 1), np.uint8)
+    if recognition.hand is not None:
+        _draw_skeleton(picture, recognition.hand.pixels[:, :2])
+    if recognition.seen != NONE:
+        _draw_label(picture, recognition)
+    return picture
+
+
+def _draw_skeleton(picture: NDArray[np.uint8], pixels: NDArray[np.float32]) -> None:
+    height, width = picture.shape[:2]
+    x = width - 1 - pixels[:, 0]
+    # Landmarks may lie far outside the frame; OpenCV wants coordinates that fit 16 bits.
+    points = np.stack([x, pixels[:, 1]], axis=1).clip(-width, 2 * width).round().astype(int).tolist()
+    thickness = max(1, height // 240)
+    for begin, end in CONNECTIONS:
+        cv2.line(picture, points[begin], points[end], _BONE, thickness, cv2.LINE_AA)
+    for point in points:
+        cv2.circle(picture, point, 2 * thickness, _JOINT, -1, cv2.LINE_AA)
+
+
+def _draw_label(picture: NDArray[np.uint8], recognition: Recognition) -> None:
+    scale = picture.shape[0] / 480
+    colour = _COUNTS if recognition.sign == recognition.seen else _WAITS
+    text = f"{recognition.seen} {recognition.confidence:.0%}"
+    origin = (round(16 * scale), round(40 * scale))
+    for ink, thickness in (((0, 0, 0), 5), (colour, 2)):
+        cv2.putText(
+            picture, text, origin, cv2.FONT_HERSHEY_SIMPLEX, scale, ink, max(1, round(thickness * scale)), cv2.LINE_AA
+        )

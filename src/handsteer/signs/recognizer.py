@@ -1,0 +1,76 @@
+"""From a frame to the sign that counts: landmarks, classifier and filter in a row."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from handsteer.config import SignsConfig
+from handsteer.landmarks.protocol import Hand, Landmarker
+from handsteer.signs.filter import SignFilter
+from handsteer.signs.protocol import Classifier, SignGuess
+from handsteer.signs.vocabulary import NONE
+
+_NOTHING = SignGuess(NONE, 0.0)
+
+
+@dataclass(frozen=True)
+class Recognition:
+    """What was understood of one frame.
+
+    Attributes:
+        sign: The sign that counts; this is what drives.
+        seen: The sign that this frame alone shows.
+        confidence: 0 to 1, how sure ``seen`` is.
+        progress: 0 to 1, how far ``seen`` is on its way to count.
+        hand: The hand that was looked at; None when there is none.
+    """
+
+    sign: str
+    seen: str
+    confidence: float
+    progress: float
+    hand: Hand | None
+
+    @property
+    def reason(self) -> str:
+        """A sentence for people on what is seen."""
+        if self.hand is None:
+            return "no hand is in view"
+        if self.seen == NONE:
+            return "the hand shows none of the signs"
+        if self.sign != self.seen:
+            return f"{self.seen} is not confirmed yet"
+        return f"{self.sign} is shown"
+
+
+class Recognizer:
+    """Recognises signs in a stream of frames."""
+
+    def __init__(self, landmarker: Landmarker, classifier: Classifier, config: SignsConfig) -> None:
+        self._landmarker = landmarker
+        self._classifier = classifier
+        self._filter = SignFilter(config)
+        self._config = config
+
+    def step(self, image: NDArray[np.uint8], dt_s: float) -> Recognition:
+        """Take the next frame.
+
+        Args:
+            image: (height, width, 3) uint8, BGR, not mirrored.
+            dt_s: Seconds since the last frame was captured, >= 0.
+
+        Raises:
+            FrameError: The image has another shape or type.
+        """
+        hands = self._landmarker.detect(image)
+        hand = hands[0] if hands else None
+        guess = self._classifier.classify(hand) if hand else _NOTHING
+        seen = guess.sign if guess.confidence >= self._config.min_confidence else NONE
+        sign = self._filter.step(seen, dt_s)
+        return Recognition(sign, seen, guess.confidence, self._filter.progress, hand)
+
+    def reset(self) -> None:
+        """Forget the stream: no hand is followed and no sign counts."""
+        self._landmarker.reset()
+        self._filter.reset()
