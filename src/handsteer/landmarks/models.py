@@ -140,7 +140,7 @@ def _pip() -> list[str]:
     if uv := shutil.which("uv"):
         return [uv, "tool", "run", "pip"]
     raise ModelMissing(
-        f"pip, which downloads the landmark models, is not installed: run '{sys.executable} -m ensurepip', or {_OFFLINE}"
+        f"pip, which downloads the models, is not installed: run '{sys.executable} -m ensurepip', or {_OFFLINE}"
     )
 
 

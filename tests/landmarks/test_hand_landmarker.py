@@ -1,0 +1,223 @@
+"""The real landmarker on drawn frames: following hands, and frames of every kind."""
+
+import cv2
+import numpy as np
+import pytest
+from drawn_hand import draw, open_left_hand, open_right_hand
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from handsteer.config import LandmarksConfig
+from handsteer.errors import FrameError, ModelMissing
+from handsteer.landmarks.mediapipe import MediaPipeLandmarker
+from handsteer.landmarks.protocol import Hand
+
+EMPTY = draw()
+
+
+@pytest.fixture(scope="module")
+def shared_landmarker() -> MediaPipeLandmarker:
+    return MediaPipeLandmarker(LandmarksConfig())
+
+
+@pytest.fixture
+def landmarker(shared_landmarker) -> MediaPipeLandmarker:
+    shared_landmarker.reset()
+    return shared_landmarker
+
+
+@pytest.fixture
+def two_hand_landmarker() -> MediaPipeLandmarker:
+    return MediaPipeLandmarker(LandmarksConfig(max_hands=2))
+
+
+def distance(hand: Hand, points: np.ndarray) -> float:
+    return float(np.median(np.linalg.norm(hand.pixels[:, :2] - points, axis=1)))
+
+
+@pytest.mark.parametrize("model", ["full", "lite"])
+@pytest.mark.parametrize(("place", "handedness"), [(open_right_hand, "Right"), (open_left_hand, "Left")])
+def test_finds_either_hand_where_it_is(model, place, handedness):
+    points = place(300, 250)
+    (hand,) = MediaPipeLandmarker(LandmarksConfig(model=model)).detect(draw(points))
+    assert distance(hand, points) < 20
+    assert hand.handedness == handedness
+    assert 0.5 <= hand.handedness_score <= 1
+    assert 0.5 < hand.presence <= 1
+    assert hand.image_size == (640, 480)
+    assert (hand.points.shape, hand.points.dtype) == ((21, 3), np.float32)
+    assert (hand.world.shape, hand.world.dtype) == ((21, 3), np.float32)
+    assert 0.05 < np.ptp(hand.world[:, 1]) < 0.3, "the world landmarks are in metres"
+
+
+def test_finds_nothing_in_an_empty_frame(landmarker):
+    assert landmarker.detect(EMPTY) == []
+
+
+def test_follows_a_moving_hand(landmarker):
+    for step in range(10):
+        points = open_right_hand(200 + 12 * step, 250 - 3 * step)
+        (hand,) = landmarker.detect(draw(points))
+        assert distance(hand, points) < 20
+
+
+def test_a_hand_that_leaves_is_lost_and_found_again_elsewhere(landmarker):
+    assert landmarker.detect(draw(open_right_hand(180, 250)))
+    assert landmarker.detect(EMPTY) == []
+    elsewhere = open_right_hand(480, 250, size=70)
+    (hand,) = landmarker.detect(draw(elsewhere))
+    assert distance(hand, elsewhere) < 20
+
+
+def test_a_followed_hand_keeps_the_others_out(landmarker):
+    followed = open_right_hand(180, 250)
+    landmarker.detect(draw(followed))
+    (hand,) = landmarker.detect(draw(followed, open_left_hand(470, 250)))
+    assert distance(hand, followed) < 20
+
+
+def test_reset_gives_what_a_fresh_landmarker_gives(landmarker):
+    frame = draw(open_right_hand(300, 250))
+    (fresh,) = landmarker.detect(frame)
+    landmarker.detect(draw(open_right_hand(320, 250)))
+    landmarker.reset()
+    (again,) = landmarker.detect(frame)
+    np.testing.assert_array_equal(again.points, fresh.points)
+
+
+def test_a_frame_of_another_size_starts_afresh(landmarker):
+    large, small = draw(open_right_hand(450, 250)), draw(open_right_hand(120, 150, size=55), width=320, height=240)
+    (fresh,) = landmarker.detect(small)
+    landmarker.reset()
+    landmarker.detect(large)
+    (after,) = landmarker.detect(small)
+    np.testing.assert_array_equal(after.points, fresh.points)
+
+
+def test_two_hands_keep_their_order_while_they_are_followed(two_hand_landmarker):
+    orders = set()
+    for step in range(6):
+        right, left = open_right_hand(150 + 4 * step, 250), open_left_hand(480 - 4 * step, 250)
+        hands = two_hand_landmarker.detect(draw(right, left))
+        orders.add(tuple(hand.handedness for hand in hands))
+    assert len(orders) == 1
+    assert set(*orders) == {"Left", "Right"}
+
+
+def test_a_hand_that_comes_later_stands_behind_the_one_already_followed(two_hand_landmarker):
+    right = open_right_hand(150, 250)
+    assert len(two_hand_landmarker.detect(draw(right))) == 1
+    hands = two_hand_landmarker.detect(draw(right, open_left_hand(480, 250)))
+    assert [hand.handedness for hand in hands] == ["Right", "Left"]
+
+
+def test_one_hand_is_never_given_twice(two_hand_landmarker):
+    for _ in range(3):
+        assert len(two_hand_landmarker.detect(draw(open_right_hand(300, 250)))) == 1
+
+
+def test_no_hand_counts_below_the_asked_presence():
+    strict = MediaPipeLandmarker(LandmarksConfig(min_presence=1.0))
+    assert strict.detect(draw(open_right_hand(300, 250))) == []
+
+
+def test_any_palm_counts_at_confidence_zero_and_none_at_one(landmarker):
+    frame = draw(open_right_hand(300, 250))
+    (hand,) = landmarker.detect(frame)
+    (same,) = MediaPipeLandmarker(LandmarksConfig(min_detection_confidence=0)).detect(frame)
+    assert distance(same, hand.pixels[:, :2]) < 5
+    assert MediaPipeLandmarker(LandmarksConfig(min_detection_confidence=1)).detect(frame) == []
+
+
+@pytest.mark.parametrize(
+    ("image", "got"),
+    [
+        (np.zeros((0, 0, 3), np.uint8), "0x0"),
+        (np.zeros((480, 0, 3), np.uint8), "0x480"),
+        (np.zeros((480, 640), np.uint8), "(480, 640) uint8"),
+        (np.zeros((480, 640, 1), np.uint8), "(480, 640, 1) uint8"),
+        (np.zeros((480, 640, 4), np.uint8), "(480, 640, 4) uint8"),
+        (np.zeros((480, 640, 3), np.float32), "(480, 640, 3) float32"),
+        (np.zeros((480, 640, 3), np.uint16), "(480, 640, 3) uint16"),
+        (np.zeros((1, 480, 640, 3), np.uint8), "(1, 480, 640, 3) uint8"),
+        (np.broadcast_to(np.uint8(0), (1, 40000, 3)), "40000x1"),
+        (np.array(None), "() object"),
+        (None, "NoneType"),
+        ([[[0, 0, 0]]], "list"),
+        (b"\xff\xd8\xff", "bytes"),
+    ],
+)
+def test_a_wrong_frame_is_refused_in_one_line_and_does_not_break_the_next(landmarker, image, got):
+    frame = draw(open_right_hand(300, 250))
+    landmarker.detect(frame)
+    (undisturbed,) = landmarker.detect(frame)
+    landmarker.reset()
+    landmarker.detect(frame)
+    with pytest.raises(FrameError) as caught:
+        landmarker.detect(image)
+    assert got in str(caught.value)
+    assert "(height, width, 3) uint8 BGR" in str(caught.value)
+    assert "\n" not in str(caught.value)
+    (hand,) = landmarker.detect(frame)
+    np.testing.assert_array_equal(hand.points, undisturbed.points)
+
+
+@pytest.mark.parametrize(("width", "height"), [(1, 1), (1, 480), (640, 1), (2, 3), (32766, 1)])
+def test_a_tiny_frame_holds_no_hand_and_does_not_break_the_next(landmarker, width, height):
+    frame = draw(open_right_hand(300, 250))
+    (before,) = landmarker.detect(frame)
+    assert landmarker.detect(np.full((height, width, 3), 128, np.uint8)) == []
+    (after,) = landmarker.detect(frame)
+    np.testing.assert_array_equal(after.points, before.points)
+
+
+def test_a_large_frame_works(landmarker):
+    points = open_right_hand(300, 250)
+    (hand,) = landmarker.detect(cv2.resize(draw(points), (4000, 3000)))
+    assert distance(hand, points * 6.25) < 6.25 * 20
+
+
+FRAME = draw(open_right_hand(300, 250))
+
+
+def _read_only() -> np.ndarray:
+    return np.frombuffer(FRAME.tobytes(), np.uint8).reshape(FRAME.shape)
+
+
+@pytest.mark.parametrize(
+    "same",
+    [
+        np.asfortranarray(FRAME),
+        FRAME[::-1].copy()[::-1],
+        FRAME[:, ::-1].copy()[:, ::-1],
+        FRAME[..., ::-1].copy()[..., ::-1],
+        np.dstack([FRAME, FRAME[..., :1]])[..., :3],
+        _read_only(),
+    ],
+    ids=["fortran", "upside down", "mirrored", "rgb", "bgra", "read-only"],
+)
+def test_the_memory_layout_does_not_matter(landmarker, same):
+    (expected,) = landmarker.detect(FRAME)
+    landmarker.reset()
+    (hand,) = landmarker.detect(same)
+    np.testing.assert_array_equal(hand.points, expected.points)
+
+
+def test_a_frame_is_not_changed(landmarker):
+    frame = FRAME.copy()
+    landmarker.detect(frame)
+    np.testing.assert_array_equal(frame, FRAME)
+
+
+@settings(max_examples=15, deadline=None)
+@given(width=st.integers(1, 90), height=st.integers(1, 90), seed=st.integers(0, 2**32 - 1))
+def test_noise_of_any_size_gives_sound_hands_or_none(shared_landmarker, width, height, seed):
+    noise = np.random.default_rng(seed).integers(0, 256, (height, width, 3), np.uint8)
+    for hand in shared_landmarker.detect(noise):
+        assert np.isfinite(hand.points).all()
+        assert hand.image_size == (width, height)
+
+
+def test_models_that_are_not_there_are_named(tmp_path):
+    with pytest.raises(ModelMissing, match=r"palm_detection_full\.tflite.*handsteer models"):
+        MediaPipeLandmarker(LandmarksConfig(), tmp_path)
