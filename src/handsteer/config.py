@@ -32,7 +32,9 @@ class CameraConfig(Section):
     height: int = Field(480, ge=48, le=4096, description="Height asked of a webcam or drawn by the virtual hand [px]")
     fps: float = Field(30.0, gt=0, le=240, description="Frames a second asked of a webcam or drawn [1/s]")
     at_end: Literal["loop", "hold", "end"] = Field(
-        "loop", description="When a file ends: start again, hold (no frames, so NONE), or end the run"
+        "loop",
+        description="When a file ends: start again, hold (no frames, so NONE), or end the run; "
+        "a headless run ends unless told otherwise",
     )
     photo_duration: float = Field(1.0, gt=0, le=3600, description="How long each photo of a folder is shown [s]")
 
@@ -124,19 +126,21 @@ class Config(Section):
     dashboard: DashboardConfig = DashboardConfig()
 
 
-def load(path: Path | None = None, overrides: dict[str, Any] | None = None) -> Config:
-    """Return the defaults, changed by the YAML file at ``path``, changed by ``overrides``.
+def load(path: Path | None = None, base: dict[str, Any] | None = None, *overrides: dict[str, Any]) -> Config:
+    """Return the parameters: each source goes before those to its left.
 
     Args:
-        path: A YAML file with some of the fields of :class:`Config`, or None.
-        overrides: Nested dictionary of fields, as ``{"control": {"linear_step": 0.02}}``.
+        path: A YAML file with some of the fields of :class:`Config`, or None; it goes before ``base``.
+        base: Nested dictionary of fields, as ``{"control": {"linear_step": 0.02}}``; goes before the defaults.
+        overrides: Further ones; they go before the file.
 
     Raises:
         ConfigError: The file cannot be read, or a field is unknown or out of range; the message names it.
     """
-    values = _read_yaml(path) if path else {}
-    where = f" in {path}" if path else ""
-    return validate(Config, _merge(values, overrides or {}), where)
+    values = _merge(base or {}, _read_yaml(path) if path else {})
+    for changes in overrides:
+        values = _merge(values, changes)
+    return validate(Config, values, f" (also read: {path})" if path else "")
 
 
 def validate(section: type[S], values: Any, where: str = "") -> S:

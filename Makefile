@@ -1,0 +1,58 @@
+# Two commands matter: `make run` drives the robot, `make test` checks everything. Both set up what they need in .venv.
+
+VENV := .venv
+BIN := $(VENV)/bin
+ARGS ?=
+
+.PHONY: help run test lint unit format lock bench models screenshots clean
+
+help:
+	@echo "make run          drive the robot: your webcam, or the virtual hand (options: make run ARGS='--camera 0')"
+	@echo "make test         everything that CI checks: format, lint, types, tests"
+	@echo "make bench        print the speed and accuracy tables"
+	@echo "make screenshots  make the README's picture again (needs Chromium)"
+	@echo "make lock         make the requirements files again from pyproject.toml"
+	@echo "make clean        remove the environment and all caches"
+
+run: $(BIN)/.run models
+	@$(BIN)/handsteer run $(ARGS)
+
+test: lint unit
+
+lint: $(BIN)/.dev
+	@$(BIN)/ruff format --check .
+	@$(BIN)/ruff check .
+	@$(BIN)/mypy
+
+unit: $(BIN)/.dev models
+	@$(BIN)/pytest -n auto $(ARGS)
+
+models: | $(BIN)/.run
+	@$(BIN)/handsteer models > /dev/null
+
+format: $(BIN)/.dev
+	@$(BIN)/ruff check --fix .
+	@$(BIN)/ruff format .
+
+bench: $(BIN)/.dev models
+	@for table in benchmarks/[!_]*.py; do echo "== $$table"; $(BIN)/python $$table || exit 1; done
+
+screenshots: $(BIN)/.dev models
+	@$(BIN)/python scripts/screenshot.py
+
+$(BIN)/.run: scripts/setup requirements.txt pyproject.toml
+	@scripts/setup requirements.txt && touch $@
+
+$(BIN)/.dev: scripts/setup requirements-dev.txt pyproject.toml | $(BIN)/.run
+	@scripts/setup requirements-dev.txt && touch $@
+
+# For every system and Python that is supported; without the address of any index.
+COMPILE = uv pip compile pyproject.toml --quiet --universal --python-version 3.11 --generate-hashes \
+	--no-emit-index-url --no-annotate --no-header --upgrade
+lock:
+	@test -x $(BIN)/uv || { python3 -m venv $(VENV) && $(BIN)/python -m pip install --quiet uv; }
+	@PATH="$(BIN):$$PATH" $(COMPILE) --group setup --output-file requirements.txt
+	@PATH="$(BIN):$$PATH" $(COMPILE) --group setup --group dev --output-file requirements-dev.txt
+
+clean:
+	@rm -rf $(VENV) .mypy_cache .pytest_cache .ruff_cache .hypothesis

@@ -1,0 +1,105 @@
+"""What works on this machine, and what to do about the rest."""
+
+import ctypes.util
+import importlib.util
+import os
+import platform
+import shutil
+import socket
+from dataclasses import dataclass
+from typing import Literal
+
+from handsteer.cameras.webcam import Webcam, webcams
+from handsteer.clock import RealClock
+from handsteer.config import CameraConfig
+from handsteer.errors import CameraError, ModelError
+from handsteer.landmarks.models import MODELS, find_model, models_dir
+
+Verdict = Literal["ok", "optional", "missing"]
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing that was looked at.
+
+    Attributes:
+        name: What it is: ``camera``, ``models``, ``port``...
+        verdict: ``ok``; ``optional`` when it is not there, but handsteer works without; ``missing`` when it does not.
+        detail: What was found, and what to do where something is amiss.
+    """
+
+    name: str
+    verdict: Verdict
+    detail: str
+
+
+def examine(port: int) -> list[Finding]:
+    """Look at everything that a run may need.
+
+    Args:
+        port: Where the page would be.
+    """
+    return [_python(), _models(), *_cameras(), _port(port), *_ros(), _gl()]
+
+
+def _python() -> Finding:
+    system = f"{platform.system()} {platform.machine()}"
+    return Finding("python", "ok", f"{platform.python_version()} on {system}, {os.cpu_count()} processors")
+
+
+def _models() -> Finding:
+    try:
+        for name in MODELS:
+            find_model(name)
+    except ModelError as error:
+        return Finding("models", "missing", str(error))
+    return Finding("models", "ok", f"the landmark models are in {models_dir()}")
+
+
+def _cameras() -> list[Finding]:
+    sources = webcams()
+    if not sources:
+        return [Finding("camera", "optional", "no webcam: the virtual hand stands in (--camera virtual)")]
+    return [_camera(source) for source in sources]
+
+
+def _camera(source: str) -> Finding:
+    wanted = CameraConfig()
+    try:
+        camera = Webcam(source, RealClock(), width=wanted.width, height=wanted.height, fps=wanted.fps)
+    except CameraError as error:
+        return Finding("camera", "optional", str(error))
+    try:
+        frame = camera.read()
+    except CameraError as error:
+        return Finding("camera", "optional", str(error))
+    finally:
+        camera.close()
+    size = f"{frame.image.shape[1]}x{frame.image.shape[0]}" if frame else "no"
+    return Finding("camera", "ok", f"{camera.name} delivers {size} frames")
+
+
+def _port(port: int) -> Finding:
+    with socket.socket() as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind(("127.0.0.1", port))
+        except OSError as error:
+            return Finding("port", "missing", f"port {port}: {error.strerror}; choose another with --port")
+    return Finding("port", "ok", f"port {port} is free for the page")
+
+
+def _ros() -> list[Finding]:
+    ros1 = "rospy can be imported" if importlib.util.find_spec("rospy") else "no rospy"
+    ros2 = "ros2 is on the path" if shutil.which("ros2") else "no ros2 command"
+    return [
+        Finding("ros 1", "ok" if importlib.util.find_spec("rospy") else "optional", f"{ros1}; not needed to run"),
+        Finding("ros 2", "ok" if shutil.which("ros2") else "optional", f"{ros2}; not needed to run"),
+    ]
+
+
+def _gl() -> Finding:
+    library = ctypes.util.find_library("GL") or ctypes.util.find_library("EGL")
+    if library:
+        return Finding("gl", "ok", f"{library}; not needed to run: the page draws in the browser")
+    return Finding("gl", "optional", "no OpenGL library; not needed to run: the page draws in the browser")

@@ -1,0 +1,178 @@
+"""The whole flow on one page: a hand sign drives a robot.
+
+::
+
+    my_camera ──/image_raw──▶ hand_sign_recognition ──/gesture/hand_sign──▶ hand_sign_control ──cmd_vel──▶ robot
+                                                                 steering ──/steering/cmd_vel──▲
+
+Each box is a node (:mod:`handsteer.nodes`), each arrow a topic (:mod:`handsteer.messages`). What a node does is
+decided elsewhere, in parts that know nothing of nodes: :mod:`handsteer.cameras` give frames,
+:mod:`handsteer.landmarks` finds the hand, :mod:`handsteer.signs` tells the sign, :mod:`handsteer.control` turns it
+into a velocity, and :mod:`handsteer.robots` follow it. A transport (:mod:`handsteer.transports`) carries the messages.
+"""
+
+import math
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from handsteer.cameras.choose import open_camera
+from handsteer.clock import Clock, RealClock, SteppedClock
+from handsteer.config import Config
+from handsteer.errors import ConfigError
+from handsteer.landmarks.mediapipe import MediaPipeLandmarker
+from handsteer.nodes.camera import CameraNode
+from handsteer.nodes.control import HandSignControlNode
+from handsteer.nodes.node import Node
+from handsteer.nodes.recognition import HandSignRecognitionNode
+from handsteer.nodes.robot import RobotNode
+from handsteer.nodes.steering import SteeringNode
+from handsteer.robots.protocol import Pose2D
+from handsteer.robots.simulated import SimulatedRobot
+from handsteer.signs.drawing import annotate
+from handsteer.signs.recognizer import Recognizer
+from handsteer.signs.rules import RuleClassifier
+from handsteer.transports.in_process import InProcessTransport
+from handsteer.transports.protocol import Transport
+
+
+class Graph:
+    """The five nodes, joined by one transport and one clock.
+
+    Use it as a context manager: whatever ends the block, the robot is told to stand.
+
+    Args:
+        config: Everything that can be set.
+        clock: Real time by default; a :class:`~handsteer.clock.SteppedClock` for :meth:`run_stepped`.
+        transport: Within this process by default.
+
+    Raises:
+        HandsteerError: A part cannot be used (camera, model, world); the message says what to do.
+    """
+
+    def __init__(self, config: Config, clock: Clock | None = None, transport: Transport | None = None) -> None:
+        self.clock = clock or RealClock()
+        self.transport = transport or InProcessTransport()
+        robot = SimulatedRobot(config.robot)
+        recognizer = open_recognizer(config)
+        camera = open_camera(config.camera, config.virtual_hand, self.clock)
+        wires = (self.transport, self.clock)
+        self.robot = RobotNode(*wires, robot)
+        self.control = HandSignControlNode(*wires, config.control)
+        self.steering = SteeringNode(*wires)
+        self.recognition = HandSignRecognitionNode(*wires, recognizer, config.signs, annotate)
+        self.camera = CameraNode(*wires, camera)
+        self._paced = camera.period_s is not None
+        self._began_s = self.clock.now()
+
+    @property
+    def nodes(self) -> tuple[Node, ...]:
+        """The nodes in the order in which they are stopped: first the one that says zero, last the one that obeys."""
+        return (self.control, self.steering, self.camera, self.recognition, self.robot)
+
+    def __enter__(self) -> "Graph":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.stop()
+
+    def start(self) -> None:
+        """Run each node on a thread of its own."""
+        self._began_s = self.clock.now()
+        for node in reversed(self.nodes):
+            node.start()
+
+    def wait(self, duration_s: float | None = None) -> None:
+        """Wait until ``duration_s`` seconds have passed or the camera's file has ended the run."""
+        self.camera.ended.wait(duration_s)
+
+    def stop(self) -> None:
+        """Stop all nodes and leave the robot standing; may be called twice."""
+        for node in self.nodes:
+            node.stop()
+        self.transport.close()
+
+    def run_stepped(self, duration_s: float = math.inf) -> None:
+        """Run all nodes in turn on this thread, as fast as they go, on the graph's stepped clock.
+
+        No frame is left out and nothing depends on the speed of the machine: the same input gives the same commands.
+
+        Args:
+            duration_s: How much of the graph's time to run, in seconds; a file that ends may end the run before.
+
+        Raises:
+            ConfigError: The graph's clock is real, or its camera waits for a device.
+        """
+        clock = self.clock
+        if not isinstance(clock, SteppedClock) or not self._paced:
+            raise ConfigError("a stepped run needs a video file, a folder of photos or the virtual hand as its camera")
+        end_s = clock.now() + duration_s
+        while not self.camera.ended.is_set():
+            due_s = min(node.next_due_s for node in self.nodes if node.next_due_s is not None)
+            if due_s > end_s:
+                clock.advance_to(end_s)
+                return
+            clock.advance_to(due_s)
+            while any([node.spin_once() for node in reversed(self.nodes)]):
+                pass
+
+    def summary(self) -> "Summary":
+        """Return the figures of the run so far."""
+        duration_s = self.clock.now() - self._began_s
+        measured = isinstance(self.clock, RealClock) and len(self.control.latency) > 0
+        return Summary(
+            duration_s=duration_s,
+            frames=self.camera.frames,
+            fps=self.camera.frames / duration_s if duration_s else 0.0,
+            latency_median_ms=self.control.latency.percentile_ms(50) if measured else None,
+            latency_p99_ms=self.control.latency.percentile_ms(99) if measured else None,
+            signs=dict(self.recognition.counts),
+            final_pose=self.robot.state.truth,
+            odometry=self.robot.state.odometry,
+            path_length_m=self.robot.path_length_m,
+            contacts=self.robot.state.collisions,
+            callback_errors=sum(node.callback_errors for node in self.nodes),
+        )
+
+
+@dataclass(frozen=True)
+class Summary:
+    """The figures of a run.
+
+    Attributes:
+        duration_s: How long it ran.
+        frames: Frames that the camera gave.
+        fps: Frames a second.
+        latency_median_ms: From the capture of a frame to the Twist that it led to; None when the clock was stepped.
+        latency_p99_ms: Likewise, 99 of 100 were faster.
+        signs: For how many frames each sign counted, ``NONE`` among them.
+        final_pose: Where the robot really is, in the world.
+        odometry: Where its wheels say that it is.
+        path_length_m: How far it has gone.
+        contacts: How often it has begun to touch an obstacle.
+        callback_errors: Callbacks that failed.
+    """
+
+    duration_s: float
+    frames: int
+    fps: float
+    latency_median_ms: float | None
+    latency_p99_ms: float | None
+    signs: dict[str, int]
+    final_pose: Pose2D
+    odometry: Pose2D
+    path_length_m: float
+    contacts: int
+    callback_errors: int
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the figures as plain values, for JSON."""
+        return asdict(self)
+
+
+def open_recognizer(config: Config) -> Recognizer:
+    """Return the recogniser that ``config`` describes.
+
+    Raises:
+        ModelError: A landmark model is missing or broken.
+    """
+    return Recognizer(MediaPipeLandmarker(config.landmarks), RuleClassifier(), config.signs)

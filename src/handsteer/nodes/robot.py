@@ -1,0 +1,139 @@
+"""The node ``robot``: velocity commands in, odometry, transforms and joint states out."""
+
+import math
+
+import numpy as np
+
+from handsteer.clock import Clock
+from handsteer.messages import (
+    CLOCK,
+    CMD_VEL,
+    JOINT_STATES,
+    ODOM,
+    ROBOT_DESCRIPTION,
+    TF,
+    WORLD_MARKERS,
+    ClockMessage,
+    Header,
+    JointState,
+    Odometry,
+    Point,
+    Pose,
+    PoseWithCovariance,
+    Quaternion,
+    String,
+    TFMessage,
+    Transform,
+    TransformStamped,
+    Twist,
+    TwistWithCovariance,
+    Vector3,
+    twist,
+)
+from handsteer.nodes.node import OK, WARN, Node
+from handsteer.nodes.world_markers import world_markers
+from handsteer.robots.protocol import Pose2D, Robot, RobotState
+from handsteer.transports.protocol import Received, Transport
+
+_PERIOD_S = 0.02
+_MARKERS_PERIOD_S = 0.05
+_DIAGNOSE_PERIOD_S = 0.1
+# A machine that was busy for longer than this lets the simulated robot wait rather than leap.
+_LONGEST_STEP_S = 0.1
+
+# The diagonal that ROS's diff_drive_controller is usually configured with: x, y, z, roll, pitch, yaw.
+_COVARIANCE = np.diag([0.001, 0.001, 1e6, 1e6, 1e6, 1000.0]).reshape(-1)
+
+
+class RobotNode(Node):
+    """Drives a robot and publishes where it is, 50 times a second.
+
+    Attributes:
+        state: The robot's newest state.
+        path_length_m: How far it has really gone, turns in place left out.
+    """
+
+    def __init__(self, transport: Transport, clock: Clock, robot: Robot) -> None:
+        super().__init__("robot", transport, clock)
+        self._robot = robot
+        self._last_step_s = clock.now()
+        self.state = robot.step(0.0)
+        self.path_length_m = 0.0
+        self._odom = self.publisher(ODOM)
+        self._tf = self.publisher(TF)
+        self._joint_states = self.publisher(JOINT_STATES)
+        self._clock_out = self.publisher(CLOCK)
+        self._markers = self.publisher(WORLD_MARKERS)
+        self.publisher(ROBOT_DESCRIPTION).publish(String(data=robot.description))
+        self.subscribe(CMD_VEL, self._on_command)
+        self.every(_PERIOD_S, self._step)
+        self.every(_MARKERS_PERIOD_S, self._publish_markers)
+        self.every(_DIAGNOSE_PERIOD_S, self._report)
+
+    def on_stop(self) -> None:
+        """Leave it standing."""
+        self._robot.command(0.0, 0.0)
+        self._robot.close()
+
+    def _on_command(self, received: Received[Twist]) -> None:
+        self._robot.command(received.message.linear.x, received.message.angular.z)
+
+    def _step(self) -> None:
+        now = self.clock.now()
+        elapsed_s, self._last_step_s = now - self._last_step_s, now
+        before = self.state.truth
+        self.state = self._robot.step(min(elapsed_s, _LONGEST_STEP_S))
+        self.path_length_m += math.hypot(self.state.truth.x - before.x, self.state.truth.y - before.y)
+        stamp = self.clock.stamp(now)
+        header = Header(stamp=stamp, frame_id="odom")
+        self._clock_out.publish(ClockMessage(clock=stamp))
+        self._odom.publish(_odometry(header, self.state))
+        self._tf.publish(TFMessage(transforms=[_transform(header, self.state.odometry)]))
+        self._joint_states.publish(_joint_state(Header(stamp=stamp, frame_id=""), self.state))
+
+    def _publish_markers(self) -> None:
+        if self._markers.wanted:
+            header = Header(stamp=self.clock.stamp(self.clock.now()), frame_id="odom")
+            self._markers.publish(world_markers(header, self._robot.obstacles()))
+
+    def _report(self) -> None:
+        state = self.state
+        message = f"touches {', '.join(state.contacts)}" if state.contacts else "moves freely"
+        self.diagnose(
+            WARN if state.contacts else OK,
+            message,
+            collisions=state.collisions,
+            path_length_m=f"{self.path_length_m:.2f}",
+            truth=f"{state.truth.x:.3f} {state.truth.y:.3f} {state.truth.yaw:.3f}",
+        )
+
+
+def _odometry(header: Header, state: RobotState) -> Odometry:
+    return Odometry(
+        header=header,
+        child_frame_id="base_link",
+        pose=PoseWithCovariance(
+            pose=Pose(position=Point(state.odometry.x, state.odometry.y, 0.0), orientation=_about_z(state.odometry.yaw)),
+            covariance=_COVARIANCE,
+        ),
+        twist=TwistWithCovariance(twist=twist(state.linear_mps, state.angular_radps), covariance=_COVARIANCE),
+    )
+
+
+def _transform(header: Header, pose: Pose2D) -> TransformStamped:
+    transform = Transform(translation=Vector3(pose.x, pose.y, 0.0), rotation=_about_z(pose.yaw))
+    return TransformStamped(header=header, child_frame_id="base_link", transform=transform)
+
+
+def _joint_state(header: Header, state: RobotState) -> JointState:
+    return JointState(
+        header=header,
+        name=list(state.joint_positions),
+        position=np.array(list(state.joint_positions.values())),
+        velocity=np.array(list(state.joint_velocities.values())),
+        effort=np.zeros(0),
+    )
+
+
+def _about_z(yaw: float) -> Quaternion:
+    return Quaternion(0.0, 0.0, math.sin(yaw / 2), math.cos(yaw / 2))

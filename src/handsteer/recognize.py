@@ -1,0 +1,93 @@
+"""What the signs in photos and videos are, frame by frame, with no robot in sight."""
+
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from handsteer.cameras.files import PHOTO_SUFFIXES, VideoFile, find_photos, read_photo
+from handsteer.cameras.protocol import EndOfStream
+from handsteer.clock import SteppedClock
+from handsteer.errors import CameraNotFound
+from handsteer.signs.recognizer import Recognition, Recognizer
+
+
+@dataclass(frozen=True)
+class FrameResult:
+    """What one frame shows.
+
+    Attributes:
+        source: The photo's path, or the video's.
+        frame: Number of the frame in its source, from 0.
+        time_s: When it is in the video, in seconds; 0 for a photo.
+        sign: The sign that counts: in a video confirmed over time, in a photo the one seen.
+        seen: The sign that this frame alone shows.
+        confidence: 0 to 1, how sure ``seen`` is.
+        handedness: ``Left`` or ``Right``, the person's own; None without a hand.
+        landmarks: The 21 landmarks, image-normalised x, y and z; None without a hand.
+    """
+
+    source: str
+    frame: int
+    time_s: float
+    sign: str
+    seen: str
+    confidence: float
+    handedness: str | None
+    landmarks: list[list[float]] | None
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the fields as plain values, for JSON."""
+        return asdict(self)
+
+
+def recognize(source: Path, recognizer: Recognizer) -> Iterator[FrameResult]:
+    """Yield what each frame of a photo, a folder of photos or a video shows.
+
+    Photos are looked at one by one, with nothing kept from one to the next; a video as a camera would give it.
+
+    Raises:
+        CameraNotFound: There is no such file or folder, or there are no photos in it.
+        CameraUnreadable: A file cannot be decoded.
+    """
+    if not source.exists():
+        raise CameraNotFound(f"there is no {source}: give a photo, a folder of photos or a video file")
+    if source.is_dir() or source.suffix.lower() in PHOTO_SUFFIXES:
+        return _photos(find_photos(source), recognizer)
+    return _video(source, recognizer)
+
+
+def _photos(paths: list[Path], recognizer: Recognizer) -> Iterator[FrameResult]:
+    for path in paths:
+        recognizer.reset()
+        recognition = recognizer.step(read_photo(path), 0.0)
+        yield _result(str(path), 0, 0.0, recognition, recognition.seen)
+
+
+def _video(path: Path, recognizer: Recognizer) -> Iterator[FrameResult]:
+    clock = SteppedClock()
+    video = VideoFile(path, clock, at_end="end")
+    try:
+        while frame := video.read():
+            number = round(frame.captured_s / video.period_s)
+            recognition = recognizer.step(frame.image, video.period_s)
+            yield _result(str(path), number, frame.captured_s, recognition, recognition.sign)
+            clock.advance(video.period_s)
+    except EndOfStream:
+        return
+    finally:
+        video.close()
+
+
+def _result(source: str, number: int, time_s: float, recognition: Recognition, sign: str) -> FrameResult:
+    hand = recognition.hand
+    return FrameResult(
+        source=source,
+        frame=number,
+        time_s=round(time_s, 6),
+        sign=sign,
+        seen=recognition.seen,
+        confidence=round(recognition.confidence, 4),
+        handedness=hand.handedness if hand else None,
+        landmarks=[[round(float(value), 5) for value in point] for point in hand.points] if hand else None,
+    )
