@@ -27,8 +27,8 @@ class HandSignControlNode(Node):
         self._driver = Driver(config)
         self._last_step_s = clock.now()
         self._cmd_vel = self.publisher(CMD_VEL)
-        self.subscribe(HAND_SIGN, self._on_sign)
         self.subscribe(STEERING_CMD_VEL, self._on_steering)
+        self.subscribe(HAND_SIGN, self._on_sign)
         self.every(_WATCHDOG_PERIOD_S, self._watch)
         self.every(_DIAGNOSE_PERIOD_S, self._report)
 

@@ -1,0 +1,98 @@
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+
+from handsteer.cameras.webcam import Webcam, is_address, is_device
+from handsteer.clock import SteppedClock
+from handsteer.errors import CameraInUse, CameraLost, CameraNotFound, CameraUnreadable
+
+IMAGE = np.full((48, 64, 3), 7, np.uint8)
+
+
+class FakeCapture:
+    """A device that gives what it is told to; no webcam can be unplugged in a test."""
+
+    def __init__(self, *reads: Any) -> None:
+        self.reads = list(reads)
+        self.settings: dict[int, float] = {}
+        self.released = False
+
+    def isOpened(self) -> bool:  # noqa: N802
+        return bool(self.reads)
+
+    def read(self) -> tuple[bool, Any]:
+        image = self.reads.pop(0) if self.reads else None
+        if isinstance(image, Exception):
+            raise image
+        return image is not None, image
+
+    def set(self, prop: int, value: float) -> bool:
+        self.settings[prop] = value
+        return True
+
+    def release(self) -> None:
+        self.released = True
+
+
+def test_frames_carry_their_time_and_the_device_is_asked_for_size_and_rate() -> None:
+    capture, clock = FakeCapture(None, IMAGE, IMAGE), SteppedClock(3.0)
+    camera = Webcam("0", clock, width=320, height=240, fps=15, open_capture=lambda _: capture)
+    first = camera.read()
+    clock.advance(1.0)
+    second = camera.read()
+    assert first is not None
+    assert second is not None
+    assert (first.captured_s, second.captured_s) == (3.0, 4.0)
+    assert capture.settings[cv2.CAP_PROP_FRAME_WIDTH] == 320
+    assert capture.settings[cv2.CAP_PROP_FPS] == 15
+    assert capture.settings[cv2.CAP_PROP_BUFFERSIZE] == 1
+
+
+@pytest.mark.parametrize("fault", [None, cv2.error("select() timeout")])
+def test_an_unplugged_webcam_is_lost_and_comes_back(fault: Exception | None) -> None:
+    captures = [FakeCapture(IMAGE, fault), FakeCapture(), FakeCapture(IMAGE, IMAGE)]
+    opened = iter(captures)
+    camera = Webcam("0", SteppedClock(), open_capture=lambda _: next(opened))
+    camera.read()
+    with pytest.raises(CameraLost, match="webcam 0 gives no more frames: is it still plugged in"):
+        camera.read()
+    assert captures[0].released
+    with pytest.raises(CameraLost):
+        camera.read()
+    assert camera.read() is not None
+    assert camera.read() is not None
+
+
+def test_there_is_no_such_webcam() -> None:
+    with pytest.raises(CameraNotFound, match="there is no webcam /dev/video97"):
+        Webcam("97", SteppedClock())
+
+
+def test_a_device_that_another_program_holds_names_it() -> None:
+    with Path("/dev/null").open() as held, subprocess.Popen(["sleep", "60"], stdin=held) as other:
+        try:
+            with pytest.raises(CameraInUse, match=r"/dev/null is in use by .* \(process \d+\): close that program"):
+                Webcam("/dev/null", SteppedClock())
+        finally:
+            other.kill()
+
+
+def test_a_device_that_gives_no_picture() -> None:
+    empty = FakeCapture(*[None] * 20)
+    with pytest.raises(CameraUnreadable, match="/dev/video98 gives no picture: unplug it"):
+        Webcam("98", SteppedClock(), open_capture=lambda _: empty)
+    assert empty.released
+
+
+def test_an_address_that_does_not_answer() -> None:
+    with pytest.raises(CameraNotFound, match=r"no picture comes from rtsp://127\.0\.0\.1:9/x: check the address"):
+        Webcam("rtsp://127.0.0.1:9/x", SteppedClock())
+
+
+def test_what_a_source_is() -> None:
+    assert [is_device(source) for source in ("0", "12", "/dev/video0", "clip.mp4")] == [True, True, True, False]
+    assert [is_address(source) for source in ("rtsp://a/b", "http://a", "/dev/video0")] == [True, True, False]

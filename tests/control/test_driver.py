@@ -1,0 +1,90 @@
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from handsteer.config import ControlConfig
+from handsteer.control.driver import Driver
+from handsteer.control.sign_control import ZERO, Velocity
+from handsteer.signs.vocabulary import FORWARD, NONE, STOP
+
+DT = 1 / 30
+
+
+def test_steering_takes_over_at_once_and_signs_are_kept_out() -> None:
+    driver = Driver(ControlConfig())
+    driver.step(DT, sign=FORWARD)
+    assert driver.step(DT, steering=Velocity(0.4, 1.0)) == Velocity(0.4, 1.0)
+    assert driver.source == "steering"
+    assert driver.step(DT, sign=FORWARD) is None
+    assert driver.velocity == Velocity(0.4, 1.0)
+
+
+def test_when_steering_ends_one_zero_goes_out_and_signs_start_from_standing() -> None:
+    driver = Driver(ControlConfig(steering_timeout=0.3))
+    for _ in range(20):
+        driver.step(DT, sign=FORWARD)
+    driver.step(DT, steering=Velocity(0.4, 0.0))
+    said = [driver.step(0.1) for _ in range(10)]
+    assert [velocity for velocity in said if velocity is not None] == [ZERO]
+    assert driver.source == "nobody"
+    assert driver.step(DT, sign=FORWARD) == Velocity(0.01, 0.0)
+
+
+@pytest.mark.parametrize("wanted", [Velocity(math.nan, 0.0), Velocity(0.0, math.inf), Velocity(-math.inf, math.nan)])
+def test_steering_that_is_no_number_means_zero(wanted: Velocity) -> None:
+    assert Driver(ControlConfig()).step(DT, steering=wanted) == ZERO
+
+
+def test_steering_is_clamped() -> None:
+    driver = Driver(ControlConfig(max_linear=0.5, max_angular=1.0))
+    assert driver.step(DT, steering=Velocity(-9.0, 9.0)) == Velocity(-0.5, 1.0)
+
+
+@pytest.mark.parametrize("dt_s", [math.nan, math.inf, -1.0])
+def test_broken_time_stops_whoever_drives(dt_s: float) -> None:
+    driver = Driver(ControlConfig())
+    driver.step(DT, steering=Velocity(0.4, 0.0))
+    assert driver.step(dt_s) == ZERO
+    assert driver.step(dt_s) is None
+
+
+def test_reasons_say_why_the_robot_stands() -> None:
+    driver = Driver(ControlConfig())
+    assert driver.reason == "standing: no sign has come for 0.5 s"
+    reasons = []
+    for sign in (NONE, STOP, FORWARD):
+        driver.step(DT, sign=sign)
+        reasons.append(driver.reason)
+    driver.step(DT, steering=Velocity(0.1, 0.0))
+    reasons.append(driver.reason)
+    assert reasons == [
+        "standing: no sign is seen",
+        "standing: the Stop sign is shown",
+        "driving: Forward",
+        "driving: steered by hand",
+    ]
+
+
+@given(
+    st.lists(
+        st.tuples(
+            st.floats(0, 0.3),
+            st.one_of(st.none(), st.sampled_from([FORWARD, STOP, NONE])),
+            st.one_of(st.none(), st.builds(Velocity, st.floats(), st.floats())),
+        ),
+        max_size=100,
+    )
+)
+def test_whatever_comes_the_command_is_finite_and_within_limits(
+    inputs: list[tuple[float, str | None, Velocity | None]],
+) -> None:
+    config = ControlConfig()
+    driver = Driver(config)
+    for dt_s, sign, steering in inputs:
+        velocity = driver.step(dt_s, sign=sign, steering=steering)
+        if velocity is not None:
+            assert velocity.is_finite
+            assert abs(velocity.linear_mps) <= config.max_linear
+            assert abs(velocity.angular_radps) <= config.max_angular

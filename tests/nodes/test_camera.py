@@ -1,0 +1,72 @@
+import numpy as np
+import pytest
+
+from handsteer.clock import to_seconds
+from handsteer.errors import CameraLost
+from handsteer.images import bgr_image
+from handsteer.messages import DIAGNOSTICS, IMAGE_COMPRESSED, IMAGE_RAW
+from handsteer.nodes.camera import CameraNode
+from handsteer.testing.faulty_camera import Event, FaultyCamera
+from tests.nodes.stepping import Bench
+
+IMAGE = np.full((48, 64, 3), 7, np.uint8)
+LOST = CameraLost("webcam 0 gives no more frames")
+
+
+def start(*events: Event, age_s: float = 0.0) -> tuple[Bench, CameraNode, FaultyCamera]:
+    bench = Bench()
+    camera = FaultyCamera(events, bench.clock, period_s=0.1, age_s=age_s)
+    node = CameraNode(bench.transport, bench.clock, camera)
+    bench.nodes = [node]
+    return bench, node, camera
+
+
+def test_frames_go_out_with_their_capture_time() -> None:
+    bench, node, _ = start(IMAGE, IMAGE, age_s=0.04)
+    bench.clock.advance(1.0)
+    images = bench.record(IMAGE_RAW)
+    bench.run(0.15)
+    assert [round(to_seconds(image.header.stamp), 3) for image in images] == [0.96, 1.06]
+    assert images[0].header.frame_id == "camera"
+    np.testing.assert_array_equal(bgr_image(images[0]), IMAGE)
+    assert node.frames == 2
+
+
+def test_jpeg_is_made_on_demand() -> None:
+    bench, _, _ = start(IMAGE, IMAGE, IMAGE)
+    bench.run(0.05)
+    compressed = bench.record(IMAGE_COMPRESSED)
+    bench.run(0.1)
+    assert len(compressed) == 1
+
+
+def test_a_lost_camera_is_tried_again_with_growing_pauses(caplog: pytest.LogCaptureFixture) -> None:
+    bench, node, _ = start(IMAGE, LOST, LOST, LOST, IMAGE, IMAGE)
+    images, diagnostics = bench.record(IMAGE_RAW), bench.record(DIAGNOSTICS)
+    bench.run(1.0)
+    assert (len(images), diagnostics[-1].status[0].message) == (1, "webcam 0 gives no more frames")
+    bench.run(2.0)
+    assert len(images) == 1
+    bench.run(1.0)
+    assert len(images) == 3
+    assert "trying again in 0.5 s" in caplog.text
+    assert "trying again in 2 s" in caplog.text
+    assert "faulty camera is back" in caplog.text
+    assert node.callback_errors == 0
+
+
+def test_a_file_that_ends_says_so_and_the_camera_is_released_at_the_end() -> None:
+    bench, node, camera = start(IMAGE)
+    bench.run(0.05)
+    assert not node.ended.is_set()
+    bench.run(0.1)
+    assert node.ended.is_set()
+    node.stop()
+    assert camera.closed
+
+
+def test_no_frame_now_is_no_message() -> None:
+    bench, _, _ = start(IMAGE, None, None, IMAGE)
+    images = bench.record(IMAGE_RAW)
+    bench.run(0.35)
+    assert len(images) == 2

@@ -1,0 +1,97 @@
+import math
+
+import pytest
+
+from handsteer.config import ControlConfig
+from handsteer.messages import CMD_VEL, DIAGNOSTICS, HAND_SIGN, STEERING_CMD_VEL, String, twist
+from handsteer.nodes.control import HandSignControlNode
+from handsteer.nodes.steering import SteeringNode
+from tests.nodes.stepping import Bench
+
+
+class ControlBench(Bench):
+    def __init__(self) -> None:
+        super().__init__()
+        self.control = HandSignControlNode(self.transport, self.clock, ControlConfig())
+        self.steering = SteeringNode(self.transport, self.clock)
+        self.nodes = [self.steering, self.control]
+        self.signs = self.transport.advertise("recognition", HAND_SIGN)
+        self.twists = self.record(CMD_VEL)
+
+    def show(self, *signs: str, age_s: float = 0.0) -> None:
+        for sign in signs:
+            self.signs.publish(String(data=sign), self.clock.now() - age_s)
+            self.run(1 / 30)
+
+    @property
+    def commands(self) -> list[tuple[float, float]]:
+        return [(round(t.linear.x, 6), round(t.angular.z, 6)) for t in self.twists]
+
+
+@pytest.fixture
+def bench() -> ControlBench:
+    return ControlBench()
+
+
+def test_exactly_one_twist_a_sign(bench: ControlBench) -> None:
+    bench.show("Forward", "Forward", "Turn Left", "Go", "Dance", "Stop", "NONE")
+    assert bench.commands == [(0.01, 0), (0.02, 0), (0.02, 0.1), (0.02, 0.1), (0.02, 0.1), (0, 0), (0, 0)]
+
+
+def test_when_signs_stop_one_zero_within_the_timeout_then_silence(bench: ControlBench) -> None:
+    bench.show("Forward", "Forward")
+    bench.twists.clear()
+    bench.run(0.46)
+    assert bench.commands == []
+    bench.run(0.1)
+    assert bench.commands == [(0, 0)]
+    bench.run(5.0)
+    assert bench.commands == [(0, 0)]
+
+
+def test_a_sign_from_a_stale_frame_moves_nothing(bench: ControlBench) -> None:
+    bench.show(*["Forward"] * 30, age_s=0.6)
+    assert bench.commands == []
+
+
+def test_one_zero_at_the_end(bench: ControlBench) -> None:
+    bench.show("Forward")
+    bench.control.stop()
+    assert bench.commands == [(0.01, 0), (0, 0)]
+
+
+def test_steering_goes_before_signs_and_is_repeated_until_released(bench: ControlBench) -> None:
+    bench.show("Forward")
+    bench.steering.steer(0.5, -1.0)
+    bench.twists.clear()
+    bench.show(*["Forward"] * 60)
+    assert set(bench.commands) == {(0.5, -1.0)}
+    bench.steering.release()
+    bench.run(0.1)
+    assert bench.commands[-1] == (0, 0)
+    bench.run(0.5)
+    bench.show("Forward")
+    assert bench.commands[-1] == (0.01, 0)
+
+
+def test_steering_that_falls_silent_stops_the_robot(bench: ControlBench) -> None:
+    bench.transport.advertise("slider", STEERING_CMD_VEL).publish(twist(0.5, 0.0))
+    bench.run(1.0)
+    assert bench.commands == [(0.5, 0), (0, 0)]
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
+def test_steering_that_is_no_number_means_zero(bench: ControlBench, bad: float) -> None:
+    bench.steering.steer(bad, 0.5)
+    bench.run(0.05)
+    assert set(bench.commands) == {(0, 0)}
+
+
+def test_latency_and_reason_are_told(bench: ControlBench) -> None:
+    statuses = bench.record(DIAGNOSTICS)
+    bench.show(*["Forward"] * 9, age_s=0.02)
+    status = statuses[-1].status[0]
+    values = {value.key: value.value for value in status.values}
+    assert status.message == "driving: Forward"
+    assert values["source"] == "signs"
+    assert float(values["latency_median_ms"]) == pytest.approx(20.0, abs=0.1)

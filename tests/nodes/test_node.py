@@ -1,0 +1,87 @@
+import threading
+
+from handsteer.clock import RealClock, SteppedClock
+from handsteer.messages import DIAGNOSTICS, DiagnosticArray, Topic
+from handsteer.nodes.node import OK, WARN, Node
+from handsteer.transports.in_process import InProcessTransport
+from handsteer.transports.protocol import Received
+
+
+def make(name: str = "node") -> tuple[Node, SteppedClock, InProcessTransport]:
+    clock, transport = SteppedClock(), InProcessTransport()
+    return Node(name, transport, clock), clock, transport
+
+
+def test_timers_keep_their_period_and_leave_out_missed_beats() -> None:
+    node, clock, _ = make()
+    beats: list[float] = []
+    node.every(0.1, lambda: beats.append(round(clock.now(), 3)))
+    for _ in range(5):
+        node.spin_once()
+        due = node.next_due_s
+        assert due is not None
+        clock.advance_to(due)
+    clock.advance(1.05)
+    while node.spin_once():
+        pass
+    assert beats == [0.0, 0.1, 0.2, 0.3, 0.4, 1.55]
+
+
+def test_a_timer_that_raises_goes_on() -> None:
+    node, clock, _ = make()
+    node.every(0.1, lambda: 1 / 0)  # type: ignore[arg-type, return-value]
+    for _ in range(3):
+        node.spin_once()
+        clock.advance(0.1)
+    assert node.callback_errors == 3
+
+
+def test_a_delayed_timer_leaves_out_the_beats_before() -> None:
+    node, clock, _ = make()
+    beats: list[float] = []
+    timer = node.every(0.1, lambda: beats.append(round(clock.now(), 3)))
+    timer.delay_until(0.5)
+    for _ in range(8):
+        node.spin_once()
+        clock.advance(0.1)
+    assert beats == [0.5, 0.6, 0.7]
+
+
+def test_with_a_key_the_newest_of_each_publisher_is_kept() -> None:
+    node, _, transport = make("page")
+    got: list[str] = []
+
+    def callback(received: Received[DiagnosticArray]) -> None:
+        got.append(f"{received.message.status[0].name}: {received.message.status[0].message}")
+
+    node.subscribe(DIAGNOSTICS, callback, key=lambda message: message.status[0].name)
+    for name in ("a", "b"):
+        other = Node(name, transport, SteppedClock())
+        other.diagnose(WARN, "old")
+        other.diagnose(OK, "new")
+    node.spin_once()
+    assert sorted(got) == ["a: new", "b: new"]
+
+
+def test_the_thread_sleeps_until_there_is_work_and_ends_at_stop() -> None:
+    transport = InProcessTransport()
+    node = Node("node", transport, RealClock())
+    topic = Topic("/number", int)
+    served = threading.Event()
+    node.subscribe(topic, lambda _: served.set())
+    node.start()
+    transport.advertise("other", topic).publish(1)
+    assert served.wait(5)
+    node.stop()
+    node.stop()
+    assert not any(thread.name == "node" for thread in threading.enumerate())
+
+
+def test_on_stop_is_called_even_when_it_raises() -> None:
+    class Bad(Node):
+        def on_stop(self) -> None:
+            raise RuntimeError("boom")
+
+    node = Bad("bad", InProcessTransport(), SteppedClock())
+    node.stop()
+    assert node.callback_errors == 1

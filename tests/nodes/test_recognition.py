@@ -1,0 +1,95 @@
+import numpy as np
+import pytest
+
+from handsteer.config import SignsConfig
+from handsteer.images import image_message
+from handsteer.landmarks.recorded import RecordedLandmarker
+from handsteer.messages import DIAGNOSTICS, HAND_SIGN, IMAGE_ANNOTATED, IMAGE_RAW, Header, Image, Time
+from handsteer.nodes.recognition import HandSignRecognitionNode
+from handsteer.signs.drawing import annotate
+from handsteer.signs.recognizer import Recognizer
+from handsteer.signs.rules import RuleClassifier
+from tests.nodes.stepping import Bench
+from tests.signs.hands import make_hand
+
+HEADER = Header(stamp=Time(0, 0), frame_id="camera")
+IMAGE = image_message(np.zeros((480, 640, 3), np.uint8), HEADER)
+BROKEN = Image(HEADER, 480, 640, "bgr8", 0, 1920, np.zeros(5, np.uint8))
+
+
+class RecognitionBench(Bench):
+    def __init__(self) -> None:
+        super().__init__()
+        landmarker = RecordedLandmarker([[make_hand(straight=("index",))]] * 100)
+        recognizer = Recognizer(landmarker, RuleClassifier(), SignsConfig())
+        self.node = HandSignRecognitionNode(self.transport, self.clock, recognizer, SignsConfig(), annotate)
+        self.nodes = [self.node]
+        self.images = self.transport.advertise("camera", IMAGE_RAW)
+        self.signs = self.record(HAND_SIGN)
+
+    def show(self, image: Image = IMAGE, frames: int = 1, age_s: float = 0.0) -> None:
+        for _ in range(frames):
+            self.images.publish(image, self.clock.now() - age_s)
+            self.run(1 / 30)
+
+    @property
+    def names(self) -> list[str]:
+        return [sign.data for sign in self.signs]
+
+
+@pytest.fixture
+def bench() -> RecognitionBench:
+    return RecognitionBench()
+
+
+def test_one_sign_a_frame(bench: RecognitionBench) -> None:
+    bench.show(frames=6)
+    assert bench.names == ["NONE"] * 3 + ["Forward"] * 3
+    assert bench.node.counts == {"NONE": 3, "Forward": 3}
+
+
+def test_while_no_frames_come_none_goes_out(bench: RecognitionBench) -> None:
+    bench.show(frames=6)
+    bench.signs.clear()
+    bench.run(1.0)
+    assert len(bench.names) in range(4, 8)
+    assert set(bench.names) == {"NONE"}
+    bench.signs.clear()
+    bench.show()
+    assert bench.names == ["NONE"], "a sign has to be confirmed anew after a loss"
+
+
+def test_a_stale_frame_is_no_frame(bench: RecognitionBench) -> None:
+    bench.show(frames=10, age_s=0.6)
+    assert bench.names == []
+    bench.show(frames=10, age_s=0.6)
+    assert set(bench.names) == {"NONE"}
+
+
+def test_a_broken_frame_is_none_and_breaks_nothing(bench: RecognitionBench) -> None:
+    bench.show(frames=6)
+    bench.show(BROKEN)
+    assert bench.names[-1] == "NONE"
+    assert bench.node.callback_errors == 1
+    bench.show(frames=4)
+    assert bench.names[-1] == "Forward"
+
+
+def test_the_annotated_picture_is_made_on_demand_and_mirrored(bench: RecognitionBench) -> None:
+    bench.show()
+    pictures = bench.record(IMAGE_ANNOTATED)
+    bench.show(frames=5)
+    assert len(pictures) == 5
+    drawn = pictures[0].data.reshape(480, 640, 3)
+    assert drawn.any()
+    assert not IMAGE.data.any(), "the frame itself is left as it is"
+
+
+def test_diagnostics_tell_what_is_seen(bench: RecognitionBench) -> None:
+    statuses = bench.record(DIAGNOSTICS)
+    bench.show(frames=10)
+    seen = statuses[-1].status[0]
+    assert seen.message == "Forward is shown"
+    assert {value.key: value.value for value in seen.values}["sign"] == "Forward"
+    bench.run(2.0)
+    assert statuses[-1].status[0].message.startswith("no frame for")

@@ -1,0 +1,63 @@
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from handsteer import config
+from handsteer.config import Config
+from handsteer.errors import ConfigError
+
+
+def sections() -> list[tuple[str, Any]]:
+    return [(name, field.annotation) for name, field in Config.model_fields.items()]
+
+
+def test_every_parameter_has_a_line_of_why() -> None:
+    for name, section in sections():
+        for parameter, field in section.model_fields.items():
+            assert field.description, f"{name}.{parameter} has no description"
+
+
+def test_a_file_goes_before_the_defaults_and_options_before_the_file(tmp_path: Path) -> None:
+    file = tmp_path / "handsteer.yaml"
+    file.write_text("control: {linear_step: 0.02, max_linear: 0.5}\ncamera:\n  at_end: hold\n")
+    settings = config.load(file, {"camera": {"at_end": "end", "fps": 10}}, {"control": {"linear_step": 0.03}})
+    assert settings.control.linear_step == 0.03
+    assert settings.control.max_linear == 0.5
+    assert settings.control.angular_step == 0.1
+    assert settings.camera.at_end == "hold"
+    assert settings.camera.fps == 10
+
+
+def test_an_empty_file_is_the_defaults(tmp_path: Path) -> None:
+    file = tmp_path / "empty.yaml"
+    file.write_text("# nothing\n")
+    assert config.load(file) == Config()
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("control: {linear_step: 7}", r"control.linear_step: 7 should be less than or equal to 1"),
+        ("control: {linear_stop: 1}", r"control.linear_stop: there is no such parameter"),
+        ("robto: {}", r"robto: there is no such parameter"),
+        ("camera: {fps: .nan}", r"camera.fps: nan should be a finite number"),
+        ("camera: {fps: fast}", r"camera.fps: 'fast' should be a valid number"),
+        ("control: {ramp: quickly}", r"control.ramp: 'quickly' should be 'per_message' or 'per_second'"),
+        ("control: 3", r"control: 3 should be"),
+        ("- 1", r"expected sections such as 'control:' at the top, found list"),
+        ("control: {", r"line 1: not valid YAML"),
+    ],
+)
+def test_what_is_wrong_in_a_file_is_named(tmp_path: Path, text: str, message: str) -> None:
+    file = tmp_path / "bad.yaml"
+    file.write_text(text)
+    with pytest.raises(ConfigError, match=message) as caught:
+        config.load(file)
+    assert "bad.yaml" in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_file_that_is_not_there() -> None:
+    with pytest.raises(ConfigError, match=r"cannot read the configuration gone\.yaml: No such file"):
+        config.load(Path("gone.yaml"))
