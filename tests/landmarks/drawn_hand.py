@@ -2,7 +2,8 @@
 
 import cv2
 import numpy as np
-from golden_frames import FIXTURE
+
+from tests.landmarks.golden_frames import FIXTURE
 
 _SKIN = (120, 150, 205)
 _SHADOW = (70, 95, 140)

@@ -2,7 +2,7 @@
 
 Run it in an environment of its own, Python 3.11 with nothing but ``pip install mediapipe==0.10.21``::
 
-    python tests/landmarks/make_golden.py
+    python -m tests.landmarks.make_golden
 
 Arrays per group (``photos``, ``video``), one row a picture: ``found`` (n,) bool; ``pixels`` (n, 21, 3) x, y and z in
 pixels; ``world`` (n, 21, 3) in metres; ``right`` (n,) MediaPipe's score for its own label "Right", which assumes a
@@ -12,7 +12,8 @@ mirrored picture. Rows without a hand are zero. ``photo_paths`` names the photos
 import cv2
 import mediapipe as mp
 import numpy as np
-from golden_frames import FIXTURE, photo_paths, read_photo, read_video
+
+from tests.landmarks.golden_frames import FIXTURE, photo_paths, read_photo, read_video
 
 
 def golden(images: list[np.ndarray], *, static: bool) -> dict[str, np.ndarray]:

@@ -3,7 +3,6 @@
 import cv2
 import numpy as np
 import pytest
-from drawn_hand import draw, open_left_hand, open_right_hand
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -11,6 +10,7 @@ from handsteer.config import LandmarksConfig
 from handsteer.errors import FrameError, ModelMissing
 from handsteer.landmarks.mediapipe import MediaPipeLandmarker
 from handsteer.landmarks.protocol import Hand
+from tests.landmarks.drawn_hand import draw, open_left_hand, open_right_hand
 
 EMPTY = draw()
 

@@ -66,7 +66,6 @@ class MediaPipeLandmarker:
         if (width, height) != self._image_size:
             self.reset()
             self._image_size = (width, height)
-        image = np.ascontiguousarray(image)
         estimates = [self._landmarks.estimate(image, roi) for roi in self._regions(image)]
         present = [estimate for estimate in estimates if estimate.presence > self._config.min_presence]
         self._followed = [from_landmarks(estimate.pixels[:, :2]) for estimate in present]
@@ -86,7 +85,10 @@ class MediaPipeLandmarker:
 
 
 def _distinct(regions: list[Roi]) -> list[Roi]:
-    """Return ``regions`` without those that look at the same hand as one before them."""
+    """Return ``regions`` without those that look at the same hand as one before them.
+
+    MediaPipe keeps the last of such regions instead, which is the palm that is less sure.
+    """
     distinct: list[Roi] = []
     for region in regions:
         if all(region.overlap(other) <= _SAME_HAND_OVERLAP for other in distinct):

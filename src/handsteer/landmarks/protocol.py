@@ -51,7 +51,9 @@ class Landmarker(Protocol):
     """Finds hands in frames; follows them from one frame to the next."""
 
     def detect(self, image: NDArray[np.uint8]) -> list[Hand]:
-        """Return the hands in ``image``, the surest first; an empty list when there is none.
+        """Return the hands in ``image``; an empty list when there is none.
+
+        Hands that are already followed come first and keep their order; new ones after them, the surest first.
 
         Args:
             image: (height, width, 3) uint8, BGR, not mirrored.
