@@ -4,12 +4,13 @@ VENV := .venv
 BIN := $(VENV)/bin
 ARGS ?=
 
-.PHONY: help run test lint unit format lock bench models screenshots clean
+.PHONY: help run test lint unit format lock bench models docs screenshots clean
 
 help:
 	@echo "make run          drive the robot: your webcam, or the virtual hand (options: make run ARGS='--camera 0')"
 	@echo "make test         everything that CI checks: format, lint, types, tests"
 	@echo "make bench        print the speed and accuracy tables"
+	@echo "make docs         write docs/configuration.md again from the configuration"
 	@echo "make screenshots  make the README's picture again (needs Chromium)"
 	@echo "make lock         make the requirements files again from pyproject.toml"
 	@echo "make clean        remove the environment and all caches"
@@ -23,6 +24,7 @@ lint: $(BIN)/.dev
 	@$(BIN)/ruff format --check .
 	@$(BIN)/ruff check .
 	@$(BIN)/mypy
+	@$(BIN)/python scripts/configuration_table.py --check
 
 unit: $(BIN)/.dev models
 	@$(BIN)/pytest -n auto $(ARGS)
@@ -36,6 +38,9 @@ format: $(BIN)/.dev
 
 bench: $(BIN)/.dev models
 	@for table in benchmarks/[!_]*.py; do echo "== $$table"; $(BIN)/python $$table || exit 1; done
+
+docs: $(BIN)/.dev
+	@$(BIN)/python scripts/configuration_table.py
 
 screenshots: $(BIN)/.dev models
 	@$(BIN)/python scripts/screenshot.py

@@ -1,0 +1,74 @@
+"""Writes docs/configuration.md from the configuration models: every parameter with its default, range and meaning."""
+
+import sys
+from pathlib import Path
+from typing import Any, Literal, get_args, get_origin
+
+from pydantic.fields import FieldInfo
+
+from handsteer.config import Config, Section
+
+PATH = Path(__file__).resolve().parents[1] / "docs" / "configuration.md"
+HEAD = """# Configuration
+
+Every parameter has a default, so no file is needed. To change some, write a YAML file with only those:
+
+```yaml
+control:
+  ramp: per_second
+  max_linear: 0.5
+camera:
+  source: /dev/video2
+```
+
+and run `handsteer run --config my.yaml`. On the command line each parameter is an option, as
+`--control.max-linear 0.5`; an option goes before the file, the file before the default. A name that does not exist and
+a value out of range are refused with exit code 2, before anything moves.
+
+This page is made from `src/handsteer/config.py` by `make docs`.
+"""
+
+
+def page() -> str:
+    """Return the page's text."""
+    sections = [_section(name, field.annotation) for name, field in Config.model_fields.items()]
+    return "\n".join([HEAD, *sections])
+
+
+def _section(name: str, section: Any) -> str:
+    assert issubclass(section, Section)
+    rows = [_row(parameter, field) for parameter, field in section.model_fields.items()]
+    head = [
+        f"## {name}",
+        "",
+        section.__doc__ or "",
+        "",
+        "| parameter | default | allowed | meaning |",
+        "|---|---|---|---|",
+    ]
+    return "\n".join([*head, *rows, ""])
+
+
+def _row(name: str, field: FieldInfo) -> str:
+    default = str(field.default).lower() if isinstance(field.default, bool) else field.default
+    return f"| `{name}` | `{default}` | {_allowed(field)} | {field.description} |"
+
+
+def _allowed(field: FieldInfo) -> str:
+    if get_origin(field.annotation) is Literal:
+        return ", ".join(f"`{choice}`" for choice in get_args(field.annotation))
+    if field.annotation is bool:
+        return "`true`, `false`"
+    bounds = [
+        f"{sign} {getattr(limit, name):g}"
+        for limit in field.metadata
+        for name, sign in (("gt", ">"), ("ge", "≥"), ("lt", "<"), ("le", "≤"))
+        if getattr(limit, name, None) is not None
+    ]
+    return ", ".join(bounds) or "text"
+
+
+if __name__ == "__main__":
+    if "--check" in sys.argv:
+        sys.exit(0 if PATH.read_text(encoding="utf-8") == page() else f"{PATH.name} is not up to date: run make docs")
+    PATH.write_text(page(), encoding="utf-8")
