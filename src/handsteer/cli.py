@@ -21,19 +21,21 @@ if TYPE_CHECKING:
     from handsteer.graph import Graph, Summary
     from handsteer.recognize import FrameResult
 
-_EXAMPLES = """Drive a mobile robot with your hand signs.
+_EXAMPLES = """Examples:
+  handsteer run                                  drive, and open the page
+  handsteer run --headless --duration 30 --json  no page, one summary at the end
+  handsteer recognize photo.jpg                  which sign is it?
+  handsteer doctor                               what works on this machine
+"""
 
-Examples:
-
-handsteer run                                 your webcam, or the virtual hand; opens the page
-
-handsteer run --headless --duration 30 --json
-
-handsteer recognize photo.jpg
-
-handsteer doctor"""
-
-app = App(name="handsteer", help=_EXAMPLES, version=__version__, help_format="plaintext", result_action="return_value")
+app = App(
+    name="handsteer",
+    help="Drive a mobile robot with your hand signs.",
+    help_epilogue=_EXAMPLES,
+    version=__version__,
+    help_format="plaintext",
+    result_action="return_value",
+)
 
 Flag = Annotated[bool, Parameter(negative="")]
 Parameters = Annotated[config.Config | None, Parameter(name="*", group="Every parameter (also in a --config file)")]

@@ -61,13 +61,18 @@ class Graph:
         self.steering = SteeringNode(*wires)
         self.recognition = HandSignRecognitionNode(*wires, recognizer, config.signs, annotate)
         self.camera = CameraNode(*wires, camera)
+        self._added: tuple[Node, ...] = ()
         self._paced = camera.period_s is not None
         self._began_s = self.clock.now()
 
     @property
     def nodes(self) -> tuple[Node, ...]:
         """The nodes in the order in which they are stopped: first the one that says zero, last the one that obeys."""
-        return (self.control, self.steering, self.camera, self.recognition, self.robot)
+        return (self.control, self.steering, self.camera, self.recognition, *self._added, self.robot)
+
+    def add(self, node: Node) -> None:
+        """Let ``node``, on this graph's transport and clock, run and stop with the others."""
+        self._added = (*self._added, node)
 
     def __enter__(self) -> "Graph":
         return self

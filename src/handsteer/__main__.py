@@ -1,0 +1,5 @@
+"""``python -m handsteer``."""
+
+from handsteer.cli import main
+
+main()

@@ -1,0 +1,163 @@
+import json
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from handsteer.cli import main
+
+VIRTUAL = ["--camera", "virtual", "--camera.width", "320", "--camera.height", "240"]
+
+
+def run_cli(*arguments: str) -> tuple[int, str, str]:
+    done = subprocess.run(
+        [sys.executable, "-m", "handsteer", *arguments], capture_output=True, text=True, timeout=120, check=False
+    )
+    return done.returncode, done.stdout, done.stderr
+
+
+def fails(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
+    """Run in this process; return the one line that it says before it exits with 2."""
+    with pytest.raises(SystemExit) as caught:
+        main(list(arguments))
+    assert caught.value.code == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    lines = [line for line in captured.err.splitlines() if line.startswith("handsteer: ")]
+    assert len(lines) == 1, captured.err
+    return lines[0].removeprefix("handsteer: ")
+
+
+def prints(capsys: pytest.CaptureFixture[str], *arguments: str, code: int = 0) -> str:
+    with pytest.raises(SystemExit) as caught:
+        main(list(arguments))
+    assert caught.value.code == code
+    return capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["run", "--camera", "gone.mp4"], r"there is no camera gone\.mp4: give auto, virtual, a webcam's number"),
+        (["run", "--camera", "97"], r"there is no webcam /dev/video97: "),
+        (["run", "--camera", __file__], r"test_cli\.py is not a video that can be decoded: try an mp4"),
+        (["run", "--camera", str(Path(__file__).parent)], r"there are no photos in "),
+        (["run", "--camera", "rtsp://127.0.0.1:9/x"], r"no picture comes from rtsp://127\.0\.0\.1:9/x"),
+        (["run", "--world", "moon"], r"moon.*obstacles"),
+        (["run", "--robot", "tank"], r"robot\.kind: 'tank' should be 'sim'"),
+        (["run", "--port", "99999"], r"dashboard\.port: 99999 should be less than or equal to 65535"),
+        (["run", "--control.linear-step", "7"], r"control\.linear_step: '7' should be less than or equal to 1"),
+        (["run", "--camera.fps", "quick"], r"camera\.fps: 'quick' should be a valid number"),
+        (["run", "--duration", "0"], r"--duration: 0 should be greater than 0"),
+        (["run", "--duration", "nan"], r"--duration: nan should be greater than 0"),
+        (["run", "--config", "gone.yaml"], r"cannot read the configuration gone\.yaml: No such file"),
+        (["run", "--camera", "virtual", "--virtual-hand.script", "Wave:2"], r"Wave"),
+        (["run", "--colour", "red"], r"Unknown option: --colour"),
+        (["recognize", "gone.jpg"], r"there is no gone\.jpg: give a photo, a folder of photos or a video file"),
+        (["dance"], r'Unknown command "dance"'),
+    ],
+    ids=lambda value: " ".join(value[:3]) if isinstance(value, list) else None,
+)
+def test_bad_input_gets_one_line_and_code_2(
+    capsys: pytest.CaptureFixture[str], arguments: list[str], message: str
+) -> None:
+    said = fails(capsys, *arguments, *(["--headless"] if arguments[0] == "run" else []))
+    assert re.search(message, said), said
+
+
+def test_a_missing_model_says_how_to_get_it(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv("HANDSTEER_MODELS", str(tmp_path))
+    assert "handsteer models" in fails(capsys, "run", "--headless", "--camera", "virtual")
+
+
+def test_a_port_in_use_names_the_port(capsys: pytest.CaptureFixture[str]) -> None:
+    with socket.socket() as other:
+        other.bind(("127.0.0.1", 0))
+        other.listen()
+        port = str(other.getsockname()[1])
+        said = fails(capsys, "run", *VIRTUAL, "--port", port, "--dashboard.no-open-browser", "--duration", "1")
+    assert port in said
+    assert "--port" in said
+
+
+def test_version_and_help(capsys: pytest.CaptureFixture[str]) -> None:
+    assert re.fullmatch(r"\d+\.\d+\.\d+\n", prints(capsys, "--version"))
+    for verb in ([], ["run"], ["recognize"], ["models"], ["doctor"]):
+        assert "handsteer " + (verb[0] if verb else "run") in prints(capsys, *verb, "--help").replace("Usage: ", "")
+
+
+def test_a_headless_run_prints_one_json_summary(capsys: pytest.CaptureFixture[str]) -> None:
+    summary = json.loads(prints(capsys, "run", "--headless", *VIRTUAL, "--duration", "2", "--json"))
+    assert summary["frames"] > 5
+    assert summary["latency_p99_ms"] > 0
+    assert {"fps", "latency_median_ms", "signs", "final_pose", "path_length_m", "contacts"} <= set(summary)
+
+
+def test_a_fast_run_takes_the_same_way_each_time(capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = ["run", "--fast", *VIRTUAL, "--duration", "2", "--json"]
+    assert prints(capsys, *arguments) == prints(capsys, *arguments)
+
+
+@pytest.mark.slow
+def test_a_file_plays_once_in_a_headless_run(capsys: pytest.CaptureFixture[str], slideshow: Path) -> None:
+    summary = json.loads(prints(capsys, "run", "--headless", "--camera", str(slideshow), "--json"))
+    assert summary["frames"] == 270
+    assert summary["duration_s"] == pytest.approx(22.5, abs=2.0)
+    assert summary["path_length_m"] > 0.1
+
+
+@pytest.mark.slow
+def test_recognize_prints_a_line_a_frame(capsys: pytest.CaptureFixture[str], slideshow: Path) -> None:
+    lines = [json.loads(line) for line in prints(capsys, "recognize", str(slideshow), "--json").splitlines()]
+    assert [line["frame"] for line in lines] == list(range(270))
+    assert lines[-1]["time_s"] == pytest.approx(269 / 12)
+    assert {line["sign"] for line in lines} >= {"NONE", "Stop", "Forward", "Go", "Turn Right", "Turn Left"}
+    assert len(lines[40]["landmarks"]) == 21
+
+
+def test_recognize_a_photo(capsys: pytest.CaptureFixture[str], data_dir: Path) -> None:
+    photo = sorted((data_dir / "photos" / "stop").glob("emre*"))[0]
+    assert "Stop" in prints(capsys, "recognize", str(photo))
+
+
+def test_doctor_finds_what_is_missing(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv("HANDSTEER_MODELS", str(tmp_path))
+    findings = {finding["name"]: finding for finding in json.loads(prints(capsys, "doctor", "--json", code=1))}
+    assert findings["models"]["verdict"] == "missing"
+    assert "handsteer models" in findings["models"]["detail"]
+    assert findings["python"]["verdict"] == "ok"
+    assert {"camera", "port", "ros 1", "ros 2", "gl"} <= set(findings)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_within_two_seconds_with_the_robot_stopped(number: signal.Signals) -> None:
+    command = [sys.executable, "-m", "handsteer", "run", "--headless", *VIRTUAL, "--json"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        time.sleep(4.0)
+        began_s = time.monotonic()
+        process.send_signal(number)
+        out, err = process.communicate(timeout=20)
+        took_s = time.monotonic() - began_s
+    assert process.returncode == 0, err
+    assert "the robot is told to stand" in err
+    assert json.loads(out)["frames"] > 5
+    assert took_s < 2.0
+
+
+def test_a_reader_that_leaves_is_no_error(data_dir: Path) -> None:
+    command = f"{sys.executable} -m handsteer recognize {data_dir}/photos/stop | head -n 1"
+    done = subprocess.run(["bash", "-o", "pipefail", "-c", command], capture_output=True, text=True, check=False)
+    assert done.returncode == 0
+    assert "Traceback" not in done.stderr
+    assert os.linesep in done.stdout
