@@ -1,0 +1,70 @@
+"""The virtual hand as a camera: no webcam needed, and everything about the picture is known."""
+
+from dataclasses import dataclass
+
+from handsteer.cameras.protocol import Frame
+from handsteer.clock import Clock
+from handsteer.config import VirtualHandConfig
+from handsteer.hand.backgrounds import make_background
+from handsteer.hand.kinematics import Array, pose_skeleton
+from handsteer.hand.placement import Pinhole
+from handsteer.hand.renderer import Look, render, true_pixels
+from handsteer.hand.script import Motion
+
+
+@dataclass(frozen=True)
+class Truth:
+    """What the virtual hand does at one moment.
+
+    Attributes:
+        sign: The sign that is being shown or taken up.
+        settled: Whether the hand has arrived at it.
+        joints_px: (21, 2) pixels, where the joints are in the picture.
+    """
+
+    sign: str
+    settled: bool
+    joints_px: Array
+
+
+class VirtualHandCamera:
+    """A :class:`~handsteer.cameras.protocol.Camera` that draws a hand going through a script of signs.
+
+    Args:
+        config: The script and the looks.
+        width: Pixels.
+        height: Pixels.
+        fps: Frames a second.
+        clock: The script starts when the camera is made.
+
+    Raises:
+        PoseError: The script is wrong.
+    """
+
+    name = "virtual hand"
+
+    def __init__(self, config: VirtualHandConfig, *, width: int, height: int, fps: float, clock: Clock) -> None:
+        self.period_s = 1.0 / fps
+        self._motion = Motion(config.script, config.handedness, config.seed)
+        self._handedness = config.handedness
+        self._look = Look(skin=config.skin, sleeve=config.sleeve)
+        self._camera = Pinhole.webcam(width, height)
+        self._background = make_background(config.background, width, height, config.seed)
+        self._clock = clock
+        self._start_s = clock.now()
+
+    def read(self) -> Frame:
+        """Return the hand as it is now; drawing stands for the exposure, so it is captured when it is drawn."""
+        pose = self._motion.at(self._clock.now() - self._start_s).pose
+        skeleton, placement = pose_skeleton(pose.angles), pose.view.placement(self._handedness)
+        image = render(skeleton, placement, self._camera, self._look, self._background)
+        return Frame(image, self._clock.now())
+
+    def truth(self, time_s: float) -> Truth:
+        """Return what the hand does at ``time_s`` of the clock."""
+        moment = self._motion.at(time_s - self._start_s)
+        skeleton, placement = pose_skeleton(moment.pose.angles), moment.pose.view.placement(self._handedness)
+        return Truth(moment.sign, moment.settled, true_pixels(skeleton, placement, self._camera))
+
+    def close(self) -> None:
+        """Hold nothing: there is nothing to release."""

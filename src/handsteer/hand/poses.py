@@ -1,0 +1,135 @@
+"""The signs as hand poses: the shape of the hand, and how it is held before the camera."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from handsteer.errors import PoseError
+from handsteer.hand.kinematics import FINGERS, Array, angles_of
+from handsteer.hand.placement import Placement, orientation
+from handsteer.landmarks.protocol import Handedness
+from handsteer.signs.vocabulary import BACKWARD, FORWARD, GO, NONE, STOP, TURN_LEFT, TURN_RIGHT
+
+
+@dataclass(frozen=True)
+class View:
+    """How a right hand is held before the camera; a left hand is held as its mirror image.
+
+    Attributes:
+        yaw: Radians about the hand's length: at 0 the camera sees the palm, at pi the back.
+        pitch: Radians; positive tips the fingers away from the camera.
+        roll: Radians in the image, clockwise; at 0 the fingers point up.
+        position: (x, y, z) of the palm in the camera frame, metres.
+    """
+
+    yaw: float = 0.0
+    pitch: float = 0.0
+    roll: float = 0.0
+    position: tuple[float, float, float] = (0.0, 0.0, 0.55)
+
+    def placement(self, handedness: Handedness) -> Placement:
+        """Return where that hand is."""
+        matrix = orientation(yaw=self.yaw, pitch=self.pitch, roll=self.roll)
+        right = Placement(matrix, np.array(self.position))
+        return right if handedness == "Right" else right.mirrored()
+
+    def to_array(self) -> Array:
+        """Return the (6,) numbers yaw, pitch, roll, x, y, z."""
+        return np.array([self.yaw, self.pitch, self.roll, *self.position])
+
+    @classmethod
+    def from_array(cls, numbers: Array) -> "View":
+        """Return the view of the (6,) numbers that :meth:`to_array` gives."""
+        yaw, pitch, roll, x, y, z = (float(number) for number in numbers)
+        return cls(yaw, pitch, roll, (x, y, z))
+
+
+@dataclass(frozen=True)
+class HandPose:
+    """A hand shape before the camera.
+
+    Attributes:
+        angles: (23,) joint angles, radians, in the order of :data:`handsteer.hand.kinematics.ANGLES`.
+        view: How it is held.
+    """
+
+    angles: Array
+    view: View
+
+
+def _shape(*, thumb: tuple[float, ...], wrist: tuple[float, float] = (0.0, 0.0), **fingers: tuple[float, ...]) -> Array:
+    """Return angles from degrees: thumb and fingers in the order of ``ANGLES``; fingers not named are closed."""
+    degrees = {"wrist_flexion": wrist[0], "wrist_deviation": wrist[1]}
+    names = ("spread", "opposition", "mcp", "ip", "rotation")
+    degrees |= {f"thumb_{name}": value for name, value in zip(names, thumb, strict=True)}
+    for finger in FINGERS:
+        values = fingers.get(finger, _CLOSED[finger])
+        degrees |= {f"{finger}_{joint}": value for joint, value in zip(_JOINTS, values, strict=True)}
+    return angles_of(**degrees)
+
+
+_JOINTS = ("spread", "mcp", "pip", "dip")
+_CLOSED = {
+    "index": (0.0, 76.0, 98.0, 52.0),
+    "middle": (0.0, 80.0, 100.0, 55.0),
+    "ring": (0.0, 82.0, 100.0, 55.0),
+    "little": (2.0, 80.0, 98.0, 52.0),
+}
+_STRAIGHT_INDEX = (2.0, 2.0, 4.0, 2.0)
+_THUMB_OVER_INDEX = (19.0, 39.0, 26.0, 64.0, -1.0)
+_THUMB_OVER_MIDDLE = (9.0, 41.0, 29.0, 66.0, -2.0)
+_THUMB_OUT = (58.0, 12.0, -6.0, -14.0, 0.0)
+
+OPEN = _shape(
+    thumb=(46.0, 12.0, 4.0, 2.0, 0.0),
+    index=(6.0, 3.0, 5.0, 3.0),
+    middle=(0.0, 2.0, 5.0, 3.0),
+    ring=(-6.0, 3.0, 6.0, 3.0),
+    little=(-14.0, 4.0, 6.0, 4.0),
+)
+RELAXED = _shape(
+    thumb=(28.0, 28.0, 15.0, 20.0, 0.0),
+    index=(1.0, 25.0, 30.0, 15.0),
+    middle=(0.0, 32.0, 36.0, 18.0),
+    ring=(-1.0, 38.0, 40.0, 20.0),
+    little=(-4.0, 42.0, 42.0, 22.0),
+)
+FIST = _shape(thumb=_THUMB_OVER_INDEX)
+INDEX = _shape(thumb=_THUMB_OVER_MIDDLE, index=_STRAIGHT_INDEX)
+INDEX_HANGING = _shape(thumb=_THUMB_OVER_MIDDLE, index=_STRAIGHT_INDEX, wrist=(20.0, -20.0))
+THUMB = _shape(thumb=_THUMB_OUT)
+
+_HEIGHT_M, _DEPTH_M = 0.03, 0.55
+_LOWERED_M = 0.75 * _DEPTH_M + 0.20  # below the picture, whatever the camera's shape
+
+
+def _held(angles: Array, *, yaw: float = 0.0, pitch: float = 0.0, roll: float = 0.0, y: float = _HEIGHT_M) -> HandPose:
+    view = View(np.radians(yaw), np.radians(pitch), np.radians(roll), (-0.02, y, _DEPTH_M))
+    return HandPose(angles, view)
+
+
+_POSES = {
+    STOP: _held(OPEN),
+    FORWARD: _held(INDEX, y=_HEIGHT_M + 0.02),
+    BACKWARD: _held(INDEX_HANGING, yaw=180, roll=180, y=-0.02),
+    TURN_LEFT: _held(THUMB, yaw=10, roll=20),
+    TURN_RIGHT: _held(THUMB, yaw=180, roll=-20),
+    GO: _held(FIST),
+    NONE: _held(RELAXED, y=_LOWERED_M),
+}
+_OTHER_HANDS = {TURN_LEFT: TURN_RIGHT, TURN_RIGHT: TURN_LEFT}
+
+
+def sign_pose(sign: str, handedness: Handedness = "Right") -> HandPose:
+    """Return how ``sign`` is shown, as people would with that hand.
+
+    A left hand is the mirror image of a right one, so it shows ``Turn Left`` as the right hand does ``Turn Right``:
+    with the back to the camera. ``NONE`` is the hand lowered out of the picture.
+
+    Raises:
+        PoseError: There is no such sign.
+    """
+    shown = _OTHER_HANDS.get(sign, sign) if handedness == "Left" else sign
+    if shown not in _POSES:
+        raise PoseError(f"unknown sign {sign!r}: the virtual hand shows {', '.join(_POSES)}")
+    return _POSES[shown]

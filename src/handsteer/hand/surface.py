@@ -1,0 +1,158 @@
+"""The hand's skin: a smooth union of round cones that follows the skeleton.
+
+A round cone is a ball that changes its size while it moves along a line. The smooth union of cones at distances d_i
+is ``-k log(sum(exp(-d_i / k)))`` (I. Quilez, *Smooth minimum*), which also says how much each of them counts.
+"""
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from handsteer.hand.kinematics import BONE_LENGTHS_M, Array, Skeleton
+
+Float = NDArray[np.float32]
+
+BLEND_M = 0.0020
+"""k of the smooth union: how far neighbouring cones melt into each other, metres."""
+
+
+class Material(IntEnum):
+    """What a cone is made of."""
+
+    SKIN = 0
+    FLUSHED = 1
+    NAIL = 2
+    SLEEVE = 3
+
+
+@dataclass(frozen=True)
+class Cones:
+    """M round cones.
+
+    Attributes:
+        start: (M, 3) centre of the first ball, metres.
+        end: (M, 3) centre of the last ball, metres.
+        start_radius: (M,) metres.
+        end_radius: (M,) metres.
+        material: (M,) :class:`Material`.
+    """
+
+    start: Array
+    end: Array
+    start_radius: Array
+    end_radius: Array
+    material: NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class _Digit:
+    """Radii, metres: base, at both joints, tip; and how far the ball at the knuckle is raised when it is bent."""
+
+    radii: tuple[float, float, float, float]
+
+
+_DIGITS = (
+    _Digit((0.0128, 0.0102, 0.0092, 0.0078)),
+    _Digit((0.0102, 0.0084, 0.0074, 0.0062)),
+    _Digit((0.0104, 0.0086, 0.0076, 0.0064)),
+    _Digit((0.0098, 0.0080, 0.0071, 0.0060)),
+    _Digit((0.0088, 0.0069, 0.0061, 0.0052)),
+)
+
+_PALM = (
+    # (start, end, start radius, end radius) in the hand frame, metres: wrist to the four knuckles,
+    ((0.0130, 0.004, 0.0), (0.0250, 0.0850, -0.001), 0.0140, 0.0098),
+    ((0.0050, 0.004, 0.0), (0.0040, 0.0860, -0.002), 0.0140, 0.0102),
+    ((-0.0050, 0.004, 0.0), (-0.0160, 0.0790, -0.001), 0.0140, 0.0100),
+    ((-0.0130, 0.004, 0.0), (-0.0325, 0.0685, 0.003), 0.0140, 0.0096),
+    # the ball of the little finger, the pads under the fingers, the hollow of the hand.
+    ((-0.0170, 0.018, 0.005), (-0.0280, 0.0560, 0.004), 0.0125, 0.0105),
+    ((0.0235, 0.0890, 0.0035), (-0.0310, 0.0720, 0.0055), 0.0085, 0.0080),
+    ((0.0150, 0.0650, 0.0020), (-0.0220, 0.0560, 0.0030), 0.0110, 0.0105),
+    ((0.0080, 0.0380, 0.0020), (-0.0150, 0.0360, 0.0030), 0.0125, 0.0125),
+)
+
+_SLEEVE_FROM_M, _ARM_LENGTH_M = 0.075, 1.2
+
+
+class _Builder:
+    def __init__(self) -> None:
+        self.rows: list[tuple[Array, Array, float, float, int]] = []
+
+    def add(self, start: Array, end: Array, radii: tuple[float, float], material: Material = Material.SKIN) -> None:
+        self.rows.append((start, end, *radii, int(material)))
+
+    def ball(self, centre: Array, radius: float, material: Material = Material.SKIN) -> None:
+        self.add(centre, centre, (radius, radius), material)
+
+    def build(self) -> Cones:
+        start, end, start_radius, end_radius, material = (np.array(column) for column in zip(*self.rows, strict=True))
+        return Cones(start, end, start_radius, end_radius, material)
+
+
+def hand_cones(skeleton: Skeleton, *, sleeve: bool = True) -> Cones:
+    """Return the cones of the first hand of ``skeleton``, in the hand frame."""
+    joints, axes = skeleton.joints[0], skeleton.axes[0]
+    builder = _Builder()
+    _add_palm(builder, joints)
+    for digit in range(5):
+        _add_digit(builder, joints[1 + 4 * digit : 5 + 4 * digit], axes[digit], _DIGITS[digit].radii, digit)
+    _add_arm(builder, skeleton.forearm[0], sleeve)
+    return builder.build()
+
+
+def _add_palm(builder: _Builder, joints: Array) -> None:
+    scale = float(np.linalg.norm(joints[9])) / float(BONE_LENGTHS_M[8])
+    for start, end, start_radius, end_radius in _PALM:
+        builder.add(np.array(start) * scale, np.array(end) * scale, (start_radius * scale, end_radius * scale))
+    thumb_base, thumb_knuckle, index = joints[1], joints[2], joints[5]
+    # The ball of the thumb, and the skin between thumb and index finger.
+    builder.add(thumb_base * 0.85, thumb_base + 0.75 * (thumb_knuckle - thumb_base), (0.0165, 0.0135))
+    builder.add(0.5 * index + 0.2 * thumb_base, 0.45 * thumb_base + 0.55 * thumb_knuckle, (0.0100, 0.0085))
+
+
+def _add_digit(builder: _Builder, joints: Array, axes: Array, radii: tuple[float, ...], digit: int) -> None:
+    tip = joints[3] - axes[2][:, 1] * radii[3]
+    ends = (joints[0], joints[1], joints[2], tip)
+    for bone in range(3):
+        material = Material.FLUSHED if bone == 2 else Material.SKIN
+        builder.add(ends[bone], ends[bone + 1], (radii[bone], radii[bone + 1]), material)
+    _add_knuckles(builder, ends, axes, radii, digit)
+    back = -axes[2][:, 2]
+    builder.add(
+        tip + axes[2][:, 1] * (0.2 * radii[3]) + back * 0.34 * radii[3],
+        tip - axes[2][:, 1] * (0.75 * radii[3]) + back * 0.42 * radii[3],
+        (0.70 * radii[3], 0.74 * radii[3]),
+        Material.NAIL,
+    )
+
+
+def _add_knuckles(
+    builder: _Builder, ends: tuple[Array, ...], axes: Array, radii: tuple[float, ...], digit: int
+) -> None:
+    """Add the bumps on the back of the joints, which stand out more the more a joint is bent."""
+    before = np.array([0.0, 0.0, 1.0]) if digit else axes[0][:, 2]
+    for joint in range(2):
+        after = axes[joint][:, 2]
+        bent = float(np.clip(1.0 - before @ after, 0.0, 1.0))
+        back = -(before + after) / max(float(np.linalg.norm(before + after)), 1e-6)
+        builder.ball(ends[joint] + back * (0.0050 * bent), (0.62 + 0.34 * bent) * radii[joint], Material.FLUSHED)
+        before = after
+
+
+def _add_arm(builder: _Builder, forearm: Array, sleeve: bool) -> None:
+    across = np.cross(forearm, [0.0, 0.0, 1.0])
+    across /= np.linalg.norm(across)
+    for side in (-1, 0, 1):
+        wrist = across * 0.010 * side
+        builder.add(wrist, across * 0.014 * side + forearm * 0.26, (0.0160, 0.0290))
+    if sleeve:
+        for side in (-1, 1):
+            offset = across * 0.010 * side
+            builder.add(
+                offset + forearm * _SLEEVE_FROM_M, offset + forearm * _ARM_LENGTH_M, (0.031, 0.060), Material.SLEEVE
+            )
+    else:
+        builder.add(forearm * 0.26, forearm * _ARM_LENGTH_M, (0.036, 0.050))
