@@ -1,7 +1,9 @@
 """What every robot offers."""
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Literal, Protocol
+
+Shape = Literal["box", "cylinder", "sphere"]
 
 
 @dataclass(frozen=True)
@@ -40,8 +42,36 @@ class RobotState:
     collisions: int
 
 
+@dataclass(frozen=True)
+class Obstacle:
+    """A thing in the robot's world, where it is now.
+
+    Attributes:
+        name: What it is called; no other has this name.
+        shape: A cylinder stands along its own z.
+        size: Extent along its own x, y and z in metres: a sphere has its diameter three times.
+        rgba: Red, green, blue and opacity, 0 to 1.
+        position: Its centre in the world, in metres.
+        orientation: Unit quaternion x, y, z, w, from its own axes to the world's.
+    """
+
+    name: str
+    shape: Shape
+    size: tuple[float, float, float]
+    rgba: tuple[float, float, float, float]
+    position: tuple[float, float, float]
+    orientation: tuple[float, float, float, float]
+
+
 class Robot(Protocol):
-    """A robot that takes velocity commands."""
+    """A robot that takes velocity commands.
+
+    Attributes:
+        description: Its URDF, as on the topic ``/robot_description``.
+    """
+
+    @property
+    def description(self) -> str: ...  # noqa: D102
 
     def command(self, linear_mps: float, angular_radps: float) -> None:
         """Ask for a velocity; the robot's own limits apply, and it brakes when no new one comes in time."""
@@ -49,6 +79,10 @@ class Robot(Protocol):
 
     def step(self, dt_s: float) -> RobotState:
         """Let ``dt_s`` seconds pass and return the state after them."""
+        ...
+
+    def obstacles(self) -> list[Obstacle]:
+        """Return the things around it, where they are now; an empty list if it knows of none."""
         ...
 
     def reset(self) -> None:

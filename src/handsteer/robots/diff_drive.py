@@ -1,0 +1,106 @@
+"""The controller of a differential drive: a velocity command in, wheel speeds and odometry out.
+
+It follows ``diff_drive_controller`` of ros2_controllers: limits on velocity and acceleration, a timeout after which it
+brakes, and odometry from measured wheel angles. Everything here is a pure function; the caller keeps the state.
+"""
+
+import math
+from dataclasses import dataclass
+
+from handsteer.config import RobotConfig
+from handsteer.robots.protocol import Pose2D
+
+
+@dataclass(frozen=True)
+class Velocity:
+    """A velocity on the floor: forward in m/s, and turning in rad/s, left positive (REP 103)."""
+
+    linear_mps: float = 0.0
+    angular_radps: float = 0.0
+
+
+@dataclass(frozen=True)
+class DriveState:
+    """What the controller remembers from one step to the next.
+
+    Attributes:
+        target: The last command; zero if it was not finite.
+        target_age_s: How long ago it came, in the robot's own seconds.
+        velocity: What the wheels are told now, within all limits.
+    """
+
+    target: Velocity = Velocity()
+    target_age_s: float = 0.0
+    velocity: Velocity = Velocity()
+
+
+def step(state: DriveState, command: Velocity | None, dt_s: float, config: RobotConfig) -> DriveState:
+    """Return the state ``dt_s`` later.
+
+    Args:
+        state: The state before.
+        command: A command that has just come, or None. One with NaN or infinity in it counts as zero velocity:
+            whatever is not understood must not move the robot.
+        dt_s: Time that passes, in seconds, >= 0.
+        config: Limits and timeout.
+    """
+    if command is None:
+        target, age_s = state.target, state.target_age_s + dt_s
+    else:
+        target, age_s = (command if _is_finite(command) else Velocity()), 0.0
+    wanted = target if age_s < config.cmd_vel_timeout else Velocity()
+    velocity = Velocity(
+        _limit(wanted.linear_mps, state.velocity.linear_mps, config.max_linear, config.max_linear_acceleration * dt_s),
+        _limit(
+            wanted.angular_radps,
+            state.velocity.angular_radps,
+            config.max_angular,
+            config.max_angular_acceleration * dt_s,
+        ),
+    )
+    return DriveState(target, age_s, velocity)
+
+
+def wheel_speeds(velocity: Velocity, config: RobotConfig) -> tuple[float, float]:
+    """Return the speeds of the left and right wheels in rad/s, forward positive: (v ∓ w L / 2) / r."""
+    sideways = velocity.angular_radps * config.wheel_separation / 2
+    return (velocity.linear_mps - sideways) / config.wheel_radius, (
+        velocity.linear_mps + sideways
+    ) / config.wheel_radius
+
+
+def velocity_of(left: float, right: float, config: RobotConfig) -> Velocity:
+    """Return the velocity of a robot whose wheels turn at ``left`` and ``right`` rad/s and do not slip.
+
+    Given angles in rad instead of speeds, it returns the distance in m and the turn in rad.
+    """
+    return Velocity(
+        (left + right) / 2 * config.wheel_radius, (right - left) * config.wheel_radius / config.wheel_separation
+    )
+
+
+def integrate(pose: Pose2D, left: float, right: float, config: RobotConfig) -> Pose2D:
+    """Return the pose after the wheels have turned by ``left`` and ``right`` rad, along a circular arc.
+
+    The chord of the arc is the midpoint rule (Runge-Kutta of second order) times sin(a) / a, where a is half the turn.
+    This is exact, as ``Odometry::integrateExact`` of diff_drive_controller, and needs no special case for small turns
+    other than zero.
+    """
+    moved = velocity_of(left, right, config)
+    half_turn = moved.angular_radps / 2
+    chord = moved.linear_mps * (math.sin(half_turn) / half_turn if half_turn else 1.0)
+    return Pose2D(
+        pose.x + chord * math.cos(pose.yaw + half_turn),
+        pose.y + chord * math.sin(pose.yaw + half_turn),
+        math.remainder(pose.yaw + moved.angular_radps, math.tau),
+    )
+
+
+def _is_finite(velocity: Velocity) -> bool:
+    return math.isfinite(velocity.linear_mps) and math.isfinite(velocity.angular_radps)
+
+
+def _limit(wanted: float, now: float, highest: float, largest_change: float) -> float:
+    """Return the value nearest to ``wanted`` within ``highest`` that ``largest_change`` lets us reach."""
+    wanted = max(-highest, min(highest, wanted))
+    return max(now - largest_change, min(now + largest_change, wanted))

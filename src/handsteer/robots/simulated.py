@@ -1,0 +1,182 @@
+"""The simulated robot: its controller, its physics, and what it touches."""
+
+import logging
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from handsteer.config import RobotConfig
+from handsteer.errors import WorldError
+from handsteer.robots import diff_drive
+from handsteer.robots.description import robot_description
+from handsteer.robots.diff_drive import DriveState, Velocity
+from handsteer.robots.physics import ROBOT_JOINT, TIMESTEP_S, WHEEL_JOINTS, compile_model, thing_name
+from handsteer.robots.protocol import Obstacle, Pose2D, RobotState
+from handsteer.robots.world import World, load_world
+
+_log = logging.getLogger(__name__)
+
+_PHYSICS_STEPS = 2
+PERIOD_S = _PHYSICS_STEPS * TIMESTEP_S
+"""One step of the controller: 100 Hz, as ros2_control's controller manager runs by default."""
+
+# A touch within this time after the last one is the same touch: what is pushed loses contact now and then.
+_SAME_TOUCH_S = 0.2
+
+# Nothing in a sound simulation gets near it: a wheel at the limits of the configuration's defaults turns at 63 rad/s.
+_WILD_SPEED = 1e5
+
+
+class SimulatedRobot:
+    """The diff-drive robot of the URDF in a world, simulated by MuJoCo.
+
+    The same commands in the same steps give the same path, bit for bit. Not safe to use from two threads at once.
+
+    Attributes:
+        world: The world that it is in.
+        description: Its URDF.
+        model: The MuJoCo model, for experiments.
+        data: The MuJoCo state, for experiments.
+    """
+
+    def __init__(self, config: RobotConfig, world: World | None = None) -> None:
+        """Put the robot at the origin of ``world``, by default the one that ``config`` names.
+
+        ``config`` sets what the controller believes of the wheels; the wheels themselves are those of the URDF.
+
+        Raises:
+            WorldError: The world cannot be read, or an obstacle in it overlaps the robot.
+        """
+        self.world = load_world(config.world) if world is None else world
+        self.description = robot_description()
+        self.model = compile_model(self.description, self.world)
+        self.data = mujoco.MjData(self.model)
+        self._config = config
+        joints = [self.model.joint(name) for name in WHEEL_JOINTS]
+        self._wheel_angles = np.array([joint.qposadr[0] for joint in joints])
+        self._wheel_speeds = np.array([joint.dofadr[0] for joint in joints])
+        self._pose_at = int(self.model.joint(ROBOT_JOINT).qposadr[0])
+        self._thing_of_geom, self._is_robot_geom = _tell_geoms_apart(self.model, self.world)
+        self._asked_s = 0.0
+        self._periods = 0
+        self._command: Velocity | None = None
+        self.reset()
+        self._refuse_overlap(config.world)
+
+    def command(self, linear_mps: float, angular_radps: float) -> None:
+        """Ask for a velocity in m/s and rad/s; see :func:`handsteer.robots.diff_drive.step` for what becomes of it."""
+        self._command = Velocity(linear_mps, angular_radps)
+
+    def step(self, dt_s: float) -> RobotState:
+        """Let ``dt_s`` seconds pass, in whole periods of 0.01 s; what is left of them is carried to the next call."""
+        self._asked_s += dt_s
+        while (self._periods + 1) * PERIOD_S <= self._asked_s + 1e-9:
+            self._periods += 1
+            self._step_period()
+        return self._state()
+
+    def obstacles(self) -> list[Obstacle]:
+        """Return the obstacles where they are now."""
+        return [
+            Obstacle(thing.name, thing.shape, thing.extent, thing.rgba, *self._thing_pose(index))
+            for index, thing in enumerate(self.world.obstacles)
+        ]
+
+    def reset(self) -> None:
+        """Stand still at the start again, obstacles too; odometry and collisions are 0 again, the time goes on."""
+        mujoco.mj_resetData(self.model, self.data)
+        mujoco.mj_forward(self.model, self.data)
+        self._command = None
+        self._drive = DriveState()
+        self._odometry = Pose2D(0.0, 0.0, 0.0)
+        self._collisions = 0
+        self._touched_until: dict[str, int] = {}
+
+    def close(self) -> None:
+        """Forget the last command, so that it stands at once; may be called twice."""
+        self._command = None
+        self._stop()
+
+    def _step_period(self) -> None:
+        self._drive = diff_drive.step(self._drive, self._command, PERIOD_S, self._config)
+        self._command = None
+        self.data.ctrl[: len(WHEEL_JOINTS)] = 2 * diff_drive.wheel_speeds(self._drive.velocity, self._config)
+        before = self.data.qpos.copy()
+        mujoco.mj_step(self.model, self.data, _PHYSICS_STEPS)
+        if not np.abs(self.data.qvel).max() < _WILD_SPEED:  # NaN is not below either
+            _log.warning("the simulation has become unstable at %.2f s; everything stops", self._periods * PERIOD_S)
+            self.data.qpos[:] = before
+            self._stop()
+        turned = self.data.qpos[self._wheel_angles] - before[self._wheel_angles]
+        self._odometry = diff_drive.integrate(self._odometry, *_sides(turned), self._config)
+        self._count_collisions()
+
+    def _stop(self) -> None:
+        self._drive = DriveState()
+        self.data.ctrl[:] = 0
+        self.data.qvel[:] = 0
+        mujoco.mj_forward(self.model, self.data)
+
+    def _state(self) -> RobotState:
+        speeds = self.data.qvel[self._wheel_speeds]
+        velocity = diff_drive.velocity_of(*_sides(speeds), self._config)
+        return RobotState(
+            time_s=self._periods * PERIOD_S,
+            odometry=self._odometry,
+            linear_mps=velocity.linear_mps,
+            angular_radps=velocity.angular_radps,
+            joint_positions=dict(zip(WHEEL_JOINTS, self.data.qpos[self._wheel_angles].tolist(), strict=True)),
+            joint_velocities=dict(zip(WHEEL_JOINTS, speeds.tolist(), strict=True)),
+            truth=self._truth(),
+            contacts=tuple(self._touched()),
+            collisions=self._collisions,
+        )
+
+    def _truth(self) -> Pose2D:
+        x, y, _, qw, qx, qy, qz = self.data.qpos[self._pose_at : self._pose_at + 7].tolist()
+        return Pose2D(x, y, float(np.arctan2(2 * (qw * qz + qx * qy), 1 - 2 * (qy * qy + qz * qz))))
+
+    def _touched(self) -> list[str]:
+        """Return the names of the obstacles that the robot touches, in the order of the world."""
+        geoms = self.data.contact.geom
+        things = np.where(self._is_robot_geom[geoms], self._thing_of_geom[geoms[:, ::-1]], -1)
+        return [self.world.obstacles[index].name for index in np.unique(things[things >= 0])]
+
+    def _count_collisions(self) -> None:
+        for name in self._touched():
+            if self._touched_until.get(name, -1) < self._periods:
+                self._collisions += 1
+            self._touched_until[name] = self._periods + round(_SAME_TOUCH_S / PERIOD_S)
+
+    def _thing_pose(self, index: int) -> tuple[tuple[float, float, float], tuple[float, float, float, float]]:
+        if self.world.obstacles[index].movable:
+            start = int(self.model.joint(thing_name(index)).qposadr[0])
+            x, y, z, qw, qx, qy, qz = self.data.qpos[start : start + 7].tolist()
+        else:
+            geom = self.model.geom(thing_name(index))
+            (x, y, z), (qw, qx, qy, qz) = geom.pos.tolist(), geom.quat.tolist()
+        return (x, y, z), (qx, qy, qz, qw)
+
+    def _refuse_overlap(self, name: str) -> None:
+        if touched := self._touched():
+            raise WorldError(
+                f"world {name}: position of obstacle {touched[0]!r} overlaps the robot, which starts at 0, 0; "
+                "keep 0.35 m around it free"
+            )
+
+
+def _sides(wheels: NDArray[np.float64]) -> tuple[float, float]:
+    """Return the means of the left and the right wheels; ``wheels`` is (4,), as WHEEL_JOINTS."""
+    front_left, front_right, rear_left, rear_right = wheels.tolist()
+    return (front_left + rear_left) / 2, (front_right + rear_right) / 2
+
+
+def _tell_geoms_apart(model: mujoco.MjModel, world: World) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """Return for each geom the index of the obstacle that it is, or -1; and whether it is a part of the robot."""
+    thing_of_geom = np.full(model.ngeom, -1)
+    for index in range(len(world.obstacles)):
+        thing_of_geom[model.geom(thing_name(index)).id] = index
+    robot = model.joint(ROBOT_JOINT).id
+    is_robot_geom = model.body_rootid[model.geom_bodyid] == model.jnt_bodyid[robot]
+    return thing_of_geom, is_robot_geom
