@@ -1,0 +1,177 @@
+"""The node ``dashboard``: listens to all that the page shows, and steers for the people who look at it."""
+
+from collections import deque
+from dataclasses import dataclass, replace
+from typing import cast
+
+from handsteer.clock import Clock, to_seconds
+from handsteer.control.sign_control import Velocity
+from handsteer.dashboard.geometry import yaw_of
+from handsteer.dashboard.state import Observed, PageState, Report, compose, place_in_world
+from handsteer.messages import (
+    CMD_VEL,
+    DIAGNOSTICS,
+    JOINT_STATES,
+    ODOM,
+    ROBOT_DESCRIPTION,
+    WORLD_MARKERS,
+    DiagnosticArray,
+    DiagnosticStatus,
+    JointState,
+    Marker,
+    MarkerArray,
+    Odometry,
+    String,
+    Twist,
+)
+from handsteer.nodes.node import Node
+from handsteer.nodes.steering import SteeringNode
+from handsteer.robots.protocol import Pose2D
+from handsteer.transports.protocol import Received, Transport
+
+HOLD_TIMEOUT_S = 0.4
+"""Steering ends when the page has not repeated it for this long: the tab was closed, or the network lost."""
+
+_WATCH_PERIOD_S = 0.1
+_FRAME_COUNTS_KEPT = 6
+_ODOMETRY_KEPT = 16
+
+
+_START = Pose2D(0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class WorldState:
+    """What the 3D view shows.
+
+    Attributes:
+        robot: Where the robot is in the world.
+        joints: Joint angles in rad by name.
+        markers: The obstacles by namespace and id.
+        description: The robot's URDF; empty as long as it is not known.
+    """
+
+    robot: Pose2D = _START
+    joints: tuple[tuple[str, float], ...] = ()
+    markers: tuple[Marker, ...] = ()
+    description: str = ""
+
+
+class DashboardNode(Node):
+    """Keeps the newest of every topic for the page.
+
+    Attributes:
+        world: What the 3D view shows.
+    """
+
+    def __init__(self, transport: Transport, clock: Clock, steering: SteeringNode) -> None:
+        super().__init__("dashboard", transport, clock)
+        self.world = WorldState()
+        self._observed = Observed()
+        self._frame_counts: deque[tuple[float, float]] = deque(maxlen=_FRAME_COUNTS_KEPT)
+        self._odometry: deque[tuple[float, Pose2D]] = deque(maxlen=_ODOMETRY_KEPT)
+        self._truth: tuple[Pose2D, Pose2D] | None = None
+        self._steering = steering
+        self._holder: tuple[str, float] | None = None
+        self.subscribe(DIAGNOSTICS, self._on_diagnostics, key=_reporter)
+        self.subscribe(CMD_VEL, self._on_command)
+        self.subscribe(ODOM, self._on_odometry)
+        self.subscribe(JOINT_STATES, self._on_joints)
+        self.subscribe(WORLD_MARKERS, self._on_markers)
+        self.subscribe(ROBOT_DESCRIPTION, self._on_description)
+        self.every(_WATCH_PERIOD_S, self._watch)
+
+    def state(self) -> PageState:
+        """Return what the page says now."""
+        return compose(self._observed, self.clock.now())
+
+    def steer(self, viewer: str, linear_mps: float, angular_radps: float) -> None:
+        """Drive at this velocity; ``viewer`` has to repeat it within :data:`HOLD_TIMEOUT_S` for it to last."""
+        self._holder = (viewer, self.clock.now())
+        self._steering.steer(linear_mps, angular_radps)
+
+    def release(self, viewer: str) -> None:
+        """Stop, if it is ``viewer`` who steers."""
+        holder = self._holder
+        if holder is not None and holder[0] == viewer:
+            self._holder = None
+            self._steering.release()
+
+    def on_stop(self) -> None:
+        """Leave nothing in motion that was steered from here."""
+        if self._holder is not None:
+            self.release(self._holder[0])
+
+    def _watch(self) -> None:
+        holder = self._holder
+        if holder is not None and self.clock.now() - holder[1] > HOLD_TIMEOUT_S:
+            self.release(holder[0])
+
+    def _on_diagnostics(self, received: Received[DiagnosticArray]) -> None:
+        now = self.clock.now()
+        stamp_s = to_seconds(received.message.header.stamp)
+        for status in received.message.status:
+            report = _report(status, now)
+            self._observed = replace(self._observed, reports={**self._observed.reports, status.name: report})
+            if status.name == "my_camera":
+                self._count_frames(report)
+            if status.name == "robot":
+                self._take_truth(report, stamp_s)
+
+    def _count_frames(self, report: Report) -> None:
+        frames = report.number("frames")
+        if frames is not None:
+            self._frame_counts.append((report.came_s, frames))
+            self._observed = replace(self._observed, frame_counts=tuple(self._frame_counts))
+
+    def _take_truth(self, report: Report, stamp_s: float) -> None:
+        truth = _pose(report.values.get("truth", ""))
+        then = [pose for at_s, pose in self._odometry if at_s <= stamp_s]
+        if truth is not None and then:
+            self._truth = (truth, then[-1])
+
+    def _on_command(self, received: Received[Twist]) -> None:
+        twist = received.message
+        command = Velocity(twist.linear.x, twist.angular.z)
+        self._observed = replace(self._observed, command=command, command_came_s=self.clock.now())
+
+    def _on_odometry(self, received: Received[Odometry]) -> None:
+        odometry = received.message
+        measured = Velocity(odometry.twist.twist.linear.x, odometry.twist.twist.angular.z)
+        self._observed = replace(self._observed, measured=measured)
+        pose = _pose_of(odometry)
+        self._odometry.append((to_seconds(odometry.header.stamp), pose))
+        self.world = replace(self.world, robot=place_in_world(*self._truth, pose) if self._truth else pose)
+
+    def _on_joints(self, received: Received[JointState]) -> None:
+        names, positions = received.message.name, received.message.position.tolist()
+        self.world = replace(self.world, joints=tuple(zip(names, positions, strict=True)))
+
+    def _on_markers(self, received: Received[MarkerArray]) -> None:
+        # rosbags types this list by the Marker of an older ROS.
+        self.world = replace(self.world, markers=tuple(cast("list[Marker]", received.message.markers)))
+
+    def _on_description(self, received: Received[String]) -> None:
+        self.world = replace(self.world, description=received.message.data)
+
+
+def _reporter(message: DiagnosticArray) -> tuple[str, ...]:
+    return tuple(status.name for status in message.status)
+
+
+def _report(status: DiagnosticStatus, came_s: float) -> Report:
+    return Report(status.level, status.message, {pair.key: pair.value for pair in status.values}, came_s)
+
+
+def _pose(text: str) -> Pose2D | None:
+    """Return the pose of ``text``, as in "x y yaw"; None when it is not that."""
+    try:
+        x, y, yaw = (float(part) for part in text.split())
+    except ValueError:
+        return None
+    return Pose2D(x, y, yaw)
+
+
+def _pose_of(odometry: Odometry) -> Pose2D:
+    pose = odometry.pose.pose
+    return Pose2D(pose.position.x, pose.position.y, yaw_of(pose.orientation))

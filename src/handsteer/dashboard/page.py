@@ -1,0 +1,100 @@
+"""The page ``/``: what the camera sees, what was understood, what the robot does, and a pad to steer it."""
+
+from nicegui import ui
+
+from handsteer.dashboard.node import DashboardNode
+from handsteer.dashboard.panels import (
+    Banner,
+    CameraPanel,
+    RobotFoot,
+    SignsPanel,
+    SteerPanel,
+    TimingPanel,
+    VelocityPanel,
+)
+from handsteer.dashboard.scene import WorldView
+from handsteer.dashboard.watch import WhileWatched
+
+PICTURE_PATH = "/camera.mjpg"
+ASSETS_PATH = "/assets"
+
+_WORLD_PERIOD_S = 0.05
+_WORDS_PERIOD_S = 0.1
+
+ICON = (
+    '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 64 64"><rect width="64" height="64" rx="16" fill="#2457d6"/>'
+    '<g fill="none" stroke="#fff" stroke-linecap="round" stroke-width="6"><path d="M24 30V12M32 28V18M40 29V22"/>'
+    '<path d="M18 34v-2a4 4 0 0 1 4-4h18a5 5 0 0 1 5 5v7a11 11 0 0 1-11 11h-5a11 11 0 0 1-11-11z" fill="#fff"/></g>'
+    "</svg>"
+)
+_THEME_ICON = (
+    '<svg viewBox="0 0 24 24" fill="none" stroke="currentColor" stroke-width="2" aria-hidden="true">'
+    '<circle cx="12" cy="12" r="9"/><path d="M12 3a9 9 0 0 1 0 18z" fill="currentColor"/></svg>'
+)
+
+
+class Page:
+    """One browser's view; its timers run while the browser is connected.
+
+    Args:
+        node: Is joined for as long as the browser shows the page.
+    """
+
+    def __init__(self, node: WhileWatched[DashboardNode]) -> None:
+        self._client = ui.context.client
+        self._node = node
+        self._client.on_disconnect(self._leave)
+        self._client.on_delete(self._leave)
+        ui.add_head_html(
+            f'<link rel="stylesheet" href="{ASSETS_PATH}/page.css"><script src="{ASSETS_PATH}/page.js" defer></script>'
+        )
+        self._top()
+        self._banner = Banner()
+        self._camera = CameraPanel(PICTURE_PATH)
+        with ui.element("section").classes("card viewer world"):
+            with ui.element("div").classes("stage"):
+                self._world = WorldView()
+                ui.label("drag to look around").classes("caption")
+            self._robot = RobotFoot()
+        with ui.element("div").classes("panels"):
+            self._velocity = VelocityPanel()
+            self._timing = TimingPanel()
+            SteerPanel(self._steer, self._release)
+            self._signs = SignsPanel()
+        ui.timer(_WORLD_PERIOD_S, self._update_world)
+        ui.timer(_WORDS_PERIOD_S, self._update_words)
+
+    def _top(self) -> None:
+        with ui.element("header").classes("top"):
+            ui.html(ICON, sanitize=False)
+            with ui.element("div"):
+                ui.html("<h1>handsteer</h1>", sanitize=False)
+                ui.label("drive a robot with your hand signs").classes("tagline")
+            with ui.element("div").classes("right"):
+                self._source = ui.label("").classes("chip")
+                with ui.element("button").classes("icon-button theme").props('aria-label="Light or dark"'):
+                    ui.html(_THEME_ICON, sanitize=False)
+
+    def _update_world(self) -> None:
+        if self._client.has_socket_connection:
+            self._world.update(self._joined().world)
+
+    def _update_words(self) -> None:
+        if not self._client.has_socket_connection:
+            return
+        state = self._joined().state()
+        self._source.set_text(state.camera)
+        for panel in (self._banner, self._camera, self._robot, self._velocity, self._timing, self._signs):
+            panel.update(state)
+
+    def _steer(self, linear_mps: float, angular_radps: float) -> None:
+        self._joined().steer(self._client.id, linear_mps, angular_radps)
+
+    def _release(self) -> None:
+        self._joined().release(self._client.id)
+
+    def _joined(self) -> DashboardNode:
+        return self._node.join(self._client.id)
+
+    def _leave(self) -> None:
+        self._node.leave(self._client.id)

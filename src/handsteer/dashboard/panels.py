@@ -1,0 +1,274 @@
+"""The panels of the page: each builds its elements once and then only changes what has changed."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+from nicegui import ui
+
+from handsteer.dashboard.legend import LEGEND
+from handsteer.dashboard.state import PageState
+from handsteer.signs.vocabulary import NONE
+
+_UNKNOWN = "--"
+_DRIVERS = {"signs": "your signs", "steering": "the pad", "nobody": "nobody"}
+
+
+@contextmanager
+def card(title: str, classes: str) -> Iterator[None]:
+    """Put what follows into a card with a heading."""
+    with ui.element("section").classes(f"card {classes}"):
+        _tag("h2", "", title)
+        yield
+
+
+class Banner:
+    """The sentence: what the robot does, and why."""
+
+    def __init__(self) -> None:
+        with ui.element("section").classes("card banner").props('role="status"') as self._banner:
+            _box("lamp")
+            self._headline = _text("headline", "Starting")
+            self._reason = _text("reason", "waiting for the first report")
+        self._mood = ""
+
+    def update(self, state: PageState) -> None:
+        """Show ``state``."""
+        self._headline.set_text(state.headline)
+        self._reason.set_text(state.reason)
+        if state.mood != self._mood:
+            self._banner.classes(remove=self._mood, add=state.mood)
+            self._mood = state.mood
+
+
+class CameraPanel:
+    """The mirrored picture, and what was understood of it."""
+
+    def __init__(self, picture_url: str) -> None:
+        with ui.element("section").classes("card viewer camera"):
+            with _box("stage"):
+                ui.element("img").props(f'src="{picture_url}" alt="The camera\'s picture, mirrored"')
+                with _box("veil") as self._veil:
+                    self._excuse = _text("", "waiting for the first picture")
+                _text("caption", "as in a mirror")
+            with _box("foot"):
+                self._sign = _text("sign", "No sign")
+                with _box("meter"):
+                    self._confidence = _box("")
+                self._percent = _text("percent", "")
+                self._hand = _text("hand", "")
+        self._width = 0
+
+    def update(self, state: PageState) -> None:
+        """Show ``state``."""
+        # A sign that counts goes on counting for a moment in which it is not seen.
+        shown = state.sign if state.seen == NONE else state.seen
+        self._sign.set_text("No sign" if shown == NONE else shown)
+        _switch(self._sign, "pending", on=shown != state.sign)
+        self._hand.set_text(f"{state.handedness} hand" if state.handedness else "No hand")
+        percent = round(100 * state.confidence) if state.seen != NONE else 0
+        self._percent.set_text(f"{percent} %" if percent else "")
+        if percent != self._width:
+            self._confidence.style(f"width: {percent}%")
+            self._width = percent
+        self._excuse.set_text(state.reason if state.mood == "trouble" else state.camera_message or "no picture yet")
+        _switch(self._veil, "off", on=state.has_picture)
+
+
+class RobotFoot:
+    """How far the robot went, what it bumped into, and who drives it."""
+
+    def __init__(self) -> None:
+        with _box("foot"):
+            self._driver = _fact("driven by")
+            self._path = _fact("path")
+            self._bumps = _fact("bumps")
+
+    def update(self, state: PageState) -> None:
+        """Show ``state``."""
+        self._driver.set_text(_DRIVERS.get(state.driver, state.driver))
+        self._path.set_text(_UNKNOWN if state.path_length_m is None else f"{state.path_length_m:.1f} m")
+        self._bumps.set_text(_UNKNOWN if state.collisions is None else str(state.collisions))
+
+
+class VelocityPanel:
+    """Both velocities: a bar for the measured one, a mark for the commanded one."""
+
+    def __init__(self) -> None:
+        with card("Velocity", "panel velocity"):
+            self._linear = _Axis("Linear", "m/s", scale=1.0, ends=("backward", "forward"), sign=1)
+            # Left is positive (REP 103), and stands at the left.
+            self._angular = _Axis("Angular", "rad/s", scale=2.0, ends=("left", "right"), sign=-1)
+
+    def update(self, state: PageState) -> None:
+        """Show ``state``."""
+        self._linear.update(state.commanded.linear_mps, state.measured.linear_mps)
+        self._angular.update(state.commanded.angular_radps, state.measured.angular_radps)
+
+
+class TimingPanel:
+    """How quick it is."""
+
+    def __init__(self) -> None:
+        with card("Camera to command", "panel timing"), _box("figures"):
+            self._median = _figure("ms", "median")
+            self._p99 = _figure("ms", "99 of 100 below")
+            self._fps = _figure("frames/s", "camera")
+
+    def update(self, state: PageState) -> None:
+        """Show ``state``."""
+        for label, value, digits in (
+            (self._median, state.latency_median_ms, 1),
+            (self._p99, state.latency_p99_ms, 1),
+            (self._fps, state.fps, 1),
+        ):
+            label.set_text(_UNKNOWN if value is None else f"{value:.{digits}f}")
+
+
+class SteerPanel:
+    """A pad to drive by hand: hold it to drive, let go to stop.
+
+    Args:
+        steer: Is called with m/s forward and rad/s to the left again and again while the pad is held.
+        release: Is called when it is let go.
+    """
+
+    _TURN_PER_SPEED = 2.0  # rad/s to the left at full deflection for each m/s of top speed
+
+    def __init__(self, steer: Callable[[float, float], None], release: Callable[[], None]) -> None:
+        self._steer = steer
+        with card("Steer by hand", "panel steer"), _box("row"):
+            with _box("pad").props('tabindex="0" role="application" aria-label="Drive pad: drag it, or use the keys"'):
+                for turn in (0, 90, 180, 270):
+                    _box("arrow").style(f"transform: rotate({turn}deg)")
+                _box("knob")
+            with _box("side"):
+                ui.label("Hold to drive, let go to stop. Arrow keys or W A S D work too.")
+                self._label = _text("speed", "")
+                self._speed = ui.slider(min=0.1, max=1.0, step=0.1, value=0.5, on_change=self._show_speed)
+                self._speed.props('aria-label="Top speed in metres a second"')
+        self._show_speed()
+        ui.on("pad_held", lambda event: self._drive(event.args))
+        ui.on("pad_released", lambda _: release())
+
+    def _drive(self, deflection: object) -> None:
+        x, y = read_deflection(deflection)
+        top: float = self._speed.value
+        self._steer(y * top, -x * top * self._TURN_PER_SPEED)
+
+    def _show_speed(self) -> None:
+        self._label.set_text(f"Top speed {self._speed.value:.1f} m/s")
+
+
+class SignsPanel:
+    """Which sign does what; the one that counts is lit."""
+
+    def __init__(self) -> None:
+        self._lit = NONE
+        self._tiles: dict[str, ui.element] = {}
+        with card("The signs", "panel legend"), _box("signs"):
+            for entry in LEGEND:
+                with _box("sign-tile") as tile:
+                    ui.html(entry.drawing, sanitize=False)
+                    with _box("words"):
+                        _text("name", entry.sign)
+                        _text("pose", entry.pose)
+                        _text("effect", entry.effect)
+                self._tiles[entry.sign] = tile
+
+    def update(self, state: PageState) -> None:
+        """Show ``state``."""
+        if state.sign == self._lit:
+            return
+        for sign in {self._lit, state.sign} & self._tiles.keys():
+            _switch(self._tiles[sign], "seen", on=sign == state.sign)
+        self._lit = state.sign
+
+
+def read_deflection(sent: object) -> tuple[float, float]:
+    """Return x (right) and y (forward) of the pad, -1 to 1, as a browser sent it; anything odd is 0."""
+    values = sent if isinstance(sent, dict) else {}
+    x, y = (_within_one(values.get(name)) for name in ("x", "y"))
+    return x, y
+
+
+def _within_one(value: object) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= 1:
+        return 0.0
+    return float(value)
+
+
+@dataclass(frozen=True)
+class Bar:
+    """A bar that starts in the middle: where it begins and how long it is, in percent of its track."""
+
+    left: float
+    width: float
+    mark: float
+
+
+def bar(commanded: float, measured: float, scale: float) -> Bar:
+    """Return the bar of ``measured`` with a mark at ``commanded``; ``scale`` is the value at the right end."""
+    at, mark = (50 + 50 * max(-1.0, min(value / scale, 1.0)) for value in (measured, commanded))
+    return Bar(round(min(at, 50.0), 1), round(abs(at - 50), 1), round(mark, 1))
+
+
+class _Axis:
+    def __init__(self, name: str, unit: str, *, scale: float, ends: tuple[str, str], sign: int) -> None:
+        self._scale = scale * sign
+        self._shown: Bar | None = None
+        with _box("axis"):
+            with _box("line"):
+                _text("", name)
+                self._measured = _text("value", "0.00")
+                _text("unit", unit)
+            with _box("bar"):
+                self._fill = _box("fill")
+                self._mark = _box("mark")
+            with _box("ends"):
+                _text("", ends[0])
+                self._commanded = _text("", "")
+                _text("", ends[1])
+
+    def update(self, commanded: float, measured: float) -> None:
+        # Adding zero turns -0.00 into 0.00.
+        self._measured.set_text(f"{round(measured, 2) + 0.0:.2f}")
+        self._commanded.set_text(f"commanded {round(commanded, 2) + 0.0:.2f}")
+        shown = bar(commanded, measured, self._scale)
+        if shown != self._shown:
+            self._shown = shown
+            self._fill.style(f"left: {shown.left}%; width: {shown.width}%")
+            self._mark.style(f"left: {shown.mark}%")
+
+
+def _figure(unit: str, name: str) -> ui.label:
+    with _box("figure"):
+        with _box(""):
+            value = ui.label(_UNKNOWN).classes("value").style("display: inline")
+            ui.label(unit).classes("unit").style("display: inline")
+        _text("name", name)
+    return value
+
+
+def _fact(name: str) -> ui.label:
+    with _box("fact"):
+        ui.label(name).style("display: inline")
+        return _tag("b", "", _UNKNOWN)
+
+
+def _switch(element: ui.element, name: str, *, on: bool) -> None:
+    element.classes(add=name if on else "", remove="" if on else name)
+
+
+def _box(classes: str) -> ui.element:
+    return ui.element("div").classes(classes)
+
+
+def _text(classes: str, text: str) -> ui.label:
+    return ui.label(text).classes(classes)
+
+
+def _tag(tag: str, classes: str, text: str) -> ui.label:
+    label = ui.label(text).classes(classes)
+    label.tag = tag
+    return label

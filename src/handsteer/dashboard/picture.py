@@ -1,0 +1,138 @@
+"""The camera's picture for browsers: a stream of JPEG files that a plain ``<img>`` shows (MJPEG)."""
+
+import asyncio
+import math
+import uuid
+from collections import deque
+from collections.abc import Callable
+from contextlib import suppress
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from starlette.responses import Response
+from starlette.types import Receive, Scope, Send
+
+from handsteer.clock import Clock
+from handsteer.dashboard.watch import WhileWatched
+from handsteer.images import bgr_image, encode_jpeg
+from handsteer.messages import IMAGE_ANNOTATED, Image
+from handsteer.nodes.node import Node
+from handsteer.transports.protocol import Received, Transport
+
+BYTES_PER_S = 2_000_000
+"""No viewer is sent more than this."""
+
+_MAX_PIXELS = 640 * 480
+_BEST_QUALITY, _WORST_QUALITY = 80, 40
+# 60 kB leave room for 30 frames a second within BYTES_PER_S.
+_TOO_LARGE, _SMALL = 60_000, 45_000
+
+_BOUNDARY = b"frame"
+
+
+class PictureNode(Node):
+    """Encodes the newest picture once for all viewers who wait for one; pictures that nobody waits for are dropped."""
+
+    def __init__(self, transport: Transport, clock: Clock) -> None:
+        super().__init__("dashboard_picture", transport, clock)
+        self._waiting: deque[asyncio.Future[bytes]] = deque()
+        self._quality = _BEST_QUALITY
+        self._not_before_s = -math.inf
+        self.subscribe(IMAGE_ANNOTATED, self._on_image)
+
+    async def next_jpeg(self) -> bytes:
+        """Return the next picture as a JPEG file."""
+        future: asyncio.Future[bytes] = asyncio.get_running_loop().create_future()
+        self._waiting.append(future)
+        return await future
+
+    def on_stop(self) -> None:
+        """Let nobody wait for a picture that will not come."""
+        self._answer(lambda future: future.cancel())
+
+    def _on_image(self, received: Received[Image]) -> None:
+        now = self.clock.now()
+        if not self._waiting or now < self._not_before_s:
+            return
+        jpeg = encode_jpeg(shrink(bgr_image(received.message)), self._quality).tobytes()
+        self._quality = next_quality(self._quality, len(jpeg))
+        self._not_before_s = now + len(jpeg) / BYTES_PER_S
+        self._answer(lambda future: future.set_result(jpeg))
+
+    def _answer(self, answer: Callable[["asyncio.Future[bytes]"], object]) -> None:
+        # A deque, because the server's thread adds to it meanwhile.
+        while self._waiting:
+            future = self._waiting.popleft()
+            with suppress(RuntimeError):  # the server has stopped
+                future.get_loop().call_soon_threadsafe(_unless_done, future, answer)
+
+
+class PictureResponse(Response):
+    """Streams pictures to one viewer until it leaves; one that reads slowly gets fewer, always the newest."""
+
+    def __init__(self, pictures: WhileWatched[PictureNode]) -> None:
+        super().__init__(
+            media_type=f"multipart/x-mixed-replace; boundary={_BOUNDARY.decode()}",
+            headers={"Cache-Control": "no-store"},
+        )
+        # The length is not known: there is no end.
+        del self.headers["content-length"]
+        self._pictures = pictures
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Send pictures; return when the viewer has left or the stream was ended."""
+        viewer = uuid.uuid4()
+        sending = asyncio.create_task(self._send_pictures(self._pictures.join(viewer), send))
+        leaving = asyncio.create_task(_wait_for_disconnect(receive))
+        try:
+            await asyncio.wait((sending, leaving), return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            self._pictures.leave(viewer)
+            for task in (sending, leaving):
+                task.cancel()
+            await asyncio.gather(sending, leaving, return_exceptions=True)
+        await _send_body(send, b"", more=False)
+
+    async def _send_pictures(self, node: PictureNode, send: Send) -> None:
+        await send({"type": "http.response.start", "status": self.status_code, "headers": self.raw_headers})
+        await _send_body(send, b"--" + _BOUNDARY + b"\r\n")
+        while True:
+            await _send_body(send, _part(await node.next_jpeg()))
+
+
+def shrink(bgr: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Return ``bgr``, (height, width, 3) uint8, with at most as many pixels as 640x480 has, in the same proportions."""
+    height, width = bgr.shape[:2]
+    scale = math.sqrt(_MAX_PIXELS / (height * width))
+    if scale >= 1:
+        return bgr
+    size = (max(1, int(width * scale)), max(1, int(height * scale)))
+    return np.asarray(cv2.resize(bgr, size, interpolation=cv2.INTER_AREA), np.uint8)
+
+
+def next_quality(quality: int, size: int) -> int:
+    """Return the JPEG quality (0 to 100) for the next picture after one of ``size`` bytes at ``quality``."""
+    if size > _TOO_LARGE:
+        return max(_WORST_QUALITY, quality - 10)
+    return min(_BEST_QUALITY, quality + 1) if size < _SMALL else quality
+
+
+def _part(jpeg: bytes) -> bytes:
+    # The boundary goes right after the picture: browsers show a picture only when they see its end.
+    header = b"Content-Type: image/jpeg\r\nContent-Length: %d\r\n\r\n" % len(jpeg)
+    return header + jpeg + b"\r\n--" + _BOUNDARY + b"\r\n"
+
+
+async def _send_body(send: Send, body: bytes, *, more: bool = True) -> None:
+    await send({"type": "http.response.body", "body": body, "more_body": more})
+
+
+async def _wait_for_disconnect(receive: Receive) -> None:
+    while (await receive())["type"] != "http.disconnect":
+        pass
+
+
+def _unless_done(future: "asyncio.Future[bytes]", answer: Callable[["asyncio.Future[bytes]"], object]) -> None:
+    if not future.done():
+        answer(future)

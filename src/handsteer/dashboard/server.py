@@ -1,0 +1,142 @@
+"""The web server of the page: beside the graph, on a thread of its own."""
+
+import errno
+import functools
+import os
+import socket
+import threading
+import time
+from pathlib import Path
+
+import uvicorn
+from fastapi import FastAPI
+from nicegui import ui
+from starlette.middleware.trustedhost import TrustedHostMiddleware
+from starlette.responses import Response
+from starlette.staticfiles import StaticFiles
+
+from handsteer.clock import Clock
+from handsteer.config import DashboardConfig
+from handsteer.dashboard.node import DashboardNode
+from handsteer.dashboard.page import ASSETS_PATH, ICON, PICTURE_PATH, Page
+from handsteer.dashboard.picture import PictureNode, PictureResponse
+from handsteer.dashboard.watch import WhileWatched
+from handsteer.errors import DashboardError
+from handsteer.nodes.steering import SteeringNode
+from handsteer.transports.protocol import Transport
+
+HOST = "127.0.0.1"
+
+_START_TIMEOUT_S = 20.0
+_STOP_TIMEOUT_S = 3.0
+# What the system may hold back for a viewer that reads slowly; more would only be older pictures.
+_SEND_BUFFER_BYTES = 256 * 1024
+
+_one_at_a_time = threading.Lock()
+
+
+class Dashboard:
+    """Serves the page of a graph; it knows the graph by its topics only.
+
+    NiceGUI keeps its state per process, so one page can be served at a time; another may follow it.
+
+    Args:
+        transport: Carries the graph's messages.
+        clock: The graph's clock.
+        steering: Drives when people steer on the page.
+        config: Holds the port.
+    """
+
+    def __init__(self, transport: Transport, clock: Clock, steering: SteeringNode, config: DashboardConfig) -> None:
+        self.node = WhileWatched(lambda: DashboardNode(transport, clock, steering))
+        self.pictures = WhileWatched(lambda: PictureNode(transport, clock))
+        self._port = config.port
+        self._server: uvicorn.Server | None = None
+        self._thread: threading.Thread | None = None
+
+    def start(self) -> str:
+        """Serve the page on 127.0.0.1 and return its address once it answers.
+
+        Raises:
+            DashboardError: The port is in use or not allowed, or this process serves another page.
+        """
+        if not _one_at_a_time.acquire(blocking=False):
+            raise DashboardError("this process serves a page already: stop that one first")
+        try:
+            listener = _listen(self._port)
+        except DashboardError:
+            _one_at_a_time.release()
+            raise
+        application = _application()
+        application.state.dashboard = self
+        settings = uvicorn.Config(
+            application, log_config=None, access_log=False, lifespan="on", timeout_graceful_shutdown=1
+        )
+        self._server = uvicorn.Server(settings)
+        self._thread = threading.Thread(target=self._server.run, args=([listener],), name="dashboard", daemon=True)
+        self._thread.start()
+        self._wait_until_served()
+        return f"http://{HOST}:{listener.getsockname()[1]}"
+
+    def stop(self) -> None:
+        """End the page, open connections too; may be called twice."""
+        self.node.close()
+        self.pictures.close()
+        if self._server is not None and self._thread is not None:
+            self._server.should_exit = True
+            self._thread.join(_STOP_TIMEOUT_S)
+            self._server = None
+            _one_at_a_time.release()
+
+    def _wait_until_served(self) -> None:
+        server, thread = self._server, self._thread
+        deadline_s = time.monotonic() + _START_TIMEOUT_S
+        while server is not None and thread is not None and not server.started:
+            if not thread.is_alive() or time.monotonic() > deadline_s:
+                self.stop()
+                raise DashboardError("the page's server did not start; its log says why")
+            time.sleep(0.01)
+
+
+def _listen(port: int) -> socket.socket:
+    listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+    if os.name == "posix":  # elsewhere this option would let two programs have the same port
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    listener.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BUFFER_BYTES)
+    try:
+        listener.bind((HOST, port))
+        listener.listen()
+    except OSError as error:
+        listener.close()
+        problem = "is in use" if error.errno == errno.EADDRINUSE else f"cannot be used ({error.strerror})"
+        raise DashboardError(f"port {port} on {HOST} {problem}: choose another with --port N (0: a free one)") from None
+    return listener
+
+
+@functools.cache
+def _application() -> FastAPI:
+    """Return the web application, made once per process, as NiceGUI wants it; ``state.dashboard`` is what it serves."""
+    application = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
+    # Keeps foreign pages from reaching the robot by a host name of theirs that resolves to this machine.
+    application.add_middleware(TrustedHostMiddleware, allowed_hosts=[HOST, "localhost"])
+    application.mount(ASSETS_PATH, StaticFiles(directory=Path(__file__).parent / "static"))
+
+    @application.get(PICTURE_PATH)
+    async def picture() -> Response:
+        return PictureResponse(application.state.dashboard.pictures)
+
+    @ui.page("/")
+    def index() -> None:
+        Page(application.state.dashboard.node)
+
+    ui.run_with(
+        application,
+        title="handsteer",
+        favicon=ICON,
+        dark=None,
+        tailwind=False,
+        binding_refresh_interval=None,
+        gzip_middleware_factory=None,
+        show_welcome_message=False,
+    )
+    return application

@@ -1,0 +1,50 @@
+"""Nodes that run only while somebody watches: no viewer, no cost."""
+
+import threading
+from collections.abc import Callable, Hashable
+from typing import Generic, TypeVar
+
+from handsteer.nodes.node import Node
+
+N = TypeVar("N", bound=Node)
+
+
+class WhileWatched(Generic[N]):
+    """Makes and starts a node for the first viewer, and stops it after the last; may be used from any thread.
+
+    Args:
+        make: Returns a new node, not started.
+    """
+
+    def __init__(self, make: Callable[[], N]) -> None:
+        self._make = make
+        self._lock = threading.Lock()
+        self._viewers: set[Hashable] = set()
+        self._node: N | None = None
+
+    def join(self, viewer: Hashable) -> N:
+        """Return the running node; ``viewer`` counts once, however often it joins."""
+        with self._lock:
+            self._viewers.add(viewer)
+            if self._node is None:
+                self._node = self._make()
+                self._node.start()
+            return self._node
+
+    def leave(self, viewer: Hashable) -> None:
+        """Do without the node; one that has not joined may leave."""
+        with self._lock:
+            self._viewers.discard(viewer)
+            if not self._viewers:
+                self._stop()
+
+    def close(self) -> None:
+        """Stop the node, whoever watches."""
+        with self._lock:
+            self._viewers.clear()
+            self._stop()
+
+    def _stop(self) -> None:
+        if self._node is not None:
+            self._node.stop()
+            self._node = None
