@@ -26,8 +26,8 @@ from handsteer.nodes.node import Node
 from handsteer.nodes.recognition import HandSignRecognitionNode
 from handsteer.nodes.robot import RobotNode
 from handsteer.nodes.steering import SteeringNode
+from handsteer.robots import open_robot
 from handsteer.robots.protocol import Pose2D
-from handsteer.robots.simulated import SimulatedRobot
 from handsteer.signs.drawing import annotate
 from handsteer.signs.recognizer import Recognizer
 from handsteer.signs.rules import RuleClassifier
@@ -52,7 +52,7 @@ class Graph:
     def __init__(self, config: Config, clock: Clock | None = None, transport: Transport | None = None) -> None:
         self.clock = clock or RealClock()
         self.transport = transport or InProcessTransport()
-        robot = SimulatedRobot(config.robot)
+        robot = open_robot(config.robot)
         recognizer = open_recognizer(config)
         camera = open_camera(config.camera, config.virtual_hand, self.clock)
         wires = (self.transport, self.clock)

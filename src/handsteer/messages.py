@@ -7,6 +7,7 @@ They are used as values: once published, a message is not changed any more.
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
+from rosbags.typesys.stores.ros2_jazzy import builtin_interfaces__msg__Duration as Duration
 from rosbags.typesys.stores.ros2_jazzy import builtin_interfaces__msg__Time as Time
 from rosbags.typesys.stores.ros2_jazzy import diagnostic_msgs__msg__DiagnosticArray as DiagnosticArray
 from rosbags.typesys.stores.ros2_jazzy import diagnostic_msgs__msg__DiagnosticStatus as DiagnosticStatus
@@ -31,6 +32,7 @@ from rosbags.typesys.stores.ros2_jazzy import std_msgs__msg__String as String
 from rosbags.typesys.stores.ros2_jazzy import tf2_msgs__msg__TFMessage as TFMessage
 from rosbags.typesys.stores.ros2_jazzy import visualization_msgs__msg__Marker as Marker
 from rosbags.typesys.stores.ros2_jazzy import visualization_msgs__msg__MarkerArray as MarkerArray
+from rosbags.typesys.stores.ros2_jazzy import visualization_msgs__msg__MeshFile as MeshFile
 
 __all__ = [
     "ClockMessage",
@@ -38,12 +40,14 @@ __all__ = [
     "CompressedImage",
     "DiagnosticArray",
     "DiagnosticStatus",
+    "Duration",
     "Header",
     "Image",
     "JointState",
     "KeyValue",
     "Marker",
     "MarkerArray",
+    "MeshFile",
     "Odometry",
     "Point",
     "Pose",

@@ -113,7 +113,9 @@ def _odometry(header: Header, state: RobotState) -> Odometry:
         header=header,
         child_frame_id="base_link",
         pose=PoseWithCovariance(
-            pose=Pose(position=Point(state.odometry.x, state.odometry.y, 0.0), orientation=_about_z(state.odometry.yaw)),
+            pose=Pose(
+                position=Point(state.odometry.x, state.odometry.y, 0.0), orientation=_about_z(state.odometry.yaw)
+            ),
             covariance=_COVARIANCE,
         ),
         twist=TwistWithCovariance(twist=twist(state.linear_mps, state.angular_radps), covariance=_COVARIANCE),
