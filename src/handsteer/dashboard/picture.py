@@ -4,7 +4,6 @@ import asyncio
 import math
 import uuid
 from collections import deque
-from collections.abc import Callable
 from contextlib import suppress
 
 import cv2
@@ -29,6 +28,8 @@ _BEST_QUALITY, _WORST_QUALITY = 80, 40
 _TOO_LARGE, _SMALL = 60_000, 45_000
 
 _BOUNDARY = b"frame"
+# How soon a viewer learns that there will be no more pictures.
+_END_PERIOD_S = 0.1
 
 
 class PictureNode(Node):
@@ -47,10 +48,6 @@ class PictureNode(Node):
         self._waiting.append(future)
         return await future
 
-    def on_stop(self) -> None:
-        """Let nobody wait for a picture that will not come."""
-        self._answer(lambda future: future.cancel())
-
     def _on_image(self, received: Received[Image]) -> None:
         now = self.clock.now()
         if not self._waiting or now < self._not_before_s:
@@ -58,14 +55,11 @@ class PictureNode(Node):
         jpeg = encode_jpeg(shrink(bgr_image(received.message)), self._quality).tobytes()
         self._quality = next_quality(self._quality, len(jpeg))
         self._not_before_s = now + len(jpeg) / BYTES_PER_S
-        self._answer(lambda future: future.set_result(jpeg))
-
-    def _answer(self, answer: Callable[["asyncio.Future[bytes]"], object]) -> None:
         # A deque, because the server's thread adds to it meanwhile.
         while self._waiting:
             future = self._waiting.popleft()
             with suppress(RuntimeError):  # the server has stopped
-                future.get_loop().call_soon_threadsafe(_unless_done, future, answer)
+                future.get_loop().call_soon_threadsafe(_resolve, future, jpeg)
 
 
 class PictureResponse(Response):
@@ -81,18 +75,20 @@ class PictureResponse(Response):
         self._pictures = pictures
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Send pictures; return when the viewer has left or the stream was ended."""
+        """Send pictures; return when the viewer has left or the pictures have ended."""
         viewer = uuid.uuid4()
         sending = asyncio.create_task(self._send_pictures(self._pictures.join(viewer), send))
         leaving = asyncio.create_task(_wait_for_disconnect(receive))
         try:
-            await asyncio.wait((sending, leaving), return_when=asyncio.FIRST_COMPLETED)
+            while self._pictures.is_watched_by(viewer) and not (sending.done() or leaving.done()):
+                await asyncio.wait((sending, leaving), timeout=_END_PERIOD_S, return_when=asyncio.FIRST_COMPLETED)
         finally:
             self._pictures.leave(viewer)
             for task in (sending, leaving):
                 task.cancel()
             await asyncio.gather(sending, leaving, return_exceptions=True)
-        await _send_body(send, b"", more=False)
+        with suppress(TimeoutError, OSError):  # the viewer does not read any more
+            await asyncio.wait_for(_send_body(send, b"", more=False), _END_PERIOD_S)
 
     async def _send_pictures(self, node: PictureNode, send: Send) -> None:
         await send({"type": "http.response.start", "status": self.status_code, "headers": self.raw_headers})
@@ -133,6 +129,6 @@ async def _wait_for_disconnect(receive: Receive) -> None:
         pass
 
 
-def _unless_done(future: "asyncio.Future[bytes]", answer: Callable[["asyncio.Future[bytes]"], object]) -> None:
+def _resolve(future: "asyncio.Future[bytes]", jpeg: bytes) -> None:
     if not future.done():
-        answer(future)
+        future.set_result(jpeg)

@@ -29,6 +29,8 @@ HOST = "127.0.0.1"
 
 _START_TIMEOUT_S = 20.0
 _STOP_TIMEOUT_S = 3.0
+# For browsers to say goodbye.
+_GRACE_S = 0.4
 # What the system may hold back for a viewer that reads slowly; more would only be older pictures.
 _SEND_BUFFER_BYTES = 256 * 1024
 
@@ -69,9 +71,8 @@ class Dashboard:
             raise
         application = _application()
         application.state.dashboard = self
-        settings = uvicorn.Config(
-            application, log_config=None, access_log=False, lifespan="on", timeout_graceful_shutdown=1
-        )
+        settings = uvicorn.Config(application, log_config=None, access_log=False, lifespan="on")
+        settings.timeout_graceful_shutdown = _GRACE_S  # type: ignore[assignment] # fractions work as well
         self._server = uvicorn.Server(settings)
         self._thread = threading.Thread(target=self._server.run, args=([listener],), name="dashboard", daemon=True)
         self._thread.start()

@@ -31,6 +31,10 @@ class WhileWatched(Generic[N]):
                 self._node.start()
             return self._node
 
+    def is_watched_by(self, viewer: Hashable) -> bool:
+        """Return whether ``viewer`` has joined, and neither left nor been sent away by :meth:`close`."""
+        return viewer in self._viewers
+
     def leave(self, viewer: Hashable) -> None:
         """Do without the node; one that has not joined may leave."""
         with self._lock:

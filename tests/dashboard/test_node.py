@@ -1,0 +1,203 @@
+import math
+
+import numpy as np
+import pytest
+
+from handsteer.clock import SteppedClock
+from handsteer.config import ControlConfig
+from handsteer.dashboard.node import HOLD_TIMEOUT_S, DashboardNode
+from handsteer.dashboard.watch import WhileWatched
+from handsteer.messages import (
+    CMD_VEL,
+    DIAGNOSTICS,
+    JOINT_STATES,
+    ODOM,
+    ROBOT_DESCRIPTION,
+    STEERING_CMD_VEL,
+    DiagnosticArray,
+    DiagnosticStatus,
+    Header,
+    JointState,
+    KeyValue,
+    Odometry,
+    Point,
+    Pose,
+    PoseWithCovariance,
+    Quaternion,
+    String,
+    Twist,
+    TwistWithCovariance,
+    twist,
+)
+from handsteer.nodes.control import HandSignControlNode
+from handsteer.nodes.steering import SteeringNode
+from handsteer.robots.description import robot_description
+from handsteer.robots.protocol import Pose2D
+from handsteer.transports.in_process import InProcessTransport
+from handsteer.transports.protocol import Received
+
+
+class Bench:
+    """The page's node with real steering on a stepped clock."""
+
+    def __init__(self) -> None:
+        self.clock = SteppedClock()
+        self.transport = InProcessTransport()
+        self.steering = SteeringNode(self.transport, self.clock)
+        self.node = DashboardNode(self.transport, self.clock, self.steering)
+        self.steered: list[tuple[float, float]] = []
+        self.transport.subscribe("test", STEERING_CMD_VEL, self._on_steered)
+
+    def _on_steered(self, received: Received[Twist]) -> None:
+        self.steered.append((received.message.linear.x, received.message.angular.z))
+
+    def publish(self, topic, message) -> None:
+        self.transport.advertise("test", topic).publish(message)
+        self.node.spin_once()
+
+    def report(self, name: str, message: str = "", **values: str) -> None:
+        pairs = [KeyValue(key, value) for key, value in values.items()]
+        header = Header(self.clock.stamp(self.clock.now()), "")
+        self.publish(DIAGNOSTICS, DiagnosticArray(header, [DiagnosticStatus(0, name, message, "", pairs)]))
+
+    def odometry(self, x: float, yaw: float = 0.0, speed: float = 0.0) -> None:
+        pose = Pose(Point(x, 0.0, 0.0), Quaternion(0.0, 0.0, math.sin(yaw / 2), math.cos(yaw / 2)))
+        self.publish(
+            ODOM,
+            Odometry(
+                Header(self.clock.stamp(self.clock.now()), "odom"),
+                "base_link",
+                PoseWithCovariance(pose, np.zeros(36)),
+                TwistWithCovariance(twist(speed, 0.0), np.zeros(36)),
+            ),
+        )
+
+    def step(self, seconds: float) -> None:
+        self.clock.advance(seconds)
+        self.node.spin_once()
+        self.steering.spin_once()
+
+
+@pytest.fixture
+def bench() -> Bench:
+    return Bench()
+
+
+def test_keeps_the_newest_report_of_every_node_that_reports(bench: Bench) -> None:
+    bench.report("hand_sign_recognition", "Go is shown", sign="Go", seen="Go", confidence="0.9")
+    bench.report("hand_sign_recognition", "Stop is shown", sign="Stop", seen="Stop", confidence="0.8")
+    bench.report("hand_sign_control", "standing: the Stop sign is shown", source="signs")
+    state = bench.node.state()
+    assert (state.sign, state.confidence, state.reason) == ("Stop", 0.8, "the Stop sign is shown")
+
+
+def test_tells_the_cameras_frames_a_second(bench: Bench) -> None:
+    for frames in (0, 12, 24):
+        bench.report("my_camera", "a clip: delivers frames", frames=str(frames))
+        bench.step(0.5)
+    assert bench.node.state().fps == pytest.approx(24.0)
+
+
+def test_shows_commanded_and_measured_velocity(bench: Bench) -> None:
+    bench.publish(CMD_VEL, twist(0.5, 0.25))
+    bench.odometry(0.0, speed=0.4)
+    state = bench.node.state()
+    assert (state.commanded.linear_mps, state.commanded.angular_radps) == (0.5, 0.25)
+    assert state.measured.linear_mps == 0.4
+
+
+def test_places_the_robot_by_odometry_when_no_truth_is_known(bench: Bench) -> None:
+    bench.odometry(1.0, yaw=0.5)
+    assert bench.node.world.robot.x == 1.0
+    assert bench.node.world.robot.yaw == pytest.approx(0.5)
+
+
+def test_places_the_robot_by_its_true_pose_and_odometry_since_then(bench: Bench) -> None:
+    bench.odometry(1.0)
+    bench.report("robot", "moves freely", truth=f"5.0 2.0 {math.pi / 2}")
+    bench.step(0.02)
+    bench.odometry(1.5)
+    assert bench.node.world.robot == Pose2D(
+        pytest.approx(5.0), pytest.approx(2.5), pytest.approx(math.pi / 2)
+    )  # half a metre on, which is along y there
+
+
+def test_a_truth_that_is_none_is_not_taken(bench: Bench) -> None:
+    bench.odometry(1.0)
+    bench.report("robot", "moves freely", truth="somewhere")
+    bench.odometry(2.0)
+    assert bench.node.world.robot.x == 2.0
+
+
+def test_knows_the_robots_shape_and_joints(bench: Bench) -> None:
+    bench.publish(ROBOT_DESCRIPTION, String(robot_description()))
+    bench.publish(
+        JOINT_STATES,
+        JointState(Header(bench.clock.stamp(0.0), ""), ["wheel"], np.array([0.5]), np.zeros(1), np.zeros(0)),
+    )
+    assert bench.node.world.description == robot_description()
+    assert dict(bench.node.world.joints) == {"wheel": 0.5}
+
+
+def test_steers_as_long_as_the_pad_is_held(bench: Bench) -> None:
+    for _ in range(10):
+        bench.node.steer("me", 0.3, -0.2)
+        bench.step(HOLD_TIMEOUT_S / 2)
+    assert set(bench.steered) == {(0.3, -0.2)}
+
+
+def test_stops_at_once_when_the_pad_is_let_go(bench: Bench) -> None:
+    bench.node.steer("me", 0.3, 0.0)
+    bench.node.release("me")
+    assert bench.steered == [(0.3, 0.0), (0.0, 0.0)]
+
+
+def test_stops_when_the_page_falls_silent_with_the_pad_held(bench: Bench) -> None:
+    bench.node.steer("me", 0.3, 0.0)
+    for _ in range(6):
+        bench.step(0.1)
+    assert bench.steered[-1] == (0.0, 0.0)
+    heard = len(bench.steered)
+    bench.step(1.0)
+    assert len(bench.steered) == heard  # then silence, so that others can drive
+
+
+def test_one_viewer_cannot_stop_what_another_one_steers(bench: Bench) -> None:
+    bench.node.steer("me", 0.3, 0.0)
+    bench.node.release("you")
+    assert bench.steered == [(0.3, 0.0)]
+
+
+def test_leaves_nothing_in_motion_when_it_stops(bench: Bench) -> None:
+    bench.node.steer("me", 0.3, 0.0)
+    bench.node.stop()
+    assert bench.steered[-1] == (0.0, 0.0)
+
+
+def test_understands_what_control_really_says(bench: Bench) -> None:
+    control = HandSignControlNode(bench.transport, bench.clock, ControlConfig())
+    bench.node.steer("me", 0.3, 0.0)
+    for node in (control, control, bench.node):
+        bench.clock.advance(0.1)
+        node.spin_once()
+    state = bench.node.state()
+    assert (state.headline, state.reason, state.driver) == ("Driving", "steered by hand", "steering")
+
+
+def test_a_node_runs_only_while_somebody_watches() -> None:
+    transport, clock = InProcessTransport(), SteppedClock()
+    reports = transport.advertise("test", DIAGNOSTICS)
+    watched = WhileWatched(lambda: DashboardNode(transport, clock, SteeringNode(transport, clock)))
+    assert not reports.wanted
+    first = watched.join("me")
+    assert watched.join("you") is first
+    assert watched.join("me") is first
+    watched.leave("me")
+    assert reports.wanted
+    watched.leave("you")
+    assert not reports.wanted
+    watched.leave("you")
+    assert watched.join("me") is not first
+    watched.close()
+    assert not reports.wanted
+    assert not watched.is_watched_by("me")
