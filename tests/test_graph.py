@@ -100,8 +100,8 @@ def test_topics_and_rates() -> None:
         for topic in (HAND_SIGN, CMD_VEL, ODOM, TF):
             graph.transport.subscribe("test", topic, lambda _, name=topic.name: count(name))  # type: ignore[misc]
         graph.run_stepped(2.0)
-    assert counts[HAND_SIGN.name] == 61
-    assert counts[CMD_VEL.name] == 61 + 1, "one a sign, and one zero at the end"
+    assert counts[HAND_SIGN.name] in (60, 61)
+    assert counts[CMD_VEL.name] == counts[HAND_SIGN.name] + 1, "one a sign, and one zero at the end"
     assert counts[ODOM.name] in (100, 101)
     assert counts[TF.name] == counts[ODOM.name]
 

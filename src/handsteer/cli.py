@@ -179,7 +179,7 @@ def main(arguments: list[str] | None = None) -> None:
         logging.getLogger(noisy).setLevel(logging.WARNING)
     signal.signal(signal.SIGTERM, _interrupt)
     try:
-        sys.exit(app(arguments, exit_on_error=False, print_error=False))
+        sys.exit(app(arguments, exit_on_error=False, print_error=False) or 0)
     except CycloptsError as error:
         _fail(_usage_problem(error))
     except HandsteerError as error:

@@ -96,7 +96,6 @@ RELAXED = _shape(
 )
 FIST = _shape(thumb=_THUMB_OVER_INDEX)
 INDEX = _shape(thumb=_THUMB_OVER_MIDDLE, index=_STRAIGHT_INDEX)
-INDEX_HANGING = _shape(thumb=_THUMB_OVER_MIDDLE, index=_STRAIGHT_INDEX, wrist=(20.0, -20.0))
 THUMB = _shape(thumb=_THUMB_OUT)
 
 _HEIGHT_M, _DEPTH_M = 0.03, 0.55
@@ -110,11 +109,11 @@ def _held(angles: Array, *, yaw: float = 0.0, pitch: float = 0.0, roll: float = 
 
 _POSES = {
     STOP: _held(OPEN),
-    FORWARD: _held(INDEX, y=_HEIGHT_M + 0.02),
-    BACKWARD: _held(INDEX_HANGING, yaw=180, roll=180, y=-0.02),
-    TURN_LEFT: _held(THUMB, yaw=10, roll=20),
-    TURN_RIGHT: _held(THUMB, yaw=180, roll=-20),
-    GO: _held(FIST),
+    FORWARD: _held(INDEX, yaw=8, y=_HEIGHT_M + 0.02),
+    BACKWARD: _held(INDEX, yaw=12, roll=180, y=-0.02),
+    TURN_LEFT: _held(THUMB, yaw=20, pitch=-20, roll=20),
+    TURN_RIGHT: _held(THUMB, yaw=152, pitch=-32, roll=-20),
+    GO: _held(FIST, yaw=10, pitch=3),
     NONE: _held(RELAXED, y=_LOWERED_M),
 }
 _OTHER_HANDS = {TURN_LEFT: TURN_RIGHT, TURN_RIGHT: TURN_LEFT}

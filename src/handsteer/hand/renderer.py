@@ -14,9 +14,9 @@ from handsteer.hand.tracing import Field, Rays, trace
 Image = NDArray[np.uint8]
 
 SKINS: dict[str, tuple[tuple[float, float, float], ...]] = {
-    "light": ((0.56, 0.66, 0.88), (0.52, 0.60, 0.89), (0.62, 0.69, 0.92)),
-    "medium": ((0.34, 0.46, 0.70), (0.33, 0.42, 0.70), (0.46, 0.54, 0.76)),
-    "dark": ((0.14, 0.20, 0.36), (0.15, 0.20, 0.37), (0.26, 0.32, 0.48)),
+    "light": ((0.56, 0.66, 0.88), (0.52, 0.60, 0.89), (0.74, 0.78, 0.97)),
+    "medium": ((0.34, 0.46, 0.70), (0.33, 0.42, 0.70), (0.56, 0.62, 0.84)),
+    "dark": ((0.14, 0.20, 0.36), (0.15, 0.20, 0.37), (0.34, 0.40, 0.56)),
 }
 """Reflected light (blue, green, red; 0 to 1) of the skin, of its redder parts, and of the nails."""
 
@@ -116,7 +116,7 @@ class _Grid:
         depth = np.full((self.rows, self.columns), np.inf, np.float32)
         ends = np.stack([cones.start, cones.end], axis=1)
         radii = np.stack([cones.start_radius, cones.end_radius], axis=1) + _MARGIN_M
-        near = np.maximum((np.linalg.norm(ends, axis=2) - radii).min(axis=1), 0.02)
+        near = np.maximum(_least_distance(cones) - radii.max(axis=1), 0.02)
         front = np.maximum(ends[..., 2], 0.05)
         pixels = camera.project(np.concatenate([ends[..., :2], front[..., None]], axis=-1))
         cells = np.clip((pixels - [self.left, self.top]) / self.cell_px, -2000, 2000).astype(np.int32)
@@ -124,6 +124,14 @@ class _Grid:
         for i in np.argsort(-near):
             _paint_outline(depth, cells[i], reach[i], float(near[i]))
         return depth
+
+
+def _least_distance(cones: Cones) -> Array:
+    """Return (M,) how near the axes of the cones come to the camera, metres."""
+    axis = cones.end - cones.start
+    square = np.maximum(np.sum(axis**2, axis=1), 1e-12)
+    along = np.clip(-np.sum(cones.start * axis, axis=1) / square, 0.0, 1.0)
+    return np.asarray(np.linalg.norm(cones.start + along[:, None] * axis, axis=1))
 
 
 def _paint_outline(depth: Float, cells: NDArray[np.int32], reach: NDArray[np.int32], value: float) -> None:

@@ -69,9 +69,10 @@ _PALM = (
     ((-0.0130, 0.004, 0.0), (-0.0325, 0.0685, 0.003), 0.0140, 0.0096),
     # the ball of the little finger, the pads under the fingers, the hollow of the hand.
     ((-0.0170, 0.018, 0.005), (-0.0280, 0.0560, 0.004), 0.0125, 0.0105),
-    ((0.0235, 0.0890, 0.0035), (-0.0310, 0.0720, 0.0055), 0.0085, 0.0080),
-    ((0.0150, 0.0650, 0.0020), (-0.0220, 0.0560, 0.0030), 0.0110, 0.0105),
-    ((0.0080, 0.0380, 0.0020), (-0.0150, 0.0360, 0.0030), 0.0125, 0.0125),
+    ((0.0230, 0.0880, 0.0020), (-0.0300, 0.0710, 0.0045), 0.0090, 0.0085),
+    ((0.0190, 0.0730, 0.0010), (-0.0260, 0.0610, 0.0025), 0.0108, 0.0104),
+    ((0.0120, 0.0560, 0.0000), (-0.0210, 0.0500, 0.0015), 0.0122, 0.0118),
+    ((0.0080, 0.0380, 0.0000), (-0.0150, 0.0360, 0.0015), 0.0130, 0.0130),
 )
 
 _SLEEVE_FROM_M, _ARM_LENGTH_M = 0.075, 1.2
@@ -118,12 +119,14 @@ def _add_digit(builder: _Builder, joints: Array, axes: Array, radii: tuple[float
     ends = (joints[0], joints[1], joints[2], tip)
     for bone in range(3):
         material = Material.FLUSHED if bone == 2 else Material.SKIN
-        builder.add(ends[bone], ends[bone + 1], (radii[bone], radii[bone + 1]), material)
+        # Cones that stop short of the joints leave room there for what the union adds.
+        inset = 0.14 * (ends[bone + 1] - ends[bone])
+        builder.add(ends[bone] + inset, ends[bone + 1] - inset * (bone < 2), (radii[bone], radii[bone + 1]), material)
     _add_knuckles(builder, ends, axes, radii, digit)
     back = -axes[2][:, 2]
     builder.add(
-        tip + axes[2][:, 1] * (0.2 * radii[3]) + back * 0.34 * radii[3],
-        tip - axes[2][:, 1] * (0.75 * radii[3]) + back * 0.42 * radii[3],
+        tip + axes[2][:, 1] * (0.2 * radii[3]) + back * 0.38 * radii[3],
+        tip - axes[2][:, 1] * (0.75 * radii[3]) + back * 0.46 * radii[3],
         (0.70 * radii[3], 0.74 * radii[3]),
         Material.NAIL,
     )

@@ -17,12 +17,8 @@ from handsteer.robots.world import World, load_world
 
 _log = logging.getLogger(__name__)
 
-_PHYSICS_STEPS = 2
-PERIOD_S = _PHYSICS_STEPS * TIMESTEP_S
-"""One step of the controller: 100 Hz, as ros2_control's controller manager runs by default."""
-
-# A touch within this time after the last one is the same touch: what is pushed loses contact now and then.
-_SAME_TOUCH_S = 0.2
+# A touch lasts this long after the last contact: what is pushed, or pushes back, loses contact now and then.
+_TOUCH_S = 0.2
 
 # Nothing in a sound simulation gets near it: a wheel at the limits of the configuration's defaults turns at 63 rad/s.
 _WILD_SPEED = 1e5
@@ -59,7 +55,7 @@ class SimulatedRobot:
         self._pose_at = int(self.model.joint(ROBOT_JOINT).qposadr[0])
         self._thing_of_geom, self._is_robot_geom = _tell_geoms_apart(self.model, self.world)
         self._asked_s = 0.0
-        self._periods = 0
+        self._steps = 0
         self._command: Velocity | None = None
         self.reset()
         self._refuse_overlap(config.world)
@@ -69,11 +65,11 @@ class SimulatedRobot:
         self._command = Velocity(linear_mps, angular_radps)
 
     def step(self, dt_s: float) -> RobotState:
-        """Let ``dt_s`` seconds pass, in whole periods of 0.01 s; what is left of them is carried to the next call."""
+        """Let ``dt_s`` seconds pass, in whole steps of 0.01 s; what is left is carried to the next call."""
         self._asked_s += dt_s
-        while (self._periods + 1) * PERIOD_S <= self._asked_s + 1e-9:
-            self._periods += 1
-            self._step_period()
+        while (self._steps + 1) * TIMESTEP_S <= self._asked_s + 1e-9:
+            self._steps += 1
+            self._step_once()
         return self._state()
 
     def obstacles(self) -> list[Obstacle]:
@@ -98,14 +94,14 @@ class SimulatedRobot:
         self._command = None
         self._stop()
 
-    def _step_period(self) -> None:
-        self._drive = diff_drive.step(self._drive, self._command, PERIOD_S, self._config)
+    def _step_once(self) -> None:
+        self._drive = diff_drive.step(self._drive, self._command, TIMESTEP_S, self._config)
         self._command = None
         self.data.ctrl[: len(WHEEL_JOINTS)] = 2 * diff_drive.wheel_speeds(self._drive.velocity, self._config)
         before = self.data.qpos.copy()
-        mujoco.mj_step(self.model, self.data, _PHYSICS_STEPS)
+        mujoco.mj_step(self.model, self.data)
         if not np.abs(self.data.qvel).max() < _WILD_SPEED:  # NaN is not below either
-            _log.warning("the simulation has become unstable at %.2f s; everything stops", self._periods * PERIOD_S)
+            _log.warning("the simulation has become unstable at %.2f s; everything stops", self._steps * TIMESTEP_S)
             self.data.qpos[:] = before
             self._stop()
         turned = self.data.qpos[self._wheel_angles] - before[self._wheel_angles]
@@ -116,20 +112,21 @@ class SimulatedRobot:
         self._drive = DriveState()
         self.data.ctrl[:] = 0
         self.data.qvel[:] = 0
+        self.data.qacc_warmstart[:] = 0
         mujoco.mj_forward(self.model, self.data)
 
     def _state(self) -> RobotState:
         speeds = self.data.qvel[self._wheel_speeds]
         velocity = diff_drive.velocity_of(*_sides(speeds), self._config)
         return RobotState(
-            time_s=self._periods * PERIOD_S,
+            time_s=self._steps * TIMESTEP_S,
             odometry=self._odometry,
             linear_mps=velocity.linear_mps,
             angular_radps=velocity.angular_radps,
             joint_positions=dict(zip(WHEEL_JOINTS, self.data.qpos[self._wheel_angles].tolist(), strict=True)),
             joint_velocities=dict(zip(WHEEL_JOINTS, speeds.tolist(), strict=True)),
             truth=self._truth(),
-            contacts=tuple(self._touched()),
+            contacts=tuple(name for name, until in self._touched_until.items() if until > self._steps),
             collisions=self._collisions,
         )
 
@@ -140,14 +137,14 @@ class SimulatedRobot:
     def _touched(self) -> list[str]:
         """Return the names of the obstacles that the robot touches, in the order of the world."""
         geoms = self.data.contact.geom
-        things = np.where(self._is_robot_geom[geoms], self._thing_of_geom[geoms[:, ::-1]], -1)
-        return [self.world.obstacles[index].name for index in np.unique(things[things >= 0])]
+        touched = self._thing_of_geom[geoms[:, ::-1]][self._is_robot_geom[geoms]]
+        return [self.world.obstacles[index].name for index in sorted(set(touched.tolist())) if index >= 0]
 
     def _count_collisions(self) -> None:
         for name in self._touched():
-            if self._touched_until.get(name, -1) < self._periods:
+            if self._touched_until.get(name, 0) <= self._steps:
                 self._collisions += 1
-            self._touched_until[name] = self._periods + round(_SAME_TOUCH_S / PERIOD_S)
+            self._touched_until[name] = self._steps + round(_TOUCH_S / TIMESTEP_S)
 
     def _thing_pose(self, index: int) -> tuple[tuple[float, float, float], tuple[float, float, float, float]]:
         if self.world.obstacles[index].movable:
