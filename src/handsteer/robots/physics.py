@@ -10,11 +10,11 @@ A robot with four fixed wheels can turn only by scrubbing: when it turns in plac
 
 Therefore the two directions are kept apart. Each wheel has a *tread*, a narrow capsule that touches only the floor.
 MuJoCo lines the friction axes of a capsule on a plane up with the capsule, so the tread grips along (1.0) and hardly
-across (0.02). Across, one force on the whole robot opposes its sideways speed, up to 0.6 of its weight: it keeps the
+across (0.01). Across, one force on the whole robot opposes its sideways speed, up to 0.6 of its weight: it keeps the
 robot on its curve without hindering the turn. It acts also on a robot that has left the floor, which none should.
 
-A turn in place then reaches 98.8 to 99.5 % of what was told, a straight drive 99.9 %, and a circle at 1 m/s and 1 rad/s
-ends 2 cm from its odometry. Above v * w = 6 m/s² the robot skids outwards.
+A turn in place then reaches 98.8 to 99.5 % of what was told and a straight drive 99.9 %; a circle of 6 m at 1 m/s and
+1 rad/s ends 6 cm from its odometry. Above v * w = 6 m/s² the robot skids outwards.
 
 The wheels as the URDF has them, cylinders, touch only obstacles.
 """
@@ -31,7 +31,7 @@ from handsteer.robots.world import Thing, World
 _log = logging.getLogger(__name__)
 
 WHEEL_JOINTS = ("front_left_wheel_joint", "front_right_wheel_joint", "rear_left_wheel_joint", "rear_right_wheel_joint")
-"""The actuators of the model have the same order; those of the scrub forces follow."""
+"""The actuators of the model have the same order; that of the scrub force follows."""
 
 ROBOT_JOINT = "robot"
 """The free joint of the robot's ``base_link``."""
@@ -42,19 +42,21 @@ straight drive by 0.1 ‰ and a turn by 1 %."""
 
 _GRAVITY_MPS2 = 9.81
 
-_TREAD_HALF_WIDTH_M = 0.01
+# Narrow: at two points further apart, MuJoCo would let each tread resist the turn.
+_TREAD_HALF_WIDTH_M = 0.002
 _GRIP_ALONG = 1.0
-_GRIP_ACROSS = 0.02
+_GRIP_ACROSS = 0.01
 _SCRUB = 0.6
 _SCRUB_NS_PER_M = 200.0
 # A wheel that gripped a wall would climb it.
 _GRIP_ON_THINGS = 0.1
 
-# A velocity servo. The rotor of a geared motor makes the wheel as heavy as gain * timestep: if it were much lighter, the
-# servo would work against the contact solver, and the robot would rock (measured: a straight drive 9 % too long).
-_SERVO_NMS_PER_RAD = 1.0
-_ROTOR_INERTIA_KGM2 = 0.01
-_MOTOR_TORQUE_NM = 1.0
+# A velocity servo. Its gain * timestep must not exceed the inertia of wheel and motor (0.0005 + 0.0015): above, it
+# works against the contact solver and the robot rocks (measured at 46 times: a straight drive 9 % too long).
+_SERVO_NMS_PER_RAD = 0.2
+_ROTOR_INERTIA_KGM2 = 0.0015
+# Less than the grip of a wheel (0.33 N m), so that a wall stalls the wheels: wheels that spin make the robot hop.
+_MOTOR_TORQUE_NM = 0.2
 
 # N s/m and N m s/rad for each kg: a ball of 0.2 m radius loses half of its speed in a second.
 _ROLLING_DAMPING_PER_S = 0.03

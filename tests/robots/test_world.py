@@ -1,0 +1,112 @@
+from contextlib import suppress
+from pathlib import Path
+
+import pytest
+import yaml
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from handsteer.errors import WorldError
+from handsteer.robots.world import load_world, shipped_worlds
+
+BOX = "name: a, shape: box, size: [1, 1, 1], position: [3, 0]"
+
+
+def thing(fields: str) -> str:
+    return f"obstacles:\n  - {{{fields}}}\n"
+
+
+def test_shipped_worlds() -> None:
+    assert shipped_worlds() == ["empty", "obstacles"]
+    assert load_world("empty").obstacles == ()
+    things = load_world("obstacles").obstacles
+    assert {thing.shape for thing in things} == {"box", "cylinder", "sphere"}
+    assert {thing.movable for thing in things} == {True, False}
+
+
+def test_a_file_by_its_path(tmp_path: Path) -> None:
+    path = tmp_path / "mine.yaml"
+    path.write_text(thing("name: ball, shape: sphere, radius: 0.2, position: [1, 2], colour: '#ff0080', movable: true"))
+    (ball,) = load_world(str(path)).obstacles
+    assert ball == load_world(path).obstacles[0]
+    assert (ball.position, ball.extent, ball.movable) == ((1.0, 2.0), (0.4, 0.4, 0.4), True)
+    assert ball.rgba == (1.0, 0.0, 128 / 255, 1.0)
+
+
+def test_an_empty_file_is_an_empty_world(tmp_path: Path) -> None:
+    path = tmp_path / "mine.yaml"
+    path.write_text("# nothing yet\n")
+    assert load_world(path) == load_world("empty")
+
+
+def test_an_unknown_name_lists_the_known_ones() -> None:
+    with pytest.raises(WorldError, match=r"no world 'moon'; use empty or obstacles, or the path of a \.yaml file"):
+        load_world("moon")
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("floor: [", "line 1: not valid YAML"),
+        ("\0", "not valid YAML"),
+        ("floor: 2026-13-45", "not valid YAML"),
+        ("[" * 5000, "not valid YAML"),
+        ("just words", "world"),
+        ("flor: {}", "flor: there is no such field"),
+        ("floor: {size: [1]}", "floor.size"),
+        ("floor: {size: [1, 0]}", "floor.size.1: 0"),
+        ("floor: {colour: green}", "floor.colour: 'green'"),
+        ("obstacles: {}", "obstacles"),
+        ("obstacles: [5]", "obstacles[0]"),
+        (thing("name: a, position: [3, 0]"), "obstacles[0] 'a': shape is missing"),
+        (thing("shape: cone, name: a"), "shape must be box, cylinder or sphere, not cone"),
+        (thing("shape: box, name: a, position: [3, 0]"), "obstacles[0] 'a' size: is missing"),
+        (thing("shape: sphere, radius: 1, position: [3, 0]"), "obstacles[0] name: is missing"),
+        (thing(BOX + ", radius: 1"), "'a' radius: there is no such field"),
+        (thing(BOX + ", size: [1, -1, 1]").replace("size: [1, 1, 1], ", ""), "'a' size.1: -1 should be greater"),
+        (thing(BOX + ", yaw: 90"), "'a' yaw: 90 should be less"),
+        (thing(BOX + ", yaw: .nan"), "'a' yaw: nan should be a finite number"),
+        (thing(BOX + ", mass: 0"), "'a' mass: 0 should be greater"),
+        (thing(BOX + ", movable: perhaps"), "'a' movable: 'perhaps'"),
+        (thing(BOX + ", colour: '#12345'"), "'a' colour: '#12345'"),
+        (thing(BOX).replace("[3, 0]", "[3, 1e9]"), "'a' position.1"),
+        (thing(BOX).replace("[3, 0]", "here"), "'a' position"),
+        (thing(BOX) + "  - {" + BOX + "}", "two are called 'a'"),
+    ],
+)
+def test_a_bad_file_is_refused_in_one_line_that_names_file_and_field(tmp_path: Path, text: str, words: str) -> None:
+    path = tmp_path / "bad.yaml"
+    path.write_text(text)
+    with pytest.raises(WorldError) as error:
+        load_world(path)
+    assert words in str(error.value)
+    assert "bad.yaml" in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def test_files_that_cannot_be_read(tmp_path: Path) -> None:
+    binary = tmp_path / "binary.yaml"
+    binary.write_bytes(b"\xff\xfe\x00\x80")
+    for path, words in ((tmp_path / "none.yaml", "No such file"), (tmp_path, "directory"), (binary, "not valid YAML")):
+        with pytest.raises(WorldError, match=words) as error:
+            load_world(path)
+        assert str(path) in str(error.value)
+
+
+yaml_values = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=5),
+    lambda inner: (
+        st.lists(inner, max_size=3)
+        | st.dictionaries(st.sampled_from(["floor", "obstacles", "shape", "size", "name", "box"]), inner, max_size=3)
+    ),
+    max_leaves=8,
+)
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+@given(values=yaml_values)
+def test_any_yaml_is_read_or_refused(tmp_path: Path, values: object) -> None:
+    path = tmp_path / "any.yaml"
+    path.write_text(yaml.safe_dump(values), encoding="utf-8")
+    with suppress(WorldError):
+        load_world(path)
