@@ -85,3 +85,21 @@ def test_on_stop_is_called_even_when_it_raises() -> None:
     node = Bad("bad", InProcessTransport(), SteppedClock())
     node.stop()
     assert node.callback_errors == 1
+
+
+def test_a_callback_that_hangs_does_not_hold_up_the_end() -> None:
+    transport = InProcessTransport()
+    node = Node("node", transport, RealClock())
+    topic, started, let_go = Topic("/number", int), threading.Event(), threading.Event()
+
+    def callback(_: Received[int]) -> None:
+        started.set()
+        let_go.wait(30)
+
+    node.subscribe(topic, callback)
+    node.start()
+    transport.advertise("other", topic).publish(1)
+    assert started.wait(5)
+    node.stop(timeout_s=0.05)
+    assert node.stuck
+    let_go.set()

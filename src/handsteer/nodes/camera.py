@@ -39,8 +39,9 @@ class CameraNode(Node):
         self.every(_DIAGNOSE_PERIOD_S, self._report)
 
     def on_stop(self) -> None:
-        """Release the device."""
-        self._camera.close()
+        """Release the device, unless it is being read: OpenCV does not survive that; the process's end releases it."""
+        if not self.stuck:
+            self._camera.close()
 
     def _read(self) -> None:
         if self.ended.is_set():

@@ -54,18 +54,24 @@ class Node:
         name: ROS node name.
         transport: Carries the messages.
         clock: The graph's clock; timers follow it.
+
+    Attributes:
+        callback_errors: Callbacks that have failed.
+        stuck: True when a callback was still under way when :meth:`stop` gave up waiting for it.
     """
 
     def __init__(self, name: str, transport: Transport, clock: Clock) -> None:
         self.name = name
         self.clock = clock
         self.callback_errors = 0
+        self.stuck = False
         self._transport = transport
         self._inboxes: list[_Inbox[Any]] = []
         self._timers: list[Timer] = []
         self._subscriptions: list[Subscription] = []
         self._wake = threading.Condition()
         self._running = False
+        self._stopped = False
         self._thread: threading.Thread | None = None
         self._diagnostics = transport.advertise(name, DIAGNOSTICS)
 
@@ -134,8 +140,15 @@ class Node:
         self._thread = threading.Thread(target=self._run, name=self.name, daemon=True)
         self._thread.start()
 
-    def stop(self, timeout_s: float = 1.0) -> None:
-        """Receive no more, end the thread, then :meth:`on_stop`; may be called twice."""
+    def stop(self, timeout_s: float = 0.5) -> None:
+        """Receive no more, end the thread, then :meth:`on_stop`; may be called twice.
+
+        Args:
+            timeout_s: How long to wait for a callback that is under way; after that :attr:`stuck` is True.
+        """
+        if self._stopped:
+            return
+        self._stopped = True
         for subscription in self._subscriptions:
             subscription.close()
         with self._wake:
@@ -143,6 +156,7 @@ class Node:
             self._wake.notify()
         if self._thread is not None and self._thread is not threading.current_thread():
             self._thread.join(timeout_s)
+            self.stuck = self._thread.is_alive()
         self._guard("stop", self.on_stop)
 
     def on_stop(self) -> None:
