@@ -138,13 +138,16 @@ def models() -> int:
 
     from handsteer.landmarks.models import fetch_models  # noqa: PLC0415
 
-    with tqdm(unit="B", unit_scale=True, desc="landmark models", leave=False) as bar:
+    bar: tqdm[Any] | None = None
 
-        def progress(done: int, total: int) -> None:
-            bar.total = total
-            bar.update(done - bar.n)
+    def progress(done: int, total: int) -> None:
+        nonlocal bar
+        bar = bar or tqdm(total=total, unit="B", unit_scale=True, desc="landmark models")
+        bar.update(done - bar.n)
 
-        paths = fetch_models(progress)
+    paths = fetch_models(progress)
+    if bar is not None:
+        bar.close()
     print(f"the landmark models are in {paths[0].parent}")
     return 0
 
