@@ -6,10 +6,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from handsteer.hand.grid import BLOCK, Grid
 from handsteer.hand.kinematics import Array, Skeleton
 from handsteer.hand.placement import Pinhole, Placement
 from handsteer.hand.surface import Cones, Float, Material, hand_cones
-from handsteer.hand.tracing import Field, Rays, trace
+from handsteer.hand.tracing import Field, trace
 
 Image = NDArray[np.uint8]
 
@@ -20,9 +21,10 @@ SKINS: dict[str, tuple[tuple[float, float, float], ...]] = {
 }
 """Reflected light (blue, green, red; 0 to 1) of the skin, of its redder parts, and of the nails."""
 
-_GRID_CELLS = 14000
-_FINEST_PX = 1.0
-_MARGIN_M = 0.006
+_STRIPS = 3
+_TOLERANCE = 0.08  # of a cell
+_NEAR_M = 0.002  # where whole blocks stop
+_EDGE = 0.75  # the nearness at which the hand ends
 _GAMMA = 0.8
 _SPECULAR, _SHININESS = 0.16, 14.0
 _AMBIENT, _DIFFUSE = 0.46, 0.62
@@ -61,118 +63,64 @@ def render(skeleton: Skeleton, placement: Placement, camera: Pinhole, look: Look
     Returns:
         (height, width, 3) uint8, BGR.
     """
-    cones = _placed(hand_cones(skeleton, sleeve=look.sleeve), placement)
+    cones = hand_cones(skeleton, sleeve=look.sleeve).placed(placement)
     picture = background.copy()
-    grid = _Grid.around(cones, camera)
-    if grid is None:
-        return picture
-    colour, cover = _trace_grid(grid, cones, camera, look)
-    _lay_over(picture, grid, colour, cover)
+    grid = Grid.around(cones, camera)
+    if grid is not None:
+        _lay_over(picture, grid, *_trace_grid(grid, cones, camera, look))
     return picture
 
 
-def _placed(cones: Cones, placement: Placement) -> Cones:
-    return Cones(
-        placement.apply(cones.start),
-        placement.apply(cones.end),
-        cones.start_radius,
-        cones.end_radius,
-        cones.material,
-    )
+def _trace_grid(grid: Grid, cones: Cones, camera: Pinhole, look: Look) -> tuple[Float, Float]:
+    """Return (rows, columns, 3) colours 0..1 and (rows, columns) how near each cell is to the hand, 1 on it.
 
-
-@dataclass(frozen=True)
-class _Grid:
-    """The part of the image that is traced: its corner and size in cells of ``cell_px`` pixels."""
-
-    left: float
-    top: float
-    columns: int
-    rows: int
-    cell_px: float
-
-    @classmethod
-    def around(cls, cones: Cones, camera: Pinhole) -> "_Grid | None":
-        """Return the grid around what the camera sees of the cones, or None when that is nothing."""
-        centres = np.concatenate([cones.start, cones.end])
-        radii = np.concatenate([cones.start_radius, cones.end_radius]) + _MARGIN_M
-        front = np.maximum(centres[:, 2], 0.05)
-        pixels = camera.project(np.column_stack([centres[:, :2], front]))
-        reach = (radii / front * camera.focal_px)[:, None] + 2.0
-        size = np.array([camera.width, camera.height])
-        low = np.clip(np.floor((pixels - reach).min(axis=0)), 0, size)
-        high = np.clip(np.ceil((pixels + reach).max(axis=0)), 0, size)
-        if np.any(high - low < 1):
-            return None
-        cell = max(_FINEST_PX, float(np.sqrt(np.prod(high - low) / _GRID_CELLS)))
-        columns, rows = (int(n) for n in np.ceil((high - low) / cell))
-        return cls(float(low[0]), float(low[1]), columns, rows, cell)
-
-    def near_depth(self, cones: Cones, camera: Pinhole) -> Float:
-        """Return (rows, columns) how far off the nearest cone can be, metres; infinite where there is none.
-
-        The outlines of the cones are painted one over the other, the nearest last.
-        """
-        depth = np.full((self.rows, self.columns), np.inf, np.float32)
-        ends = np.stack([cones.start, cones.end], axis=1)
-        radii = np.stack([cones.start_radius, cones.end_radius], axis=1) + _MARGIN_M
-        near = np.maximum(_least_distance(cones) - radii.max(axis=1), 0.02)
-        front = np.maximum(ends[..., 2], 0.05)
-        pixels = camera.project(np.concatenate([ends[..., :2], front[..., None]], axis=-1))
-        cells = np.clip((pixels - [self.left, self.top]) / self.cell_px, -2000, 2000).astype(np.int32)
-        reach = np.minimum(radii / front * camera.focal_px / self.cell_px + 1.5, 2000).astype(np.int32)
-        for i in np.argsort(-near):
-            _paint_outline(depth, cells[i], reach[i], float(near[i]))
-        return depth
-
-
-def _least_distance(cones: Cones) -> Array:
-    """Return (M,) how near the axes of the cones come to the camera, metres."""
-    axis = cones.end - cones.start
-    square = np.maximum(np.sum(axis**2, axis=1), 1e-12)
-    along = np.clip(-np.sum(cones.start * axis, axis=1) / square, 0.0, 1.0)
-    return np.asarray(np.linalg.norm(cones.start + along[:, None] * axis, axis=1))
-
-
-def _paint_outline(depth: Float, cells: NDArray[np.int32], reach: NDArray[np.int32], value: float) -> None:
-    (first, last), (first_reach, last_reach) = cells, reach
-    cv2.circle(depth, first.tolist(), int(first_reach), value, cv2.FILLED)
-    cv2.circle(depth, last.tolist(), int(last_reach), value, cv2.FILLED)
-    along = (last - first).astype(float)
-    length = float(np.hypot(*along))
-    if length < 1:
-        return
-    across = np.array([-along[1], along[0]]) / length
-    corners = [first + across * first_reach, last + across * last_reach]
-    corners += [last - across * last_reach, first - across * first_reach]
-    cv2.fillConvexPoly(depth, np.round(corners).astype(np.int32), value)
-
-
-def _trace_grid(grid: _Grid, cones: Cones, camera: Pinhole, look: Look) -> tuple[Float, Float]:
-    """Return (rows, columns, 3) colours 0..1 and (rows, columns) how much of each cell the hand covers."""
-    near = grid.near_depth(cones, camera)
-    rows, columns = np.nonzero(np.isfinite(near))
-    directions = camera.rays(grid.left + (columns + 0.5) * grid.cell_px, grid.top + (rows + 0.5) * grid.cell_px)
-    # Distances are taken about the hand, so that single precision is enough.
-    centre = cones.start.mean(axis=0)
-    about = Cones(cones.start - centre, cones.end - centre, cones.start_radius, cones.end_radius, cones.material)
-    field = Field(about)
-    start = near[rows, columns]
-    far = float(np.linalg.norm(np.concatenate([cones.start, cones.end]), axis=1).max())
-    depth = float(np.median(start)) if len(start) else 1.0
-    cell_m = grid.cell_px / camera.focal_px * depth
-    hits = trace(field, Rays(-centre.astype(np.float32), directions, start), end=far + 0.05, tolerance=0.1 * cell_m)
+    It goes strip by strip: few cones are seen in each, and what they need stays in the processor's cache.
+    """
     colour = np.zeros((grid.rows, grid.columns, 3), np.float32)
     cover = np.zeros((grid.rows, grid.columns), np.float32)
-    seen = hits.clearance < 1.2 * cell_m
-    points, directions = hits.points[:, seen], directions[:, seen]
-    colour[rows[seen], columns[seen]] = _shade(field, cones, points, directions, look)
-    cover[rows[seen], columns[seen]] = np.clip(1.0 - hits.clearance[seen] / cell_m, 0.0, 1.0)
+    near = _near_depth(grid, cones, camera)
+    rows, columns = np.nonzero(np.isfinite(near))
+    for cells in np.array_split(np.arange(len(rows)), _STRIPS):
+        if len(cells):
+            row, column = rows[cells], columns[cells]
+            strip = cones.only(grid.cones_between(int(row[0]), int(row[-1]), cones, camera))
+            directions = grid.directions(column + 0.5, row + 0.5, camera)
+            cell_rad = grid.cell_px / camera.focal_px
+            colour[row, column], cover[row, column] = _look_along(directions, near[row, column], cell_rad, strip, look)
     return colour, cover
 
 
-def _shade(field: Field, cones: Cones, points: Float, directions: Float, look: Look) -> Float:
-    """Return (n, 3) colours 0..1 of the skin at (3, n) points."""
+def _near_depth(grid: Grid, cones: Cones, camera: Pinhole) -> Float:
+    """Return (rows, columns) how far each cell can be looked along before the hand comes near; infinite if never.
+
+    Whole blocks of cells are followed as one thick ray (the first pass of cone marching).
+    """
+    shape = grid.rows // BLOCK, grid.columns // BLOCK
+    row, column = (at.ravel() * BLOCK + BLOCK / 2 for at in np.indices(shape))
+    width_rad = (BLOCK * np.sqrt(0.5) + 1.0) * grid.cell_px / camera.focal_px
+    near, far = cones.depths()
+    start = np.full(len(row), near, np.float32)
+    directions = grid.directions(column, row, camera)
+    hits = trace(Field(cones), directions, start, end=far, tolerance=_NEAR_M, width_rad=width_rad)
+    depth = np.where(hits.clearance <= 2 * _NEAR_M, hits.travelled, np.inf).astype(np.float32)
+    return depth.reshape(shape).repeat(BLOCK, axis=0).repeat(BLOCK, axis=1)
+
+
+def _look_along(directions: Float, near: Float, cell_rad: float, cones: Cones, look: Look) -> tuple[Float, Float]:
+    """Return (n, 3) colours and (n,) nearness along (3, n) directions that are ``cell_rad`` apart."""
+    field = Field(cones)
+    cell_m = cell_rad * float(np.median(near))
+    hits = trace(field, directions, near, end=cones.depths()[1], tolerance=_TOLERANCE * cell_m)
+    colour = np.zeros((len(near), 3), np.float32)
+    seen = hits.clearance < 1.7 * cell_m
+    clearance = hits.clearance[seen]
+    colour[seen] = _shade(cones, hits.points[:, seen], clearance, directions[:, seen], look)
+    return colour, np.clip(1.0 - hits.clearance / np.float32(cell_m), 0.0, 1.0)
+
+
+def _shade(cones: Cones, points: Float, clearance: Float, directions: Float, look: Look) -> Float:
+    """Return (n, 3) colours 0..1 of the skin at (3, n) points that are (n,) ``clearance`` off it."""
+    field = Field(cones)
     normals, weights = field.surface(points)
     light = np.array(look.light, np.float32)
     light /= np.linalg.norm(light)
@@ -182,7 +130,7 @@ def _shade(field: Field, cones: Cones, points: Float, directions: Float, look: L
     shine = np.maximum(np.einsum("in,in->n", half, normals), 0.0) ** _SHININESS
     # Skin lets light through: its shadows begin later than a plaster hand's.
     diffuse = np.clip((facing + 0.35) / 1.35, 0.0, 1.0)
-    gap = field.distance(points + normals * np.float32(_OCCLUSION_REACH_M))
+    gap = field.distance(points + normals * np.float32(_OCCLUSION_REACH_M)) - clearance
     open_sky = np.clip(gap / np.float32(_OCCLUSION_REACH_M), 0.0, 1.0)
     lit = (_AMBIENT + _DIFFUSE * diffuse) * (1.0 - _OCCLUSION * (1.0 - open_sky))
     palette = np.array([*SKINS[look.skin], look.sleeve_colour], np.float32)
@@ -193,18 +141,17 @@ def _shade(field: Field, cones: Cones, points: Float, directions: Float, look: L
     return shaded
 
 
-def _lay_over(picture: Image, grid: _Grid, colour: Float, cover: Float) -> None:
+def _lay_over(picture: Image, grid: Grid, colour: Float, cover: Float) -> None:
     """Enlarge the traced cells and lay them over the picture, in place."""
-    width = min(int(np.ceil(grid.columns * grid.cell_px)), picture.shape[1] - int(grid.left))
-    height = min(int(np.ceil(grid.rows * grid.cell_px)), picture.shape[0] - int(grid.top))
+    width = min(int(np.ceil(grid.columns * grid.cell_px)), picture.shape[1] - grid.left)
+    height = min(int(np.ceil(grid.rows * grid.cell_px)), picture.shape[0] - grid.top)
     scale = np.array([[grid.cell_px, 0, 0.5 * grid.cell_px - 0.5], [0, grid.cell_px, 0.5 * grid.cell_px - 0.5]])
     layers = np.dstack([colour * np.float32(255), cover])
-    large = cv2.warpAffine(layers, scale, (width, height), flags=cv2.INTER_LINEAR)
-    left, top = int(grid.left), int(grid.top)
-    patch = picture[top : top + height, left : left + width]
+    large = cv2.warpAffine(layers, scale, (width, height), flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    patch = picture[grid.top : grid.top + height, grid.left : grid.left + width]
     weight = large[..., 3]
     # The border of a cell is blurred by the enlargement; a steeper step gives back the sharp outline.
-    sharp = np.clip((weight - 0.5) * np.float32(min(grid.cell_px, 3.0)) + 0.5, 0.0, 1.0)
+    sharp = np.clip((weight - _EDGE) * np.float32(min(grid.cell_px, 4.0)) + 0.5, 0.0, 1.0)
     patch[:] = cv2.blendLinear(large[..., :3].astype(np.uint8), patch, sharp, 1.0 - sharp)
 
 

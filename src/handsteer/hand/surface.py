@@ -4,18 +4,23 @@ A round cone is a ball that changes its size while it moves along a line. The sm
 is ``-k log(sum(exp(-d_i / k)))`` (I. Quilez, *Smooth minimum*), which also says how much each of them counts.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 
 import numpy as np
 from numpy.typing import NDArray
 
 from handsteer.hand.kinematics import BONE_LENGTHS_M, Array, Skeleton
+from handsteer.hand.placement import Placement
 
 Float = NDArray[np.float32]
 
 BLEND_M = 0.0020
 """k of the smooth union: how far neighbouring cones melt into each other, metres."""
+
+
+MARGIN_M = 0.006
+"""What the smooth union adds to the cones at most, metres."""
 
 
 class Material(IntEnum):
@@ -44,6 +49,25 @@ class Cones:
     start_radius: Array
     end_radius: Array
     material: NDArray[np.int64]
+
+    def placed(self, placement: Placement) -> "Cones":
+        """Return these cones of the hand frame in the camera frame."""
+        return replace(self, start=placement.apply(self.start), end=placement.apply(self.end))
+
+    def depths(self) -> tuple[float, float]:
+        """Return bounds on how far off the nearest and the farthest point of them is, metres."""
+        axis = self.end - self.start
+        square = np.maximum(np.sum(axis**2, axis=1), 1e-12)
+        along = np.clip(-np.sum(self.start * axis, axis=1) / square, 0.0, 1.0)
+        radius = np.maximum(self.start_radius, self.end_radius) + MARGIN_M
+        near = np.linalg.norm(self.start + along[:, None] * axis, axis=1) - radius
+        far = np.maximum(np.linalg.norm(self.start, axis=1), np.linalg.norm(self.end, axis=1)) + radius
+        return max(float(near.min()), 0.0), float(far.max())
+
+    def only(self, which: NDArray[np.bool_]) -> "Cones":
+        """Return some of the cones."""
+        radii = self.start_radius[which], self.end_radius[which]
+        return Cones(self.start[which], self.end[which], *radii, self.material[which])
 
 
 @dataclass(frozen=True)
@@ -75,7 +99,7 @@ _PALM = (
     ((0.0080, 0.0380, 0.0000), (-0.0150, 0.0360, 0.0015), 0.0130, 0.0130),
 )
 
-_SLEEVE_FROM_M, _ARM_LENGTH_M = 0.075, 1.2
+_SLEEVE_FROM_M, _ARM_LENGTH_M = 0.075, 0.8
 
 
 class _Builder:

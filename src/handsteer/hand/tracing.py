@@ -6,31 +6,35 @@ import numpy as np
 
 from handsteer.hand.surface import BLEND_M, Cones, Float
 
-_STEPS = 40
-_REACH = 0.95  # of the distance: the union of cones overstates it a little beside a steep cone
+_STEPS = 16
+_SLOWEST, _LEAP_M = 0.4, np.float32(0.004)
 
 
 class Field:
-    """The distance to the skin, prepared for many points at once.
+    """The distance to the skin, for many points at once; all in the frame of the cones.
 
     Arrays are (M cones, n points), so that every sum over the cones runs along the points.
     """
 
     def __init__(self, cones: Cones) -> None:
         axis = cones.end - cones.start
-        self._start: Float = cones.start.astype(np.float32)
+        # Squares of distances are taken about the hand, so that single precision is enough.
+        middle = cones.start.mean(axis=0)
+        self._middle: Float = middle[:, None].astype(np.float32)
+        first = cones.start - middle
+        self._start: Float = first.astype(np.float32)
         self._axis: Float = axis.astype(np.float32)
         square = np.sum(axis**2, axis=1)
         self._square: Float = square[:, None].astype(np.float32)
         self._inverse: Float = (1.0 / np.maximum(square, 1e-12))[:, None].astype(np.float32)
-        self._along: Float = np.sum(cones.start * axis, axis=1)[:, None].astype(np.float32)
-        self._offset: Float = np.sum(cones.start**2, axis=1)[:, None].astype(np.float32)
+        self._along: Float = np.sum(first * axis, axis=1)[:, None].astype(np.float32)
+        self._offset: Float = np.sum(first**2, axis=1)[:, None].astype(np.float32)
         self._radius: Float = cones.start_radius[:, None].astype(np.float32)
         self._growth: Float = (cones.end_radius - cones.start_radius)[:, None].astype(np.float32)
 
     def distance(self, points: Float) -> Float:
         """Return (n,) signed distances in metres of (3, n) points."""
-        distances, _, _ = self._each(points)
+        distances, _, _ = self._each(points - self._middle)
         nearest = distances.min(axis=0)
         distances -= nearest
         distances *= np.float32(-1.0 / BLEND_M)
@@ -40,6 +44,7 @@ class Field:
 
     def surface(self, points: Float) -> tuple[Float, Float]:
         """Return (3, n) outward unit normals, and (M, n) how much each cone counts, at (3, n) points."""
+        points = points - self._middle
         distances, along, centre_distances = self._each(points)
         weights = np.exp((distances.min(axis=0) - distances) * np.float32(1.0 / BLEND_M))
         weights /= weights.sum(axis=0)
@@ -49,7 +54,7 @@ class Field:
         return normals, weights
 
     def _each(self, points: Float) -> tuple[Float, Float, Float]:
-        """Return (M, n) distances to each cone, positions 0..1 along it, and distances to its axis."""
+        """Return (M, n) distances to each cone, positions along it (0..1), distances to its axis."""
         along = self._axis @ points
         along -= self._along
         position = along * self._inverse
@@ -71,54 +76,55 @@ class Field:
 
 
 @dataclass(frozen=True)
-class Rays:
-    """n rays from one point.
-
-    Attributes:
-        origin: (3,) metres.
-        directions: (3, n) unit vectors.
-        start: (n,) where to start on each ray, metres; outside the skin.
-    """
-
-    origin: Float
-    directions: Float
-    start: Float
-
-
-@dataclass(frozen=True)
 class Hits:
     """Where n rays meet the skin, or pass it closest.
 
     Attributes:
         points: (3, n) metres.
-        clearance: (n,) how far the ray passes the skin there, metres; 0 or less where it hits.
+        travelled: (n,) how far along the rays, metres.
+        clearance: (n,) how far the ray passes the skin there, metres; about 0 where it hits.
     """
 
     points: Float
+    travelled: Float
     clearance: Float
 
 
-def trace(field: Field, rays: Rays, *, end: float, tolerance: float) -> Hits:
-    """Follow rays to the skin.
+def trace(
+    field: Field, directions: Float, start: Float, *, end: float, tolerance: float, width_rad: float = 0.0
+) -> Hits:
+    """Follow rays from the camera to the skin.
+
+    A step is the distance (J. C. Hart, *Sphere tracing*, 1996), and longer where a ray grazes: as far as the skin would
+    be if the distance went on falling as it did in the last step. What it then goes
+    too far it comes back.
 
     Args:
         field: The skin.
-        rays: Where to look.
+        directions: (3, n) unit vectors.
+        start: (n,) where to start on each ray, metres; outside the skin.
         end: How far along a ray to give up, metres.
         tolerance: How near counts as a hit, metres.
+        width_rad: Radius of a ray, growing with its distance, that must not touch the skin: then all rays within it
+            can go on from there.
     """
-    travelled, best = rays.start.copy(), rays.start.copy()
+    here, best, ahead = start, start.copy(), directions
     clearance = np.full(len(best), np.inf, np.float32)
     active = np.arange(len(best))
+    before, step = clearance.copy(), np.ones_like(start)
     for _ in range(_STEPS):
-        here = travelled[active]
-        distance = field.distance(rays.origin[:, None] + rays.directions[:, active] * here)
-        closer = distance < clearance[active]
-        clearance[active] = np.where(closer, distance, clearance[active])
-        best[active] = np.where(closer, here, best[active])
-        here = here + distance * np.float32(_REACH)
-        travelled[active] = here
-        active = active[(distance > tolerance) & (here < end)]
+        distance = field.distance(ahead * here)
+        if width_rad:
+            distance -= np.float32(width_rad) * here
+        gap = np.abs(distance)
+        closer = gap < clearance[active]
+        nearer = active[closer]
+        clearance[nearer], best[nearer] = gap[closer], here[closer]
+        falling = np.clip((before - distance) / step, _SLOWEST, 1.0)
+        step = np.minimum(distance / falling, distance + _LEAP_M)
+        going = (gap > tolerance) & (here < end)
+        active, ahead = active[going], ahead[:, going]
+        here, before, step = here[going] + step[going], distance[going], step[going]
         if not len(active):
             break
-    return Hits(rays.origin[:, None] + rays.directions * best, clearance)
+    return Hits(directions * best, best, clearance)
