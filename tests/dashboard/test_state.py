@@ -33,8 +33,6 @@ def control(message: str, linear: str = "0.000", angular: str = "0.000", source:
 
 CAMERA = report("virtual hand: delivers frames", frames="10")
 NO_HAND = report("no hand is in view", sign="NONE", seen="NONE")
-FORWARD = report("Forward is shown", sign="Forward", seen="Forward")
-FREE = report("moves freely")
 
 
 @pytest.mark.parametrize(
@@ -120,13 +118,21 @@ def test_composes_the_figures() -> None:
     assert (state.commanded, state.measured) == (Velocity(0.25, 0.0), Velocity(0.24, 0.01))
     assert (state.latency_median_ms, state.latency_p99_ms, state.fps) == (11.5, 20.0, 30.0)
     assert (state.path_length_m, state.collisions) == (1.25, 2)
-    assert (state.camera, state.driver, state.has_picture) == ("video0", "signs", True)
+    assert (state.camera, state.driver, state.no_picture) == ("video0", "signs", "")
 
 
 def test_knows_nothing_before_anything_has_come() -> None:
     state = compose(Observed(), now_s=100.0)
-    assert (state.mood, state.sign, state.commanded, state.has_picture) == ("waiting", "NONE", ZERO, False)
+    assert (state.mood, state.sign, state.commanded, state.no_picture) == ("waiting", "NONE", ZERO, "no report yet")
     assert (state.latency_median_ms, state.fps, state.path_length_m, state.collisions) == (None, None, None, None)
+
+
+def test_says_why_there_is_no_picture() -> None:
+    silent = report("no frame for 3.0 s", WARN, sign="NONE")
+    reports = {"hand_sign_recognition": silent, "my_camera": CAMERA}
+    assert compose(Observed(reports), now_s=0.1).no_picture == "no frame for 3.0 s"
+    reports["my_camera"] = report("webcam 0 was unplugged", ERROR)
+    assert compose(Observed(reports), now_s=0.1).no_picture == "webcam 0 was unplugged"
 
 
 def test_forgets_a_node_that_has_gone_silent() -> None:

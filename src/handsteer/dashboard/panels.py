@@ -11,7 +11,7 @@ from handsteer.dashboard.state import PageState
 from handsteer.signs.vocabulary import NONE
 
 _UNKNOWN = "--"
-_DRIVERS = {"signs": "your signs", "steering": "the pad", "nobody": "nobody"}
+_DRIVERS = {"signs": "your signs", "steering": "hand steering", "nobody": "nobody"}
 
 
 @contextmanager
@@ -47,7 +47,9 @@ class CameraPanel:
     def __init__(self, picture_url: str) -> None:
         with ui.element("section").classes("card viewer camera"):
             with _box("stage"):
-                ui.element("img").props(f'src="{picture_url}" alt="The camera\'s picture, mirrored"')
+                # Lazy, because a page counts as loaded only when its other pictures have come.
+                picture = ui.element("img").props('loading="lazy" alt="What the camera sees, mirrored"')
+                picture.props(f'src="{picture_url}"')
                 with _box("veil") as self._veil:
                     self._excuse = _text("", "waiting for the first picture")
                 _text("caption", "as in a mirror")
@@ -71,8 +73,8 @@ class CameraPanel:
         if percent != self._width:
             self._confidence.style(f"width: {percent}%")
             self._width = percent
-        self._excuse.set_text(state.reason if state.mood == "trouble" else state.camera_message or "no picture yet")
-        _switch(self._veil, "off", on=state.has_picture)
+        self._excuse.set_text(state.no_picture)
+        _switch(self._veil, "off", on=not state.no_picture)
 
 
 class RobotFoot:

@@ -26,7 +26,7 @@ _FLOOR = "#151f36"
 _LINES = "#2b3c63"
 _FLOOR_RADIUS_M = 12
 _LINE_WIDTH_M = 0.015
-_FRAMES_PER_S = 30
+_FRAMES_PER_S = 20
 
 # Shapes of visualization_msgs/Marker. Each is made with unit size, and its size is a scale.
 _CUBE, _SPHERE, _CYLINDER = 1, 2, 3
@@ -51,7 +51,7 @@ class WorldView:
             with scene.group() as self._world, scene.group() as self._floor:
                 _draw_floor(scene)
             self._robot = scene.group()
-        scene.move_camera(x=-1.8, y=-0.8, z=1.15, look_at_x=0.6, look_at_y=0.1, look_at_z=0.0, duration=0)
+        scene.move_camera(x=-1.6, y=-0.7, z=1.05, look_at_x=0.6, look_at_y=0.1, look_at_z=0.0, duration=0)
 
     def update(self, world: WorldState) -> None:
         """Show ``world``."""

@@ -47,6 +47,10 @@ class Dashboard:
         clock: The graph's clock.
         steering: Drives when people steer on the page.
         config: Holds the port.
+
+    Attributes:
+        node: Listens and steers for the browsers that show the page.
+        pictures: Encodes the camera's picture for the browsers that show it.
     """
 
     def __init__(self, transport: Transport, clock: Clock, steering: SteeringNode, config: DashboardConfig) -> None:

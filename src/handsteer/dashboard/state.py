@@ -75,9 +75,8 @@ class PageState:
         seen: The sign that the newest frame alone shows.
         confidence: 0 to 1, how sure ``seen`` is.
         handedness: ``Left``, ``Right`` or empty.
-        has_picture: Whether frames come.
+        no_picture: Why no pictures come; empty when they come.
         camera: Short name of the camera.
-        camera_message: What the camera says of itself.
         driver: Who drives: ``signs``, ``steering`` or ``nobody``.
         commanded: The velocity that the robot is told, zero when it is told nothing.
         measured: The velocity that odometry says.
@@ -95,9 +94,8 @@ class PageState:
     seen: str
     confidence: float
     handedness: str
-    has_picture: bool
+    no_picture: str
     camera: str
-    camera_message: str
     driver: str
     commanded: Velocity
     measured: Velocity
@@ -114,7 +112,7 @@ def compose(observed: Observed, now_s: float) -> PageState:
     seen = reports.get("hand_sign_recognition", _NO_REPORT)
     control = reports.get("hand_sign_control", _NO_REPORT)
     robot = reports.get("robot", _NO_REPORT)
-    camera = reports.get("my_camera", _NO_REPORT).message
+    camera = reports.get("my_camera", _NO_REPORT)
     mood, headline, reason = explain(reports)
     collisions = robot.number("collisions")
     return PageState(
@@ -125,9 +123,8 @@ def compose(observed: Observed, now_s: float) -> PageState:
         seen=seen.values.get("seen", NONE),
         confidence=seen.number("confidence") or 0.0,
         handedness=seen.values.get("handedness", ""),
-        has_picture=seen.level == OK and "seen" in seen.values,
-        camera=camera_name(camera),
-        camera_message=camera,
+        no_picture="" if "seen" in seen.values else camera.message if camera.level >= ERROR else seen.message,
+        camera=camera_name(camera.message),
         driver=control.values.get("source", "nobody"),
         commanded=observed.command if now_s - observed.command_came_s < _COMMAND_HOLDS_S else ZERO,
         measured=observed.measured,
@@ -208,4 +205,4 @@ def place_in_world(truth: Pose2D, odometry_then: Pose2D, odometry_now: Pose2D) -
     )
 
 
-_NO_REPORT = Report(OK, "", {}, -math.inf)
+_NO_REPORT = Report(OK, "no report yet", {}, -math.inf)

@@ -1,0 +1,152 @@
+"""The page in a real browser, on the whole graph with the virtual hand."""
+
+import threading
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+
+import pytest
+from playwright.sync_api import ConsoleMessage, Page, Request, sync_playwright
+from scripts import chromium
+
+from handsteer.config import load
+from handsteer.dashboard.server import Dashboard
+from handsteer.graph import Graph
+
+PATIENCE_MS = 60_000
+
+pytestmark = [
+    pytest.mark.browser,
+    pytest.mark.slow,
+    pytest.mark.skipif(chromium.find() is None, reason=f"no browser found: none of {', '.join(chromium.NAMES)}"),
+]
+
+
+@dataclass
+class Visit:
+    """A browser that shows the page of a running graph, and what went wrong in it."""
+
+    page: Page
+    graph: Graph
+    troubles: list[str] = field(default_factory=list)
+
+    def text(self, selector: str) -> str:
+        return self.page.locator(selector).first.inner_text()
+
+    def number(self, selector: str) -> float:
+        return float(self.text(selector).split()[-1])
+
+    def wait_until(self, condition: Callable[[], bool]) -> None:
+        for _ in range(PATIENCE_MS // 50):
+            if condition():
+                return
+            self.page.wait_for_timeout(50)
+        pytest.fail(f"waited in vain; the page says: {self.text('body')}; {self.troubles}")
+
+    def note_message(self, message: ConsoleMessage) -> None:
+        if message.type in ("error", "warning") and "GPU stall" not in message.text:
+            self.troubles.append(message.text)
+
+    def note_request(self, request: Request) -> None:
+        if not request.url.startswith(("http://127.0.0.1:", "data:", "blob:")):
+            self.troubles.append(f"asks for {request.url}")
+
+
+@pytest.fixture
+def visit(request: pytest.FixtureRequest) -> Iterator[Visit]:
+    config = load(
+        base={
+            "camera": {"source": "virtual", "width": 320, "height": 240, "fps": 15},
+            "virtual_hand": {"script": request.param},
+            "dashboard": {"port": 0},
+        }
+    )
+    with Graph(config) as graph, sync_playwright() as playwright:
+        dashboard = Dashboard(graph.transport, graph.clock, graph.steering, config.dashboard)
+        url = dashboard.start()
+        graph.start()
+        browser = chromium.launch(playwright)
+        try:
+            visit = Visit(browser.new_page(viewport={"width": 1280, "height": 800}), graph)
+            visit.page.set_default_timeout(PATIENCE_MS)
+            visit.page.on("console", visit.note_message)
+            visit.page.on("pageerror", lambda error: visit.troubles.append(str(error)))
+            visit.page.on("request", visit.note_request)
+            visit.page.goto(url)
+            yield visit
+        finally:
+            browser.close()
+            dashboard.stop()
+
+
+@pytest.mark.parametrize("visit", ["Forward:4 Stop:1"], indirect=True)
+def test_shows_what_is_seen_and_what_the_robot_does(visit: Visit) -> None:
+    visit.wait_until(lambda: visit.text(".camera .sign") == "Forward")
+    visit.wait_until(lambda: visit.text(".banner .headline") == "Driving")
+    visit.wait_until(lambda: visit.number(".velocity .axis .value") > 0.05)
+    visit.wait_until(lambda: path_shown(visit) > 0)
+    assert visit.text(".world .fact b") == "your signs"
+    visit.wait_until(lambda: visit.text(".legend .seen .name") == "Forward")
+    visit.wait_until(lambda: "Standing" in visit.text(".banner") and "Stop sign" in visit.text(".banner"))
+    assert visit.page.evaluate("document.querySelector('.camera img').naturalWidth") == 320
+    assert drawn_objects(visit.page) > 10  # robot, obstacles and floor
+    visit.wait_until(lambda: visit.text(".timing .value") != "--")
+    assert visit.troubles == []
+
+
+@pytest.mark.parametrize("visit", ["NONE:60"], indirect=True)
+def test_drives_while_the_pad_is_held_and_stops_when_it_is_let_go(visit: Visit) -> None:
+    robot = visit.graph.robot
+    visit.wait_until(lambda: visit.text(".banner .reason") == "no hand is in view")
+    pad = visit.page.locator(".pad")
+    pad.focus()
+    visit.page.keyboard.down("ArrowUp")
+    visit.wait_until(lambda: robot.state.linear_mps > 0.2)
+    visit.wait_until(lambda: visit.text(".banner .reason") == "steered by hand")
+    visit.page.keyboard.up("ArrowUp")
+    visit.wait_until(lambda: robot.state.linear_mps == pytest.approx(0, abs=0.01))
+
+    box = pad.bounding_box()
+    assert box is not None
+    visit.page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    visit.page.mouse.down()
+    visit.page.mouse.move(box["x"] + 5, box["y"] + box["height"] / 2)
+    visit.wait_until(lambda: robot.state.angular_radps > 0.2)  # the pad's left turns left, which is positive
+
+    visit.page.close()  # the pad is still held
+    waiting = threading.Event()
+    for _ in range(PATIENCE_MS // 50):
+        if abs(robot.state.angular_radps) < 0.01:
+            break
+        waiting.wait(0.05)
+    assert robot.state.angular_radps == pytest.approx(0, abs=0.01)
+
+
+@pytest.mark.parametrize("visit", ["Stop:60"], indirect=True)
+def test_fits_a_phone_and_turns_dark_and_stays_so(visit: Visit) -> None:
+    visit.wait_until(lambda: visit.text(".camera .sign") == "Stop")
+    visit.page.set_viewport_size({"width": 360, "height": 740})
+    assert visit.page.evaluate("document.documentElement.scrollWidth") <= 360
+    assert visit.page.locator(".banner").bounding_box()["y"] < 740
+    light = visit.page.evaluate("getComputedStyle(document.body).backgroundColor")
+    visit.page.locator(".theme").click()
+    dark = visit.page.evaluate("getComputedStyle(document.body).backgroundColor")
+    assert dark != light
+    visit.page.reload()
+    visit.wait_until(lambda: visit.page.evaluate("getComputedStyle(document.body).backgroundColor") == dark)
+    assert visit.troubles == []
+
+
+def path_shown(visit: Visit) -> float:
+    return float(visit.text(".world .fact:nth-child(2) b").removesuffix(" m").replace("--", "0"))
+
+
+def drawn_objects(page: Page) -> int:
+    """Count the shapes in the 3D view; NiceGUI keeps the scene in a global for tests."""
+    return page.evaluate(
+        """() => {
+            const name = Object.keys(window).find(key => key.startsWith("scene_"));
+            let shapes = 0;
+            window[name].traverse(object => shapes += object.isMesh ? 1 : 0);
+            return document.querySelector(".world canvas") ? shapes : 0;
+        }"""
+    )
