@@ -199,5 +199,6 @@ def test_a_node_runs_only_while_somebody_watches() -> None:
     watched.leave("you")
     assert watched.join("me") is not first
     watched.close()
-    assert not reports.wanted
     assert not watched.is_watched_by("me")
+    assert watched.join("me") is None  # a page that does not know yet must not start it again
+    assert not reports.wanted

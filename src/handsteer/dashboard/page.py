@@ -76,25 +76,29 @@ class Page:
                     ui.html(_THEME_ICON, sanitize=False)
 
     def _update_world(self) -> None:
-        if self._client.has_socket_connection:
-            self._world.update(self._joined().world)
+        if node := self._joined():
+            self._world.update(node.world)
 
     def _update_words(self) -> None:
-        if not self._client.has_socket_connection:
+        node = self._joined()
+        if node is None:
             return
-        state = self._joined().state()
+        state = node.state()
         self._source.set_text(state.camera)
         for panel in (self._banner, self._camera, self._robot, self._velocity, self._timing, self._signs):
             panel.update(state)
 
     def _steer(self, linear_mps: float, angular_radps: float) -> None:
-        self._joined().steer(self._client.id, linear_mps, angular_radps)
+        if node := self._joined():
+            node.steer(self._client.id, linear_mps, angular_radps)
 
     def _release(self) -> None:
-        self._joined().release(self._client.id)
+        if node := self._joined():
+            node.release(self._client.id)
 
-    def _joined(self) -> DashboardNode:
-        return self._node.join(self._client.id)
+    def _joined(self) -> DashboardNode | None:
+        """Return the node while the browser is connected and the page is served."""
+        return self._node.join(self._client.id) if self._client.has_socket_connection else None
 
     def _leave(self) -> None:
         self._node.leave(self._client.id)

@@ -77,7 +77,11 @@ class PictureResponse(Response):
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Send pictures; return when the viewer has left or the pictures have ended."""
         viewer = uuid.uuid4()
-        sending = asyncio.create_task(self._send_pictures(self._pictures.join(viewer), send))
+        node = self._pictures.join(viewer)
+        if node is None:
+            await Response(status_code=503)(scope, receive, send)
+            return
+        sending = asyncio.create_task(self._send_pictures(node, send))
         leaving = asyncio.create_task(_wait_for_disconnect(receive))
         try:
             while self._pictures.is_watched_by(viewer) and not (sending.done() or leaving.done()):

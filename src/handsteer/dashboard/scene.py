@@ -56,7 +56,7 @@ class WorldView:
     def update(self, world: WorldState) -> None:
         """Show ``world``."""
         shown, self._shown = self._shown, world
-        if world.description != shown.description:
+        if world.description and world.description != shown.description:
             self._draw_robot(world.description)
         if world.joints is not shown.joints:
             self._turn_joints(dict(world.joints))

@@ -21,10 +21,13 @@ class WhileWatched(Generic[N]):
         self._lock = threading.Lock()
         self._viewers: set[Hashable] = set()
         self._node: N | None = None
+        self._closed = False
 
-    def join(self, viewer: Hashable) -> N:
-        """Return the running node; ``viewer`` counts once, however often it joins."""
+    def join(self, viewer: Hashable) -> N | None:
+        """Return the running node, or None after :meth:`close`; ``viewer`` counts once, however often it joins."""
         with self._lock:
+            if self._closed:
+                return None
             self._viewers.add(viewer)
             if self._node is None:
                 self._node = self._make()
@@ -43,8 +46,9 @@ class WhileWatched(Generic[N]):
                 self._stop()
 
     def close(self) -> None:
-        """Stop the node, whoever watches."""
+        """Stop the node, whoever watches, for good."""
         with self._lock:
+            self._closed = True
             self._viewers.clear()
             self._stop()
 
