@@ -96,7 +96,14 @@ RELAXED = _shape(
 )
 FIST = _shape(thumb=_THUMB_OVER_INDEX)
 INDEX = _shape(thumb=_THUMB_OVER_MIDDLE, index=_STRAIGHT_INDEX)
-THUMB = _shape(thumb=_THUMB_OUT)
+THUMB = _shape(
+    # Seen from the back, only a tight fist is told from straight fingers.
+    thumb=_THUMB_OUT,
+    index=(0.0, 80.0, 106.0, 62.0),
+    middle=(0.0, 82.0, 108.0, 66.0),
+    ring=(0.0, 84.0, 108.0, 66.0),
+    little=(2.0, 86.0, 108.0, 66.0),
+)
 
 _HEIGHT_M, _DEPTH_M = 0.03, 0.55
 _LOWERED_M = 0.75 * _DEPTH_M + 0.20  # below the picture, whatever the camera's shape
@@ -111,8 +118,8 @@ _POSES = {
     STOP: _held(OPEN),
     FORWARD: _held(INDEX, yaw=8, y=_HEIGHT_M + 0.02),
     BACKWARD: _held(INDEX, yaw=12, roll=180, y=-0.02),
-    TURN_LEFT: _held(THUMB, yaw=20, pitch=-20, roll=20),
-    TURN_RIGHT: _held(THUMB, yaw=152, pitch=-32, roll=-20),
+    TURN_LEFT: _held(THUMB, yaw=20, pitch=-20, roll=10),
+    TURN_RIGHT: _held(THUMB, yaw=150, pitch=-30, roll=-28),
     GO: _held(FIST, yaw=10, pitch=3),
     NONE: _held(RELAXED, y=_LOWERED_M),
 }

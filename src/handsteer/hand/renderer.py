@@ -26,9 +26,9 @@ _TOLERANCE = 0.08  # of a cell
 _NEAR_M = 0.002  # where whole blocks stop
 _EDGE = 0.75  # the nearness at which the hand ends
 _GAMMA = 0.8
-_SPECULAR, _SHININESS = 0.16, 14.0
+_SPECULAR, _SHININESS = 0.24, 14.0
 _AMBIENT, _DIFFUSE = 0.46, 0.62
-_OCCLUSION, _OCCLUSION_REACH_M = 0.30, 0.010
+_OCCLUSION, _OCCLUSION_REACH_M = 0.22, 0.010
 
 
 @dataclass(frozen=True)

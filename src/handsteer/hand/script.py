@@ -11,7 +11,7 @@ from handsteer.hand.kinematics import ANGLES, Array, clamp
 from handsteer.hand.poses import HandPose, View, sign_pose
 from handsteer.landmarks.protocol import Handedness
 
-_CHANGE_S = 0.35
+_CHANGE_S = 0.30
 _MAX_S = 3600.0
 _PART = re.compile(r"([^:]*):(\S*)\s*")
 

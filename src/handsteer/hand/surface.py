@@ -165,7 +165,7 @@ def _add_knuckles(
         after = axes[joint][:, 2]
         bent = float(np.clip(1.0 - before @ after, 0.0, 1.0))
         back = -(before + after) / max(float(np.linalg.norm(before + after)), 1e-6)
-        builder.ball(ends[joint] + back * (0.0050 * bent), (0.62 + 0.34 * bent) * radii[joint], Material.FLUSHED)
+        builder.ball(ends[joint] + back * (0.0042 * bent), (0.62 + 0.34 * bent) * radii[joint], Material.FLUSHED)
         before = after
 
 
