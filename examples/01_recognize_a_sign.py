@@ -6,9 +6,8 @@ Run ``python examples/01_recognize_a_sign.py photo.jpg``; without a photo, a vir
 import sys
 from pathlib import Path
 
-from handsteer.cameras.virtual import VirtualHandCamera
-
 from handsteer.cameras.files import read_photo
+from handsteer.cameras.virtual import VirtualHandCamera
 from handsteer.clock import SteppedClock
 from handsteer.config import Config, VirtualHandConfig
 from handsteer.graph import open_recognizer
