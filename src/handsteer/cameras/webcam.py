@@ -1,6 +1,7 @@
 """A webcam, or any address that OpenCV can open."""
 
 import os
+import platform
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -138,7 +139,7 @@ def is_device(source: str) -> bool:
 def webcams() -> list[str]:
     """Return the webcams that this machine seems to have, as sources; on other systems than Linux, the first two."""
     devices = sorted(Path("/dev").glob("video*"), key=lambda path: (len(path.name), path.name))
-    if devices or os.uname().sysname == "Linux":
+    if devices or platform.system() == "Linux":
         return [str(path) for path in devices]
     return ["0", "1"]
 
@@ -156,7 +157,7 @@ def _device_path(source: str) -> Path:
 
 def _check_device(source: str) -> None:
     """Say what can be said about a device before OpenCV is asked, whose own answer is only yes or no."""
-    if is_address(source) or os.uname().sysname != "Linux":
+    if is_address(source) or platform.system() != "Linux":
         return
     path = _device_path(source)
     if not path.exists():
