@@ -115,7 +115,7 @@ def _look_along(directions: Float, near: Float, cell_rad: float, cones: Cones, l
     seen = hits.clearance < 1.7 * cell_m
     clearance = hits.clearance[seen]
     colour[seen] = _shade(cones, hits.points[:, seen], clearance, directions[:, seen], look)
-    return colour, np.clip(1.0 - hits.clearance / np.float32(cell_m), 0.0, 1.0)
+    return colour, np.clip(1.0 + _TOLERANCE - hits.clearance / np.float32(cell_m), 0.0, 1.0)
 
 
 def _shade(cones: Cones, points: Float, clearance: Float, directions: Float, look: Look) -> Float:

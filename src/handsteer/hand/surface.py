@@ -70,20 +70,14 @@ class Cones:
         return Cones(self.start[which], self.end[which], *radii, self.material[which])
 
 
-@dataclass(frozen=True)
-class _Digit:
-    """Radii, metres: base, at both joints, tip; and how far the ball at the knuckle is raised when it is bent."""
-
-    radii: tuple[float, float, float, float]
-
-
-_DIGITS = (
-    _Digit((0.0128, 0.0102, 0.0092, 0.0078)),
-    _Digit((0.0102, 0.0084, 0.0074, 0.0062)),
-    _Digit((0.0104, 0.0086, 0.0076, 0.0064)),
-    _Digit((0.0098, 0.0080, 0.0071, 0.0060)),
-    _Digit((0.0088, 0.0069, 0.0061, 0.0052)),
+_RADII_M = (
+    (0.0128, 0.0102, 0.0092, 0.0078),
+    (0.0102, 0.0084, 0.0074, 0.0062),
+    (0.0104, 0.0086, 0.0076, 0.0064),
+    (0.0098, 0.0080, 0.0071, 0.0060),
+    (0.0088, 0.0069, 0.0061, 0.0052),
 )
+"""Thumb to little finger: radii at the base, at both joints and at the tip, metres."""
 
 _PALM = (
     # (start, end, start radius, end radius) in the hand frame, metres: wrist to the four knuckles,
@@ -93,10 +87,12 @@ _PALM = (
     ((-0.0130, 0.004, 0.0), (-0.0325, 0.0685, 0.003), 0.0140, 0.0096),
     # the ball of the little finger, the pads under the fingers, the hollow of the hand.
     ((-0.0170, 0.018, 0.005), (-0.0280, 0.0560, 0.004), 0.0125, 0.0105),
-    ((0.0230, 0.0880, 0.0020), (-0.0300, 0.0710, 0.0045), 0.0090, 0.0085),
-    ((0.0190, 0.0730, 0.0010), (-0.0260, 0.0610, 0.0025), 0.0108, 0.0104),
-    ((0.0120, 0.0560, 0.0000), (-0.0210, 0.0500, 0.0015), 0.0122, 0.0118),
-    ((0.0080, 0.0380, 0.0000), (-0.0150, 0.0360, 0.0015), 0.0130, 0.0130),
+    ((0.0235, 0.0890, 0.0022), (-0.0305, 0.0720, 0.0045), 0.0088, 0.0083),
+    ((0.0215, 0.0800, 0.0014), (-0.0285, 0.0655, 0.0035), 0.0098, 0.0094),
+    ((0.0185, 0.0710, 0.0008), (-0.0260, 0.0590, 0.0025), 0.0107, 0.0103),
+    ((0.0150, 0.0620, 0.0004), (-0.0230, 0.0530, 0.0018), 0.0114, 0.0111),
+    ((0.0110, 0.0520, 0.0000), (-0.0190, 0.0460, 0.0015), 0.0121, 0.0119),
+    ((0.0080, 0.0400, 0.0000), (-0.0150, 0.0375, 0.0015), 0.0128, 0.0126),
 )
 
 _SLEEVE_FROM_M, _ARM_LENGTH_M = 0.075, 0.8
@@ -123,7 +119,7 @@ def hand_cones(skeleton: Skeleton, *, sleeve: bool = True) -> Cones:
     builder = _Builder()
     _add_palm(builder, joints)
     for digit in range(5):
-        _add_digit(builder, joints[1 + 4 * digit : 5 + 4 * digit], axes[digit], _DIGITS[digit].radii, digit)
+        _add_digit(builder, joints[1 + 4 * digit : 5 + 4 * digit], axes[digit], _RADII_M[digit], digit)
     _add_arm(builder, skeleton.forearm[0], sleeve)
     return builder.build()
 

@@ -7,7 +7,7 @@ import numpy as np
 from handsteer.hand.surface import BLEND_M, Cones, Float
 
 _STEPS = 16
-_SLOWEST, _LEAP_M = 0.4, np.float32(0.004)
+_SLOWEST, _LEAP_M = 0.4, np.float32(0.004)  # bounds on the longer steps: least fall a metre, metres added
 
 
 class Field:
@@ -82,7 +82,7 @@ class Hits:
     Attributes:
         points: (3, n) metres.
         travelled: (n,) how far along the rays, metres.
-        clearance: (n,) how far the ray passes the skin there, metres; about 0 where it hits.
+        clearance: (n,) signed distance of the ray to the skin there, metres; about 0 where it hits.
     """
 
     points: Float
@@ -95,9 +95,8 @@ def trace(
 ) -> Hits:
     """Follow rays from the camera to the skin.
 
-    A step is the distance (J. C. Hart, *Sphere tracing*, 1996), and longer where a ray grazes: as far as the skin would
-    be if the distance went on falling as it did in the last step. What it then goes
-    too far it comes back.
+    A step is the distance (J. C. Hart, *Sphere tracing*, 1996), and longer where a ray grazes: as far as the skin
+    would be if the distance went on falling as it did in the last step. A step too far is taken back by the next.
 
     Args:
         field: The skin.
@@ -117,9 +116,9 @@ def trace(
         if width_rad:
             distance -= np.float32(width_rad) * here
         gap = np.abs(distance)
-        closer = gap < clearance[active]
+        closer = gap < np.abs(clearance[active])
         nearer = active[closer]
-        clearance[nearer], best[nearer] = gap[closer], here[closer]
+        clearance[nearer], best[nearer] = distance[closer], here[closer]
         falling = np.clip((before - distance) / step, _SLOWEST, 1.0)
         step = np.minimum(distance / falling, distance + _LEAP_M)
         going = (gap > tolerance) & (here < end)
