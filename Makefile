@@ -11,7 +11,7 @@ help:
 	@echo "make test         everything that CI checks: format, lint, types, tests"
 	@echo "make bench        print the speed and accuracy tables"
 	@echo "make docs         write docs/configuration.md again from the configuration"
-	@echo "make screenshots  make the README's picture again (needs Chromium)"
+	@echo "make screenshots  make the README's pictures again (needs Chromium)"
 	@echo "make lock         make the requirements files again from pyproject.toml"
 	@echo "make clean        remove the environment and all caches"
 
@@ -44,6 +44,7 @@ docs: $(BIN)/.dev
 
 screenshots: $(BIN)/.dev models
 	@$(BIN)/python scripts/screenshot.py
+	@$(BIN)/python scripts/sign_pictures.py
 
 $(BIN)/.run: scripts/setup requirements.txt pyproject.toml
 	@scripts/setup requirements.txt && touch $@
