@@ -65,7 +65,9 @@ def test_models_are_looked_for_in_the_folder_named_by_the_environment(folder):
 
 @pytest.mark.parametrize("value", [None, ""])
 def test_models_are_otherwise_in_the_users_data_directory(monkeypatch, tmp_path, value):
-    monkeypatch.delenv("HANDSTEER_MODELS", raising=False) if value is None else monkeypatch.setenv("HANDSTEER_MODELS", value)
+    monkeypatch.delenv("HANDSTEER_MODELS", raising=False)
+    if value is not None:
+        monkeypatch.setenv("HANDSTEER_MODELS", value)
     monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path))
     assert models_dir().parts[-2:] == ("handsteer", "models")
     assert models_dir().is_absolute()

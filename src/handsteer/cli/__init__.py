@@ -1,0 +1,5 @@
+"""The command ``handsteer``: one file a verb. Only this package prints and exits."""
+
+from handsteer.cli.main import main
+
+__all__ = ["main"]

@@ -1,0 +1,67 @@
+"""The command line as a whole: its verbs, and what becomes of errors."""
+
+import logging
+import os
+import signal
+import sys
+from types import FrameType
+
+from cyclopts import App, CycloptsError, ValidationError
+from pydantic import ValidationError as PydanticError
+
+from handsteer import __version__, config
+from handsteer.cli.options import say
+from handsteer.errors import HandsteerError
+
+_EXAMPLES = """Examples:
+  handsteer run                                  drive, and open the page
+  handsteer run --headless --duration 30 --json  no page, one summary at the end
+  handsteer recognize photo.jpg                  which sign is it?
+  handsteer doctor                               what works on this machine
+"""
+
+app = App(
+    name="handsteer",
+    help="Drive a mobile robot with your hand signs.",
+    help_epilogue=_EXAMPLES,
+    version=__version__,
+    help_format="plaintext",
+    result_action="return_value",
+)
+# Named, not imported: a verb's module is loaded when it is used.
+for verb in ("run", "recognize", "models", "doctor"):
+    app.command(f"handsteer.cli.{verb}:{verb}", name=verb)
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Run the command line; exit code 0 when all went well, 2 when the input was wrong."""
+    logging.basicConfig(level=logging.INFO, format="handsteer: %(message)s", stream=sys.stderr)
+    for noisy in ("uvicorn", "asyncio", "httpx", "watchfiles"):
+        logging.getLogger(noisy).setLevel(logging.WARNING)
+    signal.signal(signal.SIGTERM, _interrupt)
+    try:
+        sys.exit(app(arguments, exit_on_error=False, print_error=False) or 0)
+    except CycloptsError as error:
+        _fail(_problem(error))
+    except HandsteerError as error:
+        _fail(str(error))
+    except BrokenPipeError:  # the reader of our output has left, as `head` does
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(0)
+    except KeyboardInterrupt:
+        sys.exit(130)
+
+
+def _interrupt(_signal: int, _frame: FrameType | None) -> None:
+    raise KeyboardInterrupt
+
+
+def _problem(error: CycloptsError) -> str:
+    if isinstance(error, ValidationError) and isinstance(error.__cause__, PydanticError):
+        return config.describe(error.__cause__)
+    return f"{str(error).rstrip('.')}; see handsteer --help"
+
+
+def _fail(message: str) -> None:
+    say(" ".join(message.split()))
+    sys.exit(2)

@@ -1,0 +1,30 @@
+"""What the verbs share: options that come from the configuration, and how to speak to people."""
+
+import sys
+from pathlib import Path
+from typing import Annotated, Any
+
+from cyclopts import Parameter
+
+from handsteer import config
+
+Flag = Annotated[bool, Parameter(negative="")]
+Parameters = Annotated[config.Config | None, Parameter(name="*", group="Every parameter (also in a --config file)")]
+ConfigFile = Annotated[Path | None, Parameter(name="--config")]
+
+
+def settings(
+    file: Path | None, given: config.Config | None, shorthand: dict[str, Any] | None = None, base: Any = None
+) -> config.Config:
+    """Return the parameters: defaults, then ``base``, the file, the shorthand options, and the options by full name."""
+    short = {
+        section: {name: value for name, value in values.items() if value is not None}
+        for section, values in (shorthand or {}).items()
+    }
+    full = given.model_dump(exclude_unset=True) if given else {}
+    return config.load(file, base or {}, short, full)
+
+
+def say(message: str) -> None:
+    """Tell people something, apart from the output."""
+    print(f"handsteer: {message}", file=sys.stderr, flush=True)
