@@ -9,6 +9,7 @@ from handsteer.cameras.files import PhotoFolder, VideoFile
 from handsteer.cameras.protocol import Camera, EndOfStream
 from handsteer.clock import SteppedClock
 from handsteer.errors import CameraNotFound, CameraUnreadable
+from tests.contracts.camera_contract import CameraContract
 
 FRAMES = 6
 
@@ -32,6 +33,18 @@ def photos(tmp_path: Path) -> Path:
         assert cv2.imwrite(str(folder / name), np.full((48, 64, 3), grey, np.uint8))
     (folder / "notes.txt").write_text("not a photo")
     return folder
+
+
+class TestVideoFile(CameraContract):
+    @pytest.fixture
+    def camera(self, video: Path, clock: SteppedClock) -> Camera:
+        return VideoFile(video, clock)
+
+
+class TestPhotoFolder(CameraContract):
+    @pytest.fixture
+    def camera(self, photos: Path, clock: SteppedClock) -> Camera:
+        return PhotoFolder(photos, clock)
 
 
 def greys(camera: Camera, count: int) -> Iterator[int | None]:

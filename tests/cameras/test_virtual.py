@@ -1,10 +1,18 @@
 import numpy as np
 import pytest
 
+from handsteer.cameras.protocol import Camera
 from handsteer.cameras.virtual import VirtualHandCamera
 from handsteer.clock import RealClock, SteppedClock
 from handsteer.config import VirtualHandConfig
 from handsteer.errors import PoseError
+from tests.contracts.camera_contract import CameraContract
+
+
+class TestVirtualHand(CameraContract):
+    @pytest.fixture
+    def camera(self, clock: SteppedClock) -> Camera:
+        return camera(clock)
 
 
 def camera(clock: SteppedClock, script: str = "Forward:1 Turn Left:1 NONE:1", **config: object) -> VirtualHandCamera:

@@ -6,9 +6,11 @@ import cv2
 import numpy as np
 import pytest
 
+from handsteer.cameras.protocol import Camera
 from handsteer.cameras.webcam import Webcam, is_address, is_device
 from handsteer.clock import SteppedClock
 from handsteer.errors import CameraInUse, CameraLost, CameraNotFound, CameraUnreadable
+from tests.contracts.camera_contract import CameraContract
 
 IMAGE = np.full((48, 64, 3), 7, np.uint8)
 
@@ -36,6 +38,15 @@ class FakeCapture:
 
     def release(self) -> None:
         self.released = True
+
+
+class TestWebcam(CameraContract):
+    @pytest.fixture
+    def camera(self, clock: SteppedClock) -> Camera:
+        capture = FakeCapture(*[IMAGE.copy() for _ in range(5)])
+        camera = Webcam("0", clock, open_capture=lambda _: capture)
+        camera.read()  # the first frame was taken when the device was opened
+        return camera
 
 
 def test_frames_carry_their_time_and_the_device_is_asked_for_size_and_rate() -> None:
