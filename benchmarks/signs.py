@@ -1,4 +1,4 @@
-"""How well signs are told on photos of people that the model never saw, beside what is wanted and the tutorial's figures.
+"""How well signs are told on photos of people that the model never saw, beside what is wanted.
 
 Run ``python benchmarks/signs.py`` (``make bench-signs``). The photos are not part of the repository; see docs/signs.md
 for what a folder of them looks like. Each is looked at raw and flipped, as a stream of its own; forward photos turned

@@ -69,7 +69,7 @@ class LandmarksConfig(Section):
 class SignsConfig(Section):
     """How the sign is told from the landmarks, and when it counts."""
 
-    min_confidence: float = Field(0.7, ge=0, le=1, description="Confidence from which a sign is seen")
+    min_confidence: float = Field(0.8, ge=0, le=1, description="Confidence from which a sign is seen")
     keep_confidence: float = Field(0.5, ge=0, le=1, description="Confidence down to which the sign that counts is seen")
     confirm_time: float = Field(
         0.1, ge=0, le=2, description="How long a sign must be seen before it counts; Stop counts at once [s]"

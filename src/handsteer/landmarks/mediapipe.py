@@ -2,8 +2,9 @@
 
 The way from frame to landmarks is that of MediaPipe 0.10.21's graph ``hand_landmark_tracking_cpu``, the one behind
 ``mp.solutions.hands``: while enough hands are followed, only the landmark model runs, on the region that the last
-landmarks give; otherwise palms are looked for in the whole frame first. Beyond that, a hand that is new can be looked
-at a second time, in the region that its own landmarks give: a palm says less well where a hand is.
+landmarks give; otherwise palms are looked for in the whole frame first. Beyond that, a hand that is new is looked at
+twice, unless the configuration says otherwise: the second time in the region that its own landmarks give, as a palm
+says less well where a hand is.
 """
 
 from pathlib import Path
@@ -69,8 +70,8 @@ class MediaPipeLandmarker:
         if (width, height) != self._image_size:
             self.reset()
             self._image_size = (width, height)
-        estimates = [self._estimate(image, roi) for roi in self._regions(image, search)]
-        present = [estimate for estimate in estimates if estimate.presence > self._config.min_presence]
+        estimates = [self._estimate(image, region) for region in self._regions(image, search)]
+        present = [estimate for estimate in estimates if self._is_present(estimate)]
         self._followed = [from_landmarks(estimate.pixels[:, :2]) for estimate in present]
         self._hands = [_hand(estimate, width, height) for estimate in present]
         return list(self._hands)
@@ -86,13 +87,16 @@ class MediaPipeLandmarker:
         self._followed = []
         self._hands = []
 
-    def _estimate(self, image: NDArray[np.uint8], roi: Roi) -> Estimate:
-        """Return what is seen in ``roi``; of a hand that is new, at the second look."""
-        estimate = self._landmarks.estimate(image, roi)
-        is_new = all(roi is not followed for followed in self._followed)
-        if not (is_new and self._config.second_look and estimate.presence > self._config.min_presence):
+    def _estimate(self, image: NDArray[np.uint8], region: Roi) -> Estimate:
+        """Return what is seen in a region; of a hand that is new, at the second look."""
+        estimate = self._landmarks.estimate(image, region)
+        is_new = all(region is not followed for followed in self._followed)
+        if not (is_new and self._config.second_look and self._is_present(estimate)):
             return estimate
         return self._landmarks.estimate(image, from_landmarks(estimate.pixels[:, :2]))
+
+    def _is_present(self, estimate: Estimate) -> bool:
+        return estimate.presence > self._config.min_presence
 
     def _regions(self, image: NDArray[np.uint8], search: bool) -> list[Roi]:
         """Return where to look for hands: where they were, and at new palms if not all hands are followed."""

@@ -15,7 +15,9 @@ Array = NDArray[np.floating]
 WRIST, THUMB_TIP, INDEX_BASE, INDEX_TIP = 0, 4, 5, 8
 KNUCKLES: Final = (5, 9, 13, 17)
 
-_DIGITS: Final = np.array([[0, 1, 2, 3, 4], [0, 5, 6, 7, 8], [0, 9, 10, 11, 12], [0, 13, 14, 15, 16], [0, 17, 18, 19, 20]])
+_DIGITS: Final = np.array(
+    [[0, 1, 2, 3, 4], [0, 5, 6, 7, 8], [0, 9, 10, 11, 12], [0, 13, 14, 15, 16], [0, 17, 18, 19, 20]]
+)
 _BONE_ENDS: Final = (_DIGITS[:, 1:].ravel(), _DIGITS[:, :-1].ravel())
 
 _PAIRS: Final = np.array(
@@ -50,7 +52,8 @@ def shape_features(pixels: Array, world: Array) -> NDArray[np.float64]:
     normal = np.cross(world[:, 5] - world[:, 0], world[:, 17] - world[:, 0])
     facing = np.abs(normal[:, 2:]) / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
     features = np.concatenate([_bends(world), _distances(world) / palm, _distances(image) / palm, facing], axis=1)
-    return np.clip(features, -5.0, 5.0)
+    clipped: NDArray[np.float64] = np.clip(features, -5.0, 5.0)
+    return clipped
 
 
 def directions(pixels: Array) -> tuple[Array, Array, Array]:

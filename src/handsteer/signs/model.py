@@ -1,5 +1,6 @@
 """The file of a sign model: what tells hand shapes apart, and what it was trained on."""
 
+import itertools
 import json
 import zipfile
 from collections.abc import Mapping
@@ -115,7 +116,7 @@ def _check(model: SignModel) -> None:
     """Raise ValueError unless all parts of ``model`` fit together."""
     network, novelty = model.network, model.novelty
     sizes = [COUNT, *(len(biases) for biases in network.biases)]
-    shapes = [(one, other) for one, other in zip(sizes, sizes[1:], strict=False)]
+    shapes = list(itertools.pairwise(sizes))
     numbers = [network.mean, network.scale, *network.weights, *network.biases, novelty.centres, novelty.whitening]
     fits = (
         network.mean.shape == network.scale.shape == (COUNT,)
@@ -127,5 +128,5 @@ def _check(model: SignModel) -> None:
     )
     if not fits:
         raise ValueError("its parts do not fit together")
-    if not all(np.isfinite(each).all() for each in (*numbers, novelty.limit)):
+    if not all(np.isfinite(each).all() for each in [*numbers, np.array(novelty.limit)]):
         raise ValueError("some of its numbers are not finite")

@@ -64,7 +64,7 @@ def train(
     hidden: tuple[int, ...],
     epochs: int,
     seed: int,
-    progress: Callable[[int], None] = lambda _: None,
+    progress: Callable[[int], object] = lambda _: None,
 ) -> Network:
     """Return a network that tells the classes apart, all classes counting alike.
 
@@ -128,13 +128,13 @@ class _Adam:
         for parameter, mean, square, gradient in zip(
             self._parameters, self._means, self._squares, gradients, strict=True
         ):
-            mean += 0.1 * (gradient - mean)
-            square += 0.001 * (gradient**2 - square)
+            mean[:] += 0.1 * (gradient - mean)
+            square[:] += 0.001 * (gradient**2 - square)
             corrected = mean / (1 - 0.9**self._steps)
-            parameter -= step * corrected / (np.sqrt(square / (1 - 0.999**self._steps)) + 1e-8)
+            parameter[:] -= step * corrected / (np.sqrt(square / (1 - 0.999**self._steps)) + 1e-8)
 
     def round(self) -> None:
-        """Put the parameters and all that is remembered of the gradients on a grid."""
+        """Put the parameters on a grid, and forget the gradients."""
         for parameter, mean, square in zip(self._parameters, self._means, self._squares, strict=True):
             parameter[:] = rounded(parameter)
             mean[:] = 0.0

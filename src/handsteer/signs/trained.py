@@ -12,14 +12,19 @@ from handsteer.signs.model import SignModel
 from handsteer.signs.protocol import SignGuess
 from handsteer.signs.vocabulary import BACKWARD, FORWARD, GO, NONE, STOP, TURN_LEFT, TURN_RIGHT
 
-_DOUBT: Final = 2.0
-"""Width in degrees of the doubt about a limit of direction."""
-_POINTING: Final = 46.0
-"""How far off its axis an index finger or a thumb may point, degrees: people tilt their hands by up to 30."""
+_DOUBT: Final = 1.5
+"""Width of the doubt about a limit, degrees or pixels."""
+_POINTING: Final = 52.0
+"""How far off its axis an index finger or a thumb may point, degrees: people tilt their hands by up to 30, and their
+fingers in their hands."""
 _UPRIGHT: Final = 55.0
 """How far from upwards an open hand may point: others hang, or rest."""
 _RAISED: Final = 120.0
 """How far from upwards a fist may point, likewise."""
+
+
+_SMALLEST_PX: Final = 17.0
+"""Longer side of the smallest hand that can be read, pixels; a fist 3 m from a webcam of 640x480 has some more."""
 
 
 class TrainedClassifier:
@@ -28,7 +33,7 @@ class TrainedClassifier:
     The network says how likely it is that the hand is open, points with its index finger, stretches out its thumb or
     is a fist; where it points in the image makes a sign of that. A shape of any other name is itself a sign, however
     the hand is turned. The confidence is the likelihood of the shape, times that of the direction, times the landmark
-    model's own that there is a hand.
+    model's own that there is a hand; hands of too few pixels have none.
 
     Args:
         model: As :func:`~handsteer.signs.model.load_model` gives it.
@@ -43,13 +48,16 @@ class TrainedClassifier:
         shapes = self._model.probabilities(shape_features(pixels, hand.world[None])[0])
         scores = _signs(shapes, pixels)
         best = max(scores, key=scores.__getitem__)
-        score = scores[best] * min(1.0, max(0.0, hand.presence))
+        size = float(np.ptp(pixels[0], axis=0).max())
+        score = scores[best] * min(1.0, max(0.0, hand.presence)) * _within(-_SMALLEST_PX, -size)
         return SignGuess(best, score) if score >= 0.5 else SignGuess(NONE, 1.0 - score)
 
 
 def _signs(shapes: dict[str, float], pixels: NDArray[np.float64]) -> dict[str, float]:
     """Return how likely each sign is, given the shapes' likelihoods and (1, 21, 2) landmarks."""
-    taught = {shape: chance for shape, chance in shapes.items() if shape not in ("open", "index", "thumb", "fist", "other")}
+    taught = {
+        shape: chance for shape, chance in shapes.items() if shape not in ("open", "index", "thumb", "fist", "other")
+    }
     index, thumb, palm = (vectors[0] for vectors in directions(pixels))
     return taught | {
         STOP: shapes.get("open", 0.0) * _within(_UPRIGHT, _from_up(palm)),
@@ -72,6 +80,6 @@ def _from_right(vector: NDArray[np.float64]) -> float:
     return math.degrees(math.atan2(abs(float(vector[1])), float(vector[0])))
 
 
-def _within(limit: float, angle: float) -> float:
-    """Return how sure it is, 0 to 1, that ``angle`` is below ``limit``."""
-    return 1.0 / (1.0 + math.exp((angle - limit) / _DOUBT))
+def _within(limit: float, value: float) -> float:
+    """Return how sure it is, 0 to 1, that ``value`` is below ``limit``."""
+    return 1.0 / (1.0 + math.exp(min(50.0, (value - limit) / _DOUBT)))

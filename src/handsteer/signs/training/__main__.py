@@ -13,7 +13,7 @@ def main() -> None:
     """Train, and write the file named on the command line, or the one in the package."""
     path = Path(sys.argv[1]) if len(sys.argv) > 1 else DEFAULT_MODEL
     with tqdm(total=EPOCHS, unit="epoch", disable=None) as bar:
-        model = train_default(lambda _: bar.update())
+        model = train_default(lambda _: bar.update(1))
     save_model(model, path)
 
 

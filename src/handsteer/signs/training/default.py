@@ -38,7 +38,7 @@ def made_hands(chunks: int, seed: int) -> tuple[NDArray[np.float64], NDArray[np.
     return np.concatenate(features), np.concatenate(shapes)
 
 
-def train_default(progress: Callable[[int], None], chunks: int = _CHUNKS, epochs: int = EPOCHS) -> SignModel:
+def train_default(progress: Callable[[int], object], chunks: int = _CHUNKS, epochs: int = EPOCHS) -> SignModel:
     """Return a newly trained model.
 
     Args:

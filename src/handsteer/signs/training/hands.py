@@ -58,7 +58,9 @@ def make_hands(count: int, random: Random) -> Hands:
     true = pose_joints(angles, bones) @ np.swapaxes(views, 1, 2)
     shapes = name_shapes(angles, true, _elevations(true), _facing(true))
     kept = shapes >= 0
-    seen = pose_joints(angles[kept] + _misread(angles[kept], views[kept], random), bones[kept]) @ np.swapaxes(views[kept], 1, 2)
+    seen = pose_joints(angles[kept] + _misread(angles[kept], views[kept], random), bones[kept]) @ np.swapaxes(
+        views[kept], 1, 2
+    )
     pixels, world = _landmarks(seen, random)
     return Hands(pixels, world, shapes[kept])
 
@@ -99,7 +101,7 @@ def _misread(angles: Array, views: Array, random: Random) -> Array:
     """
     size = _BEND_ERROR_RAD * _badness(len(angles), random)
     errors: Array = random.normal(0, 1, angles.shape) * size
-    hidden = np.clip(views[:, 2, 2:], 0, 1) * random.uniform(0, 0.45, (len(angles), 1))
+    hidden = np.clip(views[:, 2, 2:], 0, 1) * random.uniform(0, 0.55, (len(angles), 1))
     moved = np.clip(angles[:, PIP], 0, None) * hidden
     errors[:, PIP] -= moved
     errors[:, MCP] += 0.4 * moved

@@ -8,10 +8,12 @@ from collections.abc import Callable
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
-from handsteer.hand.kinematics import ANGLES, LIMITS, Array, clamp
+from handsteer.hand.kinematics import ANGLES, LIMITS, Array, clamp, pose_joints
 
 Random = np.random.Generator
+States = NDArray[np.int64]
 
 _THUMB: Final = slice(2, 7)
 _JOINTS: Final = 4
@@ -128,11 +130,31 @@ def relaxed(count: int, random: Random) -> Array:
 
 def holding(count: int, random: Random) -> Array:
     """Return (count, 23) angles of hands that hold a ball, a bottle or nothing: an O or C of fingers and thumb."""
-    angles = _posed(_choice([ROUND, HALF], [0.65, 0.35], count, random)[:, None].repeat(4, axis=1), np.full(count, OPPOSITE), random)
+    states = np.repeat(_choice([ROUND, HALF], [0.65, 0.35], count, random)[:, None], 4, axis=1)
+    angles = _posed(states, np.full(count, OPPOSITE), random)
     _bend_together(angles, random, mcp=15, pip=14)
-    thumb = ((28, 18), (45, 18), (2, 14), (5, 18), (10, 15))
-    angles[:, _THUMB] = _drawn(np.tile(thumb, (count, 1, 1)), random)
+    angles[:, _THUMB] = _round_thumbs(count, random)
     return angles
+
+
+def touching(count: int, random: Random) -> Array:
+    """Return (count, 23) angles of OK and of pinches: the tips of thumb and index finger meet, or nearly."""
+    tries = 6
+    states = np.full((count * tries, 4), STRAIGHT)
+    states[:, 0] = ROUND
+    others = _choice([STRAIGHT, HALF, CURLED], [0.75, 0.15, 0.1], count, random)
+    states[:, 1:] = others.repeat(tries)[:, None]
+    angles = _posed(states, np.full(count * tries, OPPOSITE), random)
+    angles[:, _THUMB] = _round_thumbs(count * tries, random)
+    joints = pose_joints(clamp(angles))
+    gaps = np.linalg.norm(joints[:, 4] - joints[:, 8], axis=1).reshape(count, tries)
+    nearest: Array = angles[np.arange(count) * tries + gaps.argmin(axis=1)]
+    return nearest
+
+
+def _round_thumbs(count: int, random: Random) -> Array:
+    """Return (count, 5) angles of thumbs that meet the fingertips around something."""
+    return _drawn(np.tile(((28, 18), (45, 18), (2, 14), (5, 18), (10, 15)), (count, 1, 1)), random)
 
 
 def anything(count: int, random: Random) -> Array:
@@ -143,14 +165,15 @@ def anything(count: int, random: Random) -> Array:
 
 
 MAKERS: Final[tuple[tuple[Callable[[int, Random], Array], float], ...]] = (
-    (open_hand, 0.12),
+    (open_hand, 0.11),
     (index_up, 0.16),
     (thumb_out, 0.15),
     (fist, 0.12),
     (any_fingers, 0.10),
-    (known_others, 0.12),
-    (relaxed, 0.12),
-    (holding, 0.09),
+    (known_others, 0.11),
+    (relaxed, 0.11),
+    (holding, 0.08),
+    (touching, 0.05),
     (anything, 0.03),
 )
 """The makers of shapes and their shares."""
@@ -162,7 +185,7 @@ def random_shapes(count: int, random: Random) -> Array:
     return clamp(np.concatenate(made))
 
 
-def _posed(states: Array, thumbs: Array, random: Random) -> Array:
+def _posed(states: States, thumbs: States, random: Random) -> Array:
     """Return (n, 23) angles of (n, 4) finger states with (n,) thumb states."""
     count = len(states)
     angles = np.zeros((count, len(ANGLES)))
@@ -186,8 +209,8 @@ def _bend_together(angles: Array, random: Random, *, mcp: float, pip: float) -> 
     angles[:, _joints(2)] += np.radians(random.normal(0, pip, (len(angles), 1)))
 
 
-def _choice(states: list[int], shares: list[float], count: int, random: Random) -> Array:
-    drawn: Array = random.choice(states, count, p=shares)
+def _choice(states: list[int], shares: list[float], count: int, random: Random) -> States:
+    drawn: States = random.choice(states, count, p=shares)
     return drawn
 
 

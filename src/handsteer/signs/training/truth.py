@@ -11,6 +11,8 @@ OPEN, INDEX, THUMB, FIST, OTHER = "open", "index", "thumb", "fist", "other"
 SHAPES: Final = (OPEN, INDEX, THUMB, FIST, OTHER)
 """What the network tells apart."""
 
+Flags = NDArray[np.bool_]
+
 _UNSURE: Final = -1
 _FIRST_FINGER: Final = ANGLES.index("index_spread")
 
@@ -31,13 +33,13 @@ def name_shapes(angles: Array, joints: Array, elevations: Array, facing: Array) 
     curled, curled_enough = _closed(angles, ease=10.0)
     elevation = np.degrees(elevations)
     sure = {
-        OPEN: straight.all(axis=1) & (reach >= 0.86) & (facing >= 0.4),
+        OPEN: straight.all(axis=1) & (reach >= 0.92) & (facing >= 0.4),
         INDEX: straight[:, 0] & curled[:, 1:].all(axis=1) & (reach <= 1.0) & (elevation[:, 0] <= 55),
         THUMB: closed.all(axis=1) & (reach >= 0.98) & (apart >= 0.5) & (elevation[:, 1] <= 55),
         FIST: closed.all(axis=1) & (reach <= 0.82),
     }
     possible = {
-        OPEN: open_enough.all(axis=1) & (reach >= 0.76),
+        OPEN: open_enough.all(axis=1) & (reach >= 0.82),
         INDEX: open_enough[:, 0] & curled_enough[:, 1:].all(axis=1) & (reach <= 1.2) & (elevation[:, 0] <= 68),
         THUMB: closed_enough.all(axis=1) & (reach >= 0.84) & (apart >= 0.35) & (elevation[:, 1] <= 68),
         FIST: closed_enough.all(axis=1) & (reach <= 0.98),
@@ -63,14 +65,14 @@ def thumb_gap(joints: Array) -> Array:
     return gaps
 
 
-def _straight(angles: Array) -> tuple[Array, Array]:
+def _straight(angles: Array) -> tuple[Flags, Flags]:
     """Return (n, 4) which fingers are straight for sure, and which are perhaps."""
     mcp, pip, dip = _degrees(angles)
     fold = mcp + pip + 0.5 * dip
     return (pip <= 32) & (fold <= 70), (pip <= 52) & (fold <= 100)
 
 
-def _closed(angles: Array, ease: float = 0.0) -> tuple[Array, Array]:
+def _closed(angles: Array, ease: float = 0.0) -> tuple[Flags, Flags]:
     """Return (n, 4) which fingers are closed for sure, and which are perhaps; ``ease`` degrees less are enough."""
     mcp, pip, dip = _degrees(angles)
     # Little fingers bend less than the others, even in a fist.
