@@ -4,12 +4,14 @@ VENV := .venv
 BIN := $(VENV)/bin
 ARGS ?=
 
-.PHONY: help run test lint unit format lock bench models docs screenshots clean
+.PHONY: help run test lint unit format lock bench bench-signs signs-model models docs screenshots clean
 
 help:
 	@echo "make run          drive the robot: your webcam, or the virtual hand (options: make run ARGS='--camera 0')"
 	@echo "make test         everything that CI checks: format, lint, types, tests"
 	@echo "make bench        print the speed and accuracy tables"
+	@echo "make bench-signs  print how well signs are told on photos of people"
+	@echo "make signs-model  train the sign model again, from hands that it makes itself; gives the same file"
 	@echo "make docs         write docs/configuration.md again from the configuration"
 	@echo "make screenshots  make the README's pictures again (needs Chromium)"
 	@echo "make lock         make the requirements files again from pyproject.toml"
@@ -38,6 +40,12 @@ format: $(BIN)/.dev
 
 bench: $(BIN)/.dev models
 	@for table in benchmarks/[!_]*.py; do echo "== $$table"; $(BIN)/python $$table || exit 1; done
+
+bench-signs: $(BIN)/.dev models
+	@$(BIN)/python benchmarks/signs.py $(ARGS)
+
+signs-model: | $(BIN)/.run
+	@$(BIN)/python -m handsteer.signs.training
 
 docs: $(BIN)/.dev
 	@$(BIN)/python scripts/configuration_table.py

@@ -57,8 +57,11 @@ class LandmarksConfig(Section):
     """How the hand is found in a frame."""
 
     model: Literal["full", "lite"] = Field("full", description="full is more accurate; lite takes about 40 % less time")
-    max_hands: int = Field(1, ge=1, le=2, description="How many hands are looked for in a frame")
-    min_detection_confidence: float = Field(0.5, ge=0, le=1, description="Score from which a palm counts as found")
+    max_hands: int = Field(
+        2, ge=1, le=2, description="How many hands are looked for in a frame, to choose the one that shows a sign"
+    )
+    min_detection_confidence: float = Field(0.3, ge=0, le=1, description="Score from which a palm counts as found")
+    second_look: bool = Field(True, description="Look twice at a hand that is new, which reads it better")
     min_presence: float = Field(0.5, ge=0, le=1, description="Score below which a followed hand counts as lost")
     threads: int = Field(1, ge=1, le=64, description="CPU threads of the landmark model")
 
@@ -66,11 +69,15 @@ class LandmarksConfig(Section):
 class SignsConfig(Section):
     """How the sign is told from the landmarks, and when it counts."""
 
-    min_confidence: float = Field(0.5, ge=0, le=1, description="Confidence from which a sign counts")
+    min_confidence: float = Field(0.8, ge=0, le=1, description="Confidence from which a sign is seen")
+    keep_confidence: float = Field(0.5, ge=0, le=1, description="Confidence down to which the sign that counts is seen")
     confirm_time: float = Field(
         0.1, ge=0, le=2, description="How long a sign must be seen before it counts; Stop counts at once [s]"
     )
     bridge_time: float = Field(0.1, ge=0, le=2, description="How long a lost hand keeps its sign [s]")
+    switch_time: float = Field(
+        0.5, ge=0, le=10, description="How long the followed hand shows no sign before another that shows one is [s]"
+    )
     max_frame_age: float = Field(0.5, gt=0, le=10, description="An older frame counts as no frame [s]")
 
 

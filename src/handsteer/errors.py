@@ -10,7 +10,7 @@
     │   ├── CameraUnreadable   it opens, but gives no picture
     │   └── CameraLost         it gave pictures and stopped; worth trying again
     ├── FrameError             an image has a shape or type that cannot be used
-    ├── ModelError             a landmark model file cannot be used
+    ├── ModelError             a model file (landmarks or signs) cannot be used
     │   ├── ModelMissing       the file is not on this machine
     │   └── ModelCorrupt       the file is not the one that was expected
     ├── PoseError              a hand pose or a script of signs is wrong
@@ -56,15 +56,15 @@ class FrameError(HandsteerError):
 
 
 class ModelError(HandsteerError):
-    """A landmark model file cannot be used."""
+    """A model file, of landmarks or of signs, cannot be used."""
 
 
 class ModelMissing(ModelError):  # noqa: N818
-    """A landmark model file is not on this machine."""
+    """A model file is not on this machine."""
 
 
 class ModelCorrupt(ModelError):  # noqa: N818
-    """A landmark model file is not the one that was expected."""
+    """A model file is damaged, or not the one that was expected."""
 
 
 class PoseError(HandsteerError):

@@ -29,8 +29,9 @@ from handsteer.nodes.steering import SteeringNode
 from handsteer.robots import open_robot
 from handsteer.robots.protocol import Pose2D
 from handsteer.signs.drawing import annotate
+from handsteer.signs.model import load_model
 from handsteer.signs.recognizer import Recognizer
-from handsteer.signs.rules import RuleClassifier
+from handsteer.signs.trained import TrainedClassifier
 from handsteer.transports.in_process import InProcessTransport
 from handsteer.transports.protocol import Transport
 
@@ -178,6 +179,6 @@ def open_recognizer(config: Config) -> Recognizer:
     """Return the recogniser that ``config`` describes.
 
     Raises:
-        ModelError: A landmark model is missing or broken.
+        ModelError: A landmark model or the sign model is missing or broken.
     """
-    return Recognizer(MediaPipeLandmarker(config.landmarks), RuleClassifier(), config.signs)
+    return Recognizer(MediaPipeLandmarker(config.landmarks), TrainedClassifier(load_model()), config.signs)

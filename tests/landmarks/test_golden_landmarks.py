@@ -25,13 +25,16 @@ class Golden:
         return np.flatnonzero(self.found)
 
 
+AS_MEDIAPIPE = LandmarksConfig(max_hands=1, min_detection_confidence=0.5, second_look=False)
+
+
 def load(group: str) -> Golden:
     with np.load(FIXTURE) as arrays:
         return Golden(**{name: arrays[f"{group}_{name}"] for name in Golden.__annotations__})
 
 
 def detect_photos() -> list[Hand | None]:
-    landmarker = MediaPipeLandmarker(LandmarksConfig())
+    landmarker = MediaPipeLandmarker(AS_MEDIAPIPE)
     with np.load(FIXTURE) as arrays:
         paths = [str(path) for path in arrays["photo_paths"]]
     hands = []
@@ -42,7 +45,7 @@ def detect_photos() -> list[Hand | None]:
 
 
 def detect_video() -> list[Hand | None]:
-    landmarker = MediaPipeLandmarker(LandmarksConfig())
+    landmarker = MediaPipeLandmarker(AS_MEDIAPIPE)
     return [next(iter(landmarker.detect(frame)), None) for frame in read_video()]
 
 

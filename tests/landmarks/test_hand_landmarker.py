@@ -69,7 +69,8 @@ def test_a_hand_that_leaves_is_lost_and_found_again_elsewhere(landmarker):
     assert distance(hand, elsewhere) < 20
 
 
-def test_a_followed_hand_keeps_the_others_out(landmarker):
+def test_a_followed_hand_keeps_the_others_out_where_one_is_wanted():
+    landmarker = MediaPipeLandmarker(LandmarksConfig(max_hands=1))
     followed = open_right_hand(180, 250)
     landmarker.detect(draw(followed))
     (hand,) = landmarker.detect(draw(followed, open_left_hand(470, 250)))
@@ -114,6 +115,35 @@ def test_a_hand_that_comes_later_stands_behind_the_one_already_followed(two_hand
 def test_one_hand_is_never_given_twice(two_hand_landmarker):
     for _ in range(3):
         assert len(two_hand_landmarker.detect(draw(open_right_hand(300, 250)))) == 1
+
+
+def test_no_further_hands_are_looked_for_unless_asked(two_hand_landmarker):
+    right = open_right_hand(150, 250)
+    both = draw(right, open_left_hand(480, 250))
+    two_hand_landmarker.detect(draw(right))
+    assert [hand.handedness for hand in two_hand_landmarker.detect(both, search=False)] == ["Right"]
+    assert len(two_hand_landmarker.detect(both)) == 2
+    two_hand_landmarker.reset()
+    assert len(two_hand_landmarker.detect(both, search=False)) == 2, "without a hand to follow it always looks"
+
+
+def test_only_the_hand_that_is_named_is_followed_on(two_hand_landmarker):
+    both = draw(open_right_hand(150, 250), open_left_hand(480, 250))
+    for handedness in ("Left", "Right"):
+        two_hand_landmarker.reset()
+        (wanted,) = (hand for hand in two_hand_landmarker.detect(both) if hand.handedness == handedness)
+        two_hand_landmarker.follow_only(wanted)
+        (followed,) = two_hand_landmarker.detect(both, search=False)
+        assert followed.handedness == handedness
+
+
+def test_the_second_look_is_what_following_would_see():
+    frame = draw(open_right_hand(300, 250))
+    once = MediaPipeLandmarker(LandmarksConfig(second_look=False))
+    once.detect(frame)
+    (followed,) = once.detect(frame)
+    (looked_twice,) = MediaPipeLandmarker(LandmarksConfig()).detect(frame)
+    np.testing.assert_array_equal(looked_twice.points, followed.points)
 
 
 def test_no_hand_counts_below_the_asked_presence():

@@ -7,10 +7,12 @@ from handsteer.landmarks.recorded import RecordedLandmarker
 from handsteer.messages import DIAGNOSTICS, HAND_SIGN, IMAGE_ANNOTATED, IMAGE_RAW, Header, Image, Time
 from handsteer.nodes.recognition import HandSignRecognitionNode
 from handsteer.signs.drawing import annotate
+from handsteer.signs.model import load_model
 from handsteer.signs.recognizer import Recognizer
-from handsteer.signs.rules import RuleClassifier
+from handsteer.signs.trained import TrainedClassifier
+from handsteer.signs.vocabulary import FORWARD
 from tests.nodes.stepping import Bench
-from tests.signs.hands import make_hand
+from tests.signs.hands import show_sign
 
 HEADER = Header(stamp=Time(0, 0), frame_id="camera")
 IMAGE = image_message(np.zeros((480, 640, 3), np.uint8), HEADER)
@@ -20,8 +22,8 @@ BROKEN = Image(HEADER, 480, 640, "bgr8", 0, 1920, np.zeros(5, np.uint8))
 class RecognitionBench(Bench):
     def __init__(self) -> None:
         super().__init__()
-        landmarker = RecordedLandmarker([[make_hand(straight=("index",))]] * 100)
-        recognizer = Recognizer(landmarker, RuleClassifier(), SignsConfig())
+        landmarker = RecordedLandmarker([[show_sign(FORWARD)]] * 100)
+        recognizer = Recognizer(landmarker, TrainedClassifier(load_model()), SignsConfig())
         self.node = HandSignRecognitionNode(self.transport, self.clock, recognizer, SignsConfig(), annotate)
         self.nodes = [self.node]
         self.images = self.transport.advertise("camera", IMAGE_RAW)

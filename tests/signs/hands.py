@@ -1,49 +1,65 @@
-"""Hands made of straight lines, for tests of rules: what they show is plain from how they are made."""
-
-import math
+"""Hands with a known shape, as a landmark model would see them if it made no errors."""
 
 import numpy as np
-from numpy.typing import NDArray
 
-from handsteer.landmarks.protocol import Hand
+from handsteer.hand.kinematics import Array, angles_of, pose_joints, turn_z
+from handsteer.hand.placement import Pinhole, Placement
+from handsteer.hand.poses import FIST, HandPose, View, sign_pose
+from handsteer.landmarks.protocol import Hand, Handedness
+from handsteer.signs.training.hands import BONES_M
 
 SIZE = (640, 480)
-_BASES = {"index": (-0.03, 0.09), "middle": (-0.01, 0.095), "ring": (0.01, 0.09), "little": (0.03, 0.08)}
+_CAMERA = Pinhole.webcam(*SIZE)
 
 
-def make_hand(
-    *, straight: tuple[str, ...] = (), thumb_out: bool = False, turn: float = 0.0, mirrored: bool = False
+def show_sign(sign: str, handedness: Handedness = "Right", *, tilt: float = 0.0, away_m: float = 0.6) -> Hand:
+    """Return a hand that shows ``sign``, tilted in the image by ``tilt`` radians, ``away_m`` metres off."""
+    return show_pose(sign_pose(sign, handedness), handedness, tilt=tilt, away_m=away_m)
+
+
+def show_pose(pose: HandPose, handedness: Handedness = "Right", *, tilt: float = 0.0, away_m: float = 0.6) -> Hand:
+    """Return the hand that is posed like this; arguments as :func:`show_sign`."""
+    placement = pose.view.placement(handedness)
+    turned = Placement(turn_z(tilt) @ placement.matrix, np.array([0.0, 0.0, away_m]))
+    joints = turned.apply(pose_joints(pose.angles, BONES_M)[0])
+    return hand_of(_CAMERA.project(joints), joints - joints.mean(axis=0), handedness)
+
+
+def show_fingers(
+    *straight: str, thumb: dict[str, float] | None = None, roll: float = 0.0, bend: dict[str, float] | None = None
 ) -> Hand:
-    """Return a hand seen from its palm, fingers up; in metres, x right, y up before it is turned left by ``turn`` rad.
+    """Return a right hand, palm to the camera, of which only some fingers are straight.
 
-    Unturned and not mirrored, the thumb is at the image's left.
+    Args:
+        straight: Names of the straight fingers.
+        thumb: Its angles in degrees; folded over the fingers by default.
+        roll: Radians in the image, clockwise; at 0 the fingers point up.
+        bend: Further angles in degrees, of any finger.
     """
-    points = [(0.0, 0.0, 0.0), (-0.02, 0.02, 0.0), (-0.035, 0.045, 0.0)]
-    points += (
-        [(-0.06, 0.06, 0.0), (-0.085, 0.075, 0.0)] if thumb_out else [(-0.03, 0.065, -0.02), (-0.005, 0.06, -0.03)]
-    )
-    for finger, (x, y) in _BASES.items():
-        if finger in straight:
-            points += [(x, y, 0.0), (x, y + 0.04, 0.0), (x, y + 0.065, 0.0), (x, y + 0.085, 0.0)]
-        else:
-            points += [(x, y, 0.0), (x, y + 0.02, -0.03), (x, y - 0.01, -0.04), (x, y - 0.02, -0.02)]
-    world = np.array(points, np.float64)
-    if mirrored:
-        world[:, 0] *= -1
-    cos, sin = math.cos(turn), math.sin(turn)
-    world[:, :2] = world[:, :2] @ np.array([[cos, sin], [-sin, cos]])
-    world[:, 1] *= -1
-    return Hand(
-        points=_project(world),
-        world=world.astype(np.float32),
-        handedness="Left" if mirrored else "Right",
-        handedness_score=0.99,
-        presence=0.99,
-        image_size=SIZE,
-    )
+    folded = {"spread": 9.0, "opposition": 50.0, "mcp": 35.0, "ip": 60.0}
+    degrees = {f"thumb_{joint}": angle for joint, angle in (thumb or folded).items()}
+    for finger in straight:
+        degrees |= {f"{finger}_mcp": 3.0, f"{finger}_pip": 5.0, f"{finger}_dip": 3.0}
+    degrees |= bend or {}
+    closed = {"mcp": 70.0, "pip": 92.0, "dip": 50.0}
+    for finger in ("index", "middle", "ring", "little"):
+        for joint, angle in closed.items():
+            degrees.setdefault(f"{finger}_{joint}", angle)
+    return show_pose(HandPose(angles_of(**degrees), View(yaw=0.15, roll=roll)))
 
 
-def _project(world: NDArray[np.float64]) -> NDArray[np.float32]:
-    pixels = world * 1200 + np.array([320.0, 280.0, 0.0])
-    points: NDArray[np.float32] = (pixels / np.array([SIZE[0], SIZE[1], SIZE[0]])).astype(np.float32)
-    return points
+def fist() -> HandPose:
+    """Return a fist, upright, palm to the camera."""
+    return HandPose(FIST, View())
+
+
+def hand_of(pixels: Array, world: Array, handedness: Handedness = "Right") -> Hand:
+    """Return a hand from (21, 2) pixels and (21, 3) metres."""
+    points = np.column_stack([pixels / SIZE, np.zeros(21)])
+    return Hand(points.astype(np.float32), world.astype(np.float32), handedness, 0.99, 0.99, SIZE)
+
+
+def moved(hand: Hand, x_px: float, scale: float = 1.0) -> Hand:
+    """Return ``hand`` moved to the right by ``x_px`` pixels, after it was scaled about the image's middle."""
+    pixels = (hand.pixels[:, :2] - np.array(SIZE) / 2) * scale + np.array(SIZE) / 2 + (x_px, 0.0)
+    return hand_of(pixels, hand.world, hand.handedness)

@@ -5,19 +5,19 @@ from handsteer.config import LandmarksConfig, SignsConfig
 from handsteer.errors import FrameError
 from handsteer.landmarks.mediapipe import MediaPipeLandmarker
 from handsteer.landmarks.recorded import RecordedLandmarker
+from handsteer.signs.model import load_model
 from handsteer.signs.recognizer import Recognizer
-from handsteer.signs.rules import RuleClassifier
+from handsteer.signs.trained import TrainedClassifier
 from handsteer.signs.vocabulary import FORWARD, NONE
-from tests.signs.hands import make_hand
+from tests.signs.hands import show_fingers, show_sign
 
 IMAGE = np.zeros((480, 640, 3), np.uint8)
-HAND = make_hand(straight=("index",))
+HAND = show_sign(FORWARD)
+CLASSIFIER = TrainedClassifier(load_model())
 
 
 def recognizer(*frames: bool) -> Recognizer:
-    return Recognizer(
-        RecordedLandmarker([[HAND] if there else [] for there in frames]), RuleClassifier(), SignsConfig()
-    )
+    return Recognizer(RecordedLandmarker([[HAND] if there else [] for there in frames]), CLASSIFIER, SignsConfig())
 
 
 def test_reasons_on_the_way_to_a_sign() -> None:
@@ -36,19 +36,17 @@ def test_reasons_on_the_way_to_a_sign() -> None:
 
 
 def test_a_hand_without_a_sign() -> None:
-    stream = Recognizer(
-        RecordedLandmarker([[make_hand(straight=("index", "middle"))]]), RuleClassifier(), SignsConfig()
-    )
+    stream = Recognizer(RecordedLandmarker([[show_fingers("index", "middle")]]), CLASSIFIER, SignsConfig())
     assert stream.step(IMAGE, 0.04).reason == "the hand shows none of the signs"
 
 
 def test_a_confidence_below_the_least_is_none() -> None:
-    stream = Recognizer(RecordedLandmarker([[HAND]]), RuleClassifier(), SignsConfig(min_confidence=1.0))
+    stream = Recognizer(RecordedLandmarker([[HAND]]), CLASSIFIER, SignsConfig(min_confidence=1.0))
     assert stream.step(IMAGE, 0.04).seen == NONE
 
 
 @pytest.mark.parametrize("image", [np.zeros((0, 0, 3), np.uint8), np.zeros((480, 640, 3), np.float32)])
 def test_a_broken_frame_raises(image: np.ndarray) -> None:
-    stream = Recognizer(MediaPipeLandmarker(LandmarksConfig()), RuleClassifier(), SignsConfig())
+    stream = Recognizer(MediaPipeLandmarker(LandmarksConfig()), CLASSIFIER, SignsConfig())
     with pytest.raises(FrameError):
         stream.step(image, 0.0)

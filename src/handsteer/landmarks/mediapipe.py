@@ -2,7 +2,9 @@
 
 The way from frame to landmarks is that of MediaPipe 0.10.21's graph ``hand_landmark_tracking_cpu``, the one behind
 ``mp.solutions.hands``: while enough hands are followed, only the landmark model runs, on the region that the last
-landmarks give; otherwise palms are looked for in the whole frame first.
+landmarks give; otherwise palms are looked for in the whole frame first. Beyond that, a hand that is new is looked at
+twice, unless the configuration says otherwise: the second time in the region that its own landmarks give, as a palm
+says less well where a hand is.
 """
 
 from pathlib import Path
@@ -46,9 +48,10 @@ class MediaPipeLandmarker:
         self._palms = PalmDetector(palm, config.threads, config.min_detection_confidence)
         self._landmarks = HandLandmarkModel(landmark, config.threads)
         self._followed: list[Roi] = []
+        self._hands: list[Hand] = []
         self._image_size = (0, 0)
 
-    def detect(self, image: NDArray[np.uint8]) -> list[Hand]:
+    def detect(self, image: NDArray[np.uint8], *, search: bool = True) -> list[Hand]:
         """Return the hands in ``image``; an empty list when there is none.
 
         A frame of another size than the one before is taken as the start of another stream: nothing is followed
@@ -57,6 +60,7 @@ class MediaPipeLandmarker:
         Args:
             image: (height, width, 3) uint8, BGR, not mirrored; 1 to 32766 pixels a side, of any memory layout. Grey
                 and BGRA pictures are refused rather than guessed at.
+            search: Whether to look for further hands while one is followed already.
 
         Raises:
             FrameError: The image has another shape or type.
@@ -66,20 +70,39 @@ class MediaPipeLandmarker:
         if (width, height) != self._image_size:
             self.reset()
             self._image_size = (width, height)
-        estimates = [self._landmarks.estimate(image, roi) for roi in self._regions(image)]
-        present = [estimate for estimate in estimates if estimate.presence > self._config.min_presence]
+        estimates = [self._estimate(image, region) for region in self._regions(image, search)]
+        present = [estimate for estimate in estimates if self._is_present(estimate)]
         self._followed = [from_landmarks(estimate.pixels[:, :2]) for estimate in present]
-        return [_hand(estimate, width, height) for estimate in present]
+        self._hands = [_hand(estimate, width, height) for estimate in present]
+        return list(self._hands)
+
+    def follow_only(self, hand: Hand) -> None:
+        """Forget all hands of the last frame but ``hand``, which is one of them."""
+        kept = [index for index, each in enumerate(self._hands) if each is hand]
+        self._hands = [self._hands[index] for index in kept]
+        self._followed = [self._followed[index] for index in kept]
 
     def reset(self) -> None:
         """Forget the hands of the last frame."""
         self._followed = []
+        self._hands = []
 
-    def _regions(self, image: NDArray[np.uint8]) -> list[Roi]:
+    def _estimate(self, image: NDArray[np.uint8], region: Roi) -> Estimate:
+        """Return what is seen in a region; of a hand that is new, at the second look."""
+        estimate = self._landmarks.estimate(image, region)
+        is_new = all(region is not followed for followed in self._followed)
+        if not (is_new and self._config.second_look and self._is_present(estimate)):
+            return estimate
+        return self._landmarks.estimate(image, from_landmarks(estimate.pixels[:, :2]))
+
+    def _is_present(self, estimate: Estimate) -> bool:
+        return estimate.presence > self._config.min_presence
+
+    def _regions(self, image: NDArray[np.uint8], search: bool) -> list[Roi]:
         """Return where to look for hands: where they were, and at new palms if not all hands are followed."""
         wanted = self._config.max_hands
         regions = list(self._followed)
-        if len(regions) < wanted:
+        if not regions or (search and len(regions) < wanted):
             regions += [palm.roi for palm in self._palms.detect(image, wanted)]
         return _distinct(regions)[:wanted]
 

@@ -50,17 +50,22 @@ class Hand:
 class Landmarker(Protocol):
     """Finds hands in frames; follows them from one frame to the next."""
 
-    def detect(self, image: NDArray[np.uint8]) -> list[Hand]:
+    def detect(self, image: NDArray[np.uint8], *, search: bool = True) -> list[Hand]:
         """Return the hands in ``image``; an empty list when there is none.
 
         Hands that are already followed come first and keep their order; new ones after them, the surest first.
 
         Args:
             image: (height, width, 3) uint8, BGR, not mirrored.
+            search: Whether to look for further hands while one is followed already, which takes time.
 
         Raises:
             FrameError: The image has another shape or type.
         """
+        ...
+
+    def follow_only(self, hand: Hand) -> None:
+        """Forget all hands of the last frame but ``hand``, which is one of them: the others take time."""
         ...
 
     def reset(self) -> None:

@@ -19,15 +19,19 @@ class RecordedLandmarker:
         self._frames = [list(hands) for hands in frames]
         self._next = 0
 
-    def detect(self, image: NDArray[np.uint8]) -> list[Hand]:
+    def detect(self, image: NDArray[np.uint8], *, search: bool = True) -> list[Hand]:
         """Return the hands of the next frame; an empty list after the last one.
 
         Args:
             image: Not looked at.
+            search: Makes no difference.
         """
         hands = self._frames[self._next] if self._next < len(self._frames) else []
         self._next += 1
         return list(hands)
+
+    def follow_only(self, hand: Hand) -> None:
+        """Do nothing: a recording goes on with all its hands."""
 
     def reset(self) -> None:
         """Do nothing: a recording goes on where it is, as it follows no hands."""

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from handsteer.config import SignsConfig
 from handsteer.landmarks.protocol import Hand, Landmarker
 from handsteer.signs.filter import SignFilter
+from handsteer.signs.operator import Operator
 from handsteer.signs.protocol import Classifier, SignGuess
 from handsteer.signs.vocabulary import NONE
 
@@ -51,6 +52,7 @@ class Recognizer:
         self._landmarker = landmarker
         self._classifier = classifier
         self._filter = SignFilter(config)
+        self._operator = Operator(config)
         self._config = config
 
     def step(self, image: NDArray[np.uint8], dt_s: float) -> Recognition:
@@ -63,14 +65,23 @@ class Recognizer:
         Raises:
             FrameError: The image has another shape or type.
         """
-        hands = self._landmarker.detect(image)
-        hand = hands[0] if hands else None
-        guess = self._classifier.classify(hand) if hand else _NOTHING
-        seen = guess.sign if guess.confidence >= self._config.min_confidence else NONE
-        sign = self._filter.step(seen, dt_s)
-        return Recognition(sign, seen, guess.confidence, self._filter.progress, hand)
+        hands = self._landmarker.detect(image, search=self._operator.wants_search(dt_s))
+        guesses = [self._seen(self._classifier.classify(hand)) for hand in hands]
+        chosen = self._operator.choose(hands, guesses, dt_s)
+        hand, guess = (hands[chosen], guesses[chosen]) if chosen is not None else (None, _NOTHING)
+        sign = self._filter.step(guess.sign, dt_s)
+        if hand is not None and guess.sign == sign != NONE:
+            self._operator.confirm()
+            self._landmarker.follow_only(hand)
+        return Recognition(sign, guess.sign, guess.confidence, self._filter.progress, hand)
 
     def reset(self) -> None:
         """Forget the stream: no hand is followed and no sign counts."""
         self._landmarker.reset()
         self._filter.reset()
+        self._operator.reset()
+
+    def _seen(self, guess: SignGuess) -> SignGuess:
+        """Return ``guess`` if it is sure enough, else ``NONE``; the sign that counts need be less sure to be kept."""
+        least = self._config.keep_confidence if guess.sign == self._filter.sign else self._config.min_confidence
+        return guess if guess.confidence >= min(least, self._config.min_confidence) else _NOTHING

@@ -1,0 +1,94 @@
+"""Numbers that say what shape a hand has, whichever hand it is, wherever it is and however it is turned in the image.
+
+All of them are distances in palm lengths and angles between bones: moving, scaling, mirroring and turning the picture
+change none of them, so one half of the hands and one direction are enough to learn from. Where the hand points is
+measured apart (:func:`directions`).
+"""
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.floating]
+
+WRIST, THUMB_TIP, INDEX_BASE, INDEX_TIP = 0, 4, 5, 8
+KNUCKLES: Final = (5, 9, 13, 17)
+
+_DIGITS: Final = np.array(
+    [[0, 1, 2, 3, 4], [0, 5, 6, 7, 8], [0, 9, 10, 11, 12], [0, 13, 14, 15, 16], [0, 17, 18, 19, 20]]
+)
+_BONE_ENDS: Final = (_DIGITS[:, 1:].ravel(), _DIGITS[:, :-1].ravel())
+
+_PAIRS: Final = np.array(
+    [
+        *((tip, WRIST) for tip in (4, 8, 12, 16, 20)),
+        *((tip, tip - 3) for tip in (4, 8, 12, 16, 20)),
+        *((tip, tip - 2) for tip in (8, 12, 16, 20)),
+        *((8, 9), (12, 13), (16, 9), (20, 13), (8, 17), (20, 5)),
+        *((THUMB_TIP, other) for other in (5, 6, 7, 8, 9, 10, 11, 13, 14, 17)),
+        *((3, 5), (3, 6), (3, 17), (2, 5), (2, 17)),
+        *((8, 12), (12, 16), (16, 20), (6, 10), (10, 14), (14, 18)),
+        *((5, 17), (5, 0), (17, 0)),
+    ]
+)
+"""Pairs of landmarks whose distances tell shapes apart."""
+
+COUNT: Final = 15 + 2 * len(_PAIRS) + 1
+"""How many features there are."""
+
+
+def shape_features(pixels: Array, world: Array) -> NDArray[np.float64]:
+    """Return the (n, :data:`COUNT`) features of n hands; finite for all finite landmarks.
+
+    Args:
+        pixels: (n, 21, 2) landmarks in pixels.
+        world: (n, 21, 3) landmarks in metres, axes as the image's.
+    """
+    world = np.asarray(world, np.float64)
+    palm = np.linalg.norm(world[:, KNUCKLES] - world[:, :1], axis=2).mean(axis=1)
+    palm = np.maximum(palm, 1e-6)[:, None]
+    image = _in_metres(np.asarray(pixels, np.float64), world)
+    normal = np.cross(world[:, 5] - world[:, 0], world[:, 17] - world[:, 0])
+    facing = np.abs(normal[:, 2:]) / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
+    features = np.concatenate([_bends(world), _distances(world) / palm, _distances(image) / palm, facing], axis=1)
+    clipped: NDArray[np.float64] = np.clip(features, -5.0, 5.0)
+    return clipped
+
+
+def directions(pixels: Array) -> tuple[Array, Array, Array]:
+    """Return where index finger, thumb and palm point in the image: (n, 2) vectors each, in pixels, x right, y down.
+
+    The thumb's is that from the middle of the knuckles to its tip: it shows better where a fist points than the thumb's
+    own direction, as thumbs bend. The palm's is that from the wrist to the middle of the knuckles.
+
+    Args:
+        pixels: (n, 21, 2) landmarks in pixels.
+    """
+    knuckles = pixels[:, KNUCKLES].mean(axis=1)
+    index = pixels[:, INDEX_TIP] - pixels[:, INDEX_BASE]
+    return index, pixels[:, THUMB_TIP] - knuckles, knuckles - pixels[:, WRIST]
+
+
+def _in_metres(pixels: Array, world: Array) -> Array:
+    """Return (n, 21, 2) image points, scaled to fit the world landmarks as seen from the camera."""
+    flat = world[:, :, :2] - world[:, :, :2].mean(axis=1, keepdims=True)
+    pixels = pixels - pixels.mean(axis=1, keepdims=True)
+    scale = np.sqrt((flat**2).sum(axis=(1, 2)) / np.maximum((pixels**2).sum(axis=(1, 2)), 1e-12))
+    scaled: Array = pixels * scale[:, None, None]
+    return scaled
+
+
+def _bends(world: Array) -> Array:
+    """Return (n, 15) angles between neighbouring bones, radians, digit by digit from the base."""
+    bones = world[:, _BONE_ENDS[0]] - world[:, _BONE_ENDS[1]]
+    bones = (bones / np.maximum(np.linalg.norm(bones, axis=2, keepdims=True), 1e-9)).reshape(-1, 5, 4, 3)
+    cosines = (bones[:, :, 1:] * bones[:, :, :-1]).sum(axis=3)
+    angles: Array = np.arccos(np.clip(cosines, -1.0, 1.0)).reshape(-1, 15)
+    return angles
+
+
+def _distances(points: Array) -> Array:
+    gaps = points[:, _PAIRS[:, 0]] - points[:, _PAIRS[:, 1]]
+    lengths: Array = np.sqrt((gaps**2).sum(axis=2))
+    return lengths

@@ -1,0 +1,148 @@
+"""A small neural network: forward pass and training, in NumPy."""
+
+import itertools
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+_GRID: Final = 2.0**-14
+_BATCH: Final = 512
+_STEP: Final = 2e-3
+_DECAY: Final = 1e-5
+_SMOOTHING: Final = 0.01
+
+
+@dataclass(frozen=True)
+class Network:
+    """A multilayer perceptron from features to the scores of classes.
+
+    Attributes:
+        mean: (features,) subtracted from the features first.
+        scale: (features,) that they are multiplied by then.
+        weights: One (inputs, outputs) matrix a layer.
+        biases: One (outputs,) vector a layer.
+    """
+
+    mean: Array
+    scale: Array
+    weights: tuple[Array, ...]
+    biases: tuple[Array, ...]
+
+    def logits(self, features: Array) -> Array:
+        """Return the (n, classes) scores of (n, features); their softmax gives probabilities."""
+        return self.layers(features)[-1]
+
+    def probabilities(self, features: Array) -> Array:
+        """Return the (n, classes) probabilities of (n, features)."""
+        return softmax(self.logits(features))
+
+    def layers(self, features: Array) -> list[Array]:
+        """Return the outputs of all layers, the scaled features first."""
+        outputs = [(features - self.mean) * self.scale]
+        for weight, bias in zip(self.weights, self.biases, strict=True):
+            inputs = outputs[-1]
+            outputs.append((np.tanh(inputs) if len(outputs) > 1 else inputs) @ weight + bias)
+        return outputs
+
+
+def softmax(logits: Array) -> Array:
+    """Return (n, classes) probabilities of (n, classes) scores."""
+    powers = np.exp(logits - logits.max(axis=1, keepdims=True))
+    probabilities: Array = powers / powers.sum(axis=1, keepdims=True)
+    return probabilities
+
+
+def train(
+    features: Array,
+    targets: NDArray[np.int64],
+    *,
+    hidden: tuple[int, ...],
+    epochs: int,
+    seed: int,
+    progress: Callable[[int], object] = lambda _: None,
+) -> Network:
+    """Return a network that tells the classes apart, all classes counting alike.
+
+    Adam (D. Kingma and J. Ba, 2015) on the cross entropy, with a step that falls to nothing. After each epoch the
+    weights are rounded to a grid, so that the last digits in which processors differ don't grow: the same data gives
+    the same network everywhere.
+
+    Args:
+        features: (n, features).
+        targets: (n,) class of each row, 0 to classes - 1; each class occurs.
+        hidden: Sizes of the hidden layers.
+        epochs: How often all rows are seen.
+        seed: Of the first weights and the order of the rows.
+        progress: Called after each epoch with its number, from 1.
+    """
+    random = np.random.default_rng(seed)
+    mean, scale = rounded(features.mean(axis=0)), rounded(1.0 / np.maximum(features.std(axis=0), 1e-3))
+    sizes = (features.shape[1], *hidden, int(targets.max()) + 1)
+    weights = [rounded(random.normal(0, n**-0.5, (n, m))) for n, m in itertools.pairwise(sizes)]
+    biases = [np.zeros(m) for m in sizes[1:]]
+    importance = (len(targets) / len(np.unique(targets)) / np.bincount(targets))[targets]
+    optimiser = _Adam([*weights, *biases])
+    network = Network(mean, scale, tuple(weights), tuple(biases))
+    for epoch in range(epochs):
+        order = random.permutation(len(targets))
+        for batch in np.array_split(order, max(1, len(order) // _BATCH)):
+            step = _STEP * 0.5 * (1 + np.cos(np.pi * epoch / epochs))
+            gradients = _gradients(network, features[batch], targets[batch], importance[batch])
+            optimiser.step(gradients, step)
+        optimiser.round()
+        progress(epoch + 1)
+    return network
+
+
+def _gradients(network: Network, features: Array, targets: NDArray[np.int64], importance: Array) -> list[Array]:
+    """Return the gradients of the mean cross entropy for all weights, then all biases."""
+    outputs = network.layers(features)
+    wanted = np.eye(outputs[-1].shape[1])[targets] * (1 - _SMOOTHING) + _SMOOTHING / outputs[-1].shape[1]
+    error = (softmax(outputs[-1]) - wanted) * importance[:, None] / len(targets)
+    weights: list[Array] = []
+    biases: list[Array] = []
+    for layer in reversed(range(len(network.weights))):
+        inputs = np.tanh(outputs[layer]) if layer else outputs[layer]
+        weights.insert(0, inputs.T @ error + _DECAY * network.weights[layer])
+        biases.insert(0, error.sum(axis=0))
+        error = (error @ network.weights[layer].T) * (1 - inputs**2)
+    return [*weights, *biases]
+
+
+class _Adam:
+    """Changes parameters in place."""
+
+    def __init__(self, parameters: list[Array]) -> None:
+        self._parameters = parameters
+        self._means = [np.zeros_like(each) for each in parameters]
+        self._squares = [np.zeros_like(each) for each in parameters]
+        self._steps = 0
+
+    def step(self, gradients: list[Array], step: float) -> None:
+        self._steps += 1
+        for parameter, mean, square, gradient in zip(
+            self._parameters, self._means, self._squares, gradients, strict=True
+        ):
+            mean[:] += 0.1 * (gradient - mean)
+            square[:] += 0.001 * (gradient**2 - square)
+            corrected = mean / (1 - 0.9**self._steps)
+            parameter[:] -= step * corrected / (np.sqrt(square / (1 - 0.999**self._steps)) + 1e-8)
+
+    def round(self) -> None:
+        """Put the parameters on a grid, and forget the gradients."""
+        for parameter, mean, square in zip(self._parameters, self._means, self._squares, strict=True):
+            parameter[:] = rounded(parameter)
+            mean[:] = 0.0
+            square[:] = 0.0
+        self._steps = 0
+
+
+def rounded(values: Array) -> Array:
+    """Return ``values`` on a grid that is much coarser than the rounding errors of any processor."""
+    on_grid: Array = np.round(values / _GRID) * _GRID
+    return on_grid

@@ -1,0 +1,115 @@
+"""Whose hand it is that gives the signs, when there are several in view."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from handsteer.config import SignsConfig
+from handsteer.landmarks.protocol import Hand
+from handsteer.signs.protocol import SignGuess
+from handsteer.signs.vocabulary import NONE
+
+_SEARCH_PERIOD_S: Final = 0.2
+_JUMP: Final = 1.0
+"""How far a hand can move from one frame to the next, in its own sizes."""
+_MUCH_SMALLER: Final = 0.6
+"""A hand that is smaller than this share of the followed one is somebody's in the background."""
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a hand is in the image: the centre of its box and the box's longer side, in pixels."""
+
+    x: float
+    y: float
+    size: float
+
+    @classmethod
+    def of(cls, hand: Hand) -> "Place":
+        """Return where ``hand`` is."""
+        low, high = hand.pixels[:, :2].min(axis=0), hand.pixels[:, :2].max(axis=0)
+        x, y = ((low + high) / 2).tolist()
+        return cls(x, y, max(1.0, float(np.max(high - low))))
+
+    def distance(self, other: "Place") -> float:
+        """Return how far ``other`` is from here, in sizes of this one."""
+        return float(np.hypot(self.x - other.x, self.y - other.y)) / self.size
+
+
+class Operator:
+    """Chooses the hand that gives the signs, and stays with it.
+
+    - While none is followed, it is the hand that shows a sign: the surest and largest of them.
+    - Once a sign of it counts, it stays the one while it is in view, until none has counted for ``switch_time`` and
+      another hand, which is not much smaller, shows one: a resting hand or a bystander doesn't take over.
+    - A hand that is out of view for ``bridge_time`` is followed no more.
+    """
+
+    def __init__(self, config: SignsConfig) -> None:
+        self._config = config
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the hand that is followed."""
+        self._followed: Place | None = None
+        self._unseen_s = 0.0
+        self._idle_s = math.inf
+        self._since_search_s = 0.0
+
+    def wants_search(self, dt_s: float) -> bool:
+        """Return whether to look for further hands, ``dt_s`` seconds after the last frame: it takes time.
+
+        It is wanted now and then while the followed hand gives no sign.
+        """
+        self._since_search_s += dt_s
+        if self._idle_s == 0.0 or self._since_search_s < _SEARCH_PERIOD_S:
+            return False
+        self._since_search_s = 0.0
+        return True
+
+    def choose(self, hands: Sequence[Hand], guesses: Sequence[SignGuess], dt_s: float) -> int | None:
+        """Return the index of the hand that gives the signs; None when it is not in view.
+
+        Args:
+            hands: Those of one frame.
+            guesses: What each of them shows; ``NONE`` where it is not sure enough.
+            dt_s: Seconds since the last frame, >= 0.
+        """
+        places = [Place.of(hand) for hand in hands]
+        showing = [index for index, guess in enumerate(guesses) if guess.sign != NONE]
+        self._idle_s += dt_s
+        followed = self._find(places, dt_s)
+        if self._followed is not None and followed is None:
+            return None
+        if followed is not None and followed not in showing and self._idle_s >= self._config.switch_time:
+            showing = [index for index in showing if places[index].size >= _MUCH_SMALLER * places[followed].size]
+        elif followed is not None:
+            showing = []
+        if showing:
+            followed = max(showing, key=lambda index: guesses[index].confidence * places[index].size ** 0.5)
+            self._idle_s = math.inf
+        if followed is None:
+            return max(range(len(places)), key=lambda index: places[index].size, default=None)
+        self._followed = places[followed]
+        return followed
+
+    def confirm(self) -> None:
+        """Note that the sign of the followed hand counts: from now on it is kept."""
+        self._idle_s = 0.0
+
+    def _find(self, places: list[Place], dt_s: float) -> int | None:
+        """Return the index of the followed hand among ``places``; None when it is not there, or none is followed."""
+        before = self._followed
+        if before is None:
+            return None
+        nearest = min(range(len(places)), key=lambda index: before.distance(places[index]), default=None)
+        if nearest is not None and before.distance(places[nearest]) <= _JUMP:
+            self._unseen_s = 0.0
+            return nearest
+        self._unseen_s += dt_s
+        if self._unseen_s > self._config.bridge_time:
+            self.reset()
+        return None

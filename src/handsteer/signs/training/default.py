@@ -1,0 +1,54 @@
+"""Trains the sign model that handsteer ships, from hands that it makes itself: ``make signs-model``.
+
+The same code gives the same bytes, so the file in the repository can be checked against it.
+"""
+
+from collections.abc import Callable
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from handsteer.signs.features import shape_features
+from handsteer.signs.model import FORMAT, SignModel
+from handsteer.signs.network import train
+from handsteer.signs.novelty import learn_novelty
+from handsteer.signs.training.hands import make_hands
+from handsteer.signs.training.truth import SHAPES
+
+SEED: Final = 7
+_CHUNKS, _CHUNK = 12, 50_000
+HIDDEN: Final = (64, 32)
+EPOCHS: Final = 30
+
+
+def made_hands(chunks: int, seed: int) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Return (n, features) of n made hands, and their (n,) shapes as indices into ``SHAPES``.
+
+    Args:
+        chunks: How much to make: each is about 39 000 hands.
+        seed: The same seed gives the same hands.
+    """
+    features, shapes = [], []
+    for random in np.random.default_rng(seed).spawn(chunks):
+        hands = make_hands(_CHUNK, random)
+        # Rounded, so that the last digits in which processors differ are gone.
+        features.append(np.round(shape_features(hands.pixels, hands.world), 4))
+        shapes.append(hands.shapes)
+    return np.concatenate(features), np.concatenate(shapes)
+
+
+def train_default(progress: Callable[[int], object], chunks: int = _CHUNKS, epochs: int = EPOCHS) -> SignModel:
+    """Return a newly trained model.
+
+    Args:
+        progress: Called after each epoch with its number, from 1.
+        chunks: How much to train on, as :func:`made_hands` takes it.
+        epochs: How often all of it is seen.
+    """
+    features, shapes = made_hands(chunks, SEED)
+    network = train(features, shapes, hidden=HIDDEN, epochs=epochs, seed=SEED, progress=progress)
+    novelty = learn_novelty(features, shapes, network.mean, network.scale)
+    counts = {shape: int(count) for shape, count in zip(SHAPES, np.bincount(shapes), strict=True)}
+    trained_on = {"source": "hands made by handsteer.signs.training", "seed": SEED, "hands": counts, "format": FORMAT}
+    return SignModel(SHAPES, network, novelty, trained_on)

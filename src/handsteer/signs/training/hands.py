@@ -1,0 +1,130 @@
+"""Hands before a camera as the landmark model would see them, with their true shape."""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from handsteer.hand.kinematics import ANGLES, FINGERS, Array, pose_joints, turn_x, turn_y, turn_z
+from handsteer.signs.training.shapes import Random, random_shapes
+from handsteer.signs.training.truth import name_shapes
+
+BONES_M: Final = 0.096 * np.array(
+    [
+        *(0.43, 0.33, 0.36, 0.29),
+        *(1.03, 0.305, 0.225, 0.275),
+        *(1.00, 0.38, 0.28, 0.26),
+        *(0.96, 0.32, 0.255, 0.25),
+        *(0.87, 0.23, 0.21, 0.19),
+    ]
+)
+"""(20,) bone lengths as MediaPipe's world landmarks have them, metres: its knuckles are nearer to the fingertips than
+the joints are. Medians over photos, rounded."""
+
+# Standard deviations of the landmark model's errors, metres at the size of its own world landmarks.
+_IMAGE_ERROR_M: Final = 0.0022
+_WORLD_ERROR_M: Final = 0.0022
+_DEPTH_ERROR_M: Final = 0.005
+_SHARED_ERROR_M: Final = 0.0025
+_BEND_ERROR_RAD: Final = np.radians(8.0)
+
+
+MCP: Final = [ANGLES.index(f"{finger}_mcp") for finger in FINGERS]
+PIP: Final = [ANGLES.index(f"{finger}_pip") for finger in FINGERS]
+
+
+@dataclass(frozen=True)
+class Hands:
+    """N hands as a landmark model sees them.
+
+    Attributes:
+        pixels: (n, 21, 2) landmarks in pixels.
+        world: (n, 21, 3) landmarks in metres, axes as the image's.
+        shapes: (n,) indices into :data:`~handsteer.signs.training.truth.SHAPES`.
+    """
+
+    pixels: Array
+    world: Array
+    shapes: NDArray[np.int64]
+
+
+def make_hands(count: int, random: Random) -> Hands:
+    """Return fewer than ``count`` random hands: those whose shape nobody would doubt."""
+    angles = random_shapes(count, random)
+    count = len(angles)
+    bones = BONES_M * random.normal(1.0, 0.06, (count, 20)) * random.normal(1.0, 0.05, (count, 1))
+    views = _views(count, random)
+    true = pose_joints(angles, bones) @ np.swapaxes(views, 1, 2)
+    shapes = name_shapes(angles, true, _elevations(true), _facing(true))
+    kept = shapes >= 0
+    seen = pose_joints(angles[kept] + _misread(angles[kept], views[kept], random), bones[kept]) @ np.swapaxes(
+        views[kept], 1, 2
+    )
+    pixels, world = _landmarks(seen, random)
+    return Hands(pixels, world, shapes[kept])
+
+
+def _views(count: int, random: Random) -> Array:
+    """Return (count, 3, 3) rotations to the camera frame: most show palm or back, some are any."""
+    back = random.random(count) < 0.5
+    yaw = np.where(back, np.pi, 0.0) + np.radians(random.normal(0, 32, count))
+    pitch = np.radians(random.normal(0, 28, count))
+    anyhow = random.random(count) < 0.25
+    yaw = np.where(anyhow, random.uniform(-np.pi, np.pi, count), yaw)
+    pitch = np.where(anyhow, np.arcsin(random.uniform(-1, 1, count)), pitch)
+    roll = random.uniform(-np.pi, np.pi, count)
+    views: Array = turn_z(roll) @ turn_x(-pitch) @ np.diag([1.0, -1.0, -1.0]) @ turn_y(yaw)
+    return views
+
+
+def _elevations(joints: Array) -> Array:
+    """Return (n, 2) angles of index finger and thumb tip (from the knuckles) off the image plane, radians."""
+    index = joints[:, 8] - joints[:, 5]
+    thumb = joints[:, 4] - joints[:, [5, 9, 13, 17]].mean(axis=1)
+    both = np.stack([index, thumb], axis=1)
+    elevations: Array = np.arcsin(np.abs(both[..., 2]) / np.linalg.norm(both, axis=2))
+    return elevations
+
+
+def _facing(joints: Array) -> Array:
+    normal = np.cross(joints[:, 5] - joints[:, 0], joints[:, 17] - joints[:, 0])
+    facing: Array = np.abs(normal[:, 2]) / np.linalg.norm(normal, axis=1)
+    return facing
+
+
+def _misread(angles: Array, views: Array, random: Random) -> Array:
+    """Return (n, 23) errors of joint angles: a landmark model takes whole fingers for more or less bent than they are.
+
+    Hands far away or in poor light are read much worse than others, and seen from the back, closed fingers are hidden:
+    they are taken for bent at the knuckles rather than in the middle.
+    """
+    size = _BEND_ERROR_RAD * _badness(len(angles), random)
+    errors: Array = random.normal(0, 1, angles.shape) * size
+    hidden = np.clip(views[:, 2, 2:], 0, 1) * random.uniform(0, 0.55, (len(angles), 1))
+    moved = np.clip(angles[:, PIP], 0, None) * hidden
+    errors[:, PIP] -= moved
+    errors[:, MCP] += 0.4 * moved
+    return errors
+
+
+def _badness(count: int, random: Random) -> Array:
+    """Return (count, 1) factors on the errors, about 1, seldom 3."""
+    factors: Array = np.exp(random.normal(-0.3, 0.5, (count, 1)))
+    return factors
+
+
+def _landmarks(joints: Array, random: Random) -> tuple[Array, Array]:
+    """Return pixels and world landmarks of (n, 21, 3) joints in the camera frame, with errors."""
+    count = len(joints)
+    centred = joints - joints.mean(axis=1, keepdims=True)
+    badness = _badness(count, random)[..., None]
+    shared = random.normal(0, 1, centred.shape) * (_SHARED_ERROR_M, _SHARED_ERROR_M, 0) * badness
+    distance = random.uniform(0.3, 2.5, (count, 1))
+    seen = centred + shared
+    flat = seen[..., :2] / (1 + centred[..., 2:] / distance[..., None])
+    pixels = 1000 * (flat + random.normal(0, _IMAGE_ERROR_M, flat.shape) * badness)
+    depth = (random.uniform(0.5, 1.15, (count, 1, 1)), random.normal(0, _DEPTH_ERROR_M, (count, 21, 1)))
+    world = seen + random.normal(0, _WORLD_ERROR_M, centred.shape) * badness
+    world[..., 2:] = world[..., 2:] * depth[0] + depth[1] * badness
+    return pixels, world

@@ -1,0 +1,46 @@
+"""The whole way from photos and clips of real people to signs; the full table is made by ``make bench-signs``."""
+
+import csv
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from handsteer.config import Config
+from handsteer.graph import open_recognizer
+from handsteer.signs.recognizer import Recognizer
+from handsteer.signs.vocabulary import MOTION_SIGNS, NONE
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def recognizer() -> Recognizer:
+    return open_recognizer(Config())
+
+
+def test_signs_of_strangers_are_told_and_nothing_else_moves_the_robot(data_dir: Path, recognizer: Recognizer) -> None:
+    right, shown, moving = 0, 0, []
+    with (data_dir / "photos" / "index.csv").open() as file:
+        rows = [row for row in csv.DictReader(file) if row["sign"] and int(row["width"]) >= 400]
+    for row in rows[::3]:
+        recognizer.reset()
+        seen = recognizer.step(cv2.imread(str(data_dir / "photos" / row["path"])), 0.0).seen
+        shown += row["sign"] != NONE
+        right += seen == row["sign"] != NONE
+        if row["sign"] == NONE and seen in MOTION_SIGNS:
+            moving.append(row["path"])
+    assert shown > 50
+    assert right >= 0.95 * shown
+    assert len(moving) <= 1
+
+
+def test_a_hand_that_opens_pinches_and_closes_never_moves_the_robot(data_dir: Path, recognizer: Recognizer) -> None:
+    recognizer.reset()
+    video = cv2.VideoCapture(str(data_dir / "videos" / "dex-retargeting_human_hand_video_1280x720.mp4"))
+    signs = set()
+    while (image := video.read()[1]) is not None:
+        signs.add(recognizer.step(np.asarray(image), 1 / 30).sign)
+    assert signs
+    assert not signs & MOTION_SIGNS

@@ -1,0 +1,114 @@
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from handsteer.landmarks.protocol import Hand, Handedness
+from handsteer.signs.model import load_model
+from handsteer.signs.trained import TrainedClassifier
+from handsteer.signs.vocabulary import FORWARD, GO, NONE, SIGNS, STOP, TURN_LEFT, TURN_RIGHT
+from tests.signs.hands import SIZE, hand_of, show_fingers, show_sign
+
+CLASSIFIER = TrainedClassifier(load_model())
+THUMB_OUT = {"spread": 56.0, "opposition": 12.0}
+THUMB_ACROSS = {"spread": 10.0, "opposition": 58.0, "mcp": 38.0, "ip": 45.0}
+
+
+def sure_sign(hand: Hand) -> str:
+    guess = CLASSIFIER.classify(hand)
+    return guess.sign if guess.confidence >= 0.8 else NONE
+
+
+@pytest.mark.parametrize("handedness", ["Left", "Right"])
+@pytest.mark.parametrize("tilt", [-30, 0, 30])
+@pytest.mark.parametrize("sign", SIGNS)
+def test_signs_of_either_hand_near_and_far_and_tilted(sign: str, handedness: Handedness, tilt: float) -> None:
+    # The virtual hand's thumb points 29 degrees above the horizontal in one of the turns.
+    tilt = max(-20, min(20, tilt)) if sign in (TURN_LEFT, TURN_RIGHT) else tilt
+    for away_m in (0.5, 1.5, 2.5):
+        assert sure_sign(show_sign(sign, handedness, tilt=math.radians(tilt), away_m=away_m)) == sign
+
+
+OTHERS = {
+    "index sideways": show_fingers("index", roll=math.pi / 2),
+    "index to the other side": show_fingers("index", roll=-math.pi / 2),
+    "thumb up": show_fingers(thumb=THUMB_OUT, roll=math.radians(-65)),
+    "thumb down": show_fingers(thumb=THUMB_OUT, roll=math.radians(115)),
+    "peace": show_fingers("index", "middle"),
+    "three": show_fingers("index", "middle", "ring"),
+    "three with the thumb": show_fingers("index", "middle", thumb=THUMB_OUT),
+    "four": show_fingers("index", "middle", "ring", "little", thumb=THUMB_ACROSS),
+    "L": show_fingers("index", thumb=THUMB_OUT),
+    "horns": show_fingers("index", "little"),
+    "call": show_fingers("little", thumb=THUMB_OUT),
+    "little finger": show_fingers("little"),
+    "middle finger": show_fingers("middle"),
+    "OK": show_fingers(
+        "middle",
+        "ring",
+        "little",
+        thumb={"spread": 28.0, "opposition": 45.0, "mcp": 5.0, "ip": 20.0},
+        bend={"index_mcp": 50.0, "index_pip": 60.0, "index_dip": 35.0},
+    ),
+    "half open": show_fingers(
+        thumb={"spread": 30.0, "opposition": 30.0, "mcp": 10.0, "ip": 15.0},
+        bend={f"{f}_{j}": a for f in ("index", "middle", "ring", "little") for j, a in (("mcp", 30.0), ("pip", 45.0))},
+    ),
+    "an open hand that hangs": show_fingers("index", "middle", "ring", "little", thumb=THUMB_OUT, roll=math.pi),
+}
+
+
+@pytest.mark.parametrize("name", OTHERS)
+def test_other_hands_are_none(name: str) -> None:
+    assert sure_sign(OTHERS[name]) == NONE
+
+
+@pytest.mark.parametrize("sign", SIGNS)
+def test_the_mirror_image_is_as_sure_and_turns_the_other_way(sign: str) -> None:
+    hand = show_sign(sign)
+    flipped = hand_of(
+        np.array([SIZE[0], 0]) + hand.pixels[:, :2] * np.array([-1, 1]), hand.world * np.array([-1, 1, 1]), "Left"
+    )
+    one, other = CLASSIFIER.classify(hand), CLASSIFIER.classify(flipped)
+    assert other.sign == {TURN_LEFT: TURN_RIGHT, TURN_RIGHT: TURN_LEFT}.get(one.sign, one.sign)
+    assert other.confidence == pytest.approx(one.confidence, abs=1e-4)
+
+
+def test_a_hand_that_is_hardly_there_is_no_sign() -> None:
+    assert CLASSIFIER.classify(replace(show_sign(STOP), presence=0.4)).sign == NONE
+
+
+def test_a_hand_of_a_few_pixels_is_no_sign() -> None:
+    assert CLASSIFIER.classify(show_sign(GO, away_m=3.0)).sign == GO
+    assert CLASSIFIER.classify(show_sign(GO, away_m=8.0)).sign == NONE
+
+
+def test_points_that_are_no_hand_are_no_sign() -> None:
+    random = np.random.default_rng(0)
+    signs = []
+    for _ in range(200):
+        world = random.normal(0, 0.05, (21, 3))
+        signs.append(CLASSIFIER.classify(hand_of(world[:, :2] * 900 + 300, world)).sign)
+    assert signs.count(NONE) >= 198
+
+
+@given(st.lists(st.floats(-10, 10, width=32), min_size=126, max_size=126), st.floats(0, 1))
+def test_any_landmarks_give_a_known_sign_and_a_confidence(values: list[float], presence: float) -> None:
+    numbers = np.array(values, np.float32).reshape(2, 21, 3)
+    guess = CLASSIFIER.classify(Hand(numbers[0], numbers[1], "Left", 0.5, presence, SIZE))
+    assert 0.0 <= guess.confidence <= 1.0
+    assert guess.sign in (*SIGNS, NONE)
+
+
+def test_collapsed_landmarks_are_no_sign() -> None:
+    nothing = np.zeros((21, 3), np.float32)
+    assert CLASSIFIER.classify(Hand(nothing, nothing, "Left", 0.5, 1.0, SIZE)).sign == NONE
+
+
+@pytest.mark.parametrize("roll", [-90, -75, -35, 0, 35, 75, 90])
+def test_forward_is_an_index_finger_that_points_up_more_than_sideways(roll: int) -> None:
+    expected = FORWARD if abs(roll) <= 35 else NONE
+    assert sure_sign(show_fingers("index", roll=math.radians(roll))) == expected
