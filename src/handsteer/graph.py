@@ -17,7 +17,7 @@ from typing import Any
 
 from handsteer.cameras.choose import open_camera
 from handsteer.clock import Clock, RealClock, SteppedClock
-from handsteer.config import Config
+from handsteer.config import Config, SignsConfig
 from handsteer.errors import ConfigError
 from handsteer.landmarks.mediapipe import MediaPipeLandmarker
 from handsteer.nodes.camera import CameraNode
@@ -29,6 +29,7 @@ from handsteer.nodes.steering import SteeringNode
 from handsteer.robots import open_robot
 from handsteer.robots.protocol import Pose2D
 from handsteer.signs.drawing import annotate
+from handsteer.signs.protocol import Classifier
 from handsteer.signs.recognizer import Recognizer
 from handsteer.signs.rules import RuleClassifier
 from handsteer.transports.in_process import InProcessTransport
@@ -180,4 +181,9 @@ def open_recognizer(config: Config) -> Recognizer:
     Raises:
         ModelError: A landmark model is missing or broken.
     """
-    return Recognizer(MediaPipeLandmarker(config.landmarks), RuleClassifier(), config.signs)
+    return Recognizer(MediaPipeLandmarker(config.landmarks), open_classifier(config.signs), config.signs)
+
+
+def open_classifier(config: SignsConfig) -> Classifier:
+    """Return the classifier that ``config`` describes; today there is one."""
+    return RuleClassifier()

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from handsteer.landmarks.protocol import Hand
 from handsteer.signs.protocol import SignGuess
-from handsteer.signs.vocabulary import BACKWARD, FORWARD, GO, NONE, STOP, TURN_LEFT, TURN_RIGHT
+from handsteer.signs.vocabulary import BACKWARD, FORWARD, GO, NONE, SIGNS, STOP, TURN_LEFT, TURN_RIGHT
 
 _WRIST, _THUMB_TIP, _INDEX_MCP, _INDEX_TIP, _MIDDLE_MCP, _LITTLE_MCP = 0, 4, 5, 8, 9, 17
 _FINGER_BASES = (5, 9, 13, 17)
@@ -46,6 +46,8 @@ class HandShape:
 
 class RuleClassifier:
     """A :class:`~handsteer.signs.protocol.Classifier` that needs no training; the confidence is the weakest rule's."""
+
+    signs = SIGNS
 
     def classify(self, hand: Hand) -> SignGuess:
         """Return the sign whose rules hold best, or ``NONE`` when none of them holds."""
