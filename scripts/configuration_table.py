@@ -57,6 +57,9 @@ def _row(name: str, field: FieldInfo) -> str:
 def _allowed(field: FieldInfo) -> str:
     if get_origin(field.annotation) is Literal:
         return ", ".join(f"`{choice}`" for choice in get_args(field.annotation))
+    if get_origin(field.annotation) is dict:
+        choices = get_args(get_args(field.annotation)[1])
+        return "for each name: " + ", ".join(f"`{choice}`" for choice in choices)
     if field.annotation is bool:
         return "`true`, `false`"
     bounds = [

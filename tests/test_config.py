@@ -29,6 +29,13 @@ def test_a_file_goes_before_the_defaults_and_options_before_the_file(tmp_path: P
     assert settings.camera.fps == 10
 
 
+def test_actions_of_file_and_options_are_joined_and_built_in_signs_may_be_written_as_one_likes(tmp_path: Path) -> None:
+    file = tmp_path / "handsteer.yaml"
+    file.write_text("control: {actions: {Hi: stop, Peace: go, turn-left: turbo, STOP: stop}}\n")
+    settings = config.load(file, None, {"control": {"actions": {"Peace": "turbo"}}})
+    assert settings.control.actions == {"Hi": "stop", "Peace": "turbo", "Turn Left": "turbo", "Stop": "stop"}
+
+
 def test_an_empty_file_is_the_defaults(tmp_path: Path) -> None:
     file = tmp_path / "empty.yaml"
     file.write_text("# nothing\n")
@@ -45,6 +52,11 @@ def test_an_empty_file_is_the_defaults(tmp_path: Path) -> None:
         ("camera: {fps: fast}", r"camera.fps: 'fast' should be a valid number"),
         ("control: {ramp: quickly}", r"control.ramp: 'quickly' should be 'per_message' or 'per_second'"),
         ("control: 3", r"control: 3 should be"),
+        ("control: {actions: {Hi: fly}}", r"control.actions.Hi: 'fly' should be 'forward', .* or 'turbo'"),
+        ("control: {actions: {Stop: go}}", r"control.actions: {'Stop': 'go'} should leave Stop at 'stop'"),
+        ("control: {actions: {none: turbo}}", r"control.actions: {'none': 'turbo'} should leave NONE at 'stop'"),
+        ("control: {actions: {Go: stop, GO: go}}", r"control.actions: .*should name each sign once, and 'GO' does not"),
+        ("control: {actions: {' ': go}}", r"control.actions: .*should name each sign once"),
         ("- 1", r"expected sections such as 'control:' at the top, found list"),
         ("control: {", r"line 1: not valid YAML"),
     ],

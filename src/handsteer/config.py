@@ -8,9 +8,11 @@ from pathlib import Path
 from typing import Any, Literal, TypeVar
 
 import yaml
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
 
+from handsteer.control.actions import ALWAYS_STOP, BUILT_IN, Action
 from handsteer.errors import ConfigError
+from handsteer.signs.vocabulary import find_sign
 
 S = TypeVar("S", bound="Section")
 
@@ -98,6 +100,22 @@ class ControlConfig(Section):
     steering_timeout: float = Field(
         0.5, gt=0, le=5, description="Steering by hand keeps the signs out for this long after its last command [s]"
     )
+    actions: dict[str, Action] = Field(
+        {}, description="What further signs do, as {Hi: stop, Peace: turbo}; Stop and NONE always stop"
+    )
+
+    @field_validator("actions")
+    @classmethod
+    def _known_names_and_a_way_to_stop(cls, actions: dict[str, Action]) -> dict[str, Action]:
+        named: dict[str, Action] = {}
+        for name, action in actions.items():
+            sign = find_sign(name, BUILT_IN) or name.strip()
+            if not sign or sign in named:
+                raise ValueError(f"should name each sign once, and {name!r} does not")
+            if sign in ALWAYS_STOP and action != "stop":
+                raise ValueError(f"should leave {sign} at 'stop', so that the robot can always be stopped")
+            named[sign] = action
+        return named
 
 
 class RobotConfig(Section):

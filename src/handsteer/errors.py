@@ -13,6 +13,8 @@
     ├── ModelError             a model file (landmarks or signs) cannot be used
     │   ├── ModelMissing       the file is not on this machine
     │   └── ModelCorrupt       the file is not the one that was expected
+    ├── EvaluationError        signs cannot be evaluated: no such photos or video, or no place for the report
+    │   └── LabelError         the labels of photos or of a video are missing or wrong
     ├── PoseError              a hand pose or a script of signs is wrong
     ├── WorldError             a world file or robot description is wrong
     ├── TransportError         a topic cannot be published or subscribed to
@@ -65,6 +67,14 @@ class ModelMissing(ModelError):  # noqa: N818
 
 class ModelCorrupt(ModelError):  # noqa: N818
     """A model file is damaged, or not the one that was expected."""
+
+
+class EvaluationError(HandsteerError):
+    """Signs cannot be evaluated: there are no such photos or video, or there is no place for the report."""
+
+
+class LabelError(EvaluationError):
+    """The labels of photos or of a video are missing or wrong."""
 
 
 class PoseError(HandsteerError):

@@ -17,7 +17,7 @@ from typing import Any
 
 from handsteer.cameras.choose import open_camera
 from handsteer.clock import Clock, RealClock, SteppedClock
-from handsteer.config import Config
+from handsteer.config import Config, SignsConfig
 from handsteer.errors import ConfigError
 from handsteer.landmarks.mediapipe import MediaPipeLandmarker
 from handsteer.nodes.camera import CameraNode
@@ -30,6 +30,7 @@ from handsteer.robots import open_robot
 from handsteer.robots.protocol import Pose2D
 from handsteer.signs.drawing import annotate
 from handsteer.signs.model import load_model
+from handsteer.signs.protocol import Classifier
 from handsteer.signs.recognizer import Recognizer
 from handsteer.signs.trained import TrainedClassifier
 from handsteer.transports.in_process import InProcessTransport
@@ -181,4 +182,13 @@ def open_recognizer(config: Config) -> Recognizer:
     Raises:
         ModelError: A landmark model or the sign model is missing or broken.
     """
-    return Recognizer(MediaPipeLandmarker(config.landmarks), TrainedClassifier(load_model()), config.signs)
+    return Recognizer(MediaPipeLandmarker(config.landmarks), open_classifier(config.signs), config.signs)
+
+
+def open_classifier(config: SignsConfig) -> Classifier:
+    """Return the classifier that ``config`` describes; today there is one.
+
+    Raises:
+        ModelError: The sign model is missing or broken.
+    """
+    return TrainedClassifier(load_model())

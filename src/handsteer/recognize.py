@@ -5,9 +5,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from handsteer.cameras.files import PHOTO_SUFFIXES, VideoFile, find_photos, read_photo
-from handsteer.cameras.protocol import EndOfStream
-from handsteer.clock import SteppedClock
+from handsteer.cameras.files import PHOTO_SUFFIXES, find_photos, read_photo, video_frames
 from handsteer.errors import CameraNotFound
 from handsteer.signs.recognizer import Recognition, Recognizer
 
@@ -65,18 +63,11 @@ def _photos(paths: list[Path], recognizer: Recognizer) -> Iterator[FrameResult]:
 
 
 def _video(path: Path, recognizer: Recognizer) -> Iterator[FrameResult]:
-    clock = SteppedClock()
-    video = VideoFile(path, clock, at_end="end")
-    try:
-        while frame := video.read():
-            number = round(frame.captured_s / video.period_s)
-            recognition = recognizer.step(frame.image, video.period_s)
-            yield _result(str(path), number, frame.captured_s, recognition, recognition.sign)
-            clock.advance(video.period_s)
-    except EndOfStream:
-        return
-    finally:
-        video.close()
+    last_s = 0.0
+    for number, frame in enumerate(video_frames(path)):
+        recognition = recognizer.step(frame.image, frame.captured_s - last_s)
+        last_s = frame.captured_s
+        yield _result(str(path), number, frame.captured_s, recognition, recognition.sign)
 
 
 def _result(source: str, number: int, time_s: float, recognition: Recognition, sign: str) -> FrameResult:

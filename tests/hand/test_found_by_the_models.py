@@ -8,7 +8,8 @@ import pytest
 
 from handsteer.config import LandmarksConfig
 from handsteer.landmarks.mediapipe import MediaPipeLandmarker
-from handsteer.signs.rules import RuleClassifier
+from handsteer.signs.model import load_model
+from handsteer.signs.trained import TrainedClassifier
 from handsteer.signs.vocabulary import SIGNS
 from tests.hand.views import random_picture
 
@@ -34,7 +35,7 @@ class Outcome:
 def look_at(sign: str, hand: str, views: int, distances_m: tuple[float, float]) -> Outcome:
     """Show random views, each by itself; a hand that is found elsewhere counts as not found."""
     random = np.random.default_rng([SIGNS.index(sign), hand == "Left"])
-    landmarker, classifier = MediaPipeLandmarker(LandmarksConfig()), RuleClassifier()
+    landmarker, classifier = MediaPipeLandmarker(LandmarksConfig()), TrainedClassifier(load_model())
     outcome = Outcome(views)
     for _ in range(views):
         picture = random_picture(sign, hand, random, distances_m)

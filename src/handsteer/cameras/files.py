@@ -1,5 +1,6 @@
 """Frames from a video file or a folder of photos."""
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Literal
 
@@ -8,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handsteer.cameras.protocol import EndOfStream, Frame
-from handsteer.clock import Clock
+from handsteer.clock import Clock, SteppedClock
 from handsteer.errors import CameraNotFound, CameraUnreadable
 
 AtEnd = Literal["loop", "hold", "end"]
@@ -128,6 +129,25 @@ class PhotoFolder:
         except CameraUnreadable:
             self._shown = (index + 1) * self._repeats
             raise
+
+
+def video_frames(path: Path) -> Iterator[Frame]:
+    """Yield the frames of a video as fast as they are decoded; each is stamped with its time in the video, from 0 s.
+
+    Raises:
+        CameraNotFound: There is no such file.
+        CameraUnreadable: It is not a video that can be decoded.
+    """
+    clock = SteppedClock()
+    video = VideoFile(path, clock, at_end="end")
+    try:
+        while frame := video.read():
+            yield frame
+            clock.advance(video.period_s)
+    except EndOfStream:
+        return
+    finally:
+        video.close()
 
 
 def find_photos(path: Path) -> list[Path]:

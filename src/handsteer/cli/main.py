@@ -17,6 +17,7 @@ _EXAMPLES = """Examples:
   handsteer run                                  drive, and open the page
   handsteer run --headless --duration 30 --json  no page, one summary at the end
   handsteer recognize photo.jpg                  which sign is it?
+  handsteer signs evaluate photos/               how well are signs told?
   handsteer doctor                               what works on this machine
 """
 
@@ -31,6 +32,7 @@ app = App(
 # Named, not imported: a verb's module is loaded when it is used.
 for verb in ("run", "recognize", "models", "doctor"):
     app.command(f"handsteer.cli.{verb}:{verb}", name=verb)
+app.command("handsteer.cli.signs:app", name="signs")
 
 
 def main(arguments: list[str] | None = None) -> None:

@@ -4,8 +4,9 @@ import math
 from typing import Literal
 
 from handsteer.config import ControlConfig
+from handsteer.control.actions import action_of
 from handsteer.control.sign_control import ZERO, SignControl, Velocity
-from handsteer.signs.vocabulary import NONE, STOP
+from handsteer.signs.vocabulary import NONE
 
 Source = Literal["nobody", "signs", "steering"]
 
@@ -73,8 +74,11 @@ class Driver:
             return f"standing: no sign has come for {self._config.sign_timeout:g} s"
         if not self._velocity.is_zero:
             return f"driving: {self._last_sign}"
-        why = {STOP: "the Stop sign is shown", NONE: "no sign is seen"}
-        return f"standing: {why.get(self._last_sign or NONE, 'no sign has set it in motion yet')}"
+        sign = self._last_sign or NONE
+        if sign == NONE:
+            return "standing: no sign is seen"
+        stops = action_of(sign, self._config.actions) == "stop"
+        return f"standing: the {sign} sign is shown" if stops else "standing: no sign has set it in motion yet"
 
     def _steer(self, wanted: Velocity) -> Velocity | None:
         config = self._config

@@ -4,7 +4,9 @@ import math
 from dataclasses import dataclass
 
 from handsteer.config import ControlConfig
-from handsteer.signs.vocabulary import BACKWARD, FORWARD, NONE, STOP, TURN_LEFT, TURN_RIGHT
+from handsteer.control.actions import Action, action_of
+
+_TURBO = 2.0
 
 
 @dataclass(frozen=True)
@@ -40,11 +42,15 @@ class SignControl:
 
     ``Forward`` and ``Backward`` change the linear velocity and end turning; ``Turn Left`` and ``Turn Right`` change
     the angular velocity and keep the linear one; ``Stop`` and ``NONE`` set both to zero; ``Go`` and unknown words
-    change nothing (the rule of the ROS 101 course, chapter 12). The velocity itself is clamped, so that it does not
-    wind up beyond the limits.
+    change nothing (the rule of the ROS 101 course, chapter 12). ``config.actions`` says what further signs do. The
+    velocity itself is clamped, so that it does not wind up beyond the limits.
+
+    While a ``turbo`` sign is shown, twice the linear velocity is commanded, within the limit, and the turning
+    velocity as it is. Nothing of it is kept: with the next sign the robot is back at its own speed. A robot that
+    stands goes on standing.
 
     Attributes:
-        velocity: What was commanded last.
+        velocity: What the signs have added up to; this is commanded, but for ``turbo``.
         silent: True after a timeout: nothing is commanded until a sign comes.
     """
 
@@ -75,8 +81,10 @@ class SignControl:
         interval_s = 0.0 if self.silent else self._since_sign_s
         self._since_sign_s = 0.0
         self.silent = False
-        self.velocity = self._next(sign, interval_s)
-        return self.velocity if self.velocity.is_finite else self.halt()
+        action = action_of(sign, self._config.actions)
+        self.velocity = self._next(action, interval_s)
+        commanded = self._boosted() if action == "turbo" else self.velocity
+        return commanded if commanded.is_finite else self.halt()
 
     def halt(self) -> Velocity | None:
         """Forget the velocity; return one zero, or None when that has been said already."""
@@ -86,18 +94,21 @@ class SignControl:
         self._since_sign_s = 0.0
         return None if was_silent else ZERO
 
-    def _next(self, sign: str, interval_s: float) -> Velocity:
+    def _next(self, action: Action, interval_s: float) -> Velocity:
         now = self.velocity
         linear, angular = self._growth(interval_s)
         after = {
-            FORWARD: Velocity(now.linear_mps + linear, 0.0),
-            BACKWARD: Velocity(now.linear_mps - linear, 0.0),
-            TURN_LEFT: Velocity(now.linear_mps, now.angular_radps + angular),
-            TURN_RIGHT: Velocity(now.linear_mps, now.angular_radps - angular),
-            STOP: ZERO,
-            NONE: ZERO,
-        }.get(sign, now)
+            "forward": Velocity(now.linear_mps + linear, 0.0),
+            "backward": Velocity(now.linear_mps - linear, 0.0),
+            "turn_left": Velocity(now.linear_mps, now.angular_radps + angular),
+            "turn_right": Velocity(now.linear_mps, now.angular_radps - angular),
+            "stop": ZERO,
+        }.get(action, now)
         return after.clamped(self._config.max_linear, self._config.max_angular)
+
+    def _boosted(self) -> Velocity:
+        doubled = Velocity(_TURBO * self.velocity.linear_mps, self.velocity.angular_radps)
+        return doubled.clamped(self._config.max_linear, self._config.max_angular)
 
     def _growth(self, interval_s: float) -> tuple[float, float]:
         config = self._config

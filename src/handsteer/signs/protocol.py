@@ -22,6 +22,11 @@ class SignGuess:
 class Classifier(Protocol):
     """Tells the sign from the landmarks of one hand; keeps nothing from one frame to the next."""
 
+    @property
+    def signs(self) -> tuple[str, ...]:
+        """The signs that it can tell, without ``NONE``."""
+        ...
+
     def classify(self, hand: Hand) -> SignGuess:
         """Return the sign that ``hand`` shows."""
         ...

@@ -10,7 +10,10 @@ from handsteer.landmarks.protocol import Hand
 from handsteer.signs.features import directions, shape_features
 from handsteer.signs.model import SignModel
 from handsteer.signs.protocol import SignGuess
-from handsteer.signs.vocabulary import BACKWARD, FORWARD, GO, NONE, STOP, TURN_LEFT, TURN_RIGHT
+from handsteer.signs.vocabulary import BACKWARD, FORWARD, GO, NONE, SIGNS, STOP, TURN_LEFT, TURN_RIGHT
+
+_SHAPES: Final = frozenset({"open", "index", "thumb", "fist", "other"})
+"""The shapes that are signs only by where they point, or none."""
 
 _DOUBT: Final = 1.5
 """Width of the doubt about a limit, degrees or pixels."""
@@ -42,6 +45,11 @@ class TrainedClassifier:
     def __init__(self, model: SignModel) -> None:
         self._model = model
 
+    @property
+    def signs(self) -> tuple[str, ...]:
+        """The signs that it can tell, without ``NONE``."""
+        return (*SIGNS, *(shape for shape in self._model.shapes if shape not in _SHAPES))
+
     def classify(self, hand: Hand) -> SignGuess:
         """Return the sign that ``hand`` shows; ``NONE`` when it is likelier that it shows none."""
         pixels = hand.pixels[None, :, :2].astype(np.float64)
@@ -55,9 +63,7 @@ class TrainedClassifier:
 
 def _signs(shapes: dict[str, float], pixels: NDArray[np.float64]) -> dict[str, float]:
     """Return how likely each sign is, given the shapes' likelihoods and (1, 21, 2) landmarks."""
-    taught = {
-        shape: chance for shape, chance in shapes.items() if shape not in ("open", "index", "thumb", "fist", "other")
-    }
+    taught = {shape: chance for shape, chance in shapes.items() if shape not in _SHAPES}
     index, thumb, palm = (vectors[0] for vectors in directions(pixels))
     return taught | {
         STOP: shapes.get("open", 0.0) * _within(_UPRIGHT, _from_up(palm)),

@@ -1,0 +1,65 @@
+"""The recogniser, put to the test on photos and videos whose signs are known."""
+
+from collections.abc import Iterable, Iterator, Mapping
+
+import numpy as np
+
+from handsteer.cameras.files import read_photo
+from handsteer.cameras.protocol import Frame
+from handsteer.errors import LabelError
+from handsteer.landmarks.protocol import Hand
+from handsteer.signs.figures import PhotoResult
+from handsteer.signs.labelled import LabelledPhoto
+from handsteer.signs.recognizer import Recognizer
+from handsteer.signs.video_figures import FrameVerdict
+from handsteer.signs.views import View
+
+
+def evaluate_photos(photos: Iterable[LabelledPhoto], recognizer: Recognizer, view: View) -> Iterator[PhotoResult]:
+    """Yield what is seen in each photo, with nothing kept from one to the next.
+
+    Photos that are not to be scored, or cannot be when they are seen as ``view`` does, are left out.
+
+    Raises:
+        CameraUnreadable: A photo cannot be decoded.
+    """
+    for photo in photos:
+        truth, kind = view.truth(photo.truth, photo.kind)
+        if truth is None:
+            continue
+        recognizer.reset()
+        recognition = recognizer.step(view.picture(read_photo(photo.path)), 0.0)
+        size = _longer_side(recognition.hand) if recognition.hand else None
+        yield PhotoResult(str(photo.path), kind, truth, recognition.seen, round(recognition.confidence, 4), size)
+
+
+def evaluate_frames(
+    frames: Iterable[Frame], truths: Mapping[int, str] | None, recognizer: Recognizer, view: View
+) -> Iterator[FrameVerdict]:
+    """Yield what is seen in each frame of a video, as a camera would give it, and which sign counts then.
+
+    Args:
+        frames: The frames in their order.
+        truths: The sign of each frame, by its number from 0; a frame that is not there is not scored. None when
+            nothing is known.
+        recognizer: What is tested.
+        view: How the frames are looked at.
+
+    Raises:
+        LabelError: There are labels for more frames than there are.
+    """
+    recognizer.reset()
+    last_s: float | None = None
+    number = -1
+    for number, frame in enumerate(frames):
+        dt_s = 0.0 if last_s is None else frame.captured_s - last_s
+        last_s = frame.captured_s
+        recognition = recognizer.step(view.picture(frame.image), dt_s)
+        truth, _ = view.truth((truths or {}).get(number))
+        yield FrameVerdict(frame.captured_s, truth, recognition.seen, recognition.sign)
+    if truths and max(truths) > number:
+        raise LabelError(f"there is a label for frame {max(truths)}, but the last frame of the video is {number}")
+
+
+def _longer_side(hand: Hand) -> float:
+    return round(float(np.ptp(hand.pixels[:, :2], axis=0).max()), 1)

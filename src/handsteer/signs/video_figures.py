@@ -1,0 +1,209 @@
+"""How well signs are told over time: false commands a minute, and how soon each sign counts."""
+
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import asdict, dataclass
+from itertools import groupby
+from statistics import median
+from typing import Any
+
+from handsteer.signs.figures import Confusion, Share
+from handsteer.signs.vocabulary import NONE
+
+
+@dataclass(frozen=True)
+class FrameVerdict:
+    """What one frame shows, and what was made of it.
+
+    Attributes:
+        time_s: When it is, from the first frame.
+        truth: The sign that it shows, or ``NONE``; None when nobody knows.
+        seen: The sign that was seen in this frame alone.
+        counts: The sign that counted, and drove.
+    """
+
+    time_s: float
+    truth: str | None
+    seen: str
+    counts: str
+
+
+@dataclass(frozen=True)
+class Event:
+    """A time in which a sign counted without a break, in seconds from the first frame."""
+
+    sign: str
+    start_s: float
+    end_s: float
+
+
+@dataclass(frozen=True)
+class Reaction:
+    """How soon a sign counted after it was first shown.
+
+    Attributes:
+        shown: How often it was shown.
+        missed: How often it never counted while it was.
+        median_s: Of the other times, the time from its first frame to the frame at which it counted, in seconds.
+        slowest_s: Likewise, the longest.
+    """
+
+    shown: int
+    missed: int
+    median_s: float | None
+    slowest_s: float | None
+
+
+@dataclass(frozen=True)
+class VideoReport:
+    """The figures of a video.
+
+    Attributes:
+        frames: How many there are.
+        duration_s: How long it is.
+        counted_s: For how long each sign counted, ``NONE`` among them.
+        motion_events: Each time in which a sign counted that moves the robot.
+        labels: What the labels say about it; None when there are none.
+    """
+
+    frames: int
+    duration_s: float
+    counted_s: dict[str, float]
+    motion_events: tuple[Event, ...]
+    labels: "LabelledFigures | None"
+
+    @property
+    def motion_events_per_minute(self) -> float:
+        """Times a minute at which a sign began to count that moves the robot."""
+        return _per_minute(len(self.motion_events), self.duration_s)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the figures as plain values, for JSON."""
+        return {
+            "frames": self.frames,
+            "duration_s": self.duration_s,
+            "counted_s": self.counted_s,
+            "motion_events": [asdict(event) for event in self.motion_events],
+            "motion_events_per_minute": self.motion_events_per_minute,
+            "labels": self.labels and self.labels.as_dict(),
+        }
+
+
+@dataclass(frozen=True)
+class LabelledFigures:
+    """The figures of the frames whose sign is known.
+
+    Attributes:
+        scored_s: For how long the sign is known.
+        seen_right: Of the frames of each sign, in how many it was seen.
+        counted_right: Of the frames of each sign, for how many it counted; the time to react is lost here.
+        reactions: How soon each sign counted.
+        false_commands: Each time in which a sign counted that moves the robot and that was not shown.
+        confusion: Frames by the sign that they show and the one that counted.
+    """
+
+    scored_s: float
+    seen_right: dict[str, Share]
+    counted_right: dict[str, Share]
+    reactions: dict[str, Reaction]
+    false_commands: tuple[Event, ...]
+    confusion: Confusion
+
+    @property
+    def false_commands_per_minute(self) -> float:
+        """False commands a minute of the time in which the sign is known."""
+        return _per_minute(len(self.false_commands), self.scored_s)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the figures as plain values, for JSON."""
+        return {
+            "scored_s": self.scored_s,
+            "seen_right": {sign: share.as_dict() for sign, share in self.seen_right.items()},
+            "counted_right": {sign: share.as_dict() for sign, share in self.counted_right.items()},
+            "reactions": {sign: asdict(reaction) for sign, reaction in self.reactions.items()},
+            "false_commands": [asdict(event) for event in self.false_commands],
+            "false_commands_per_minute": self.false_commands_per_minute,
+            "confusion": self.confusion.as_dict(),
+        }
+
+
+def video_report(
+    frames: Sequence[FrameVerdict], signs: Sequence[str], motion: Collection[str], grace_s: float = 0.3
+) -> VideoReport:
+    """Return the figures of the frames of a video.
+
+    A false command is a time in which one sign counts that moves the robot, but was not shown at any moment of the
+    last ``grace_s`` seconds: those who change their sign are given that long to be understood. It is one event however
+    long it lasts. Where the truth is not known within that time, nothing is held against the recogniser.
+
+    Args:
+        frames: All of them, in their order.
+        signs: The signs that can occur, without ``NONE``.
+        motion: Those that can move the robot.
+        grace_s: How long a sign that is no longer shown may go on to count, in seconds.
+    """
+    period_s = (frames[-1].time_s - frames[0].time_s) / (len(frames) - 1) if len(frames) > 1 else 0.0
+    counted = {sign: sum(frame.counts == sign for frame in frames) * period_s for sign in (*signs, NONE)}
+    known = any(frame.truth is not None for frame in frames)
+    return VideoReport(
+        frames=len(frames),
+        duration_s=len(frames) * period_s,
+        counted_s={sign: round(time_s, 3) for sign, time_s in counted.items() if time_s},
+        motion_events=tuple(_events([frame.counts if frame.counts in motion else None for frame in frames], frames)),
+        labels=_labelled(frames, signs, motion, grace_s, period_s) if known else None,
+    )
+
+
+def _labelled(
+    frames: Sequence[FrameVerdict], signs: Sequence[str], motion: Collection[str], grace_s: float, period_s: float
+) -> LabelledFigures:
+    scored = [frame for frame in frames if frame.truth is not None]
+    shown = [sign for sign in (*signs, NONE) if any(frame.truth == sign for frame in scored)]
+    of_sign = {sign: [frame for frame in scored if frame.truth == sign] for sign in shown}
+    false = [frame.counts if _is_false(frames, at, motion, grace_s) else None for at, frame in enumerate(frames)]
+    return LabelledFigures(
+        scored_s=len(scored) * period_s,
+        seen_right={sign: Share(sum(f.seen == sign for f in of), len(of)) for sign, of in of_sign.items()},
+        counted_right={sign: Share(sum(f.counts == sign for f in of), len(of)) for sign, of in of_sign.items()},
+        reactions={sign: _reaction(sign, frames) for sign in shown},
+        false_commands=tuple(_events(false, frames)),
+        confusion=Confusion.of(((frame.truth or NONE, frame.counts) for frame in scored), signs),
+    )
+
+
+def _is_false(frames: Sequence[FrameVerdict], at: int, motion: Collection[str], grace_s: float) -> bool:
+    now = frames[at]
+    if now.counts not in motion:
+        return False
+    begin = at
+    # What a frame shows is shown until the next one.
+    while begin > 0 and now.time_s - frames[begin].time_s < grace_s:
+        begin -= 1
+    return all(frame.truth not in (None, now.counts) for frame in frames[begin : at + 1])
+
+
+def _reaction(sign: str, frames: Sequence[FrameVerdict]) -> Reaction:
+    times_s: list[float | None] = []
+    for truth, group in groupby(frames, key=lambda frame: frame.truth):
+        if truth == sign:
+            showing = list(group)
+            counted_s = next((frame.time_s for frame in showing if frame.counts == sign), None)
+            times_s.append(None if counted_s is None else round(counted_s - showing[0].time_s, 6))
+    known_s = [time_s for time_s in times_s if time_s is not None]
+    return Reaction(
+        shown=len(times_s),
+        missed=len(times_s) - len(known_s),
+        median_s=median(known_s) if known_s else None,
+        slowest_s=max(known_s, default=None),
+    )
+
+
+def _events(marks: Sequence[str | None], frames: Sequence[FrameVerdict]) -> Iterator[Event]:
+    """Yield an event for each run of the same mark; None marks nothing. It ends with its last frame."""
+    for mark, group in groupby(zip(marks, frames, strict=True), key=lambda pair: pair[0]):
+        if mark is not None:
+            times_s = [frame.time_s for _, frame in group]
+            yield Event(mark, round(times_s[0], 6), round(times_s[-1], 6))
+
+
+def _per_minute(events: int, duration_s: float) -> float:
+    return 60 * events / duration_s if duration_s else 0.0

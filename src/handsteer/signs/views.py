@@ -1,0 +1,92 @@
+"""Photos seen in another way: flipped, turned, enlarged; and which sign they show then."""
+
+import math
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from handsteer.signs.vocabulary import BACKWARD, FORWARD, NONE, TURN_LEFT, TURN_RIGHT
+
+_SMALL_PX = 400
+_ENLARGED_PX = 480
+_MARGIN = 0.3
+# The most that people tilt a hand while they mean the same direction.
+_TILT_DEG = 30.0
+
+# Where each points in the image, in degrees clockwise from up. The image is not mirrored: the user's own right is its
+# left. A sideways index finger, and a thumb up or down, are no signs, but become one when they are turned.
+_DIRECTIONS: dict[tuple[str, str], tuple[str, float]] = {
+    (FORWARD, ""): ("index", 0.0),
+    (BACKWARD, ""): ("index", 180.0),
+    (TURN_LEFT, ""): ("thumb", 90.0),
+    (TURN_RIGHT, ""): ("thumb", 270.0),
+    (NONE, "thumb_up"): ("thumb", 0.0),
+    (NONE, "thumb_down"): ("thumb", 180.0),
+    (NONE, "index_to_image_right"): ("index", 90.0),
+    (NONE, "index_to_image_left"): ("index", 270.0),
+}
+
+
+@dataclass(frozen=True)
+class View:
+    """How to look at pictures.
+
+    Attributes:
+        flip: Left to right, which makes the other hand of each hand.
+        rotate_deg: Turned clockwise by so many degrees, after the flip.
+        enlarge: Pad and enlarge pictures below 400 px: a camera would not frame a hand as tightly as they do.
+    """
+
+    flip: bool = False
+    rotate_deg: float = 0.0
+    enlarge: bool = True
+
+    def picture(self, image: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        """Return ``image``, (height, width, 3) uint8, seen so; its size may change."""
+        if self.enlarge and max(image.shape[:2]) < _SMALL_PX:
+            image = _enlarged(image)
+        if self.flip:
+            image = np.asarray(cv2.flip(image, 1), np.uint8)
+        return _turned(image, self.rotate_deg)
+
+    def truth(self, sign: str | None, kind: str = "") -> tuple[str | None, str]:
+        """Return the sign and the kind of a picture of ``sign`` and ``kind`` when it is seen so.
+
+        A flip makes ``Turn Left`` of ``Turn Right``. Half a turn makes ``Backward`` of ``Forward``, and swaps the
+        turns too. A quarter turn makes a turn of a thumb up or down, and the reverse; an index finger that points
+        sideways is ``NONE``. A direction further than 30 degrees from all of these is not scored (None). ``Stop``,
+        ``Go``, taught signs and all other kinds stay what they are.
+        """
+        name = kind.lower().replace(" ", "_").replace("-", "_") if sign == NONE else ""
+        pose = _DIRECTIONS.get((sign or "", name))
+        if sign is None or pose is None:
+            return sign, kind
+        what, direction = pose
+        seen = (-direction if self.flip else direction) + self.rotate_deg
+        for (other_sign, other_kind), (other, towards) in _DIRECTIONS.items():
+            if other == what and abs(math.remainder(seen - towards, 360.0)) <= _TILT_DEG:
+                return other_sign, other_kind
+        return None, kind
+
+
+def _enlarged(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    height, width = image.shape[:2]
+    y, x = round(_MARGIN * height), round(_MARGIN * width)
+    padded = cv2.copyMakeBorder(image, y, y, x, x, cv2.BORDER_REPLICATE)
+    scale = _ENLARGED_PX / max(padded.shape[:2])
+    return np.asarray(cv2.resize(padded, None, fx=scale, fy=scale, interpolation=cv2.INTER_CUBIC), np.uint8)
+
+
+def _turned(image: NDArray[np.uint8], clockwise_deg: float) -> NDArray[np.uint8]:
+    quarters, rest = divmod(clockwise_deg % 360.0, 90.0)
+    if rest == 0.0:
+        return np.ascontiguousarray(np.rot90(image, -int(quarters)))
+    height, width = image.shape[:2]
+    matrix = cv2.getRotationMatrix2D(((width - 1) / 2, (height - 1) / 2), -clockwise_deg, 1.0)
+    cos, sin = np.abs(matrix[0, :2])
+    new_width, new_height = math.ceil(width * cos + height * sin), math.ceil(width * sin + height * cos)
+    matrix[:, 2] += (new_width - width) / 2, (new_height - height) / 2
+    turned = cv2.warpAffine(image, matrix, (new_width, new_height), borderMode=cv2.BORDER_REPLICATE)
+    return np.asarray(turned, np.uint8)
