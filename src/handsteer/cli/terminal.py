@@ -18,8 +18,8 @@ except ImportError:  # not a POSIX system: no single keys then
     termios = None  # type: ignore[assignment]
 
 _WIDEST: Final = 96
-_HELD_S: Final = 0.7
-"""Terminals tell keys that are held as keys that come again and again; the first one again after up to 0.66 s."""
+_PERIOD_S: Final = 0.1
+_COLOUR_BITS: Final = 0xF0
 
 
 class TerminalPicture:
@@ -27,6 +27,7 @@ class TerminalPicture:
 
     def __init__(self) -> None:
         self._lines = 0
+        self._drawn_s = float("-inf")
 
     @staticmethod
     def possible() -> bool:
@@ -34,7 +35,14 @@ class TerminalPicture:
         return sys.stderr.isatty()
 
     def draw(self, picture: NDArray[np.uint8], *text: str) -> None:
-        """Draw ``picture``, (height, width, 3) uint8, BGR, and lines of ``text``, over what was drawn before."""
+        """Draw ``picture``, (height, width, 3) uint8, BGR, and lines of ``text``, over what was drawn before.
+
+        Pictures that come too fast for a terminal far away are left out.
+        """
+        now_s = time.monotonic()
+        if now_s - self._drawn_s < _PERIOD_S:
+            return
+        self._drawn_s = now_s
         columns, rows = shutil.get_terminal_size()
         width = max(8, min(columns - 1, _WIDEST, int((rows - len(text) - 1) * 2 * picture.shape[1] / picture.shape[0])))
         lines = [*half_blocks(picture, width), *(f"{line[: columns - 1]}\x1b[K" for line in text)]
@@ -52,14 +60,20 @@ def half_blocks(picture: NDArray[np.uint8], width: int) -> list[str]:
         width: Of the lines, in characters.
     """
     height = max(2, round(width * picture.shape[0] / picture.shape[1])) // 2 * 2
-    small = np.asarray(cv2.resize(picture, (width, height), interpolation=cv2.INTER_AREA))[..., ::-1]
+    small = np.asarray(cv2.resize(picture, (width, height), interpolation=cv2.INTER_AREA), np.uint8)[..., ::-1]
+    small = small & np.uint8(_COLOUR_BITS)
+    pairs = np.stack([small[0::2], small[1::2]], axis=2).tolist()
     lines = []
-    for upper, lower in zip(small[0::2].tolist(), small[1::2].tolist(), strict=True):
-        pairs = (
-            f"\x1b[38;2;{r};{g};{b}m\x1b[48;2;{R};{G};{B}m▀" for (r, g, b), (R, G, B) in zip(upper, lower, strict=True)
-        )
-        lines.append("".join(pairs) + "\x1b[0m\x1b[K")
+    for line in pairs:
+        # Neighbours of the same colours need not be told again, which is most of them.
+        parts = [_colours(*pair) if at == 0 or pair != line[at - 1] else "▀" for at, pair in enumerate(line)]
+        lines.append("".join(parts) + "\x1b[0m\x1b[K")
     return lines
+
+
+def _colours(upper: list[int], lower: list[int]) -> str:
+    inks = (";".join(map(str, colour)) for colour in (upper, lower))
+    return "\x1b[38;2;{}m\x1b[48;2;{}m▀".format(*inks)
 
 
 class Keys:
@@ -94,10 +108,10 @@ class Keys:
         self._pressed.remove(key)
         return True
 
-    def space_held(self) -> bool:
-        """Return whether the space key is held."""
+    def space_age_s(self) -> float:
+        """Return how long ago the space key was last sent, in seconds; infinity when it never was."""
         self._read()
-        return time.monotonic() - self._space_s < _HELD_S
+        return time.monotonic() - self._space_s
 
     def _read(self) -> None:
         while self._before is not None and select.select([sys.stdin], [], [], 0)[0]:

@@ -1,3 +1,4 @@
+import math
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -20,7 +21,10 @@ HAND = show_sign("Stop")
 
 
 def run(collector: Collector, seconds: float, *, held: bool = False, hand: bool = True) -> list[Status]:
-    return [collector.step(HAND if hand else None, 0.1, held=held) for _ in range(round(seconds / 0.1))]
+    return [
+        collector.step(HAND if hand else None, 0.1, key_age_s=0.0 if held else math.inf)
+        for _ in range(round(seconds / 0.1))
+    ]
 
 
 def test_a_countdown_goes_before_each_take() -> None:
@@ -45,9 +49,12 @@ def test_a_take_lasts_for_as_long_as_the_key_is_held() -> None:
     collector = Collector(FACTS, takes=2, take_s=1.0, countdown_s=1.0, hold=True)
     assert {status.phase for status in run(collector, 5.0)} == {"ready"}
     assert {status.phase for status in run(collector, 2.0, held=True)} == {"recording"}
-    take = run(collector, 0.1)[0].finished
+    ages_s = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.71]
+    after = [collector.step(HAND, 0.1, key_age_s=age_s) for age_s in ages_s]
+    assert [status.phase for status in after] == [*["recording"] * 6, "ready"]
+    take = after[-1].finished
     assert take is not None
-    assert len(take.hands) == 20
+    assert len(take.hands) == pytest.approx(20, abs=1)  # what came after the key was let go is left out
     assert not collector.done
 
 
@@ -70,7 +77,7 @@ def test_a_take_that_was_undone_is_collected_again() -> None:
 @given(st.lists(st.tuples(st.floats(0, 2), st.booleans(), st.booleans()), max_size=60), st.booleans())
 def test_it_never_gives_more_takes_than_asked_for(frames: list[tuple[float, bool, bool]], hold: bool) -> None:
     collector = Collector(FACTS, takes=2, take_s=0.5, countdown_s=0.5, hold=hold)
-    statuses = [collector.step(HAND if seen else None, dt, held=held) for dt, seen, held in frames]
+    statuses = [collector.step(HAND if seen else None, dt, key_age_s=0.0 if held else 1.0) for dt, seen, held in frames]
     finished = [status.finished for status in statuses if status.finished]
     assert len(finished) <= 2
     assert all(len(take.hands) == len(take.times_s) >= 5 for take in finished)

@@ -118,7 +118,7 @@ def _live(config: Config, collector: Collector, known: Dataset, path: Path, labe
                     collector.again()
                 view.show(image, hand, status, len(known.takes) - began)
 
-            for take in collect_live(camera, landmarker, collector, clock, show=show, held=keys.space_held):
+            for take in collect_live(camera, landmarker, collector, clock, show=show, key_age=keys.space_age_s):
                 known = known.with_takes([take])
                 save_dataset(known, path)
     except KeyboardInterrupt:

@@ -91,7 +91,9 @@ def _photos(folder: Path, config: Config, view: View) -> PhotoReport:
     results = list(evaluate_photos(_with_progress(photos, "photos"), open_recognizer(config), view))
     if not results:
         raise EvaluationError(f"{folder}: no photo shows a sign or NONE when it is turned so; try another --rotate")
-    return photo_report(results, signs, motion_signs(config.control.actions), unscored=len(photos) - len(results))
+    return photo_report(
+        results, signs, motion_signs(config.control.actions, signs), unscored=len(photos) - len(results)
+    )
 
 
 def _dataset(path: Path, config: Config, view: View) -> PhotoReport:
@@ -101,7 +103,7 @@ def _dataset(path: Path, config: Config, view: View) -> PhotoReport:
     if not results:
         raise EvaluationError(f"{path}: no hand shows a sign or NONE when it is turned so; try another --rotate")
     unscored = sum(len(take.hands) for take in dataset.takes) - len(results)
-    return photo_report(results, classifier.signs, motion_signs(config.control.actions), unscored)
+    return photo_report(results, classifier.signs, motion_signs(config.control.actions, classifier.signs), unscored)
 
 
 def _video(path: Path, config: Config, view: View, grace_s: float, *, wants_confusion: bool) -> VideoReport:
@@ -115,7 +117,7 @@ def _video(path: Path, config: Config, view: View, grace_s: float, *, wants_conf
         )
     frames = _with_progress(video_frames(path), "frames")
     verdicts = list(evaluate_frames(frames, truths, open_recognizer(config), view))
-    return video_report(verdicts, signs, motion_signs(config.control.actions), grace_s)
+    return video_report(verdicts, signs, motion_signs(config.control.actions, signs), grace_s)
 
 
 def _with_progress(things: Any, unit: str) -> Any:

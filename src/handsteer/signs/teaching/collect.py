@@ -1,5 +1,6 @@
 """Collects takes: live, one after the other, or from recordings."""
 
+import math
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -20,6 +21,10 @@ Phase = Literal["ready", "countdown", "recording", "done"]
 
 _FEWEST: Final = 5
 """Hands in the shortest take that is kept."""
+
+
+_HELD_S: Final = 0.7
+"""Terminals tell of a key that is held by sending it again and again, the second time after up to 0.66 s."""
 
 
 @dataclass(frozen=True)
@@ -86,21 +91,22 @@ class Collector:
         """Whether all takes are there."""
         return self._left == 0
 
-    def step(self, hand: Hand | None, dt_s: float, *, held: bool = False) -> Status:
+    def step(self, hand: Hand | None, dt_s: float, *, key_age_s: float = math.inf) -> Status:
         """Take what the next frame shows.
 
         Args:
             hand: The hand in it, if there is one.
             dt_s: Seconds since the last frame.
-            held: Whether the key is held.
+            key_age_s: How long ago the key that is held last made itself known, in seconds.
         """
+        held = key_age_s < _HELD_S
         if self.done:
             return Status("done", 0.0, 0)
         self._elapsed_s += dt_s
         if self._recording:
             if held if self._hold else self._elapsed_s <= self._take_s:
                 return self._record(hand)
-            return self._end()
+            return self._end(self._elapsed_s - key_age_s if self._hold else self._take_s)
         if held if self._hold else self._elapsed_s >= self._countdown_s:
             self._recording = True
             self._elapsed_s = 0.0
@@ -117,9 +123,10 @@ class Collector:
             self._times_s.append(self._elapsed_s)
         return Status("recording", 0.0 if self._hold else self._take_s - self._elapsed_s, len(self._hands))
 
-    def _end(self) -> Status:
-        enough = len(self._hands) >= _FEWEST
-        take = self._facts.take(self._hands, self._times_s) if enough else None
+    def _end(self, end_s: float) -> Status:
+        count = sum(time_s <= end_s for time_s in self._times_s)
+        enough = count >= _FEWEST
+        take = self._facts.take(self._hands[:count], self._times_s[:count]) if enough else None
         self._hands, self._times_s, self._elapsed_s, self._recording = [], [], 0.0, False
         self._left -= enough
         waiting = Status("done", 0.0, 0) if self.done else self._waiting()
@@ -141,7 +148,7 @@ def collect_live(
     clock: Clock,
     *,
     show: Show,
-    held: Callable[[], bool] = lambda: False,
+    key_age: Callable[[], float] = lambda: math.inf,
 ) -> Iterator[Take]:
     """Yield the takes of ``collector`` as they end.
 
@@ -151,7 +158,7 @@ def collect_live(
         collector: Says what to keep.
         clock: The camera's.
         show: Called for each frame, with the hand and how far the collecting is.
-        held: Returns whether the key is held.
+        key_age: Returns how long ago the key that is held last made itself known, in seconds.
 
     Raises:
         CameraLost: The camera gives no more frames.
@@ -163,7 +170,7 @@ def collect_live(
             time.sleep(camera.period_s or 0.01)
             continue
         hand = largest(landmarker.detect(frame.image))
-        status = collector.step(hand, 0.0 if last_s is None else frame.captured_s - last_s, held=held())
+        status = collector.step(hand, 0.0 if last_s is None else frame.captured_s - last_s, key_age_s=key_age())
         last_s = frame.captured_s
         show(frame.image, hand, status)
         if status.finished is not None:
