@@ -111,7 +111,7 @@ def test_a_file_plays_once_in_a_headless_run(capsys: pytest.CaptureFixture[str],
     summary = json.loads(prints(capsys, "run", "--headless", "--camera", str(slideshow), "--json"))
     assert summary["frames"] == 270
     assert summary["duration_s"] == pytest.approx(22.5, abs=2.0)
-    assert summary["path_length_m"] > 0.1
+    assert sum(summary["signs"].values()) > 0  # how many is a matter of the machine's speed: --fast leaves none out
 
 
 @pytest.mark.slow
