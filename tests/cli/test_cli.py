@@ -161,3 +161,8 @@ def test_a_reader_that_leaves_is_no_error(data_dir: Path) -> None:
     assert done.returncode == 0
     assert "Traceback" not in done.stderr
     assert os.linesep in done.stdout
+
+
+@pytest.mark.parametrize(("arguments", "words"), [(["--help"], "Drive the robot"), (["signs"], "Learn the signs of")])
+def test_help_says_what_each_verb_does(capsys: pytest.CaptureFixture[str], arguments: list[str], words: str) -> None:
+    assert words in prints(capsys, *arguments)

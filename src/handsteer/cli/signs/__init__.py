@@ -17,11 +17,11 @@ app = App(
     result_action="return_value",
 )
 # Named, not imported: a verb's module is loaded when it is used.
-for verb, function, summary in (
-    ("list", "list_signs:list_signs", "Print the signs, and what each makes the robot do."),
-    ("evaluate", "evaluate:evaluate", "Print how well the signs are told."),
-    ("collect", "collect:collect", "Collect takes of a sign that shall be taught."),
-    ("import", "import_keypoints:import_keypoints", "Add landmark rows of others to a dataset."),
-    ("train", "train:train", "Learn the signs of datasets."),
-):
-    app.command(f"handsteer.cli.signs.{function}", name=verb, help=summary)
+for verb, function in {
+    "list": "list_signs:list_signs",
+    "evaluate": "evaluate:evaluate",
+    "collect": "collect:collect",
+    "import": "import_keypoints:import_keypoints",
+    "train": "train:train",
+}.items():
+    app.command(f"handsteer.cli.signs.{function}", name=verb)
