@@ -38,16 +38,21 @@ def numbers(message: Any) -> dict[str, Any]:
     return found
 
 
+def say(line: str) -> None:
+    sys.stdout.write(line + "\n")
+    sys.stdout.flush()
+
+
 def main() -> None:
     rospy.init_node("recorder", anonymous=True, disable_signals=True)
 
     def write(message: Any, topic: str) -> None:
         record = {"topic": topic, "at_s": time.monotonic(), **numbers(message)}
-        print(json.dumps(record), flush=True)
+        say(json.dumps(record))
 
     for topic, kind in json.loads(sys.argv[1]).items():
         rospy.Subscriber(topic, roslib.message.get_message_class(kind), write, callback_args=topic)
-    print("ready", flush=True)
+    say("ready")
     rospy.spin()
 
 

@@ -136,6 +136,17 @@ class RosGraph:
             return []
         return sorted({node for topics in (publishers, subscribers) for _, nodes in topics for node in nodes})
 
+    def topics(self) -> dict[str, tuple[set[str], set[str]]]:
+        """Return who publishes and who subscribes to each topic."""
+        publishers, subscribers, _ = (dict(topics) for topics in self._master("getSystemState"))
+        names = {*publishers, *subscribers}
+        return {name: (set(publishers.get(name, ())), set(subscribers.get(name, ()))) for name in names}
+
+    def set(self, **parameters: str | float) -> None:
+        """Set parameters, given as ``node__section__name=value``."""
+        for name, value in parameters.items():
+            self._master("setParam", "/" + name.replace("__", "/"), value)
+
     def pid(self, node: str) -> int | None:
         """Return the process that ``node`` runs in, or None while it does not answer."""
         try:
@@ -153,7 +164,7 @@ class RosGraph:
         for running in reversed(self._running):
             running.stop()
 
-    def _master(self, method: str, *arguments: str) -> Any:
+    def _master(self, method: str, *arguments: Any) -> Any:
         return _ask(self.uri, method, *arguments)
 
 
@@ -167,7 +178,7 @@ def ros_graph(folder: Path) -> Iterator[RosGraph]:
         graph.stop()
 
 
-def _ask(uri: str, method: str, *arguments: str) -> Any:
+def _ask(uri: str, method: str, *arguments: Any) -> Any:
     with ServerProxy(uri) as server:
         code, message, value = getattr(server, method)("/test", *arguments)
     if code != 1:

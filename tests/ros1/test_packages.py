@@ -180,7 +180,7 @@ def test_gazebos_controller_has_the_limits_of_the_simulated_one() -> None:
 # image_subscriber.py is plain rospy and needs no handsteer.
 @pytest.mark.parametrize(
     "script",
-    sorted(ROS.glob("*/scripts/[!i]*.py")) + [ROS / "my_cam/scripts/image_publisher.py"],
+    [*sorted(ROS.glob("*/scripts/[!i]*.py")), ROS / "my_cam/scripts/image_publisher.py"],
     ids=lambda path: path.name,
 )
 def test_a_node_without_handsteer_says_what_to_do(script: Path, tmp_path: Path) -> None:
