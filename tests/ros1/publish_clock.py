@@ -1,19 +1,18 @@
-"""Run by Debian's Python, which has rospy: publishes /clock from 1000 s on, as fast as real time, until it is killed."""
+"""Run by Debian's Python, which has rospy: publishes /clock, from the second in its argument on, until it is killed."""
 
+import sys
 import time
 
 import rospy
 from rosgraph_msgs.msg import Clock
 
-START_S = 1000.0
-
 
 def main() -> None:
     rospy.init_node("time_server", disable_signals=True)
     publisher = rospy.Publisher("/clock", Clock, queue_size=1)
-    began_s = time.monotonic()
+    offset_s = float(sys.argv[1]) - time.monotonic()
     while True:
-        publisher.publish(Clock(clock=rospy.Time.from_sec(START_S + time.monotonic() - began_s)))
+        publisher.publish(Clock(clock=rospy.Time.from_sec(offset_s + time.monotonic())))
         time.sleep(0.01)
 
 
