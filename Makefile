@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 ARGS ?=
 
-.PHONY: help run test lint unit format lock bench bench-signs signs-model models docs screenshots clean
+.PHONY: help run test lint unit format lock bench bench-signs signs-model models docs screenshots screenshots-ros1 clean
 
 help:
 	@echo "make run          drive the robot: your webcam, or the virtual hand (options: make run ARGS='--camera 0')"
@@ -14,6 +14,7 @@ help:
 	@echo "make signs-model  train the sign model again, from hands that it makes itself; gives the same file"
 	@echo "make docs         write docs/configuration.md again from the configuration"
 	@echo "make screenshots  make the README's pictures again (needs Chromium)"
+	@echo "make screenshots-ros1  make the picture of RViz again (needs ROS 1, rviz, xvfb and imagemagick)"
 	@echo "make lock         make the requirements files again from pyproject.toml"
 	@echo "make clean        remove the environment and all caches"
 
@@ -53,6 +54,9 @@ docs: $(BIN)/.dev
 screenshots: $(BIN)/.dev models
 	@$(BIN)/python scripts/screenshot.py
 	@$(BIN)/python scripts/sign_pictures.py
+
+screenshots-ros1: | $(BIN)/.dev models
+	@$(BIN)/python scripts/rviz_screenshot.py
 
 $(BIN)/.run: scripts/setup requirements.txt pyproject.toml
 	@scripts/setup requirements.txt && touch $@
