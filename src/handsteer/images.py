@@ -52,6 +52,18 @@ def jpeg_message(bgr: NDArray[np.uint8], header: Header, quality: int = 80) -> C
     return CompressedImage(header=header, format="bgr8; jpeg compressed bgr8", data=encode_jpeg(bgr, quality))
 
 
+def jpeg_picture(message: CompressedImage) -> NDArray[np.uint8]:
+    """Return the picture of ``message`` as (height, width, 3) uint8, BGR; any format that OpenCV reads.
+
+    Raises:
+        FrameError: The data is not a picture.
+    """
+    picture = cv2.imdecode(message.data, cv2.IMREAD_COLOR) if message.data.size else None
+    if picture is None:
+        raise FrameError(f"a compressed image of {message.data.size} bytes, format {message.format!r}, is no picture")
+    return np.asarray(picture, np.uint8)
+
+
 def encode_jpeg(bgr: NDArray[np.uint8], quality: int = 80) -> NDArray[np.uint8]:
     """Return ``bgr``, (height, width, 3) uint8, as the bytes of a JPEG file in an (n,) uint8 array."""
     done, data = cv2.imencode(".jpg", bgr, [cv2.IMWRITE_JPEG_QUALITY, quality])

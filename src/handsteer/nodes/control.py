@@ -70,6 +70,10 @@ class HandSignControlNode(Node):
             source=self._driver.source,
             linear_mps=f"{velocity.linear_mps:.3f}",
             angular_radps=f"{velocity.angular_radps:.3f}",
-            latency_median_ms=f"{self.latency.percentile_ms(50):.1f}",
-            latency_p99_ms=f"{self.latency.percentile_ms(99):.1f}",
+            **self._latencies(),
         )
+
+    def _latencies(self) -> dict[str, str]:
+        """Return the latency's figures; none where the transport does not carry the frame's time with a sign."""
+        percents = {"latency_median_ms": 50, "latency_p99_ms": 99} if len(self.latency) else {}
+        return {name: f"{self.latency.percentile_ms(percent):.1f}" for name, percent in percents.items()}
