@@ -5,7 +5,7 @@ import os
 import signal
 import subprocess
 import time
-from itertools import groupby
+from itertools import groupby, pairwise
 from pathlib import Path
 from typing import Any
 from urllib.request import urlopen
@@ -62,7 +62,7 @@ def assert_moves_as_the_signs_say(recorder: Recorder, expected: set[str]) -> Non
             continue
         seen.add(word)
         first, last = during[0], during[-1]
-        turned = math.remainder(last["yaw"] - first["yaw"], math.tau)
+        turned = sum(math.remainder(b["yaw"] - a["yaw"], math.tau) for a, b in pairwise(during))
         told = f"{word}: {first} ... {last}"
         if word == "Forward":
             assert last["linear"] > first["linear"] + 0.02, told
@@ -90,7 +90,7 @@ def test_the_two_terminals_drive_the_robot_by_the_virtual_hand(ros: RosGraph) ->
         diagnostics="diagnostic_msgs/DiagnosticArray",
     )
     ros.launch(*SIGN_CONTROL, "camera_name:=virtual")
-    ros.launch(*DRIVE_ROBOT)
+    ros.launch(*DRIVE_ROBOT, "world:=empty")
 
     def shown() -> set[str]:
         return {sign["word"] for sign in record.of(HAND_SIGN)}
@@ -102,7 +102,7 @@ def test_the_two_terminals_drive_the_robot_by_the_virtual_hand(ros: RosGraph) ->
 
     assert set(ros.tell("rosnode", "list").split()) >= {*CHAIN, "/robot_state_publisher", "/rosout"}
     reported = {name for message in record.of("/diagnostics") for name in message["status"]}
-    assert {name.strip("/") for name in CHAIN} <= {name.strip("/") for name in reported}
+    assert {name.strip("/") for name in CHAIN} <= {name.partition(":")[0] for name in reported}
     odom = record.of(ODOM)[-1]
     assert odom["frame_id"] == "odom"
     assert abs(odom["stamp_s"] - time.time()) < 5.0
@@ -124,7 +124,7 @@ def test_photos_as_a_30_hz_video_drive_the_robot(ros: RosGraph, data_dir: Path, 
     writer.release()
 
     record = ros.record(**TOPICS)
-    ros.launch(*DRIVE_ROBOT)
+    ros.launch(*DRIVE_ROBOT, "world:=empty")
     eventually(lambda: record.of(ODOM), "the robot is there")
     ros.launch(*SIGN_CONTROL, f"camera_name:={video}")
     eventually(lambda: record.of(HAND_SIGN), "signs are told")
@@ -164,7 +164,7 @@ def test_two_systems_run_side_by_side_in_namespaces(ros: RosGraph) -> None:
     record = ros.record(**kinds, r1__tf="tf2_msgs/TFMessage", r2__tf="tf2_msgs/TFMessage")
     for name in ("r1", "r2"):
         ros.launch(*SIGN_CONTROL, "camera_name:=virtual", ROS_NAMESPACE=name)
-        ros.launch(*DRIVE_ROBOT, ROS_NAMESPACE=name)
+        ros.launch(*DRIVE_ROBOT, "world:=empty", ROS_NAMESPACE=name)
     eventually(lambda: any(odom["x"] > 0.1 for odom in record.of(f"/r1{ODOM}")), "the first drives")
     eventually(lambda: any(odom["yaw"] > 0.2 for odom in record.of(f"/r2{ODOM}")), "the second turns")
     assert max(abs(odom["yaw"]) for odom in record.of(f"/r1{ODOM}")) < 0.1
@@ -218,12 +218,15 @@ def assert_stops(record: Recorder, killed_s: float, *, by_itself: bool) -> float
 
 
 def assert_starts_from_zero(record: Recorder, stopped_s: float) -> None:
-    """After the stop, the first velocity is one step: nothing of the old one is taken up again."""
+    """After the stop, velocities grow from zero: nothing of the old one, 0.3 m/s, is taken up again.
+
+    The first steps of a new publisher go before the recorder is connected to it.
+    """
     first = eventually(
         lambda: next((twist for twist in record.of(CMD_VEL, stopped_s) if twist["linear"] != 0.0), None),
         "it is told to drive again",
     )
-    assert 0 < first["linear"] <= 0.011
+    assert 0 < first["linear"] <= 0.05
 
 
 def assert_starts_standing(record: Recorder, killed_s: float) -> None:
@@ -237,7 +240,7 @@ def test_ctrl_c_leaves_the_robot_standing(ros: RosGraph) -> None:
     small_hand(ros, "Forward:600")
     record = ros.record(**TOPICS)
     control = ros.launch(*SIGN_CONTROL, "camera_name:=virtual")
-    ros.launch(*DRIVE_ROBOT)
+    ros.launch(*DRIVE_ROBOT, "world:=empty")
     eventually(lambda: moving(record, 0.0), "it drives")
     control.stop()
     assert record.of(CMD_VEL)[-1]["linear"] == 0.0
@@ -253,7 +256,7 @@ def test_time_may_come_from_the_clock_topic(ros: RosGraph) -> None:
     ) as clock:
         try:
             ros.launch(*SIGN_CONTROL, "camera_name:=virtual")
-            ros.launch(*DRIVE_ROBOT)
+            ros.launch(*DRIVE_ROBOT, "world:=empty")
             driving = eventually(lambda: moving(record, 0.0), "it drives on simulated time")
             assert 1000 < driving["stamp_s"] < 1200
         finally:
