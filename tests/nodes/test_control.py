@@ -41,7 +41,7 @@ def test_exactly_one_twist_a_sign(bench: ControlBench) -> None:
 def test_when_signs_stop_one_zero_within_the_timeout_then_silence(bench: ControlBench) -> None:
     bench.show("Forward", "Forward")
     bench.twists.clear()
-    bench.run(0.46)
+    bench.run(0.31)
     assert bench.commands == []
     bench.run(0.1)
     assert bench.commands == [(0, 0)]

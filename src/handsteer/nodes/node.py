@@ -117,8 +117,9 @@ class Node:
         """Publish this node's state on ``/diagnostics``: a level, a sentence for people, and named values."""
         if self._diagnostics.wanted:
             pairs = [KeyValue(key, str(value)) for key, value in values.items()]
-            name = self.transport.full_name(self.name)
-            status = DiagnosticStatus(level=level, name=name, message=message, hardware_id="", values=pairs)
+            status = DiagnosticStatus(
+                level=level, name=self.transport.full_name(self.name), message=message, hardware_id="", values=pairs
+            )
             header = Header(stamp=self.clock.stamp(self.clock.now()), frame_id="")
             self._diagnostics.publish(DiagnosticArray(header=header, status=[status]))
 

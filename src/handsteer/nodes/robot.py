@@ -31,6 +31,7 @@ from handsteer.messages import (
     Vector3,
     twist,
 )
+from handsteer.nodes.interruption import Interruption
 from handsteer.nodes.node import OK, WARN, Node
 from handsteer.nodes.world_markers import world_markers
 from handsteer.robots.protocol import Pose2D, Robot, RobotState
@@ -65,6 +66,7 @@ class RobotNode(Node):
         self._robot = robot
         self._config = config
         self._last_step_s = clock.now()
+        self._interruption = Interruption(config.cmd_vel_timeout, clock.now())
         self.state = robot.step(0.0)
         self.path_length_m = 0.0
         self._odom = self.publisher(ODOM)
@@ -84,11 +86,19 @@ class RobotNode(Node):
         self._robot.close()
 
     def _on_command(self, received: Received[Twist]) -> None:
-        self._robot.command(received.message.linear.x, received.message.angular.z)
+        now = self.clock.now()
+        self._notice_interruption(now)
+        if not self._interruption.distrusts(now):
+            self._robot.command(received.message.linear.x, received.message.angular.z)
+
+    def _notice_interruption(self, now: float) -> None:
+        if self._interruption.note(now):
+            self._robot.command(0.0, 0.0)
 
     def _step(self) -> None:
         now = self.clock.now()
         elapsed_s, self._last_step_s = now - self._last_step_s, now
+        self._notice_interruption(now)
         before = self.state.truth
         self.state = self._robot.step(min(elapsed_s, _LONGEST_STEP_S))
         self.path_length_m += math.hypot(self.state.truth.x - before.x, self.state.truth.y - before.y)
