@@ -2,8 +2,11 @@
 
 import math
 import os
+import re
+import shutil
 import signal
 import subprocess
+import sys
 import time
 from itertools import groupby, pairwise
 from pathlib import Path
@@ -11,9 +14,10 @@ from typing import Any
 from urllib.request import urlopen
 
 import cv2
+import numpy as np
 import pytest
 
-from tests.ros1.ros_graph import DEBIAN_PYTHON, Recorder, RosGraph, eventually, needs_ros
+from tests.ros1.ros_graph import DEBIAN_PYTHON, ROOT, Recorder, RosGraph, eventually, needs_ros, run
 
 pytestmark = [pytest.mark.ros1, pytest.mark.slow, needs_ros]
 
@@ -289,6 +293,40 @@ def test_a_camera_that_is_not_there_is_named_with_what_works_without(ros: RosGra
     record = ros.record(**TOPICS)
     eventually(lambda: record.of(HAND_SIGN), "the others run on")
     assert {sign["word"] for sign in record.of(HAND_SIGN)} == {"NONE"}
+
+
+def test_the_subscriber_of_chapter_8_says_what_images_come(ros: RosGraph) -> None:
+    small_hand(ros, "Forward:600")
+    ros.launch("my_cam", "my_cam.launch", "camera_name:=virtual")
+    log = ros.folder / "subscriber.txt"
+    with log.open("w") as output:
+        command = ["rosrun", "my_cam", "image_subscriber.py"]
+        with subprocess.Popen(command, env=ros.env, stdout=output, stderr=subprocess.STDOUT) as subscriber:
+            try:
+                said = eventually(
+                    lambda: re.search(r"320x240 bgr8, (\d+) images.* (\d+) ms old", log.read_text()), "it"
+                )
+            finally:
+                subscriber.terminate()
+    assert int(said[1]) >= 5
+    assert int(said[2]) < 500
+
+
+@pytest.mark.skipif(
+    not all(shutil.which(tool) for tool in ("rviz", "Xvfb", "import")), reason="needs rviz, xvfb and imagemagick"
+)
+def test_rviz_shows_the_robot_driving(tmp_path: Path) -> None:
+    path = tmp_path / "rviz.png"
+    run(sys.executable, str(ROOT / "scripts" / "rviz_screenshot.py"), str(path), env=dict(os.environ), timeout_s=240)
+    picture = cv2.imread(str(path))
+    assert picture is not None
+    assert picture.shape == (800, 1280, 3)
+    # Left of the blue columns of the world; only the robot is blue there.
+    view, hand = picture[70:760, 430:1150].astype(int), picture[475:765, 5:395].astype(int)
+    blue, green, red = view[..., 0], view[..., 1], view[..., 2]
+    assert np.count_nonzero((blue > red + 60) & (blue > green + 20)) > 300, "the blue chassis"
+    assert np.count_nonzero((red > blue + 60) & (green > blue + 20)) > 300, "the trail of odometry, the obstacles"
+    assert np.count_nonzero(hand[..., 1] > hand[..., 0] + 60) > 100, "the green word in the picture with the hand"
 
 
 def test_parameters_on_the_server_count(ros: RosGraph) -> None:
