@@ -55,7 +55,7 @@ def main(path: Path) -> None:
         until(lambda: "/rviz" in subscribers("/gesture/image_annotated", env))
         until(lambda: driven_m(env) >= DRIVEN_M)
         path.parent.mkdir(parents=True, exist_ok=True)
-        subprocess.run(["import", "-window", "root", "-colors", "255", str(path)], env=env, check=True)
+        subprocess.run(["import", "-window", "root", "+dither", "-colors", "255", str(path)], env=env, check=True)
     size = path.stat().st_size
     if size > LARGEST_BYTES:
         sys.exit(f"{path} has {size} bytes, it should have at most {LARGEST_BYTES}")
