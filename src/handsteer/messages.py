@@ -99,7 +99,7 @@ IMAGE_COMPRESSED = Topic("/image_raw/compressed", CompressedImage)
 # Each sign makes the robot a step faster, so none may be lost when several come at once.
 HAND_SIGN = Topic("/gesture/hand_sign", String, depth=10)
 IMAGE_ANNOTATED = Topic("/gesture/image_annotated", Image)
-CMD_VEL = Topic("/robot_diff_drive_controller/cmd_vel", Twist)
+CMD_VEL = Topic("/robot_diff_drive_controller/cmd_vel", Twist, depth=10)
 STEERING_CMD_VEL = Topic("/steering/cmd_vel", Twist)
 ODOM = Topic("/robot_diff_drive_controller/odom", Odometry)
 TF = Topic("/tf", TFMessage, is_global=True, depth=10)
