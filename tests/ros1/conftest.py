@@ -1,15 +1,18 @@
-"""What the tests on real ROS 1 share."""
+"""What the tests of launch files share."""
 
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-from tests.ros1.ros_graph import RosGraph, ros_graph
+from tests.ros1.launches import LaunchGraph
 
 
 @pytest.fixture
-def ros(tmp_path: Path) -> Iterator[RosGraph]:
-    """A ROS graph with a master of its own, on a free port."""
-    with ros_graph(tmp_path) as graph:
-        yield graph
+def ros(tmp_path: Path) -> Iterator[LaunchGraph]:
+    """A ROS 1 graph of the test's own, for launch files."""
+    graph = LaunchGraph(tmp_path)
+    try:
+        yield graph.start()
+    finally:
+        graph.stop()

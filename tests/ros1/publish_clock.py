@@ -1,4 +1,4 @@
-"""Run by Debian's Python, which has rospy: publishes /clock, from the second in its argument on, until it is killed."""
+"""Publishes /clock, from the second in its argument on, until it is killed."""
 
 import sys
 import time

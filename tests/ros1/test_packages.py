@@ -9,9 +9,9 @@ import yaml
 from handsteer import __version__
 from handsteer.config import RobotConfig
 from handsteer.robots.description import joints
-from tests.ros1.ros_graph import ROS, needs_ros, ros_environment, run
+from tests.ros1.launches import ROS, ros_environment, run
 
-pytestmark = [pytest.mark.ros1, needs_ros]
+pytestmark = pytest.mark.ros1
 
 PACKAGES = ["my_cam", "ros_hand_gesture_recognition", "ros_mobile_robot", "xacro"]
 
