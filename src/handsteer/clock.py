@@ -128,6 +128,7 @@ class SimulatedClock:
         self._told_s = 0.0
         self._told_at_s = real() - _STANDS_AFTER_S
         self._offset_s = 0.0
+        self._newest_s = 0.0
         # Stamps up to this one are older than the last interruption, and have the offset of before.
         self._old_until_s, self._old_offset_s = -math.inf, 0.0
 
@@ -169,7 +170,9 @@ class SimulatedClock:
 
     def _now(self) -> float:
         stood_s = max(0.0, self._real() - self._told_at_s - _STANDS_AFTER_S)
-        return self._told_s + self._offset_s + stood_s
+        # The greatest of all, because sums of the same seconds in another order differ in their last digit.
+        self._newest_s = max(self._newest_s, self._told_s + self._offset_s + stood_s)
+        return self._newest_s
 
 
 def to_stamp(seconds: float) -> Time:

@@ -3,12 +3,13 @@
 It reads orders as lines of JSON from its input and answers each by one line of JSON:
 ``record`` (topic, package, type, fields) starts to note messages, ``get`` (topic) returns what was noted as
 ``[time_s, [values]]``, ``advertise`` (topic, package, type), ``listeners`` (topic) returns how many listen, and
-``publish`` (topic, values, count, period_s) sends messages.
+``publish`` (topic, values, count, period_s) sends messages, ``stream`` images and ``run_clock`` the simulated time.
 """
 
 import importlib
 import json
 import sys
+import threading
 import time
 from functools import reduce
 from typing import Any
@@ -63,7 +64,39 @@ def publish(order: dict[str, Any]) -> bool:
     return True
 
 
-ORDERS = {order.__name__: order for order in (record, get, advertise, listeners, publish)}
+def stream(order: dict[str, Any]) -> bool:
+    """Send images at a steady rate on a thread, stamped when they are sent, as a camera does."""
+    publisher, width, height = publishers[order["topic"]], order["width"], order["height"]
+    message = publisher.data_class(height=height, width=width, encoding="bgr8", step=3 * width)
+    message.data = bytes(3 * width * height)
+
+    def run() -> None:
+        due_s = time.monotonic()
+        for _ in range(order["count"]):
+            message.header.stamp = rospy.Time.from_sec(time.time())
+            publisher.publish(message)
+            due_s += order["period_s"]
+            time.sleep(max(0.0, due_s - time.monotonic()))
+
+    threading.Thread(target=run, daemon=True).start()
+    return True
+
+
+def run_clock(order: dict[str, Any]) -> bool:
+    """Tell the time on /clock, from ``from_s`` on, ``rate`` times as fast as real time, for ``seconds`` of it."""
+    publisher = publishers["/clock"]
+
+    def run() -> None:
+        began_s = time.monotonic()
+        while (passed_s := (time.monotonic() - began_s) * order["rate"]) < order["seconds"]:
+            publisher.publish(rospy.Time.from_sec(order["from_s"] + passed_s))
+            time.sleep(0.01)
+
+    threading.Thread(target=run, daemon=True).start()
+    return True
+
+
+ORDERS = {order.__name__: order for order in (record, get, advertise, listeners, publish, stream, run_clock)}
 
 rospy.init_node("peer", anonymous=True)
 print("ready", flush=True)

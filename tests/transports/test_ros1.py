@@ -1,11 +1,17 @@
-from collections.abc import Iterator
+import threading
+import time
+from collections.abc import Callable, Iterator
 
+import numpy as np
 import pytest
 
 from handsteer.clock import WallClock
+from handsteer.errors import TransportError
+from handsteer.messages import Image, Topic
+from handsteer.nodes.node import Node
 from handsteer.transports import join
-from handsteer.transports.protocol import Session, Transport
-from tests.contracts.transport_contract import TransportContract
+from handsteer.transports.protocol import Received, Session, Transport
+from tests.contracts.transport_contract import TransportContract, eventually
 from tests.ros1.graph import Ros1Graph, ros1_graph
 
 pytestmark = pytest.mark.ros1
@@ -23,7 +29,7 @@ def graph(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Ros1Graph]:
 @pytest.fixture(scope="session")
 def session(graph: Ros1Graph) -> Session:
     """This process as a ROS node; it leaves the graph when the process ends."""
-    return join("ros1", "tests", ["__ns:=bench"])
+    return join("ros1", "tests", [])
 
 
 class TestRos1(TransportContract):
@@ -41,3 +47,37 @@ class TestRos1(TransportContract):
     def clock(self, session: Session) -> WallClock:
         assert isinstance(session.clock, WallClock)
         return session.clock
+
+    def test_a_slow_subscriber_gets_fresh_images(self, graph: Ros1Graph, make_node: Callable[[str], Node]) -> None:
+        """A callback slower than the camera; with rospy's own buffer, images wait in the socket for over a second."""
+        listener = make_node("listener")
+        ages_s: list[float] = []
+        done = threading.Event()
+
+        def callback(received: Received[Image]) -> None:
+            assert received.captured_s is not None
+            ages_s.append(listener.clock.now() - received.captured_s)
+            time.sleep(0.1)
+            if len(ages_s) == 20:
+                done.set()
+
+        listener.subscribe(Topic("/fast_camera", Image, is_global=True), callback)
+        listener.start()
+        camera = graph.peer("__name:=fast_camera")
+        camera.ask("advertise", topic="/fast_camera", package="sensor_msgs", type="Image")
+        assert eventually(lambda: camera.ask("listeners", topic="/fast_camera") > 0)
+        camera.ask("stream", topic="/fast_camera", width=640, height=480, period_s=1 / 60, count=180)
+        assert done.wait(20.0)
+        # At the worst a frame has waited for one period of the camera and its own way, never for a callback.
+        assert float(np.median(ages_s)) < 0.1, ages_s
+        assert max(ages_s[1:]) < 0.5, ages_s
+
+    def test_a_process_has_one_name(self, session: Session) -> None:
+        assert session.name == "/tests"
+        with pytest.raises(TransportError, match=r"is the ROS node /tests already.*one a process.*process of its own"):
+            join("ros1", "another", [])
+
+
+def test_a_transport_that_is_not_there() -> None:
+    with pytest.raises(TransportError, match="there is no transport 'carrier_pigeon': use ros1"):
+        join("carrier_pigeon", "camera", [])

@@ -37,7 +37,8 @@ class Ros1Session:
 
     Args:
         node: Name of the node, unless ``arguments`` rename it.
-        arguments: rospy's own: ``topic:=other``, ``__name:=``, ``__ns:=``, ``_parameter:=value``, ``__log:=``.
+        arguments: rospy's own: ``topic:=other``, ``__name:=``, ``__ns:=``, ``_parameter:=value``, ``__log:=``. rospy
+            looks for ``__ns:=`` in the arguments of the program itself.
 
     Raises:
         TransportError: No master answers, an argument is none of rospy's, or this process has another name already.
