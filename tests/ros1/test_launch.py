@@ -184,13 +184,16 @@ def test_each_node_that_is_killed_stops_the_robot_and_comes_back(ros: LaunchGrap
 def zero_reaches_the_robot(record: Recorder, killed_s: float, *, by_itself: bool) -> float:
     """Return when a Twist told the robot to stand or, without one, when it began to brake by itself; then it stands."""
     before = record.of(ODOM, killed_s - 0.2)[0]["linear"]
+    stamps_minus_arrivals_s = time.time() - time.monotonic()
 
-    def stops() -> dict[str, Any] | None:
+    def when() -> float | None:
         if by_itself:
-            return next((odom for odom in record.of(ODOM, killed_s) if odom["linear"] < 0.9 * before), None)
-        return next((twist for twist in record.of(CMD_VEL, killed_s) if twist["linear"] == 0.0), None)
+            slower = [odom for odom in record.of(ODOM, killed_s) if odom["linear"] < 0.97 * before]
+            return slower[0]["stamp_s"] - stamps_minus_arrivals_s if slower else None
+        zeros = [twist for twist in record.of(CMD_VEL, killed_s) if twist["linear"] == 0.0]
+        return zeros[0]["at_s"] if zeros else None
 
-    stopped_s = float(eventually(stops, what="it stops")["at_s"])
+    stopped_s = float(eventually(when, what="it stops"))
     eventually(lambda: any(abs(odom["linear"]) < 0.01 for odom in record.of(ODOM, stopped_s)), what="it stands")
     return stopped_s
 
