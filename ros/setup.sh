@@ -3,7 +3,7 @@
 
 # Each shell names a sourced file in its own way; others would stumble over zsh's, hence the eval.
 if [ -n "${BASH_VERSION:-}" ]; then
-    _ros=$(dirname "$BASH_SOURCE")
+    _ros=$(dirname "${BASH_SOURCE[0]}")
 elif [ -n "${ZSH_VERSION:-}" ]; then
     _ros=$(eval 'dirname "${(%):-%x}"')
 else

@@ -217,6 +217,27 @@ def assert_starts_standing(record: Recorder, killed_s: float) -> None:
     assert abs(odom["linear"]) < 0.1
 
 
+def test_images_that_waited_out_a_freeze_are_not_worked_through(ros: LaunchGraph) -> None:
+    show(ros, "Forward:600")
+    record = ros.record(TOPICS)
+    ros.launch(*SIGN_CONTROL, VIRTUAL)
+    ros.launch(*DRIVE_ROBOT, "world:=empty")
+    eventually(lambda: drives(record), what="it drives")
+    pid = ros.pid("/hand_sign_recognition")
+    assert pid is not None
+    os.kill(pid, signal.SIGSTOP)
+    try:
+        zero_reaches_the_robot(record, time.monotonic(), by_itself=False)
+        time.sleep(3.0)
+        resumed_s = time.monotonic()
+    finally:
+        os.kill(pid, signal.SIGCONT)
+    time.sleep(1.0)
+    # 20 frames a second; 60 waited.
+    assert 0 < len(record.of(HAND_SIGN, resumed_s)) <= 30
+    assert_starts_from_zero(record, resumed_s)
+
+
 def test_ctrl_c_leaves_the_robot_standing(ros: LaunchGraph) -> None:
     show(ros, "Forward:600")
     record = ros.record(TOPICS)
