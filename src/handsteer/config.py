@@ -50,7 +50,8 @@ class VirtualHandConfig(Section):
 
     script: str = Field(
         "Forward:3 Turn Left:2 Forward:2 Turn Right:2 Go:1 Backward:3 Stop:2 NONE:1",
-        description="Signs to show with their durations in seconds, over and over; NONE lowers the hand",
+        description="Signs to show with their durations in seconds, over and over; NONE lowers the hand; "
+        "Peace, Three, Four, Horns, Call and OK are there to be taught",
     )
     handedness: Literal["Left", "Right"] = Field("Right", description="Which hand")
     skin: Literal["light", "medium", "dark"] = Field("medium", description="Skin tone")
@@ -68,6 +69,9 @@ class LandmarksConfig(Section):
     )
     min_detection_confidence: float = Field(0.3, ge=0, le=1, description="Score from which a palm counts as found")
     second_look: bool = Field(True, description="Look twice at a hand that is new, which reads it better")
+    wide_search: bool = Field(
+        True, description="Look for hands also as if they were smaller, which finds more near ones"
+    )
     min_presence: float = Field(0.5, ge=0, le=1, description="Score below which a followed hand counts as lost")
     threads: int = Field(1, ge=1, le=64, description="CPU threads of the landmark model")
 
@@ -75,6 +79,9 @@ class LandmarksConfig(Section):
 class SignsConfig(Section):
     """How the sign is told from the landmarks, and when it counts."""
 
+    model: Path | None = Field(
+        None, description="File of taught signs, as `handsteer signs train` writes it; none has the shipped signs only"
+    )
     min_confidence: float = Field(0.8, ge=0, le=1, description="Confidence from which a sign is seen")
     keep_confidence: float = Field(0.5, ge=0, le=1, description="Confidence down to which the sign that counts is seen")
     confirm_time: float = Field(

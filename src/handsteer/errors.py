@@ -15,6 +15,8 @@
     │   └── ModelCorrupt       the file is not the one that was expected
     ├── EvaluationError        signs cannot be evaluated: no such photos or video, or no place for the report
     │   └── LabelError         the labels of photos or of a video are missing or wrong
+    ├── DatasetError           a dataset of signs, or what shall become one, cannot be used
+    ├── TrainingError          signs cannot be learnt from a dataset
     ├── PoseError              a hand pose or a script of signs is wrong
     ├── WorldError             a world file or robot description is wrong
     ├── TransportError         a topic cannot be published or subscribed to
@@ -75,6 +77,14 @@ class EvaluationError(HandsteerError):
 
 class LabelError(EvaluationError):
     """The labels of photos or of a video are missing or wrong."""
+
+
+class DatasetError(HandsteerError):
+    """A dataset of signs, or what shall become one, cannot be used."""
+
+
+class TrainingError(HandsteerError):
+    """Signs cannot be learnt from a dataset."""
 
 
 class PoseError(HandsteerError):

@@ -11,6 +11,7 @@ decided elsewhere, in parts that know nothing of nodes: :mod:`handsteer.cameras`
 into a velocity, and :mod:`handsteer.robots` follow it. A transport (:mod:`handsteer.transports`) carries the messages.
 """
 
+import logging
 import math
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -20,6 +21,7 @@ from handsteer.clock import Clock, RealClock, SimulatedClock, SteppedClock, Wall
 from handsteer.config import Config, SignsConfig
 from handsteer.errors import ConfigError
 from handsteer.landmarks.mediapipe import MediaPipeLandmarker
+from handsteer.landmarks.protocol import Landmarker
 from handsteer.nodes.camera import CameraNode
 from handsteer.nodes.control import HandSignControlNode
 from handsteer.nodes.node import Node
@@ -32,9 +34,13 @@ from handsteer.signs.drawing import annotate
 from handsteer.signs.model import load_model
 from handsteer.signs.protocol import Classifier
 from handsteer.signs.recognizer import Recognizer
+from handsteer.signs.teaching.taught import TaughtClassifier, load_taught
 from handsteer.signs.trained import TrainedClassifier
+from handsteer.signs.vocabulary import NONE, find_sign
 from handsteer.transports.in_process import InProcessTransport
 from handsteer.transports.protocol import Transport
+
+log = logging.getLogger(__name__)
 
 
 class Graph:
@@ -188,7 +194,9 @@ def make_recognition(config: Config, transport: Transport, clock: Clock) -> Hand
     Raises:
         ModelError: A landmark model or the sign model is missing or broken.
     """
-    return HandSignRecognitionNode(transport, clock, open_recognizer(config), config.signs, annotate)
+    recognizer = open_recognizer(config)
+    _warn_of_unknown_signs(config, recognizer.signs)
+    return HandSignRecognitionNode(transport, clock, recognizer, config.signs, annotate)
 
 
 def make_control(config: Config, transport: Transport, clock: Clock) -> HandSignControlNode:
@@ -212,19 +220,35 @@ def make_steering(_config: Config, transport: Transport, clock: Clock) -> Steeri
     return SteeringNode(transport, clock)
 
 
+def _warn_of_unknown_signs(config: Config, signs: tuple[str, ...]) -> None:
+    for name in config.control.actions:
+        if find_sign(name, (*signs, NONE)) is None:
+            log.warning("control.actions: the sign %s is not known; the signs are %s", name, ", ".join(signs))
+
+
 def open_recognizer(config: Config) -> Recognizer:
     """Return the recogniser that ``config`` describes.
 
     Raises:
         ModelError: A landmark model or the sign model is missing or broken.
     """
-    return Recognizer(MediaPipeLandmarker(config.landmarks), open_classifier(config.signs), config.signs)
+    return Recognizer(open_landmarker(config), open_classifier(config.signs), config.signs)
+
+
+def open_landmarker(config: Config) -> Landmarker:
+    """Return what finds the hands in frames.
+
+    Raises:
+        ModelError: A landmark model is missing or broken.
+    """
+    return MediaPipeLandmarker(config.landmarks)
 
 
 def open_classifier(config: SignsConfig) -> Classifier:
-    """Return the classifier that ``config`` describes; today there is one.
+    """Return the classifier that ``config`` describes: the signs that are shipped, and those that were taught.
 
     Raises:
-        ModelError: The sign model is missing or broken.
+        ModelError: A sign model is missing or broken.
     """
-    return TrainedClassifier(load_model())
+    shipped = TrainedClassifier(load_model())
+    return TaughtClassifier(shipped, load_taught(config.model.expanduser())) if config.model else shipped

@@ -86,3 +86,9 @@ def test_the_reason_names_a_taught_sign_that_stops() -> None:
     driver.step(DT, sign=FORWARD)
     driver.step(DT, sign="Hi")
     assert driver.reason == "standing: the Hi sign is shown"
+
+
+def test_names_of_signs_may_be_written_in_other_ways() -> None:
+    assert action_of("Thumbs Up", {"thumbs_up": "turbo"}) == "turbo"
+    assert "Thumbs Up" in motion_signs({"thumbs_up": "turbo"}, ["Thumbs Up", "Peace"])
+    assert "Peace" not in motion_signs({"thumbs_up": "turbo"}, ["Thumbs Up", "Peace"])

@@ -1,15 +1,19 @@
 """The real landmarker on drawn frames: following hands, and frames of every kind."""
 
+from pathlib import Path
+
 import cv2
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from handsteer.cameras.files import read_photo
 from handsteer.config import LandmarksConfig
 from handsteer.errors import FrameError, ModelMissing
 from handsteer.landmarks.mediapipe import MediaPipeLandmarker
 from handsteer.landmarks.protocol import Hand
+from handsteer.signs.views import View
 from tests.landmarks.drawn_hand import draw, open_left_hand, open_right_hand
 
 EMPTY = draw()
@@ -251,3 +255,34 @@ def test_noise_of_any_size_gives_sound_hands_or_none(shared_landmarker, width, h
 def test_models_that_are_not_there_are_named(tmp_path):
     with pytest.raises(ModelMissing, match=r"palm_detection_full\.tflite.*handsteer models"):
         MediaPipeLandmarker(LandmarksConfig(), tmp_path)
+
+
+@pytest.mark.slow
+def test_hands_that_nearly_fill_the_frame_are_found_in_a_widened_one(data_dir: Path):
+    photos = [View().picture(read_photo(path)) for path in sorted((data_dir / "photos" / "forward").glob("sld*"))]
+    assert len(photos) == 68
+
+    def found(**config: bool) -> int:
+        landmarker = MediaPipeLandmarker(LandmarksConfig(**config))
+        hands = []
+        for photo in photos:
+            landmarker.reset()
+            hands.append(max((np.ptp(hand.pixels[:, 1]) for hand in landmarker.detect(photo)), default=0.0))
+        return sum(height > 0.25 * photo.shape[0] for height, photo in zip(hands, photos, strict=True))
+
+    assert found() == 68
+    assert found(wide_search=False) < 68
+
+
+@pytest.mark.slow
+def test_a_part_of_a_hand_is_not_another_hand(data_dir: Path):
+    landmarker = MediaPipeLandmarker(LandmarksConfig())
+    for path in sorted((data_dir / "photos" / "negatives" / "thumb_down").glob("*")):
+        landmarker.reset()
+        boxes = [
+            (hand.pixels[:, :2].min(axis=0), hand.pixels[:, :2].max(axis=0))
+            for hand in landmarker.detect(read_photo(path))
+        ]
+        for low, high in boxes:
+            inside = [(other_low <= low).all() and (high <= other_high).all() for other_low, other_high in boxes]
+            assert sum(inside) == 1, path.name

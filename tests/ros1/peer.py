@@ -1,13 +1,15 @@
 """A plain rospy node that knows nothing of handsteer: what others' nodes see of ours.
 
-It reads orders as lines of JSON from its input and answers each by one line of JSON:
-``record`` (topic, package, type, fields) starts to note messages, ``get`` (topic) returns what was noted as
-``[time_s, [values]]``, ``advertise`` (topic, package, type), ``listeners`` (topic) returns how many listen, and
-``publish`` (topic, values, count, period_s) sends messages, ``stream`` images and ``run_clock`` the simulated time.
+It reads orders as lines of JSON from its input and answers each by one line of JSON. ``record`` (topic, package, type,
+fields) starts to note messages, ``record_stamps`` (topic) those of large ones, ``record_diagnostics`` the values of
+nodes; ``get`` (topic) returns what was noted as ``[time_s, [values]]``. ``advertise`` (topic, package, type) comes
+before ``listeners`` (topic), which returns how many listen, ``publish`` (topic, values, count, period_s), ``stream`` of
+images, and ``run_clock`` of simulated time.
 """
 
 import importlib
 import json
+import struct
 import sys
 import threading
 import time
@@ -34,6 +36,33 @@ def record(order: dict[str, Any]) -> bool:
         mine.append([time.monotonic(), [v.to_sec() if hasattr(v, "to_sec") else v for v in values]])
 
     subscribers.append(rospy.Subscriber(order["topic"], message_type(order), note, tcp_nodelay=True))
+    return True
+
+
+def record_stamps(order: dict[str, Any]) -> bool:
+    """Note the stamps of the headers alone, without unpacking what may be a large message."""
+    mine: list[Any] = []
+    noted[order["topic"]] = mine
+
+    def note(message: Any) -> None:
+        _, seconds, nanoseconds = struct.unpack_from("<III", message._buff)
+        mine.append([time.monotonic(), [seconds + nanoseconds / 1e9]])
+
+    subscribers.append(rospy.Subscriber(order["topic"], rospy.AnyMsg, note, buff_size=2**24, tcp_nodelay=True))
+    return True
+
+
+def record_diagnostics(_order: dict[str, Any]) -> bool:
+    mine: list[Any] = []
+    noted["/diagnostics"] = mine
+
+    def note(message: Any) -> None:
+        statuses = [[status.name, {pair.key: pair.value for pair in status.values}] for status in message.status]
+        mine.append([time.monotonic(), [statuses]])
+
+    subscribers.append(
+        rospy.Subscriber("/diagnostics", importlib.import_module("diagnostic_msgs.msg").DiagnosticArray, note)
+    )
     return True
 
 
@@ -96,7 +125,20 @@ def run_clock(order: dict[str, Any]) -> bool:
     return True
 
 
-ORDERS = {order.__name__: order for order in (record, get, advertise, listeners, publish, stream, run_clock)}
+ORDERS = {
+    order.__name__: order
+    for order in (
+        record,
+        record_diagnostics,
+        record_stamps,
+        get,
+        advertise,
+        listeners,
+        publish,
+        stream,
+        run_clock,
+    )
+}
 
 rospy.init_node("peer", anonymous=True)
 print("ready", flush=True)

@@ -287,6 +287,13 @@ def test_a_camera_that_is_not_there_is_named_with_what_works_without(ros: Launch
     assert {sign["word"] for sign in record.of(HAND_SIGN)} == {"NONE"}
 
 
+def test_a_sign_model_that_is_not_there_is_named(ros: LaunchGraph, tmp_path: Path) -> None:
+    path = tmp_path / "my signs.npz"
+    launch = ros.launch("ros_hand_gesture_recognition", "hand_sign.launch", f"keypoint_classifier_model:={path}")
+    eventually(lambda: f"cannot read the model of taught signs {path}" in launch.text, what="the message")
+    assert "Traceback" not in launch.text
+
+
 def test_the_subscriber_of_chapter_8_says_what_images_come(ros: LaunchGraph) -> None:
     show(ros, "Forward:600")
     ros.launch("my_cam", "my_cam.launch", VIRTUAL)

@@ -44,3 +44,25 @@ def test_a_hand_that_opens_pinches_and_closes_never_moves_the_robot(data_dir: Pa
         signs.add(recognizer.step(np.asarray(image), 1 / 30).sign)
     assert signs
     assert not signs & MOTION_SIGNS
+
+
+def test_a_bystander_does_not_take_over_until_the_operator_has_stopped(data_dir: Path, recognizer: Recognizer) -> None:
+    """Two people side by side, of whom one signs first."""
+
+    def photo(folder: str, number: int) -> np.ndarray:
+        path = sorted((data_dir / "photos" / folder).glob("emre*"))[number]
+        return np.asarray(cv2.imread(str(path)))
+
+    signing, other = photo("forward", 6), photo("turn_left", 3)
+    idle, other_idle = (photo("negatives/person_no_hand_sign", number) for number in (0, 5))
+
+    def show(operator: np.ndarray, bystander: np.ndarray, seconds: float) -> set[str]:
+        both = np.hstack([operator, bystander])
+        return {recognizer.step(np.roll(both, step % 3, axis=1), 1 / 30).sign for step in range(round(30 * seconds))}
+
+    recognizer.reset()
+    assert show(signing, other_idle, 1.0) == {NONE, "Forward"}
+    assert show(signing, other, 2.0) == {"Forward"}
+    assert show(idle, other_idle, 1.0) == {"Forward", NONE}
+    assert show(idle, other, 2.0) == {NONE, "Turn Left"}
+    assert show(signing, other, 2.0) == {"Turn Left"}

@@ -1,3 +1,4 @@
+import cv2
 import numpy as np
 import pytest
 from hypothesis import given
@@ -5,6 +6,7 @@ from hypothesis import strategies as st
 
 from handsteer.signs.views import View
 from handsteer.signs.vocabulary import BACKWARD, FORWARD, GO, NONE, STOP, TURN_LEFT, TURN_RIGHT
+from tests.signs.hands import show_sign
 
 Truth = tuple[str | None, str]
 
@@ -84,3 +86,21 @@ def test_turning_on_and_on_is_turning_once(quarters: list[int]) -> None:
     for quarter in quarters:
         truth = View(rotate_deg=quarter).truth(*truth)
     assert truth == View(rotate_deg=sum(quarters) % 360).truth(FORWARD)
+
+
+@pytest.mark.parametrize("view", [View(flip=True), View(rotate_deg=90), View(rotate_deg=30), View(True, 200)])
+def test_a_hand_is_seen_as_the_picture_that_it_is_in(view: View) -> None:
+    """Each landmark, drawn into the picture as a dot, is where the landmark of the hand is that is seen so."""
+    hand = show_sign("Forward")
+    seen = view.hand(hand)
+    for number in (0, 4, 8, 17):
+        x, y = hand.pixels[number, :2]
+        picture = np.zeros((480, 640, 3), np.uint8)
+        cv2.circle(picture, (round(float(x)), round(float(y))), 4, (255, 255, 255), -1)
+        shown = View(view.flip, view.rotate_deg, enlarge=False).picture(picture)
+        assert abs(shown.shape[1] - seen.image_size[0]) <= 1
+        ys, xs = np.nonzero(shown[..., 0] > 128)
+        assert seen.pixels[number, :2] == pytest.approx((xs.mean(), ys.mean()), abs=2.5)
+    assert seen.handedness == ("Left" if view.flip else "Right")
+    lengths = [np.linalg.norm(each.world[8] - each.world[0]) for each in (hand, seen)]
+    assert lengths[0] == pytest.approx(lengths[1])

@@ -48,8 +48,12 @@ class TestRos1(TransportContract):
         assert isinstance(session.clock, WallClock)
         return session.clock
 
-    def test_a_slow_subscriber_gets_fresh_images(self, graph: Ros1Graph, make_node: Callable[[str], Node]) -> None:
-        """A callback slower than the camera; with rospy's own buffer, images wait in the socket for over a second."""
+    @pytest.mark.slow
+    @pytest.mark.parametrize("through_a_node", [True, False], ids=["node", "callback"])
+    def test_a_slow_subscriber_gets_fresh_images(
+        self, graph: Ros1Graph, make_node: Callable[[str], Node], transport: Transport, *, through_a_node: bool
+    ) -> None:
+        """With rospy's own buffer, images wait in the socket for a callback that is slower than the camera."""
         listener = make_node("listener")
         ages_s: list[float] = []
         done = threading.Event()
@@ -58,19 +62,23 @@ class TestRos1(TransportContract):
             assert received.captured_s is not None
             ages_s.append(listener.clock.now() - received.captured_s)
             time.sleep(0.1)
-            if len(ages_s) == 20:
+            if len(ages_s) == 30:
                 done.set()
 
-        listener.subscribe(Topic("/fast_camera", Image, is_global=True), callback)
-        listener.start()
+        topic = Topic(f"/fast_camera_{through_a_node}", Image, is_global=True)
+        if through_a_node:
+            listener.subscribe(topic, callback)
+            listener.start()
+        else:
+            transport.subscribe("listener", topic, callback)
         camera = graph.peer("__name:=fast_camera")
-        camera.ask("advertise", topic="/fast_camera", package="sensor_msgs", type="Image")
-        assert eventually(lambda: camera.ask("listeners", topic="/fast_camera") > 0)
-        camera.ask("stream", topic="/fast_camera", width=640, height=480, period_s=1 / 60, count=180)
+        camera.ask("advertise", topic=topic.name, package="sensor_msgs", type="Image")
+        assert eventually(lambda: camera.ask("listeners", topic=topic.name) > 0)
+        camera.ask("stream", topic=topic.name, width=640, height=480, period_s=1 / 60, count=300)
         assert done.wait(20.0)
-        # At the worst a frame has waited for one period of the camera and its own way, never for a callback.
-        assert float(np.median(ages_s)) < 0.1, ages_s
-        assert max(ages_s[1:]) < 0.5, ages_s
+        camera.kill()
+        # One period of the camera and the way here, and one callback where that runs on the socket's own thread.
+        assert float(np.median(ages_s)) < (0.1 if through_a_node else 0.25), ages_s
 
     def test_a_process_has_one_name(self, session: Session) -> None:
         assert session.name == "/tests"

@@ -1,9 +1,9 @@
 """What a sign does: the table from signs to actions."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Literal, get_args
 
-from handsteer.signs.vocabulary import BACKWARD, FORWARD, GO, NONE, STOP, TURN_LEFT, TURN_RIGHT
+from handsteer.signs.vocabulary import BACKWARD, FORWARD, GO, NONE, STOP, TURN_LEFT, TURN_RIGHT, find_sign
 
 Action = Literal["forward", "backward", "turn_left", "turn_right", "stop", "go", "turbo"]
 """Everything that a sign can do to the velocity."""
@@ -39,10 +39,19 @@ ALWAYS_STOP = frozenset({STOP, NONE})
 
 
 def action_of(sign: str, given: Mapping[str, Action]) -> Action:
-    """Return what ``sign`` does: as ``given`` says, else as built in; an unknown word changes nothing, as ``Go``."""
-    return given.get(sign) or BUILT_IN.get(sign, "go")
+    """Return what ``sign`` does: as ``given`` says, else as built in; an unknown word changes nothing, as ``Go``.
+
+    Names in ``given`` may have any case, and ``_`` or ``-`` for spaces.
+    """
+    name = find_sign(sign, given)
+    return given[name] if name is not None else BUILT_IN.get(sign, "go")
 
 
-def motion_signs(given: Mapping[str, Action]) -> frozenset[str]:
-    """Return the signs that can make the robot move, when ``given`` goes before what is built in."""
-    return frozenset(sign for sign in {*BUILT_IN, *given} if action_of(sign, given) in MOTION_ACTIONS)
+def motion_signs(given: Mapping[str, Action], signs: Iterable[str] = ()) -> frozenset[str]:
+    """Return the signs, of ``signs`` and of those that are named, that can make the robot move.
+
+    Args:
+        given: Actions that go before what is built in.
+        signs: Further signs, by their own names.
+    """
+    return frozenset(sign for sign in {*BUILT_IN, *given, *signs} if action_of(sign, given) in MOTION_ACTIONS)

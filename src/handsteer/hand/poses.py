@@ -105,6 +105,28 @@ THUMB = _shape(
     little=(2.0, 86.0, 108.0, 66.0),
 )
 
+_STRAIGHT = (0.0, 3.0, 5.0, 3.0)
+_STRAIGHT_LITTLE = (-8.0, 4.0, 6.0, 4.0)
+_THUMB_ACROSS = (9.0, 45.0, 32.0, 62.0, 0.0)
+PEACE = _shape(thumb=_THUMB_ACROSS, index=(8.0, 3.0, 5.0, 3.0), middle=(-6.0, 3.0, 5.0, 3.0))
+THREE = _shape(thumb=_THUMB_ACROSS, index=(8.0, 3.0, 5.0, 3.0), middle=_STRAIGHT, ring=(-8.0, 4.0, 6.0, 3.0))
+FOUR = _shape(
+    thumb=_THUMB_ACROSS,
+    index=(6.0, 3.0, 5.0, 3.0),
+    middle=_STRAIGHT,
+    ring=(-5.0, 4.0, 6.0, 3.0),
+    little=_STRAIGHT_LITTLE,
+)
+HORNS = _shape(thumb=_THUMB_ACROSS, index=_STRAIGHT_INDEX, little=_STRAIGHT_LITTLE)
+CALL = _shape(thumb=_THUMB_OUT, little=_STRAIGHT_LITTLE)
+OK = _shape(
+    thumb=(28.0, 45.0, 5.0, 20.0, 0.0),
+    index=(0.0, 50.0, 60.0, 35.0),
+    middle=(0.0, 8.0, 12.0, 6.0),
+    ring=(-4.0, 5.0, 8.0, 4.0),
+    little=_STRAIGHT_LITTLE,
+)
+
 _HEIGHT_M, _DEPTH_M = 0.03, 0.55
 _LOWERED_M = 0.75 * _DEPTH_M + 0.20  # below the picture, whatever the camera's shape
 
@@ -122,6 +144,13 @@ _POSES = {
     TURN_RIGHT: _held(THUMB, yaw=150, pitch=-30, roll=-28),
     GO: _held(FIST, yaw=10, pitch=3),
     NONE: _held(RELAXED, y=_LOWERED_M),
+    # No signs until they are taught.
+    "Peace": _held(PEACE, yaw=8),
+    "Three": _held(THREE, yaw=8),
+    "Four": _held(FOUR, yaw=8),
+    "Horns": _held(HORNS, yaw=8),
+    "Call": _held(CALL, yaw=8),
+    "OK": _held(OK, yaw=8),
 }
 _OTHER_HANDS = {TURN_LEFT: TURN_RIGHT, TURN_RIGHT: TURN_LEFT}
 
@@ -130,7 +159,8 @@ def sign_pose(sign: str, handedness: Handedness = "Right") -> HandPose:
     """Return how ``sign`` is shown, as people would with that hand.
 
     A left hand is the mirror image of a right one, so it shows ``Turn Left`` as the right hand does ``Turn Right``:
-    with the back to the camera. ``NONE`` is the hand lowered out of the picture.
+    with the back to the camera. ``NONE`` is the hand lowered out of the picture. There are also ``Peace``, ``Three``,
+    ``Four``, ``Horns``, ``Call`` and ``OK``, which are no signs until they are taught.
 
     Raises:
         PoseError: There is no such sign.

@@ -4,9 +4,12 @@ The way from frame to landmarks is that of MediaPipe 0.10.21's graph ``hand_land
 ``mp.solutions.hands``: while enough hands are followed, only the landmark model runs, on the region that the last
 landmarks give; otherwise palms are looked for in the whole frame first. Beyond that, a hand that is new is looked at
 twice, unless the configuration says otherwise: the second time in the region that its own landmarks give, as a palm
-says less well where a hand is.
+says less well where a hand is. And palms are looked for in a widened frame too, where hands look smaller: the
+palm model misses some that nearly fill the frame.
 """
 
+import itertools
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
 
@@ -17,11 +20,13 @@ from handsteer.config import LandmarksConfig
 from handsteer.errors import FrameError
 from handsteer.landmarks.hand_landmark import Estimate, HandLandmarkModel
 from handsteer.landmarks.models import find_model
-from handsteer.landmarks.palm import PalmDetector
+from handsteer.landmarks.palm import Palm, PalmDetector
 from handsteer.landmarks.protocol import Hand
 from handsteer.landmarks.roi import Roi, from_landmarks
 
 _SAME_HAND_OVERLAP: Final = 0.5
+_WIDENED: Final = 1.25
+_PART: Final = 0.7
 _MAX_SIDE: Final = 32766
 """OpenCV samples no picture that is larger."""
 
@@ -49,6 +54,7 @@ class MediaPipeLandmarker:
         self._landmarks = HandLandmarkModel(landmark, config.threads)
         self._followed: list[Roi] = []
         self._hands: list[Hand] = []
+        self._searches = self._all_searches()
         self._image_size = (0, 0)
 
     def detect(self, image: NDArray[np.uint8], *, search: bool = True) -> list[Hand]:
@@ -71,7 +77,7 @@ class MediaPipeLandmarker:
             self.reset()
             self._image_size = (width, height)
         estimates = [self._estimate(image, region) for region in self._regions(image, search)]
-        present = [estimate for estimate in estimates if self._is_present(estimate)]
+        present = _of_different_hands([estimate for estimate in estimates if self._is_present(estimate)])
         self._followed = [from_landmarks(estimate.pixels[:, :2]) for estimate in present]
         self._hands = [_hand(estimate, width, height) for estimate in present]
         return list(self._hands)
@@ -86,6 +92,12 @@ class MediaPipeLandmarker:
         """Forget the hands of the last frame."""
         self._followed = []
         self._hands = []
+        self._searches = self._all_searches()
+
+    def _all_searches(self) -> Iterator[tuple[float, ...]]:
+        if not self._config.wide_search:
+            return itertools.repeat((1.0,))
+        return itertools.chain([(1.0, _WIDENED)], itertools.cycle([(1.0,), (_WIDENED,)]))
 
     def _estimate(self, image: NDArray[np.uint8], region: Roi) -> Estimate:
         """Return what is seen in a region; of a hand that is new, at the second look."""
@@ -103,8 +115,15 @@ class MediaPipeLandmarker:
         wanted = self._config.max_hands
         regions = list(self._followed)
         if not regions or (search and len(regions) < wanted):
-            regions += [palm.roi for palm in self._palms.detect(image, wanted)]
+            regions += [palm.roi for palm in self._search(image, wanted)]
         return _distinct(regions)[:wanted]
+
+    def _search(self, image: NDArray[np.uint8], wanted: int) -> list[Palm]:
+        """Return palms, the surest first: at the first search in the plain and the widened frame, then in turns."""
+        palms = [
+            palm for widened in next(self._searches) for palm in self._palms.detect(image, wanted, widened=widened)
+        ]
+        return sorted(palms, key=lambda palm: -palm.score)
 
 
 def _distinct(regions: list[Roi]) -> list[Roi]:
@@ -117,6 +136,30 @@ def _distinct(regions: list[Roi]) -> list[Roi]:
         if all(region.overlap(other) <= _SAME_HAND_OVERLAP for other in distinct):
             distinct.append(region)
     return distinct
+
+
+def _of_different_hands(estimates: list[Estimate]) -> list[Estimate]:
+    """Return ``estimates`` without those of a hand that one before them has, and without parts taken for a hand.
+
+    Two regions may lead to the same hand, and some fingers of a hand to a smaller one within it.
+    """
+    regions = [from_landmarks(estimate.pixels[:, :2]) for estimate in estimates]
+    whole = [
+        (estimate, region)
+        for estimate, region in zip(estimates, regions, strict=True)
+        if not any(_is_part(estimate, other) for other in estimates)
+    ]
+    kept = _distinct([region for _, region in whole])
+    return [estimate for estimate, region in whole if any(region is each for each in kept)]
+
+
+def _is_part(estimate: Estimate, other: Estimate) -> bool:
+    """Return whether ``estimate`` is much smaller than ``other`` and has its centre in its box."""
+    low, high = estimate.pixels[:, :2].min(axis=0), estimate.pixels[:, :2].max(axis=0)
+    other_low, other_high = other.pixels[:, :2].min(axis=0), other.pixels[:, :2].max(axis=0)
+    centre = (low + high) / 2
+    is_smaller = (high - low).max() < _PART * (other_high - other_low).max()
+    return bool(is_smaller and (other_low <= centre).all() and (centre <= other_high).all())
 
 
 def _hand(estimate: Estimate, width: int, height: int) -> Hand:

@@ -63,10 +63,17 @@ class PalmDetector:
         self._min_logit = _logit(min_score)
         self._anchors = _anchors(self._model.side)
 
-    def detect(self, image: NDArray[np.uint8], limit: int) -> list[Palm]:
-        """Return at most ``limit`` palms in ``image``, (height, width, 3) uint8 BGR; the surest first."""
+    def detect(self, image: NDArray[np.uint8], limit: int, *, widened: float = 1.0) -> list[Palm]:
+        """Return at most ``limit`` palms in ``image``, (height, width, 3) uint8 BGR; the surest first.
+
+        Args:
+            image: The frame.
+            limit: How many palms are wanted.
+            widened: The frame is looked at as if it had a black border that makes it so many times as large: hands look
+                smaller then.
+        """
         height, width = image.shape[:2]
-        square = whole_frame(width, height)
+        square = whole_frame(width, height, widened)
         values, logits = self._model.run(square.crop(image, self._model.side, cv2.BORDER_CONSTANT))
         logits = logits[:, 0]
         found = np.flatnonzero(logits >= self._min_logit)

@@ -74,9 +74,9 @@ class Roi:
         return shared / (self.side**2 + other.side**2 - shared)
 
 
-def whole_frame(width: int, height: int) -> Roi:
-    """Return the smallest upright square about a whole frame of that size in pixels."""
-    return Roi(width / 2, height / 2, max(width, height))
+def whole_frame(width: int, height: int, widened: float = 1.0) -> Roi:
+    """Return the smallest upright square about a whole frame of that size in pixels, ``widened`` so many times."""
+    return Roi(width / 2, height / 2, max(width, height) * widened)
 
 
 def from_palm(corners: Array, wrist: Array, middle_base: Array) -> Roi:

@@ -115,6 +115,7 @@ class HandSignRecognitionNode(Node):
             progress=f"{seen.progress:.2f}",
             handedness=seen.hand.handedness if seen.hand else "",
             processing_ms=f"{self.processing.percentile_ms(50):.1f}",
+            processing_p99_ms=f"{self.processing.percentile_ms(99):.1f}",
         )
 
     def _why_no_frame(self) -> str:

@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from handsteer.landmarks.protocol import CONNECTIONS
+from handsteer.landmarks.protocol import CONNECTIONS, Hand
 from handsteer.signs.recognizer import Recognition
 from handsteer.signs.vocabulary import NONE
 
@@ -24,11 +24,17 @@ def annotate(image: NDArray[np.uint8], recognition: Recognition) -> NDArray[np.u
     Returns:
         (height, width, 3) uint8, BGR, mirrored.
     """
-    picture = np.asarray(cv2.flip(image, 1), np.uint8)
-    if recognition.hand is not None:
-        _draw_skeleton(picture, recognition.hand.pixels[:, :2])
+    picture = draw_hand(image, recognition.hand)
     if recognition.seen != NONE:
         _draw_label(picture, recognition)
+    return picture
+
+
+def draw_hand(image: NDArray[np.uint8], hand: Hand | None) -> NDArray[np.uint8]:
+    """Return a mirrored copy of ``image``, (height, width, 3) uint8, BGR, with the skeleton of ``hand``."""
+    picture = np.asarray(cv2.flip(image, 1), np.uint8)
+    if hand is not None:
+        _draw_skeleton(picture, hand.pixels[:, :2])
     return picture
 
 

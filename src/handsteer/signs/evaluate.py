@@ -6,13 +6,16 @@ import numpy as np
 
 from handsteer.cameras.files import read_photo
 from handsteer.cameras.protocol import Frame
-from handsteer.errors import LabelError
+from handsteer.errors import EvaluationError, LabelError
 from handsteer.landmarks.protocol import Hand
 from handsteer.signs.figures import PhotoResult
 from handsteer.signs.labelled import LabelledPhoto
+from handsteer.signs.protocol import Classifier
 from handsteer.signs.recognizer import Recognizer
+from handsteer.signs.teaching.dataset import Dataset
 from handsteer.signs.video_figures import FrameVerdict
 from handsteer.signs.views import View
+from handsteer.signs.vocabulary import NONE
 
 
 def evaluate_photos(photos: Iterable[LabelledPhoto], recognizer: Recognizer, view: View) -> Iterator[PhotoResult]:
@@ -59,6 +62,34 @@ def evaluate_frames(
         yield FrameVerdict(frame.captured_s, truth, recognition.seen, recognition.sign)
     if truths and max(truths) > number:
         raise LabelError(f"there is a label for frame {max(truths)}, but the last frame of the video is {number}")
+
+
+def evaluate_takes(
+    dataset: Dataset, classifier: Classifier, min_confidence: float, view: View
+) -> Iterator[PhotoResult]:
+    """Yield what is seen in each hand of a dataset, with nothing kept from one to the next; its kind is the person.
+
+    Hands that cannot be scored when they are seen as ``view`` does are left out.
+
+    Raises:
+        EvaluationError: The dataset has a sign that the classifier doesn't know.
+    """
+    unknown = [label for label in dataset.labels if label not in (*classifier.signs, NONE)]
+    if unknown:
+        known = ", ".join((*classifier.signs, NONE))
+        raise EvaluationError(
+            f"the sign {unknown[0]!r} is not known; the signs are {known}: name a model that knows it by --signs.model"
+        )
+    for number, take in enumerate(dataset.takes, start=1):
+        truth, _ = view.truth(take.label)
+        if truth is None:
+            continue
+        for row, hand in enumerate(take.hands):
+            guess = classifier.classify(view.hand(hand))
+            seen = guess.sign if guess.confidence >= min_confidence else NONE
+            confidence = round(guess.confidence, 4)
+            name = f"take {number}, hand {row + 1}"
+            yield PhotoResult(name, take.person, truth, seen, confidence, _longer_side(hand))
 
 
 def _longer_side(hand: Hand) -> float:

@@ -34,7 +34,9 @@ _PAIRS: Final = np.array(
 )
 """Pairs of landmarks whose distances tell shapes apart."""
 
-COUNT: Final = 15 + 2 * len(_PAIRS) + 1
+BEND_COUNT: Final = 15
+PAIR_COUNT: Final = len(_PAIRS)
+COUNT: Final = BEND_COUNT + 2 * PAIR_COUNT + 1
 """How many features there are."""
 
 
@@ -49,9 +51,10 @@ def shape_features(pixels: Array, world: Array) -> NDArray[np.float64]:
     palm = np.linalg.norm(world[:, KNUCKLES] - world[:, :1], axis=2).mean(axis=1)
     palm = np.maximum(palm, 1e-6)[:, None]
     image = _in_metres(np.asarray(pixels, np.float64), world)
-    normal = np.cross(world[:, 5] - world[:, 0], world[:, 17] - world[:, 0])
-    facing = np.abs(normal[:, 2:]) / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
-    features = np.concatenate([_bends(world), _distances(world) / palm, _distances(image) / palm, facing], axis=1)
+    facing = _facing(world)
+    features = np.concatenate(
+        [bone_bends(world), pair_distances(world) / palm, pair_distances(image) / palm, facing], axis=1
+    )
     clipped: NDArray[np.float64] = np.clip(features, -5.0, 5.0)
     return clipped
 
@@ -70,6 +73,16 @@ def directions(pixels: Array) -> tuple[Array, Array, Array]:
     return index, pixels[:, THUMB_TIP] - knuckles, knuckles - pixels[:, WRIST]
 
 
+def _facing(world: Array) -> Array:
+    """Return (n, 1) cosines, 0 to 1, of the angle between the palm's normal and the camera's axis."""
+    # Written out, as numpy's cross product takes as long as all other features together.
+    ax, ay, az = (world[:, 5] - world[:, 0]).T
+    bx, by, bz = (world[:, 17] - world[:, 0]).T
+    x, y, z = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+    facing: Array = (np.abs(z) / np.maximum(np.sqrt(x * x + y * y + z * z), 1e-12))[:, None]
+    return facing
+
+
 def _in_metres(pixels: Array, world: Array) -> Array:
     """Return (n, 21, 2) image points, scaled to fit the world landmarks as seen from the camera."""
     flat = world[:, :, :2] - world[:, :, :2].mean(axis=1, keepdims=True)
@@ -79,16 +92,25 @@ def _in_metres(pixels: Array, world: Array) -> Array:
     return scaled
 
 
-def _bends(world: Array) -> Array:
-    """Return (n, 15) angles between neighbouring bones, radians, digit by digit from the base."""
-    bones = world[:, _BONE_ENDS[0]] - world[:, _BONE_ENDS[1]]
-    bones = (bones / np.maximum(np.linalg.norm(bones, axis=2, keepdims=True), 1e-9)).reshape(-1, 5, 4, 3)
+def bone_bends(points: Array) -> Array:
+    """Return (n, 15) angles between neighbouring bones, radians, digit by digit from the base.
+
+    Args:
+        points: (n, 21, 2 or 3) landmarks, in any unit.
+    """
+    bones = points[:, _BONE_ENDS[0]] - points[:, _BONE_ENDS[1]]
+    bones = (bones / np.maximum(np.linalg.norm(bones, axis=2, keepdims=True), 1e-9)).reshape(-1, 5, 4, bones.shape[2])
     cosines = (bones[:, :, 1:] * bones[:, :, :-1]).sum(axis=3)
     angles: Array = np.arccos(np.clip(cosines, -1.0, 1.0)).reshape(-1, 15)
     return angles
 
 
-def _distances(points: Array) -> Array:
+def pair_distances(points: Array) -> Array:
+    """Return (n, :data:`PAIR_COUNT`) distances between landmarks that tell shapes apart, in the points' unit.
+
+    Args:
+        points: (n, 21, 2 or 3) landmarks.
+    """
     gaps = points[:, _PAIRS[:, 0]] - points[:, _PAIRS[:, 1]]
     lengths: Array = np.sqrt((gaps**2).sum(axis=2))
     return lengths

@@ -38,7 +38,9 @@ class Novelty:
         return distances
 
 
-def learn_novelty(features: Array, classes: NDArray[np.int64], mean: Array, scale: Array) -> Novelty:
+def learn_novelty(
+    features: Array, classes: NDArray[np.int64], mean: Array, scale: Array, margin: float = 1.0
+) -> Novelty:
     """Return what is normal for (n, features) of (n,) classes: as far as 999 of 1000 are.
 
     Args:
@@ -46,6 +48,7 @@ def learn_novelty(features: Array, classes: NDArray[np.int64], mean: Array, scal
         classes: (n,) from 0; each occurs.
         mean: (features,) subtracted from the features first.
         scale: (features,) that they are multiplied by then.
+        margin: How many times as far as those a hand may be.
     """
     scaled = (features - mean) * scale
     centres = rounded(np.stack([scaled[classes == each].mean(axis=0) for each in range(classes.max() + 1)]))
@@ -55,4 +58,4 @@ def learn_novelty(features: Array, classes: NDArray[np.int64], mean: Array, scal
     whitening = rounded(np.linalg.cholesky(np.linalg.inv(covariance)))
     novelty = Novelty(mean, scale, centres, whitening, np.inf)
     farthest = np.quantile(novelty.distances(features, classes), 0.999)
-    return Novelty(mean, scale, centres, whitening, round(float(farthest), 2))
+    return Novelty(mean, scale, centres, whitening, round(margin * float(farthest), 2))

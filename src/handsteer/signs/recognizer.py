@@ -55,6 +55,11 @@ class Recognizer:
         self._operator = Operator(config)
         self._config = config
 
+    @property
+    def signs(self) -> tuple[str, ...]:
+        """The signs that it can tell, without ``NONE``."""
+        return self._classifier.signs
+
     def step(self, image: NDArray[np.uint8], dt_s: float) -> Recognition:
         """Take the next frame.
 

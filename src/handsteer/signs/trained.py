@@ -12,9 +12,6 @@ from handsteer.signs.model import SignModel
 from handsteer.signs.protocol import SignGuess
 from handsteer.signs.vocabulary import BACKWARD, FORWARD, GO, NONE, SIGNS, STOP, TURN_LEFT, TURN_RIGHT
 
-_SHAPES: Final = frozenset({"open", "index", "thumb", "fist", "other"})
-"""The shapes that are signs only by where they point, or none."""
-
 _DOUBT: Final = 1.5
 """Width of the doubt about a limit, degrees or pixels."""
 _POINTING: Final = 52.0
@@ -34,9 +31,8 @@ class TrainedClassifier:
     """A :class:`~handsteer.signs.protocol.Classifier` that knows the shapes of a model.
 
     The network says how likely it is that the hand is open, points with its index finger, stretches out its thumb or
-    is a fist; where it points in the image makes a sign of that. A shape of any other name is itself a sign, however
-    the hand is turned. The confidence is the likelihood of the shape, times that of the direction, times the landmark
-    model's own that there is a hand; hands of too few pixels have none.
+    is a fist; where it points in the image makes a sign of that. The confidence is the likelihood of the shape, times
+    that of the direction, times the landmark model's own that there is a hand; hands of too few pixels have none.
 
     Args:
         model: As :func:`~handsteer.signs.model.load_model` gives it.
@@ -48,24 +44,33 @@ class TrainedClassifier:
     @property
     def signs(self) -> tuple[str, ...]:
         """The signs that it can tell, without ``NONE``."""
-        return (*SIGNS, *(shape for shape in self._model.shapes if shape not in _SHAPES))
+        return SIGNS
 
     def classify(self, hand: Hand) -> SignGuess:
-        """Return the sign that ``hand`` shows; ``NONE`` when it is likelier that it shows none."""
+        """Return the sign that ``hand`` shows; ``NONE`` when it is likelier that it shows none.
+
+        Nothing can be said of a hand whose landmarks are not all finite: it is ``NONE`` with a confidence of 0.
+        """
+        if not (np.isfinite(hand.points[:, :2]).all() and np.isfinite(hand.world).all()):
+            return SignGuess(NONE, 0.0)
         pixels = hand.pixels[None, :, :2].astype(np.float64)
         shapes = self._model.probabilities(shape_features(pixels, hand.world[None])[0])
         scores = _signs(shapes, pixels)
         best = max(scores, key=scores.__getitem__)
-        size = float(np.ptp(pixels[0], axis=0).max())
-        score = scores[best] * min(1.0, max(0.0, hand.presence)) * _within(-_SMALLEST_PX, -size)
+        score = scores[best] * legibility(hand)
         return SignGuess(best, score) if score >= 0.5 else SignGuess(NONE, 1.0 - score)
+
+
+def legibility(hand: Hand) -> float:
+    """Return how far ``hand`` can be read at all, 0 to 1: that it is there, times that it has enough pixels."""
+    size = float(np.ptp(hand.pixels[:, :2], axis=0).max())
+    return min(1.0, max(0.0, hand.presence)) * _within(-_SMALLEST_PX, -size)
 
 
 def _signs(shapes: dict[str, float], pixels: NDArray[np.float64]) -> dict[str, float]:
     """Return how likely each sign is, given the shapes' likelihoods and (1, 21, 2) landmarks."""
-    taught = {shape: chance for shape, chance in shapes.items() if shape not in _SHAPES}
     index, thumb, palm = (vectors[0] for vectors in directions(pixels))
-    return taught | {
+    return {
         STOP: shapes.get("open", 0.0) * _within(_UPRIGHT, _from_up(palm)),
         GO: shapes.get("fist", 0.0) * _within(_RAISED, _from_up(palm)),
         FORWARD: shapes.get("index", 0.0) * _within(_POINTING, _from_up(index)),

@@ -7,6 +7,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from handsteer.landmarks.protocol import Hand
 from handsteer.signs.vocabulary import BACKWARD, FORWARD, NONE, TURN_LEFT, TURN_RIGHT
 
 _SMALL_PX = 400
@@ -50,6 +51,27 @@ class View:
         if self.flip:
             image = np.asarray(cv2.flip(image, 1), np.uint8)
         return _turned(image, self.rotate_deg)
+
+    def hand(self, hand: Hand) -> Hand:
+        """Return ``hand`` as it would be found in the picture that is seen so."""
+        pixels, world = hand.pixels.astype(np.float64), hand.world.astype(np.float64)
+        width, height = hand.image_size
+        handedness = hand.handedness
+        if self.flip:
+            pixels[:, 0] = width - pixels[:, 0]
+            world[:, 0] *= -1
+            handedness = "Left" if handedness == "Right" else "Right"
+        turn = np.radians(self.rotate_deg)
+        cos, sin = math.cos(turn), math.sin(turn)
+        matrix = np.array([[cos, sin], [-sin, cos]])
+        middle = np.array([width, height]) / 2
+        new_width, new_height = (round(abs(cos) * a + abs(sin) * b) for a, b in ((width, height), (height, width)))
+        pixels[:, :2] = (pixels[:, :2] - middle) @ matrix + np.array([new_width, new_height]) / 2
+        world[:, :2] = world[:, :2] @ matrix
+        points = (pixels / (new_width, new_height, new_width)).astype(np.float32)
+        return Hand(
+            points, world.astype(np.float32), handedness, hand.handedness_score, hand.presence, (new_width, new_height)
+        )
 
     def truth(self, sign: str | None, kind: str = "") -> tuple[str | None, str]:
         """Return the sign and the kind of a picture of ``sign`` and ``kind`` when it is seen so.

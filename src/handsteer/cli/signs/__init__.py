@@ -4,16 +4,24 @@ from cyclopts import App
 
 _EXAMPLES = """Examples:
   handsteer signs list                 the signs, and what each does
-  handsteer signs evaluate photos/     how well they are told in labelled photos
+  handsteer signs collect --label Hi   show a new sign to the camera
+  handsteer signs train                learn it
+  handsteer signs evaluate photos/     how well signs are told
 """
 
 app = App(
     name="signs",
-    help="The signs: what each does, and how well they are told.",
+    help="The signs: what each does, how well they are told, and how to teach further ones.",
     help_epilogue=_EXAMPLES,
     help_format="plaintext",
     result_action="return_value",
 )
 # Named, not imported: a verb's module is loaded when it is used.
-app.command("handsteer.cli.signs.evaluate:evaluate", name="evaluate")
-app.command("handsteer.cli.signs.list_signs:list_signs", name="list")
+for verb, function in {
+    "list": "list_signs:list_signs",
+    "evaluate": "evaluate:evaluate",
+    "collect": "collect:collect",
+    "import": "import_keypoints:import_keypoints",
+    "train": "train:train",
+}.items():
+    app.command(f"handsteer.cli.signs.{function}", name=verb)

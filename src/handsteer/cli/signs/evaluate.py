@@ -17,9 +17,10 @@ from handsteer.control.actions import motion_signs
 from handsteer.errors import EvaluationError
 from handsteer.graph import open_classifier, open_recognizer
 from handsteer.signs.confusion_picture import draw_confusion
-from handsteer.signs.evaluate import evaluate_frames, evaluate_photos
+from handsteer.signs.evaluate import evaluate_frames, evaluate_photos, evaluate_takes
 from handsteer.signs.figures import Confusion, PhotoReport, photo_report
 from handsteer.signs.labelled import labels_of, read_photo_labels, read_video_labels
+from handsteer.signs.teaching.dataset import load_dataset
 from handsteer.signs.video_figures import VideoReport, video_report
 from handsteer.signs.views import View
 
@@ -37,7 +38,7 @@ def evaluate(
     config_file: ConfigFile = None,
     parameters: Parameters = None,
 ) -> int:
-    """Print how well the signs are told in labelled photos or in a video.
+    """Print how well the signs are told in labelled photos, in a video, or in a dataset of landmarks.
 
     Example: handsteer signs evaluate photos/ --flip --png confusion.png
 
@@ -47,7 +48,7 @@ def evaluate(
     Parameters
     ----------
     source
-        A folder of labelled photos, or a video file.
+        A folder of labelled photos, a video file, or a dataset (.npz) of `signs collect`.
     json
         Print one JSON object.
     png
@@ -67,7 +68,11 @@ def evaluate(
     _check(rotate, grace, png)
     view = View(flip=flip, rotate_deg=rotate, enlarge=not as_is)
     report: PhotoReport | VideoReport
-    if source.is_file():
+    confusion: Confusion | None
+    if source.suffix.lower() == ".npz":
+        report = _dataset(source, config, view)
+        text, confusion = photo_tables(report, "hands"), report.confusion
+    elif source.is_file():
         report = _video(source, config, view, grace, wants_confusion=png is not None)
         text, confusion = video_tables(report), report.labels.confusion if report.labels else None
     else:
@@ -86,7 +91,19 @@ def _photos(folder: Path, config: Config, view: View) -> PhotoReport:
     results = list(evaluate_photos(_with_progress(photos, "photos"), open_recognizer(config), view))
     if not results:
         raise EvaluationError(f"{folder}: no photo shows a sign or NONE when it is turned so; try another --rotate")
-    return photo_report(results, signs, motion_signs(config.control.actions), unscored=len(photos) - len(results))
+    return photo_report(
+        results, signs, motion_signs(config.control.actions, signs), unscored=len(photos) - len(results)
+    )
+
+
+def _dataset(path: Path, config: Config, view: View) -> PhotoReport:
+    dataset = load_dataset(path)
+    classifier = open_classifier(config.signs)
+    results = list(evaluate_takes(dataset, classifier, config.signs.min_confidence, view))
+    if not results:
+        raise EvaluationError(f"{path}: no hand shows a sign or NONE when it is turned so; try another --rotate")
+    unscored = sum(len(take.hands) for take in dataset.takes) - len(results)
+    return photo_report(results, classifier.signs, motion_signs(config.control.actions, classifier.signs), unscored)
 
 
 def _video(path: Path, config: Config, view: View, grace_s: float, *, wants_confusion: bool) -> VideoReport:
@@ -100,7 +117,7 @@ def _video(path: Path, config: Config, view: View, grace_s: float, *, wants_conf
         )
     frames = _with_progress(video_frames(path), "frames")
     verdicts = list(evaluate_frames(frames, truths, open_recognizer(config), view))
-    return video_report(verdicts, signs, motion_signs(config.control.actions), grace_s)
+    return video_report(verdicts, signs, motion_signs(config.control.actions, signs), grace_s)
 
 
 def _with_progress(things: Any, unit: str) -> Any:

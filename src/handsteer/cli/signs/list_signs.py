@@ -6,7 +6,7 @@ from handsteer.cli.options import ConfigFile, Flag, Parameters, settings
 from handsteer.cli.signs.tables import table
 from handsteer.control.actions import EFFECTS, action_of
 from handsteer.graph import open_classifier
-from handsteer.signs.vocabulary import NONE
+from handsteer.signs.vocabulary import NONE, find_sign
 
 
 def list_signs(*, json: Flag = False, config_file: ConfigFile = None, parameters: Parameters = None) -> int:
@@ -24,7 +24,7 @@ def list_signs(*, json: Flag = False, config_file: ConfigFile = None, parameters
     config = settings(config_file, parameters)
     actions = config.control.actions
     known = (*open_classifier(config.signs).signs, NONE)
-    named = [sign for sign in actions if sign not in known]
+    named = [sign for sign in actions if find_sign(sign, known) is None]
     signs = [
         {"sign": sign, "action": action, "effect": EFFECTS[action], "known": sign in known}
         for sign in (*known, *named)

@@ -3,6 +3,8 @@
 from collections.abc import Sequence
 
 from handsteer.signs.figures import SIZES, Confusion, PhotoReport, Share
+from handsteer.signs.teaching.dataset import Dataset, summarise
+from handsteer.signs.teaching.train import TeachingReport
 from handsteer.signs.video_figures import Event, LabelledFigures, VideoReport
 
 
@@ -19,23 +21,48 @@ def table(head: Sequence[str], rows: Sequence[Sequence[str]], text_columns: int 
     )
 
 
-def photo_tables(report: PhotoReport) -> str:
-    """Return the figures of photos as text."""
+def photo_tables(report: PhotoReport, what: str = "photos") -> str:
+    """Return the figures of photos as text; ``what`` they are called."""
     recall = [_recall_row(report, sign) for sign in report.recall]
     parts = [
-        f"{len(report.results)} photos, and {report.unscored} that are not scored",
+        f"{len(report.results)} {what}, and {report.unscored} that are not scored",
         "Recall, in all and by the longer side of the hand; then how many hands were not found (they are wrong),\n"
-        "and how many photos gave another sign that moves the robot",
+        f"and how many {what} gave another sign that moves the robot",
         table(["sign", "right", "of", "recall", *SIZES, "moves"], recall),
     ]
     if report.false_commands.of:
         kinds = {**report.false_commands_by_kind, "all": report.false_commands}
         rows = [[kind or "(no kind)", *_cells(share)] for kind, share in kinds.items()]
         parts += [
-            "False commands: photos that show no sign and gave one that moves the robot",
+            f"False commands: {what} that show no sign and gave one that moves the robot",
             table(["kind", "false", "of", "rate"], rows),
         ]
-    return "\n\n".join([*parts, *_confusion("photos", report.confusion)])
+    return "\n\n".join([*parts, *_confusion(what, report.confusion)])
+
+
+def dataset_table(dataset: Dataset) -> str:
+    """Return how much there is of each sign, as text."""
+    rows = [[each.label, str(each.takes), str(each.rows), str(each.persons)] for each in summarise(dataset)]
+    return table(["sign", "takes", "hands", "persons"], rows)
+
+
+def teaching_tables(report: TeachingReport) -> str:
+    """Return how well signs were learnt, as text."""
+    rows = [
+        [
+            *(sign.summary.label, str(sign.summary.takes), str(sign.summary.rows), str(sign.summary.persons)),
+            "as shown" if sign.sided else "either",
+            *(_cells(sign.recall) if sign.recall else ["-", "-", "-"]),
+        ]
+        for sign in report.signs
+    ]
+    parts = [
+        f"How well hands are told that were held out, one {report.held_out} after the other"
+        + ("" if report.held_out == "person" else "; how well those of others are told, nobody knows yet"),
+        table(["sign", "takes", "hands", "persons", "hand", "right", "of", "recall"], rows),
+        f"Of made hands of all shapes, {_rate(report.made)} are told as one of these signs; some of them do show it.",
+    ]
+    return "\n\n".join([*parts, *_confusion("hands", report.confusion)])
 
 
 def video_tables(report: VideoReport) -> str:

@@ -82,7 +82,9 @@ class Ros1Publisher(Generic[M]):
     def __init__(self, topic: Topic[M]) -> None:
         self._topic = topic
         there = ros1_type(type_name(topic.type))
-        self._publisher: Any = rospy.Publisher(topic.ros_name, there, queue_size=topic.depth, latch=topic.latched)
+        self._publisher: Any = rospy.Publisher(
+            topic.ros_name, there, queue_size=topic.depth, latch=topic.latched, tcp_nodelay=True
+        )
 
     @property
     def wanted(self) -> bool:
@@ -143,7 +145,12 @@ class _Incoming(Generic[M]):
             if self._subscriber is None:
                 there = ros1_type(type_name(self.topic.type))
                 self._subscriber = rospy.Subscriber(
-                    self.topic.ros_name, there, self._on_message, queue_size=self.topic.depth, buff_size=_BUFFER_BYTES
+                    self.topic.ros_name,
+                    there,
+                    self._on_message,
+                    queue_size=self.topic.depth,
+                    buff_size=_BUFFER_BYTES,
+                    tcp_nodelay=True,
                 )
 
     def remove(self, deliver: Deliver[M]) -> None:

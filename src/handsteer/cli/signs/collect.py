@@ -1,0 +1,177 @@
+"""``handsteer signs collect``: show a sign, to teach it."""
+
+import datetime
+import math
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from handsteer.cameras.choose import open_camera
+from handsteer.cli.options import ConfigFile, Flag, Parameters, say, settings
+from handsteer.cli.signs.tables import dataset_table
+from handsteer.cli.terminal import Keys, TerminalPicture
+from handsteer.clock import RealClock
+from handsteer.config import Config
+from handsteer.errors import DatasetError
+from handsteer.graph import open_landmarker
+from handsteer.landmarks.protocol import Hand
+from handsteer.signs.drawing import draw_hand
+from handsteer.signs.teaching.collect import Collector, Facts, Status, collect_live, collect_recorded
+from handsteer.signs.teaching.dataset import Dataset, label_for, load_dataset, save_dataset
+
+
+def collect(
+    *,
+    label: str | None = None,
+    dataset: Path = Path("signs.npz"),
+    camera: str | None = None,
+    person: str = "me",
+    session: str | None = None,
+    takes: int = 5,
+    take_time: float = 3.0,
+    countdown: float = 3.0,
+    hold: Flag = False,
+    undo: Flag = False,
+    config_file: ConfigFile = None,
+    parameters: Parameters = None,
+) -> int:
+    """Collect takes of a sign that shall be taught, in front of a camera or from a recording.
+
+    Example: handsteer signs collect --label Hi
+
+    Before each take there is a countdown, so both hands are free. In the terminal, u undoes the last take and q ends.
+    Takes are in the file as soon as they end. Show the sign as you will when you drive, and move the hand a little:
+    nearer, farther, tilted. The label NONE collects what shall be no sign.
+
+    Parameters
+    ----------
+    label
+        The sign, as Hi.
+    dataset
+        File that the takes are added to; it is made when it is not there.
+    camera
+        auto, virtual, a webcam's index or /dev/videoN, an address, a video file or a folder of photos. A video is cut
+        into takes; each photo is one.
+    person
+        Who shows it. A person is never both learnt from and tested on.
+    session
+        When or where it is; by default the date and time.
+    takes
+        How many to collect; a recording is taken as a whole.
+    take_time
+        How long each is, in seconds.
+    countdown
+        How long to wait before each, in seconds.
+    hold
+        No countdown: a take is as long as the space key is held.
+    undo
+        Take the last take out of the file again.
+    config_file
+        YAML file with parameters; those given here go before it.
+    """
+    config = settings(config_file, parameters, {"camera": {"source": camera}})
+    known = load_dataset(dataset) if dataset.exists() else Dataset()
+    if undo:
+        gone = known.takes[-1:]
+        save_dataset(known.without_last(), dataset)
+        say(f"took out the last take: {len(gone[0].hands)} hands of {gone[0].label}")
+        print(dataset_table(known.without_last()))
+        return 0
+    if label is None:
+        raise DatasetError("--label is missing: say which sign is shown, as --label Hi")
+    _check(takes, take_time, countdown, dataset)
+    when = session or f"{datetime.datetime.now():%Y-%m-%d %H:%M}"
+    facts = Facts(label_for(label, known.labels), person, when, _source_name(config.camera.source))
+    recorded = Path(config.camera.source).expanduser()
+    if recorded.exists() and not recorded.is_char_device():
+        new = collect_recorded(recorded, open_landmarker(config), facts, take_time)
+        known = known.with_takes(new)
+        save_dataset(known, dataset)
+    else:
+        if hold and not Keys.possible():
+            raise DatasetError(
+                "--hold needs a terminal to read keys from: leave it out, and a countdown takes its place"
+            )
+        collector = Collector(facts, takes=takes, take_s=take_time, countdown_s=countdown, hold=hold)
+        known = _live(config, collector, known, dataset, facts.label)
+    print(dataset_table(known))
+    return 0
+
+
+def _live(config: Config, collector: Collector, known: Dataset, path: Path, label: str) -> Dataset:
+    clock = RealClock()
+    landmarker = open_landmarker(config)
+    camera = open_camera(config.camera, config.virtual_hand, clock)
+    view = _View(label)
+    began = len(known.takes)
+    try:
+        with Keys() as keys:
+
+            def show(image: NDArray[np.uint8], hand: Hand | None, status: Status) -> None:
+                nonlocal known
+                if keys.pressed("q"):
+                    raise KeyboardInterrupt
+                if keys.pressed("u") and len(known.takes) > began:
+                    known = known.without_last()
+                    save_dataset(known, path)
+                    collector.again()
+                view.show(image, hand, status, len(known.takes) - began)
+
+            for take in collect_live(camera, landmarker, collector, clock, show=show, key_age=keys.space_age_s):
+                known = known.with_takes([take])
+                save_dataset(known, path)
+    except KeyboardInterrupt:
+        say("ended; the takes so far are in the file")
+    finally:
+        camera.close()
+    return known
+
+
+class _View:
+    """Shows how far the collecting is: the picture where there is a terminal, else a line for each change."""
+
+    def __init__(self, label: str) -> None:
+        self._label = label
+        self._picture = TerminalPicture() if TerminalPicture.possible() else None
+        self._last = ""
+
+    def show(self, image: NDArray[np.uint8], hand: Hand | None, status: Status, takes: int) -> None:
+        if self._picture is not None:
+            help_text = "u undoes the last take, q ends" if Keys.possible() else ""
+            self._picture.draw(
+                draw_hand(image, hand), _sentence(status, self._label, hand), f"takes: {takes}  {help_text}"
+            )
+        elif status.phase != self._last or status.finished or status.failed:
+            say(_sentence(status, self._label, hand))
+        self._last = status.phase
+
+
+def _sentence(status: Status, label: str, hand: Hand | None) -> str:
+    seen = "" if hand else " - no hand is in view"
+    if status.failed:
+        return "too few hands were seen: this take is done again"
+    if status.finished:
+        return f"a take of {len(status.finished.hands)} hands is done"
+    return {
+        "ready": f"hold the space key while you show {label}{seen}",
+        "countdown": f"show {label} in {math.ceil(status.left_s)} s{seen}",
+        "recording": f"recording {label}: {status.hands} hands{seen}",
+        "done": "all takes are done",
+    }[status.phase]
+
+
+def _source_name(source: str) -> str:
+    return Path(source).name if Path(source).expanduser().exists() else source
+
+
+def _check(takes: int, take_s: float, countdown_s: float, path: Path) -> None:
+    if not 1 <= takes <= 1000:
+        raise DatasetError(f"--takes: {takes} should be from 1 to 1000")
+    if not 0.2 <= take_s <= 60:
+        raise DatasetError(f"--take-time: {take_s:g} should be from 0.2 to 60 seconds")
+    if not 0 <= countdown_s <= 60:
+        raise DatasetError(f"--countdown: {countdown_s:g} should be from 0 to 60 seconds")
+    # Before the work, not after it.
+    if not path.absolute().parent.is_dir():
+        raise DatasetError(f"--dataset: there is no folder {path.absolute().parent} for {path.name}")

@@ -1,0 +1,158 @@
+"""Signs that were taught: their model file, and the classifier that knows them beside those that are shipped."""
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from handsteer.errors import DatasetError, ModelCorrupt, ModelError, ModelMissing
+from handsteer.landmarks.protocol import Hand
+from handsteer.signs.network import Network
+from handsteer.signs.network_arrays import from_arrays, to_arrays
+from handsteer.signs.novelty import Novelty
+from handsteer.signs.npz import Arrays, NpzFormat
+from handsteer.signs.protocol import Classifier, SignGuess
+from handsteer.signs.teaching.dataset import label_for
+from handsteer.signs.teaching.features import FEATURE_COUNTS, Array, Depth, taught_features
+from handsteer.signs.trained import legibility
+from handsteer.signs.vocabulary import NONE, SIGNS
+
+FORMAT: Final = 1
+"""Version of the file and of the features."""
+
+SURE: Final = 0.8
+"""The confidence that a sign gets whose likelihood is just at its threshold."""
+
+_FILE: Final = NpzFormat(
+    "model of taught signs",
+    FORMAT,
+    missing=ModelMissing,
+    corrupt=ModelCorrupt,
+    remedy="give one that `handsteer signs train` has written, or train it again",
+)
+
+
+_DEPTHS: Final[dict[str, Depth]] = {"full": "full", "flat": "flat"}
+
+
+@dataclass(frozen=True)
+class TaughtModel:
+    """Tells taught signs from all other hands.
+
+    Attributes:
+        labels: The signs, in the order of the network's classes; one more class is all other hands.
+        depth: Which features it takes.
+        network: From features to classes.
+        novelty: How far from all that was taught a hand may be.
+        thresholds: (labels,) likelihood from which each sign is sure, between 0 and 1.
+        trained_on: What it was trained on, with which version, as plain values.
+    """
+
+    labels: tuple[str, ...]
+    depth: Depth
+    network: Network
+    novelty: Novelty
+    thresholds: Array
+    trained_on: Mapping[str, Any]
+
+    def confidences(self, pixels: Array, world: Array) -> Array:
+        """Return the (n, labels) confidences, 0 to 1, of (n, 21, 2) pixels and (n, 21, 3) metres.
+
+        All but that of the likeliest sign are 0. So is that one for a shape that is new, and for landmarks that are not
+        numbers.
+        """
+        features = taught_features(pixels, world, self.depth)
+        chances = np.nan_to_num(self.network.probabilities(features)[:, :-1])
+        rows, best = np.arange(len(chances)), chances.argmax(axis=1)
+        near = self.novelty.distances(features, best) <= self.novelty.limit
+        confidences = np.zeros_like(chances)
+        confidences[rows, best] = chances[rows, best] ** (math.log(SURE) / np.log(self.thresholds[best])) * near
+        return confidences
+
+
+class TaughtClassifier:
+    """A :class:`~handsteer.signs.protocol.Classifier` for taught signs beside those of another.
+
+    What the other is sure of stays, so that no taught sign can change how the shipped ones drive.
+
+    Args:
+        other: Knows the signs that are shipped.
+        model: As :func:`load_taught` gives it.
+    """
+
+    def __init__(self, other: Classifier, model: TaughtModel) -> None:
+        self._other = other
+        self._model = model
+
+    @property
+    def signs(self) -> tuple[str, ...]:
+        """The signs that it can tell, without ``NONE``."""
+        return (*self._other.signs, *self._model.labels)
+
+    def classify(self, hand: Hand) -> SignGuess:
+        """Return the sign that ``hand`` shows; ``NONE`` when it is likelier that it shows none."""
+        known = self._other.classify(hand)
+        if known.sign != NONE and known.confidence >= SURE:
+            return known
+        confidences = self._model.confidences(
+            hand.pixels[None, :, :2].astype(np.float64), hand.world[None].astype(np.float64)
+        )[0]
+        best = int(confidences.argmax())
+        confidence = float(confidences[best]) * legibility(hand)
+        if confidence < 0.5 or (known.sign != NONE and known.confidence >= confidence):
+            return known
+        return SignGuess(self._model.labels[best], confidence)
+
+
+def save_taught(model: TaughtModel, path: Path) -> None:
+    """Write ``model`` to ``path``, as a whole or not at all; the same model always gives the same bytes.
+
+    Raises:
+        ModelError: It cannot be written.
+    """
+    content = {
+        "taught": np.array(model.labels),
+        "depth": np.array(model.depth),
+        "limit": np.array(model.novelty.limit),
+        "thresholds": model.thresholds,
+        "trained_on": np.array(json.dumps(model.trained_on, sort_keys=True)),
+    }
+    try:
+        _FILE.write(path, content | to_arrays(model.network, model.novelty))
+    except OSError as error:
+        raise ModelError(f"cannot write the model of taught signs {path}: {error.strerror}") from None
+
+
+def load_taught(path: Path) -> TaughtModel:
+    """Return the model in the file ``path``. Nothing in a file is ever run.
+
+    Raises:
+        ModelMissing: It cannot be read.
+        ModelCorrupt: It is no model of taught signs, is damaged, or has another format.
+    """
+    arrays = _FILE.read(path)
+    try:
+        return _built(arrays)
+    except (KeyError, ValueError, TypeError, AttributeError, DatasetError) as error:
+        raise _FILE.damaged(path, error) from None
+
+
+def _built(arrays: Arrays) -> TaughtModel:
+    depth = _DEPTHS[str(arrays["depth"])]
+    network, novelty = from_arrays(arrays, FEATURE_COUNTS[depth])
+    labels = tuple(str(label) for label in arrays["taught"])
+    thresholds = arrays["thresholds"].astype(np.float64)
+    count = len(labels)
+    if not (
+        len(network.biases[-1]) == count + 1 > 1 and len(novelty.centres) == count and thresholds.shape == (count,)
+    ):
+        raise ValueError("its parts do not fit together")
+    if not ((thresholds > 0) & (thresholds < 1)).all():
+        raise ValueError("a threshold is not between 0 and 1")
+    if len(set(labels)) < count or {*SIGNS, NONE} & set(labels) or any(label_for(each) != each for each in labels):
+        raise ValueError("its signs are not named as taught signs are")
+    return TaughtModel(labels, depth, network, novelty, thresholds, dict(json.loads(str(arrays["trained_on"]))))

@@ -1,0 +1,275 @@
+"""Learns what the takes of a sign have in common, and how well that tells it from all other hands."""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence, Set
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from handsteer import __version__
+from handsteer.signs.figures import Confusion, Share
+from handsteer.signs.network import train
+from handsteer.signs.novelty import learn_novelty
+from handsteer.signs.protocol import Classifier
+from handsteer.signs.teaching.checks import check_enough, check_not_known, check_told_apart, taught_labels
+from handsteer.signs.teaching.dataset import Dataset, LabelSummary, Take, summarise
+from handsteer.signs.teaching.features import Array, Depth, taught_features
+from handsteer.signs.teaching.split import split
+from handsteer.signs.teaching.taught import FORMAT, SURE, TaughtModel
+from handsteer.signs.teaching.variation import mirrored, points_sideways, vary
+from handsteer.signs.training.hands import Hands, make_hands
+from handsteer.signs.vocabulary import NONE
+
+SEED: Final = 11
+_HIDDEN: Final = (64, 32)
+_EPOCHS: Final = 8
+_OF_EACH: Final = 6_000
+_MADE: Final = 50_000
+"""Hands to make of all shapes; about four of five have a shape that nobody would doubt, and are used."""
+_LEAST_RECALL: Final = 0.975
+_THRESHOLDS: Final = (0.7, 0.98)
+_LIMIT_MARGIN: Final = 1.2
+"""How much farther than those of the takes and their variations a hand of the same sign may be."""
+
+
+@dataclass(frozen=True)
+class TaughtSign:
+    """How a sign was learnt.
+
+    Attributes:
+        summary: What there was of it.
+        sided: Whether it is told as it was shown only, and not mirrored too.
+        threshold: Likelihood from which it is sure.
+        recall: Of the rows that were held out, how many were told right; None when it could not be held out, as only
+            one person showed it and others showed other signs.
+    """
+
+    summary: LabelSummary
+    sided: bool
+    threshold: float
+    recall: Share | None
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the figures as plain values, for JSON."""
+        recall = self.recall.as_dict() if self.recall else None
+        return {**self.summary.as_dict(), "sided": self.sided, "threshold": round(self.threshold, 4), "recall": recall}
+
+
+@dataclass(frozen=True)
+class TeachingReport:
+    """How well the signs were learnt.
+
+    Attributes:
+        signs: Each of them.
+        held_out: What was held out at a time to find out: ``person``, ``session`` or ``take``.
+        confusion: Held-out rows, both hands, by the sign that they show and the one that was told.
+        made: Of made hands of all shapes, how many are told as one of the signs; some of them truly show it.
+    """
+
+    signs: tuple[TaughtSign, ...]
+    held_out: str
+    confusion: Confusion
+    made: Share
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the figures as plain values, for JSON."""
+        return {
+            "signs": [sign.as_dict() for sign in self.signs],
+            "held_out": self.held_out,
+            "confusion": self.confusion.as_dict(),
+            "made_hands": self.made.as_dict(),
+        }
+
+
+@dataclass(frozen=True)
+class _Rows:
+    """Hands with the class that they are of."""
+
+    pixels: Array
+    world: Array
+    classes: NDArray[np.int64]
+
+
+def train_signs(
+    dataset: Dataset,
+    shipped: Classifier,
+    *,
+    sided: Sequence[str] = (),
+    progress: Callable[[int, int], object] = lambda _done, _of: None,
+) -> tuple[TaughtModel, TeachingReport]:
+    """Return a model that tells the signs of ``dataset`` from all other hands, and how well it does.
+
+    Each sign is told with either hand, by its mirror image, unless it points to a side. What makes other hands is made
+    (:mod:`handsteer.signs.training`), and what the dataset has of ``NONE`` and of the signs that are shipped.
+    Persons are held out in turn to find out how well the signs are told, and from which likelihood on; where there is
+    one person only, sessions or takes are. The model is then trained on all of them.
+
+    Args:
+        dataset: The takes.
+        shipped: Knows the signs that are shipped, which cannot be taught again.
+        sided: Signs that are another sign, or none, when they are mirrored, beyond those that point to a side.
+        progress: Called with the number of steps that are done, and of all.
+
+    Raises:
+        TrainingError: There is no sign to learn or too little of one, two labels mean the same or look alike, one looks
+            like a shipped sign, or ``sided`` names a sign that is not there.
+    """
+    labels = taught_labels(dataset, sided)
+    check_enough(dataset, labels)
+    check_not_known(dataset, labels, shipped)
+    depth: Depth = "flat" if any(take.is_flat for take in dataset.takes) else "full"
+    teacher = _Teacher(frozenset(sided) | _pointing_sideways(dataset, labels), depth)
+    held_out, folds = split(dataset, labels)
+    steps = _Steps(progress, of=_EPOCHS * (len(folds) + 1))
+    tries = []
+    for fold in folds:
+        learnt = tuple(label for label in labels if any(take.label == label for take in fold.rest))
+        tries.append(teacher.try_out(teacher.learn(fold.rest, learnt, steps), fold.held_out, labels))
+    truths = np.concatenate([truth for truth, _ in tries] or [np.zeros(0, np.int64)])
+    chances = np.concatenate([chance for _, chance in tries] or [np.zeros((0, len(labels)))])
+    thresholds = _thresholds(truths, chances, len(labels))
+    confusion = _confusion(truths, chances, thresholds, labels)
+    check_told_apart(_confusion(truths, chances, np.zeros(len(labels)), labels))
+    model = teacher.learn(dataset.takes, labels, steps, thresholds)
+    made = _made(SEED + 1)
+    report = TeachingReport(
+        signs=tuple(_taught_signs(dataset, labels, teacher.sided, thresholds, confusion)),
+        held_out=held_out,
+        confusion=confusion,
+        made=Share(int((model.confidences(made.pixels, made.world) >= SURE).any(axis=1).sum()), len(made.shapes)),
+    )
+    return model, report
+
+
+class _Steps:
+    """Counts epochs over several trainings."""
+
+    def __init__(self, progress: Callable[[int, int], object], of: int) -> None:
+        self._progress = progress
+        self._of = of
+        self._done = 0
+
+    def __call__(self, _epoch: int) -> None:
+        self._done += 1
+        self._progress(self._done, self._of)
+
+
+class _Teacher:
+    """Makes models of taught signs.
+
+    Attributes:
+        sided: Signs that are not mirrored.
+    """
+
+    def __init__(self, sided: frozenset[str], depth: Depth) -> None:
+        self.sided = sided
+        self._depth = depth
+        self._made = _made(SEED)
+
+    def learn(
+        self,
+        takes: Sequence[Take],
+        labels: tuple[str, ...],
+        progress: Callable[[int], object],
+        thresholds: Array | None = None,
+    ) -> TaughtModel:
+        """Return a model of ``labels``, each of which occurs in ``takes``; other takes are examples of other hands."""
+        random = np.random.default_rng(SEED)
+        other = len(labels)
+        rows = [
+            self._varied([take for take in takes if take.label == label], number, random)
+            for number, label in enumerate(labels)
+        ]
+        others = [take for take in takes if take.label not in labels]
+        if others:
+            rows.append(self._varied(others, other, random))
+        rows.append(_Rows(self._made.pixels, self._made.world, np.full(len(self._made.shapes), other)))
+        features = np.concatenate([taught_features(each.pixels, each.world, self._depth) for each in rows])
+        classes = np.concatenate([each.classes for each in rows])
+        network = train(features, classes, hidden=_HIDDEN, epochs=_EPOCHS, seed=SEED, progress=progress)
+        mine = classes < other
+        novelty = learn_novelty(features[mine], classes[mine], network.mean, network.scale, margin=_LIMIT_MARGIN)
+        if thresholds is None:
+            thresholds = np.full(other, SURE)
+        return TaughtModel(labels, self._depth, network, novelty, thresholds, self._facts(takes))
+
+    def try_out(
+        self, model: TaughtModel, takes: Sequence[Take], labels: tuple[str, ...]
+    ) -> tuple[NDArray[np.int64], Array]:
+        """Return the (n,) true ``labels`` of ``takes``, as indices, and the (n, labels) confidences that they get.
+
+        Each hand is tried as it is, and mirrored if its sign is one of both hands.
+        """
+        truths, chances = [], []
+        columns = [labels.index(label) for label in model.labels]
+        for take in takes:
+            looks = [(take.pixels, take.world)]
+            if take.label not in self.sided:
+                looks.append((mirrored(take.pixels), mirrored(take.world)))
+            for pixels, world in looks:
+                of_all = np.zeros((len(pixels), len(labels)))
+                of_all[:, columns] = model.confidences(pixels, world)
+                truths.append(np.full(len(pixels), labels.index(take.label)))
+                chances.append(of_all)
+        return np.concatenate(truths), np.concatenate(chances)
+
+    def _varied(self, takes: Sequence[Take], number: int, random: np.random.Generator) -> _Rows:
+        pixels = np.concatenate([take.pixels for take in takes])
+        world = np.concatenate([take.world for take in takes])
+        both_hands = not any(take.label in self.sided for take in takes)
+        pixels, world = vary(pixels, world, _OF_EACH, random, both_hands=both_hands)
+        return _Rows(pixels, world, np.full(len(pixels), number))
+
+    def _facts(self, takes: Sequence[Take]) -> Mapping[str, Any]:
+        dataset = Dataset(tuple(takes))
+        return {
+            "format": FORMAT,
+            "handsteer": __version__,
+            "sources": sorted({take.source for take in takes}),
+            "persons": len({take.person for take in takes}),
+            "signs": [summary.as_dict() for summary in summarise(dataset)],
+            "sided": sorted(self.sided),
+            "made_hands": len(self._made.shapes),
+            "seed": SEED,
+        }
+
+
+def _made(seed: int) -> Hands:
+    return make_hands(_MADE, np.random.default_rng(seed))
+
+
+def _thresholds(truths: NDArray[np.int64], chances: Array, count: int) -> Array:
+    """Return the (labels,) likelihoods from which a sign is sure: as high as most held-out rows of it allow."""
+    thresholds = np.full(count, SURE)
+    for label in range(count):
+        mine = chances[truths == label, label]
+        if mine.size:
+            thresholds[label] = np.clip(
+                np.quantile(mine[mine > 0], 1 - _LEAST_RECALL) if mine.any() else 0, *_THRESHOLDS
+            )
+    return thresholds
+
+
+def _confusion(truths: NDArray[np.int64], chances: Array, thresholds: Array, labels: tuple[str, ...]) -> Confusion:
+    best = chances.argmax(axis=1) if len(chances) else np.zeros(0, int)
+    highest = chances[np.arange(len(best)), best]
+    sure = (highest > 0) & (highest >= thresholds[best])
+    names = (*labels, NONE)
+    seen = np.where(sure, best, len(labels))
+    return Confusion.of(((names[truth], names[told]) for truth, told in zip(truths, seen, strict=True)), labels)
+
+
+def _pointing_sideways(dataset: Dataset, labels: Sequence[str]) -> frozenset[str]:
+    rows = {label: np.concatenate([take.pixels for take in dataset.of(label)]) for label in labels}
+    return frozenset(label for label, pixels in rows.items() if points_sideways(pixels))
+
+
+def _taught_signs(
+    dataset: Dataset, labels: tuple[str, ...], sided: Set[str], thresholds: Array, confusion: Confusion
+) -> Iterable[TaughtSign]:
+    summaries = {summary.label: summary for summary in summarise(dataset)}
+    for number, label in enumerate(labels):
+        counts = confusion.counts[number]
+        recall = Share(counts[number], sum(counts)) if any(counts) else None
+        yield TaughtSign(summaries[label], label in sided, float(thresholds[number]), recall)
