@@ -4,16 +4,20 @@ VENV := .venv
 BIN := $(VENV)/bin
 ARGS ?=
 
-.PHONY: help run test lint unit format lock bench bench-signs signs-model models docs screenshots clean
+.PHONY: help run test ros1 test-ros1 lint unit format lock bench bench-signs signs-model models docs screenshots \
+	screenshots-ros1 clean
 
 help:
 	@echo "make run          drive the robot: your webcam, or the virtual hand (options: make run ARGS='--camera 0')"
 	@echo "make test         everything that CI checks: format, lint, types, tests"
+	@echo "make ros1         install ROS 1 from Debian's or Ubuntu's packages, for handsteer ... --transport ros1"
+	@echo "make test-ros1    check what runs on ROS 1"
 	@echo "make bench        print the speed and accuracy tables"
 	@echo "make bench-signs  print how well signs are told on photos of people"
 	@echo "make signs-model  train the sign model again, from hands that it makes itself; gives the same file"
 	@echo "make docs         write docs/configuration.md again from the configuration"
 	@echo "make screenshots  make the README's pictures again (needs Chromium)"
+	@echo "make screenshots-ros1  make the picture of RViz again (needs ROS 1, rviz, xvfb and imagemagick)"
 	@echo "make lock         make the requirements files again from pyproject.toml"
 	@echo "make clean        remove the environment and all caches"
 
@@ -30,6 +34,12 @@ lint: $(BIN)/.dev
 
 unit: $(BIN)/.dev models
 	@$(BIN)/pytest -n auto $(ARGS)
+
+ros1: $(BIN)/.dev
+	@scripts/setup-ros1
+
+test-ros1: $(BIN)/.dev models
+	@$(BIN)/pytest -n auto -m ros1 $(ARGS)
 
 models: | $(BIN)/.run
 	@$(BIN)/handsteer models > /dev/null
@@ -53,6 +63,9 @@ docs: $(BIN)/.dev
 screenshots: $(BIN)/.dev models
 	@$(BIN)/python scripts/screenshot.py
 	@$(BIN)/python scripts/sign_pictures.py
+
+screenshots-ros1: | $(BIN)/.dev models
+	@$(BIN)/python scripts/rviz_screenshot.py
 
 $(BIN)/.run: scripts/setup requirements.txt pyproject.toml
 	@scripts/setup requirements.txt && touch $@

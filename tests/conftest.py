@@ -1,8 +1,13 @@
-"""What tests share: where the real photos and clips are."""
+"""What tests share: where the real photos and clips are, and a ROS 1 graph."""
 
+import importlib.util
+import shutil
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+
+from tests.ros1.graph import Ros1Graph, ros1_graph
 
 DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 
@@ -19,3 +24,17 @@ def data_dir() -> Path:
 def slideshow(data_dir: Path) -> Path:
     """A labelled slide show of people showing signs, 12 frames a second."""
     return data_dir / "videos" / "slideshow_emre_MIT_640x480.mp4"
+
+
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """Skip what needs ROS 1 where that is not installed."""
+    there = importlib.util.find_spec("rospy") and shutil.which("roscore")
+    if item.get_closest_marker("ros1") and not there:
+        pytest.skip("ROS 1 is not installed: make ros1")
+
+
+@pytest.fixture(scope="module")
+def ros1(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Ros1Graph]:
+    """A ROS 1 graph with a master of its own; mark the tests that use it ``ros1``."""
+    with ros1_graph(tmp_path_factory.mktemp("ros")) as graph:
+        yield graph

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from handsteer.clock import RealClock, SteppedClock, to_seconds, to_stamp
+from handsteer.clock import RealClock, SimulatedClock, SteppedClock, WallClock, to_seconds, to_stamp
 
 
 def test_stamps_of_the_real_clock_are_unix_time() -> None:
@@ -25,3 +25,86 @@ def test_stamps_keep_nanoseconds_within_a_second(seconds: float) -> None:
     stamp = to_stamp(seconds)
     assert 0 <= stamp.nanosec < 1_000_000_000
     assert to_seconds(stamp) == pytest.approx(seconds, abs=1e-6)
+
+
+class Simulator:
+    """A simulator whose time is told to a clock, in real time that a test moves."""
+
+    def __init__(self) -> None:
+        self.real_s = 100.0
+        self.clock = SimulatedClock(lambda: self.real_s)
+
+    def run(self, seconds: float, *, from_s: float, tick_s: float = 0.02) -> float:
+        """Tell the clock the time from ``from_s`` on, as fast as real time; return the time told last."""
+        for tick in range(1, round(seconds / tick_s) + 1):
+            self.real_s += tick_s
+            self.clock.tell(from_s + tick * tick_s)
+        return from_s + seconds
+
+
+def test_simulated_time_is_followed() -> None:
+    simulator = Simulator()
+    simulator.run(1.0, from_s=50.0)
+    assert simulator.clock.now() == pytest.approx(51.0)
+    simulator.real_s += 0.1
+    assert simulator.clock.now() == pytest.approx(51.0)
+    assert simulator.clock.stamp(50.5) == to_stamp(50.5)
+    assert simulator.clock.time_of(to_stamp(50.5)) == pytest.approx(50.5)
+
+
+def test_when_simulated_time_stands_seconds_pass_and_frames_grow_old() -> None:
+    simulator = Simulator()
+    simulator.run(1.0, from_s=50.0)
+    simulator.real_s += 2.0
+    clock = simulator.clock
+    assert 52.5 < clock.now() < 53.0
+    frame = clock.stamp(clock.now())
+    assert frame == to_stamp(51.0)
+    simulator.real_s += 1.0
+    clock.tell(51.0)  # it is paused, and says so
+    assert clock.now() - clock.time_of(frame) > 2.5
+    assert clock.silence_s == pytest.approx(3.0)
+
+
+def test_when_simulated_time_goes_on_the_clock_goes_on_from_where_it_is() -> None:
+    simulator = Simulator()
+    end_s = simulator.run(1.0, from_s=50.0)
+    old = simulator.clock.stamp(simulator.clock.now())
+    simulator.real_s += 10.0
+    before_s = simulator.clock.now()
+    simulator.run(1.0, from_s=end_s)
+    clock = simulator.clock
+    assert clock.now() == pytest.approx(before_s + 1.0, abs=0.03)
+    fresh = clock.stamp(clock.now())
+    assert fresh == to_stamp(52.0)
+    assert clock.time_of(fresh) == pytest.approx(clock.now())
+    assert clock.now() - clock.time_of(old) > 10.0
+
+
+def test_a_simulator_that_starts_again_does_not_turn_the_clock_back() -> None:
+    simulator = Simulator()
+    simulator.run(1.0, from_s=50.0)
+    before_s = simulator.clock.now()
+    simulator.run(1.0, from_s=0.0)
+    assert simulator.clock.now() == pytest.approx(before_s + 1.0, abs=0.03)
+    assert simulator.clock.stamp(simulator.clock.now()) == to_stamp(1.0)
+
+
+@given(st.lists(st.tuples(st.floats(0, 5), st.floats(0, 1000)), max_size=30))
+def test_simulated_time_never_goes_back(steps: list[tuple[float, float]]) -> None:
+    simulator = Simulator()
+    last_s = simulator.clock.now()
+    for real_s, told_s in steps:
+        simulator.real_s += real_s
+        for _ in range(2):
+            assert simulator.clock.now() >= last_s
+            last_s = simulator.clock.now()
+            simulator.clock.tell(told_s)
+        assert simulator.clock.stamp(simulator.clock.now()) == to_stamp(told_s)
+
+
+def test_stamps_of_a_shared_clock_follow_the_wall_clock() -> None:
+    clock = WallClock()
+    stamp = clock.stamp(clock.now())
+    assert to_seconds(stamp) == pytest.approx(time.time(), abs=0.05)
+    assert clock.time_of(stamp) == pytest.approx(clock.now(), abs=0.05)

@@ -5,17 +5,20 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from handsteer.errors import FrameError
-from handsteer.images import bgr_image, image_message, jpeg_message
-from handsteer.messages import Header, Image, Time
+from handsteer.images import bgr_image, image_message, jpeg_message, jpeg_picture
+from handsteer.messages import CompressedImage, Header, Image, Time
 
 HEADER = Header(stamp=Time(1, 2), frame_id="camera")
 BGR = np.random.default_rng(0).integers(0, 255, (48, 64, 3), np.uint8)
 
 
-def message(encoding: str, pixels: np.ndarray, padding: int = 0) -> Image:
+BT_601 = [[65.481, 128.553, 24.966], [-37.797, -74.203, 112.0], [112.0, -93.786, -18.214]]
+
+
+def message(encoding: str, pixels: np.ndarray, padding: int = 0, width: int | None = None) -> Image:
     rows = pixels.reshape(pixels.shape[0], -1)
     padded = np.pad(rows, ((0, 0), (0, padding)), constant_values=99)
-    return Image(HEADER, pixels.shape[0], pixels.shape[1], encoding, 0, padded.shape[1], padded.reshape(-1))
+    return Image(HEADER, pixels.shape[0], width or pixels.shape[1], encoding, 0, padded.shape[1], padded.reshape(-1))
 
 
 def test_there_and_back_shares_the_data() -> None:
@@ -25,37 +28,86 @@ def test_there_and_back_shares_the_data() -> None:
     np.testing.assert_array_equal(bgr_image(sent), BGR)
 
 
+def packed(encoding: str, bgr: np.ndarray) -> np.ndarray:
+    """Return ``bgr`` in ``encoding``, worked out here and not by OpenCV, but for YUV's colours."""
+    blue, green, red = bgr[..., 0], bgr[..., 1], bgr[..., 2]
+    opaque = np.full_like(blue, 255)
+    orders = {
+        "bgr8": (blue, green, red),
+        "8UC3": (blue, green, red),
+        "rgb8": (red, green, blue),
+        "bgra8": (blue, green, red, opaque),
+        "rgba8": (red, green, blue, opaque),
+        "mono8": (blue,),
+        "8UC1": (blue,),
+    }
+    return np.stack(orders[encoding], axis=2)
+
+
+@st.composite
+def pictures(draw: st.DrawFn) -> np.ndarray:
+    """Return small pictures, (height, width, 3) uint8, BGR, of noise."""
+    height, width, seed = draw(st.integers(1, 9)), draw(st.integers(1, 9)), draw(st.integers(0, 99))
+    return np.random.default_rng(seed).integers(0, 256, (height, width, 3), np.uint8)
+
+
+@given(pictures(), st.sampled_from(["bgr8", "8UC3", "rgb8", "bgra8", "rgba8"]), st.integers(0, 20))
+def test_colours_and_padded_rows(bgr: np.ndarray, encoding: str, padding: int) -> None:
+    np.testing.assert_array_equal(bgr_image(message(encoding, packed(encoding, bgr), padding)), bgr)
+
+
+@given(pictures(), st.sampled_from(["mono8", "8UC1"]), st.integers(0, 20))
+def test_grey_becomes_three_equal_channels(bgr: np.ndarray, encoding: str, padding: int) -> None:
+    grey = np.repeat(bgr[:, :, :1], 3, axis=2)
+    np.testing.assert_array_equal(bgr_image(message(encoding, packed(encoding, bgr), padding)), grey)
+
+
 @pytest.mark.parametrize(
-    ("encoding", "pixels"),
-    [
-        ("bgr8", BGR),
-        ("rgb8", cv2.cvtColor(BGR, cv2.COLOR_BGR2RGB)),
-        ("bgra8", cv2.cvtColor(BGR, cv2.COLOR_BGR2BGRA)),
-        ("rgba8", cv2.cvtColor(BGR, cv2.COLOR_BGR2RGBA)),
-    ],
+    ("encoding", "order"),
+    [("yuv422", "UYVY"), ("uyvy", "UYVY"), ("yuv422_yuy2", "YUYV"), ("yuyv", "YUYV")],
 )
-@pytest.mark.parametrize("padding", [0, 16])
-def test_colours_and_padded_rows(encoding: str, pixels: np.ndarray, padding: int) -> None:
-    np.testing.assert_array_equal(bgr_image(message(encoding, pixels, padding)), BGR)
+@given(st.tuples(*[st.integers(0, 255)] * 3), st.integers(1, 5), st.sampled_from([0, 6]))
+def test_both_byte_orders_of_yuv422(
+    encoding: str, order: str, rgb: tuple[int, int, int], pairs: int, padding: int
+) -> None:
+    # BT.601, as video has it: Y from 16 to 235, U and V from 16 to 240.
+    y, u, v = np.array([16, 128, 128]) + np.array(BT_601) @ rgb / 255
+    pair = np.array([round({"Y": y, "U": u, "V": v}[letter]) for letter in order], np.uint8)
+    picture = bgr_image(message(encoding, np.tile(pair, (2, pairs)), padding, width=2 * pairs))
+    assert picture.shape == (2, 2 * pairs, 3)
+    assert np.abs(picture[..., ::-1].astype(int) - rgb).max() <= 3
 
 
-def test_grey_becomes_three_equal_channels() -> None:
-    grey = BGR[:, :, 0].copy()
-    np.testing.assert_array_equal(bgr_image(message("mono8", grey)), np.repeat(grey[:, :, None], 3, axis=2))
+def test_the_last_row_needs_no_padding() -> None:
+    padded = message("bgr8", BGR, padding=8)
+    padded.data = padded.data[:-8]
+    np.testing.assert_array_equal(bgr_image(padded), BGR)
 
 
-def test_an_encoding_that_is_not_known() -> None:
-    with pytest.raises(FrameError, match="image encoding '16UC1' is not supported: use one of bgr8, rgb8"):
-        bgr_image(message("16UC1", BGR))
+@pytest.mark.parametrize("encoding", ["16UC1", "mono16", "rgb16", "32FC1"])
+def test_more_than_8_bits_are_refused(encoding: str) -> None:
+    with pytest.raises(FrameError, match=rf"'{encoding}' has more than 8 bits a channel: use one of bgr8, rgb8"):
+        bgr_image(message(encoding, BGR))
+
+
+@pytest.mark.parametrize("encoding", ["", "bayer_rggb8", "BGR8"])
+def test_an_encoding_that_is_not_known(encoding: str) -> None:
+    with pytest.raises(FrameError, match=rf"'{encoding}' is not known: use one of bgr8, rgb8"):
+        bgr_image(message(encoding, BGR))
+
+
+def test_half_a_pair_of_pixels_is_refused() -> None:
+    with pytest.raises(FrameError, match="yuv422 image has pairs of pixels, it cannot be 3 wide"):
+        bgr_image(message("yuv422", np.zeros((2, 3, 2), np.uint8)))
 
 
 @given(st.integers(0, 300), st.integers(0, 40), st.integers(0, 40), st.integers(0, 200))
 def test_sizes_that_do_not_fit_are_refused(size: int, height: int, width: int, step: int) -> None:
     wrong = Image(HEADER, height, width, "bgr8", 0, step, np.zeros(size, np.uint8))
-    if step >= 3 * width and size >= step * height:
+    if height and width and step >= 3 * width and size >= step * (height - 1) + 3 * width:
         assert bgr_image(wrong).shape == (height, width, 3)
     else:
-        with pytest.raises(FrameError, match="needs a step of at least"):
+        with pytest.raises(FrameError, match=r"needs a step of at least|has no pixels"):
             bgr_image(wrong)
 
 
@@ -66,3 +118,10 @@ def test_jpeg() -> None:
     assert decoded is not None
     assert np.abs(decoded.astype(int) - smooth).mean() < 3
     assert "jpeg" in compressed.format
+    np.testing.assert_array_equal(jpeg_picture(compressed), decoded)
+
+
+@given(st.binary(max_size=64))
+def test_what_is_no_picture_is_refused(data: bytes) -> None:
+    with pytest.raises(FrameError, match="is no picture"):
+        jpeg_picture(CompressedImage(HEADER, "jpeg", np.frombuffer(data, np.uint8)))

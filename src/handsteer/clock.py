@@ -1,15 +1,21 @@
-"""The time that a graph runs on: real, or stepped by hand.
+"""The time that a graph runs on: real, stepped by hand, or a simulator's.
 
 Everything timed uses :meth:`Clock.now`, which is monotonic. :meth:`Clock.stamp` turns such a time into the
-``builtin_interfaces/Time`` that message headers carry.
+``builtin_interfaces/Time`` that message headers carry, :meth:`Clock.time_of` turns it back.
 """
 
+import math
+import threading
 import time
+from collections.abc import Callable
 from typing import Protocol
 
 from handsteer.messages import Time
 
 _NS_PER_S = 1_000_000_000
+_LOOK_AGAIN_S = 0.005
+# Simulators tell their time 10 to 1000 times a second.
+_STANDS_AFTER_S = 0.15
 
 
 class Clock(Protocol):
@@ -21,6 +27,17 @@ class Clock(Protocol):
 
     def stamp(self, time_s: float) -> Time:
         """Return the header stamp for ``time_s``, a time that :meth:`now` returned."""
+        ...
+
+    def time_of(self, stamp: Time) -> float:
+        """Return the time in seconds, as :meth:`now` tells it, that a header stamp stands for."""
+        ...
+
+    def wait(self, wake: threading.Condition, timeout_s: float | None) -> None:
+        """Wait until ``wake``, which the caller holds, is notified, or ``timeout_s`` of this clock have passed.
+
+        It may return early: the caller looks again at what it waits for. None waits for the notification alone.
+        """
         ...
 
 
@@ -39,7 +56,28 @@ class RealClock:
 
     def stamp(self, time_s: float) -> Time:
         """Return Unix time for the monotonic ``time_s``."""
-        return to_stamp(time_s + self._epoch_offset_s)
+        return to_stamp(time_s + self._offset_s())
+
+    def time_of(self, stamp: Time) -> float:
+        """Return the monotonic time for the Unix time ``stamp``."""
+        return to_seconds(stamp) - self._offset_s()
+
+    def wait(self, wake: threading.Condition, timeout_s: float | None) -> None:
+        """Wait in real seconds."""
+        wake.wait(timeout_s)
+
+    def _offset_s(self) -> float:
+        return self._epoch_offset_s
+
+
+class WallClock(RealClock):
+    """The machine's monotonic clock; stamps are Unix time as it is now, for graphs that share stamps among processes.
+
+    When the wall clock is set, the stamps of all processes must jump alike, or a frame of one is stale to the other.
+    """
+
+    def _offset_s(self) -> float:
+        return time.time() - time.monotonic()
 
 
 class SteppedClock:
@@ -56,6 +94,14 @@ class SteppedClock:
         """Return ``time_s`` as a stamp."""
         return to_stamp(time_s)
 
+    def time_of(self, stamp: Time) -> float:
+        """Return ``stamp`` in seconds."""
+        return to_seconds(stamp)
+
+    def wait(self, wake: threading.Condition, timeout_s: float | None) -> None:
+        """Wait for a moment: only others can move this clock, so the caller has to look again."""
+        wake.wait(_LOOK_AGAIN_S)
+
     def advance_to(self, time_s: float) -> None:
         """Move to ``time_s`` seconds; a time in the past leaves the clock where it is."""
         self._now_s = max(self._now_s, time_s)
@@ -63,6 +109,70 @@ class SteppedClock:
     def advance(self, seconds: float) -> None:
         """Move forward by ``seconds``."""
         self.advance_to(self._now_s + seconds)
+
+
+class SimulatedClock:
+    """Follows a simulator's time, as the topic ``/clock`` tells it; may be used from any thread.
+
+    When the simulator's time stands still, so do the stamps, but this clock goes on in real seconds: a watchdog must
+    bark even then, and a frame that was stamped by a clock that stands must grow old. When the simulator's time goes
+    on, or starts again from an earlier one, this clock goes on from where it is; it never goes back.
+
+    Args:
+        real: Tells real, monotonic seconds.
+    """
+
+    def __init__(self, real: Callable[[], float] = time.monotonic) -> None:
+        self._real = real
+        self._lock = threading.Lock()
+        self._told_s = 0.0
+        self._told_at_s = real() - _STANDS_AFTER_S
+        self._offset_s = 0.0
+        self._newest_s = 0.0
+        # Stamps up to this one are older than the last interruption, and have the offset of before.
+        self._old_until_s, self._old_offset_s = -math.inf, 0.0
+
+    @property
+    def silence_s(self) -> float:
+        """How long ago the simulator's time was told last, in real seconds."""
+        return self._real() - self._told_at_s
+
+    def tell(self, time_s: float) -> None:
+        """Note that the simulator's time is ``time_s`` seconds now."""
+        with self._lock:
+            if time_s == self._told_s:
+                return  # a simulator that is paused
+            now = self._now()
+            if time_s + self._offset_s < now:
+                self._old_until_s, self._old_offset_s = min(self._told_s, time_s), self._offset_s
+                self._offset_s = now - time_s
+            self._told_s, self._told_at_s = time_s, self._real()
+
+    def now(self) -> float:
+        """Return the time in seconds since the simulator's start, interruptions included."""
+        with self._lock:
+            return self._now()
+
+    def stamp(self, time_s: float) -> Time:
+        """Return the simulator's time for ``time_s``; never one that the simulator has not reached yet."""
+        with self._lock:
+            return to_stamp(max(0.0, min(time_s - self._offset_s, self._told_s)))
+
+    def time_of(self, stamp: Time) -> float:
+        """Return the time in seconds that the simulator's time ``stamp`` stands for."""
+        seconds = to_seconds(stamp)
+        with self._lock:
+            return seconds + (self._old_offset_s if seconds <= self._old_until_s else self._offset_s)
+
+    def wait(self, wake: threading.Condition, timeout_s: float | None) -> None:
+        """Wait for a moment: how long a second takes here is not known before it is over."""
+        wake.wait(_LOOK_AGAIN_S if timeout_s is None or timeout_s > 0 else 0)
+
+    def _now(self) -> float:
+        stood_s = max(0.0, self._real() - self._told_at_s - _STANDS_AFTER_S)
+        # The greatest of all, because sums of the same seconds in another order differ in their last digit.
+        self._newest_s = max(self._newest_s, self._told_s + self._offset_s + stood_s)
+        return self._newest_s
 
 
 def to_stamp(seconds: float) -> Time:

@@ -26,6 +26,9 @@ class Section(BaseModel):
 class CameraConfig(Section):
     """Where frames come from."""
 
+    # A webcam's number is a number in YAML and on ROS's parameter server.
+    model_config = ConfigDict(coerce_numbers_to_str=True)
+
     source: str = Field(
         "auto",
         description="auto, virtual, a webcam's index or /dev/videoN, an address (rtsp, http), a video file or a folder",
@@ -39,6 +42,7 @@ class CameraConfig(Section):
         "a headless run ends unless told otherwise",
     )
     photo_duration: float = Field(1.0, gt=0, le=3600, description="How long each photo of a folder is shown [s]")
+    frame_id: str = Field("camera", description="Coordinate frame that stands in the header of each image")
 
 
 class VirtualHandConfig(Section):
@@ -87,7 +91,10 @@ class SignsConfig(Section):
     switch_time: float = Field(
         0.5, ge=0, le=10, description="How long the followed hand shows no sign before another that shows one is [s]"
     )
-    max_frame_age: float = Field(0.5, gt=0, le=10, description="An older frame counts as no frame [s]")
+    max_frame_age: float = Field(0.35, gt=0, le=10, description="An older frame counts as no frame [s]")
+    image_transport: Literal["raw", "compressed"] = Field(
+        "raw", description="Which images are recognised: raw is /image_raw, compressed is /image_raw/compressed"
+    )
 
 
 class ControlConfig(Section):
@@ -103,9 +110,9 @@ class ControlConfig(Section):
     angular_acceleration: float = Field(3.0, gt=0, le=50, description="Growth of turning speed if per_second [rad/s²]")
     max_linear: float = Field(1.0, gt=0, le=10, description="Highest forward and backward speed [m/s]")
     max_angular: float = Field(2.0, gt=0, le=20, description="Highest turning speed [rad/s]")
-    sign_timeout: float = Field(0.5, gt=0, le=5, description="Without a sign for this long, the robot is stopped [s]")
+    sign_timeout: float = Field(0.35, gt=0, le=5, description="Without a sign for this long, the robot is stopped [s]")
     steering_timeout: float = Field(
-        0.5, gt=0, le=5, description="Steering by hand keeps the signs out for this long after its last command [s]"
+        0.35, gt=0, le=5, description="Steering by hand keeps the signs out for this long after its last command [s]"
     )
     actions: dict[str, Action] = Field(
         {}, description="What further signs do, as {Hi: stop, Peace: turbo}; Stop and NONE always stop"
@@ -136,7 +143,10 @@ class RobotConfig(Section):
     max_linear_acceleration: float = Field(1.0, gt=0, le=50, description="Limit of the controller [m/s²]")
     max_angular: float = Field(8.0, gt=0, le=50, description="Limit of the controller [rad/s]")
     max_angular_acceleration: float = Field(2.0, gt=0, le=50, description="Limit of the controller [rad/s²]")
-    cmd_vel_timeout: float = Field(0.5, gt=0, le=10, description="Without a command for this long, it brakes [s]")
+    cmd_vel_timeout: float = Field(0.4, gt=0, le=10, description="Without a command for this long, it brakes [s]")
+    odom_frame_id: str = Field("odom", description="Coordinate frame of the odometry")
+    base_frame_id: str = Field("base_link", description="Coordinate frame of the robot")
+    publish_clock: bool = Field(False, description="Whether it publishes /clock; it then runs on real time itself")
 
 
 class DashboardConfig(Section):

@@ -90,7 +90,7 @@ def _port(port: int) -> Finding:
 
 
 def _ros() -> list[Finding]:
-    ros1 = "rospy can be imported" if importlib.util.find_spec("rospy") else "no rospy"
+    ros1 = "rospy can be imported" if importlib.util.find_spec("rospy") else "no rospy (Debian, Ubuntu: make ros1)"
     ros2 = "ros2 is on the path" if shutil.which("ros2") else "no ros2 command"
     return [
         Finding("ros 1", "ok" if importlib.util.find_spec("rospy") else "optional", f"{ros1}; not needed to run"),

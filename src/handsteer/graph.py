@@ -17,7 +17,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from handsteer.cameras.choose import open_camera
-from handsteer.clock import Clock, RealClock, SteppedClock
+from handsteer.clock import Clock, RealClock, SimulatedClock, SteppedClock, WallClock
 from handsteer.config import Config, SignsConfig
 from handsteer.errors import ConfigError
 from handsteer.landmarks.mediapipe import MediaPipeLandmarker
@@ -60,18 +60,13 @@ class Graph:
     def __init__(self, config: Config, clock: Clock | None = None, transport: Transport | None = None) -> None:
         self.clock = clock or RealClock()
         self.transport = transport or InProcessTransport()
-        robot = open_robot(config.robot)
-        recognizer = open_recognizer(config)
-        camera = open_camera(config.camera, config.virtual_hand, self.clock)
         wires = (self.transport, self.clock)
-        self.robot = RobotNode(*wires, robot)
-        self.control = HandSignControlNode(*wires, config.control)
-        self.steering = SteeringNode(*wires)
-        self.recognition = HandSignRecognitionNode(*wires, recognizer, config.signs, annotate)
-        self.camera = CameraNode(*wires, camera)
-        _warn_of_unknown_signs(config, recognizer.signs)
+        self.robot = make_robot(config, *wires)
+        self.recognition = make_recognition(config, *wires)
+        self.camera = make_camera(config, *wires)
+        self.control = make_control(config, *wires)
+        self.steering = make_steering(config, *wires)
         self._added: tuple[Node, ...] = ()
-        self._paced = camera.period_s is not None
         self._began_s = self.clock.now()
 
     @property
@@ -117,7 +112,7 @@ class Graph:
             ConfigError: The graph's clock is real, or its camera waits for a device.
         """
         clock = self.clock
-        if not isinstance(clock, SteppedClock) or not self._paced:
+        if not isinstance(clock, SteppedClock) or not self.camera.is_paced:
             raise ConfigError("a stepped run needs a video file, a folder of photos or the virtual hand as its camera")
         end_s = clock.now() + duration_s
         while not self.camera.ended.is_set():
@@ -181,6 +176,48 @@ class Summary:
     def as_dict(self) -> dict[str, Any]:
         """Return the figures as plain values, for JSON."""
         return asdict(self)
+
+
+def make_camera(config: Config, transport: Transport, clock: Clock) -> CameraNode:
+    """Return the node ``my_camera``.
+
+    Raises:
+        CameraError: The camera cannot be used.
+    """
+    camera = open_camera(config.camera, config.virtual_hand, clock)
+    return CameraNode(transport, clock, camera, config.camera.frame_id)
+
+
+def make_recognition(config: Config, transport: Transport, clock: Clock) -> HandSignRecognitionNode:
+    """Return the node ``hand_sign_recognition``.
+
+    Raises:
+        ModelError: A landmark model or the sign model is missing or broken.
+    """
+    recognizer = open_recognizer(config)
+    _warn_of_unknown_signs(config, recognizer.signs)
+    return HandSignRecognitionNode(transport, clock, recognizer, config.signs, annotate)
+
+
+def make_control(config: Config, transport: Transport, clock: Clock) -> HandSignControlNode:
+    """Return the node ``hand_sign_control``."""
+    return HandSignControlNode(transport, clock, config.control)
+
+
+def make_robot(config: Config, transport: Transport, clock: Clock) -> RobotNode:
+    """Return the node ``robot``; one that publishes ``/clock`` runs on real time, so that it cannot drive itself.
+
+    Raises:
+        WorldError: The world of a simulated robot cannot be used.
+    """
+    if config.robot.publish_clock and isinstance(clock, SimulatedClock):
+        clock = WallClock()
+    return RobotNode(transport, clock, open_robot(config.robot), config.robot)
+
+
+def make_steering(_config: Config, transport: Transport, clock: Clock) -> SteeringNode:
+    """Return the node ``steering``; people steer by its methods, as the page does."""
+    return SteeringNode(transport, clock)
 
 
 def _warn_of_unknown_signs(config: Config, signs: tuple[str, ...]) -> None:

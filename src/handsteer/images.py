@@ -1,6 +1,7 @@
 """Between numpy pictures and ROS image messages, without cv_bridge."""
 
-from typing import Any
+from collections.abc import Mapping
+from typing import Any, Final
 
 import cv2
 import numpy as np
@@ -9,12 +10,20 @@ from numpy.typing import NDArray
 from handsteer.errors import FrameError
 from handsteer.messages import CompressedImage, Header, Image
 
-_CHANNELS = {"bgr8": 3, "rgb8": 3, "mono8": 1, "bgra8": 4, "rgba8": 4}
-_TO_BGR = {
-    "rgb8": cv2.COLOR_RGB2BGR,
-    "mono8": cv2.COLOR_GRAY2BGR,
-    "bgra8": cv2.COLOR_BGRA2BGR,
-    "rgba8": cv2.COLOR_RGBA2BGR,
+# Encodings of ROS's sensor_msgs/image_encodings.h: bytes a pixel, and what makes them BGR. ROS 1 names the byte order
+# of yuv422 after OpenCV (UYVY), or yuv422_yuy2; ROS 2 has the names of the byte orders besides.
+_ENCODINGS: Final[Mapping[str, tuple[int, int | None]]] = {
+    "bgr8": (3, None),
+    "rgb8": (3, cv2.COLOR_RGB2BGR),
+    "mono8": (1, cv2.COLOR_GRAY2BGR),
+    "bgra8": (4, cv2.COLOR_BGRA2BGR),
+    "rgba8": (4, cv2.COLOR_RGBA2BGR),
+    "8UC3": (3, None),
+    "8UC1": (1, cv2.COLOR_GRAY2BGR),
+    "yuv422": (2, cv2.COLOR_YUV2BGR_UYVY),
+    "uyvy": (2, cv2.COLOR_YUV2BGR_UYVY),
+    "yuv422_yuy2": (2, cv2.COLOR_YUV2BGR_YUY2),
+    "yuyv": (2, cv2.COLOR_YUV2BGR_YUY2),
 }
 
 
@@ -29,27 +38,52 @@ def bgr_image(message: Image) -> NDArray[np.uint8]:
     """Return the picture of ``message`` as (height, width, 3) uint8, BGR; a view of the message where it can be.
 
     Raises:
-        FrameError: The encoding is not one of bgr8, rgb8, mono8, bgra8, rgba8, or the data does not fit the size.
+        FrameError: The encoding is none of 8 bits that are known here, or the data does not fit the size.
     """
-    channels = _CHANNELS.get(message.encoding)
-    if channels is None:
-        raise FrameError(f"image encoding {message.encoding!r} is not supported: use one of {', '.join(_CHANNELS)}")
-    height, width, row = message.height, message.width, message.width * channels
-    if message.step < row or message.data.size < message.step * height:
+    if message.encoding not in _ENCODINGS:
+        deep = "16" in message.encoding or "32" in message.encoding or "64" in message.encoding
+        why = "has more than 8 bits a channel" if deep else "is not known"
+        raise FrameError(f"image encoding {message.encoding!r} {why}: use one of {', '.join(_ENCODINGS)}")
+    pixel_bytes, to_bgr = _ENCODINGS[message.encoding]
+    picture = _pixels(message, pixel_bytes)
+    if to_bgr is None:
+        return picture
+    if pixel_bytes == 2 and message.width % 2:
+        raise FrameError(f"a {message.encoding} image has pairs of pixels, it cannot be {message.width} wide")
+    return np.asarray(cv2.cvtColor(np.ascontiguousarray(picture), to_bgr), np.uint8)
+
+
+def _pixels(message: Image, pixel_bytes: int) -> NDArray[np.uint8]:
+    """Return a view of ``message`` as (height, width, pixel_bytes), the padding at the end of each row left out."""
+    height, width, step = message.height, message.width, message.step
+    row = width * pixel_bytes
+    if not (height and width):
+        raise FrameError(f"an image of {width}x{height} has no pixels")
+    # The last row needs no padding after it.
+    if step < row or message.data.size < step * (height - 1) + row:
         raise FrameError(
             f"a {width}x{height} {message.encoding} image needs a step of at least {row} and step x {height} bytes, "
-            f"got a step of {message.step} and {message.data.size} bytes"
+            f"got a step of {step} and {message.data.size} bytes"
         )
-    rows = message.data[: message.step * height].reshape(height, message.step)[:, :row]
-    picture: NDArray[np.uint8] = rows.reshape(height, width, channels)
-    if message.encoding == "bgr8":
-        return picture
-    return np.asarray(cv2.cvtColor(np.ascontiguousarray(picture), _TO_BGR[message.encoding]), np.uint8)
+    shape, strides = (height, width, pixel_bytes), (step, pixel_bytes, 1)
+    return np.lib.stride_tricks.as_strided(message.data, shape, strides, writeable=False)
 
 
 def jpeg_message(bgr: NDArray[np.uint8], header: Header, quality: int = 80) -> CompressedImage:
     """Return ``bgr``, (height, width, 3) uint8, as a JPEG message; ``quality`` is 0 to 100."""
     return CompressedImage(header=header, format="bgr8; jpeg compressed bgr8", data=encode_jpeg(bgr, quality))
+
+
+def jpeg_picture(message: CompressedImage) -> NDArray[np.uint8]:
+    """Return the picture of ``message`` as (height, width, 3) uint8, BGR; any format that OpenCV reads.
+
+    Raises:
+        FrameError: The data is not a picture.
+    """
+    picture = cv2.imdecode(message.data, cv2.IMREAD_COLOR) if message.data.size else None
+    if picture is None:
+        raise FrameError(f"a compressed image of {message.data.size} bytes, format {message.format!r}, is no picture")
+    return np.asarray(picture, np.uint8)
 
 
 def encode_jpeg(bgr: NDArray[np.uint8], quality: int = 80) -> NDArray[np.uint8]:

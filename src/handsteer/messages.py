@@ -63,6 +63,7 @@ __all__ = [
     "TwistWithCovariance",
     "Vector3",
     "twist",
+    "type_name",
 ]
 
 M = TypeVar("M")
@@ -73,29 +74,45 @@ class Topic(Generic[M]):
     """A named stream of messages of one type.
 
     Attributes:
-        name: Full ROS name, such as ``/image_raw``.
+        name: Full ROS name in the root namespace, such as ``/image_raw``.
         type: The message class.
         latched: A late subscriber gets the last message at once (ROS 2: transient local).
+        is_global: All namespaces share it, as ROS has it for transforms, time and diagnostics; others move with the
+            namespace of their node.
+        depth: How many messages may wait for a subscriber that is busy; older ones are dropped (ROS 2: keep last).
     """
 
     name: str
     type: type[M]
     latched: bool = False
+    is_global: bool = False
+    depth: int = 1
+
+    @property
+    def ros_name(self) -> str:
+        """The name to give to ROS: relative to the node's namespace (``image_raw``), or global (``/tf``)."""
+        return self.name if self.is_global else self.name.removeprefix("/")
 
 
 IMAGE_RAW = Topic("/image_raw", Image)
 IMAGE_COMPRESSED = Topic("/image_raw/compressed", CompressedImage)
-HAND_SIGN = Topic("/gesture/hand_sign", String)
+# Each sign makes the robot a step faster, so none may be lost when several come at once.
+HAND_SIGN = Topic("/gesture/hand_sign", String, depth=10)
 IMAGE_ANNOTATED = Topic("/gesture/image_annotated", Image)
-CMD_VEL = Topic("/robot_diff_drive_controller/cmd_vel", Twist)
+CMD_VEL = Topic("/robot_diff_drive_controller/cmd_vel", Twist, depth=10)
 STEERING_CMD_VEL = Topic("/steering/cmd_vel", Twist)
 ODOM = Topic("/robot_diff_drive_controller/odom", Odometry)
-TF = Topic("/tf", TFMessage)
+TF = Topic("/tf", TFMessage, is_global=True, depth=10)
 JOINT_STATES = Topic("/joint_states", JointState)
-CLOCK = Topic("/clock", ClockMessage)
+CLOCK = Topic("/clock", ClockMessage, is_global=True)
 ROBOT_DESCRIPTION = Topic("/robot_description", String, latched=True)
 WORLD_MARKERS = Topic("/world/markers", MarkerArray)
-DIAGNOSTICS = Topic("/diagnostics", DiagnosticArray)
+DIAGNOSTICS = Topic("/diagnostics", DiagnosticArray, is_global=True, depth=10)
+
+
+def type_name(message_type: type) -> str:
+    """Return the ROS name of a message class, as ``std_msgs/msg/String``."""
+    return str(getattr(message_type, "__msgtype__", message_type.__name__))
 
 
 def twist(linear_mps: float, angular_radps: float) -> Twist:

@@ -1,32 +1,65 @@
 """What every transport must do; each transport's own test module inherits it."""
 
 import threading
+import time
 from collections.abc import Callable, Iterator
+from typing import TypeVar
 
+import numpy as np
 import pytest
 
-from handsteer.clock import RealClock
+from handsteer.clock import Clock, RealClock
 from handsteer.errors import TransportError
-from handsteer.messages import CMD_VEL, HAND_SIGN, ROBOT_DESCRIPTION, String, Topic, twist
+from handsteer.images import bgr_image, image_message
+from handsteer.messages import CMD_VEL, HAND_SIGN, IMAGE_RAW, ROBOT_DESCRIPTION, Header, Image, String, Topic, twist
 from handsteer.nodes.node import Node
-from handsteer.transports.protocol import Received, Transport
+from handsteer.nodes.reporters import split_reporter
+from handsteer.transports.protocol import Publisher, Received, Transport
 
-WAIT_S = 5.0
+M = TypeVar("M")
+WAIT_S = 10.0
+WORDS = Topic("/words", String)
+
+
+def eventually(condition: Callable[[], object]) -> bool:
+    """Return whether ``condition`` comes true: a transport may need time to bring both ends together."""
+    deadline_s = time.monotonic() + WAIT_S
+    while not condition():
+        if time.monotonic() > deadline_s:
+            return False
+        time.sleep(0.005)
+    return True
+
+
+def heard(publisher: Publisher[M]) -> Publisher[M]:
+    """Return ``publisher`` once somebody listens."""
+    assert eventually(lambda: publisher.wanted)
+    return publisher
 
 
 class TransportContract:
-    """Inherit, and provide ``transport``."""
+    """Inherit, and provide ``transport``.
+
+    Attributes:
+        settle_s: How long a message may take that must not arrive.
+    """
+
+    settle_s = 0.0
 
     @pytest.fixture
     def transport(self) -> Iterator[Transport]:
         raise NotImplementedError
 
     @pytest.fixture
-    def make_node(self, transport: Transport) -> Iterator[Callable[[str], Node]]:
+    def clock(self) -> Clock:
+        return RealClock()
+
+    @pytest.fixture
+    def make_node(self, transport: Transport, clock: Clock) -> Iterator[Callable[[str], Node]]:
         nodes = []
 
         def make(name: str) -> Node:
-            nodes.append(Node(name, transport, RealClock()))
+            nodes.append(Node(name, transport, clock))
             return nodes[-1]
 
         yield make
@@ -36,18 +69,59 @@ class TransportContract:
 
     def test_a_message_arrives_with_its_capture_time(self, make_node: Callable[[str], Node]) -> None:
         talker, listener = make_node("talker"), make_node("listener")
-        got: list[Received[String]] = []
+        got: list[Received[Image]] = []
         arrived = threading.Event()
 
-        def callback(received: Received[String]) -> None:
+        def callback(received: Received[Image]) -> None:
             got.append(received)
             arrived.set()
 
+        listener.subscribe(IMAGE_RAW, callback)
+        listener.start()
+        captured_s = talker.clock.now() - 0.25
+        header = Header(stamp=talker.clock.stamp(captured_s), frame_id="camera")
+        picture = np.arange(24, dtype=np.uint8).reshape(2, 4, 3)
+        heard(talker.publisher(IMAGE_RAW)).publish(image_message(picture, header), captured_s)
+        assert arrived.wait(WAIT_S)
+        assert got[0].captured_s == pytest.approx(captured_s, abs=0.01)
+        assert got[0].message.header == header
+        assert bgr_image(got[0].message).tolist() == picture.tolist()
+
+    def test_a_message_without_a_header_keeps_its_capture_time_or_has_none(
+        self, make_node: Callable[[str], Node]
+    ) -> None:
+        talker, listener = make_node("talker"), make_node("listener")
+        got: list[Received[String]] = []
+        listener.subscribe(HAND_SIGN, got.append)
+        listener.start()
+        heard(talker.publisher(HAND_SIGN)).publish(String(data="Go"), captured_s=12.5)
+        assert eventually(lambda: got)
+        assert got[0].message == String(data="Go")
+        assert got[0].captured_s in {12.5, None}
+
+    def test_several_messages_wait_for_a_busy_subscriber_where_the_topic_has_depth(
+        self, make_node: Callable[[str], Node]
+    ) -> None:
+        talker, listener = make_node("talker"), make_node("listener")
+        started, let_go = threading.Event(), threading.Event()
+        got: list[str] = []
+
+        def callback(received: Received[String]) -> None:
+            got.append(received.message.data)
+            started.set()
+            assert let_go.wait(WAIT_S)
+
         listener.subscribe(HAND_SIGN, callback)
         listener.start()
-        talker.publisher(HAND_SIGN).publish(String(data="Go"), captured_s=12.5)
-        assert arrived.wait(WAIT_S)
-        assert got == [Received(String(data="Go"), 12.5)]
+        publisher = heard(talker.publisher(HAND_SIGN))
+        publisher.publish(String(data="first"))
+        assert started.wait(WAIT_S)
+        for number in range(HAND_SIGN.depth):
+            publisher.publish(String(data=str(number)))
+        time.sleep(self.settle_s)
+        let_go.set()
+        assert eventually(lambda: len(got) == 1 + HAND_SIGN.depth)
+        assert got == ["first", *map(str, range(HAND_SIGN.depth))]
 
     def test_every_subscriber_gets_it(self, make_node: Callable[[str], Node]) -> None:
         talker = make_node("talker")
@@ -56,7 +130,7 @@ class TransportContract:
             listener = make_node(f"listener_{number}")
             listener.subscribe(HAND_SIGN, lambda _, event=event: event.set())  # type: ignore[misc]
             listener.start()
-        talker.publisher(HAND_SIGN).publish(String(data="Stop"))
+        heard(talker.publisher(HAND_SIGN)).publish(String(data="Stop"))
         assert all(event.wait(WAIT_S) for event in arrived)
 
     def test_a_busy_subscriber_blocks_nobody_and_gets_the_newest_only(self, make_node: Callable[[str], Node]) -> None:
@@ -71,14 +145,15 @@ class TransportContract:
             if received.message.data == "last":
                 done.set()
 
-        listener.subscribe(HAND_SIGN, callback)
+        listener.subscribe(WORDS, callback)
         listener.start()
-        publisher = talker.publisher(HAND_SIGN)
+        publisher = heard(talker.publisher(WORDS))
         publisher.publish(String(data="first"))
         assert started.wait(WAIT_S)
         for number in range(100):
             publisher.publish(String(data=str(number)))
         publisher.publish(String(data="last"))
+        time.sleep(self.settle_s)
         let_go.set()
         assert done.wait(WAIT_S)
         assert got == ["first", "last"]
@@ -97,7 +172,7 @@ class TransportContract:
 
         listener.subscribe(HAND_SIGN, callback)
         listener.start()
-        publisher = talker.publisher(HAND_SIGN)
+        publisher = heard(talker.publisher(HAND_SIGN))
         publisher.publish(String(data="bad"))
         assert failed.wait(WAIT_S)
         publisher.publish(String(data="good"))
@@ -109,10 +184,10 @@ class TransportContract:
         publisher = transport.advertise("talker", CMD_VEL)
         assert not publisher.wanted
         subscription = transport.subscribe("listener", CMD_VEL, lambda _: None)
-        assert publisher.wanted
+        assert eventually(lambda: publisher.wanted)
         subscription.close()
         subscription.close()
-        assert not publisher.wanted
+        assert eventually(lambda: not publisher.wanted)
 
     def test_a_late_subscriber_gets_the_last_message_of_a_latched_topic(self, transport: Transport) -> None:
         publisher = transport.advertise("robot", ROBOT_DESCRIPTION)
@@ -120,14 +195,21 @@ class TransportContract:
         publisher.publish(String(data="<robot/>"))
         got: list[str] = []
         transport.subscribe("late", ROBOT_DESCRIPTION, lambda received: got.append(received.message.data))
+        assert eventually(lambda: got)
         assert got == ["<robot/>"]
+        again: list[str] = []
+        transport.subscribe("later", ROBOT_DESCRIPTION, lambda received: again.append(received.message.data))
+        assert eventually(lambda: again)
+        assert again == ["<robot/>"]
 
     def test_a_closed_subscription_gets_nothing(self, transport: Transport) -> None:
         publisher = transport.advertise("talker", HAND_SIGN)
         got: list[object] = []
         subscription = transport.subscribe("listener", HAND_SIGN, got.append)
+        heard(publisher)
         subscription.close()
         publisher.publish(String(data="Go"))
+        time.sleep(self.settle_s)
         assert got == []
 
     def test_a_message_of_another_type_is_refused(self, transport: Transport) -> None:
@@ -144,7 +226,12 @@ class TransportContract:
         publisher = transport.advertise("talker", HAND_SIGN)
         got: list[object] = []
         transport.subscribe("listener", HAND_SIGN, got.append)
+        heard(publisher)
         transport.close()
         transport.close()
         publisher.publish(String(data="Go"))
+        time.sleep(self.settle_s)
         assert got == []
+
+    def test_a_node_is_known_by_its_own_name(self, transport: Transport) -> None:
+        assert split_reporter(transport.full_name("my_camera"))[1] == "my_camera"

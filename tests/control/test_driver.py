@@ -52,7 +52,7 @@ def test_broken_time_stops_whoever_drives(dt_s: float) -> None:
 
 def test_reasons_say_why_the_robot_stands() -> None:
     driver = Driver(ControlConfig())
-    assert driver.reason == "standing: no sign has come for 0.5 s"
+    assert driver.reason == "standing: no sign has come for 0.35 s"
     reasons = []
     for sign in (NONE, STOP, FORWARD):
         driver.step(DT, sign=sign)

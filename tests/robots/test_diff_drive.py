@@ -64,7 +64,7 @@ def test_it_accelerates_and_reaches_the_command() -> None:
 
 
 def test_without_a_new_command_it_brakes_after_the_timeout() -> None:
-    state = run(DriveState(velocity=Velocity(1.0, 0.0)), Velocity(1.0, 0.0), 0.48)
+    state = run(DriveState(velocity=Velocity(1.0, 0.0)), Velocity(1.0, 0.0), 0.38)
     assert state.velocity.linear_mps == 1.0
     assert run(state, None, 0.28).velocity.linear_mps == pytest.approx(0.75, abs=0.03)
     assert run(state, None, 1.2).velocity == STILL

@@ -106,7 +106,7 @@ def test_it_does_not_tip_when_braking_from_full_speed() -> None:
 def test_it_brakes_when_commands_stop_coming_by_its_own_time() -> None:
     robot = make()
     end_of(drive(robot, 0.5, 0.0, 1.0))
-    assert robot.step(0.4).linear_mps == pytest.approx(0.5, rel=0.02)
+    assert robot.step(0.3).linear_mps == pytest.approx(0.5, rel=0.02)
     assert 0.2 < robot.step(0.3).linear_mps < 0.4
     assert abs(robot.step(0.5).linear_mps) < 0.01
 

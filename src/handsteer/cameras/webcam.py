@@ -162,7 +162,7 @@ def _check_device(source: str) -> None:
     path = _device_path(source)
     if not path.exists():
         found = ", ".join(webcams())
-        there = f"there is {found}" if found else "this machine has no webcam; --camera virtual needs none"
+        there = f"there is {found}" if found else "this machine has no webcam; the camera 'virtual' needs none"
         raise CameraNotFound(f"there is no webcam {path}: {there}")
     if not os.access(path, os.R_OK | os.W_OK):
         raise CameraUnreadable(f"no permission to use {path}: add yourself to the group 'video' and log in again")

@@ -18,6 +18,7 @@ _EXAMPLES = """Examples:
   handsteer run --headless --duration 30 --json  no page, one summary at the end
   handsteer recognize photo.jpg                  which sign is it?
   handsteer signs evaluate photos/               how well are signs told?
+  handsteer camera --transport ros1              one node, in a ROS 1 graph
   handsteer doctor                               what works on this machine
 """
 
@@ -33,12 +34,14 @@ app = App(
 for verb in ("run", "recognize", "models", "doctor"):
     app.command(f"handsteer.cli.{verb}:{verb}", name=verb)
 app.command("handsteer.cli.signs:app", name="signs")
+for verb in ("camera", "recognition", "control", "robot", "steering"):
+    app.command(f"handsteer.cli.nodes:{verb}", name=verb, group="One node of a graph of several processes")
 
 
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line; exit code 0 when all went well, 2 when the input was wrong."""
     logging.basicConfig(level=logging.INFO, format="handsteer: %(message)s", stream=sys.stderr)
-    for noisy in ("uvicorn", "asyncio", "httpx", "watchfiles"):
+    for noisy in ("uvicorn", "asyncio", "httpx", "watchfiles", "rospy"):
         logging.getLogger(noisy).setLevel(logging.WARNING)
     signal.signal(signal.SIGTERM, _interrupt)
     _load_what_help_lists(app, sys.argv[1:] if arguments is None else arguments)

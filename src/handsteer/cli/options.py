@@ -14,15 +14,23 @@ ConfigFile = Annotated[Path | None, Parameter(name="--config")]
 
 
 def settings(
-    file: Path | None, given: config.Config | None, shorthand: dict[str, Any] | None = None, base: Any = None
+    file: Path | None,
+    given: config.Config | None,
+    shorthand: dict[str, Any] | None = None,
+    base: dict[str, Any] | None = None,
+    service: dict[str, Any] | None = None,
 ) -> config.Config:
-    """Return the parameters: defaults, then ``base``, the file, the shorthand options, and the options by full name."""
+    """Return the parameters.
+
+    They come from the defaults, then ``base``, the file, a graph's parameter ``service``, the shorthand options, and
+    the options by full name.
+    """
     short = {
         section: {name: value for name, value in values.items() if value is not None}
         for section, values in (shorthand or {}).items()
     }
     full = given.model_dump(exclude_unset=True) if given else {}
-    return config.load(file, base or {}, short, full)
+    return config.load(file, base or {}, service or {}, short, full)
 
 
 def say(message: str) -> None:

@@ -25,6 +25,7 @@ from handsteer.messages import (
     Twist,
 )
 from handsteer.nodes.node import Node
+from handsteer.nodes.reporters import split_reporter
 from handsteer.nodes.steering import SteeringNode
 from handsteer.robots.protocol import Pose2D
 from handsteer.transports.protocol import Received, Transport
@@ -68,6 +69,7 @@ class DashboardNode(Node):
         super().__init__("dashboard", transport, clock)
         self.world = WorldState()
         self._observed = Observed()
+        self._namespace, _ = split_reporter(transport.full_name(self.name))
         self._frame_counts: deque[tuple[float, float]] = deque(maxlen=_FRAME_COUNTS_KEPT)
         self._odometry: deque[tuple[float, Pose2D]] = deque(maxlen=_ODOMETRY_KEPT)
         self._truth: tuple[Pose2D, Pose2D] | None = None
@@ -111,11 +113,14 @@ class DashboardNode(Node):
         now = self.clock.now()
         stamp_s = to_seconds(received.message.header.stamp)
         for status in received.message.status:
+            namespace, name = split_reporter(status.name)
+            if namespace != self._namespace:
+                continue  # another robot's
             report = _report(status, now)
-            self._observed = replace(self._observed, reports={**self._observed.reports, status.name: report})
-            if status.name == "my_camera":
+            self._observed = replace(self._observed, reports={**self._observed.reports, name: report})
+            if name == "my_camera":
                 self._count_frames(report)
-            if status.name == "robot":
+            if name == "robot":
                 self._take_truth(report, stamp_s)
 
     def _count_frames(self, report: Report) -> None:

@@ -15,7 +15,7 @@ Mood = Literal["driving", "standing", "trouble", "waiting"]
 STALE_S = 2.0
 """A node that has not reported for this long counts as silent; the slowest reports twice a second."""
 
-_COMMAND_HOLDS_S = 0.5
+_COMMAND_HOLDS_S = 0.4
 """A command counts for this long, as in the robot's controller; then nothing is commanded."""
 
 

@@ -1,7 +1,6 @@
 """The node ``my_camera``: frames out, whatever the camera does."""
 
 import logging
-import threading
 
 from handsteer.cameras.protocol import Camera, EndOfStream, Frame
 from handsteer.clock import Clock
@@ -21,22 +20,33 @@ log = logging.getLogger(__name__)
 class CameraNode(Node):
     """Publishes each frame of a camera with its capture time; a camera that is lost is tried again and again.
 
+    Args:
+        transport: Carries the messages.
+        clock: The graph's clock.
+        camera: Gives the frames.
+        frame_id: Coordinate frame of the images.
+
     Attributes:
         ended: Set when a file has ended and shall end the run.
         frames: How many frames were published.
     """
 
-    def __init__(self, transport: Transport, clock: Clock, camera: Camera) -> None:
+    def __init__(self, transport: Transport, clock: Clock, camera: Camera, frame_id: str = "camera") -> None:
         super().__init__("my_camera", transport, clock)
-        self.ended = threading.Event()
         self.frames = 0
         self._camera = camera
+        self._frame_id = frame_id
         self._retry_s = _FIRST_RETRY_S
         self._state = (OK, f"{camera.name}: waiting for the first frame")
         self._image = self.publisher(IMAGE_RAW)
         self._compressed = self.publisher(IMAGE_COMPRESSED)
         self._reading = self.every(camera.period_s or 0.0, self._read)
         self.every(_DIAGNOSE_PERIOD_S, self._report)
+
+    @property
+    def is_paced(self) -> bool:
+        """Whether frames come by the clock, not when a device has them."""
+        return self._camera.period_s is not None
 
     def on_stop(self) -> None:
         """Release the device, unless it is being read: OpenCV does not survive that; the process's end releases it."""
@@ -63,7 +73,7 @@ class CameraNode(Node):
         self._retry_s = _FIRST_RETRY_S
         self.frames += 1
         self._state = (OK, f"{self._camera.name}: delivers frames")
-        header = Header(stamp=self.clock.stamp(frame.captured_s), frame_id="camera")
+        header = Header(stamp=self.clock.stamp(frame.captured_s), frame_id=self._frame_id)
         self._image.publish(image_message(frame.image, header), frame.captured_s)
         if self._compressed.wanted:
             self._compressed.publish(jpeg_message(frame.image, header), frame.captured_s)

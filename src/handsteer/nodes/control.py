@@ -5,6 +5,7 @@ from handsteer.config import ControlConfig
 from handsteer.control.driver import Driver
 from handsteer.control.sign_control import Velocity
 from handsteer.messages import CMD_VEL, HAND_SIGN, STEERING_CMD_VEL, String, Twist, twist
+from handsteer.nodes.interruption import Interruption
 from handsteer.nodes.latency import LatencyLog
 from handsteer.nodes.node import OK, Node
 from handsteer.transports.protocol import Received, Transport
@@ -26,6 +27,7 @@ class HandSignControlNode(Node):
         self._config = config
         self._driver = Driver(config)
         self._last_step_s = clock.now()
+        self._interruption = Interruption(config.sign_timeout, clock.now())
         self._cmd_vel = self.publisher(CMD_VEL)
         self.subscribe(STEERING_CMD_VEL, self._on_steering)
         self.subscribe(HAND_SIGN, self._on_sign)
@@ -41,11 +43,15 @@ class HandSignControlNode(Node):
         captured_s = received.captured_s
         if captured_s is not None and self.clock.now() - captured_s > self._config.sign_timeout:
             return  # a stale frame is no frame: the watchdog goes on counting
-        self._publish(self._driver.step(self._elapsed(), sign=received.message.data), captured_s)
+        elapsed_s = self._elapsed()
+        sign = None if self._interruption.distrusts(self.clock.now()) else received.message.data
+        self._publish(self._driver.step(elapsed_s, sign=sign), captured_s)
 
     def _on_steering(self, received: Received[Twist]) -> None:
         wanted = Velocity(received.message.linear.x, received.message.angular.z)
-        self._publish(self._driver.step(self._elapsed(), steering=wanted))
+        elapsed_s = self._elapsed()
+        steering = None if self._interruption.distrusts(self.clock.now()) else wanted
+        self._publish(self._driver.step(elapsed_s, steering=steering))
 
     def _watch(self) -> None:
         self._publish(self._driver.step(self._elapsed()))
@@ -60,6 +66,7 @@ class HandSignControlNode(Node):
     def _elapsed(self) -> float:
         now = self.clock.now()
         elapsed_s, self._last_step_s = now - self._last_step_s, now
+        self._interruption.note(now)
         return elapsed_s
 
     def _report(self) -> None:
@@ -70,6 +77,10 @@ class HandSignControlNode(Node):
             source=self._driver.source,
             linear_mps=f"{velocity.linear_mps:.3f}",
             angular_radps=f"{velocity.angular_radps:.3f}",
-            latency_median_ms=f"{self.latency.percentile_ms(50):.1f}",
-            latency_p99_ms=f"{self.latency.percentile_ms(99):.1f}",
+            **self._latencies(),
         )
+
+    def _latencies(self) -> dict[str, str]:
+        """Return the latency's figures; none where the transport does not carry the frame's time with a sign."""
+        percents = {"latency_median_ms": 50, "latency_p99_ms": 99} if len(self.latency) else {}
+        return {name: f"{self.latency.percentile_ms(percent):.1f}" for name, percent in percents.items()}

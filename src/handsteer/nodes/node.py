@@ -2,6 +2,7 @@
 
 import logging
 import threading
+from collections import deque
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field
 from typing import Any, Generic, TypeVar
@@ -56,6 +57,7 @@ class Node:
         clock: The graph's clock; timers follow it.
 
     Attributes:
+        ended: Set when the node has nothing more to do.
         callback_errors: Callbacks that have failed.
         stuck: True when a callback was still under way when :meth:`stop` gave up waiting for it.
     """
@@ -63,9 +65,10 @@ class Node:
     def __init__(self, name: str, transport: Transport, clock: Clock) -> None:
         self.name = name
         self.clock = clock
+        self.ended = threading.Event()
         self.callback_errors = 0
         self.stuck = False
-        self._transport = transport
+        self.transport = transport
         self._inboxes: list[_Inbox[Any]] = []
         self._timers: list[Timer] = []
         self._subscriptions: list[Subscription] = []
@@ -77,7 +80,7 @@ class Node:
 
     def publisher(self, topic: Topic[M]) -> Publisher[M]:
         """Return the sending end of ``topic``."""
-        return self._transport.advertise(self.name, topic)
+        return self.transport.advertise(self.name, topic)
 
     def subscribe(
         self,
@@ -87,12 +90,14 @@ class Node:
     ) -> None:
         """Call ``callback`` with the newest message of ``topic``; older ones that were not served are dropped.
 
+        For a topic of some depth, as many of the newest messages are kept, and served in their order.
+
         Args:
             topic: What to listen to.
             callback: Runs on this node's thread.
             key: For a topic that several nodes publish to: keeps the newest message for each value of ``key(message)``.
         """
-        inbox = _Inbox(topic.name, callback, key)
+        inbox = _Inbox(topic.name, callback, key, 1 if key else topic.depth)
         self._inboxes.append(inbox)
 
         def deliver(received: Received[M]) -> None:
@@ -100,7 +105,7 @@ class Node:
                 inbox.put(received)
                 self._wake.notify()
 
-        self._subscriptions.append(self._transport.subscribe(self.name, topic, deliver))
+        self._subscriptions.append(self.transport.subscribe(self.name, topic, deliver))
 
     def every(self, period_s: float, callback: Callable[[], None]) -> "Timer":
         """Call ``callback`` every ``period_s`` seconds; a beat that is missed is left out, not made up for."""
@@ -112,7 +117,9 @@ class Node:
         """Publish this node's state on ``/diagnostics``: a level, a sentence for people, and named values."""
         if self._diagnostics.wanted:
             pairs = [KeyValue(key, str(value)) for key, value in values.items()]
-            status = DiagnosticStatus(level=level, name=self.name, message=message, hardware_id="", values=pairs)
+            status = DiagnosticStatus(
+                level=level, name=self.transport.full_name(self.name), message=message, hardware_id="", values=pairs
+            )
             header = Header(stamp=self.clock.stamp(self.clock.now()), frame_id="")
             self._diagnostics.publish(DiagnosticArray(header=header, status=[status]))
 
@@ -171,7 +178,7 @@ class Node:
         with self._wake:
             if self._running and not any(inbox.filled for inbox in self._inboxes):
                 due = self.next_due_s
-                self._wake.wait(None if due is None else max(0.0, due - self.clock.now()))
+                self.clock.wait(self._wake, None if due is None else max(0.0, due - self.clock.now()))
 
     def _guard(self, source: str, callback: Callable[..., None], *args: object) -> None:
         try:
@@ -186,16 +193,18 @@ class _Inbox(Generic[M]):
     topic: str
     callback: Callable[[Received[M]], None]
     key: Callable[[M], Hashable] | None
-    _newest: dict[Hashable, Received[M]] = field(default_factory=dict)
+    depth: int = 1
+    _newest: dict[Hashable, deque[Received[M]]] = field(default_factory=dict)
 
     @property
     def filled(self) -> bool:
         return bool(self._newest)
 
     def put(self, received: Received[M]) -> None:
-        self._newest[self.key(received.message) if self.key else None] = received
+        key = self.key(received.message) if self.key else None
+        self._newest.setdefault(key, deque(maxlen=self.depth)).append(received)
 
     def take(self) -> list[Received[M]]:
-        taken = list(self._newest.values())
+        taken = [received for waiting in self._newest.values() for received in waiting]
         self._newest.clear()
         return taken

@@ -1,23 +1,27 @@
 """The node ``hand_sign_recognition``: a frame in, the name of a sign out."""
 
+import math
 from collections.abc import Callable
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from handsteer.clock import Clock
 from handsteer.config import SignsConfig
-from handsteer.images import bgr_image, image_message
-from handsteer.messages import HAND_SIGN, IMAGE_ANNOTATED, IMAGE_RAW, Image, String
+from handsteer.images import bgr_image, image_message, jpeg_picture
+from handsteer.messages import HAND_SIGN, IMAGE_ANNOTATED, IMAGE_COMPRESSED, IMAGE_RAW, CompressedImage, Image, String
 from handsteer.nodes.latency import LatencyLog
 from handsteer.nodes.node import OK, WARN, Node
 from handsteer.signs.recognizer import Recognition, Recognizer
 from handsteer.signs.vocabulary import NONE
 from handsteer.transports.protocol import Received, Transport
 
+_WATCH_PERIOD_S = 0.02
 _SILENCE_PERIOD_S = 0.1
 _DIAGNOSE_PERIOD_S = 0.1
 
+M = TypeVar("M", Image, CompressedImage)
 Annotate = Callable[[NDArray[np.uint8], Recognition], NDArray[np.uint8]]
 
 
@@ -47,20 +51,26 @@ class HandSignRecognitionNode(Node):
         self._annotate = annotate
         self._last_captured_s: float | None = None
         self._last_frame_s = clock.now()
+        self._last_none_s = -math.inf
+        self._age_s = 0.0
         self._recognition: Recognition | None = None
         self._sign = self.publisher(HAND_SIGN)
         self._annotated = self.publisher(IMAGE_ANNOTATED)
-        self.subscribe(IMAGE_RAW, self._on_image)
-        self.every(_SILENCE_PERIOD_S, self._watch)
+        if config.image_transport == "compressed":
+            self.subscribe(IMAGE_COMPRESSED, lambda received: self._on_frame(received, jpeg_picture))
+        else:
+            self.subscribe(IMAGE_RAW, lambda received: self._on_frame(received, bgr_image))
+        self.every(_WATCH_PERIOD_S, self._watch)
         self.every(_DIAGNOSE_PERIOD_S, self._report)
 
-    def _on_image(self, received: Received[Image]) -> None:
+    def _on_frame(self, received: Received[M], picture_of: Callable[[M], NDArray[np.uint8]]) -> None:
         began_s = self.clock.now()
         captured_s = received.captured_s if received.captured_s is not None else began_s
-        if began_s - captured_s > self._config.max_frame_age:
+        self._age_s = began_s - captured_s
+        if self._age_s > self._config.max_frame_age:
             return  # a stale frame is no frame: the watch publishes NONE
         try:
-            image = bgr_image(received.message)
+            image = picture_of(received.message)
             recognition = self._recognizer.step(image, self._since_last_frame(captured_s))
         except Exception:
             self._lose()
@@ -71,8 +81,8 @@ class HandSignRecognitionNode(Node):
         self._sign.publish(String(data=recognition.sign), received.captured_s)
         self.processing.add(self.clock.now() - began_s)
         if self._annotated.wanted:
-            picture = self._annotate(image, recognition)
-            self._annotated.publish(image_message(picture, received.message.header), received.captured_s)
+            header = received.message.header
+            self._annotated.publish(image_message(self._annotate(image, recognition), header), received.captured_s)
 
     def _since_last_frame(self, captured_s: float) -> float:
         last_s = captured_s if self._last_captured_s is None else self._last_captured_s
@@ -80,7 +90,10 @@ class HandSignRecognitionNode(Node):
         return max(0.0, captured_s - last_s)
 
     def _watch(self) -> None:
-        if self.clock.now() - self._last_frame_s > self._config.max_frame_age:
+        now = self.clock.now()
+        silent = now - self._last_frame_s > self._config.max_frame_age
+        if silent and (self._recognition is not None or now - self._last_none_s >= _SILENCE_PERIOD_S):
+            self._last_none_s = now
             self._lose()
 
     def _lose(self) -> None:
@@ -91,7 +104,7 @@ class HandSignRecognitionNode(Node):
     def _report(self) -> None:
         seen = self._recognition
         if seen is None:
-            self.diagnose(WARN, f"no frame for {self.clock.now() - self._last_frame_s:.1f} s", sign=NONE)
+            self.diagnose(WARN, self._why_no_frame(), sign=NONE)
             return
         self.diagnose(
             OK,
@@ -102,4 +115,10 @@ class HandSignRecognitionNode(Node):
             progress=f"{seen.progress:.2f}",
             handedness=seen.hand.handedness if seen.hand else "",
             processing_ms=f"{self.processing.percentile_ms(50):.1f}",
+            processing_p99_ms=f"{self.processing.percentile_ms(99):.1f}",
         )
+
+    def _why_no_frame(self) -> str:
+        if self._age_s > self._config.max_frame_age:
+            return f"frames come {self._age_s:.1f} s after their stamp: are the clocks of the machines in step?"
+        return f"no frame for {self.clock.now() - self._last_frame_s:.1f} s"

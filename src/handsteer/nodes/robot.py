@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from handsteer.clock import Clock
+from handsteer.config import RobotConfig
 from handsteer.messages import (
     CLOCK,
     CMD_VEL,
@@ -30,6 +31,7 @@ from handsteer.messages import (
     Vector3,
     twist,
 )
+from handsteer.nodes.interruption import Interruption
 from handsteer.nodes.node import OK, WARN, Node
 from handsteer.nodes.world_markers import world_markers
 from handsteer.robots.protocol import Pose2D, Robot, RobotState
@@ -48,21 +50,29 @@ _COVARIANCE = np.diag([0.001, 0.001, 1e6, 1e6, 1e6, 1000.0]).reshape(-1)
 class RobotNode(Node):
     """Drives a robot and publishes where it is, 50 times a second.
 
+    Args:
+        transport: Carries the messages.
+        clock: The graph's clock.
+        robot: What is driven.
+        config: Holds the names of the coordinate frames, and whether to publish ``/clock``.
+
     Attributes:
         state: The robot's newest state.
         path_length_m: How far it has really gone, turns in place left out.
     """
 
-    def __init__(self, transport: Transport, clock: Clock, robot: Robot) -> None:
+    def __init__(self, transport: Transport, clock: Clock, robot: Robot, config: RobotConfig) -> None:
         super().__init__("robot", transport, clock)
         self._robot = robot
+        self._config = config
         self._last_step_s = clock.now()
+        self._interruption = Interruption(config.cmd_vel_timeout, clock.now())
         self.state = robot.step(0.0)
         self.path_length_m = 0.0
         self._odom = self.publisher(ODOM)
         self._tf = self.publisher(TF)
         self._joint_states = self.publisher(JOINT_STATES)
-        self._clock_out = self.publisher(CLOCK)
+        self._clock_out = self.publisher(CLOCK) if config.publish_clock else None
         self._markers = self.publisher(WORLD_MARKERS)
         self.publisher(ROBOT_DESCRIPTION).publish(String(data=robot.description))
         self.subscribe(CMD_VEL, self._on_command)
@@ -76,24 +86,34 @@ class RobotNode(Node):
         self._robot.close()
 
     def _on_command(self, received: Received[Twist]) -> None:
-        self._robot.command(received.message.linear.x, received.message.angular.z)
+        now = self.clock.now()
+        self._notice_interruption(now)
+        if not self._interruption.distrusts(now):
+            self._robot.command(received.message.linear.x, received.message.angular.z)
+
+    def _notice_interruption(self, now: float) -> None:
+        if self._interruption.note(now):
+            self._robot.command(0.0, 0.0)
 
     def _step(self) -> None:
         now = self.clock.now()
         elapsed_s, self._last_step_s = now - self._last_step_s, now
+        self._notice_interruption(now)
         before = self.state.truth
         self.state = self._robot.step(min(elapsed_s, _LONGEST_STEP_S))
         self.path_length_m += math.hypot(self.state.truth.x - before.x, self.state.truth.y - before.y)
         stamp = self.clock.stamp(now)
-        header = Header(stamp=stamp, frame_id="odom")
-        self._clock_out.publish(ClockMessage(clock=stamp))
-        self._odom.publish(_odometry(header, self.state))
-        self._tf.publish(TFMessage(transforms=[_transform(header, self.state.odometry)]))
+        header = Header(stamp=stamp, frame_id=self._config.odom_frame_id)
+        base = self._config.base_frame_id
+        if self._clock_out is not None:
+            self._clock_out.publish(ClockMessage(clock=stamp))
+        self._odom.publish(_odometry(header, base, self.state))
+        self._tf.publish(TFMessage(transforms=[_transform(header, base, self.state.odometry)]))
         self._joint_states.publish(_joint_state(Header(stamp=stamp, frame_id=""), self.state))
 
     def _publish_markers(self) -> None:
         if self._markers.wanted:
-            header = Header(stamp=self.clock.stamp(self.clock.now()), frame_id="odom")
+            header = Header(stamp=self.clock.stamp(self.clock.now()), frame_id=self._config.odom_frame_id)
             self._markers.publish(world_markers(header, self._robot.obstacles()))
 
     def _report(self) -> None:
@@ -108,10 +128,10 @@ class RobotNode(Node):
         )
 
 
-def _odometry(header: Header, state: RobotState) -> Odometry:
+def _odometry(header: Header, base: str, state: RobotState) -> Odometry:
     return Odometry(
         header=header,
-        child_frame_id="base_link",
+        child_frame_id=base,
         pose=PoseWithCovariance(
             pose=Pose(
                 position=Point(state.odometry.x, state.odometry.y, 0.0), orientation=_about_z(state.odometry.yaw)
@@ -122,9 +142,9 @@ def _odometry(header: Header, state: RobotState) -> Odometry:
     )
 
 
-def _transform(header: Header, pose: Pose2D) -> TransformStamped:
+def _transform(header: Header, base: str, pose: Pose2D) -> TransformStamped:
     transform = Transform(translation=Vector3(pose.x, pose.y, 0.0), rotation=_about_z(pose.yaw))
-    return TransformStamped(header=header, child_frame_id="base_link", transform=transform)
+    return TransformStamped(header=header, child_frame_id=base, transform=transform)
 
 
 def _joint_state(header: Header, state: RobotState) -> JointState:

@@ -46,7 +46,7 @@ def _marker(header: Header, number: int, obstacle: Obstacle) -> Marker:
         texture_resource="",
         texture=CompressedImage(header=header, format="", data=_EMPTY),
         uv_coordinates=[],
-        text=obstacle.name,
+        text="",  # RViz warns of text on any shape but text
         mesh_resource="",
         mesh_file=MeshFile(filename="", data=_EMPTY),
         mesh_use_embedded_materials=False,

@@ -1,1 +1,33 @@
 """How messages travel between nodes."""
+
+from collections.abc import Callable, Sequence
+
+from handsteer.errors import TransportError
+from handsteer.transports.protocol import Session
+
+
+def join(transport: str, node: str, arguments: Sequence[str]) -> Session:
+    """Make this process a node of a graph of several processes.
+
+    Args:
+        transport: Which kind of graph, one of :data:`TRANSPORTS`.
+        node: Name of the node, unless ``arguments`` rename it.
+        arguments: In the words of the transport itself, as ROS 1 has ``image_raw:=/camera/image``.
+
+    Raises:
+        TransportError: There is no such transport or graph, or an argument is wrong.
+    """
+    if transport not in TRANSPORTS:
+        raise TransportError(f"there is no transport {transport!r}: use {' or '.join(TRANSPORTS)}")
+    return TRANSPORTS[transport](node, arguments)
+
+
+def _ros1(node: str, arguments: Sequence[str]) -> Session:
+    # rospy is not everywhere, and is loaded only when it is used.
+    from handsteer.transports.ros1.session import Ros1Session  # noqa: PLC0415
+
+    return Ros1Session(node, arguments)
+
+
+TRANSPORTS: dict[str, Callable[[str, Sequence[str]], Session]] = {"ros1": _ros1}
+"""What joins a graph of several processes, by name."""

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any, Generic, TypeVar
 
 from handsteer.errors import TransportError
-from handsteer.messages import Topic
+from handsteer.messages import Topic, type_name
 from handsteer.transports.protocol import Received
 
 M = TypeVar("M")
@@ -30,6 +30,10 @@ class InProcessTransport:
         channel.add(deliver)
         return InProcessSubscription(channel, deliver)
 
+    def full_name(self, node: str) -> str:
+        """Return ``node``."""
+        return node
+
     def close(self) -> None:
         """End all publishing and receiving; may be called twice."""
         with self._lock:
@@ -42,7 +46,7 @@ class InProcessTransport:
             channel = self._channels.setdefault(topic.name, _Channel(topic))
         if channel.topic.type is not topic.type:
             raise TransportError(
-                f"{topic.name} carries {_type_name(channel.topic.type)}, it cannot carry {_type_name(topic.type)} too"
+                f"{topic.name} carries {type_name(channel.topic.type)}, it cannot carry {type_name(topic.type)} too"
             )
         return channel
 
@@ -62,7 +66,7 @@ class InProcessPublisher(Generic[M]):
         """Hand ``message`` to every subscriber's inbox."""
         topic = self._channel.topic
         if not isinstance(message, topic.type):
-            raise TransportError(f"{topic.name} carries {_type_name(topic.type)}, not {_type_name(type(message))}")
+            raise TransportError(f"{topic.name} carries {type_name(topic.type)}, not {type_name(type(message))}")
         self._channel.send(Received(message, captured_s))
 
 
@@ -107,7 +111,3 @@ class _Channel(Generic[M]):
                 self._last = received
         for deliver in self.subscribers:
             deliver(received)
-
-
-def _type_name(message_type: type) -> str:
-    return str(getattr(message_type, "__msgtype__", message_type.__name__))

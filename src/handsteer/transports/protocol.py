@@ -1,9 +1,10 @@
 """What every transport offers: topics to publish to and to subscribe to."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Generic, Protocol, TypeVar
+from typing import Any, Generic, Protocol, TypeVar
 
+from handsteer.clock import Clock
 from handsteer.messages import Topic
 
 M = TypeVar("M")
@@ -72,6 +73,45 @@ class Transport(Protocol):
         """
         ...
 
+    def full_name(self, node: str) -> str:
+        """Return what others know the node named ``node`` by: ``process: node`` where it has a process of its own."""
+        ...
+
     def close(self) -> None:
         """End all publishing and receiving; may be called twice."""
+        ...
+
+
+class Session(Protocol):
+    """A process's membership in a graph of several processes.
+
+    Attributes:
+        name: Full name of the process in the graph, namespaces included, as ``/r1/my_camera``.
+        parameters: What the graph's own parameter service has set for this process, as it was at the start.
+        clock: The graph's time.
+        transport: Carries the graph's messages.
+    """
+
+    @property
+    def name(self) -> str: ...  # noqa: D102
+
+    @property
+    def parameters(self) -> Mapping[str, Any]: ...  # noqa: D102
+
+    @property
+    def clock(self) -> Clock: ...  # noqa: D102
+
+    @property
+    def transport(self) -> Transport: ...  # noqa: D102
+
+    def wait(self, timeout_s: float) -> bool:
+        """Wait for at most ``timeout_s`` seconds; return whether the graph has asked this process to end.
+
+        Raises:
+            TransportError: The graph is gone.
+        """
+        ...
+
+    def close(self) -> None:
+        """Deliver what was published, then leave; may be called twice."""
         ...

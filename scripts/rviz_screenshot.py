@@ -1,0 +1,112 @@
+"""Makes the picture of RViz in docs/ros1.md: both launches of the course on a screen that nobody sees.
+
+Usage: python scripts/rviz_screenshot.py [file.png]; needs ROS 1 (make ros1), rviz, xvfb and imagemagick.
+"""
+
+import os
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+PICTURE = ROOT / "docs" / "images" / "rviz.png"
+SIZE = "1280x800"
+LARGEST_BYTES = 400_000
+DRIVEN_M = 1.0
+PATIENCE_S = 120.0
+PROGRAMS = ("roscore", "roslaunch", "rostopic", "rviz", "Xvfb", "import")
+ODOM = "/robot_diff_drive_controller/odom"
+
+
+def main(path: Path) -> None:
+    missing = [program for program in PROGRAMS if not shutil.which(program)]
+    if missing:
+        sys.exit(f"{', '.join(missing)}: not found; make ros1, then apt install rviz xvfb imagemagick")
+    with ExitStack() as stack, tempfile.TemporaryDirectory() as folder:
+        run = stack.enter_context
+        display = run(screen())
+        with socket.socket() as probe:
+            probe.bind(("127.0.0.1", 0))
+            port = str(probe.getsockname()[1])
+        env = {
+            **os.environ,
+            "DISPLAY": display,
+            "LIBGL_ALWAYS_SOFTWARE": "1",
+            "PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}",
+            "ROS_HOME": folder,
+            "ROS_HOSTNAME": "localhost",
+            "ROS_MASTER_URI": f"http://localhost:{port}",
+            "ROS_PACKAGE_PATH": str(ROOT / "ros"),
+        }
+        run(process(["roscore", "-p", port], env))
+        until(lambda: not subprocess.run(["rostopic", "list"], env=env, capture_output=True, check=False).returncode)
+        script = "Forward:6 Turn Left:1 Forward:3"
+        subprocess.run(["rosparam", "set", "/my_camera/virtual_hand/script", script], env=env, check=True)
+        drive = ["ros_hand_gesture_recognition", "sign_control.launch", "camera_name:=virtual", "show_image:=false"]
+        run(process(["roslaunch", "ros_mobile_robot", "drive_robot.launch", "rviz:=true"], env))
+        run(process(["roslaunch", *drive], env))
+        until(lambda: "/rviz" in subscribers("/gesture/image_annotated", env))
+        until(lambda: driven_m(env) >= DRIVEN_M)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        subprocess.run(["import", "-window", "root", "+dither", "-colors", "255", str(path)], env=env, check=True)
+    size = path.stat().st_size
+    if size > LARGEST_BYTES:
+        sys.exit(f"{path} has {size} bytes, it should have at most {LARGEST_BYTES}")
+    print(f"{path}: {size} bytes")
+
+
+@contextmanager
+def screen() -> Iterator[str]:
+    """A screen in memory; yields its name."""
+    read, write = os.pipe()
+    command = ["Xvfb", "-displayfd", str(write), "-screen", "0", f"{SIZE}x24", "-nolisten", "tcp"]
+    with process(command, dict(os.environ), pass_fds=(write,)):
+        os.close(write)
+        with os.fdopen(read) as answer:
+            yield f":{answer.readline().strip()}"
+
+
+@contextmanager
+def process(command: list[str], env: dict[str, str], pass_fds: tuple[int, ...] = ()) -> Iterator[None]:
+    """Run ``command`` for the length of the block."""
+    running = subprocess.Popen(
+        command, env=env, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, pass_fds=pass_fds
+    )
+    try:
+        yield
+    finally:
+        running.send_signal(signal.SIGINT)
+        running.wait(60)
+
+
+def until(condition: Callable[[], bool]) -> None:
+    """Wait until ``condition`` holds."""
+    end_s = time.monotonic() + PATIENCE_S
+    while not condition():
+        if time.monotonic() > end_s:
+            sys.exit(f"nothing to take a picture of within {PATIENCE_S:g} s")
+        time.sleep(0.2)
+
+
+def subscribers(topic: str, env: dict[str, str]) -> str:
+    """Return what rostopic says of those who listen to ``topic``."""
+    said = subprocess.run(["rostopic", "info", topic], env=env, capture_output=True, text=True, check=False).stdout
+    return said.partition("Subscribers:")[2]
+
+
+def driven_m(env: dict[str, str]) -> float:
+    """Return how far forward the robot is."""
+    command = ["rostopic", "echo", "-n", "1", f"{ODOM}/pose/pose/position/x"]
+    said = subprocess.run(command, env=env, capture_output=True, text=True, check=False).stdout.split()
+    return float(said[0]) if said else 0.0
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]) if len(sys.argv) > 1 else PICTURE)

@@ -1,0 +1,32 @@
+"""What a node that was itself held up does with messages that waited meanwhile: nothing, for they may be old."""
+
+_DISTRUST_S = 0.1
+"""How long after an interruption messages may still come out of sockets and queues."""
+
+
+class Interruption:
+    """Notices that a node was held up: its process was stopped, or the machine was too busy.
+
+    Commands without a time of their own would be obeyed late otherwise, however old they are.
+
+    Args:
+        limit_s: A longer gap between two calls of :meth:`note` is an interruption.
+        now_s: The time now, in seconds of the graph's clock.
+    """
+
+    def __init__(self, limit_s: float, now_s: float) -> None:
+        self._limit_s = limit_s
+        self._noted_s = now_s
+        self._distrust_until_s = now_s
+
+    def note(self, now_s: float) -> bool:
+        """Note that the node runs; return whether it has just come out of an interruption."""
+        interrupted = now_s - self._noted_s > self._limit_s
+        self._noted_s = now_s
+        if interrupted:
+            self._distrust_until_s = now_s + _DISTRUST_S
+        return interrupted
+
+    def distrusts(self, now_s: float) -> bool:
+        """Return whether a message that comes now may have waited during an interruption."""
+        return now_s < self._distrust_until_s

@@ -1,0 +1,198 @@
+"""A real ROS 1 graph for tests: a master on a port of its own, and processes in it."""
+
+import contextlib
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+import xmlrpc.client
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+PEER = Path(__file__).with_name("peer.py")
+START_S = 60.0
+"""Long, for a machine that is busy with other tests; everything waits for conditions, not for this."""
+
+
+def free_port() -> int:
+    """Return a TCP port on which nobody listens."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+def eventually(condition: Callable[[], Any], timeout_s: float = START_S, what: str = "") -> Any:
+    """Return what ``condition`` returns once that is true; fail after ``timeout_s`` seconds."""
+    deadline_s = time.monotonic() + timeout_s
+    while not (result := condition()):
+        assert time.monotonic() < deadline_s, f"{what or condition} has not come true within {timeout_s:g} s"
+        time.sleep(0.02)
+    return result
+
+
+class Ros1Graph:
+    """A ``roscore`` on a free port, and the processes that a test starts in its graph.
+
+    Attributes:
+        uri: Address of the master.
+        env: Environment of the processes.
+    """
+
+    def __init__(self, home: Path) -> None:
+        self._home = home
+        self._processes: list[Process] = []
+        self._core: subprocess.Popen[bytes] | None = None
+        self.uri = ""
+        self.env: dict[str, str] = {}
+
+    def start(self) -> "Ros1Graph":
+        """Start the master, and wait until it and ``/rosout`` are there."""
+        port = free_port()
+        self.uri = f"http://localhost:{port}"
+        self.env = {
+            **os.environ,
+            "ROS_MASTER_URI": self.uri,
+            "ROS_HOSTNAME": "localhost",
+            "ROS_HOME": str(self._home),
+            "PYTHONUNBUFFERED": "1",
+        }
+        for inherited in ("ROS_IP", "ROS_NAMESPACE"):
+            self.env.pop(inherited, None)
+        with (self._home / "roscore.log").open("wb") as log:
+            self._core = subprocess.Popen(
+                ["roscore", "-p", str(port)], env=self.env, stdout=log, stderr=log, start_new_session=True
+            )
+        eventually(lambda: "/rosout" in self.nodes(), what="roscore")
+        return self
+
+    def stop(self) -> None:
+        """End all processes, the master last."""
+        for process in self._processes:
+            process.kill()
+        self.stop_master()
+
+    def stop_master(self) -> None:
+        """End the master."""
+        if self._core is not None:
+            self._core.send_signal(signal.SIGINT)
+            try:
+                self._core.wait(10)
+            except subprocess.TimeoutExpired:
+                os.killpg(self._core.pid, signal.SIGKILL)
+                self._core.wait()
+            self._core = None
+
+    def nodes(self) -> set[str]:
+        """Return the full names of all nodes; empty when no master answers."""
+        try:
+            _, _, state = self.master.getSystemState("/test")
+        except OSError:
+            return set()
+        return {node for kind in state for _, nodes in kind for node in nodes}  # type: ignore[union-attr]
+
+    def listeners(self, topic: str) -> list[str]:
+        """Return the full names of the nodes that subscribe to ``topic``."""
+        _, _, state = self.master.getSystemState("/test")
+        return dict(state[1]).get(topic, [])  # type: ignore[index]
+
+    @property
+    def master(self) -> Any:
+        """The master's XML-RPC interface."""
+        return xmlrpc.client.ServerProxy(self.uri)
+
+    def set_parameter(self, name: str, value: object) -> None:
+        """Set a parameter on the master."""
+        self.master.setParam("/test", name, value)
+
+    def run(self, *command: str) -> "Process":
+        """Start a process in this graph."""
+        process = Process(list(command), self.env, self._home / f"process_{len(self._processes)}.log")
+        self._processes.append(process)
+        return process
+
+    def handsteer(self, *arguments: str) -> "Process":
+        """Start ``handsteer`` with ``arguments`` in this graph."""
+        return self.run(sys.executable, "-m", "handsteer", *arguments)
+
+    def node(self, verb: str, *arguments: str, name: str = "") -> "Process":
+        """Start one of handsteer's nodes and wait until it is in the graph under ``name``."""
+        process = self.handsteer(verb, "--transport", "ros1", *arguments)
+        if name:
+            eventually(lambda: name in self.nodes() or not process.running, what=f"{name} to start")
+            assert process.running, process.text
+        return process
+
+    def peer(self, *arguments: str) -> "Peer":
+        """Start a plain rospy node, as ``tests/ros1/peer.py`` tells; wait until it is ready."""
+        peer = Peer([sys.executable, str(PEER), *arguments], self.env, self._home / f"peer_{len(self._processes)}.log")
+        self._processes.append(peer)
+        return peer
+
+
+class Process:
+    """A process, and what it says."""
+
+    def __init__(self, command: list[str], env: dict[str, str], log: Path, **pipes: Any) -> None:
+        self._log = log
+        with log.open("wb") as file:
+            self.popen = subprocess.Popen(command, env=env, **{"stdout": file, "stderr": file, **pipes})
+
+    @property
+    def text(self) -> str:
+        """All that it has printed."""
+        return self._log.read_text(encoding="utf-8", errors="replace")
+
+    @property
+    def running(self) -> bool:
+        """Whether it runs."""
+        return self.popen.poll() is None
+
+    def signal(self, number: signal.Signals) -> None:
+        """Send it a signal."""
+        self.popen.send_signal(number)
+
+    def code(self, timeout_s: float = START_S) -> int:
+        """Wait until it has ended; return its exit code."""
+        return self.popen.wait(timeout_s)
+
+    def kill(self) -> None:
+        """End it at once, whatever it does."""
+        if self.running:
+            self.popen.send_signal(signal.SIGCONT)
+            self.popen.kill()
+        self.popen.wait()
+
+
+class Peer(Process):
+    """A plain rospy node, which takes orders as lines of JSON and tells what it gets."""
+
+    def __init__(self, command: list[str], env: dict[str, str], log: Path) -> None:
+        super().__init__(command, env, log, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        assert self._line() == "ready", self.text
+
+    def ask(self, order: str, **details: Any) -> Any:
+        """Give an order; return its answer."""
+        assert self.popen.stdin is not None
+        self.popen.stdin.write(json.dumps({"order": order, **details}) + "\n")
+        self.popen.stdin.flush()
+        return json.loads(self._line())
+
+    def _line(self) -> str:
+        assert self.popen.stdout is not None
+        line = str(self.popen.stdout.readline())
+        assert line, f"the peer has ended: {self.text}"
+        return line.strip()
+
+
+@contextlib.contextmanager
+def ros1_graph(home: Path) -> Iterator[Ros1Graph]:
+    """A graph with a master, for as long as the block lasts."""
+    graph = Ros1Graph(home)
+    try:
+        yield graph.start()
+    finally:
+        graph.stop()

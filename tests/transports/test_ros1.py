@@ -1,0 +1,91 @@
+import threading
+import time
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import pytest
+
+from handsteer.clock import WallClock
+from handsteer.errors import TransportError
+from handsteer.messages import Image, Topic
+from handsteer.nodes.node import Node
+from handsteer.transports import join
+from handsteer.transports.protocol import Received, Session, Transport
+from tests.contracts.transport_contract import TransportContract, eventually
+from tests.ros1.graph import Ros1Graph, ros1_graph
+
+pytestmark = pytest.mark.ros1
+
+
+@pytest.fixture(scope="session")
+def graph(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Ros1Graph]:
+    """The one master that rospy can have in this process."""
+    with ros1_graph(tmp_path_factory.mktemp("ros")) as graph, pytest.MonkeyPatch.context() as patch:
+        for name in ("ROS_MASTER_URI", "ROS_HOSTNAME", "ROS_HOME"):
+            patch.setenv(name, graph.env[name])
+        yield graph
+
+
+@pytest.fixture(scope="session")
+def session(graph: Ros1Graph) -> Session:
+    """This process as a ROS node; it leaves the graph when the process ends."""
+    return join("ros1", "tests", [])
+
+
+class TestRos1(TransportContract):
+    settle_s = 0.3
+
+    @pytest.fixture
+    def transport(self, session: Session) -> Iterator[Transport]:
+        from handsteer.transports.ros1.transport import Ros1Transport  # noqa: PLC0415 - only where ROS 1 is
+
+        transport = Ros1Transport(session.clock)
+        yield transport
+        transport.close()
+
+    @pytest.fixture
+    def clock(self, session: Session) -> WallClock:
+        assert isinstance(session.clock, WallClock)
+        return session.clock
+
+    @pytest.mark.slow
+    @pytest.mark.parametrize("through_a_node", [True, False], ids=["node", "callback"])
+    def test_a_slow_subscriber_gets_fresh_images(
+        self, graph: Ros1Graph, make_node: Callable[[str], Node], transport: Transport, *, through_a_node: bool
+    ) -> None:
+        """With rospy's own buffer, images wait in the socket for a callback that is slower than the camera."""
+        listener = make_node("listener")
+        ages_s: list[float] = []
+        done = threading.Event()
+
+        def callback(received: Received[Image]) -> None:
+            assert received.captured_s is not None
+            ages_s.append(listener.clock.now() - received.captured_s)
+            time.sleep(0.1)
+            if len(ages_s) == 30:
+                done.set()
+
+        topic = Topic(f"/fast_camera_{through_a_node}", Image, is_global=True)
+        if through_a_node:
+            listener.subscribe(topic, callback)
+            listener.start()
+        else:
+            transport.subscribe("listener", topic, callback)
+        camera = graph.peer("__name:=fast_camera")
+        camera.ask("advertise", topic=topic.name, package="sensor_msgs", type="Image")
+        assert eventually(lambda: camera.ask("listeners", topic=topic.name) > 0)
+        camera.ask("stream", topic=topic.name, width=640, height=480, period_s=1 / 60, count=300)
+        assert done.wait(20.0)
+        camera.kill()
+        # One period of the camera and the way here, and one callback where that runs on the socket's own thread.
+        assert float(np.median(ages_s)) < (0.1 if through_a_node else 0.25), ages_s
+
+    def test_a_process_has_one_name(self, session: Session) -> None:
+        assert session.name == "/tests"
+        with pytest.raises(TransportError, match=r"is the ROS node /tests already.*one a process.*process of its own"):
+            join("ros1", "another", [])
+
+
+def test_a_transport_that_is_not_there() -> None:
+    with pytest.raises(TransportError, match="there is no transport 'carrier_pigeon': use ros1"):
+        join("carrier_pigeon", "camera", [])
