@@ -151,6 +151,14 @@ def test_a_full_name_can_be_remapped(ros1: Ros1Graph) -> None:
     eventually(lambda: "/remapped" in ros1.listeners("/hand"))
 
 
+def test_compressed_images_are_renamed_with_the_raw_ones_unless_named_themselves(ros1: Ros1Graph) -> None:
+    options = ["recognition", "_image_transport:=compressed", "image_raw:=/front/image"]
+    ros1.node(*options, "__name:=beneath", name="/beneath")
+    eventually(lambda: "/beneath" in ros1.listeners("/front/image/compressed"))
+    ros1.node(*options, "__name:=named", "image_raw/compressed:=/jpeg", name="/named")
+    eventually(lambda: "/named" in ros1.listeners("/jpeg"))
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
