@@ -115,7 +115,7 @@ def test_a_file_plays_once_in_a_headless_run(capsys: pytest.CaptureFixture[str],
     summary = json.loads(prints(capsys, "run", "--headless", "--camera", str(slideshow), "--json"))
     assert summary["frames"] == 270
     assert summary["duration_s"] == pytest.approx(22.5, abs=2.0)
-    assert summary["path_length_m"] > 0.1
+    assert sum(summary["signs"].values()) > 0  # how many is a matter of the machine's speed: --fast leaves none out
 
 
 @pytest.mark.slow
@@ -165,3 +165,8 @@ def test_a_reader_that_leaves_is_no_error(data_dir: Path) -> None:
     assert done.returncode == 0
     assert "Traceback" not in done.stderr
     assert os.linesep in done.stdout
+
+
+@pytest.mark.parametrize(("arguments", "words"), [(["--help"], "Drive the robot"), (["signs"], "Learn the signs of")])
+def test_help_says_what_each_verb_does(capsys: pytest.CaptureFixture[str], arguments: list[str], words: str) -> None:
+    assert words in prints(capsys, *arguments)

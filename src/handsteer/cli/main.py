@@ -44,6 +44,7 @@ def main(arguments: list[str] | None = None) -> None:
     for noisy in ("uvicorn", "asyncio", "httpx", "watchfiles", "rospy"):
         logging.getLogger(noisy).setLevel(logging.WARNING)
     signal.signal(signal.SIGTERM, _interrupt)
+    _load_what_help_lists(app, sys.argv[1:] if arguments is None else arguments)
     try:
         sys.exit(app(arguments, exit_on_error=False, print_error=False) or 0)
     except CycloptsError as error:
@@ -55,6 +56,15 @@ def main(arguments: list[str] | None = None) -> None:
         sys.exit(0)
     except KeyboardInterrupt:
         sys.exit(130)
+
+
+def _load_what_help_lists(group: App, arguments: list[str]) -> None:
+    """Load the verbs of a group that is asked for help or named alone: their descriptions are listed then."""
+    if not arguments or arguments[0] in group.help_flags:
+        for verb in group:
+            group[verb]
+    elif arguments[0] in set(group):
+        _load_what_help_lists(group[arguments[0]], arguments[1:])
 
 
 def _interrupt(_signal: int, _frame: FrameType | None) -> None:

@@ -58,8 +58,10 @@ def test_mirrored_twice_is_as_before() -> None:
         ("Forward", 0.0, False),
         ("Forward", np.pi / 2, True),
         ("Forward", -np.pi / 2, True),
-        ("Turn Left", 0.0, True),
+        ("Turn Left", 0.0, False),
         ("Turn Left", np.pi / 2, False),
+        ("Call", 0.0, False),
+        ("Call", np.pi / 2, True),
         ("Stop", 0.0, False),
     ],
 )

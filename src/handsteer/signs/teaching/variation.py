@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handsteer.hand.kinematics import turn_x, turn_y, turn_z
+from handsteer.signs.features import KNUCKLES, WRIST
 
 Array = NDArray[np.float64]
 
@@ -16,7 +17,6 @@ _ERROR: Final = 0.02
 _DEPTH_ERROR: Final = 0.04
 _SIDEWAYS: Final = np.cos(np.radians(35.0))
 _TIPS: Final = (4, 8, 12, 16, 20)
-_PALM: Final = (0, 5, 9, 13, 17)
 _PARENTS: Final = (0, 0, 1, 2, 3, 0, 5, 6, 7, 0, 9, 10, 11, 0, 13, 14, 15, 0, 17, 18, 19)
 
 
@@ -69,13 +69,21 @@ def mirrored(points: Array) -> Array:
 
 
 def points_sideways(pixels: Array) -> bool:
-    """Return whether (n, 21, 2) hands all reach out to one side of the image: mirrored, they would say the opposite.
+    """Return whether (n, 21, 2) hands all point to one side of the image: mirrored, they would say the opposite.
 
-    A hand reaches out to where its fingertips are on average, from the middle of its palm.
+    The palm does, from the wrist to the knuckles, and so do the fingertips on average, from the middle of the palm. A
+    thumb alone is not enough: which side it is on tells left hands from right ones.
     """
-    reach = (pixels[:, _TIPS] - pixels[:, _PALM].mean(axis=1, keepdims=True)).mean(axis=1)
-    towards = (reach / np.maximum(np.linalg.norm(reach, axis=1, keepdims=True), 1e-9)).mean(axis=0)
-    return bool(abs(towards[0]) >= _SIDEWAYS)
+    knuckles = pixels[:, KNUCKLES].mean(axis=1)
+    palm = _mean_direction(knuckles - pixels[:, WRIST])
+    fingers = _mean_direction(pixels[:, _TIPS].mean(axis=1) - (knuckles + pixels[:, WRIST]) / 2)
+    return bool(min(abs(palm), abs(fingers)) >= _SIDEWAYS and palm * fingers > 0)
+
+
+def _mean_direction(vectors: Array) -> float:
+    """Return how far (n, 2) vectors point to the right on average, -1 to 1."""
+    lengths = np.maximum(np.linalg.norm(vectors, axis=1), 1e-9)
+    return float((vectors[:, 0] / lengths).mean())
 
 
 def _with_other_bones(points: Array, factors: Array) -> Array:
