@@ -93,3 +93,9 @@ def test_left_and_right_mirror_each_other(steps: list[tuple[str | None, float]])
         assert (a is None) == (b is None)
         if a and b:
             assert (a.linear_mps, a.angular_radps) == (b.linear_mps, -b.angular_radps)
+
+
+def test_steps_add_up_to_round_numbers() -> None:
+    control = SignControl(ControlConfig())
+    speeds = [velocity.linear_mps for _ in range(40) if (velocity := control.step(FORWARD, 0.03))]
+    assert speeds == [round(0.01 * step, 2) for step in range(1, 41)]

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from handsteer.config import ControlConfig
 from handsteer.control.actions import Action, action_of
 
+_DIGITS = 9
 _TURBO = 2.0
 
 
@@ -104,7 +105,9 @@ class SignControl:
             "turn_right": Velocity(now.linear_mps, now.angular_radps - angular),
             "stop": ZERO,
         }.get(action, now)
-        return after.clamped(self._config.max_linear, self._config.max_angular)
+        # So that a sum of steps is what people make of it: 0.22, not 0.22000000000000006.
+        summed = Velocity(round(after.linear_mps, _DIGITS), round(after.angular_radps, _DIGITS))
+        return summed.clamped(self._config.max_linear, self._config.max_angular)
 
     def _boosted(self) -> Velocity:
         doubled = Velocity(_TURBO * self.velocity.linear_mps, self.velocity.angular_radps)
