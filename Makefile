@@ -33,13 +33,13 @@ lint: $(BIN)/.dev
 	@$(BIN)/python scripts/configuration_table.py --check
 
 unit: $(BIN)/.dev models
-	@$(BIN)/pytest -n auto $(ARGS)
+	@$(BIN)/pytest -n auto --dist loadfile $(ARGS)
 
 ros1: $(BIN)/.dev
 	@scripts/setup-ros1
 
 test-ros1: $(BIN)/.dev models
-	@$(BIN)/pytest -n auto -m ros1 $(ARGS)
+	@$(BIN)/pytest -n auto --dist loadfile -m ros1 $(ARGS)
 
 models: | $(BIN)/.run
 	@$(BIN)/handsteer models > /dev/null
