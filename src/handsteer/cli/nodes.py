@@ -35,8 +35,9 @@ def camera(
     ----------
     words
         In the transport's own words. ROS 1: topic:=other, __name:=name, __ns:=namespace, _parameter:=value.
+        ROS 2: --ros-args -r topic:=other -r __node:=name -r __ns:=/namespace -p parameter:=value --params-file file.
     transport
-        What joins the nodes: ros1.
+        What joins the nodes: dds (ROS 2) or ros1.
     camera
         auto, virtual, a webcam's index or /dev/videoN, an address (rtsp, http), a video file or a folder of photos.
     config_file
@@ -55,8 +56,9 @@ def recognition(*words: str, transport: str, config_file: ConfigFile = None, par
     ----------
     words
         In the transport's own words. ROS 1: topic:=other, __name:=name, __ns:=namespace, _parameter:=value.
+        ROS 2: --ros-args -r topic:=other -r __node:=name -r __ns:=/namespace -p parameter:=value --params-file file.
     transport
-        What joins the nodes: ros1.
+        What joins the nodes: dds (ROS 2) or ros1.
     config_file
         YAML file with parameters; ROS parameters go before it, options before both.
     """
@@ -73,8 +75,9 @@ def control(*words: str, transport: str, config_file: ConfigFile = None, paramet
     ----------
     words
         In the transport's own words. ROS 1: topic:=other, __name:=name, __ns:=namespace, _parameter:=value.
+        ROS 2: --ros-args -r topic:=other -r __node:=name -r __ns:=/namespace -p parameter:=value --params-file file.
     transport
-        What joins the nodes: ros1.
+        What joins the nodes: dds (ROS 2) or ros1.
     config_file
         YAML file with parameters; ROS parameters go before it, options before both.
     """
@@ -97,8 +100,9 @@ def robot(
     ----------
     words
         In the transport's own words. ROS 1: topic:=other, __name:=name, __ns:=namespace, _parameter:=value.
+        ROS 2: --ros-args -r topic:=other -r __node:=name -r __ns:=/namespace -p parameter:=value --params-file file.
     transport
-        What joins the nodes: ros1.
+        What joins the nodes: dds (ROS 2) or ros1.
     world
         Name of a shipped world, or a YAML file.
     config_file
@@ -123,8 +127,9 @@ def steering(
     ----------
     words
         In the transport's own words. ROS 1: topic:=other, __name:=name, __ns:=namespace, _parameter:=value.
+        ROS 2: --ros-args -r topic:=other -r __node:=name -r __ns:=/namespace -p parameter:=value --params-file file.
     transport
-        What joins the nodes: ros1.
+        What joins the nodes: dds (ROS 2) or ros1.
     port
         Port of the page on 127.0.0.1; 0 takes a free one.
     config_file
