@@ -66,7 +66,7 @@ def main(arguments: list[str] | None = None) -> None:
 
 
 def _ros_words_last(arguments: list[str]) -> list[str]:
-    """Return ``arguments`` with what stands between ``--ros-args`` and ``--`` moved to the end, where none is an option.
+    """Return ``arguments`` with what stands between ``--ros-args`` and ``--`` moved to the end, where options end.
 
     ROS 2 allows them anywhere, and ``ros2 launch`` appends its own.
     """
