@@ -159,7 +159,9 @@ endpoints = {
 }
 discovery_qos = Qos(RELIABLE, Policy.Durability.TransientLocal, Policy.History.KeepLast(1), CDR)
 discovery_topic = Topic(participant, "ros_discovery_info", ParticipantEntitiesInfo)
-discovery = DataReader(participant, discovery_topic, qos=discovery_qos)
+discovery = DataReader(
+    participant, discovery_topic, qos=Qos(RELIABLE, Policy.Durability.TransientLocal, Policy.History.KeepAll, CDR)
+)
 introductions: list[Any] = []
 infos: dict[bytes, Any] = {}
 

@@ -5,7 +5,6 @@ import uuid
 from typing import Any
 
 import numpy as np
-from cyclonedds.core import Qos
 from cyclonedds.domain import DomainParticipant
 from cyclonedds.internal import InvalidSample
 from cyclonedds.pub import DataWriter
@@ -20,7 +19,7 @@ from handsteer.transports.ros2.names import NodeName
 _INFO = "rmw_dds_common/msg/ParticipantEntitiesInfo"
 DISCOVERY_TOPIC = "ros_discovery_info"
 """Name of the topic in DDS, where ROS 2's own topics begin with ``rt/``."""
-_AT_ONCE = 32
+_AT_ONCE = 256
 # All identifiers of a participant begin with the same bytes.
 _PREFIX_BYTES = 12
 
@@ -44,9 +43,8 @@ class RosGraph:
         self._names: dict[bytes, dict[bytes, str]] = {}
         self._type = dds_type(_INFO, distribution)
         topic = Topic(participant, DISCOVERY_TOPIC, self._type)
-        qos: Qos = discovery_qos()
-        self.reader: Any = DataReader(participant, topic, qos=qos)
-        self._writer: Any = DataWriter(participant, topic, qos=qos)
+        self.reader: Any = DataReader(participant, topic, qos=discovery_qos(_AT_ONCE))
+        self._writer: Any = DataWriter(participant, topic, qos=discovery_qos(1))
         self._tell()
 
     def add(self, endpoint: DataWriter[Any] | DataReader[Any]) -> None:

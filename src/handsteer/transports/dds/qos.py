@@ -37,9 +37,9 @@ def reader_qos(topic: Topic[Any]) -> Qos:
     return _qos(topic, reliable=topic.type not in (*_SENSOR_DATA, *_STATE))
 
 
-def discovery_qos() -> Qos:
-    """Return what ROS 2 has for ``ros_discovery_info``."""
-    return Qos(_RELIABLE, _TRANSIENT_LOCAL, Policy.History.KeepLast(1), _CDR)
+def discovery_qos(depth: int) -> Qos:
+    """Return what ROS 2 has for ``ros_discovery_info``, of which a writer keeps one and a reader one of each writer."""
+    return Qos(_RELIABLE, _TRANSIENT_LOCAL, Policy.History.KeepLast(depth), _CDR, Policy.IgnoreLocal.Participant)
 
 
 def describe(qos: Qos) -> str:
