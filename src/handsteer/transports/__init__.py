@@ -43,5 +43,5 @@ def _dds(node: str, arguments: Sequence[str]) -> Session:
     return DdsSession(node, arguments)
 
 
-TRANSPORTS: dict[str, Callable[[str, Sequence[str]], Session]] = {"dds": _dds, "ros1": _ros1}
+TRANSPORTS: dict[str, Callable[[str, Sequence[str]], Session]] = {"ros1": _ros1, "dds": _dds}
 """What joins a graph of several processes, by name."""

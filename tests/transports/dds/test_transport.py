@@ -1,3 +1,5 @@
+import subprocess
+import sys
 from collections.abc import Iterator
 
 import pytest
@@ -33,3 +35,12 @@ class TestDds(TransportContract):
     def test_the_process_has_its_full_name(self, session: Session) -> None:
         assert session.name == "/r1/tests"
         assert session.transport.full_name("my_camera") == "r1/tests: my_camera"
+
+
+def test_without_cyclonedds_it_says_what_to_install() -> None:
+    program = "import sys; sys.modules['cyclonedds'] = None; from handsteer.cli import main; main(sys.argv[1:])"
+    command = [sys.executable, "-c", program, "control", "--transport", "dds"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 2
+    assert "the transport dds needs the package cyclonedds: pip install 'handsteer[dds]'" in done.stderr
+    assert "Traceback" not in done.stderr

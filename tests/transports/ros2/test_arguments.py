@@ -1,3 +1,4 @@
+import contextlib
 import re
 from pathlib import Path
 
@@ -15,31 +16,9 @@ VALUES = st.booleans() | st.integers(-1000, 1000) | st.floats(-1e3, 1e3) | st.te
 
 
 def test_remapping_and_parameters() -> None:
-    said = parse_arguments(
-        [
-            "--ros-args",
-            "-r",
-            "a:=b",
-            "--remap",
-            "__node:=x",
-            "-r",
-            "__name:=y",
-            "-r",
-            "__ns:=/r1",
-            "-r",
-            "cam:c:=/d",
-            "-r",
-            "rostopic://e:=rostopic:///f",
-            "-p",
-            "fps:=15",
-            "--param",
-            "virtual_hand.script:=Forward:60",
-            "--",
-            "--ros-args",
-            "--log-level",
-            "debug",
-        ]
-    )
+    words = "--ros-args -r a:=b --remap __node:=x -r __name:=y -r __ns:=/r1 -r cam:c:=/d -r rostopic://e:=rostopic:///f"
+    more = "-p fps:=15 --param virtual_hand.script:=Forward:60 -- --ros-args --log-level debug"
+    said = parse_arguments(f"{words} {more}".split())
     assert said.remaps == [
         Remap("a", "b"),
         Remap("__node", "x"),
@@ -83,11 +62,8 @@ def test_wrong_words(words: str, message: str) -> None:
 
 @given(st.lists(st.text("-:=/_ar1.p", max_size=10)))
 def test_any_words_are_understood_or_refused(words: list[str]) -> None:
-    try:
-        said = parse_arguments(["--ros-args", *words])
-        said.parameters("/cam")
-    except TransportError as error:
-        assert len(str(error).splitlines()) == 1
+    with contextlib.suppress(TransportError):  # any other error fails the test
+        parse_arguments(["--ros-args", *words]).parameters("/cam")
 
 
 @given(st.dictionaries(TOKENS, VALUES, max_size=4))
@@ -153,5 +129,5 @@ def test_wrong_parameter_files(tmp_path: Path, content: str, message: str) -> No
 
 def test_a_value_cannot_have_parts() -> None:
     said = parse_arguments(["--ros-args", "-p", "hand:=1", "-p", "hand.skin:=dark"])
-    with pytest.raises(TransportError, match="parameter hand.skin: hand is a value already"):
+    with pytest.raises(TransportError, match=r"parameter hand\.skin: hand is a value already"):
         said.parameters("/cam")
