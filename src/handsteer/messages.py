@@ -5,7 +5,7 @@ They are used as values: once published, a message is not changed any more.
 """
 
 from dataclasses import dataclass
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 from rosbags.typesys.stores.ros2_jazzy import builtin_interfaces__msg__Duration as Duration
 from rosbags.typesys.stores.ros2_jazzy import builtin_interfaces__msg__Time as Time
@@ -80,6 +80,7 @@ class Topic(Generic[M]):
         is_global: All namespaces share it, as ROS has it for transforms, time and diagnostics; others move with the
             namespace of their node.
         depth: How many messages may wait for a subscriber that is busy; older ones are dropped (ROS 2: keep last).
+        beneath: The topic whose name it extends; it is renamed with it, as the topics of ROS's image_transport are.
     """
 
     name: str
@@ -87,6 +88,7 @@ class Topic(Generic[M]):
     latched: bool = False
     is_global: bool = False
     depth: int = 1
+    beneath: "Topic[Any] | None" = None
 
     @property
     def ros_name(self) -> str:
@@ -95,7 +97,7 @@ class Topic(Generic[M]):
 
 
 IMAGE_RAW = Topic("/image_raw", Image)
-IMAGE_COMPRESSED = Topic("/image_raw/compressed", CompressedImage)
+IMAGE_COMPRESSED = Topic("/image_raw/compressed", CompressedImage, beneath=IMAGE_RAW)
 # Each sign makes the robot a step faster, so none may be lost when several come at once.
 HAND_SIGN = Topic("/gesture/hand_sign", String, depth=10)
 IMAGE_ANNOTATED = Topic("/gesture/image_annotated", Image)

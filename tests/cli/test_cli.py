@@ -60,6 +60,9 @@ def prints(capsys: pytest.CaptureFixture[str], *arguments: str, code: int = 0) -
         (["run", "--camera", "virtual", "--virtual-hand.script", "Wave:2"], r"Wave"),
         (["run", "--colour", "red"], r"Unknown option: --colour"),
         (["recognize", "gone.jpg"], r"there is no gone\.jpg: give a photo, a folder of photos or a video file"),
+        (["camera"], r"--transport requires an argument"),
+        (["control", "--transport", "pigeon"], r"there is no transport 'pigeon': use ros1"),
+        (["control", "--transport", "ros1", "--config", "gone.yaml"], r"cannot read the configuration gone\.yaml"),
         (["dance"], r'Unknown command "dance"'),
     ],
     ids=lambda value: " ".join(value[:3]) if isinstance(value, list) else None,
@@ -90,7 +93,8 @@ def test_a_port_in_use_names_the_port(capsys: pytest.CaptureFixture[str]) -> Non
 
 def test_version_and_help(capsys: pytest.CaptureFixture[str]) -> None:
     assert re.fullmatch(r"\d+\.\d+\.\d+\n", prints(capsys, "--version"))
-    for verb in ([], ["run"], ["recognize"], ["models"], ["doctor"]):
+    verbs = ["run", "recognize", "models", "doctor", "camera", "recognition", "control", "robot", "steering"]
+    for verb in ([], *([verb] for verb in verbs)):
         assert "handsteer " + (verb[0] if verb else "run") in prints(capsys, *verb, "--help").replace("Usage: ", "")
 
 

@@ -202,3 +202,10 @@ def test_a_node_runs_only_while_somebody_watches() -> None:
     assert not watched.is_watched_by("me")
     assert watched.join("me") is None  # a page that does not know yet must not start it again
     assert not reports.wanted
+
+
+def test_nodes_of_processes_are_known_by_their_role_and_those_of_other_namespaces_are_left_out(bench: Bench) -> None:
+    bench.report("left_camera: my_camera", "webcam 0: delivers frames")
+    assert bench.node.state().camera == "webcam 0"
+    bench.report("r2/my_camera: my_camera", "webcam 9: delivers frames")
+    assert bench.node.state().camera == "webcam 0"

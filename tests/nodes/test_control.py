@@ -95,3 +95,32 @@ def test_latency_and_reason_are_told(bench: ControlBench) -> None:
     assert status.message == "driving: Forward"
     assert values["source"] == "signs"
     assert float(values["latency_median_ms"]) == pytest.approx(20.0, abs=0.1)
+
+
+def test_after_it_was_held_up_nothing_that_waited_is_obeyed(bench: ControlBench) -> None:
+    bench.show("Forward", "Forward")
+    for _ in range(5):
+        bench.signs.publish(String(data="Forward"))
+    bench.transport.advertise("slider", STEERING_CMD_VEL).publish(twist(0.5, 0.0))
+    bench.clock.advance(5.0)
+    bench.run(0.02)
+    bench.signs.publish(String(data="Forward"))  # came out of a socket a moment later
+    bench.run(0.3)
+    assert bench.commands == [(0.01, 0), (0.02, 0), (0, 0)]
+    bench.show("Forward")
+    assert bench.commands[-1] == (0.01, 0)
+
+
+def test_signs_that_come_all_at_once_count_each(bench: ControlBench) -> None:
+    for sign in ("Forward", "Forward", "Turn Left", "Forward"):
+        bench.signs.publish(String(data=sign))
+    bench.run(0.01)
+    assert bench.commands == [(0.01, 0), (0.02, 0), (0.02, 0.1), (0.03, 0)]
+
+
+def test_no_latency_is_told_where_signs_come_without_the_time_of_their_frame(bench: ControlBench) -> None:
+    statuses = bench.record(DIAGNOSTICS)
+    for _ in range(9):
+        bench.signs.publish(String(data="Forward"))
+        bench.run(1 / 30)
+    assert "latency_median_ms" not in {value.key for value in statuses[-1].status[0].values}

@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 
 from handsteer.config import SignsConfig
-from handsteer.images import image_message
+from handsteer.images import image_message, jpeg_message
 from handsteer.landmarks.recorded import RecordedLandmarker
-from handsteer.messages import DIAGNOSTICS, HAND_SIGN, IMAGE_ANNOTATED, IMAGE_RAW, Header, Image, Time
+from handsteer.messages import DIAGNOSTICS, HAND_SIGN, IMAGE_ANNOTATED, IMAGE_COMPRESSED, IMAGE_RAW, Header, Image, Time
 from handsteer.nodes.recognition import HandSignRecognitionNode
 from handsteer.signs.drawing import annotate
 from handsteer.signs.model import load_model
@@ -20,11 +20,12 @@ BROKEN = Image(HEADER, 480, 640, "bgr8", 0, 1920, np.zeros(5, np.uint8))
 
 
 class RecognitionBench(Bench):
-    def __init__(self) -> None:
+    def __init__(self, config: SignsConfig | None = None) -> None:
         super().__init__()
+        config = config or SignsConfig()
         landmarker = RecordedLandmarker([[show_sign(FORWARD)]] * 100)
-        recognizer = Recognizer(landmarker, TrainedClassifier(load_model()), SignsConfig())
-        self.node = HandSignRecognitionNode(self.transport, self.clock, recognizer, SignsConfig(), annotate)
+        recognizer = Recognizer(landmarker, TrainedClassifier(load_model()), config)
+        self.node = HandSignRecognitionNode(self.transport, self.clock, recognizer, config, annotate)
         self.nodes = [self.node]
         self.images = self.transport.advertise("camera", IMAGE_RAW)
         self.signs = self.record(HAND_SIGN)
@@ -95,3 +96,33 @@ def test_diagnostics_tell_what_is_seen(bench: RecognitionBench) -> None:
     assert {value.key: value.value for value in seen.values}["sign"] == "Forward"
     bench.run(2.0)
     assert statuses[-1].status[0].message.startswith("no frame for")
+
+
+def test_frames_that_come_late_are_told_from_none() -> None:
+    bench = RecognitionBench()
+    statuses = bench.record(DIAGNOSTICS)
+    bench.show(frames=20, age_s=2.0)
+    assert set(bench.names) == {"NONE"}
+    assert statuses[-1].status[0].message == (
+        "frames come 2.0 s after their stamp: are the clocks of the machines in step?"
+    )
+
+
+def test_compressed_images_instead() -> None:
+    bench = RecognitionBench(SignsConfig(image_transport="compressed"))
+    compressed = bench.transport.advertise("camera", IMAGE_COMPRESSED)
+    annotated = bench.record(IMAGE_ANNOTATED)
+    for _ in range(6):
+        compressed.publish(jpeg_message(np.zeros((480, 640, 3), np.uint8), HEADER), bench.clock.now())
+        bench.run(1 / 30)
+    assert bench.names == ["NONE"] * 3 + ["Forward"] * 3
+    assert annotated[-1].header == HEADER
+    assert not bench.images.wanted
+
+
+def test_none_comes_within_the_timeout_and_a_moment(bench: RecognitionBench) -> None:
+    bench.show(frames=6)
+    bench.run(0.3)
+    assert bench.names[-1] == "Forward"
+    bench.run(0.08)
+    assert bench.names[-1] == "NONE"

@@ -99,6 +99,11 @@ class Ros1Graph:
         _, _, state = self.master.getSystemState("/test")
         return dict(state[1]).get(topic, [])  # type: ignore[index]
 
+    def talkers(self, topic: str) -> list[str]:
+        """Return the full names of the nodes that publish ``topic``."""
+        _, _, state = self.master.getSystemState("/test")
+        return dict(state[0]).get(topic, [])  # type: ignore[index]
+
     @property
     def master(self) -> Any:
         """The master's XML-RPC interface."""

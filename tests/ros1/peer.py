@@ -4,7 +4,7 @@ It reads orders as lines of JSON from its input and answers each by one line of 
 fields) starts to note messages, ``record_stamps`` (topic) those of large ones, ``record_diagnostics`` the values of
 nodes; ``get`` (topic) returns what was noted as ``[time_s, [values]]``. ``advertise`` (topic, package, type) comes
 before ``listeners`` (topic), which returns how many listen, ``publish`` (topic, values, count, period_s), ``stream`` of
-images, and ``run_clock`` of simulated time.
+images, and ``run_clock`` of simulated time, which ``stop_clock`` ends.
 """
 
 import importlib
@@ -21,6 +21,7 @@ import rospy
 noted: dict[str, list[Any]] = {}
 publishers: dict[str, Any] = {}
 subscribers: list[Any] = []
+clock_stands = threading.Event()
 
 
 def message_type(order: dict[str, Any]) -> Any:
@@ -112,16 +113,22 @@ def stream(order: dict[str, Any]) -> bool:
 
 
 def run_clock(order: dict[str, Any]) -> bool:
-    """Tell the time on /clock, from ``from_s`` on, ``rate`` times as fast as real time, for ``seconds`` of it."""
+    """Tell the time on /clock, from ``from_s`` on, ``rate`` times as fast as real time, until ``stop_clock``."""
     publisher = publishers["/clock"]
+    clock_stands.clear()
 
     def run() -> None:
         began_s = time.monotonic()
-        while (passed_s := (time.monotonic() - began_s) * order["rate"]) < order["seconds"]:
-            publisher.publish(rospy.Time.from_sec(order["from_s"] + passed_s))
+        while not clock_stands.is_set():
+            publisher.publish(rospy.Time.from_sec(order["from_s"] + (time.monotonic() - began_s) * order["rate"]))
             time.sleep(0.01)
 
     threading.Thread(target=run, daemon=True).start()
+    return True
+
+
+def stop_clock(_order: dict[str, Any]) -> bool:
+    clock_stands.set()
     return True
 
 
@@ -137,6 +144,7 @@ ORDERS = {
         publish,
         stream,
         run_clock,
+        stop_clock,
     )
 }
 

@@ -138,10 +138,9 @@ def test_after_a_freeze_nothing_old_is_obeyed(drive: Callable[..., Driver]) -> N
 
 def test_names_follow_remappings_and_namespaces(ros1: Ros1Graph) -> None:
     control = ros1.node("control", "__ns:=/far", "__name:=driver", f"{CMD_VEL[1:]}:=/base/cmd_vel", name="/far/driver")
-    _, _, (publishers, subscribers, _) = ros1.master.getSystemState("/test")
-    assert ["/base/cmd_vel", ["/far/driver"]] in publishers
-    assert ["/far/gesture/hand_sign", ["/far/driver"]] in subscribers
-    assert "/far/driver" in dict(publishers)["/diagnostics"]
+    eventually(lambda: ros1.listeners("/far/gesture/hand_sign") == ["/far/driver"])
+    assert ros1.talkers("/base/cmd_vel") == ["/far/driver"]
+    assert "/far/driver" in ros1.talkers("/diagnostics")
     control.signal(signal.SIGTERM)
     assert control.code() == 0
 
@@ -149,6 +148,14 @@ def test_names_follow_remappings_and_namespaces(ros1: Ros1Graph) -> None:
 def test_a_full_name_can_be_remapped(ros1: Ros1Graph) -> None:
     ros1.node("control", "__name:=remapped", "/gesture/hand_sign:=/hand", name="/remapped")
     eventually(lambda: "/remapped" in ros1.listeners("/hand"))
+
+
+def test_compressed_images_are_renamed_with_the_raw_ones_unless_named_themselves(ros1: Ros1Graph) -> None:
+    options = ["recognition", "_image_transport:=compressed", "image_raw:=/front/image"]
+    ros1.node(*options, "__name:=beneath", name="/beneath")
+    eventually(lambda: "/beneath" in ros1.listeners("/front/image/compressed"))
+    ros1.node(*options, "__name:=named", "image_raw/compressed:=/jpeg", name="/named")
+    eventually(lambda: "/named" in ros1.listeners("/jpeg"))
 
 
 @pytest.mark.parametrize(

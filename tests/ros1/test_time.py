@@ -1,7 +1,6 @@
 """Simulated time, as ``/use_sim_time`` and ``/clock`` have it."""
 
 import signal
-import time
 from collections.abc import Iterator
 from typing import Any
 
@@ -51,15 +50,18 @@ def test_nodes_follow_the_clock_and_stop_the_robot_when_it_stands(simulated: Ros
     control = simulated.node("control", "--control.linear-step", "0.3", name="/hand_sign_control")
     eventually(lambda: stamps(peer))
     assert stamps(peer)[-1][1] == 0.0  # nobody has told the time yet
-    peer.ask("run_clock", from_s=START_S, rate=2.0, seconds=8.0)
-    eventually(lambda: stamps(peer)[-1][1] > START_S + 0.5)
-    peer.ask("publish", topic="/gesture/hand_sign", values={"data": "Forward"}, count=250, period_s=0.02)
-    moving = [row for row in stamps(peer) if START_S < row[1] < START_S + 7.5]
+    peer.ask("run_clock", from_s=START_S, rate=2.0)
+    eventually(lambda: stamps(peer)[-1][1] > START_S + 4.0)
+    moving = [row for row in stamps(peer) if row[1] > START_S]
     first, last = moving[0], moving[-1]
-    assert (last[1] - first[1]) / (last[0] - first[0]) == pytest.approx(2.0, rel=0.1)
-    # The clock stands after 4 real seconds, when signs still come; a second later there are no signs either.
-    assert stamps(peer)[-1][1] == pytest.approx(START_S + 8.0, abs=0.1)
-    assert peer.ask("get", topic=CMD_VEL)[-1][1] != [0.0]
+    assert (last[1] - first[1]) / (last[0] - first[0]) == pytest.approx(2.0, rel=0.2)
+    show = {"topic": "/gesture/hand_sign", "values": {"data": "Forward"}, "period_s": 0.02}
+    peer.ask("publish", count=100, **show)
+    eventually(lambda: abs(speed(peer)) > 0.1, what="the robot to drive")
+    # The clock stands when signs still come; a moment later there are no signs either.
+    peer.ask("stop_clock")
+    peer.ask("publish", count=20, **show)
+    assert max(values[0] for _, values in peer.ask("get", topic=CMD_VEL)) > 0.0
     eventually(lambda: peer.ask("get", topic=CMD_VEL)[-1][1] == [0.0], 5.0, what="zero velocity")
     eventually(lambda: abs(speed(peer)) < 0.01, 10.0, what="the robot to stand")
     eventually(lambda: "/clock stands still" in control.text, 10.0)
@@ -74,15 +76,14 @@ def test_frames_are_old_when_the_clock_stands(simulated: Ros1Graph, peer: Peer) 
     simulated.node("camera", *options, "_virtual_hand/script:=Forward:60", name="/my_camera")
     simulated.node("recognition", name="/hand_sign_recognition")
     clock_heard(simulated, "/hand_sign_recognition")
-    peer.ask("run_clock", from_s=START_S, rate=1.0, seconds=10.0)
+    peer.ask("run_clock", from_s=START_S, rate=1.0)
 
     def signs() -> list[Any]:
         return [values[0] for _, values in peer.ask("get", topic="/gesture/hand_sign")]
 
-    eventually(lambda: "Forward" in signs(), 20.0)
-    eventually(lambda: signs()[-1] == "NONE" and len(signs()) > signs().index("Forward"), 25.0)
-    time.sleep(0.5)
-    assert set(signs()[-5:]) == {"NONE"}
+    eventually(lambda: "Forward" in signs())
+    peer.ask("stop_clock")
+    eventually(lambda: set(signs()[-5:]) == {"NONE"}, what="frames to grow old")
 
 
 def test_a_robot_may_tell_the_time_and_does_not_follow_itself(simulated: Ros1Graph, peer: Peer) -> None:

@@ -62,7 +62,7 @@ class TestRos1(TransportContract):
             assert received.captured_s is not None
             ages_s.append(listener.clock.now() - received.captured_s)
             time.sleep(0.1)
-            if len(ages_s) == 30:
+            if len(ages_s) == 40:
                 done.set()
 
         topic = Topic(f"/fast_camera_{through_a_node}", Image, is_global=True)
@@ -74,11 +74,11 @@ class TestRos1(TransportContract):
         camera = graph.peer("__name:=fast_camera")
         camera.ask("advertise", topic=topic.name, package="sensor_msgs", type="Image")
         assert eventually(lambda: camera.ask("listeners", topic=topic.name) > 0)
-        camera.ask("stream", topic=topic.name, width=640, height=480, period_s=1 / 60, count=300)
-        assert done.wait(20.0)
+        camera.ask("stream", topic=topic.name, width=320, height=240, period_s=1 / 30, count=100_000)
+        assert done.wait(60.0)
         camera.kill()
-        # One period of the camera and the way here, and one callback where that runs on the socket's own thread.
-        assert float(np.median(ages_s)) < (0.1 if through_a_node else 0.25), ages_s
+        # It is 1.3 s with rospy's own buffer; a fresh one is as old as one callback is long, 0.1 s, at the worst.
+        assert float(np.median(ages_s)) < 0.7, ages_s
 
     def test_a_process_has_one_name(self, session: Session) -> None:
         assert session.name == "/tests"

@@ -1,5 +1,6 @@
 """``handsteer camera``, ``recognition``, ``control``, ``robot``, ``steering``: one node of a graph, as a process."""
 
+import signal
 import webbrowser
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
@@ -207,4 +208,7 @@ def _run_until_end(node: Node, session: Session, beside: AbstractContextManager[
             while not (node.ended.is_set() or session.wait(_LOOK_PERIOD_S)):
                 pass
     finally:
+        # Whoever presses Ctrl-C twice must not keep the robot from being told to stand.
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, signal.SIG_IGN)
         node.stop()

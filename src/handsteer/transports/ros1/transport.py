@@ -5,6 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, Generic, TypeVar
 
+import rosgraph
 import rospy
 
 from handsteer.clock import Clock
@@ -33,22 +34,22 @@ class Ros1Transport:
         self._clock = clock
         self._lock = threading.Lock()
         self._types: dict[str, type] = {}
-        self._publishers: list[Ros1Publisher[Any]] = []
+        self._outgoing: dict[str, Ros1Publisher[Any]] = {}
         self._incoming: dict[str, _Incoming[Any]] = {}
 
     def advertise(self, node: str, topic: Topic[M]) -> "Ros1Publisher[M]":
         """Return the sending end of ``topic`` for the node named ``node``."""
-        self._claim(topic)
-        publisher = Ros1Publisher(topic)
+        name = self._claim(topic)
         with self._lock:
-            self._publishers.append(publisher)
-        return publisher
+            if name not in self._outgoing:
+                self._outgoing[name] = Ros1Publisher(topic, name)
+            return self._outgoing[name]
 
     def subscribe(self, node: str, topic: Topic[M], deliver: Deliver[M]) -> "Ros1Subscription[M]":
         """Call ``deliver`` for each message on ``topic`` from now on, on the thread of the connection it came by."""
-        self._claim(topic)
+        name = self._claim(topic)
         with self._lock:
-            incoming = self._incoming.setdefault(topic.ros_name, _Incoming(topic, self._clock))
+            incoming = self._incoming.setdefault(name, _Incoming(topic, name, self._clock))
         incoming.add(deliver)
         return Ros1Subscription(incoming, deliver)
 
@@ -59,31 +60,32 @@ class Ros1Transport:
     def close(self) -> None:
         """End all publishing and receiving; may be called twice."""
         with self._lock:
-            publishers, incoming = self._publishers, list(self._incoming.values())
-            self._publishers = []
+            publishers, incoming = list(self._outgoing.values()), list(self._incoming.values())
+            self._outgoing = {}
             self._incoming = {}
         for publisher in publishers:
             publisher.close()
         for channel in incoming:
             channel.close()
 
-    def _claim(self, topic: Topic[Any]) -> None:
+    def _claim(self, topic: Topic[Any]) -> str:
+        """Return the full name of ``topic``, namespace and remappings included, unless it is in use otherwise."""
+        name = _full_name(topic)
         with self._lock:
-            known = self._types.setdefault(topic.ros_name, topic.type)
+            known = self._types.setdefault(name, topic.type)
         if known is not topic.type:
-            raise TransportError(
-                f"{topic.name} carries {type_name(known)}, it cannot carry {type_name(topic.type)} too"
-            )
+            raise TransportError(f"{name} carries {type_name(known)}, it cannot carry {type_name(topic.type)} too")
+        return name
 
 
 class Ros1Publisher(Generic[M]):
     """The sending end of a topic."""
 
-    def __init__(self, topic: Topic[M]) -> None:
+    def __init__(self, topic: Topic[M], name: str) -> None:
         self._topic = topic
         there = ros1_type(type_name(topic.type))
         self._publisher: Any = rospy.Publisher(
-            topic.ros_name, there, queue_size=topic.depth, latch=topic.latched, tcp_nodelay=True
+            name, there, queue_size=topic.depth, latch=topic.latched, tcp_nodelay=True
         )
 
     @property
@@ -131,6 +133,7 @@ class _Incoming(Generic[M]):
     """One topic's subscribers in this process: they share one connection, and each message is converted once."""
 
     topic: Topic[M]
+    name: str
     clock: Clock
     subscribers: tuple[Deliver[M], ...] = ()
     _subscriber: Any = None
@@ -145,7 +148,7 @@ class _Incoming(Generic[M]):
             if self._subscriber is None:
                 there = ros1_type(type_name(self.topic.type))
                 self._subscriber = rospy.Subscriber(
-                    self.topic.ros_name,
+                    self.name,
                     there,
                     self._on_message,
                     queue_size=self.topic.depth,
@@ -182,6 +185,15 @@ class _Incoming(Generic[M]):
         if header is None or header.stamp == _NO_STAMP:
             return None
         return min(self.clock.time_of(header.stamp), self.clock.now())
+
+
+def _full_name(topic: Topic[Any]) -> str:
+    """Return the name after namespace and remappings, which rospy leaves as it is when it is given."""
+    name = str(rospy.resolve_name(topic.ros_name))
+    is_remapped = name != rosgraph.names.resolve_name(topic.ros_name, rospy.get_name())
+    if topic.beneath is None or is_remapped:
+        return name
+    return _full_name(topic.beneath) + topic.name.removeprefix(topic.beneath.name)
 
 
 _NO_STAMP = Time(sec=0, nanosec=0)
