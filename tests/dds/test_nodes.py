@@ -227,7 +227,7 @@ def running(tmp_path: Path) -> Iterator[tuple[Peer, dict[str, Process]]]:
             "recognition": graph.node("recognition", name="/hand_sign_recognition"),
             "camera": graph.node("camera", *FORWARD, name="/my_camera", ros=SCRIPT),
         }
-        eventually(lambda: speeds(peer) and speeds(peer)[-1][1] > 0.25, what="the robot to drive")
+        eventually(lambda: speeds(peer) and speeds(peer)[-1][1] > 0.29, what="the robot to drive at its limit")
         yield peer, nodes
 
 
