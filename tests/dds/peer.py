@@ -4,8 +4,8 @@ Its types are written by hand, from ROS 2's definitions, and cyclonedds itself e
 JSON from its input and answers each by one line of JSON. ``record`` (topic, type, fields, reliable) starts to note
 messages, ``get`` (topic) returns what was noted as ``[time_s, [values]]``. ``advertise`` (topic, type, reliable) comes
 before ``listeners`` (topic), which returns how many listen, ``publish`` (topic, values, count, period_s) and
-``publish_raw`` (topic, hex). ``introduce`` (name) makes it a node for ROS 2, and ``graph`` returns what a ROS 2 node
-would know of others.
+``publish_raw`` (topic, hex). ``introduce`` (name) makes it a node for ROS 2, and ``graph`` and ``user_data``
+(topic) return what a ROS 2 node would know of others.
 """
 
 import json
@@ -292,13 +292,27 @@ def graph(_order: dict[str, Any]) -> dict[str, Any]:
     return nodes
 
 
+def user_data(order: dict[str, Any]) -> dict[str, list[str]]:
+    """Return the user data of all publishers and subscribers of a topic that are not this program's."""
+    return {
+        kind: [
+            text(end.qos)
+            for end in reader.read(1000)
+            if end.sample_info.valid_data
+            and end.topic_name == order["topic"]
+            and end.participant_key != participant.guid
+        ]
+        for kind, reader in endpoints.items()
+    }
+
+
 def text(of: Qos) -> str:
     return of[Policy.Userdata].data.decode() if Policy.Userdata in of else ""
 
 
 ORDERS = {
     order.__name__: order
-    for order in (record, get, advertise, listeners, publish, publish_raw, run_clock, introduce, graph)
+    for order in (record, get, advertise, listeners, publish, publish_raw, run_clock, introduce, graph, user_data)
 }
 
 threading.Thread(target=collect, daemon=True).start()

@@ -163,6 +163,13 @@ def test_ros2_sees_the_node_by_its_names_types_and_hashes(dds: DdsGraph) -> None
     assert control.code() == 0
 
 
+def test_the_discovery_itself_carries_the_hash_of_ros2(tmp_path: Path) -> None:
+    with dds_graph(tmp_path) as graph:
+        graph.node("control", name=f"/{NODE}")
+        digest = "typehash=RIHS01_91a0593bacdcc50ea9bdcf849a938b128412cc1ea821245c663bcd26f83c295e;"
+        assert graph.peer.ask("user_data", topic="ros_discovery_info") == {"writers": [digest], "readers": [digest]}
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [

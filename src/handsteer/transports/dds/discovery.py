@@ -43,8 +43,8 @@ class RosGraph:
         self._names: dict[bytes, dict[bytes, str]] = {}
         self._type = dds_type(_INFO, distribution)
         topic = Topic(participant, DISCOVERY_TOPIC, self._type)
-        self.reader: Any = DataReader(participant, topic, qos=discovery_qos(_AT_ONCE))
-        self._writer: Any = DataWriter(participant, topic, qos=discovery_qos(1))
+        self.reader: Any = DataReader(participant, topic, qos=discovery_qos(_INFO, _AT_ONCE))
+        self._writer: Any = DataWriter(participant, topic, qos=discovery_qos(_INFO, 1))
         self._tell()
 
     def add(self, endpoint: DataWriter[Any] | DataReader[Any]) -> None:

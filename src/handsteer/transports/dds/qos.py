@@ -37,9 +37,15 @@ def reader_qos(topic: Topic[Any]) -> Qos:
     return _qos(topic, reliable=topic.type not in (*_SENSOR_DATA, *_STATE))
 
 
-def discovery_qos(depth: int) -> Qos:
-    """Return what ROS 2 has for ``ros_discovery_info``, of which a writer keeps one and a reader one of each writer."""
-    return Qos(_RELIABLE, _TRANSIENT_LOCAL, Policy.History.KeepLast(depth), _CDR, Policy.IgnoreLocal.Participant)
+def discovery_qos(name: str, depth: int) -> Qos:
+    """Return what ROS 2 has for ``ros_discovery_info``, of which a writer keeps one and a reader one of each writer.
+
+    Args:
+        name: The message type.
+        depth: How many messages are kept.
+    """
+    history = Policy.History.KeepLast(depth)
+    return Qos(_RELIABLE, _TRANSIENT_LOCAL, history, _CDR, Policy.IgnoreLocal.Participant, _user_data(name))
 
 
 def describe(qos: Qos) -> str:
@@ -81,8 +87,12 @@ def _qos(topic: Topic[Any], *, reliable: bool) -> Qos:
         _TRANSIENT_LOCAL if topic.latched else _VOLATILE,
         Policy.History.KeepLast(topic.depth),
         _CDR,
-        Policy.Userdata(f"typehash={type_hash(type_name(topic.type))};".encode()),
+        _user_data(type_name(topic.type)),
     )
+
+
+def _user_data(name: str) -> Any:
+    return Policy.Userdata(f"typehash={type_hash(name)};".encode())
 
 
 def _find(qos: Qos, scope: str, default: Any = None) -> Any:
