@@ -22,9 +22,10 @@ camera:
 ```
 
 and run `handsteer run --config my.yaml`. On the command line each parameter is an option, as
-`--control.max-linear 0.5`; an option goes before the file, the file before the default. A ROS 1 node takes ROS's own
-private parameters too, as `_max_linear:=0.5`; they go before the file, and options before them. A name that does not
-exist and a value out of range are refused with exit code 2, before anything moves.
+`--control.max-linear 0.5`; an option goes before the file, the file before the default. A node in a
+ROS graph takes ROS's own parameters too, as `_max_linear:=0.5` (ROS 1) or `--ros-args -p max_linear:=0.5` (ROS 2);
+they go before the file, and options before them. A name that does not exist and a value out of range are refused with
+exit code 2, before anything moves.
 
 This page is made from `src/handsteer/config.py` by `make docs`.
 """

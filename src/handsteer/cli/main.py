@@ -19,6 +19,7 @@ _EXAMPLES = """Examples:
   handsteer recognize photo.jpg                  which sign is it?
   handsteer signs evaluate photos/               how well are signs told?
   handsteer camera --transport ros1              one node, in a ROS 1 graph
+  handsteer camera --transport dds               one node, in a ROS 2 graph
   handsteer doctor                               what works on this machine
 """
 
@@ -44,9 +45,10 @@ def main(arguments: list[str] | None = None) -> None:
     for noisy in ("uvicorn", "asyncio", "httpx", "watchfiles", "rospy"):
         logging.getLogger(noisy).setLevel(logging.WARNING)
     signal.signal(signal.SIGTERM, _interrupt)
-    _load_what_help_lists(app, sys.argv[1:] if arguments is None else arguments)
+    words = _ros_words_last(sys.argv[1:] if arguments is None else arguments)
+    _load_what_help_lists(app, words)
     try:
-        sys.exit(app(arguments, exit_on_error=False, print_error=False) or 0)
+        sys.exit(app(words, exit_on_error=False, print_error=False) or 0)
     except CycloptsError as error:
         _fail(_problem(error))
     except HandsteerError as error:
@@ -65,6 +67,21 @@ def _load_what_help_lists(group: App, arguments: list[str]) -> None:
             group[verb]
     elif arguments[0] in set(group):
         _load_what_help_lists(group[arguments[0]], arguments[1:])
+
+
+def _ros_words_last(arguments: list[str]) -> list[str]:
+    """Return ``arguments`` with what stands between ``--ros-args`` and ``--`` moved to the end, where options end.
+
+    ROS 2 allows them anywhere, and ``ros2 launch`` appends its own.
+    """
+    ours: list[str] = []
+    ros: list[str] = []
+    inside = False
+    for argument in arguments:
+        inside = inside or argument == "--ros-args"
+        (ros if inside else ours).append(argument)
+        inside = inside and argument != "--"
+    return [*ours, *([] if "--" in ours else ["--"]), *ros] if ros else ours
 
 
 def _interrupt(_signal: int, _frame: FrameType | None) -> None:

@@ -36,8 +36,9 @@ def camera(
     ----------
     words
         In the transport's own words. ROS 1: topic:=other, __name:=name, __ns:=namespace, _parameter:=value.
+        ROS 2: --ros-args -r topic:=other -r __node:=name -r __ns:=/namespace -p parameter:=value --params-file file.
     transport
-        What joins the nodes: ros1.
+        What joins the nodes: dds (ROS 2) or ros1.
     camera
         auto, virtual, a webcam's index or /dev/videoN, an address (rtsp, http), a video file or a folder of photos.
     config_file
@@ -56,8 +57,9 @@ def recognition(*words: str, transport: str, config_file: ConfigFile = None, par
     ----------
     words
         In the transport's own words. ROS 1: topic:=other, __name:=name, __ns:=namespace, _parameter:=value.
+        ROS 2: --ros-args -r topic:=other -r __node:=name -r __ns:=/namespace -p parameter:=value --params-file file.
     transport
-        What joins the nodes: ros1.
+        What joins the nodes: dds (ROS 2) or ros1.
     config_file
         YAML file with parameters; ROS parameters go before it, options before both.
     """
@@ -74,8 +76,9 @@ def control(*words: str, transport: str, config_file: ConfigFile = None, paramet
     ----------
     words
         In the transport's own words. ROS 1: topic:=other, __name:=name, __ns:=namespace, _parameter:=value.
+        ROS 2: --ros-args -r topic:=other -r __node:=name -r __ns:=/namespace -p parameter:=value --params-file file.
     transport
-        What joins the nodes: ros1.
+        What joins the nodes: dds (ROS 2) or ros1.
     config_file
         YAML file with parameters; ROS parameters go before it, options before both.
     """
@@ -98,8 +101,9 @@ def robot(
     ----------
     words
         In the transport's own words. ROS 1: topic:=other, __name:=name, __ns:=namespace, _parameter:=value.
+        ROS 2: --ros-args -r topic:=other -r __node:=name -r __ns:=/namespace -p parameter:=value --params-file file.
     transport
-        What joins the nodes: ros1.
+        What joins the nodes: dds (ROS 2) or ros1.
     world
         Name of a shipped world, or a YAML file.
     config_file
@@ -124,8 +128,9 @@ def steering(
     ----------
     words
         In the transport's own words. ROS 1: topic:=other, __name:=name, __ns:=namespace, _parameter:=value.
+        ROS 2: --ros-args -r topic:=other -r __node:=name -r __ns:=/namespace -p parameter:=value --params-file file.
     transport
-        What joins the nodes: ros1.
+        What joins the nodes: dds (ROS 2) or ros1.
     port
         Port of the page on 127.0.0.1; 0 takes a free one.
     config_file

@@ -12,7 +12,8 @@ def join(transport: str, node: str, arguments: Sequence[str]) -> Session:
     Args:
         transport: Which kind of graph, one of :data:`TRANSPORTS`.
         node: Name of the node, unless ``arguments`` rename it.
-        arguments: In the words of the transport itself, as ROS 1 has ``image_raw:=/camera/image``.
+        arguments: In the words of the transport itself, as ROS 1 has ``image_raw:=/camera/image``, and ROS 2
+            ``--ros-args -r image_raw:=/camera/image``.
 
     Raises:
         TransportError: There is no such transport or graph, or an argument is wrong.
@@ -29,5 +30,18 @@ def _ros1(node: str, arguments: Sequence[str]) -> Session:
     return Ros1Session(node, arguments)
 
 
-TRANSPORTS: dict[str, Callable[[str, Sequence[str]], Session]] = {"ros1": _ros1}
+def _dds(node: str, arguments: Sequence[str]) -> Session:
+    try:
+        from handsteer.transports.dds.session import DdsSession  # noqa: PLC0415
+    except ModuleNotFoundError as problem:
+        if (problem.name or "").partition(".")[0] != "cyclonedds":
+            raise
+        raise TransportError(
+            "the transport dds needs the package cyclonedds: pip install 'handsteer[dds]' "
+            "(there is none for Python 3.14 and newer, nor for Linux on ARM)"
+        ) from None
+    return DdsSession(node, arguments)
+
+
+TRANSPORTS: dict[str, Callable[[str, Sequence[str]], Session]] = {"ros1": _ros1, "dds": _dds}
 """What joins a graph of several processes, by name."""

@@ -10,9 +10,10 @@ import rospy
 
 from handsteer.clock import Clock
 from handsteer.errors import TransportError
-from handsteer.messages import Time, Topic, type_name
+from handsteer.messages import Topic, type_name
 from handsteer.transports.protocol import Received
 from handsteer.transports.ros1.conversion import from_ros1, ros1_type, to_ros1
+from handsteer.transports.stamps import capture_time
 
 M = TypeVar("M")
 Deliver = Callable[[Received[M]], None]
@@ -171,20 +172,13 @@ class _Incoming(Generic[M]):
 
     def _on_message(self, theirs: Any) -> None:
         message = from_ros1(theirs, type_name(self.topic.type))
-        received = Received(message, self._captured_s(message))
+        received = Received(message, capture_time(message, self.clock))
         with self._lock:
             if self.topic.latched:
                 self._last = received
             subscribers = self.subscribers
         for deliver in subscribers:
             deliver(received)
-
-    def _captured_s(self, message: Any) -> float | None:
-        """Return when the message was stamped; a stamp of another machine's that is ahead of ours counts as now."""
-        header = getattr(message, "header", None)
-        if header is None or header.stamp == _NO_STAMP:
-            return None
-        return min(self.clock.time_of(header.stamp), self.clock.now())
 
 
 def _full_name(topic: Topic[Any]) -> str:
@@ -194,6 +188,3 @@ def _full_name(topic: Topic[Any]) -> str:
     if topic.beneath is None or is_remapped:
         return name
     return _full_name(topic.beneath) + topic.name.removeprefix(topic.beneath.name)
-
-
-_NO_STAMP = Time(sec=0, nanosec=0)

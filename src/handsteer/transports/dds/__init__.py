@@ -1,0 +1,1 @@
+"""The graph over DDS, as ROS 2 has it; needs the package cyclonedds."""

@@ -1,0 +1,118 @@
+"""What ROS 2's tools know of nodes: the topic ``ros_discovery_info``, which DDS itself has no word for."""
+
+import threading
+import uuid
+from typing import Any
+
+import numpy as np
+from cyclonedds.domain import DomainParticipant
+from cyclonedds.internal import InvalidSample
+from cyclonedds.pub import DataWriter
+from cyclonedds.sub import DataReader
+from cyclonedds.topic import Topic
+
+from handsteer.transports.dds.qos import discovery_qos
+from handsteer.transports.dds.types import dds_type
+from handsteer.transports.ros2.encoding import types
+from handsteer.transports.ros2.names import NodeName
+
+_INFO = "rmw_dds_common/msg/ParticipantEntitiesInfo"
+DISCOVERY_TOPIC = "ros_discovery_info"
+"""Name of the topic in DDS, where ROS 2's own topics begin with ``rt/``."""
+_AT_ONCE = 256
+# All identifiers of a participant begin with the same bytes.
+_PREFIX_BYTES = 12
+
+
+class RosGraph:
+    """Tells others which publishers and subscribers belong to our node, and learns it of theirs.
+
+    Args:
+        participant: The participant of this process.
+        name: The name of this process's node.
+        distribution: The ROS 2 distribution that is spoken to: identifiers have 24 bytes in ``humble``, 16 since.
+    """
+
+    def __init__(self, participant: DomainParticipant, name: NodeName, distribution: str) -> None:
+        self._guid = participant.guid
+        self._name = name
+        self._store = types(distribution)
+        self._lock = threading.Lock()
+        self._writers: list[uuid.UUID] = []
+        self._readers: list[uuid.UUID] = []
+        self._names: dict[bytes, dict[bytes, str]] = {}
+        self._type = dds_type(_INFO, distribution)
+        topic = Topic(participant, DISCOVERY_TOPIC, self._type)
+        self.reader: Any = DataReader(participant, topic, qos=discovery_qos(_INFO, _AT_ONCE))
+        self._writer: Any = DataWriter(participant, topic, qos=discovery_qos(_INFO, 1))
+        self._tell()
+
+    def add(self, endpoint: DataWriter[Any] | DataReader[Any]) -> None:
+        """Tell others that ``endpoint`` belongs to our node."""
+        with self._lock:
+            self._list_of(endpoint).append(endpoint.guid)
+            self._tell()
+
+    def remove(self, endpoint: DataWriter[Any] | DataReader[Any]) -> None:
+        """Tell others that ``endpoint`` is gone."""
+        with self._lock:
+            self._list_of(endpoint).remove(endpoint.guid)
+            self._tell()
+
+    def node_of(self, endpoint: uuid.UUID) -> str | None:
+        """Return the full name of the node that has the publisher or subscriber; None when it has not been told."""
+        with self._lock:
+            return next((nodes[endpoint.bytes] for nodes in self._names.values() if endpoint.bytes in nodes), None)
+
+    def serve(self) -> None:
+        """Learn what others have told."""
+        for sample in self.reader.take(_AT_ONCE):
+            if isinstance(sample, InvalidSample):
+                continue
+            info: Any = self._store.deserialize_cdr(sample.raw, _INFO)
+            with self._lock:
+                self._names[_bytes(info.gid)] = {
+                    _bytes(gid): f"{node.node_namespace.rstrip('/')}/{node.node_name}"
+                    for node in info.node_entities_info_seq
+                    for gid in (*node.reader_gid_seq, *node.writer_gid_seq)
+                }
+
+    def forget(self, endpoint: uuid.UUID) -> None:
+        """Forget the nodes of the participant that had ``endpoint``."""
+        with self._lock:
+            self._names = {
+                gid: nodes
+                for gid, nodes in self._names.items()
+                if gid[:_PREFIX_BYTES] != endpoint.bytes[:_PREFIX_BYTES]
+            }
+
+    def close(self) -> None:
+        """Leave the topic; may be called twice."""
+        self._writer = self.reader = None
+
+    def _list_of(self, endpoint: DataWriter[Any] | DataReader[Any]) -> list[uuid.UUID]:
+        return self._writers if isinstance(endpoint, DataWriter) else self._readers
+
+    def _tell(self) -> None:
+        kinds = self._store.types
+        node = kinds["rmw_dds_common/msg/NodeEntitiesInfo"](
+            node_namespace=self._name.namespace,
+            node_name=self._name.name,
+            reader_gid_seq=[self._gid(guid) for guid in self._readers],
+            writer_gid_seq=[self._gid(guid) for guid in self._writers],
+        )
+        info = kinds[_INFO](gid=self._gid(self._guid), node_entities_info_seq=[node])
+        if self._writer is not None:
+            self._writer.write(self._type(bytes(self._store.serialize_cdr(info, _INFO))))
+
+    def _gid(self, guid: uuid.UUID) -> Any:
+        kind = "rmw_dds_common/msg/Gid"
+        fields: Any = self._store.fielddefs[kind][1]
+        _, length = fields[0][1][1]
+        data = np.zeros(length, np.uint8)
+        data[:16] = np.frombuffer(guid.bytes, np.uint8)
+        return self._store.types[kind](data=data)
+
+
+def _bytes(gid: Any) -> bytes:
+    return bytes(gid.data[:16])

@@ -1,0 +1,89 @@
+"""The one thread on which everything that comes over DDS is served."""
+
+import logging
+import threading
+from collections.abc import Callable
+from typing import Any
+
+from cyclonedds.core import GuardCondition, InstanceState, ReadCondition, SampleState, ViewState, WaitSet
+from cyclonedds.domain import DomainParticipant
+from cyclonedds.sub import DataReader
+
+log = logging.getLogger(__name__)
+
+_TICK_S = 0.25
+_NS_PER_S = 1_000_000_000
+_AFTER_FAILURE_S = 0.05
+_LEAVE_TIMEOUT_S = 2.0
+_ANY = SampleState.Any | ViewState.Any | InstanceState.Any
+
+
+class Dispatcher:
+    """Calls what serves a reader when there is something to take from it.
+
+    Listeners would run on the threads of Cyclone DDS, which hold its locks while they wait for Python's.
+
+    Args:
+        participant: Whose readers are served.
+        tick: Called four times a second, too.
+    """
+
+    def __init__(self, participant: DomainParticipant, tick: Callable[[], None]) -> None:
+        self._waitset = WaitSet(participant)
+        self._guard = GuardCondition(participant)
+        self._waitset.attach(self._guard)
+        self._tick = tick
+        self._lock = threading.Lock()
+        self._served: dict[DataReader[Any], tuple[ReadCondition, Callable[[], None]]] = {}
+        self._closing = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="dds", daemon=True)
+
+    def start(self) -> None:
+        """Serve from now on."""
+        self._thread.start()
+
+    def add(self, reader: DataReader[Any], serve: Callable[[], None]) -> None:
+        """Call ``serve``, which has to take all that there is, whenever ``reader`` has something."""
+        condition = ReadCondition(reader, _ANY)
+        with self._lock:
+            self._served[reader] = (condition, serve)
+            self._waitset.attach(condition)
+
+    def remove(self, reader: DataReader[Any]) -> None:
+        """Serve ``reader`` no more; one call may still be under way."""
+        with self._lock:
+            condition, _ = self._served.pop(reader)
+            self._waitset.detach(condition)
+
+    def close(self) -> None:
+        """End the thread; may be called twice."""
+        if not self._closing.is_set():
+            self._closing.set()
+            self._guard.set(True)
+            if self._thread.is_alive() and self._thread is not threading.current_thread():
+                self._thread.join(_LEAVE_TIMEOUT_S)
+            for reader in list(self._served):
+                self.remove(reader)
+
+    def _run(self) -> None:
+        while not self._closing.is_set():
+            self._guarded(self._wait)
+            self._serve_all()
+            self._guarded(self._tick)
+
+    def _wait(self) -> None:
+        self._waitset.wait(round(_TICK_S * _NS_PER_S))
+
+    def _serve_all(self) -> None:
+        with self._lock:
+            served = [serve for _, serve in self._served.values()]
+        for serve in served:
+            self._guarded(serve)
+
+    def _guarded(self, call: Callable[[], None]) -> None:
+        try:
+            call()
+        except Exception:
+            if not self._closing.is_set():
+                log.exception("DDS: a message could not be served")
+                self._closing.wait(_AFTER_FAILURE_S)  # what fails again and again must not take the whole machine

@@ -1,0 +1,147 @@
+"""Says in words why a publisher and a subscriber of one topic are not connected; DDS itself keeps silent."""
+
+import logging
+import threading
+import time
+import uuid
+from dataclasses import dataclass
+from typing import Any
+
+from cyclonedds.builtin import BuiltinDataReader, BuiltinTopicDcpsPublication, BuiltinTopicDcpsSubscription
+from cyclonedds.core import Qos
+from cyclonedds.domain import DomainParticipant
+
+from handsteer.transports.dds.discovery import DISCOVERY_TOPIC, RosGraph
+from handsteer.transports.dds.qos import describe, misfits
+
+log = logging.getLogger(__name__)
+
+_AT_ONCE = 64
+# A node tells its name shortly after its publishers and subscribers are seen.
+_NAME_DUE_S = 1.0
+
+
+@dataclass(frozen=True)
+class Endpoint:
+    """A publisher or subscriber.
+
+    Attributes:
+        topic: Its name in DDS, as ``rt/image_raw``.
+        type: Name of its type in DDS.
+        qos: What it offers or requests.
+        publishes: Whether it is a publisher.
+    """
+
+    topic: str
+    type: str
+    qos: Qos
+    publishes: bool
+
+    @property
+    def kind(self) -> str:
+        """What it is, in words."""
+        return "publisher" if self.publishes else "subscriber"
+
+
+class Matching:
+    """Compares our publishers and subscribers with those of others.
+
+    Args:
+        participant: The participant of this process; its own are taken to fit.
+        graph: Knows the names of nodes, as far as they have been told.
+    """
+
+    def __init__(self, participant: DomainParticipant, graph: RosGraph) -> None:
+        self._own = participant.guid
+        self._graph = graph
+        self._lock = threading.Lock()
+        self._ours: dict[tuple[str, bool], Endpoint] = {}
+        self._theirs: dict[uuid.UUID, Endpoint] = {}
+        self._pending: dict[uuid.UUID, float] = {}
+        self._said: set[uuid.UUID] = set()
+        self.publications: Any = BuiltinDataReader(participant, BuiltinTopicDcpsPublication)
+        self.subscriptions: Any = BuiltinDataReader(participant, BuiltinTopicDcpsSubscription)
+
+    def add(self, endpoint: Endpoint) -> None:
+        """Compare a publisher or subscriber of ours with those of others, now and later."""
+        with self._lock:
+            self._ours[endpoint.topic, endpoint.publishes] = endpoint
+            for key in self._theirs:
+                self._compare(key)
+
+    def serve_publications(self) -> None:
+        """Note publishers that have come or gone."""
+        self._serve(self.publications, publishes=True)
+
+    def serve_subscriptions(self) -> None:
+        """Note subscribers that have come or gone."""
+        self._serve(self.subscriptions, publishes=False)
+
+    def tick(self) -> None:
+        """Report what does not fit, once the other's name is known, or after a while without it."""
+        now = time.monotonic()
+        with self._lock:
+            due = [key for key, due_s in self._pending.items() if due_s <= now or self._graph.node_of(key)]
+            lines = [self._line(key) for key in due]
+            for key in due:
+                del self._pending[key]
+        for line in lines:
+            log.warning("%s", line)
+
+    def close(self) -> None:
+        """Look no more; may be called twice."""
+        self.publications = self.subscriptions = None
+
+    def _serve(self, reader: Any, *, publishes: bool) -> None:
+        for seen in reader.take(_AT_ONCE):
+            if seen.participant_key == self._own:
+                continue
+            with self._lock:
+                if seen.sample_info.valid_data and seen.qos is not None:
+                    self._theirs[seen.key] = Endpoint(seen.topic_name, seen.type_name, seen.qos, publishes)
+                    self._compare(seen.key)
+                else:
+                    self._forget(seen.key)
+
+    def _ours_for(self, key: uuid.UUID) -> Endpoint | None:
+        """Return our end of the topic of another's publisher or subscriber."""
+        theirs = self._theirs[key]
+        return self._ours.get((theirs.topic, not theirs.publishes))
+
+    def _compare(self, key: uuid.UUID) -> None:
+        ours = self._ours_for(key)
+        if ours is not None and key not in self._said and reasons(ours, self._theirs[key]):
+            self._said.add(key)
+            self._pending[key] = time.monotonic() + _NAME_DUE_S
+
+    def _line(self, key: uuid.UUID) -> str:
+        ours = self._ours_for(key)
+        assert ours is not None
+        return explain(ours, self._theirs[key], self._graph.node_of(key))
+
+    def _forget(self, key: uuid.UUID) -> None:
+        gone = self._theirs.pop(key, None)
+        if gone is not None and gone.publishes and gone.topic == DISCOVERY_TOPIC:
+            self._graph.forget(key)
+        self._said.discard(key)
+        self._pending.pop(key, None)
+
+
+def reasons(ours: Endpoint, theirs: Endpoint) -> list[str]:
+    """Return why a publisher and a subscriber of one topic are not connected, in words; empty when they are."""
+    if ours.type != theirs.type:
+        return [f"ours has the type {_ros_type(ours.type)}, theirs {_ros_type(theirs.type)}"]
+    return misfits(ours.qos, theirs.qos) if ours.publishes else misfits(theirs.qos, ours.qos)
+
+
+def explain(ours: Endpoint, theirs: Endpoint, node: str | None) -> str:
+    """Return one line that says which ends are not connected, why, and both profiles."""
+    who = node or "a node without a name"
+    return (
+        f"{ours.topic.removeprefix('rt')}: nothing passes between our {ours.kind} and the {theirs.kind} of {who}: "
+        f"{'; '.join(reasons(ours, theirs))} (ours: {describe(ours.qos)}; theirs: {describe(theirs.qos)})"
+    )
+
+
+def _ros_type(name: str) -> str:
+    return name.replace("::dds_::", "::").replace("::", "/").removesuffix("_")

@@ -1,0 +1,93 @@
+"""Which DDS domain to join and over which network, as ROS 2's environment variables say."""
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from handsteer.errors import TransportError
+
+_RANGES = ("LOCALHOST", "SUBNET", "OFF", "SYSTEM_DEFAULT")
+_LARGEST_DOMAIN = 232  # those above have no UDP ports
+_ADDRESS = re.compile(r"[A-Za-z0-9_.:%\[\]-]+")
+_LARGEST_INDEX = 32
+
+
+@dataclass(frozen=True)
+class Network:
+    """Where to look for others.
+
+    Attributes:
+        domain: Number of the DDS domain, 0 to 232.
+        config: Configuration of Cyclone DDS, as XML; None leaves it to the user's ``CYCLONEDDS_URI`` or its defaults.
+        distribution: The ROS 2 distribution whose discovery is spoken: ``humble``, or ``jazzy`` for all newer ones.
+    """
+
+    domain: int
+    config: str | None
+    distribution: str = "jazzy"
+
+
+def network(environment: Mapping[str, str]) -> Network:
+    """Return what ``environment`` says; without a word of it, only this machine is looked at.
+
+    ``ROS_DOMAIN_ID``, ``ROS_LOCALHOST_ONLY``, ``ROS_AUTOMATIC_DISCOVERY_RANGE``, ``ROS_STATIC_PEERS`` and
+    ``ROS_DISTRO`` count as in ROS 2; the user's ``CYCLONEDDS_URI`` goes before all but the domain.
+
+    Raises:
+        TransportError: A variable has a value that is not allowed.
+    """
+    domain = _domain(environment.get("ROS_DOMAIN_ID", ""))
+    distribution = "humble" if environment.get("ROS_DISTRO") == "humble" else "jazzy"
+    reach = _range(environment)
+    peers = _peers(environment.get("ROS_STATIC_PEERS", ""))
+    if environment.get("CYCLONEDDS_URI") or reach == "SYSTEM_DEFAULT":
+        return Network(domain, None, distribution)
+    if environment.get("ROS_LOCALHOST_ONLY") == "1" or reach == "OFF":
+        peers = []
+    return Network(domain, _config(reach, peers), distribution)
+
+
+def _domain(text: str) -> int:
+    if not text:
+        return 0
+    if not (text.isascii() and text.isdigit() and int(text) <= _LARGEST_DOMAIN):
+        raise TransportError(f"ROS_DOMAIN_ID is {text!r}: it should be a whole number from 0 to {_LARGEST_DOMAIN}")
+    return int(text)
+
+
+def _range(environment: Mapping[str, str]) -> str:
+    only = environment.get("ROS_LOCALHOST_ONLY", "")
+    if only not in {"", "0", "1"}:
+        raise TransportError(f"ROS_LOCALHOST_ONLY is {only!r}: it should be 0 or 1")
+    if only == "1":
+        return "LOCALHOST"
+    unsaid = "SUBNET" if only == "0" else "LOCALHOST"
+    reach = environment.get("ROS_AUTOMATIC_DISCOVERY_RANGE") or unsaid
+    if reach.upper() not in _RANGES:
+        raise TransportError(f"ROS_AUTOMATIC_DISCOVERY_RANGE is {reach!r}: it should be {' or '.join(_RANGES)}")
+    return reach.upper()
+
+
+def _peers(text: str) -> list[str]:
+    peers = [peer.strip() for peer in text.split(";") if peer.strip()]
+    for peer in peers:
+        if not _ADDRESS.fullmatch(peer):
+            raise TransportError(f"ROS_STATIC_PEERS has {peer!r}: it should be addresses with ; between them")
+    return peers
+
+
+def _config(reach: str, peers: list[str]) -> str:
+    interface = '<Interfaces><NetworkInterface address="127.0.0.1"/></Interfaces>'
+    alone = reach in {"LOCALHOST", "OFF"} and not peers
+    multicast = "true" if reach == "SUBNET" else "false"
+    everyone = [*(["127.0.0.1"] if reach == "LOCALHOST" else []), *peers]
+    found = "".join(f'<Peer address="{peer}"/>' for peer in everyone)
+    index = (
+        f"<ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>{_LARGEST_INDEX}</MaxAutoParticipantIndex>"
+    )
+    return (
+        "<CycloneDDS><Domain>"
+        f"<General>{interface if alone else ''}<AllowMulticast>{multicast}</AllowMulticast></General>"
+        f"<Discovery>{index if multicast == 'false' or peers else ''}<Peers>{found}</Peers></Discovery>"
+        "</Domain></CycloneDDS>"
+    )

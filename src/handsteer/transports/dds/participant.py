@@ -1,0 +1,103 @@
+"""This process as a participant of a DDS domain and a node of ROS 2: what it publishes and subscribes to."""
+
+import threading
+from collections.abc import Callable
+from typing import Any
+
+from cyclonedds.core import DDSException, Policy, Qos
+from cyclonedds.domain import Domain, DomainParticipant
+from cyclonedds.pub import DataWriter
+from cyclonedds.sub import DataReader
+from cyclonedds.topic import Topic as DdsTopic
+
+from handsteer.errors import TransportError
+from handsteer.messages import Topic, type_name
+from handsteer.transports.dds.discovery import RosGraph
+from handsteer.transports.dds.dispatcher import Dispatcher
+from handsteer.transports.dds.matching import Endpoint, Matching
+from handsteer.transports.dds.network import Network
+from handsteer.transports.dds.qos import reader_qos, writer_qos
+from handsteer.transports.dds.types import dds_type, dds_type_name
+from handsteer.transports.ros2.names import NodeName
+
+_USER_DATA = b"enclave=/;"
+
+
+class Participant:
+    """A participant of a DDS domain, known to ROS 2 as one node.
+
+    Args:
+        network: The domain, and where to look for others.
+        name: The node's name.
+
+    Raises:
+        TransportError: The domain cannot be joined.
+    """
+
+    def __init__(self, network: Network, name: NodeName) -> None:
+        self.name = name
+        try:
+            self._domain: Any = None if network.config is None else Domain(network.domain, network.config)
+            self._participant: Any = DomainParticipant(network.domain, Qos(Policy.Userdata(_USER_DATA)))
+        except DDSException as error:
+            raise TransportError(
+                f"cannot join the ROS 2 domain {network.domain} as {name.full}: {error} Is it joined already by this "
+                f"process, are there more than 32 others on this machine, is CYCLONEDDS_URI wrong?"
+            ) from None
+        self._lock = threading.Lock()
+        self._topics: dict[str, Any] = {}
+        self._graph = RosGraph(self._participant, name, network.distribution)
+        self._matching = Matching(self._participant, self._graph)
+        self._dispatcher = Dispatcher(self._participant, self._matching.tick)
+        self._dispatcher.add(self._graph.reader, self._graph.serve)
+        self._dispatcher.add(self._matching.publications, self._matching.serve_publications)
+        self._dispatcher.add(self._matching.subscriptions, self._matching.serve_subscriptions)
+        self._dispatcher.start()
+
+    def writer(self, topic: Topic[Any]) -> DataWriter[Any]:
+        """Return a new writer of ``topic``; its messages are instances of its ``data_type``."""
+        qos = writer_qos(topic)
+        writer: DataWriter[Any] = DataWriter(self._participant, self._topic(topic), qos=qos)
+        self._graph.add(writer)
+        self._matching.add(self._endpoint(topic, qos, publishes=True))
+        return writer
+
+    def reader(self, topic: Topic[Any]) -> DataReader[Any]:
+        """Return a new reader of ``topic``."""
+        qos = reader_qos(topic)
+        reader: DataReader[Any] = DataReader(self._participant, self._topic(topic), qos=qos)
+        self._graph.add(reader)
+        self._matching.add(self._endpoint(topic, qos, publishes=False))
+        return reader
+
+    def serve(self, reader: DataReader[Any], serve: Callable[[], None]) -> None:
+        """Call ``serve`` on the DDS thread whenever ``reader`` has something, until it is released."""
+        self._dispatcher.add(reader, serve)
+
+    def release(self, endpoint: DataWriter[Any] | DataReader[Any]) -> None:
+        """Let go of a writer or reader; it is gone when the caller forgets it too."""
+        if isinstance(endpoint, DataReader):
+            self._dispatcher.remove(endpoint)
+        self._graph.remove(endpoint)
+
+    def close(self) -> None:
+        """Leave the domain; may be called twice."""
+        self._dispatcher.close()
+        self._matching.close()
+        self._graph.close()
+        self._topics.clear()
+        self._participant = self._domain = None
+
+    def _topic(self, topic: Topic[Any]) -> DdsTopic[Any]:
+        name = self._dds_name(topic)
+        with self._lock:
+            if name not in self._topics:
+                self._topics[name] = DdsTopic(self._participant, name, dds_type(type_name(topic.type)))
+            known: DdsTopic[Any] = self._topics[name]
+        return known
+
+    def _endpoint(self, topic: Topic[Any], qos: Qos, *, publishes: bool) -> Endpoint:
+        return Endpoint(self._dds_name(topic), dds_type_name(type_name(topic.type)), qos, publishes)
+
+    def _dds_name(self, topic: Topic[Any]) -> str:
+        return f"rt{self.name.topic(topic)}"

@@ -1,0 +1,120 @@
+"""Quality of service: what we offer and request for each kind of topic, and why two ends do not fit.
+
+Commands, signs and what follows from them are reliable. Images and ``/clock`` are best effort, as ROS 2's
+``sensor_data`` has it: a late one is of no use. Of a robot's state we offer reliable and request best effort, which
+fits with any robot. A writer never waits for a slow reader.
+"""
+
+from typing import Any
+
+from cyclonedds.core import Policy, Qos
+
+from handsteer.messages import ClockMessage, CompressedImage, Image, JointState, Odometry, Topic, type_name
+from handsteer.transports.ros2.encoding import type_hash
+
+_SENSOR_DATA = (Image, CompressedImage, ClockMessage)
+_STATE = (Odometry, JointState)
+_RELIABLE = Policy.Reliability.Reliable(0)
+_BEST_EFFORT = Policy.Reliability.BestEffort
+_VOLATILE, _TRANSIENT_LOCAL = Policy.Durability.Volatile, Policy.Durability.TransientLocal
+_DURABILITIES = (_VOLATILE, _TRANSIENT_LOCAL, Policy.Durability.Transient, Policy.Durability.Persistent)
+_ORDERS = (Policy.DestinationOrder.ByReceptionTimestamp, Policy.DestinationOrder.BySourceTimestamp)
+_LIVELINESS = (
+    Policy.Liveliness.Automatic,
+    Policy.Liveliness.ManualByParticipant,
+    Policy.Liveliness.ManualByTopic,
+)
+_NEVER_NS = 2**63 - 1
+
+
+def writer_qos(topic: Topic[Any]) -> Qos:
+    """Return what a publisher of ``topic`` offers."""
+    return _qos(topic, reliable=topic.type not in _SENSOR_DATA)
+
+
+def reader_qos(topic: Topic[Any]) -> Qos:
+    """Return what a subscriber of ``topic`` requests."""
+    return _qos(topic, reliable=topic.type not in (*_SENSOR_DATA, *_STATE))
+
+
+def discovery_qos(name: str, depth: int) -> Qos:
+    """Return what ROS 2 has for ``ros_discovery_info``, of which a writer keeps one and a reader one of each writer.
+
+    Args:
+        name: The message type.
+        depth: How many messages are kept.
+    """
+    history = Policy.History.KeepLast(depth)
+    return Qos(_RELIABLE, _TRANSIENT_LOCAL, history, _CDR, Policy.IgnoreLocal.Participant, _user_data(name))
+
+
+def describe(qos: Qos) -> str:
+    """Return the profile in words, as ``reliable, volatile, keep last 1``; the depth of others is not known."""
+    words = [_reliability(qos), _durability(qos)]
+    history = _find(qos, "History")
+    if isinstance(history, Policy.History.KeepLast):
+        words.append(f"keep last {history.depth}")
+    return ", ".join(words)
+
+
+def misfits(offered: Qos, requested: Qos) -> list[str]:
+    """Return what a publisher lacks for a subscriber, in words; empty when they fit (DDS 1.4, section 2.2.3)."""
+    found = []
+    if _reliability(requested) == "reliable" and _reliability(offered) != "reliable":
+        found.append("the publisher is best effort, the subscriber wants reliable")
+    if _rank(offered, "Durability", _DURABILITIES) < _rank(requested, "Durability", _DURABILITIES):
+        found.append(f"the publisher is {_durability(offered)}, the subscriber wants {_durability(requested)}")
+    if _time_ns(offered, "Deadline", "deadline") > _time_ns(requested, "Deadline", "deadline"):
+        found.append("the subscriber has a deadline that the publisher does not promise to meet")
+    if _liveliness(offered) < _liveliness(requested) or (
+        _time_ns(offered, "Liveliness", "lease_duration") > _time_ns(requested, "Liveliness", "lease_duration")
+    ):
+        found.append("the subscriber wants a liveliness that the publisher does not promise")
+    if _find(offered, "Ownership", Policy.Ownership.Shared) != _find(requested, "Ownership", Policy.Ownership.Shared):
+        found.append("one has exclusive ownership, the other shared")
+    if _rank(offered, "DestinationOrder", _ORDERS) < _rank(requested, "DestinationOrder", _ORDERS):
+        found.append("the subscriber wants the order of the sending, the publisher has that of the arrival")
+    return found
+
+
+# ROS 2's nodes speak the first version of CDR, and newer Cyclone DDS might choose the second.
+_CDR = Policy.DataRepresentation(use_cdrv0_representation=True)
+
+
+def _qos(topic: Topic[Any], *, reliable: bool) -> Qos:
+    return Qos(
+        _RELIABLE if reliable else _BEST_EFFORT,
+        _TRANSIENT_LOCAL if topic.latched else _VOLATILE,
+        Policy.History.KeepLast(topic.depth),
+        _CDR,
+        _user_data(type_name(topic.type)),
+    )
+
+
+def _user_data(name: str) -> Any:
+    return Policy.Userdata(f"typehash={type_hash(name)};".encode())
+
+
+def _find(qos: Qos, scope: str, default: Any = None) -> Any:
+    return next((policy for policy in qos if policy.__scope__ == scope), default)
+
+
+def _reliability(qos: Qos) -> str:
+    return "reliable" if isinstance(_find(qos, "Reliability"), Policy.Reliability.Reliable) else "best effort"
+
+
+def _durability(qos: Qos) -> str:
+    return ("volatile", "transient local", "transient", "persistent")[_rank(qos, "Durability", _DURABILITIES)]
+
+
+def _rank(qos: Qos, scope: str, order: tuple[Any, ...]) -> int:
+    return order.index(_find(qos, scope, order[0]))
+
+
+def _liveliness(qos: Qos) -> int:
+    policy = _find(qos, "Liveliness")
+    return next((rank for rank, kind in enumerate(_LIVELINESS) if isinstance(policy, kind)), 0)
+
+
+def _time_ns(qos: Qos, scope: str, attribute: str) -> int:
+    return int(getattr(_find(qos, scope), attribute, _NEVER_NS))

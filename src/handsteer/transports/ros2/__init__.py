@@ -1,0 +1,1 @@
+"""What ROS 2 has whatever carries its messages: names, arguments, and how messages are encoded."""

@@ -1,0 +1,104 @@
+"""Names of nodes and topics by the rules of ROS 2: expansion, remapping, and what is allowed.
+
+Source of the rules: design.ros2.org/articles/topic_and_service_names.html and static_remapping.html.
+"""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from handsteer.errors import TransportError
+from handsteer.messages import Topic
+
+_TOKEN = r"[A-Za-z_][A-Za-z0-9_]*"
+_NODE = re.compile(_TOKEN)
+_FULL = re.compile(rf"(/{_TOKEN})+")
+_LONGEST = 255
+
+
+@dataclass(frozen=True)
+class Remap:
+    """One ``-r from:=to``.
+
+    Attributes:
+        source: What is renamed: a topic's name, ``__node`` or ``__ns``.
+        target: The name that it gets.
+        node: The node for which the rule holds; None for all.
+    """
+
+    source: str
+    target: str
+    node: str | None = None
+
+    def applies_to(self, node: str) -> bool:
+        """Return whether the rule holds for the node of this name."""
+        return self.node in {None, node}
+
+
+@dataclass(frozen=True)
+class NodeName:
+    """A node's name and namespace, and the names of topics as that node sees them.
+
+    Attributes:
+        name: As ``my_camera``.
+        namespace: As ``/`` or ``/r1``.
+        remaps: Rules for topics; the first that fits counts.
+    """
+
+    name: str
+    namespace: str = "/"
+    remaps: tuple[Remap, ...] = ()
+
+    @property
+    def full(self) -> str:
+        """The full name, as ``/r1/my_camera``."""
+        return f"{self.namespace.rstrip('/')}/{self.name}"
+
+    def topic(self, topic: Topic[object]) -> str:
+        """Return the full name of ``topic``, as ``/r1/image_raw``, remapped.
+
+        Raises:
+            TransportError: A rule gives it a name that is not allowed.
+        """
+        full = self.expand(topic.ros_name)
+        for rule in self.remaps:
+            if rule.applies_to(self.name) and self.expand(rule.source) == full:
+                return self.expand(rule.target)
+        return full
+
+    def expand(self, name: str) -> str:
+        """Return the full name for one that may be relative (``a``), private (``~/a``) or hold ``{node}``, ``{ns}``.
+
+        Raises:
+            TransportError: That is no name of a topic.
+        """
+        base = self.namespace.rstrip("/")
+        full = name.replace("{node}", self.name).replace("{namespace}", base).replace("{ns}", base)
+        if full == "~" or full.startswith("~/"):
+            full = self.full + full[1:]
+        elif not full.startswith("/"):
+            full = f"{base}/{full}"
+        if not _FULL.fullmatch(full) or len(full) > _LONGEST:
+            raise TransportError(
+                f"{name!r} is no name of a topic in ROS 2: it should have letters, digits and _, as camera/image"
+            )
+        return full
+
+
+def identify(node: str, remaps: Sequence[Remap]) -> NodeName:
+    """Return the name of the node that would be called ``node`` but for ``remaps``.
+
+    Raises:
+        TransportError: A rule has a name that is not allowed.
+    """
+    name = next((rule.target for rule in remaps if rule.source == "__node" and rule.applies_to(node)), node)
+    if not _NODE.fullmatch(name) or len(name) > _LONGEST:
+        raise TransportError(f"__node:={name}: the name of a node has letters, digits and _, as my_camera")
+    namespace = next((rule.target for rule in remaps if rule.source == "__ns" and rule.applies_to(name)), "/")
+    if namespace != "/" and (not _FULL.fullmatch(namespace) or len(namespace) > _LONGEST):
+        raise TransportError(f"__ns:={namespace}: a namespace starts with a slash and does not end with one, as /r1")
+    named = NodeName(name, namespace, tuple(rule for rule in remaps if not rule.source.startswith("__")))
+    for rule in named.remaps:
+        named.expand(rule.source)
+        named.expand(rule.target)
+    return named

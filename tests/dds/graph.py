@@ -1,0 +1,87 @@
+"""A DDS domain of its own for a test, and processes in it."""
+
+import contextlib
+import os
+import random
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from tests.ros1.graph import Peer, Process, eventually
+
+PEER = Path(__file__).with_name("peer.py")
+# Domains above have their ports among those that the system gives to others.
+_LARGEST_DOMAIN = 100
+_SHARES = 20
+_ROS_VARIABLES = (
+    "CYCLONEDDS_URI",
+    "ROS_AUTOMATIC_DISCOVERY_RANGE",
+    "ROS_DISTRO",
+    "ROS_LOCALHOST_ONLY",
+    "ROS_STATIC_PEERS",
+)
+
+
+def free_domain() -> int:
+    """Return the number of a domain that no test on another worker uses."""
+    worker = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw")) % _SHARES
+    return 1 + worker + _SHARES * random.randrange(_LARGEST_DOMAIN // _SHARES)
+
+
+class DdsGraph:
+    """The processes of a test in a domain, with one plain DDS program among them that looks on.
+
+    Attributes:
+        env: Environment of the processes.
+        peer: The plain program.
+    """
+
+    def __init__(self, home: Path) -> None:
+        self._home = home
+        self._processes: list[Process] = []
+        self.domain = free_domain()
+        self.env = {**os.environ, "ROS_DOMAIN_ID": str(self.domain), "PYTHONUNBUFFERED": "1"}
+        for inherited in _ROS_VARIABLES:
+            self.env.pop(inherited, None)
+        self.peer = self.start_peer()
+
+    def stop(self) -> None:
+        """End all processes."""
+        for process in self._processes:
+            process.kill()
+
+    def start_peer(self) -> Peer:
+        """Start a plain DDS program, as ``tests/dds/peer.py`` tells; wait until it is ready."""
+        log = self._home / f"peer_{len(self._processes)}.log"
+        peer = Peer([sys.executable, str(PEER), str(self.domain)], self.env, log)
+        self._processes.append(peer)
+        return peer
+
+    def handsteer(self, *arguments: str) -> Process:
+        """Start ``handsteer`` with ``arguments`` in this domain."""
+        log = self._home / f"process_{len(self._processes)}.log"
+        process = Process([sys.executable, "-m", "handsteer", *arguments], self.env, log)
+        self._processes.append(process)
+        return process
+
+    def node(self, verb: str, *arguments: str, name: str, ros: tuple[str, ...] = ()) -> Process:
+        """Start one of handsteer's nodes and wait until it is in the graph under ``name``."""
+        process = self.handsteer(verb, "--transport", "dds", *arguments, *(("--ros-args", *ros) if ros else ()))
+        eventually(lambda: name in self.nodes() or not process.running, what=f"{name} to start")
+        assert process.running, process.text
+        return process
+
+    def nodes(self) -> dict[str, Any]:
+        """Return the nodes as the plain program knows them: what they publish and subscribe to."""
+        return dict(self.peer.ask("graph"))
+
+
+@contextlib.contextmanager
+def dds_graph(home: Path) -> Iterator[DdsGraph]:
+    """A domain with a plain program in it, for as long as the block lasts."""
+    graph = DdsGraph(home)
+    try:
+        yield graph
+    finally:
+        graph.stop()

@@ -1,0 +1,322 @@
+"""A plain DDS program that knows nothing of handsteer: what others' nodes see of ours.
+
+Its types are written by hand, from ROS 2's definitions, and cyclonedds itself encodes them. It reads orders as lines of
+JSON from its input and answers each by one line of JSON. ``record`` (topic, type, fields, reliable) starts to note
+messages, ``get`` (topic) returns what was noted as ``[time_s, [values]]``. ``advertise`` (topic, type, reliable) comes
+before ``listeners`` (topic), which returns how many listen, ``publish`` (topic, values, count, period_s) and
+``publish_raw`` (topic, hex). ``introduce`` (name) makes it a node for ROS 2, and ``graph`` and ``user_data``
+(topic) return what a ROS 2 node would know of others.
+"""
+
+import json
+import sys
+import threading
+import time
+from dataclasses import dataclass, field
+from functools import reduce
+from typing import Any
+
+from cyclonedds.builtin import (
+    BuiltinDataReader,
+    BuiltinTopicDcpsParticipant,
+    BuiltinTopicDcpsPublication,
+    BuiltinTopicDcpsSubscription,
+)
+from cyclonedds.core import Policy, Qos
+from cyclonedds.domain import Domain, DomainParticipant
+from cyclonedds.idl import IdlStruct
+from cyclonedds.idl.types import array, bounded_str, float64, int32, sequence, uint8, uint32
+from cyclonedds.internal import InvalidSample
+from cyclonedds.pub import DataWriter
+from cyclonedds.sub import DataReader
+from cyclonedds.topic import Topic
+
+LOOPBACK = """<CycloneDDS><Domain><General>
+<Interfaces><NetworkInterface address="127.0.0.1"/></Interfaces><AllowMulticast>false</AllowMulticast>
+</General><Discovery><ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>32</MaxAutoParticipantIndex>
+<Peers><Peer address="127.0.0.1"/></Peers></Discovery></Domain></CycloneDDS>"""
+
+
+@dataclass
+class String(IdlStruct, typename="std_msgs::msg::dds_::String_"):
+    data: str = ""
+
+
+@dataclass
+class Time(IdlStruct, typename="builtin_interfaces::msg::dds_::Time_"):
+    sec: int32 = 0
+    nanosec: uint32 = 0
+
+
+@dataclass
+class Header(IdlStruct, typename="std_msgs::msg::dds_::Header_"):
+    stamp: Time = field(default_factory=Time)
+    frame_id: str = ""
+
+
+@dataclass
+class Image(IdlStruct, typename="sensor_msgs::msg::dds_::Image_"):
+    header: Header = field(default_factory=Header)
+    height: uint32 = 0
+    width: uint32 = 0
+    encoding: str = ""
+    is_bigendian: uint8 = 0
+    step: uint32 = 0
+    data: sequence[uint8] = field(default_factory=list)
+
+
+@dataclass
+class Vector3(IdlStruct, typename="geometry_msgs::msg::dds_::Vector3_"):
+    x: float64 = 0.0
+    y: float64 = 0.0
+    z: float64 = 0.0
+
+
+@dataclass
+class Twist(IdlStruct, typename="geometry_msgs::msg::dds_::Twist_"):
+    linear: Vector3 = field(default_factory=Vector3)
+    angular: Vector3 = field(default_factory=Vector3)
+
+
+@dataclass
+class Point(IdlStruct, typename="geometry_msgs::msg::dds_::Point_"):
+    x: float64 = 0.0
+    y: float64 = 0.0
+    z: float64 = 0.0
+
+
+@dataclass
+class Quaternion(IdlStruct, typename="geometry_msgs::msg::dds_::Quaternion_"):
+    x: float64 = 0.0
+    y: float64 = 0.0
+    z: float64 = 0.0
+    w: float64 = 1.0
+
+
+@dataclass
+class Pose(IdlStruct, typename="geometry_msgs::msg::dds_::Pose_"):
+    position: Point = field(default_factory=Point)
+    orientation: Quaternion = field(default_factory=Quaternion)
+
+
+@dataclass
+class PoseWithCovariance(IdlStruct, typename="geometry_msgs::msg::dds_::PoseWithCovariance_"):
+    pose: Pose = field(default_factory=Pose)
+    covariance: array[float64, 36] = field(default_factory=lambda: [0.0] * 36)
+
+
+@dataclass
+class TwistWithCovariance(IdlStruct, typename="geometry_msgs::msg::dds_::TwistWithCovariance_"):
+    twist: Twist = field(default_factory=Twist)
+    covariance: array[float64, 36] = field(default_factory=lambda: [0.0] * 36)
+
+
+@dataclass
+class Odometry(IdlStruct, typename="nav_msgs::msg::dds_::Odometry_"):
+    header: Header = field(default_factory=Header)
+    child_frame_id: str = ""
+    pose: PoseWithCovariance = field(default_factory=PoseWithCovariance)
+    twist: TwistWithCovariance = field(default_factory=TwistWithCovariance)
+
+
+@dataclass
+class Clock(IdlStruct, typename="rosgraph_msgs::msg::dds_::Clock_"):
+    clock: Time = field(default_factory=Time)
+
+
+@dataclass
+class Gid(IdlStruct, typename="rmw_dds_common::msg::dds_::Gid_"):
+    data: array[uint8, 16]
+
+
+@dataclass
+class NodeEntitiesInfo(IdlStruct, typename="rmw_dds_common::msg::dds_::NodeEntitiesInfo_"):
+    node_namespace: bounded_str[256]
+    node_name: bounded_str[256]
+    reader_gid_seq: sequence[Gid]
+    writer_gid_seq: sequence[Gid]
+
+
+@dataclass
+class ParticipantEntitiesInfo(IdlStruct, typename="rmw_dds_common::msg::dds_::ParticipantEntitiesInfo_"):
+    gid: Gid
+    node_entities_info_seq: sequence[NodeEntitiesInfo]
+
+
+TYPES = {kind.__name__: kind for kind in (String, Image, Twist, Odometry, Clock)}
+RELIABLE, BEST_EFFORT = Policy.Reliability.Reliable(1_000_000_000), Policy.Reliability.BestEffort
+CDR = Policy.DataRepresentation(use_cdrv0_representation=True)
+
+domain = Domain(int(sys.argv[1]), LOOPBACK)
+participant = DomainParticipant(int(sys.argv[1]))
+noted: dict[str, list[Any]] = {}
+readers: dict[str, tuple[Any, list[str]]] = {}
+writers: dict[str, Any] = {}
+participants = BuiltinDataReader(participant, BuiltinTopicDcpsParticipant)
+endpoints = {
+    "writers": BuiltinDataReader(participant, BuiltinTopicDcpsPublication),
+    "readers": BuiltinDataReader(participant, BuiltinTopicDcpsSubscription),
+}
+discovery_qos = Qos(RELIABLE, Policy.Durability.TransientLocal, Policy.History.KeepLast(1), CDR)
+discovery_topic = Topic(participant, "ros_discovery_info", ParticipantEntitiesInfo)
+discovery = DataReader(
+    participant, discovery_topic, qos=Qos(RELIABLE, Policy.Durability.TransientLocal, Policy.History.KeepAll, CDR)
+)
+introductions: list[Any] = []
+infos: dict[bytes, Any] = {}
+
+
+def qos(order: dict[str, Any]) -> Qos:
+    reliability = RELIABLE if order.get("reliable", True) else BEST_EFFORT
+    durability = Policy.Durability.TransientLocal if order.get("latched") else Policy.Durability.Volatile
+    return Qos(reliability, durability, Policy.History.KeepLast(order.get("depth", 100)), CDR)
+
+
+def topic(order: dict[str, Any]) -> Any:
+    return Topic(participant, f"rt{order['topic']}", TYPES[order["type"]])
+
+
+def record(order: dict[str, Any]) -> bool:
+    noted[order["topic"]] = []
+    readers[order["topic"]] = (DataReader(participant, topic(order), qos=qos(order)), order["fields"])
+    return True
+
+
+def collect() -> None:
+    while True:
+        for name, (reader, fields) in list(readers.items()):
+            for message in reader.take(100):
+                if not isinstance(message, InvalidSample):
+                    noted[name].append([time.monotonic(), [value(message, path) for path in fields]])
+        time.sleep(0.002)
+
+
+def value(message: Any, path: str) -> Any:
+    found = reduce(getattr, path.split("."), message)
+    if isinstance(found, Time):
+        return found.sec + found.nanosec / 1e9
+    return len(found) if isinstance(found, (bytes, list)) else found
+
+
+def get(order: dict[str, Any]) -> list[Any]:
+    return list(noted[order["topic"]])
+
+
+def advertise(order: dict[str, Any]) -> bool:
+    writers[order["topic"]] = DataWriter(participant, topic(order), qos=qos(order))
+    return True
+
+
+def listeners(order: dict[str, Any]) -> int:
+    return int(writers[order["topic"]].get_publication_matched_status().current_count)
+
+
+def publish(order: dict[str, Any]) -> bool:
+    writer = writers[order["topic"]]
+    message = writer.data_type()
+    for path, wanted in order["values"].items():
+        *parts, last = path.split(".")
+        setattr(reduce(getattr, parts, message), last, wanted)
+    for _ in range(order.get("count", 1)):
+        writer.write(message)
+        time.sleep(order.get("period_s", 0.0))
+    return True
+
+
+def publish_raw(order: dict[str, Any]) -> bool:
+    """Send bytes that are no message."""
+    writer = writers[order["topic"]]
+    message = writer.data_type()
+    message.serialize = lambda **_: bytes.fromhex(order["hex"])
+    writer.write(message)
+    return True
+
+
+def run_clock(order: dict[str, Any]) -> bool:
+    """Tell the time on /clock, in real time, from ``from_s`` on, for ``seconds``."""
+    writer = writers["/clock"]
+
+    def run() -> None:
+        began_s = time.monotonic()
+        while (passed_s := time.monotonic() - began_s) < order["seconds"]:
+            now_s = order["from_s"] + passed_s
+            writer.write(Clock(Time(int(now_s), int(now_s % 1 * 1e9))))
+            time.sleep(0.01)
+
+    threading.Thread(target=run, daemon=True).start()
+    return True
+
+
+def introduce(order: dict[str, Any]) -> bool:
+    """Tell ROS 2 that all publishers and subscribers of this program belong to a node."""
+    node = NodeEntitiesInfo(
+        node_namespace="/",
+        node_name=order["name"],
+        reader_gid_seq=[gid(reader) for reader, _ in readers.values()],
+        writer_gid_seq=[gid(writer) for writer in writers.values()],
+    )
+    introductions.append(DataWriter(participant, discovery_topic, qos=discovery_qos))
+    introductions[-1].write(ParticipantEntitiesInfo(gid=gid(participant), node_entities_info_seq=[node]))
+    return True
+
+
+def gid(entity: Any) -> Gid:
+    return Gid(data=list(entity.guid.bytes))
+
+
+def graph(_order: dict[str, Any]) -> dict[str, Any]:
+    """Return nodes by full name with the topics, types and user data of what they publish and subscribe to."""
+    seen = {
+        kind: {end.key.bytes: end for end in reader.read(1000) if end.sample_info.valid_data}
+        for kind, reader in endpoints.items()
+    }
+    alive = {end.key.bytes: text(end.qos) for end in participants.read(100) if end.sample_info.valid_data}
+    for info in discovery.take(100):
+        if not isinstance(info, InvalidSample):
+            infos[bytes(info.gid.data)] = info
+    nodes: dict[str, Any] = {}
+    for info in infos.values():
+        for node in info.node_entities_info_seq:
+            gids = {"writers": node.writer_gid_seq, "readers": node.reader_gid_seq}
+            nodes[f"{node.node_namespace.rstrip('/')}/{node.node_name}"] = {
+                "participant": alive.get(bytes(info.gid.data)),
+                **{
+                    kind: {
+                        end.topic_name: [end.type_name, text(end.qos)]
+                        for one in gids[kind]
+                        if (end := seen[kind].get(bytes(one.data)))
+                    }
+                    for kind in gids
+                },
+            }
+    return nodes
+
+
+def user_data(order: dict[str, Any]) -> dict[str, list[str]]:
+    """Return the user data of all publishers and subscribers of a topic that are not this program's."""
+    return {
+        kind: [
+            text(end.qos)
+            for end in reader.read(1000)
+            if end.sample_info.valid_data
+            and end.topic_name == order["topic"]
+            and end.participant_key != participant.guid
+        ]
+        for kind, reader in endpoints.items()
+    }
+
+
+def text(of: Qos) -> str:
+    return of[Policy.Userdata].data.decode() if Policy.Userdata in of else ""
+
+
+ORDERS = {
+    order.__name__: order
+    for order in (record, get, advertise, listeners, publish, publish_raw, run_clock, introduce, graph, user_data)
+}
+
+threading.Thread(target=collect, daemon=True).start()
+print("ready", flush=True)
+for line in sys.stdin:
+    order = json.loads(line)
+    print(json.dumps(ORDERS[order["order"]](order)), flush=True)

@@ -1,0 +1,280 @@
+"""Our nodes as processes in a DDS domain, seen by a plain DDS program with types of its own."""
+
+import itertools
+import signal
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.dds.graph import DdsGraph, dds_graph
+from tests.ros1.graph import Peer, Process, eventually
+
+pytest.importorskip("cyclonedds")
+pytestmark = pytest.mark.slow
+
+CMD_VEL = "/robot_diff_drive_controller/cmd_vel"
+ODOM = "/robot_diff_drive_controller/odom"
+NODE = "hand_sign_control"
+LIMIT_S = 0.5
+"""From the death of any node to a zero velocity at the robot."""
+SETTLE_S = 0.3
+"""One end sees the other first; the other follows within milliseconds."""
+
+numbers = itertools.count()
+
+
+@pytest.fixture(scope="module")
+def dds(tmp_path_factory: pytest.TempPathFactory) -> Iterator[DdsGraph]:
+    with dds_graph(tmp_path_factory.mktemp("dds")) as graph:
+        yield graph
+
+
+class Driver:
+    """Shows signs to a control of its own namespace, and notes the velocities that come out."""
+
+    def __init__(self, graph: DdsGraph, *options: str, ros: tuple[str, ...] = ()) -> None:
+        namespace = f"/n{next(numbers)}"
+        self._signs, self._cmd_vel, self._peer = f"{namespace}/gesture/hand_sign", f"{namespace}{CMD_VEL}", graph.peer
+        record_twists(graph.peer, self._cmd_vel)
+        graph.peer.ask("advertise", topic=self._signs, type="String")
+        words = ("-r", f"__ns:={namespace}", *ros)
+        self.process = graph.node("control", *options, name=f"{namespace}/{NODE}", ros=words)
+        eventually(lambda: graph.peer.ask("listeners", topic=self._signs) > 0)
+        eventually(lambda: f"rt{self._cmd_vel}" in graph.nodes()[f"{namespace}/{NODE}"]["writers"])
+        time.sleep(SETTLE_S)
+
+    def show(self, sign: str, count: int = 1, period_s: float = 0.02) -> None:
+        self._peer.ask("publish", topic=self._signs, values={"data": sign}, count=count, period_s=period_s)
+
+    def show_raw(self, raw: bytes) -> None:
+        self._peer.ask("publish_raw", topic=self._signs, hex=raw.hex())
+
+    @property
+    def twists(self) -> list[tuple[float, float]]:
+        return [twist for _, twist in twists(self._peer, self._cmd_vel)]
+
+    def expect(self, *wanted: tuple[float, float]) -> None:
+        eventually(lambda: len(self.twists) >= len(wanted), 10.0, what=f"{len(wanted)} twists")
+        assert self.twists[: len(wanted)] == list(wanted)
+
+
+def record_twists(peer: Peer, topic: str = CMD_VEL) -> None:
+    peer.ask("record", topic=topic, type="Twist", fields=["linear.x", "angular.z"])
+
+
+def twists(peer: Peer, topic: str = CMD_VEL) -> list[tuple[float, tuple[float, float]]]:
+    return [(at_s, (round(x, 6), round(z, 6))) for at_s, (x, z) in peer.ask("get", topic=topic)]
+
+
+@pytest.fixture
+def drive(dds: DdsGraph) -> Callable[..., Driver]:
+    return lambda *options, ros=(): Driver(dds, *options, ros=ros)
+
+
+def test_exactly_one_twist_a_sign_with_the_values_of_the_course(drive: Callable[..., Driver]) -> None:
+    driver = drive()
+    driver.show("Forward", count=5)
+    for sign in ("Turn Left", "Go", "Dance", "Turn Right", "Backward", "Stop", "Forward", "NONE"):
+        driver.show(sign)
+    grown = [(0.01, 0.0), (0.02, 0.0), (0.03, 0.0), (0.04, 0.0), (0.05, 0.0)]
+    kept = [(0.05, 0.1), (0.05, 0.1), (0.05, 0.1), (0.05, 0.0), (0.04, 0.0), (0.0, 0.0), (0.01, 0.0), (0.0, 0.0)]
+    driver.expect(*grown, *kept)
+    time.sleep(0.2)
+    assert len(driver.twists) == len(grown) + len(kept)
+
+
+def test_signs_that_come_all_at_once_count_each(drive: Callable[..., Driver]) -> None:
+    driver = drive()
+    driver.show("Forward", count=5, period_s=0.0)
+    driver.expect(*[(round(0.01 * n, 6), 0.0) for n in range(1, 6)])
+
+
+def test_parameters_go_before_the_file_and_options_before_both(drive: Callable[..., Driver], tmp_path: Path) -> None:
+    file = tmp_path / "ros.yaml"
+    file.write_text(f"/**/{NODE}: {{ros__parameters: {{linear_step: 0.02, angular_step: 0.2}}}}\n")
+    words = ("--params-file", str(file), "-p", "linear_step:=0.03")
+    driver = drive("--control.angular-step=0.4", ros=words)
+    driver.show("Forward")
+    driver.show("Turn Left")
+    driver.expect((0.03, 0.0), (0.03, 0.4))
+
+
+def test_zero_when_signs_stop_then_silence(drive: Callable[..., Driver]) -> None:
+    driver = drive()
+    driver.show("Forward", count=2)
+    driver.expect((0.01, 0.0), (0.02, 0.0), (0.0, 0.0))
+    time.sleep(0.6)
+    assert len(driver.twists) == 3
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_one_zero_at_exit(drive: Callable[..., Driver], number: signal.Signals) -> None:
+    driver = drive("--control.sign-timeout", "5")
+    driver.show("Forward", count=2)
+    driver.expect((0.01, 0.0), (0.02, 0.0))
+    driver.process.signal(number)
+    assert driver.process.code() == 0, driver.process.text
+    driver.expect((0.01, 0.0), (0.02, 0.0), (0.0, 0.0))
+
+
+def test_after_a_freeze_nothing_old_is_obeyed(drive: Callable[..., Driver]) -> None:
+    driver = drive()
+    driver.show("Forward", count=3)
+    driver.expect((0.01, 0.0))
+    driver.process.signal(signal.SIGSTOP)
+    driver.show("Forward", count=30, period_s=0.033)
+    driver.process.signal(signal.SIGCONT)
+    driver.expect((0.01, 0.0), (0.02, 0.0), (0.03, 0.0), (0.0, 0.0))
+    time.sleep(0.5)
+    assert set(driver.twists[3:]) == {(0.0, 0.0)}
+
+
+def test_what_is_no_text_does_not_end_the_node(drive: Callable[..., Driver]) -> None:
+    driver = drive()
+    driver.show_raw(b"\x00\x01\x00\x00\x03\x00\x00\x00\xff\xfe\x00\x00")
+    driver.show("Turn Left")
+    driver.expect((0.0, 0.1))
+    assert "a message of 12 bytes cannot be read" in driver.process.text
+    assert "Traceback" not in driver.process.text
+
+
+def test_ros2_sees_the_node_by_its_names_types_and_hashes(dds: DdsGraph) -> None:
+    words = ("-r", "__ns:=/far", "-r", "__node:=driver", "-r", f"{CMD_VEL[1:]}:=/base/cmd_vel")
+    control = dds.node("control", name="/far/driver", ros=words)
+    twist = [
+        "geometry_msgs::msg::dds_::Twist_",
+        "typehash=RIHS01_9c45bf16fe0983d80e3cfe750d6835843d265a9a6c46bd2e609fcddde6fb8d2a;",
+    ]
+    string = [
+        "std_msgs::msg::dds_::String_",
+        "typehash=RIHS01_df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18;",
+    ]
+    eventually(lambda: "rt/base/cmd_vel" in dds.nodes()["/far/driver"]["writers"])
+    eventually(lambda: len(dds.nodes()["/far/driver"]["readers"]) == 2)
+    node = dds.nodes()["/far/driver"]
+    assert node["participant"] == "enclave=/;"
+    assert node["writers"]["rt/base/cmd_vel"] == twist
+    assert set(node["writers"]) == {"rt/base/cmd_vel", "rt/diagnostics"}
+    assert node["readers"] == {"rt/far/gesture/hand_sign": string, "rt/far/steering/cmd_vel": twist}
+    control.signal(signal.SIGTERM)
+    assert control.code() == 0
+
+
+def test_the_discovery_itself_carries_the_hash_of_ros2(tmp_path: Path) -> None:
+    with dds_graph(tmp_path) as graph:
+        graph.node("control", name=f"/{NODE}")
+        digest = "typehash=RIHS01_91a0593bacdcc50ea9bdcf849a938b128412cc1ea821245c663bcd26f83c295e;"
+        assert graph.peer.ask("user_data", topic="ros_discovery_info") == {"writers": [digest], "readers": [digest]}
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["-p", "linear_stepp:=0.1"], "ROS parameter /hand_sign_control/linear_stepp: there is no such parameter"),
+        (["-p", "linear_step:=7"], "ROS parameter /hand_sign_control/linear_step: 7 should be less than or eq"),
+        (["-p", "use_sim_time:=7"], "parameter use_sim_time is 7: it should be true or false"),
+        (["-r", "__ns:=r1"], "__ns:=r1: a namespace starts with a slash"),
+        (["-r"], "-r lacks its value"),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, list) else None,
+)
+def test_what_is_wrong_is_said_in_one_line(dds: DdsGraph, words: list[str], message: str) -> None:
+    process = dds.handsteer("control", "--transport", "dds", "--ros-args", *words)
+    assert process.code() == 2, process.text
+    assert [line for line in process.text.splitlines() if line.startswith(f"handsteer: {message}")], process.text
+    assert "Traceback" not in process.text
+
+
+def test_what_does_not_fit_is_said_in_words(tmp_path: Path) -> None:
+    with dds_graph(tmp_path) as graph:
+        peer = graph.peer
+        peer.ask("record", topic="/image_raw", type="Image", fields=["width"], depth=5)
+        peer.ask("advertise", topic="/gesture/hand_sign", type="Twist")
+        peer.ask("introduce", name="viewer")
+        camera = graph.node("camera", *FORWARD, name="/my_camera")
+        control = graph.node("control", name=f"/{NODE}")
+        profile = "the publisher is best effort, the subscriber wants reliable"
+        line = f"/image_raw: nothing passes between our publisher and the subscriber of /viewer: {profile}"
+        eventually(lambda: line in camera.text, 10.0, what=line)
+        assert "(ours: best effort, volatile, keep last 1; theirs: reliable, volatile" in camera.text
+        types = "ours has the type std_msgs/msg/String, theirs geometry_msgs/msg/Twist"
+        eventually(lambda: types in control.text, 10.0, what=types)
+        assert peer.ask("get", topic="/image_raw") == []
+
+
+def test_simulated_time_is_followed(drive: Callable[..., Driver], tmp_path: Path) -> None:
+    with dds_graph(tmp_path) as graph:
+        graph.peer.ask("advertise", topic="/clock", type="Clock", reliable=False, depth=1)
+        graph.peer.ask("record", topic="/image_raw", type="Image", fields=["header.stamp"], reliable=False)
+        camera = graph.node("camera", *FORWARD, name="/my_camera", ros=("-p", "use_sim_time:=true"))
+        eventually(lambda: graph.peer.ask("listeners", topic="/clock") > 0)
+        graph.peer.ask("run_clock", from_s=1000.0, seconds=30.0)
+        eventually(lambda: [v for _, (v,) in graph.peer.ask("get", topic="/image_raw") if 1000.0 < v < 1040.0], 15.0)
+        assert camera.running
+
+
+FORWARD = ["--camera", "virtual", "--camera.width", "320", "--camera.height", "240"]
+SCRIPT = ("-p", "virtual_hand.script:=Forward:60")
+
+
+@pytest.fixture
+def running(tmp_path: Path) -> Iterator[tuple[Peer, dict[str, Process]]]:
+    """The whole graph, the robot driving forward."""
+    with dds_graph(tmp_path) as graph:
+        peer = graph.peer
+        record_twists(peer)
+        fields = ["twist.twist.linear.x", "pose.pose.position.x"]
+        peer.ask("record", topic=ODOM, type="Odometry", fields=fields)
+        nodes = {
+            "robot": graph.node("robot", name="/robot"),
+            "control": graph.node("control", name=f"/{NODE}", ros=("-p", "max_linear:=0.3")),
+            "recognition": graph.node("recognition", name="/hand_sign_recognition"),
+            "camera": graph.node("camera", *FORWARD, name="/my_camera", ros=SCRIPT),
+        }
+        eventually(lambda: speeds(peer) and speeds(peer)[-1][1] > 0.29, what="the robot to drive at its limit")
+        yield peer, nodes
+
+
+def odometry(peer: Peer) -> list[tuple[float, list[float]]]:
+    return [(at_s, values) for at_s, values in peer.ask("get", topic=ODOM)]
+
+
+def speeds(peer: Peer) -> list[tuple[float, float]]:
+    return [(at_s, values[0]) for at_s, values in odometry(peer)]
+
+
+@pytest.mark.parametrize("victim", ["camera", "recognition", "control"])
+def test_kill_9_of_any_node_stops_the_robot(running: tuple[Peer, dict[str, Process]], victim: str) -> None:
+    peer, nodes = running
+    assert odometry(peer)[-1][1][1] > 0.1  # it has moved forward, as the sign says
+    killed_s = time.monotonic()
+    nodes[victim].popen.kill()
+    eventually(lambda: abs(speeds(peer)[-1][1]) < 0.01, 5.0, what="the robot to stand")
+    if victim == "control":
+        # No Twist can come any more: the robot's controller brakes by itself.
+        braked_s = next(at_s for at_s, speed in speeds(peer) if at_s > killed_s and speed < 0.28)
+        assert braked_s - killed_s <= LIMIT_S + 0.05  # the speed has to fall before it can be seen to fall
+    else:
+        zero_s = next(at_s for at_s, twist in twists(peer) if at_s > killed_s and twist == (0.0, 0.0))
+        assert zero_s - killed_s <= LIMIT_S + 0.02  # the peer looks every few milliseconds
+        time.sleep(0.3)
+        assert {twist for at_s, twist in twists(peer) if at_s > zero_s} <= {(0.0, 0.0)}
+
+
+def test_a_robot_follows_another_programs_twists(dds: DdsGraph) -> None:
+    peer: Any = dds.peer
+    dds.node("robot", name="/lone/robot", ros=("-r", "__ns:=/lone", "-r", f"{CMD_VEL[1:]}:=/lone/cmd_vel"))
+    peer.ask(
+        "record", topic=f"/lone{ODOM}", type="Odometry", fields=["twist.twist.angular.z", "pose.pose.orientation.z"]
+    )
+    peer.ask("advertise", topic="/lone/cmd_vel", type="Twist")
+    eventually(lambda: peer.ask("listeners", topic="/lone/cmd_vel") > 0)
+    eventually(lambda: peer.ask("get", topic=f"/lone{ODOM}"))
+    peer.ask("publish", topic="/lone/cmd_vel", values={"angular.z": 0.5}, count=20, period_s=0.05)
+    turned = peer.ask("get", topic=f"/lone{ODOM}")
+    assert max(speed for _, (speed, _) in turned) == pytest.approx(0.5, abs=0.05)
+    assert turned[-1][1][1] > 0.1  # to the left
+    eventually(lambda: abs(peer.ask("get", topic=f"/lone{ODOM}")[-1][1][0]) < 0.01, 5.0, what="the robot to stand")

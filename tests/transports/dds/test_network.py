@@ -1,0 +1,81 @@
+import re
+import xml.etree.ElementTree as ET
+
+import pytest
+
+from handsteer.errors import TransportError
+from handsteer.transports.dds.network import network
+
+
+def settings(**environment: str) -> dict[str, object]:
+    """Return what Cyclone DDS is told."""
+    config = network(environment).config
+    assert config is not None
+    tree = ET.fromstring(config)
+    interface = tree.find(".//NetworkInterface")
+    return {
+        "interface": None if interface is None else interface.get("address"),
+        "multicast": tree.findtext(".//AllowMulticast"),
+        "index": tree.findtext(".//ParticipantIndex"),
+        "peers": [peer.get("address") for peer in tree.iter("Peer")],
+    }
+
+
+LOOPBACK = {"interface": "127.0.0.1", "multicast": "false", "index": "auto", "peers": ["127.0.0.1"]}
+
+
+@pytest.mark.parametrize(
+    "environment",
+    [
+        {},
+        {"ROS_LOCALHOST_ONLY": "1"},
+        {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"},
+        {"ROS_LOCALHOST_ONLY": "1", "ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET", "ROS_STATIC_PEERS": "10.0.0.1"},
+    ],
+)
+def test_this_machine_only(environment: dict[str, str]) -> None:
+    assert settings(**environment) == LOOPBACK
+
+
+@pytest.mark.parametrize("environment", [{"ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"}, {"ROS_LOCALHOST_ONLY": "0"}])
+def test_the_subnet(environment: dict[str, str]) -> None:
+    assert settings(**environment) == {"interface": None, "multicast": "true", "index": None, "peers": []}
+
+
+def test_static_peers() -> None:
+    assert settings(ROS_STATIC_PEERS="10.0.0.1; robot.local;") == {
+        "interface": None,
+        "multicast": "false",
+        "index": "auto",
+        "peers": ["127.0.0.1", "10.0.0.1", "robot.local"],
+    }
+    assert settings(ROS_STATIC_PEERS="10.0.0.1", ROS_AUTOMATIC_DISCOVERY_RANGE="OFF")["peers"] == []
+    assert settings(ROS_STATIC_PEERS="10.0.0.1", ROS_AUTOMATIC_DISCOVERY_RANGE="SUBNET")["peers"] == ["10.0.0.1"]
+
+
+def test_the_users_configuration_wins() -> None:
+    assert network({"CYCLONEDDS_URI": "file:///my.xml", "ROS_LOCALHOST_ONLY": "1"}).config is None
+    assert network({"ROS_AUTOMATIC_DISCOVERY_RANGE": "SYSTEM_DEFAULT"}).config is None
+
+
+def test_domain_and_distribution() -> None:
+    assert network({}).domain == 0
+    assert network({"ROS_DOMAIN_ID": "42", "CYCLONEDDS_URI": "x"}).domain == 42
+    assert network({"ROS_DISTRO": "humble"}).distribution == "humble"
+    assert network({"ROS_DISTRO": "kilted"}).distribution == "jazzy"
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "right"),
+    [
+        ("ROS_DOMAIN_ID", "x", "a whole number from 0 to 232"),
+        ("ROS_DOMAIN_ID", "-1", "a whole number from 0 to 232"),
+        ("ROS_DOMAIN_ID", "233", "a whole number from 0 to 232"),
+        ("ROS_LOCALHOST_ONLY", "yes", "0 or 1"),
+        ("ROS_AUTOMATIC_DISCOVERY_RANGE", "WORLD", "LOCALHOST or SUBNET or OFF or SYSTEM_DEFAULT"),
+        ("ROS_STATIC_PEERS", '"/><x', "addresses with ; between them"),
+    ],
+)
+def test_wrong_variables(name: str, value: str, right: str) -> None:
+    with pytest.raises(TransportError, match=f"^{name} (is|has) {re.escape(repr(value))}: it should be {right}$"):
+        network({name: value})

@@ -1,0 +1,48 @@
+import pytest
+
+pytest.importorskip("cyclonedds")
+
+from cyclonedds.core import Policy, Qos
+
+from handsteer.messages import CMD_VEL, HAND_SIGN, IMAGE_RAW, ODOM, ROBOT_DESCRIPTION, Topic
+from handsteer.transports.dds.qos import describe, misfits, reader_qos, writer_qos
+
+RELIABLE = Policy.Reliability.Reliable(0)
+
+
+@pytest.mark.parametrize(
+    ("topic", "offered", "requested"),
+    [
+        (CMD_VEL, "reliable, volatile, keep last 10", "reliable, volatile, keep last 10"),
+        (HAND_SIGN, "reliable, volatile, keep last 10", "reliable, volatile, keep last 10"),
+        (IMAGE_RAW, "best effort, volatile, keep last 1", "best effort, volatile, keep last 1"),
+        (ODOM, "reliable, volatile, keep last 1", "best effort, volatile, keep last 1"),
+        (ROBOT_DESCRIPTION, "reliable, transient local, keep last 1", "reliable, transient local, keep last 1"),
+    ],
+    ids=lambda value: value.name if isinstance(value, Topic) else None,
+)
+def test_each_kind_of_topic_has_its_profile(topic: Topic[object], offered: str, requested: str) -> None:
+    assert describe(writer_qos(topic)) == offered
+    assert describe(reader_qos(topic)) == requested
+    assert misfits(writer_qos(topic), reader_qos(topic)) == []
+
+
+@pytest.mark.parametrize(
+    ("offered", "requested", "word"),
+    [
+        (Qos(Policy.Reliability.BestEffort), Qos(RELIABLE), "wants reliable"),
+        (Qos(Policy.Durability.Volatile), Qos(Policy.Durability.TransientLocal), "wants transient local"),
+        (Qos(Policy.Deadline(2)), Qos(Policy.Deadline(1)), "deadline"),
+        (Qos(), Qos(Policy.Deadline(1)), "deadline"),
+        (Qos(Policy.Liveliness.Automatic(1)), Qos(Policy.Liveliness.ManualByTopic(1)), "liveliness"),
+        (Qos(Policy.Liveliness.Automatic(2)), Qos(Policy.Liveliness.Automatic(1)), "liveliness"),
+        (Qos(Policy.Ownership.Exclusive), Qos(), "ownership"),
+        (Qos(), Qos(Policy.DestinationOrder.BySourceTimestamp), "order"),
+    ],
+)
+def test_what_does_not_fit_one_way_fits_the_other(offered: Qos, requested: Qos, word: str) -> None:
+    (reason,) = misfits(offered, requested)
+    assert word in reason
+    if word != "ownership":  # which has to be the same
+        assert misfits(requested, offered) == []
+    assert misfits(offered, offered) == []
