@@ -37,7 +37,7 @@ def _dds(node: str, arguments: Sequence[str]) -> Session:
         if (problem.name or "").partition(".")[0] != "cyclonedds":
             raise
         raise TransportError(
-            "the transport dds needs the package cyclonedds: pip install 'handsteer[dds]' "
+            "the transport dds needs the package cyclonedds: run pip install 'cyclonedds>=11,<12' beside handsteer "
             "(there is none for Python 3.14 and newer, nor for Linux on ARM)"
         ) from None
     return DdsSession(node, arguments)
