@@ -145,13 +145,19 @@ def test_doctor_finds_what_is_missing(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_ends_within_two_seconds_with_the_robot_stopped(number: signal.Signals) -> None:
-    command = [sys.executable, "-m", "handsteer", "run", "--headless", *VIRTUAL, "--json"]
+@pytest.mark.parametrize("in_background", [False, True], ids=["foreground", "background"])
+def test_a_signal_ends_within_two_seconds_with_the_robot_stopped(number: signal.Signals, in_background: bool) -> None:
+    """A shell lets its background jobs ignore SIGINT."""
+    shell = ["env", f"--{'ignore' if in_background else 'default'}-signal=INT"]
+    command = [*shell, sys.executable, "-m", "handsteer", "run", "--headless", *VIRTUAL, "--json"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         time.sleep(4.0)
         began_s = time.monotonic()
         process.send_signal(number)
-        out, err = process.communicate(timeout=20)
+        try:
+            out, err = process.communicate(timeout=20)
+        finally:
+            process.kill()
         took_s = time.monotonic() - began_s
     assert process.returncode == 0, err
     assert "the robot is told to stand" in err

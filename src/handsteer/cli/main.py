@@ -44,7 +44,9 @@ def main(arguments: list[str] | None = None) -> None:
     logging.basicConfig(level=logging.INFO, format="handsteer: %(message)s", stream=sys.stderr)
     for noisy in ("uvicorn", "asyncio", "httpx", "watchfiles", "rospy"):
         logging.getLogger(noisy).setLevel(logging.WARNING)
-    signal.signal(signal.SIGTERM, _interrupt)
+    # SIGINT too: a shell lets its background jobs ignore it, and a robot must be stopped all the same.
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, _interrupt)
     words = _ros_words_last(sys.argv[1:] if arguments is None else arguments)
     _load_what_help_lists(app, words)
     try:
