@@ -2,7 +2,6 @@
 
 import os
 import tempfile
-import zipfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -13,8 +12,6 @@ from numpy.typing import NDArray
 from handsteer.errors import HandsteerError
 
 Arrays = dict[str, NDArray[Any]]
-
-_DAMAGE = (ValueError, EOFError, KeyError, zipfile.BadZipFile, NotImplementedError, SyntaxError)
 
 
 class NpzFormat:
@@ -51,7 +48,9 @@ class NpzFormat:
         except OSError as error:
             reason = error.strerror or error
             raise self._missing(f"cannot read the {self.what} {path} ({reason}): {self.remedy}") from None
-        except _DAMAGE:
+        except HandsteerError:
+            raise
+        except Exception:  # the readers of headers and of packed data raise whatever they stumble on
             raise self._corrupt(f"{path}: not a {self.what}, or damaged; {self.remedy}") from None
         version = arrays.pop("format", None)
         if version is None or version.shape != () or version != self.version:

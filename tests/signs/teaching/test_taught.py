@@ -2,7 +2,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from handsteer.errors import ModelCorrupt, ModelError, ModelMissing
@@ -143,6 +143,7 @@ def test_other_files_are_refused(tmp_path: Path) -> None:
 
 
 @given(place=st.integers(0, 10**6), flip=st.integers(1, 255))
+@example(place=3711, flip=1)
 def test_a_flipped_byte_is_refused_or_makes_no_difference_to_loading(
     tmp_path_factory: pytest.TempPathFactory, place: int, flip: int
 ) -> None:
