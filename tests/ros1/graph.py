@@ -160,6 +160,15 @@ class Process:
         """Send it a signal."""
         self.popen.send_signal(number)
 
+    def freeze(self) -> None:
+        """Stop it where it is, and wait until all its threads stand."""
+        self.signal(signal.SIGSTOP)
+        eventually(lambda: set(self._thread_states()) == {"T"}, what="a process that stands")
+
+    def _thread_states(self) -> list[str]:
+        tasks = Path(f"/proc/{self.popen.pid}/task").iterdir()
+        return [(task / "stat").read_text().rpartition(") ")[2][0] for task in tasks]
+
     def code(self, timeout_s: float = START_S) -> int:
         """Wait until it has ended; return its exit code."""
         return self.popen.wait(timeout_s)

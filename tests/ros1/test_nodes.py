@@ -127,8 +127,8 @@ def test_one_zero_when_ros_ends_the_node(ros1: Ros1Graph, drive: Callable[..., D
 def test_after_a_freeze_nothing_old_is_obeyed(drive: Callable[..., Driver]) -> None:
     driver = drive()
     driver.show("Forward", count=3)
-    driver.expect((0.01, 0.0))
-    driver.control.signal(signal.SIGSTOP)
+    driver.expect((0.01, 0.0), (0.02, 0.0), (0.03, 0.0))
+    driver.control.freeze()
     driver.show("Forward", count=30, period_s=0.033)
     driver.control.signal(signal.SIGCONT)
     driver.expect((0.01, 0.0), (0.02, 0.0), (0.03, 0.0), (0.0, 0.0))
@@ -268,7 +268,7 @@ def test_kill_9_of_any_node_stops_the_robot(running: tuple[Ros1Graph, Peer, dict
 
 def test_a_robot_that_was_frozen_does_not_drive_on(running: tuple[Ros1Graph, Peer, dict[str, Process]]) -> None:
     _, peer, nodes = running
-    nodes["robot"].signal(signal.SIGSTOP)
+    nodes["robot"].freeze()
     nodes["control"].popen.kill()
     time.sleep(1.0)
     resumed_s = time.monotonic()
