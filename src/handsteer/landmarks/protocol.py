@@ -46,6 +46,11 @@ class Hand:
         width, height = self.image_size
         return self.points * np.array([width, height, width], np.float32)
 
+    @property
+    def longer_side_px(self) -> float:
+        """The longer side of the box about the landmarks, in pixels."""
+        return float(np.ptp(self.pixels[:, :2], axis=0).max())
+
 
 class Landmarker(Protocol):
     """Finds hands in frames; follows them from one frame to the next."""

@@ -2,12 +2,9 @@
 
 from collections.abc import Iterable, Iterator, Mapping
 
-import numpy as np
-
 from handsteer.cameras.files import read_photo
 from handsteer.cameras.protocol import Frame
 from handsteer.errors import EvaluationError, LabelError
-from handsteer.landmarks.protocol import Hand
 from handsteer.signs.figures import PhotoResult
 from handsteer.signs.labelled import LabelledPhoto
 from handsteer.signs.protocol import Classifier
@@ -32,7 +29,7 @@ def evaluate_photos(photos: Iterable[LabelledPhoto], recognizer: Recognizer, vie
             continue
         recognizer.reset()
         recognition = recognizer.step(view.picture(read_photo(photo.path)), 0.0)
-        size = _longer_side(recognition.hand) if recognition.hand else None
+        size = round(recognition.hand.longer_side_px, 1) if recognition.hand else None
         yield PhotoResult(str(photo.path), kind, truth, recognition.seen, round(recognition.confidence, 4), size)
 
 
@@ -89,8 +86,4 @@ def evaluate_takes(
             seen = guess.sign if guess.confidence >= min_confidence else NONE
             confidence = round(guess.confidence, 4)
             name = f"take {number}, hand {row + 1}"
-            yield PhotoResult(name, take.person, truth, seen, confidence, _longer_side(hand))
-
-
-def _longer_side(hand: Hand) -> float:
-    return round(float(np.ptp(hand.pixels[:, :2], axis=0).max()), 1)
+            yield PhotoResult(name, take.person, truth, seen, confidence, round(hand.longer_side_px, 1))

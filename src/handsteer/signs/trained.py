@@ -63,8 +63,7 @@ class TrainedClassifier:
 
 def legibility(hand: Hand) -> float:
     """Return how far ``hand`` can be read at all, 0 to 1: that it is there, times that it has enough pixels."""
-    size = float(np.ptp(hand.pixels[:, :2], axis=0).max())
-    return min(1.0, max(0.0, hand.presence)) * _within(-_SMALLEST_PX, -size)
+    return min(1.0, max(0.0, hand.presence)) * _within(-_SMALLEST_PX, -hand.longer_side_px)
 
 
 def _signs(shapes: dict[str, float], pixels: NDArray[np.float64]) -> dict[str, float]:

@@ -201,7 +201,7 @@ def collect_recorded(source: Path, landmarker: Landmarker, facts: Facts, take_s:
 
 def largest(hands: Sequence[Hand]) -> Hand | None:
     """Return the largest of ``hands`` in the image."""
-    return max(hands, key=lambda hand: float(np.ptp(hand.pixels[:, :2], axis=0).max()), default=None)
+    return max(hands, key=lambda hand: hand.longer_side_px, default=None)
 
 
 def _photo_takes(source: Path, landmarker: Landmarker, facts: Facts) -> Iterator[Take]:
