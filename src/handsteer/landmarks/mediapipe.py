@@ -77,8 +77,7 @@ class MediaPipeLandmarker:
             self.reset()
             self._image_size = (width, height)
         estimates = [self._estimate(image, region) for region in self._regions(image, search)]
-        present = _of_different_hands([estimate for estimate in estimates if self._is_present(estimate)])
-        self._followed = [from_landmarks(estimate.pixels[:, :2]) for estimate in present]
+        present, self._followed = _of_different_hands([each for each in estimates if self._is_present(each)])
         self._hands = [_hand(estimate, width, height) for estimate in present]
         return list(self._hands)
 
@@ -138,19 +137,15 @@ def _distinct(regions: list[Roi]) -> list[Roi]:
     return distinct
 
 
-def _of_different_hands(estimates: list[Estimate]) -> list[Estimate]:
-    """Return ``estimates`` without those of a hand that one before them has, and without parts taken for a hand.
+def _of_different_hands(estimates: list[Estimate]) -> tuple[list[Estimate], list[Roi]]:
+    """Return ``estimates``, and where each hand is, without hands that one before has, and parts taken for a hand.
 
     Two regions may lead to the same hand, and some fingers of a hand to a smaller one within it.
     """
-    regions = [from_landmarks(estimate.pixels[:, :2]) for estimate in estimates]
-    whole = [
-        (estimate, region)
-        for estimate, region in zip(estimates, regions, strict=True)
-        if not any(_is_part(estimate, other) for other in estimates)
-    ]
-    kept = _distinct([region for _, region in whole])
-    return [estimate for estimate, region in whole if any(region is each for each in kept)]
+    whole = [estimate for estimate in estimates if not any(_is_part(estimate, other) for other in estimates)]
+    regions = [from_landmarks(estimate.pixels[:, :2]) for estimate in whole]
+    kept = _distinct(regions)
+    return [each for each, region in zip(whole, regions, strict=True) if any(region is one for one in kept)], kept
 
 
 def _is_part(estimate: Estimate, other: Estimate) -> bool:
