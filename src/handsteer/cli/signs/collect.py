@@ -54,7 +54,7 @@ def collect(
         auto, virtual, a webcam's index or /dev/videoN, an address, a video file or a folder of photos. A video is cut
         into takes; each photo is one.
     person
-        Who shows it. A person is never both learnt from and tested on.
+        Who shows it. Where several show a sign, nobody is both learnt from and tested on.
     session
         When or where it is; by default the date and time.
     takes

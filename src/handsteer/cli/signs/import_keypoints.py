@@ -38,7 +38,7 @@ def import_keypoints(
     dataset
         File that the rows are added to; it is made when it is not there.
     person
-        Who showed them; by default the name of the file. A person is never both learnt from and tested on.
+        Who showed them; by default the name of the file.
     not_mirrored
         The rows come from images as the camera saw them; such projects usually mirror them first.
     """

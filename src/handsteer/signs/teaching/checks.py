@@ -47,7 +47,7 @@ def check_enough(dataset: Dataset, labels: Sequence[str]) -> None:
 
 
 def check_not_known(dataset: Dataset, labels: Sequence[str], shipped: Classifier) -> None:
-    """Raise TrainingError when one of ``labels`` is mostly told as a sign of ``shipped`` already."""
+    """Raise TrainingError when one of ``labels`` is often told as a sign of ``shipped`` already."""
     for label in labels:
         told = [
             guess.sign if guess.confidence >= SURE else NONE

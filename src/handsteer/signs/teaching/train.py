@@ -102,8 +102,8 @@ def train_signs(
 
     Each sign is told with either hand, by its mirror image, unless it points to a side. What makes other hands is made
     (:mod:`handsteer.signs.training`), and what the dataset has of ``NONE`` and of the signs that are shipped.
-    Persons are held out in turn to find out how well the signs are told, and from which likelihood on; where there is
-    one person only, sessions or takes are. The model is then trained on all of them.
+    Persons are held out in turn to find out how well the signs are told, and from which likelihood on; where no sign is
+    shown by several, sessions or takes are. The model is then trained on all of them.
 
     Args:
         dataset: The takes.
