@@ -4,7 +4,7 @@ import logging
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from functools import partial
 from typing import Any, Generic, TypeVar
 
 from cyclonedds.core import DDSException
@@ -13,13 +13,13 @@ from cyclonedds.internal import InvalidSample
 from handsteer.clock import Clock
 from handsteer.errors import TransportError
 from handsteer.messages import Topic, type_name
+from handsteer.transports.channels import Deliver, Fanout, FanoutSubscription, TopicTypes, check_type
 from handsteer.transports.dds.participant import Participant
 from handsteer.transports.protocol import Received
 from handsteer.transports.ros2.encoding import decode, encode
 from handsteer.transports.stamps import capture_time
 
 M = TypeVar("M")
-Deliver = Callable[[Received[M]], None]
 
 log = logging.getLogger(__name__)
 
@@ -37,10 +37,10 @@ class DdsTransport:
     def __init__(self, participant: Participant, clock: Clock) -> None:
         self._participant = participant
         self._clock = clock
+        self._types = TopicTypes()
         self._lock = threading.Lock()
-        self._types: dict[str, type] = {}
         self._publishers: list[DdsPublisher[Any]] = []
-        self._incoming: dict[str, _Incoming[Any]] = {}
+        self._incoming: dict[str, Fanout[Any]] = {}
 
     def advertise(self, node: str, topic: Topic[M]) -> "DdsPublisher[M]":
         """Return the sending end of ``topic`` for the node named ``node``."""
@@ -50,13 +50,14 @@ class DdsTransport:
             self._publishers.append(publisher)
         return publisher
 
-    def subscribe(self, node: str, topic: Topic[M], deliver: Deliver[M]) -> "DdsSubscription[M]":
+    def subscribe(self, node: str, topic: Topic[M], deliver: Deliver[M]) -> FanoutSubscription[M]:
         """Call ``deliver`` for each message on ``topic`` from now on, on the DDS thread of this process."""
         name = self._claim(topic)
         with self._lock:
-            incoming = self._incoming.setdefault(name, _Incoming(topic, self._participant, self._clock))
-        incoming.add(deliver)
-        return DdsSubscription(incoming, deliver)
+            if name not in self._incoming:
+                self._incoming[name] = Fanout(latched=topic.latched, receive=partial(self._receive, topic))
+            fanout: Fanout[M] = self._incoming[name]
+        return fanout.add(deliver)
 
     def full_name(self, node: str) -> str:
         """Return the ROS 2 node's name and ``node``, as ROS's own diagnostics do: ``r1/my_camera: my_camera``."""
@@ -83,13 +84,11 @@ class DdsTransport:
 
     def _claim(self, topic: Topic[Any]) -> str:
         name = self._participant.name.topic(topic)
-        with self._lock:
-            known = self._types.setdefault(name, topic.type)
-        if known is not topic.type:
-            raise TransportError(
-                f"{topic.name} carries {type_name(known)}, it cannot carry {type_name(topic.type)} too"
-            )
+        self._types.claim(name, topic)
         return name
+
+    def _receive(self, topic: Topic[M], send: Deliver[M]) -> Callable[[], None]:
+        return _Reception(self._participant, topic, self._clock, send).close
 
 
 class DdsPublisher(Generic[M]):
@@ -109,10 +108,7 @@ class DdsPublisher(Generic[M]):
 
     def publish(self, message: M, captured_s: float | None = None) -> None:
         """Give ``message`` to the network; a reader that is too slow for it goes without."""
-        if not isinstance(message, self._topic.type):
-            raise TransportError(
-                f"{self._topic.name} carries {type_name(self._topic.type)}, not {type_name(type(message))}"
-            )
+        check_type(self._topic, message)
         writer = self._writer
         if writer is None or not (self._topic.latched or self.wanted):
             return
@@ -141,76 +137,39 @@ class DdsPublisher(Generic[M]):
             self._participant.release(writer)
 
 
-class DdsSubscription(Generic[M]):
-    """The receiving end of a topic."""
+class _Reception(Generic[M]):
+    """A reader, whose messages are decoded and passed on."""
 
-    def __init__(self, incoming: "_Incoming[M]", deliver: Deliver[M]) -> None:
-        self._incoming = incoming
-        self._deliver = deliver
-
-    def close(self) -> None:
-        """Receive no more; may be called twice."""
-        self._incoming.remove(self._deliver)
-
-
-@dataclass
-class _Incoming(Generic[M]):
-    """One topic's subscribers in this process: they share one reader, and each message is decoded once."""
-
-    topic: Topic[M]
-    participant: Participant
-    clock: Clock
-    subscribers: tuple[Deliver[M], ...] = ()
-    _reader: Any = None
-    _last: Received[M] | None = None
-    _broken: bool = False
-    _lock: threading.RLock = field(default_factory=threading.RLock)
-
-    def add(self, deliver: Deliver[M]) -> None:
-        with self._lock:
-            self.subscribers = (*self.subscribers, deliver)
-            if self._last is not None:
-                deliver(self._last)
-            if self._reader is None:
-                self._reader = self.participant.reader(self.topic)
-                self.participant.serve(self._reader, self._serve)
-
-    def remove(self, deliver: Deliver[M]) -> None:
-        with self._lock:
-            self.subscribers = tuple(known for known in self.subscribers if known is not deliver)
-            if not self.subscribers:
-                self.close()
+    def __init__(self, participant: Participant, topic: Topic[M], clock: Clock, send: Deliver[M]) -> None:
+        self._participant = participant
+        self._topic = topic
+        self._clock = clock
+        self._send = send
+        self._is_broken = False
+        self._reader: Any = participant.reader(topic)
+        participant.serve(self._reader, self._serve)
 
     def close(self) -> None:
-        with self._lock:
-            reader, self._reader = self._reader, None
-            self.subscribers, self._last = (), None
-            if reader is not None:
-                self.participant.release(reader)
+        """Receive no more."""
+        reader, self._reader = self._reader, None
+        self._participant.release(reader)
 
     def _serve(self) -> None:
-        with self._lock:
-            if self._reader is None:
-                return
-            samples = self._reader.take(self.topic.depth)
-        for sample in samples:
+        reader = self._reader
+        if reader is None:
+            return
+        for sample in reader.take(self._topic.depth):
             # A writer that leaves sends one without a message.
             if not isinstance(sample, InvalidSample):
                 self._pass_on(sample.raw)
 
     def _pass_on(self, raw: bytes) -> None:
         try:
-            message = decode(raw, type_name(self.topic.type))
+            message = decode(raw, type_name(self._topic.type))
         except Exception as error:
             # Whatever the network brings must not end the receiving.
-            if not self._broken:
-                log.warning("%s: a message of %d bytes cannot be read: %s", self.topic.name, len(raw), error)
-            self._broken = True
+            if not self._is_broken:
+                log.warning("%s: a message of %d bytes cannot be read: %s", self._topic.name, len(raw), error)
+            self._is_broken = True
             return
-        received = Received(message, capture_time(message, self.clock))
-        with self._lock:
-            if self.topic.latched:
-                self._last = received
-            subscribers = self.subscribers
-        for deliver in subscribers:
-            deliver(received)
+        self._send(Received(message, capture_time(message, self._clock)))

@@ -1,0 +1,110 @@
+"""What every transport does on this side of its wire: one type a topic, and one message to many subscribers."""
+
+import threading
+from collections.abc import Callable
+from typing import Any, Generic, TypeVar
+
+from handsteer.errors import TransportError
+from handsteer.messages import Topic, type_name
+from handsteer.transports.protocol import Received
+
+M = TypeVar("M")
+Deliver = Callable[[Received[M]], None]
+Receive = Callable[[Deliver[M]], Callable[[], None]]
+
+
+class TopicTypes:
+    """Which type each topic of this process carries."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._types: dict[str, type] = {}
+
+    def claim(self, name: str, topic: Topic[Any]) -> None:
+        """Note that the topic whose full name is ``name`` carries the type of ``topic``.
+
+        Raises:
+            TransportError: It carries another.
+        """
+        with self._lock:
+            known = self._types.setdefault(name, topic.type)
+        if known is not topic.type:
+            raise TransportError(f"{name} carries {type_name(known)}, it cannot carry {type_name(topic.type)} too")
+
+
+def check_type(topic: Topic[Any], message: object) -> None:
+    """Raise TransportError unless ``message`` is of the type that ``topic`` carries."""
+    if not isinstance(message, topic.type):
+        raise TransportError(f"{topic.name} carries {type_name(topic.type)}, not {type_name(type(message))}")
+
+
+class Fanout(Generic[M]):
+    """One topic's subscribers in this process; each message is received and decoded once for all of them.
+
+    Args:
+        latched: Whether a late subscriber gets the last message at once.
+        receive: Begins to receive from the wire, gives each message to the function that it gets, and returns what
+            ends that. Called when a first subscriber comes. None where messages come from this process.
+    """
+
+    def __init__(self, *, latched: bool, receive: Receive[M] | None = None) -> None:
+        self._latched = latched
+        self._receive = receive
+        self._end: Callable[[], None] | None = None
+        self._lock = threading.RLock()
+        # Replaced, never changed, so that it can be read without the lock.
+        self._subscribers: tuple[Deliver[M], ...] = ()
+        self._last: Received[M] | None = None
+
+    @property
+    def wanted(self) -> bool:
+        """Whether there is a subscriber."""
+        return bool(self._subscribers)
+
+    def add(self, deliver: Deliver[M]) -> "FanoutSubscription[M]":
+        """Call ``deliver`` for each message from now on."""
+        with self._lock:
+            self._subscribers = (*self._subscribers, deliver)
+            if self._last is not None:
+                deliver(self._last)
+            if self._receive is not None and self._end is None:
+                self._end = self._receive(self.send)
+        return FanoutSubscription(self, deliver)
+
+    def remove(self, deliver: Deliver[M]) -> None:
+        """Call ``deliver`` no more; does nothing where it has been removed already."""
+        with self._lock:
+            self._subscribers = tuple(known for known in self._subscribers if known is not deliver)
+            is_last = not self._subscribers and self._receive is not None
+        if is_last:
+            self.close()
+
+    def send(self, received: Received[M]) -> None:
+        """Give ``received`` to all subscribers, on this thread."""
+        with self._lock:
+            if self._latched:
+                self._last = received
+            subscribers = self._subscribers
+        for deliver in subscribers:
+            deliver(received)
+
+    def close(self) -> None:
+        """Remove all subscribers and receive no more; may be called twice."""
+        with self._lock:
+            end, self._end = self._end, None
+            self._subscribers, self._last = (), None
+        # Without the lock, which a message that is under way may wait for.
+        if end is not None:
+            end()
+
+
+class FanoutSubscription(Generic[M]):
+    """The receiving end of a topic."""
+
+    def __init__(self, fanout: Fanout[M], deliver: Deliver[M]) -> None:
+        self._fanout = fanout
+        self._deliver = deliver
+
+    def close(self) -> None:
+        """Receive no more; may be called twice."""
+        self._fanout.remove(self._deliver)
