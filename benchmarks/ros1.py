@@ -17,7 +17,8 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # for the graph that the tests use
 
-from tests.ros1.graph import Peer, Process, Ros1Graph, eventually, ros1_graph
+from tests.processes import Peer, Process, eventually
+from tests.ros1.graph import Ros1Graph, ros1_graph
 
 from handsteer.cameras.virtual import VirtualHandCamera
 from handsteer.clock import SteppedClock

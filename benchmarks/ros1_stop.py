@@ -15,7 +15,8 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # for the graph that the tests use
 
-from tests.ros1.graph import Peer, Ros1Graph, eventually, ros1_graph
+from tests.processes import Peer, eventually
+from tests.ros1.graph import Ros1Graph, ros1_graph
 
 CMD_VEL, ODOM = "/robot_diff_drive_controller/cmd_vel", "/robot_diff_drive_controller/odom"
 SPEED_MPS, SLOWER_MPS = 0.3, 0.29

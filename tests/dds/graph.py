@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from tests.ros1.graph import Peer, Process, eventually
+from tests.processes import Peer, Process, eventually
 
 PEER = Path(__file__).with_name("peer.py")
 # Domains above have their ports among those that the system gives to others.

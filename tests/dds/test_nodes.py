@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from tests.dds.graph import DdsGraph, dds_graph
-from tests.ros1.graph import Peer, Process, eventually
+from tests.processes import Peer, Process, eventually
 
 pytest.importorskip("cyclonedds")
 pytestmark = pytest.mark.slow

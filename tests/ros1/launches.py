@@ -8,7 +8,8 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from tests.ros1.graph import Peer, Process, Ros1Graph
+from tests.processes import Peer, Process
+from tests.ros1.graph import Ros1Graph
 
 ROOT = Path(__file__).resolve().parents[2]
 ROS = ROOT / "ros"

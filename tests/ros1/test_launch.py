@@ -16,7 +16,7 @@ import cv2
 import numpy as np
 import pytest
 
-from tests.ros1.graph import eventually, free_port
+from tests.processes import eventually, free_port
 from tests.ros1.launches import ROOT, LaunchGraph, Recorder, run
 
 pytestmark = [pytest.mark.ros1, pytest.mark.slow]

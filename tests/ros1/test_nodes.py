@@ -11,7 +11,8 @@ from typing import Any
 
 import pytest
 
-from tests.ros1.graph import Peer, Process, Ros1Graph, eventually, ros1_graph
+from tests.processes import Peer, Process, eventually
+from tests.ros1.graph import Ros1Graph, ros1_graph
 
 pytestmark = [pytest.mark.ros1, pytest.mark.slow]
 

@@ -6,7 +6,8 @@ from typing import Any
 
 import pytest
 
-from tests.ros1.graph import Peer, Ros1Graph, eventually, ros1_graph
+from tests.processes import Peer, eventually
+from tests.ros1.graph import Ros1Graph, ros1_graph
 
 pytestmark = [pytest.mark.ros1, pytest.mark.slow]
 
