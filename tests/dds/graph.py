@@ -1,19 +1,20 @@
 """A DDS domain of its own for a test, and processes in it."""
 
 import contextlib
+import fcntl
 import os
 import random
 import sys
+import tempfile
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 
 from tests.processes import Peer, Process, eventually
 
 PEER = Path(__file__).with_name("peer.py")
 # Domains above have their ports among those that the system gives to others.
 _LARGEST_DOMAIN = 100
-_SHARES = 20
 _ROS_VARIABLES = (
     "CYCLONEDDS_URI",
     "ROS_AUTOMATIC_DISCOVERY_RANGE",
@@ -23,10 +24,19 @@ _ROS_VARIABLES = (
 )
 
 
+_claims: list[TextIO] = []
+
+
 def free_domain() -> int:
-    """Return the number of a domain that no test on another worker uses."""
-    worker = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw")) % _SHARES
-    return 1 + worker + _SHARES * random.randrange(_LARGEST_DOMAIN // _SHARES)
+    """Return the number of a domain that no other test on this machine has claimed; it is ours until we end."""
+    for domain in random.sample(range(1, _LARGEST_DOMAIN + 1), _LARGEST_DOMAIN):
+        claim = Path(tempfile.gettempdir(), f"handsteer_test_domain_{domain}").open("w", encoding="utf-8")
+        with contextlib.suppress(BlockingIOError):
+            fcntl.flock(claim, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            _claims.append(claim)
+            return domain
+        claim.close()
+    raise AssertionError("all DDS domains are taken by other tests")
 
 
 class DdsGraph:

@@ -3,23 +3,33 @@
 import itertools
 import signal
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from tests.contracts.node_contract import (
+    CMD_VEL,
+    FORWARD,
+    ODOM,
+    ChainContract,
+    ControlContract,
+    Driver,
+    MakeDriver,
+    Running,
+    Twists,
+    twists,
+)
 from tests.dds.graph import DdsGraph, dds_graph
-from tests.processes import Peer, Process, eventually
+from tests.processes import Peer, eventually
 
 pytest.importorskip("cyclonedds")
 pytestmark = pytest.mark.slow
 
-CMD_VEL = "/robot_diff_drive_controller/cmd_vel"
-ODOM = "/robot_diff_drive_controller/odom"
 NODE = "hand_sign_control"
-LIMIT_S = 0.5
-"""From the death of any node to a zero velocity at the robot."""
+SCRIPT = ("-p", "virtual_hand.script:=Forward:60")
 SETTLE_S = 0.3
 """One end sees the other first; the other follows within milliseconds."""
 
@@ -32,16 +42,15 @@ def dds(tmp_path_factory: pytest.TempPathFactory) -> Iterator[DdsGraph]:
         yield graph
 
 
-class Driver:
-    """Shows signs to a control of its own namespace, and notes the velocities that come out."""
-
-    def __init__(self, graph: DdsGraph, *options: str, ros: tuple[str, ...] = ()) -> None:
+class DdsDriver(Driver):
+    def __init__(self, graph: DdsGraph, *options: str, parameters: Mapping[str, Any] | None = None) -> None:
         namespace = f"/n{next(numbers)}"
         self._signs, self._cmd_vel, self._peer = f"{namespace}/gesture/hand_sign", f"{namespace}{CMD_VEL}", graph.peer
         record_twists(graph.peer, self._cmd_vel)
         graph.peer.ask("advertise", topic=self._signs, type="String")
-        words = ("-r", f"__ns:={namespace}", *ros)
-        self.process = graph.node("control", *options, name=f"{namespace}/{NODE}", ros=words)
+        words = [word for name, value in (parameters or {}).items() for word in ("-p", f"{name}:={value}")]
+        ros = ("-r", f"__ns:={namespace}", *words)
+        self.process = graph.node("control", *options, name=f"{namespace}/{NODE}", ros=ros)
         eventually(lambda: graph.peer.ask("listeners", topic=self._signs) > 0)
         eventually(lambda: f"rt{self._cmd_vel}" in graph.nodes()[f"{namespace}/{NODE}"]["writers"])
         time.sleep(SETTLE_S)
@@ -53,87 +62,37 @@ class Driver:
         self._peer.ask("publish_raw", topic=self._signs, hex=raw.hex())
 
     @property
-    def twists(self) -> list[tuple[float, float]]:
-        return [twist for _, twist in twists(self._peer, self._cmd_vel)]
-
-    def expect(self, *wanted: tuple[float, float]) -> None:
-        eventually(lambda: len(self.twists) >= len(wanted), 10.0, what=f"{len(wanted)} twists")
-        assert self.twists[: len(wanted)] == list(wanted)
+    def commands(self) -> Twists:
+        return twists(self._peer, self._cmd_vel)
 
 
 def record_twists(peer: Peer, topic: str = CMD_VEL) -> None:
     peer.ask("record", topic=topic, type="Twist", fields=["linear.x", "angular.z"])
 
 
-def twists(peer: Peer, topic: str = CMD_VEL) -> list[tuple[float, tuple[float, float]]]:
-    return [(at_s, (round(x, 6), round(z, 6))) for at_s, (x, z) in peer.ask("get", topic=topic)]
+class TestControl(ControlContract):
+    @pytest.fixture
+    def drive(self, dds: DdsGraph) -> MakeDriver:
+        return partial(DdsDriver, dds)
 
 
-@pytest.fixture
-def drive(dds: DdsGraph) -> Callable[..., Driver]:
-    return lambda *options, ros=(): Driver(dds, *options, ros=ros)
-
-
-def test_exactly_one_twist_a_sign_with_the_values_of_the_course(drive: Callable[..., Driver]) -> None:
-    driver = drive()
-    driver.show("Forward", count=5)
-    for sign in ("Turn Left", "Go", "Dance", "Turn Right", "Backward", "Stop", "Forward", "NONE"):
-        driver.show(sign)
-    grown = [(0.01, 0.0), (0.02, 0.0), (0.03, 0.0), (0.04, 0.0), (0.05, 0.0)]
-    kept = [(0.05, 0.1), (0.05, 0.1), (0.05, 0.1), (0.05, 0.0), (0.04, 0.0), (0.0, 0.0), (0.01, 0.0), (0.0, 0.0)]
-    driver.expect(*grown, *kept)
-    time.sleep(0.2)
-    assert len(driver.twists) == len(grown) + len(kept)
-
-
-def test_signs_that_come_all_at_once_count_each(drive: Callable[..., Driver]) -> None:
-    driver = drive()
-    driver.show("Forward", count=5, period_s=0.0)
-    driver.expect(*[(round(0.01 * n, 6), 0.0) for n in range(1, 6)])
-
-
-def test_parameters_go_before_the_file_and_options_before_both(drive: Callable[..., Driver], tmp_path: Path) -> None:
+def test_parameters_come_from_files_too(dds: DdsGraph, tmp_path: Path) -> None:
     file = tmp_path / "ros.yaml"
     file.write_text(f"/**/{NODE}: {{ros__parameters: {{linear_step: 0.02, angular_step: 0.2}}}}\n")
-    words = ("--params-file", str(file), "-p", "linear_step:=0.03")
-    driver = drive("--control.angular-step=0.4", ros=words)
-    driver.show("Forward")
-    driver.show("Turn Left")
-    driver.expect((0.03, 0.0), (0.03, 0.4))
+    words = ("-r", "__ns:=/filed", "--params-file", str(file), "-p", "linear_step:=0.03")
+    dds.node("control", "--control.angular-step=0.4", name=f"/filed/{NODE}", ros=words)
+    cmd_vel, signs = f"/filed{CMD_VEL}", "/filed/gesture/hand_sign"
+    record_twists(dds.peer, cmd_vel)
+    dds.peer.ask("advertise", topic=signs, type="String")
+    eventually(lambda: dds.peer.ask("listeners", topic=signs) > 0)
+    time.sleep(SETTLE_S)
+    for sign in ("Forward", "Turn Left"):
+        dds.peer.ask("publish", topic=signs, values={"data": sign}, count=1, period_s=0.0)
+    eventually(lambda: [twist for _, twist in twists(dds.peer, cmd_vel)][:2] == [(0.03, 0.0), (0.03, 0.4)], 10.0)
 
 
-def test_zero_when_signs_stop_then_silence(drive: Callable[..., Driver]) -> None:
-    driver = drive()
-    driver.show("Forward", count=2)
-    driver.expect((0.01, 0.0), (0.02, 0.0), (0.0, 0.0))
-    time.sleep(0.6)
-    assert len(driver.twists) == 3
-
-
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_one_zero_at_exit(drive: Callable[..., Driver], number: signal.Signals) -> None:
-    driver = drive("--control.sign-timeout", "5")
-    driver.show("Forward", count=2)
-    driver.expect((0.01, 0.0), (0.02, 0.0))
-    driver.process.signal(number)
-    assert driver.process.code() == 0, driver.process.text
-    driver.expect((0.01, 0.0), (0.02, 0.0), (0.0, 0.0))
-
-
-def test_after_a_freeze_nothing_old_is_obeyed(drive: Callable[..., Driver]) -> None:
-    driver = drive()
-    driver.show("Forward", count=3)
-    driver.expect((0.01, 0.0), (0.02, 0.0), (0.03, 0.0))
-    driver.process.freeze()
-    driver.show("Forward", count=30, period_s=0.033)
-    driver.process.signal(signal.SIGCONT)
-    driver.expect((0.01, 0.0), (0.02, 0.0), (0.03, 0.0), (0.0, 0.0))
-    time.sleep(0.5)
-    assert set(driver.twists[3:]) == {(0.0, 0.0)}
-
-
-def test_what_is_no_text_does_not_end_the_node(drive: Callable[..., Driver]) -> None:
-    driver = drive()
+def test_what_is_no_text_does_not_end_the_node(dds: DdsGraph) -> None:
+    driver = DdsDriver(dds)
     driver.show_raw(b"\x00\x01\x00\x00\x03\x00\x00\x00\xff\xfe\x00\x00")
     driver.show("Turn Left")
     driver.expect((0.0, 0.1))
@@ -205,7 +164,7 @@ def test_what_does_not_fit_is_said_in_words(tmp_path: Path) -> None:
         assert peer.ask("get", topic="/image_raw") == []
 
 
-def test_simulated_time_is_followed(drive: Callable[..., Driver], tmp_path: Path) -> None:
+def test_simulated_time_is_followed(tmp_path: Path) -> None:
     with dds_graph(tmp_path) as graph:
         graph.peer.ask("advertise", topic="/clock", type="Clock", reliable=False, depth=1)
         graph.peer.ask("record", topic="/image_raw", type="Image", fields=["header.stamp"], reliable=False)
@@ -216,52 +175,20 @@ def test_simulated_time_is_followed(drive: Callable[..., Driver], tmp_path: Path
         assert camera.running
 
 
-FORWARD = ["--camera", "virtual", "--camera.width", "320", "--camera.height", "240"]
-SCRIPT = ("-p", "virtual_hand.script:=Forward:60")
-
-
-@pytest.fixture
-def running(tmp_path: Path) -> Iterator[tuple[Peer, dict[str, Process]]]:
-    """The whole graph, the robot driving forward."""
-    with dds_graph(tmp_path) as graph:
-        peer = graph.peer
-        record_twists(peer)
-        fields = ["twist.twist.linear.x", "pose.pose.position.x"]
-        peer.ask("record", topic=ODOM, type="Odometry", fields=fields)
-        nodes = {
-            "robot": graph.node("robot", name="/robot"),
-            "control": graph.node("control", name=f"/{NODE}", ros=("-p", "max_linear:=0.3")),
-            "recognition": graph.node("recognition", name="/hand_sign_recognition"),
-            "camera": graph.node("camera", *FORWARD, name="/my_camera", ros=SCRIPT),
-        }
-        eventually(lambda: speeds(peer) and speeds(peer)[-1][1] > 0.29, what="the robot to drive at its limit")
-        yield peer, nodes
-
-
-def odometry(peer: Peer) -> list[tuple[float, list[float]]]:
-    return [(at_s, values) for at_s, values in peer.ask("get", topic=ODOM)]
-
-
-def speeds(peer: Peer) -> list[tuple[float, float]]:
-    return [(at_s, values[0]) for at_s, values in odometry(peer)]
-
-
-@pytest.mark.parametrize("victim", ["camera", "recognition", "control"])
-def test_kill_9_of_any_node_stops_the_robot(running: tuple[Peer, dict[str, Process]], victim: str) -> None:
-    peer, nodes = running
-    assert odometry(peer)[-1][1][1] > 0.1  # it has moved forward, as the sign says
-    killed_s = time.monotonic()
-    nodes[victim].popen.kill()
-    eventually(lambda: abs(speeds(peer)[-1][1]) < 0.01, 5.0, what="the robot to stand")
-    if victim == "control":
-        # No Twist can come any more: the robot's controller brakes by itself.
-        braked_s = next(at_s for at_s, speed in speeds(peer) if at_s > killed_s and speed < 0.28)
-        assert braked_s - killed_s <= LIMIT_S + 0.05  # the speed has to fall before it can be seen to fall
-    else:
-        zero_s = next(at_s for at_s, twist in twists(peer) if at_s > killed_s and twist == (0.0, 0.0))
-        assert zero_s - killed_s <= LIMIT_S + 0.02  # the peer looks every few milliseconds
-        time.sleep(0.3)
-        assert {twist for at_s, twist in twists(peer) if at_s > zero_s} <= {(0.0, 0.0)}
+class TestChain(ChainContract):
+    @pytest.fixture
+    def running(self, tmp_path: Path) -> Iterator[Running]:
+        with dds_graph(tmp_path) as graph:
+            record_twists(graph.peer)
+            fields = ["twist.twist.linear.x", "pose.pose.position.x"]
+            graph.peer.ask("record", topic=ODOM, type="Odometry", fields=fields)
+            nodes = {
+                "robot": graph.node("robot", name="/robot"),
+                "control": graph.node("control", name=f"/{NODE}", ros=("-p", "max_linear:=0.3")),
+                "recognition": graph.node("recognition", name="/hand_sign_recognition"),
+                "camera": graph.node("camera", *FORWARD, name="/my_camera", ros=SCRIPT),
+            }
+            yield Running(graph.peer, nodes).expect_full_speed()
 
 
 def test_a_robot_follows_another_programs_twists(dds: DdsGraph) -> None:

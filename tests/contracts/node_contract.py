@@ -1,0 +1,194 @@
+"""What our nodes must do as processes, whatever joins them; each transport's own test module inherits it."""
+
+import signal
+import time
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import pytest
+
+from tests.processes import Peer, Process, eventually
+
+CMD_VEL = "/robot_diff_drive_controller/cmd_vel"
+ODOM = "/robot_diff_drive_controller/odom"
+FORWARD = ("--camera", "virtual", "--camera.width", "320", "--camera.height", "240")
+"""A small virtual camera, whose script the transport's own words set to Forward."""
+LIMIT_S = 0.5
+"""From the death of any node to a zero velocity at the robot."""
+_SEEN_S = 0.05
+"""What it takes until the speed has fallen by so much, or until the peer looks, that it is seen."""
+
+Twists = list[tuple[float, tuple[float, float]]]
+
+
+def twists(peer: Peer, topic: str = CMD_VEL) -> Twists:
+    """Return what was recorded: when, in seconds of the monotonic clock, and (m/s, rad/s)."""
+    return [(at_s, (round(x, 6), round(z, 6))) for at_s, (x, z) in peer.ask("get", topic=topic)]
+
+
+class Driver(ABC):
+    """Shows signs to a control of its own namespace, and notes the velocities that come out.
+
+    Attributes:
+        process: The control.
+    """
+
+    process: Process
+
+    @abstractmethod
+    def show(self, sign: str, count: int = 1, period_s: float = 0.02) -> None:
+        """Publish ``sign`` so many times."""
+
+    @property
+    @abstractmethod
+    def commands(self) -> Twists:
+        """What the control has published."""
+
+    @property
+    def twists(self) -> list[tuple[float, float]]:
+        """What the control has published, without the times."""
+        return [twist for _, twist in self.commands]
+
+    def expect(self, *wanted: tuple[float, float]) -> None:
+        """Wait for these twists; fail when others come."""
+        eventually(lambda: len(self.twists) >= len(wanted), 10.0, what=f"{len(wanted)} twists")
+        assert self.twists[: len(wanted)] == list(wanted)
+
+
+MakeDriver = Callable[..., Driver]
+"""Takes options of the command line, and ``parameters``, which it sets in the transport's own way."""
+
+
+class ControlContract:
+    """Inherit, and provide ``drive``."""
+
+    @pytest.fixture
+    def drive(self) -> MakeDriver:
+        raise NotImplementedError
+
+    def test_exactly_one_twist_a_sign_with_the_values_of_the_course(self, drive: MakeDriver) -> None:
+        driver = drive()
+        driver.show("Forward", count=5)
+        for sign in ("Turn Left", "Go", "Dance", "Turn Right", "Backward", "Stop", "Forward", "NONE"):
+            driver.show(sign)
+        grown = [(0.01, 0.0), (0.02, 0.0), (0.03, 0.0), (0.04, 0.0), (0.05, 0.0)]
+        kept = [(0.05, 0.1)] * 3 + [(0.05, 0.0), (0.04, 0.0), (0.0, 0.0), (0.01, 0.0), (0.0, 0.0)]
+        driver.expect(*grown, *kept)
+        time.sleep(0.2)
+        assert len(driver.twists) == len(grown) + len(kept)
+
+    def test_signs_that_come_all_at_once_count_each(self, drive: MakeDriver) -> None:
+        driver = drive()
+        driver.show("Forward", count=5, period_s=0.0)
+        driver.expect(*[(round(0.01 * n, 6), 0.0) for n in range(1, 6)])
+
+    def test_speed_is_bounded_and_does_not_wind_up(self, drive: MakeDriver) -> None:
+        driver = drive(parameters={"max_linear": 0.1, "linear_step": 0.04})
+        driver.show("Forward", count=60, period_s=0.01)
+        driver.show("Backward")
+        driver.expect((0.04, 0.0), (0.08, 0.0), *[(0.1, 0.0)] * 58, (0.06, 0.0))
+
+    def test_options_go_before_parameters_before_the_file(self, drive: MakeDriver, tmp_path: Any) -> None:
+        file = tmp_path / "my.yaml"
+        file.write_text("control: {linear_step: 0.02, angular_step: 0.2, max_linear: 3.0}\n")
+        options = ("--config", str(file), "--control.angular-step=0.4")
+        driver = drive(*options, parameters={"linear_step": 0.03, "angular_step": 0.3})
+        driver.show("Forward")
+        driver.show("Turn Left")
+        driver.expect((0.03, 0.0), (0.03, 0.4))
+
+    def test_zero_when_signs_stop_then_silence(self, drive: MakeDriver) -> None:
+        driver = drive()
+        driver.show("Forward", count=2)
+        driver.expect((0.01, 0.0), (0.02, 0.0), (0.0, 0.0))
+        time.sleep(0.6)
+        assert len(driver.twists) == 3
+
+    @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+    def test_one_zero_at_exit(self, drive: MakeDriver, number: signal.Signals) -> None:
+        driver = drive("--control.sign-timeout", "5")
+        driver.show("Forward", count=2)
+        driver.expect((0.01, 0.0), (0.02, 0.0))
+        driver.process.signal(number)
+        assert driver.process.code() == 0, driver.process.text
+        driver.expect((0.01, 0.0), (0.02, 0.0), (0.0, 0.0))
+
+    def test_after_a_freeze_nothing_old_is_obeyed(self, drive: MakeDriver) -> None:
+        driver = drive()
+        driver.show("Forward", count=3)
+        driver.expect((0.01, 0.0), (0.02, 0.0), (0.03, 0.0))
+        driver.process.freeze()
+        driver.show("Forward", count=30, period_s=0.033)
+        driver.process.signal(signal.SIGCONT)
+        driver.expect((0.01, 0.0), (0.02, 0.0), (0.03, 0.0), (0.0, 0.0))
+        time.sleep(0.5)
+        assert set(driver.twists[3:]) == {(0.0, 0.0)}
+
+
+@dataclass(frozen=True)
+class Running:
+    """The whole chain as processes.
+
+    Attributes:
+        peer: Has recorded ``CMD_VEL`` (linear.x, angular.z) and ``ODOM`` (twist.twist.linear.x, pose.pose.position.x).
+        nodes: The processes: robot, control with a limit of 0.3 m/s, recognition, camera that shows Forward.
+    """
+
+    peer: Peer
+    nodes: dict[str, Process]
+
+    @property
+    def speeds(self) -> list[tuple[float, float]]:
+        """When, and the robot's speed in m/s."""
+        return [(at_s, speed) for at_s, (speed, _) in self.peer.ask("get", topic=ODOM)]
+
+    @property
+    def x_m(self) -> float:
+        """Where the robot is."""
+        return float(self.peer.ask("get", topic=ODOM)[-1][1][1])
+
+    def expect_full_speed(self) -> "Running":
+        """Wait until the robot drives at its limit."""
+        eventually(lambda: self.speeds and self.speeds[-1][1] > 0.29, what="the robot to drive at its limit")
+        return self
+
+    def expect_rest(self) -> None:
+        """Wait until the robot stands."""
+        eventually(lambda: abs(self.speeds[-1][1]) < 0.01, 5.0, what="the robot to stand")
+
+
+class ChainContract:
+    """Inherit, and provide ``running``, a chain that drives at full speed."""
+
+    @pytest.fixture
+    def running(self) -> Iterator[Running]:
+        raise NotImplementedError
+
+    @pytest.mark.parametrize("victim", ["camera", "recognition", "control"])
+    def test_kill_9_of_any_node_stops_the_robot(self, running: Running, victim: str) -> None:
+        assert running.x_m > 0.1  # it has moved forward, as the sign says
+        killed_s = time.monotonic()
+        running.nodes[victim].popen.kill()
+        running.expect_rest()
+        if victim == "control":
+            # No Twist can come any more: the robot's controller brakes by itself.
+            stopped_s = next(at_s for at_s, speed in running.speeds if at_s > killed_s and speed < 0.28)
+        else:
+            zeros = [at_s for at_s, twist in twists(running.peer) if at_s > killed_s and twist == (0.0, 0.0)]
+            stopped_s = zeros[0]
+            time.sleep(0.3)
+            assert {twist for at_s, twist in twists(running.peer) if at_s > stopped_s} <= {(0.0, 0.0)}
+        assert stopped_s - killed_s <= LIMIT_S + _SEEN_S
+
+    def test_a_robot_that_was_frozen_does_not_drive_on(self, running: Running) -> None:
+        robot = running.nodes["robot"]
+        robot.freeze()
+        running.nodes["control"].popen.kill()
+        time.sleep(1.0)
+        resumed_s = time.monotonic()
+        robot.signal(signal.SIGCONT)
+        running.expect_rest()
+        stood_s = next(at_s for at_s, speed in running.speeds if at_s > resumed_s and abs(speed) < 0.01)
+        assert stood_s - resumed_s < 0.6  # 0.3 m/s at 1 m/s², and no more
