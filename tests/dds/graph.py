@@ -8,13 +8,15 @@ import sys
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any
 
 from tests.processes import Peer, Process, eventually
 
 PEER = Path(__file__).with_name("peer.py")
 # Domains above have their ports among those that the system gives to others.
 _LARGEST_DOMAIN = 100
+# Whoever was killed is still in its domain for others, for ten seconds.
+_AT_ONCE = 10
 _ROS_VARIABLES = (
     "CYCLONEDDS_URI",
     "ROS_AUTOMATIC_DISCOVERY_RANGE",
@@ -24,18 +26,20 @@ _ROS_VARIABLES = (
 )
 
 
-_claims: list[TextIO] = []
+_claims: list[int] = []
 
 
 def free_domain() -> int:
-    """Return the number of a domain that no other test on this machine has claimed; it is ours until we end."""
+    """Return the number of a domain that no other test on this machine uses."""
+    if len(_claims) == _AT_ONCE:
+        os.close(_claims.pop(0))  # its test ended long ago
     for domain in random.sample(range(1, _LARGEST_DOMAIN + 1), _LARGEST_DOMAIN):
-        claim = Path(tempfile.gettempdir(), f"handsteer_test_domain_{domain}").open("w", encoding="utf-8")
+        claim = os.open(Path(tempfile.gettempdir(), f"handsteer_test_domain_{domain}"), os.O_CREAT | os.O_RDWR)
         with contextlib.suppress(BlockingIOError):
             fcntl.flock(claim, fcntl.LOCK_EX | fcntl.LOCK_NB)
             _claims.append(claim)
             return domain
-        claim.close()
+        os.close(claim)
     raise AssertionError("all DDS domains are taken by other tests")
 
 
