@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 ARGS ?=
 
-.PHONY: help run test ros1 test-ros1 lint unit format lock bench bench-signs signs-model models docs screenshots \
+.PHONY: help run test ros1 test-ros1 ros2 test-ros2 lint unit format lock bench bench-signs signs-model models docs screenshots \
 	screenshots-ros1 clean
 
 help:
@@ -12,6 +12,8 @@ help:
 	@echo "make test         everything that CI checks: format, lint, types, tests"
 	@echo "make ros1         install ROS 1 from Debian's or Ubuntu's packages, for handsteer ... --transport ros1"
 	@echo "make test-ros1    check what runs on ROS 1"
+	@echo "make ros2         install a ROS 2 for the tests to talk to, beside handsteer (not needed to use it)"
+	@echo "make test-ros2    check what runs among nodes of ROS 2"
 	@echo "make bench        print the speed and accuracy tables"
 	@echo "make bench-signs  print how well signs are told on photos of people"
 	@echo "make signs-model  train the sign model again, from hands that it makes itself; gives the same file"
@@ -40,6 +42,12 @@ ros1: $(BIN)/.dev
 
 test-ros1: $(BIN)/.dev models
 	@$(BIN)/pytest -n auto --dist loadfile -m ros1 $(ARGS)
+
+ros2: $(BIN)/.dev
+	@scripts/setup-ros2
+
+test-ros2: $(BIN)/.dev models
+	@$(BIN)/pytest -n auto --dist loadfile -m ros2 $(ARGS)
 
 models: | $(BIN)/.run
 	@$(BIN)/handsteer models > /dev/null
@@ -74,12 +82,13 @@ $(BIN)/.dev: scripts/setup requirements-dev.txt pyproject.toml | $(BIN)/.run
 	@scripts/setup requirements-dev.txt && touch $@
 
 # For every system and Python that is supported; without the address of any index.
-COMPILE = uv pip compile pyproject.toml --quiet --universal --python-version 3.11 --generate-hashes \
+COMPILE = uv pip compile --quiet --universal --python-version 3.11 --generate-hashes \
 	--no-emit-index-url --no-annotate --no-header --upgrade
 lock:
 	@test -x $(BIN)/uv || { python3 -m venv $(VENV) && $(BIN)/python -m pip install --quiet uv; }
-	@PATH="$(BIN):$$PATH" $(COMPILE) --group setup --output-file requirements.txt
-	@PATH="$(BIN):$$PATH" $(COMPILE) --group setup --group dev --output-file requirements-dev.txt
+	@PATH="$(BIN):$$PATH" $(COMPILE) pyproject.toml --group setup --output-file requirements.txt
+	@PATH="$(BIN):$$PATH" $(COMPILE) pyproject.toml --group setup --group dev --output-file requirements-dev.txt
+	@PATH="$(BIN):$$PATH" $(COMPILE) --group pyproject.toml:ros2 --output-file requirements-ros2.txt
 
 clean:
 	@rm -rf $(VENV) .mypy_cache .pytest_cache .ruff_cache .hypothesis

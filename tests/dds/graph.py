@@ -6,7 +6,7 @@ import os
 import random
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -49,15 +49,21 @@ class DdsGraph:
     Attributes:
         env: Environment of the processes.
         peer: The plain program.
+
+    Args:
+        home: Folder for logs.
+        peer: Command that starts the plain program; the domain is added.
     """
 
-    def __init__(self, home: Path) -> None:
+    def __init__(self, home: Path, peer: Sequence[str] = (sys.executable, str(PEER))) -> None:
         self._home = home
+        self._peer_command = list(peer)
         self._processes: list[Process] = []
         self.domain = free_domain()
         self.env = {**os.environ, "ROS_DOMAIN_ID": str(self.domain), "PYTHONUNBUFFERED": "1"}
         for inherited in _ROS_VARIABLES:
             self.env.pop(inherited, None)
+        self.env["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"  # ours by default, but not ROS 2's
         self.peer = self.start_peer()
 
     def stop(self) -> None:
@@ -66,9 +72,9 @@ class DdsGraph:
             process.kill()
 
     def start_peer(self) -> Peer:
-        """Start a plain DDS program, as ``tests/dds/peer.py`` tells; wait until it is ready."""
+        """Start a plain program, as ``tests/dds/peer.py`` tells; wait until it is ready."""
         log = self._home / f"peer_{len(self._processes)}.log"
-        peer = Peer([sys.executable, str(PEER), str(self.domain)], self.env, log)
+        peer = Peer([*self._peer_command, str(self.domain)], self.env, log)
         self._processes.append(peer)
         return peer
 
@@ -89,6 +95,10 @@ class DdsGraph:
     def nodes(self) -> dict[str, Any]:
         """Return the nodes as the plain program knows them: what they publish and subscribe to."""
         return dict(self.peer.ask("graph"))
+
+    def publishes(self, node: str, topic: str) -> bool:
+        """Return whether the plain program knows that the node of this full name publishes ``topic``."""
+        return f"rt{topic}" in self.nodes()[node]["writers"]
 
 
 @contextlib.contextmanager

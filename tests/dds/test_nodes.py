@@ -1,9 +1,8 @@
 """Our nodes as processes in a DDS domain, seen by a plain DDS program with types of its own."""
 
-import itertools
 import signal
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -16,58 +15,22 @@ from tests.contracts.node_contract import (
     ODOM,
     ChainContract,
     ControlContract,
-    Driver,
     MakeDriver,
     Running,
-    Twists,
     twists,
 )
+from tests.dds.driver import NODE, SETTLE_S, DdsDriver, driving_chain, record_twists
 from tests.dds.graph import DdsGraph, dds_graph
-from tests.processes import Peer, eventually
+from tests.processes import eventually
 
 pytest.importorskip("cyclonedds")
 pytestmark = pytest.mark.slow
-
-NODE = "hand_sign_control"
-SCRIPT = ("-p", "virtual_hand.script:=Forward:60")
-SETTLE_S = 0.3
-"""One end sees the other first; the other follows within milliseconds."""
-
-numbers = itertools.count()
 
 
 @pytest.fixture(scope="module")
 def dds(tmp_path_factory: pytest.TempPathFactory) -> Iterator[DdsGraph]:
     with dds_graph(tmp_path_factory.mktemp("dds")) as graph:
         yield graph
-
-
-class DdsDriver(Driver):
-    def __init__(self, graph: DdsGraph, *options: str, parameters: Mapping[str, Any] | None = None) -> None:
-        namespace = f"/n{next(numbers)}"
-        self._signs, self._cmd_vel, self._peer = f"{namespace}/gesture/hand_sign", f"{namespace}{CMD_VEL}", graph.peer
-        record_twists(graph.peer, self._cmd_vel)
-        graph.peer.ask("advertise", topic=self._signs, type="String")
-        words = [word for name, value in (parameters or {}).items() for word in ("-p", f"{name}:={value}")]
-        ros = ("-r", f"__ns:={namespace}", *words)
-        self.process = graph.node("control", *options, name=f"{namespace}/{NODE}", ros=ros)
-        eventually(lambda: graph.peer.ask("listeners", topic=self._signs) > 0)
-        eventually(lambda: f"rt{self._cmd_vel}" in graph.nodes()[f"{namespace}/{NODE}"]["writers"])
-        time.sleep(SETTLE_S)
-
-    def show(self, sign: str, count: int = 1, period_s: float = 0.02) -> None:
-        self._peer.ask("publish", topic=self._signs, values={"data": sign}, count=count, period_s=period_s)
-
-    def show_raw(self, raw: bytes) -> None:
-        self._peer.ask("publish_raw", topic=self._signs, hex=raw.hex())
-
-    @property
-    def commands(self) -> Twists:
-        return twists(self._peer, self._cmd_vel)
-
-
-def record_twists(peer: Peer, topic: str = CMD_VEL) -> None:
-    peer.ask("record", topic=topic, type="Twist", fields=["linear.x", "angular.z"])
 
 
 class TestControl(ControlContract):
@@ -179,16 +142,7 @@ class TestChain(ChainContract):
     @pytest.fixture
     def running(self, tmp_path: Path) -> Iterator[Running]:
         with dds_graph(tmp_path) as graph:
-            record_twists(graph.peer)
-            fields = ["twist.twist.linear.x", "pose.pose.position.x"]
-            graph.peer.ask("record", topic=ODOM, type="Odometry", fields=fields)
-            nodes = {
-                "robot": graph.node("robot", name="/robot"),
-                "control": graph.node("control", name=f"/{NODE}", ros=("-p", "max_linear:=0.3")),
-                "recognition": graph.node("recognition", name="/hand_sign_recognition"),
-                "camera": graph.node("camera", *FORWARD, name="/my_camera", ros=SCRIPT),
-            }
-            yield Running(graph.peer, nodes).expect_full_speed()
+            yield driving_chain(graph)
 
 
 def test_a_robot_follows_another_programs_twists(dds: DdsGraph) -> None:

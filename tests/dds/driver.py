@@ -1,0 +1,59 @@
+"""What drives our nodes in a DDS domain, and notes what they do; the domain's peer may be of any make."""
+
+import itertools
+import time
+from collections.abc import Mapping
+from typing import Any
+
+from tests.contracts.node_contract import CMD_VEL, FORWARD, ODOM, Driver, Running, Twists, twists
+from tests.dds.graph import DdsGraph
+from tests.processes import Peer, eventually
+
+NODE = "hand_sign_control"
+SCRIPT = ("-p", "virtual_hand.script:=Forward:60")
+SETTLE_S = 0.3
+"""One end sees the other first; the other follows within milliseconds."""
+
+_numbers = itertools.count()
+
+
+class DdsDriver(Driver):
+    def __init__(self, graph: DdsGraph, *options: str, parameters: Mapping[str, Any] | None = None) -> None:
+        namespace = f"/n{next(_numbers)}"
+        self._signs, self._cmd_vel, self._peer = f"{namespace}/gesture/hand_sign", f"{namespace}{CMD_VEL}", graph.peer
+        record_twists(graph.peer, self._cmd_vel)
+        graph.peer.ask("advertise", topic=self._signs, type="String")
+        words = [word for name, value in (parameters or {}).items() for word in ("-p", f"{name}:={value}")]
+        ros = ("-r", f"__ns:={namespace}", *words)
+        self.process = graph.node("control", *options, name=f"{namespace}/{NODE}", ros=ros)
+        eventually(lambda: graph.peer.ask("listeners", topic=self._signs) > 0)
+        eventually(lambda: graph.publishes(f"{namespace}/{NODE}", self._cmd_vel))
+        time.sleep(SETTLE_S)
+
+    def show(self, sign: str, count: int = 1, period_s: float = 0.02) -> None:
+        self._peer.ask("publish", topic=self._signs, values={"data": sign}, count=count, period_s=period_s)
+
+    def show_raw(self, raw: bytes) -> None:
+        self._peer.ask("publish_raw", topic=self._signs, hex=raw.hex())
+
+    @property
+    def commands(self) -> Twists:
+        return twists(self._peer, self._cmd_vel)
+
+
+def record_twists(peer: Peer, topic: str = CMD_VEL) -> None:
+    peer.ask("record", topic=topic, type="Twist", fields=["linear.x", "angular.z"])
+
+
+def driving_chain(graph: DdsGraph) -> Running:
+    """Start all nodes, and wait until the robot drives forward at full speed."""
+    record_twists(graph.peer)
+    fields = ["twist.twist.linear.x", "pose.pose.position.x"]
+    graph.peer.ask("record", topic=ODOM, type="Odometry", fields=fields)
+    nodes = {
+        "robot": graph.node("robot", name="/robot"),
+        "control": graph.node("control", name=f"/{NODE}", ros=("-p", "max_linear:=0.3")),
+        "recognition": graph.node("recognition", name="/hand_sign_recognition"),
+        "camera": graph.node("camera", *FORWARD, name="/my_camera", ros=SCRIPT),
+    }
+    return Running(graph.peer, nodes).expect_full_speed()

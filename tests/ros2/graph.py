@@ -1,0 +1,33 @@
+"""A domain of a real ROS 2 for a test: its rclpy, with Fast DDS, looks at our nodes."""
+
+import contextlib
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+from tests.dds.graph import DdsGraph
+
+PEER = Path(__file__).with_name("peer.py")
+PYTHON = Path(sys.prefix) / "ros2" / "bin" / "python"
+"""Made by ``make ros2``."""
+
+
+class Ros2Graph(DdsGraph):
+    """The processes of a test in a domain, with a node of a real ROS 2 among them that looks on."""
+
+    def __init__(self, home: Path) -> None:
+        super().__init__(home, (str(PYTHON), str(PEER)))
+
+    def publishes(self, node: str, topic: str) -> bool:
+        """Return whether ROS 2 knows that the node of this full name publishes ``topic``."""
+        return topic in self.nodes()[node]["publishes"]
+
+
+@contextlib.contextmanager
+def ros2_graph(home: Path) -> Iterator[Ros2Graph]:
+    """A domain with a ROS 2 node in it, for as long as the block lasts."""
+    graph = Ros2Graph(home)
+    try:
+        yield graph
+    finally:
+        graph.stop()

@@ -1,0 +1,162 @@
+"""A plain node of a real ROS 2: rclpy, its own types, its own DDS. It runs on the Python of ``make ros2``.
+
+It reads orders as lines of JSON from its input and answers each by one line of JSON; they are those of
+``tests/dds/peer.py`` as far as it has them. Beside them, ``endpoints`` (topic) returns what ``ros2 topic info -v``
+says, ``topics`` what ``ros2 topic list -t`` says, ``shift`` (from, to, type) publishes on one topic what comes on
+another, and ``parameters`` (node, names) what ``ros2 param`` would get.
+"""
+
+import json
+import sys
+import threading
+import time
+from contextlib import suppress
+from functools import reduce
+from typing import Any
+
+import rclpy
+from builtin_interfaces.msg import Time
+from geometry_msgs.msg import Twist, TwistStamped
+from nav_msgs.msg import Odometry
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import CompressedImage, Image
+from std_msgs.msg import String
+
+TYPES = {kind.__name__: kind for kind in (Clock, CompressedImage, Image, Odometry, String, Twist, TwistStamped)}
+
+rclpy.init()
+node = rclpy.create_node("looker")
+noted: dict[str, list[Any]] = {}
+publishers: dict[str, Any] = {}
+
+
+def profile(order: dict[str, Any]) -> QoSProfile:
+    reliable = order.get("reliable", True)
+    return QoSProfile(
+        depth=order.get("depth", 100),
+        reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
+        durability=DurabilityPolicy.TRANSIENT_LOCAL if order.get("latched") else DurabilityPolicy.VOLATILE,
+    )
+
+
+def record(order: dict[str, Any]) -> bool:
+    found: list[Any] = []
+    noted[order["topic"]] = found
+
+    def note(message: Any) -> None:
+        found.append([time.monotonic(), [value(message, path) for path in order["fields"]]])
+
+    node.create_subscription(TYPES[order["type"]], order["topic"], note, profile(order))
+    return True
+
+
+def value(message: Any, path: str) -> Any:
+    found = reduce(getattr, path.split("."), message)
+    if isinstance(found, Time):
+        return found.sec + found.nanosec / 1e9
+    return found if isinstance(found, (bool, int, float, str)) else len(found)
+
+
+def get(order: dict[str, Any]) -> list[Any]:
+    return list(noted[order["topic"]])
+
+
+def advertise(order: dict[str, Any]) -> bool:
+    publishers[order["topic"]] = node.create_publisher(TYPES[order["type"]], order["topic"], profile(order))
+    return True
+
+
+def listeners(order: dict[str, Any]) -> int:
+    return int(publishers[order["topic"]].get_subscription_count())
+
+
+def publish(order: dict[str, Any]) -> bool:
+    publisher = publishers[order["topic"]]
+    message = publisher.msg_type()
+    for path, wanted in order["values"].items():
+        *parts, last = path.split(".")
+        setattr(reduce(getattr, parts, message), last, wanted)
+    for _ in range(order.get("count", 1)):
+        publisher.publish(message)
+        time.sleep(order.get("period_s", 0.0))
+    return True
+
+
+def run_clock(order: dict[str, Any]) -> bool:
+    """Publish simulated time at 50 Hz, beside other orders."""
+    publisher = publishers["/clock"]
+
+    def run() -> None:
+        for step in range(int(order["seconds"] * 50)):
+            now_s = order["from_s"] + step / 50
+            publisher.publish(Clock(clock=Time(sec=int(now_s), nanosec=int(now_s % 1 * 1e9))))
+            time.sleep(0.02)
+
+    threading.Thread(target=run, daemon=True).start()
+    return True
+
+
+def shift(order: dict[str, Any]) -> bool:
+    kind = TYPES[order["type"]]
+    publisher = node.create_publisher(kind, order["to"], profile(order))
+    node.create_subscription(kind, order["from"], publisher.publish, profile(order))
+    return True
+
+
+def graph(_: dict[str, Any]) -> dict[str, Any]:
+    return {
+        f"{namespace.rstrip('/')}/{name}": {
+            "publishes": dict(node.get_publisher_names_and_types_by_node(name, namespace)),
+            "subscribes": dict(node.get_subscriber_names_and_types_by_node(name, namespace)),
+        }
+        for name, namespace in node.get_node_names_and_namespaces()
+    }
+
+
+def topics(_: dict[str, Any]) -> dict[str, list[str]]:
+    return dict(node.get_topic_names_and_types())
+
+
+def endpoints(order: dict[str, Any]) -> list[dict[str, Any]]:
+    both = [
+        ("publisher", node.get_publishers_info_by_topic(order["topic"])),
+        ("subscription", node.get_subscriptions_info_by_topic(order["topic"])),
+    ]
+    return [
+        {
+            "kind": kind,
+            "node": f"{info.node_namespace.rstrip('/')}/{info.node_name}",
+            "type": info.topic_type,
+            "hash": str(info.topic_type_hash),
+            "reliability": info.qos_profile.reliability.name,
+            "durability": info.qos_profile.durability.name,
+        }
+        for kind, infos in both
+        for info in infos
+    ]
+
+
+ORDERS = {
+    order.__name__: order
+    for order in (record, get, advertise, listeners, publish, run_clock, shift, graph, topics, endpoints)
+}
+
+
+def spin() -> None:
+    executor = SingleThreadedExecutor()
+    executor.add_node(node)
+    with suppress(ExternalShutdownException):
+        executor.spin()
+
+
+threading.Thread(target=spin, daemon=True).start()
+print("ready", flush=True)
+for line in sys.stdin:
+    wanted = json.loads(line)
+    try:
+        answer: Any = ORDERS[wanted["order"]](wanted)
+    except Exception as error:  # a node that leaves meanwhile
+        answer = {"error": str(error)}
+    print(json.dumps(answer), flush=True)

@@ -1,0 +1,165 @@
+"""Our nodes among those of a real ROS 2: rclpy, on Fast DDS."""
+
+import signal
+import time
+from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
+
+import pytest
+
+from tests.contracts.node_contract import (
+    CMD_VEL,
+    FORWARD,
+    ODOM,
+    ChainContract,
+    ControlContract,
+    MakeDriver,
+    Running,
+)
+from tests.dds.driver import NODE, SCRIPT, DdsDriver, driving_chain
+from tests.processes import eventually
+from tests.ros2.graph import PYTHON, Ros2Graph, ros2_graph
+
+pytest.importorskip("cyclonedds")
+pytestmark = [
+    pytest.mark.ros2,
+    pytest.mark.slow,
+    pytest.mark.skipif(not PYTHON.exists(), reason="no ROS 2 here: make ros2 installs one for the tests"),
+]
+
+
+@pytest.fixture(scope="module")
+def ros2(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Ros2Graph]:
+    with ros2_graph(tmp_path_factory.mktemp("ros2")) as graph:
+        yield graph
+
+
+class TestControl(ControlContract):
+    @pytest.fixture
+    def drive(self, ros2: Ros2Graph) -> MakeDriver:
+        return partial(DdsDriver, ros2)
+
+
+class TestChain(ChainContract):
+    @pytest.fixture
+    def running(self, tmp_path: Path) -> Iterator[Running]:
+        with ros2_graph(tmp_path) as graph:
+            yield driving_chain(graph)
+
+
+def test_ros2_lists_the_node_its_topics_types_hashes_and_profiles(ros2: Ros2Graph) -> None:
+    words = ("-r", "__ns:=/far", "-r", "__node:=driver", "-r", f"{CMD_VEL[1:]}:=/base/cmd_vel")
+    control = ros2.node("control", name="/far/driver", ros=words)
+    eventually(lambda: len(ros2.nodes()["/far/driver"]["subscribes"]) == 2)
+    assert ros2.nodes()["/far/driver"]["subscribes"] == {
+        "/far/gesture/hand_sign": ["std_msgs/msg/String"],
+        "/far/steering/cmd_vel": ["geometry_msgs/msg/Twist"],
+    }
+    publishes = ros2.nodes()["/far/driver"]["publishes"]
+    assert publishes["/base/cmd_vel"] == ["geometry_msgs/msg/Twist"]
+    assert publishes["/diagnostics"] == ["diagnostic_msgs/msg/DiagnosticArray"]
+    assert ros2.peer.ask("topics")["/base/cmd_vel"] == ["geometry_msgs/msg/Twist"]
+    assert ros2.peer.ask("endpoints", topic="/base/cmd_vel") == [
+        {
+            "kind": "publisher",
+            "node": "/far/driver",
+            "type": "geometry_msgs/msg/Twist",
+            "hash": "RIHS01_9c45bf16fe0983d80e3cfe750d6835843d265a9a6c46bd2e609fcddde6fb8d2a",
+            "reliability": "RELIABLE",
+            "durability": "VOLATILE",
+        }
+    ]
+    control.signal(signal.SIGTERM)
+    assert control.code() == 0
+    eventually(lambda: "/far/driver" not in ros2.nodes(), what="the node to be gone for ROS 2 too")
+
+
+def test_every_type_of_the_graph_has_ros2s_own_hash(ros2: Ros2Graph) -> None:
+    """ROS 2 tells the hashes of its own publishers, too."""
+    ours = {"/image_raw": "Image", ODOM: "Odometry", "/robot_description": "String", CMD_VEL: "Twist"}
+    ours |= {"/image_raw/compressed": "CompressedImage", "/clock": "Clock"}
+    ros2.node("camera", *FORWARD, name="/hashed/my_camera", ros=("-r", "__ns:=/hashed"))
+    ros2.node("robot", name="/hashed/robot", ros=("-r", "__ns:=/hashed", "-p", "publish_clock:=true"))
+    for topic, kind in ours.items():
+        here = topic if topic == "/clock" else f"/hashed{topic}"
+        ros2.peer.ask("advertise", topic=here, type=kind)
+        eventually(lambda: len(ros2.peer.ask("endpoints", topic=here)) >= 2, what=here)  # noqa: B023
+        assert len({(end["type"], end["hash"]) for end in ros2.peer.ask("endpoints", topic=here)}) == 1, here
+
+
+def test_a_late_subscriber_gets_the_description_of_the_robot(ros2: Ros2Graph) -> None:
+    ros2.node("robot", name="/late/robot", ros=("-r", "__ns:=/late"))
+    ros2.peer.ask("record", topic="/late/robot_description", type="String", fields=["data"], latched=True)
+    description = eventually(lambda: ros2.peer.ask("get", topic="/late/robot_description"))[0][1][0]
+    assert "<robot" in description
+
+
+def test_a_robot_follows_the_twists_of_rclpy(ros2: Ros2Graph) -> None:
+    peer = ros2.peer
+    ros2.node("robot", name="/lone/robot", ros=("-r", "__ns:=/lone", "-r", f"{CMD_VEL[1:]}:=/lone/cmd_vel"))
+    peer.ask("record", topic=f"/lone{ODOM}", type="Odometry", fields=["twist.twist.angular.z"], reliable=False)
+    peer.ask("advertise", topic="/lone/cmd_vel", type="Twist")
+    eventually(lambda: peer.ask("listeners", topic="/lone/cmd_vel") > 0)
+    eventually(lambda: peer.ask("get", topic=f"/lone{ODOM}"))
+    peer.ask("publish", topic="/lone/cmd_vel", values={"angular.z": 0.5}, count=20, period_s=0.05)
+    assert max(speed for _, (speed,) in peer.ask("get", topic=f"/lone{ODOM}")) == pytest.approx(0.5, abs=0.05)
+    eventually(lambda: abs(peer.ask("get", topic=f"/lone{ODOM}")[-1][1][0]) < 0.01, 5.0, what="the robot to stand")
+
+
+def test_pictures_of_a_ros2_camera_are_recognised(ros2: Ros2Graph) -> None:
+    """The virtual hand's pictures go through rclpy, which makes them those of a ROS 2 camera."""
+    peer = ros2.peer
+    details = {"type": "CompressedImage", "reliable": False, "depth": 1}
+    peer.ask("shift", **{"from": "/eye/image_raw/compressed", "to": "/brain/image_raw/compressed"}, **details)
+    peer.ask("record", topic="/brain/gesture/hand_sign", type="String", fields=["data"])
+    compressed = ("-p", "image_transport:=compressed")
+    ros2.node("recognition", name="/brain/hand_sign_recognition", ros=("-r", "__ns:=/brain", *compressed))
+    ros2.node("camera", *FORWARD, name="/eye/my_camera", ros=("-r", "__ns:=/eye", *SCRIPT))
+    eventually(lambda: ["Forward"] in [values for _, values in peer.ask("get", topic="/brain/gesture/hand_sign")])
+
+
+def test_compressed_pictures_reach_rclpy(ros2: Ros2Graph) -> None:
+    """``benchmarks/ros2.py`` counts how many."""
+    peer = ros2.peer
+    topic = "/film/image_raw/compressed"
+    peer.ask("record", topic=topic, type="CompressedImage", fields=["header.stamp", "data"], reliable=False, depth=5)
+    ros2.node("camera", "--camera", "virtual", name="/film/my_camera", ros=("-r", "__ns:=/film", *SCRIPT))
+    pictures = eventually(lambda: len(found := peer.ask("get", topic=topic)) >= 60 and found)
+    stamps = [stamp for _, (stamp, _) in pictures]
+    assert stamps == sorted(set(stamps))
+    assert all(1000 < size < 200_000 for _, (_, size) in pictures)
+
+
+def test_the_time_of_ros2_is_followed(tmp_path: Path) -> None:
+    with ros2_graph(tmp_path) as graph:
+        peer = graph.peer
+        peer.ask("advertise", topic="/clock", type="Clock", reliable=False, depth=1)
+        topic = "/image_raw/compressed"
+        peer.ask("record", topic=topic, type="CompressedImage", fields=["header.stamp"], reliable=False)
+        graph.node("camera", *FORWARD, name="/my_camera", ros=("-p", "use_sim_time:=true"))
+        eventually(lambda: peer.ask("listeners", topic="/clock") > 0)
+        peer.ask("run_clock", from_s=1000.0, seconds=30.0)
+        eventually(lambda: [v for _, (v,) in peer.ask("get", topic=topic) if 1000.0 < v < 1040.0], 15.0)
+
+
+def test_profiles_that_do_not_fit_are_said_in_words(tmp_path: Path) -> None:
+    with ros2_graph(tmp_path) as graph:
+        graph.peer.ask("record", topic="/image_raw", type="Image", fields=["width"], depth=5)
+        camera = graph.node("camera", *FORWARD, name="/my_camera")
+        line = (
+            "/image_raw: nothing passes between our publisher and the subscriber of /looker: "
+            "the publisher is best effort, the subscriber wants reliable"
+        )
+        eventually(lambda: line in camera.text, 10.0, what=line)
+        time.sleep(0.2)
+        assert graph.peer.ask("get", topic="/image_raw") == []
+
+
+def test_a_node_of_ros2_that_is_killed_is_no_harm(ros2: Ros2Graph, tmp_path: Path) -> None:
+    with ros2_graph(tmp_path) as graph:
+        control = graph.node("control", name=f"/{NODE}")
+        graph.peer.kill()
+        time.sleep(0.5)
+        assert control.running
+        assert "Traceback" not in control.text
