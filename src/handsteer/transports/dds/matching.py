@@ -17,7 +17,7 @@ from handsteer.transports.dds.qos import describe, misfits
 log = logging.getLogger(__name__)
 
 _AT_ONCE = 64
-# Publishers and subscribers are seen before the name of their node: at once by Cyclone DDS, by Fast DDS up to 3 s later.
+# A node tells its name after its publishers and subscribers: Cyclone DDS at once, Fast DDS up to three seconds later.
 _NAME_DUE_S = 4.0
 
 
