@@ -162,8 +162,15 @@ class Drive:
 
     def moved_m(self, since_s: float) -> float:
         """Return how far the robot has been from where it was at ``since_s``."""
-        places = [one.x_m for one in self.odometry(since_s)]
+        places = [one.x_m for one in self.odometry(since_s)] or [0.0]
         return max(places) - min(places)
+
+    def assert_standing(self, seconds: float) -> None:
+        """See that the robot stands for so long, by what it says itself."""
+        since_s = self._last().at_s
+        time.sleep(seconds)
+        assert len(self.odometry(since_s)) > 10 * seconds, "the robot has fallen silent"
+        assert self.moved_m(since_s) < 0.001
 
     def _last(self) -> Odometry:
         noted = self.odometry()

@@ -105,8 +105,8 @@ def test_a_real_link_delays_loses_is_cut_and_leaves_nothing(tmp_path: Path) -> N
             link.shape(0.02, 0.005)
             there_and_back_s = times_s(robot, 40)
             assert len(there_and_back_s) == 40
-            assert 0.03 <= min(there_and_back_s)
-            assert 0.035 <= statistics.median(there_and_back_s)
+            assert min(there_and_back_s) >= 0.03
+            assert statistics.median(there_and_back_s) >= 0.035
             link.cut()
             with pytest.raises(ValueError):
                 times_s(robot, 3)
