@@ -26,7 +26,7 @@ _ONLOOKER = (
     f'<CycloneDDS><Domain><General><Interfaces><NetworkInterface name="{DEVICE}"/></Interfaces>'
     "<AllowMulticast>{multicast}</AllowMulticast></General>"
     "<Discovery><ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>32</MaxAutoParticipantIndex>"
-    f'<Peers><Peer address="{ROBOT}"/></Peers></Discovery></Domain></CycloneDDS>'
+    '<Peers><Peer address="{address}"/></Peers></Discovery></Domain></CycloneDDS>'
 )
 
 
@@ -55,11 +55,17 @@ class TwoMachines:
         for process in self._processes:
             process.kill()
 
-    def onlooker(self) -> Peer:
-        """Start the plain program, which notes what the robot does and what all nodes say of themselves."""
+    def onlooker(self, machine: Machine | None = None) -> Peer:
+        """Start the plain program, on the robot's machine or another; it notes odometry and what all nodes report."""
+        machine = machine or self.robot
         multicast = str("ROS_STATIC_PEERS" not in self.variables).lower()
-        words = (sys.executable, str(PEER), str(self.domain), _ONLOOKER.format(multicast=multicast))
-        peer = Peer(self.robot.command(*words), self._environment(), self._log())
+        words = (
+            sys.executable,
+            str(PEER),
+            str(self.domain),
+            _ONLOOKER.format(multicast=multicast, address=machine.address),
+        )
+        peer = Peer(machine.command(*words), self._environment(), self._log())
         self._processes.append(peer)
         fields = ["header.stamp", "twist.twist.linear.x", "pose.pose.position.x"]
         peer.ask("record", topic=ODOM, type="Odometry", fields=fields)
@@ -82,12 +88,13 @@ class TwoMachines:
         self._processes.append(process)
         return process
 
-    def start(self, script: str = "Forward:600", ahead_s: float = 0.0) -> "Drive":
+    def start(self, script: str = "Forward:600", ahead_s: float = 0.0, camera: tuple[str, ...] = ()) -> "Drive":
         """Start all nodes, with compressed images.
 
         Args:
             script: What the virtual hand shows.
             ahead_s: How far the clock of the robot's machine is ahead of the workstation's.
+            camera: Further options for the camera.
         """
         peer = self.onlooker()
         nodes = {
@@ -95,7 +102,7 @@ class TwoMachines:
             "control": self.node(self.workstation, "control", ros=("-p", f"max_linear:={SPEED_MPS}")),
             "recognition": self.node(self.workstation, "recognition", ros=("-p", "image_transport:=compressed")),
             "camera": self.node(
-                self.robot, "camera", *CAMERA, ros=("-p", f"virtual_hand.script:={script}"), ahead_s=ahead_s
+                self.robot, "camera", *CAMERA, *camera, ros=("-p", f"virtual_hand.script:={script}"), ahead_s=ahead_s
             ),
         }
         return Drive(self, peer, nodes)
@@ -144,6 +151,10 @@ class Drive:
     def until_fast(self) -> None:
         """Wait until the robot drives at its limit."""
         self.until(lambda: self._last().speed_mps > SPEED_MPS - 0.01, "the robot to drive at its limit")
+
+    def until_moving(self) -> None:
+        """Wait until the robot drives at whatever speed."""
+        self.until(lambda: self._last().speed_mps > 0.05, "the robot to drive")
 
     def until_standing(self) -> None:
         """Wait until the robot stands."""

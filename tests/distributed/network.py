@@ -81,13 +81,11 @@ class Link:
 
     def cut(self) -> float:
         """Let nothing pass; return when, in Unix time."""
-        self._apply(0.0, 0.0, 1.0)
-        return time.time()
+        return self._apply(0.0, 0.0, 1.0)
 
     def restore(self) -> float:
         """Let frames pass as before the cut; return when, in Unix time."""
-        self._apply(*self._shape)
-        return time.time()
+        return self._apply(*self._shape)
 
     def without_multicast(self) -> None:
         """Carry no multicast, as many a Wi-Fi does."""
@@ -99,13 +97,14 @@ class Link:
         if self._relay is not None:
             self._relay.kill()
 
-    def _apply(self, delay_s: float, jitter_s: float, loss: float) -> None:
+    def _apply(self, delay_s: float, jitter_s: float, loss: float) -> float:
         if self._relay is not None:
-            self._relay.ask("shape", delay_s=delay_s, jitter_s=jitter_s, loss=loss)
-            return
+            return float(self._relay.ask("shape", delay_s=delay_s, jitter_s=jitter_s, loss=loss)["at_s"])
+        began_s = time.time()
         words = ["delay", f"{delay_s * 1000:g}ms", f"{jitter_s * 1000:g}ms", "loss", f"{loss * 100:g}%"]
         for end in self._ends:
             end.run("tc", "qdisc", "replace", "dev", DEVICE, "root", "netem", *words)
+        return began_s
 
 
 @contextlib.contextmanager
