@@ -88,22 +88,33 @@ class TwoMachines:
         self._processes.append(process)
         return process
 
-    def start(self, script: str = "Forward:600", ahead_s: float = 0.0, camera: tuple[str, ...] = ()) -> "Drive":
+    def start(
+        self,
+        script: str = "Forward:600",
+        *,
+        ahead_s: float = 0.0,
+        camera: tuple[str, ...] = (),
+        robot: tuple[str, ...] = (),
+        camera_on: Machine | None = None,
+        control_on: Machine | None = None,
+    ) -> "Drive":
         """Start all nodes, with compressed images.
 
         Args:
             script: What the virtual hand shows.
             ahead_s: How far the clock of the robot's machine is ahead of the workstation's.
             camera: Further options for the camera.
+            robot: Further ROS arguments for the robot.
+            camera_on: Where the camera runs; the robot's machine by default.
+            control_on: Where the control runs; the workstation by default.
         """
         peer = self.onlooker()
+        hand = ("-p", f"virtual_hand.script:={script}")
         nodes = {
-            "robot": self.node(self.robot, "robot", "--world", "empty", ahead_s=ahead_s),
-            "control": self.node(self.workstation, "control", ros=("-p", f"max_linear:={SPEED_MPS}")),
+            "robot": self.node(self.robot, "robot", "--world", "empty", ros=robot, ahead_s=ahead_s),
+            "control": self.node(control_on or self.workstation, "control", ros=("-p", f"max_linear:={SPEED_MPS}")),
             "recognition": self.node(self.workstation, "recognition", ros=("-p", "image_transport:=compressed")),
-            "camera": self.node(
-                self.robot, "camera", *CAMERA, *camera, ros=("-p", f"virtual_hand.script:={script}"), ahead_s=ahead_s
-            ),
+            "camera": self.node(camera_on or self.robot, "camera", *CAMERA, *camera, ros=hand, ahead_s=ahead_s),
         }
         return Drive(self, peer, nodes)
 

@@ -1,12 +1,11 @@
 """Camera and robot on one machine, recognition and control on another: real processes over a link of two namespaces."""
 
 import itertools
-import signal
 import time
 
 import pytest
 
-from tests.distributed.graph import CAMERA, CMD_VEL, SPEED_MPS, STATIC_PEERS, SUBNET, Drive, TwoMachines
+from tests.distributed.graph import CMD_VEL, STATIC_PEERS, SUBNET, Drive, TwoMachines
 
 pytest.importorskip("cyclonedds")
 pytestmark = [pytest.mark.netns, pytest.mark.slow]
@@ -22,6 +21,18 @@ def assert_stopped(drive: Drive, since_s: float) -> None:
     slower_s, stood_s = drive.stop_times(since_s)
     assert slower_s <= LIMIT_S
     assert stood_s <= slower_s + BRAKING_S
+
+
+def test_a_firewall_has_to_open_only_the_ports_of_the_domain(machines: TwoMachines) -> None:
+    # 7400 + 250 x domain; two ports for all, and two more a process.
+    machines.domain = 3
+    machines.link.shape(**WIFI)
+    drive = machines.start()
+    drive.until_fast()
+    for end, processes in ((machines.robot, 3), (machines.workstation, 2)):
+        ports = {int(line.split()[3].rpartition(":")[2]) for line in end.run("ss", "-Hlun").splitlines()}
+        # Those above only send: the system gives them a port of its choice.
+        assert {port for port in ports if port < 20000} == {8150, 8151, *range(8160, 8160 + 2 * processes)}
 
 
 @pytest.mark.parametrize("variables", [SUBNET, STATIC_PEERS], ids=["multicast", "static peers"])
@@ -81,27 +92,30 @@ def test_nothing_old_is_replayed_when_the_link_comes_back(machines: TwoMachines)
 
 def test_a_short_cut_brings_no_old_commands_either(machines: TwoMachines) -> None:
     # The workstation has the camera, too: it goes on sending commands into the cut.
-    peer = machines.onlooker()
-    peer.ask("record", topic=CMD_VEL, type="Twist", fields=["linear.x", "angular.z"])
-    robot, workstation = machines.robot, machines.workstation
-    script = ("-p", "virtual_hand.script:=Forward:600")
-    nodes = {
-        "robot": machines.node(robot, "robot", "--world", "empty"),
-        "control": machines.node(workstation, "control", ros=("-p", f"max_linear:={SPEED_MPS}")),
-        "recognition": machines.node(workstation, "recognition", ros=("-p", "image_transport:=compressed")),
-        "camera": machines.node(workstation, "camera", *CAMERA, ros=script),
-    }
-    drive = Drive(machines, peer, nodes)
+    drive = machines.start(camera_on=machines.workstation)
+    drive.peer.ask("record", topic=CMD_VEL, type="Twist", fields=["linear.x"])
     drive.until_fast()
     machines.link.cut()
-    nodes["camera"].signal(signal.SIGKILL)
+    drive.nodes.pop("camera").kill()
     time.sleep(0.6)  # since the last Forward; the zeros that followed were cut off
     back_s = time.monotonic()
     machines.link.restore()
     time.sleep(1.5)
-    came = [speed for at_s, (speed, _) in peer.ask("get", topic=CMD_VEL) if at_s > back_s]
-    assert set(came) <= {0.0}
+    assert {speed for at_s, (speed,) in drive.peer.ask("get", topic=CMD_VEL) if at_s > back_s} <= {0.0}
     drive.until_standing()
+
+
+def test_a_control_on_the_robot_says_zero_when_the_link_is_cut(machines: TwoMachines) -> None:
+    # For a base that goes on with its last command for ever.
+    patient = ("-p", "cmd_vel_timeout:=10.0")
+    drive = machines.start(control_on=machines.robot, robot=patient)
+    drive.peer.ask("record", topic=CMD_VEL, type="Twist", fields=["linear.x"])
+    drive.until_fast()
+    cut_s = machines.link.cut()
+    drive.until_standing()
+    assert_stopped(drive, cut_s)
+    assert drive.peer.ask("get", topic=CMD_VEL)[-1][1] == [0.0]
+    assert drive.reports("hand_sign_control")[-1] == "standing: no sign has come for 0.35 s"
 
 
 @pytest.mark.parametrize("victim", ["camera", "recognition", "control"])

@@ -39,7 +39,7 @@ def test_this_machine_only(environment: dict[str, str]) -> None:
 
 @pytest.mark.parametrize("environment", [{"ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"}, {"ROS_LOCALHOST_ONLY": "0"}])
 def test_the_subnet(environment: dict[str, str]) -> None:
-    assert settings(**environment) == {"interface": None, "multicast": "true", "index": None, "peers": []}
+    assert settings(**environment) == {"interface": None, "multicast": "true", "index": "auto", "peers": []}
 
 
 def test_static_peers() -> None:
