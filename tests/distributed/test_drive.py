@@ -90,6 +90,18 @@ def test_nothing_old_is_replayed_when_the_link_comes_back(machines: TwoMachines)
     drive.assert_standing(0.5)
 
 
+def test_after_a_cut_in_which_they_gave_each_other_up_they_soon_meet_again(machines: TwoMachines) -> None:
+    machines.variables = STATIC_PEERS
+    machines.link.without_multicast()
+    drive = machines.start()
+    drive.until_fast()
+    machines.link.cut()
+    time.sleep(13.0)  # DDS gives others up after ten
+    back_s = machines.link.restore()
+    drive.until_moving()
+    assert time.time() - back_s < 12.0, "Cyclone's own announcements take half a minute"
+
+
 def test_a_short_cut_brings_no_old_commands_either(machines: TwoMachines) -> None:
     # The workstation has the camera, too: it goes on sending commands into the cut.
     drive = machines.start(camera_on=machines.workstation)

@@ -53,6 +53,16 @@ def test_static_peers() -> None:
     assert settings(ROS_STATIC_PEERS="10.0.0.1", ROS_AUTOMATIC_DISCOVERY_RANGE="SUBNET")["peers"] == ["10.0.0.1"]
 
 
+@pytest.mark.parametrize(
+    ("environment", "interval"),
+    [({}, None), ({"ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"}, "2 s"), ({"ROS_STATIC_PEERS": "10.0.0.1"}, "2 s")],
+)
+def test_over_a_network_we_say_often_that_we_are_there(environment: dict[str, str], interval: str | None) -> None:
+    config = network(environment).config
+    assert config is not None
+    assert ET.fromstring(config).findtext(".//SPDPInterval") == interval
+
+
 def test_the_users_configuration_wins() -> None:
     assert network({"CYCLONEDDS_URI": "file:///my.xml", "ROS_LOCALHOST_ONLY": "1"}).config is None
     assert network({"ROS_AUTOMATIC_DISCOVERY_RANGE": "SYSTEM_DEFAULT"}).config is None

@@ -9,6 +9,8 @@ from handsteer.errors import TransportError
 _RANGES = ("LOCALHOST", "SUBNET", "OFF", "SYSTEM_DEFAULT")
 _LARGEST_DOMAIN = 232  # those above have no UDP ports
 _ADDRESS = re.compile(r"[A-Za-z0-9_.:%\[\]-]+")
+# How soon others find us again after a cut that was so long that they gave us up: Cyclone's default is half a minute.
+_ANNOUNCE_S = 2
 # Every process of a machine has the two UDP ports of its index: known to firewalls, and to others by address alone.
 # Where others are looked for by address, all their ports are tried, so that there are fewer.
 _LARGEST_INDEX, _LARGEST_INDEX_BY_MULTICAST = 32, 119
@@ -86,9 +88,10 @@ def _config(reach: str, peers: list[str]) -> str:
     found = "".join(f'<Peer address="{peer}"/>' for peer in everyone)
     largest = _LARGEST_INDEX_BY_MULTICAST if reach == "SUBNET" and not peers else _LARGEST_INDEX
     index = f"<ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>{largest}</MaxAutoParticipantIndex>"
+    announce = f"<SPDPInterval>{_ANNOUNCE_S} s</SPDPInterval>"
     return (
         "<CycloneDDS><Domain>"
         f"<General>{interface if alone else ''}<AllowMulticast>{multicast}</AllowMulticast></General>"
-        f"<Discovery>{index}<Peers>{found}</Peers></Discovery>"
+        f"<Discovery>{index}{'' if alone else announce}<Peers>{found}</Peers></Discovery>"
         "</Domain></CycloneDDS>"
     )
