@@ -88,6 +88,11 @@ class TwoMachines:
         self._processes.append(process)
         return process
 
+    def camera(self, script: str, *options: str, on: Machine | None = None, ahead_s: float = 0.0) -> Process:
+        """Start a camera that shows the virtual hand, on the robot's machine by default."""
+        ros = ("-p", f"virtual_hand.script:={script}")
+        return self.node(on or self.robot, "camera", *CAMERA, *options, ros=ros, ahead_s=ahead_s)
+
     def start(
         self,
         script: str = "Forward:600",
@@ -109,12 +114,11 @@ class TwoMachines:
             control_on: Where the control runs; the workstation by default.
         """
         peer = self.onlooker()
-        hand = ("-p", f"virtual_hand.script:={script}")
         nodes = {
             "robot": self.node(self.robot, "robot", "--world", "empty", ros=robot, ahead_s=ahead_s),
             "control": self.node(control_on or self.workstation, "control", ros=("-p", f"max_linear:={SPEED_MPS}")),
             "recognition": self.node(self.workstation, "recognition", ros=("-p", "image_transport:=compressed")),
-            "camera": self.node(camera_on or self.robot, "camera", *CAMERA, *camera, ros=hand, ahead_s=ahead_s),
+            "camera": self.camera(script, *camera, on=camera_on, ahead_s=ahead_s),
         }
         return Drive(self, peer, nodes)
 
