@@ -132,6 +132,18 @@ def test_a_control_on_the_robot_says_zero_when_the_link_is_cut(machines: TwoMach
     assert drive.reports("hand_sign_control")[-1] == "standing: no sign has come for 0.35 s"
 
 
+def test_commands_that_come_late_are_not_obeyed(machines: TwoMachines) -> None:
+    # The camera is at the desk: nothing but the commands' own time tells that the link has become slow.
+    drive = machines.start(camera_on=machines.workstation)
+    drive.until_fast()
+    machines.link.shape(0.8)
+    drive.until_standing()
+    drive.until(lambda: "messages come over 0.35 s late" in drive.nodes["robot"].text, "it to be said")
+    drive.assert_standing(1.0)
+    machines.link.shape(**WIFI)
+    drive.until_fast()
+
+
 @pytest.mark.parametrize("victim", ["camera", "recognition", "control"])
 def test_kill_9_of_any_node_stops_the_robot(machines: TwoMachines, victim: str) -> None:
     machines.link.shape(**WIFI)
