@@ -17,7 +17,7 @@ PEER = Path(__file__).with_name("peer.py")
 _LARGEST_DOMAIN = 100
 # Whoever was killed is still in its domain for others, for ten seconds.
 _AT_ONCE = 10
-_ROS_VARIABLES = (
+ROS_VARIABLES = (
     "CYCLONEDDS_URI",
     "ROS_AUTOMATIC_DISCOVERY_RANGE",
     "ROS_DISTRO",
@@ -61,7 +61,7 @@ class DdsGraph:
         self._processes: list[Process] = []
         self.domain = free_domain()
         self.env = {**os.environ, "ROS_DOMAIN_ID": str(self.domain), "PYTHONUNBUFFERED": "1"}
-        for inherited in _ROS_VARIABLES:
+        for inherited in ROS_VARIABLES:
             self.env.pop(inherited, None)
         self.env["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"  # ours by default, but not ROS 2's
         self.peer = self.start_peer()

@@ -6,6 +6,8 @@ messages, ``get`` (topic) returns what was noted as ``[time_s, [values]]``. ``ad
 before ``listeners`` (topic), which returns how many listen, ``publish`` (topic, values, count, period_s) and
 ``publish_raw`` (topic, hex). ``introduce`` (name) makes it a node for ROS 2, and ``graph`` and ``user_data``
 (topic) return what a ROS 2 node would know of others.
+
+Arguments: the number of the domain, and a configuration of Cyclone DDS where it shall not keep to this machine.
 """
 
 import json
@@ -25,7 +27,7 @@ from cyclonedds.builtin import (
 from cyclonedds.core import Policy, Qos
 from cyclonedds.domain import Domain, DomainParticipant
 from cyclonedds.idl import IdlStruct
-from cyclonedds.idl.types import array, bounded_str, float64, int32, sequence, uint8, uint32
+from cyclonedds.idl.types import array, bounded_str, byte, float64, int32, sequence, uint8, uint32
 from cyclonedds.internal import InvalidSample
 from cyclonedds.pub import DataWriter
 from cyclonedds.sub import DataReader
@@ -120,6 +122,34 @@ class Odometry(IdlStruct, typename="nav_msgs::msg::dds_::Odometry_"):
 
 
 @dataclass
+class KeyValue(IdlStruct, typename="diagnostic_msgs::msg::dds_::KeyValue_"):
+    key: str = ""
+    value: str = ""
+
+
+@dataclass
+class DiagnosticStatus(IdlStruct, typename="diagnostic_msgs::msg::dds_::DiagnosticStatus_"):
+    level: byte = 0
+    name: str = ""
+    message: str = ""
+    hardware_id: str = ""
+    values: sequence[KeyValue] = field(default_factory=list)
+
+
+@dataclass
+class DiagnosticArray(IdlStruct, typename="diagnostic_msgs::msg::dds_::DiagnosticArray_"):
+    header: Header = field(default_factory=Header)
+    status: sequence[DiagnosticStatus] = field(default_factory=list)
+
+
+@dataclass
+class CompressedImage(IdlStruct, typename="sensor_msgs::msg::dds_::CompressedImage_"):
+    header: Header = field(default_factory=Header)
+    format: str = ""
+    data: sequence[uint8] = field(default_factory=list)
+
+
+@dataclass
 class Clock(IdlStruct, typename="rosgraph_msgs::msg::dds_::Clock_"):
     clock: Time = field(default_factory=Time)
 
@@ -143,11 +173,11 @@ class ParticipantEntitiesInfo(IdlStruct, typename="rmw_dds_common::msg::dds_::Pa
     node_entities_info_seq: sequence[NodeEntitiesInfo]
 
 
-TYPES = {kind.__name__: kind for kind in (String, Image, Twist, Odometry, Clock)}
+TYPES = {kind.__name__: kind for kind in (String, Image, CompressedImage, Twist, Odometry, DiagnosticArray, Clock)}
 RELIABLE, BEST_EFFORT = Policy.Reliability.Reliable(1_000_000_000), Policy.Reliability.BestEffort
 CDR = Policy.DataRepresentation(use_cdrv0_representation=True)
 
-domain = Domain(int(sys.argv[1]), LOOPBACK)
+domain = Domain(int(sys.argv[1]), sys.argv[2] if len(sys.argv) > 2 else LOOPBACK)
 participant = DomainParticipant(int(sys.argv[1]))
 noted: dict[str, list[Any]] = {}
 readers: dict[str, tuple[Any, list[str]]] = {}
@@ -192,10 +222,14 @@ def collect() -> None:
 
 
 def value(message: Any, path: str) -> Any:
-    found = reduce(getattr, path.split("."), message)
+    found = reduce(part_of, path.split("."), message)
     if isinstance(found, Time):
         return found.sec + found.nanosec / 1e9
     return len(found) if isinstance(found, (bytes, list)) else found
+
+
+def part_of(whole: Any, name: str) -> Any:
+    return whole[int(name)] if name.isdigit() else getattr(whole, name)
 
 
 def get(order: dict[str, Any]) -> list[Any]:

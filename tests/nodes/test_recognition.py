@@ -108,6 +108,27 @@ def test_frames_that_come_late_are_told_from_none() -> None:
     )
 
 
+def test_frames_of_a_clock_that_is_far_ahead_are_no_frames() -> None:
+    bench = RecognitionBench()
+    statuses = bench.record(DIAGNOSTICS)
+    bench.show(frames=20, age_s=-2.0)
+    assert set(bench.names) == {"NONE"}
+    assert statuses[-1].status[0].message == (
+        "frames are stamped 2.0 s ahead of our clock: are the clocks of the machines in step?"
+    )
+    bench.run(1.0)
+    assert statuses[-1].status[0].message.startswith("no frame for 1.")
+
+
+def test_a_stale_frame_is_told_though_its_clock_is_ahead() -> None:
+    bench = RecognitionBench()
+    bench.show(frames=6, age_s=-0.2)
+    assert bench.names[-1] == "Forward"
+    bench.signs.clear()
+    bench.show(frames=20, age_s=0.2)
+    assert set(bench.names) == {"NONE"}
+
+
 def test_compressed_images_instead() -> None:
     bench = RecognitionBench(SignsConfig(image_transport="compressed"))
     compressed = bench.transport.advertise("camera", IMAGE_COMPRESSED)

@@ -1,7 +1,9 @@
+import re
+
 import pytest
 
 from handsteer.config import RobotConfig
-from handsteer.messages import CLOCK, CMD_VEL, ODOM, TF, Odometry, twist
+from handsteer.messages import CLOCK, CMD_VEL, DIAGNOSTICS, ODOM, TF, Odometry, twist
 from handsteer.nodes.robot import RobotNode
 from handsteer.robots import open_robot
 from tests.nodes.stepping import Bench
@@ -53,3 +55,17 @@ def test_after_it_was_held_up_it_brakes_and_obeys_nothing_that_waited() -> None:
     assert bench.newest.twist.twist.linear.x == pytest.approx(0.0, abs=0.02)
     bench.drive(1.0)
     assert bench.newest.twist.twist.linear.x == pytest.approx(0.3, abs=0.02)
+
+
+def test_it_says_that_it_stands_for_want_of_commands() -> None:
+    bench = RobotBench()
+    reports = bench.record(DIAGNOSTICS)
+    bench.drive(1.0)
+    assert (reports[-1].status[0].level, reports[-1].status[0].message) == (0, "moves freely")
+    bench.run(1.0)
+    said = reports[-1].status[0]
+    assert said.level == 1
+    assert re.fullmatch(r"standing: no command for 1\.[01] s, and the last one was to drive", said.message)
+    bench.commands.publish(twist(0.0, 0.0))
+    bench.run(1.0)
+    assert reports[-1].status[0].message == "moves freely", "whoever says zero last leaves nothing to be explained"

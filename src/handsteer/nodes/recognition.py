@@ -11,6 +11,7 @@ from handsteer.clock import Clock
 from handsteer.config import SignsConfig
 from handsteer.images import bgr_image, image_message, jpeg_picture
 from handsteer.messages import HAND_SIGN, IMAGE_ANNOTATED, IMAGE_COMPRESSED, IMAGE_RAW, CompressedImage, Image, String
+from handsteer.nodes.frame_age import FrameAge
 from handsteer.nodes.latency import LatencyLog
 from handsteer.nodes.node import OK, WARN, Node
 from handsteer.signs.recognizer import Recognition, Recognizer
@@ -52,7 +53,9 @@ class HandSignRecognitionNode(Node):
         self._last_captured_s: float | None = None
         self._last_frame_s = clock.now()
         self._last_none_s = -math.inf
-        self._age_s = 0.0
+        self._age = FrameAge(config.max_frame_age)
+        self._refused: str | None = None
+        self._refused_s = -math.inf
         self._recognition: Recognition | None = None
         self._sign = self.publisher(HAND_SIGN)
         self._annotated = self.publisher(IMAGE_ANNOTATED)
@@ -66,8 +69,9 @@ class HandSignRecognitionNode(Node):
     def _on_frame(self, received: Received[M], picture_of: Callable[[M], NDArray[np.uint8]]) -> None:
         began_s = self.clock.now()
         captured_s = received.captured_s if received.captured_s is not None else began_s
-        self._age_s = began_s - captured_s
-        if self._age_s > self._config.max_frame_age:
+        self._refused = self._age.why_refused(began_s, captured_s)
+        if self._refused is not None:
+            self._refused_s = began_s
             return  # a stale frame is no frame: the watch publishes NONE
         try:
             image = picture_of(received.message)
@@ -116,9 +120,12 @@ class HandSignRecognitionNode(Node):
             handedness=seen.hand.handedness if seen.hand else "",
             processing_ms=f"{self.processing.percentile_ms(50):.1f}",
             processing_p99_ms=f"{self.processing.percentile_ms(99):.1f}",
+            frame_age_ms=f"{self._age.age_s * 1000:.0f}",
+            clock_ahead_ms=f"{self._age.ahead_s * 1000:.0f}",
         )
 
     def _why_no_frame(self) -> str:
-        if self._age_s > self._config.max_frame_age:
-            return f"frames come {self._age_s:.1f} s after their stamp: are the clocks of the machines in step?"
-        return f"no frame for {self.clock.now() - self._last_frame_s:.1f} s"
+        now = self.clock.now()
+        if self._refused is not None and now - self._refused_s <= self._config.max_frame_age:
+            return self._refused
+        return f"no frame for {now - max(self._last_frame_s, self._refused_s):.1f} s"

@@ -34,6 +34,7 @@ from handsteer.messages import (
 from handsteer.nodes.interruption import Interruption
 from handsteer.nodes.node import OK, WARN, Node
 from handsteer.nodes.world_markers import world_markers
+from handsteer.robots.diff_drive import Velocity
 from handsteer.robots.protocol import Pose2D, Robot, RobotState
 from handsteer.transports.protocol import Received, Transport
 
@@ -67,6 +68,8 @@ class RobotNode(Node):
         self._config = config
         self._last_step_s = clock.now()
         self._interruption = Interruption(config.cmd_vel_timeout, clock.now())
+        self._command = Velocity()
+        self._commanded_s = clock.now()
         self.state = robot.step(0.0)
         self.path_length_m = 0.0
         self._odom = self.publisher(ODOM)
@@ -89,11 +92,15 @@ class RobotNode(Node):
         now = self.clock.now()
         self._notice_interruption(now)
         if not self._interruption.distrusts(now):
-            self._robot.command(received.message.linear.x, received.message.angular.z)
+            self._tell(Velocity(received.message.linear.x, received.message.angular.z))
 
     def _notice_interruption(self, now: float) -> None:
         if self._interruption.note(now):
-            self._robot.command(0.0, 0.0)
+            self._tell(Velocity())
+
+    def _tell(self, velocity: Velocity) -> None:
+        self._command, self._commanded_s = velocity, self.clock.now()
+        self._robot.command(velocity.linear_mps, velocity.angular_radps)
 
     def _step(self) -> None:
         now = self.clock.now()
@@ -118,14 +125,22 @@ class RobotNode(Node):
 
     def _report(self) -> None:
         state = self.state
-        message = f"touches {', '.join(state.contacts)}" if state.contacts else "moves freely"
+        level, message = self._condition()
         self.diagnose(
-            WARN if state.contacts else OK,
+            level,
             message,
             collisions=state.collisions,
             path_length_m=f"{self.path_length_m:.2f}",
             truth=f"{state.truth.x:.3f} {state.truth.y:.3f} {state.truth.yaw:.3f}",
         )
+
+    def _condition(self) -> tuple[int, str]:
+        silence_s = self.clock.now() - self._commanded_s
+        if self.state.contacts:
+            return WARN, f"touches {', '.join(self.state.contacts)}"
+        if silence_s > self._config.cmd_vel_timeout and self._command != Velocity():
+            return WARN, f"standing: no command for {silence_s:.1f} s, and the last one was to drive"
+        return OK, "moves freely"
 
 
 def _odometry(header: Header, base: str, state: RobotState) -> Odometry:

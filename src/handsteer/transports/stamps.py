@@ -11,9 +11,9 @@ _NO_STAMP = Time(sec=0, nanosec=0)
 def capture_time(message: Any, clock: Clock) -> float | None:
     """Return when ``message`` was stamped, in seconds of ``clock``; None when it has no header or no stamp.
 
-    A stamp of another machine's that is ahead of ours counts as now.
+    It lies in the future where another machine's clock is ahead of ours.
     """
     header = getattr(message, "header", None)
     if header is None or header.stamp == _NO_STAMP:
         return None
-    return min(clock.time_of(header.stamp), clock.now())
+    return clock.time_of(header.stamp)

@@ -39,7 +39,7 @@ def test_this_machine_only(environment: dict[str, str]) -> None:
 
 @pytest.mark.parametrize("environment", [{"ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"}, {"ROS_LOCALHOST_ONLY": "0"}])
 def test_the_subnet(environment: dict[str, str]) -> None:
-    assert settings(**environment) == {"interface": None, "multicast": "true", "index": None, "peers": []}
+    assert settings(**environment) == {"interface": None, "multicast": "true", "index": "auto", "peers": []}
 
 
 def test_static_peers() -> None:
@@ -51,6 +51,16 @@ def test_static_peers() -> None:
     }
     assert settings(ROS_STATIC_PEERS="10.0.0.1", ROS_AUTOMATIC_DISCOVERY_RANGE="OFF")["peers"] == []
     assert settings(ROS_STATIC_PEERS="10.0.0.1", ROS_AUTOMATIC_DISCOVERY_RANGE="SUBNET")["peers"] == ["10.0.0.1"]
+
+
+@pytest.mark.parametrize(
+    ("environment", "interval"),
+    [({}, None), ({"ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"}, "2 s"), ({"ROS_STATIC_PEERS": "10.0.0.1"}, "2 s")],
+)
+def test_over_a_network_we_say_often_that_we_are_there(environment: dict[str, str], interval: str | None) -> None:
+    config = network(environment).config
+    assert config is not None
+    assert ET.fromstring(config).findtext(".//SPDPInterval") == interval
 
 
 def test_the_users_configuration_wins() -> None:

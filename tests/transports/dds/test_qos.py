@@ -4,7 +4,8 @@ pytest.importorskip("cyclonedds")
 
 from cyclonedds.core import Policy, Qos
 
-from handsteer.messages import CMD_VEL, HAND_SIGN, IMAGE_RAW, ODOM, ROBOT_DESCRIPTION, Topic
+from handsteer.config import RobotConfig
+from handsteer.messages import CMD_VEL, HAND_SIGN, IMAGE_RAW, ODOM, ROBOT_DESCRIPTION, STEERING_CMD_VEL, Topic
 from handsteer.transports.dds.qos import describe, misfits, reader_qos, writer_qos
 
 RELIABLE = Policy.Reliability.Reliable(0)
@@ -25,6 +26,16 @@ def test_each_kind_of_topic_has_its_profile(topic: Topic[object], offered: str, 
     assert describe(writer_qos(topic)) == offered
     assert describe(reader_qos(topic)) == requested
     assert misfits(writer_qos(topic), reader_qos(topic)) == []
+
+
+@pytest.mark.parametrize("topic", [CMD_VEL, HAND_SIGN, STEERING_CMD_VEL], ids=lambda topic: topic.name)
+def test_commands_live_for_less_than_the_robot_waits_for_the_next_one(topic: Topic[object]) -> None:
+    lifespan_s = writer_qos(topic)[Policy.Lifespan].lifespan / 1e9
+    assert 0.3 < lifespan_s < RobotConfig().cmd_vel_timeout
+
+
+def test_what_is_no_command_lives_on() -> None:
+    assert Policy.Lifespan not in writer_qos(ROBOT_DESCRIPTION)
 
 
 @pytest.mark.parametrize(

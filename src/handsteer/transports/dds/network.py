@@ -9,7 +9,11 @@ from handsteer.errors import TransportError
 _RANGES = ("LOCALHOST", "SUBNET", "OFF", "SYSTEM_DEFAULT")
 _LARGEST_DOMAIN = 232  # those above have no UDP ports
 _ADDRESS = re.compile(r"[A-Za-z0-9_.:%\[\]-]+")
-_LARGEST_INDEX = 32
+# How soon others find us again after a cut that was so long that they gave us up: Cyclone's default is half a minute.
+_ANNOUNCE_S = 2
+# Every process of a machine has the two UDP ports of its index: known to firewalls, and to others by address alone.
+# Where others are looked for by address, all their ports are tried, so that there are fewer.
+_LARGEST_INDEX, _LARGEST_INDEX_BY_MULTICAST = 32, 119
 
 
 @dataclass(frozen=True)
@@ -82,12 +86,12 @@ def _config(reach: str, peers: list[str]) -> str:
     multicast = "true" if reach == "SUBNET" else "false"
     everyone = [*(["127.0.0.1"] if reach == "LOCALHOST" else []), *peers]
     found = "".join(f'<Peer address="{peer}"/>' for peer in everyone)
-    index = (
-        f"<ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>{_LARGEST_INDEX}</MaxAutoParticipantIndex>"
-    )
+    largest = _LARGEST_INDEX_BY_MULTICAST if reach == "SUBNET" and not peers else _LARGEST_INDEX
+    index = f"<ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>{largest}</MaxAutoParticipantIndex>"
+    announce = f"<SPDPInterval>{_ANNOUNCE_S} s</SPDPInterval>"
     return (
         "<CycloneDDS><Domain>"
         f"<General>{interface if alone else ''}<AllowMulticast>{multicast}</AllowMulticast></General>"
-        f"<Discovery>{index if multicast == 'false' or peers else ''}<Peers>{found}</Peers></Discovery>"
+        f"<Discovery>{index}{'' if alone else announce}<Peers>{found}</Peers></Discovery>"
         "</Domain></CycloneDDS>"
     )

@@ -2,7 +2,8 @@
 
 Commands, signs and what follows from them are reliable. Images and ``/clock`` are best effort, as ROS 2's
 ``sensor_data`` has it: a late one is of no use. Of a robot's state we offer reliable and request best effort, which
-fits with any robot. A writer never waits for a slow reader.
+fits with any robot. A writer never waits for a slow reader. Commands and signs have a lifespan, so that a link that
+comes back does not bring old ones.
 """
 
 from typing import Any
@@ -25,11 +26,14 @@ _LIVELINESS = (
     Policy.Liveliness.ManualByTopic,
 )
 _NEVER_NS = 2**63 - 1
+_NS_PER_S = 1_000_000_000
 
 
 def writer_qos(topic: Topic[Any]) -> Qos:
     """Return what a publisher of ``topic`` offers."""
-    return _qos(topic, reliable=topic.type not in _SENSOR_DATA)
+    offered = _qos(topic, reliable=topic.type not in _SENSOR_DATA)
+    lifespan_s = topic.lifespan_s
+    return offered if lifespan_s is None else Qos(Policy.Lifespan(round(lifespan_s * _NS_PER_S)), base=offered)
 
 
 def reader_qos(topic: Topic[Any]) -> Qos:

@@ -15,6 +15,7 @@ from handsteer.errors import TransportError
 from handsteer.messages import Topic, type_name
 from handsteer.transports.channels import Deliver, Fanout, FanoutSubscription, TopicTypes, check_type
 from handsteer.transports.dds.participant import Participant
+from handsteer.transports.lateness import Lateness
 from handsteer.transports.protocol import Received
 from handsteer.transports.ros2.encoding import decode, encode
 from handsteer.transports.stamps import capture_time
@@ -146,6 +147,8 @@ class _Reception(Generic[M]):
         self._clock = clock
         self._send = send
         self._is_broken = False
+        self._lateness = None if topic.lifespan_s is None else Lateness(topic.lifespan_s)
+        self._was_late = False
         self._reader: Any = participant.reader(topic)
         participant.serve(self._reader, self._serve)
 
@@ -160,8 +163,23 @@ class _Reception(Generic[M]):
             return
         for sample in reader.take(self._topic.depth):
             # A writer that leaves sends one without a message.
-            if not isinstance(sample, InvalidSample):
+            if not isinstance(sample, InvalidSample) and not self._is_late(sample.sample_info):
                 self._pass_on(sample.raw)
+
+    def _is_late(self, info: Any) -> bool:
+        if self._lateness is None or info.source_timestamp <= 0:  # RTPS lets a sender leave its time out
+            return False
+        sender = info.publication_handle.to_bytes(8, "big")
+        late = self._lateness.is_late(sender, info.source_timestamp / 1e9, time.monotonic())
+        if late and not self._was_late:
+            log.warning(
+                "%s: messages come over %g s late and are not obeyed: has the link stood still, or has the clock of "
+                "their sender been set back?",
+                self._topic.name,
+                self._topic.lifespan_s,
+            )
+        self._was_late = late
+        return late
 
     def _pass_on(self, raw: bytes) -> None:
         try:

@@ -17,9 +17,9 @@ idl: Any = cyclonedds.idl.types
 
 _BASES: dict[str, Any] = {
     "bool": bool,
-    "byte": idl.uint8,
+    "byte": idl.byte,
     "char": idl.uint8,
-    "octet": idl.uint8,
+    "octet": idl.byte,
     "float32": idl.float32,
     "float64": idl.float64,
     **{f"{sign}int{bits}": getattr(idl, f"{sign}int{bits}") for sign in ("", "u") for bits in (8, 16, 32, 64)},
