@@ -13,6 +13,7 @@ from cyclonedds.domain import DomainParticipant
 
 from handsteer.transports.dds.discovery import DISCOVERY_TOPIC, RosGraph
 from handsteer.transports.dds.qos import describe, misfits
+from handsteer.transports.ros2.encoding import ros_type_name
 
 log = logging.getLogger(__name__)
 
@@ -130,7 +131,7 @@ class Matching:
 def reasons(ours: Endpoint, theirs: Endpoint) -> list[str]:
     """Return why a publisher and a subscriber of one topic are not connected, in words; empty when they are."""
     if ours.type != theirs.type:
-        return [f"ours has the type {_ros_type(ours.type)}, theirs {_ros_type(theirs.type)}"]
+        return [f"ours has the type {ros_type_name(ours.type)}, theirs {ros_type_name(theirs.type)}"]
     return misfits(ours.qos, theirs.qos) if ours.publishes else misfits(theirs.qos, ours.qos)
 
 
@@ -141,7 +142,3 @@ def explain(ours: Endpoint, theirs: Endpoint, node: str | None) -> str:
         f"{ours.topic.removeprefix('rt')}: nothing passes between our {ours.kind} and the {theirs.kind} of {who}: "
         f"{'; '.join(reasons(ours, theirs))} (ours: {describe(ours.qos)}; theirs: {describe(theirs.qos)})"
     )
-
-
-def _ros_type(name: str) -> str:
-    return name.replace("::dds_::", "::").replace("::", "/").removesuffix("_")

@@ -5,9 +5,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from handsteer.errors import TransportError
+from handsteer.transports.ros2.domain import domain_id
 
 _RANGES = ("LOCALHOST", "SUBNET", "OFF", "SYSTEM_DEFAULT")
-_LARGEST_DOMAIN = 232  # those above have no UDP ports
 _ADDRESS = re.compile(r"[A-Za-z0-9_.:%\[\]-]+")
 _LARGEST_INDEX = 32
 
@@ -36,7 +36,7 @@ def network(environment: Mapping[str, str]) -> Network:
     Raises:
         TransportError: A variable has a value that is not allowed.
     """
-    domain = _domain(environment.get("ROS_DOMAIN_ID", ""))
+    domain = domain_id(environment)
     distribution = "humble" if environment.get("ROS_DISTRO") == "humble" else "jazzy"
     reach = _range(environment)
     peers = _peers(environment.get("ROS_STATIC_PEERS", ""))
@@ -45,14 +45,6 @@ def network(environment: Mapping[str, str]) -> Network:
     if environment.get("ROS_LOCALHOST_ONLY") == "1" or reach == "OFF":
         peers = []
     return Network(domain, _config(reach, peers), distribution)
-
-
-def _domain(text: str) -> int:
-    if not text:
-        return 0
-    if not (text.isascii() and text.isdigit() and int(text) <= _LARGEST_DOMAIN):
-        raise TransportError(f"ROS_DOMAIN_ID is {text!r}: it should be a whole number from 0 to {_LARGEST_DOMAIN}")
-    return int(text)
 
 
 def _range(environment: Mapping[str, str]) -> str:

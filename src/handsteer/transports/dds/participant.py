@@ -17,7 +17,8 @@ from handsteer.transports.dds.dispatcher import Dispatcher
 from handsteer.transports.dds.matching import Endpoint, Matching
 from handsteer.transports.dds.network import Network
 from handsteer.transports.dds.qos import reader_qos, writer_qos
-from handsteer.transports.dds.types import dds_type, dds_type_name
+from handsteer.transports.dds.types import dds_type
+from handsteer.transports.ros2.encoding import dds_type_name
 from handsteer.transports.ros2.names import NodeName
 
 _USER_DATA = b"enclave=/;"

@@ -1,19 +1,16 @@
-"""Quality of service: what we offer and request for each kind of topic, and why two ends do not fit.
+"""Quality of service in DDS: our profiles in its terms, and why two ends do not fit.
 
-Commands, signs and what follows from them are reliable. Images and ``/clock`` are best effort, as ROS 2's
-``sensor_data`` has it: a late one is of no use. Of a robot's state we offer reliable and request best effort, which
-fits with any robot. A writer never waits for a slow reader.
+A writer never waits for a slow reader.
 """
 
 from typing import Any
 
 from cyclonedds.core import Policy, Qos
 
-from handsteer.messages import ClockMessage, CompressedImage, Image, JointState, Odometry, Topic, type_name
+from handsteer.messages import Topic, type_name
 from handsteer.transports.ros2.encoding import type_hash
+from handsteer.transports.ros2.profiles import Profile, offered, requested
 
-_SENSOR_DATA = (Image, CompressedImage, ClockMessage)
-_STATE = (Odometry, JointState)
 _RELIABLE = Policy.Reliability.Reliable(0)
 _BEST_EFFORT = Policy.Reliability.BestEffort
 _VOLATILE, _TRANSIENT_LOCAL = Policy.Durability.Volatile, Policy.Durability.TransientLocal
@@ -29,12 +26,12 @@ _NEVER_NS = 2**63 - 1
 
 def writer_qos(topic: Topic[Any]) -> Qos:
     """Return what a publisher of ``topic`` offers."""
-    return _qos(topic, reliable=topic.type not in _SENSOR_DATA)
+    return _qos(topic, offered(topic))
 
 
 def reader_qos(topic: Topic[Any]) -> Qos:
     """Return what a subscriber of ``topic`` requests."""
-    return _qos(topic, reliable=topic.type not in (*_SENSOR_DATA, *_STATE))
+    return _qos(topic, requested(topic))
 
 
 def discovery_qos(name: str, depth: int) -> Qos:
@@ -81,11 +78,11 @@ def misfits(offered: Qos, requested: Qos) -> list[str]:
 _CDR = Policy.DataRepresentation(use_cdrv0_representation=True)
 
 
-def _qos(topic: Topic[Any], *, reliable: bool) -> Qos:
+def _qos(topic: Topic[Any], profile: Profile) -> Qos:
     return Qos(
-        _RELIABLE if reliable else _BEST_EFFORT,
-        _TRANSIENT_LOCAL if topic.latched else _VOLATILE,
-        Policy.History.KeepLast(topic.depth),
+        _RELIABLE if profile.reliable else _BEST_EFFORT,
+        _TRANSIENT_LOCAL if profile.latched else _VOLATILE,
+        Policy.History.KeepLast(profile.depth),
         _CDR,
         _user_data(type_name(topic.type)),
     )

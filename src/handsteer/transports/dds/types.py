@@ -11,7 +11,7 @@ import cyclonedds.idl.types
 from cyclonedds.idl import make_idl_struct
 from rosbags.interfaces import Nodetype
 
-from handsteer.transports.ros2.encoding import types
+from handsteer.transports.ros2.encoding import dds_type_name, types
 
 idl: Any = cyclonedds.idl.types
 
@@ -24,12 +24,6 @@ _BASES: dict[str, Any] = {
     "float64": idl.float64,
     **{f"{sign}int{bits}": getattr(idl, f"{sign}int{bits}") for sign in ("", "u") for bits in (8, 16, 32, 64)},
 }
-
-
-def dds_type_name(name: str) -> str:
-    """Return ROS 2's name in DDS for a type: ``geometry_msgs::msg::dds_::Twist_`` for ``geometry_msgs/msg/Twist``."""
-    package, kind, message = name.split("/")
-    return f"{package}::{kind}::dds_::{message}_"
 
 
 @functools.cache

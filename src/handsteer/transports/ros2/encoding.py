@@ -34,3 +34,14 @@ def decode(raw: bytes, name: str) -> Any:
 def type_hash(name: str) -> str:
     """Return the hash of the type ``name``, as ``RIHS01_df66…`` (ROS REP 2016)."""
     return _KNOWN_HASHES.get(name) or types().hash_rihs01(name)
+
+
+def dds_type_name(name: str) -> str:
+    """Return ROS 2's name in DDS for a type: ``geometry_msgs::msg::dds_::Twist_`` for ``geometry_msgs/msg/Twist``."""
+    package, kind, message = name.split("/")
+    return f"{package}::{kind}::dds_::{message}_"
+
+
+def ros_type_name(dds_name: str) -> str:
+    """Return the type's name in ROS 2, ``geometry_msgs/msg/Twist``, for its name in DDS."""
+    return dds_name.replace("::dds_::", "::").replace("::", "/").removesuffix("_")

@@ -1,0 +1,82 @@
+"""This process as a node of a ROS 2 graph, whatever carries its messages: name, parameters and time."""
+
+import logging
+import threading
+from collections.abc import Callable, Sequence
+from typing import Any, Protocol
+
+from handsteer.clock import Clock, SimulatedClock, WallClock, to_seconds
+from handsteer.errors import TransportError
+from handsteer.messages import CLOCK
+from handsteer.transports.protocol import Transport
+from handsteer.transports.ros2.arguments import parse_arguments
+from handsteer.transports.ros2.names import NodeName, identify
+
+_CLOCK_SILENCE_S = 2.0
+_DELIVER_S = 0.2
+_LEVELS = {"debug": 10, "info": 20, "warn": 30, "error": 40, "fatal": 50}
+
+log = logging.getLogger(__name__)
+
+
+class Ros2Transport(Transport, Protocol):
+    """A transport that can be asked to deliver what is under way."""
+
+    def flush(self, timeout_s: float) -> None:
+        """Wait until what was published is sent, for at most ``timeout_s`` seconds."""
+        ...
+
+
+class Ros2Session:
+    """A :class:`~handsteer.transports.protocol.Session` of ROS 2.
+
+    Args:
+        node: Name of the node, unless ``arguments`` rename it.
+        arguments: ROS 2's own: ``--ros-args -r topic:=other -r __node:=name -r __ns:=/r1 -p parameter:=value
+            --params-file file.yaml``.
+        connect: Joins the graph as the node of this name, on the graph's clock.
+
+    Raises:
+        TransportError: The graph cannot be joined, or an argument or one of ROS 2's environment variables is wrong.
+    """
+
+    def __init__(
+        self, node: str, arguments: Sequence[str], connect: Callable[[NodeName, Clock], Ros2Transport]
+    ) -> None:
+        said = parse_arguments(arguments)
+        name = identify(node, said.remaps)
+        self.name = name.full
+        self.parameters: dict[str, Any] = said.parameters(self.name)
+        simulated = self.parameters.pop("use_sim_time", False)
+        if not isinstance(simulated, bool):
+            raise TransportError(f"parameter use_sim_time is {simulated!r}: it should be true or false")
+        if said.log_level:
+            logging.getLogger("handsteer").setLevel(_LEVELS[said.log_level])
+        self.clock: Clock = SimulatedClock() if simulated else WallClock()
+        self.transport: Ros2Transport = connect(name, self.clock)
+        if isinstance(self.clock, SimulatedClock):
+            self._follow(self.clock)
+        self._was_silent = False
+        self._left = threading.Event()
+
+    def wait(self, timeout_s: float) -> bool:
+        """Wait for at most ``timeout_s`` seconds; return whether this session has been closed.
+
+        ROS 2 itself asks no node to end.
+        """
+        silent = isinstance(self.clock, SimulatedClock) and self.clock.silence_s > _CLOCK_SILENCE_S
+        if silent and not self._was_silent:
+            log.warning("use_sim_time is set, but /clock stands still: frames count as old, the robot stands")
+        self._was_silent = silent
+        return self._left.wait(timeout_s)
+
+    def close(self) -> None:
+        """Deliver what was published, then leave the graph; may be called twice."""
+        if self._left.is_set():
+            return
+        self._left.set()
+        self.transport.flush(_DELIVER_S)
+        self.transport.close()
+
+    def _follow(self, clock: SimulatedClock) -> None:
+        self.transport.subscribe("clock", CLOCK, lambda received: clock.tell(to_seconds(received.message.clock)))
