@@ -80,6 +80,7 @@ class Topic(Generic[M]):
         is_global: All namespaces share it, as ROS has it for transforms, time and diagnostics; others move with the
             namespace of their node.
         depth: How many messages may wait for a subscriber that is busy; older ones are dropped (ROS 2: keep last).
+        lifespan_s: A message that has not arrived after so long is not to arrive at all; None for no limit.
         beneath: The topic whose name it extends; it is renamed with it, as the topics of ROS's image_transport are.
     """
 
@@ -88,6 +89,7 @@ class Topic(Generic[M]):
     latched: bool = False
     is_global: bool = False
     depth: int = 1
+    lifespan_s: float | None = None
     beneath: "Topic[Any] | None" = None
 
     @property
@@ -96,13 +98,16 @@ class Topic(Generic[M]):
         return self.name if self.is_global else self.name.removeprefix("/")
 
 
+# Shorter than the robot's own patience: what is older has been answered by a stop already.
+_COMMAND_LIFESPAN_S = 0.35
+
 IMAGE_RAW = Topic("/image_raw", Image)
 IMAGE_COMPRESSED = Topic("/image_raw/compressed", CompressedImage, beneath=IMAGE_RAW)
 # Each sign makes the robot a step faster, so none may be lost when several come at once.
-HAND_SIGN = Topic("/gesture/hand_sign", String, depth=10)
+HAND_SIGN = Topic("/gesture/hand_sign", String, depth=10, lifespan_s=_COMMAND_LIFESPAN_S)
 IMAGE_ANNOTATED = Topic("/gesture/image_annotated", Image)
-CMD_VEL = Topic("/robot_diff_drive_controller/cmd_vel", Twist, depth=10)
-STEERING_CMD_VEL = Topic("/steering/cmd_vel", Twist)
+CMD_VEL = Topic("/robot_diff_drive_controller/cmd_vel", Twist, depth=10, lifespan_s=_COMMAND_LIFESPAN_S)
+STEERING_CMD_VEL = Topic("/steering/cmd_vel", Twist, lifespan_s=_COMMAND_LIFESPAN_S)
 ODOM = Topic("/robot_diff_drive_controller/odom", Odometry)
 TF = Topic("/tf", TFMessage, is_global=True, depth=10)
 JOINT_STATES = Topic("/joint_states", JointState)

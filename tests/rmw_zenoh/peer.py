@@ -182,16 +182,16 @@ def listeners(order: dict[str, Any]) -> int:
     return int(matching[order["topic"]].matching_status.matching)
 
 
-def send(topic: str, raw: bytes) -> None:
+def send(topic: str, raw: bytes, age_s: float = 0.0) -> None:
     numbers[topic] += 1
-    attachment = struct.pack("<qqB", numbers[topic], time.time_ns(), len(GID)) + GID
+    attachment = struct.pack("<qqB", numbers[topic], time.time_ns() - round(age_s * 1e9), len(GID)) + GID
     publishers[topic].put(raw, attachment=attachment)
 
 
 def publish(order: dict[str, Any]) -> bool:
     raw = cdr(kinds[order["topic"]], order["values"])
     for _ in range(order.get("count", 1)):
-        send(order["topic"], raw)
+        send(order["topic"], raw, order.get("age_s", 0.0))
         time.sleep(order.get("period_s", 0.0))
     return True
 

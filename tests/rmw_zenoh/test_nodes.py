@@ -66,6 +66,17 @@ def test_what_is_no_text_does_not_end_the_node(network: ZenohGraph) -> None:
     assert "Traceback" not in driver.process.text
 
 
+def test_signs_that_were_held_up_on_their_way_are_not_obeyed(network: ZenohGraph) -> None:
+    driver = DdsDriver(network, "--control.sign-timeout", "5")
+    driver.show("Forward", count=2)
+    driver.expect((0.01, 0.0), (0.02, 0.0))
+    old = {"topic": driver.signs, "values": {"data": "Forward"}, "age_s": 0.6}
+    network.peer.ask("publish", count=5, **old)
+    driver.show("Turn Left")
+    driver.expect((0.01, 0.0), (0.02, 0.0), (0.02, 0.1))
+    assert "messages come over 0.35 s late and are not obeyed" in driver.process.text
+
+
 def test_ros2_sees_the_node_by_its_names_types_hashes_and_profiles(network: ZenohGraph) -> None:
     words = ("-r", "__ns:=/far", "-r", "__node:=driver", "-r", f"{CMD_VEL[1:]}:=/base/cmd_vel")
     control = network.node("control", name="/far/driver", ros=words)
@@ -195,6 +206,19 @@ class TestRouter:
             assert {twist for at_s, twist in twists(graph.peer) if at_s > began_s} == {(0.3, 0.0)}
             graph.start_router()
             eventually(lambda: "the Zenoh router is there" in running.nodes["control"].text)
+
+    def test_what_waited_in_a_router_that_stood_still_is_not_obeyed(self, tmp_path: Path) -> None:
+        with zenoh_graph(tmp_path, mode="client") as graph:
+            driver = DdsDriver(graph)
+            driver.show("Forward", count=3)
+            driver.expect((0.01, 0.0), (0.02, 0.0), (0.03, 0.0), (0.0, 0.0))
+            graph.router.freeze()
+            driver.show("Forward", count=30, period_s=0.033)
+            graph.router.signal(signal.SIGCONT)
+            eventually(lambda: "late and are not obeyed" in driver.process.text, 10.0)
+            eventually(lambda: driver.twists[-1] == (0.0, 0.0), 10.0, what="the control to say zero")
+            # Only those that were shown last, within the lifespan of signs, count.
+            assert max(linear for linear, _ in driver.twists[4:]) <= 0.15
 
     def test_where_all_goes_by_it_the_robot_stops_and_goes_on_with_fresh_signs(self, tmp_path: Path) -> None:
         with zenoh_graph(tmp_path, mode="client") as graph:

@@ -18,7 +18,8 @@ from handsteer.transports.protocol import Received
 from handsteer.transports.ros2.encoding import decode, encode
 from handsteer.transports.ros2.profiles import Profile, offered, requested
 from handsteer.transports.stamps import capture_time
-from handsteer.transports.zenoh.keys import attachment, gid
+from handsteer.transports.zenoh.keys import attachment, gid, read_attachment
+from handsteer.transports.zenoh.lateness import Lateness
 from handsteer.transports.zenoh.member import Member
 
 M = TypeVar("M")
@@ -183,6 +184,8 @@ class _Reception(Generic[M]):
         self._send = send
         self._is_closed = False
         self._is_broken = False
+        self._lateness = None if topic.lifespan_s is None else Lateness(topic.lifespan_s)
+        self._was_late = False
         profile = requested(topic)
         self._subscriber = _subscriber(member, topic, profile)
         self._token, _ = member.introduce("subscriber", topic, profile)
@@ -202,8 +205,26 @@ class _Reception(Generic[M]):
                 sample = ring.recv()
             except zenoh.ZError:  # it has been closed
                 return
-            if sample.kind == zenoh.SampleKind.PUT:
+            if sample.kind == zenoh.SampleKind.PUT and not self._is_late(sample.attachment):
                 self._pass_on(sample.payload.to_bytes())
+
+    def _is_late(self, attached: zenoh.ZBytes | None) -> bool:
+        if self._lateness is None or attached is None:
+            return False
+        try:
+            _, time_ns, sender = read_attachment(attached.to_bytes())
+        except ValueError:
+            return False  # of a sender that is not ROS 2, or of an older one: when it was sent is not known
+        late = self._lateness.is_late(sender, time_ns / 1e9, time.monotonic())
+        if late and not self._was_late:
+            log.warning(
+                "%s: messages come over %g s late and are not obeyed: has the link stood still, or has the clock of "
+                "their sender been set back?",
+                self._topic.name,
+                self._topic.lifespan_s,
+            )
+        self._was_late = late
+        return late
 
     def _pass_on(self, raw: bytes) -> None:
         try:
