@@ -214,11 +214,11 @@ class TestRouter:
             driver.expect((0.01, 0.0), (0.02, 0.0), (0.03, 0.0), (0.0, 0.0))
             graph.router.freeze()
             driver.show("Forward", count=30, period_s=0.033)
+            time.sleep(0.5)  # longer than signs live
             graph.router.signal(signal.SIGCONT)
             eventually(lambda: "late and are not obeyed" in driver.process.text, 10.0)
-            eventually(lambda: driver.twists[-1] == (0.0, 0.0), 10.0, what="the control to say zero")
-            # Only those that were shown last, within the lifespan of signs, count.
-            assert max(linear for linear, _ in driver.twists[4:]) <= 0.15
+            driver.show("Turn Left")
+            driver.expect((0.01, 0.0), (0.02, 0.0), (0.03, 0.0), (0.0, 0.0), (0.0, 0.1))
 
     def test_where_all_goes_by_it_the_robot_stops_and_goes_on_with_fresh_signs(self, tmp_path: Path) -> None:
         with zenoh_graph(tmp_path, mode="client") as graph:
