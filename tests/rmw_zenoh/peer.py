@@ -4,8 +4,9 @@ Key expressions, liveliness tokens, attachments and CDR are written by hand here
 the endpoint of a router and a domain, reads orders as lines of JSON from its input and answers each by one line of
 JSON. ``record`` (topic, type, fields, latched) starts to note messages, ``get`` (topic) returns what was noted as
 ``[time_s, [values]]``, ``attachments`` (topic) what came with them. ``advertise`` (topic, type, latched) comes before
-``listeners`` (topic), ``publish`` (topic, values, count, period_s) and ``publish_raw`` (topic, hex). ``introduce``
-(name, topic, type, kind) tells a liveliness token, ``graph`` returns what tokens tell of others.
+``listeners`` (topic), ``publish`` (topic, values, count, period_s, age_s) and ``publish_raw`` (topic, hex). ``call``
+(node, service, hex) asks a service. ``introduce`` (name, topic, type, kind) tells a liveliness token, ``graph`` returns
+what tokens tell of others.
 """
 
 import json
@@ -27,6 +28,16 @@ HASHES = {
     "sensor_msgs::msg::dds_::Image_": "RIHS01_d31d41a9a4c4bc8eae9be757b0beed306564f7526c88ea6a4588fb9582527d47",
     "nav_msgs::msg::dds_::Odometry_": "RIHS01_3cc97dc7fb7502f8714462c526d369e35b603cfc34d946e3f2eda2766dfec6e0",
     "rosgraph_msgs::msg::dds_::Clock_": "RIHS01_692f7a66e93a3c83e71765d033b60349ba68023a8c689a79e48078bcb5c58564",
+}
+SERVICES = {
+    "get_parameters": (
+        "rcl_interfaces::srv::dds_::GetParameters_",
+        "RIHS01_bf9803d5c74cf989a5de3e0c2e99444599a627c7ff75f97b8c05b01003675cbc",
+    ),
+    "set_parameters": (
+        "rcl_interfaces::srv::dds_::SetParameters_",
+        "RIHS01_56eed9a67e169f9cb6c1f987bc88f868c14a8fc9f743a263bc734c154015d7e0",
+    ),
 }
 TYPES = {name.split("::")[-1].rstrip("_"): name for name in HASHES}
 HEADER = b"\x00\x01\x00\x00"
@@ -202,6 +213,21 @@ def publish_raw(order: dict[str, Any]) -> bool:
     return True
 
 
+def call(order: dict[str, Any]) -> list[Any]:
+    """Ask a service of a node; return payload and attachment of each reply."""
+    node, service = order["node"], order["service"]
+    found = session.get(
+        f"{DOMAIN}{node}/{service}/{'/'.join(SERVICES[service])}",
+        payload=bytes.fromhex(order["hex"]),
+        attachment=struct.pack("<qqB", order.get("number", 1), time.time_ns(), len(GID)) + GID,
+        target=zenoh.QueryTarget.ALL_COMPLETE,
+        consolidation=zenoh.ConsolidationMode.NONE,
+        timeout=10.0,
+    )
+    replies = [reply.ok for reply in found]
+    return [[reply.payload.to_bytes().hex(), reply.attachment.to_bytes().hex()] for reply in replies]
+
+
 def run_clock(order: dict[str, Any]) -> bool:
     """Tell the time on /clock, in real time, from ``from_s`` on, for ``seconds``."""
 
@@ -255,6 +281,7 @@ ORDERS = {
         listeners,
         publish,
         publish_raw,
+        call,
         run_clock,
         introduce,
         graph,

@@ -109,6 +109,38 @@ def test_every_message_comes_with_rmw_zenohs_attachment(network: ZenohGraph) -> 
     assert len({one[17:] for one in raw}) == 1
 
 
+def test_ros2_param_gets_and_sets_the_parameters_of_a_running_node(network: ZenohGraph) -> None:
+    driver = DdsDriver(network)
+    node = driver.cmd_vel.removesuffix(CMD_VEL) + f"/{NODE}"
+    header = bytes.fromhex("00010000")
+    name = struct.pack("<I", 12) + b"linear_step\0"
+    eventually(lambda: len(network.nodes()[node]["SS"]) == 6)
+    assert network.nodes()[node]["SS"][f"{node}/get_parameters"][2] == "::,1000:,:,:,,"
+
+    def linear_step() -> float:
+        request = (header + struct.pack("<I", 1) + name).hex()
+        [[reply, attachment]] = network.peer.ask("call", node=node, service="get_parameters", hex=request, number=5)
+        assert bytes.fromhex(attachment)[:8] == struct.pack("<q", 5)  # the request's own number and sender
+        assert bytes.fromhex(attachment)[16:] == bytes([16, *range(16)])
+        count, kind, value = struct.unpack_from("<IB11xd", bytes.fromhex(reply), 4)
+        assert (count, kind) == (1, 3)
+        return float(value)
+
+    assert linear_step() == 0.01
+    double = struct.pack("<BB2xqd", 3, 0, 0, 0.03)
+    no_text, no_arrays = struct.pack("<I4x", 1), bytes(5 * 4)
+    request = (header + struct.pack("<I", 1) + name + double + no_text + no_arrays).hex()
+    [[reply, _]] = network.peer.ask("call", node=node, service="set_parameters", hex=request)
+    assert struct.unpack_from("<IB", bytes.fromhex(reply), 4) == (1, 1), bytes.fromhex(reply)
+    assert linear_step() == 0.03
+    driver.show("Forward")
+    driver.expect((0.03, 0.0))
+    for nonsense in ("", "00010000ffffffff"):
+        assert network.peer.ask("call", node=node, service="set_parameters", hex=nonsense) == []
+    assert "cannot be answered" in driver.process.text
+    assert linear_step() == 0.03
+
+
 def test_a_late_subscriber_gets_the_description_of_the_robot(network: ZenohGraph) -> None:
     network.node("robot", name="/late/robot", ros=("-r", "__ns:=/late"))
     topic = "/late/robot_description"

@@ -14,7 +14,7 @@ from handsteer.clock import Clock
 from handsteer.config import Config
 from handsteer.nodes.node import Node
 from handsteer.nodes.steering import SteeringNode
-from handsteer.parameters import from_parameters
+from handsteer.parameters import NodeParameters, from_parameters
 from handsteer.transports import join
 from handsteer.transports.protocol import Session, Transport
 
@@ -193,6 +193,7 @@ def _run(job: _Job, transport: str, words: tuple[str, ...]) -> int:
     try:
         config = job.settings(from_parameters(session.parameters, job.section, session.name))
         node = job.make(config, session.transport, session.clock)
+        session.serve(NodeParameters(config, job.section, node.reconfigure))
         _run_until_end(node, session, job.beside(node, config))
     except KeyboardInterrupt:
         pass  # the ordinary end of a node

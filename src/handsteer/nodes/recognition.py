@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handsteer.clock import Clock
-from handsteer.config import SignsConfig
+from handsteer.config import Config, SignsConfig
 from handsteer.images import bgr_image, image_message, jpeg_picture
 from handsteer.messages import HAND_SIGN, IMAGE_ANNOTATED, IMAGE_COMPRESSED, IMAGE_RAW, CompressedImage, Image, String
 from handsteer.nodes.latency import LatencyLog
@@ -62,6 +62,11 @@ class HandSignRecognitionNode(Node):
             self.subscribe(IMAGE_RAW, lambda received: self._on_frame(received, bgr_image))
         self.every(_WATCH_PERIOD_S, self._watch)
         self.every(_DIAGNOSE_PERIOD_S, self._report)
+
+    def on_reconfigure(self, config: Config) -> None:
+        """Take the confidences and times of ``signs``."""
+        self._config = config.signs
+        self._recognizer.reconfigure(config.signs)
 
     def _on_frame(self, received: Received[M], picture_of: Callable[[M], NDArray[np.uint8]]) -> None:
         began_s = self.clock.now()

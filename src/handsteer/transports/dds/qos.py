@@ -22,6 +22,7 @@ _LIVELINESS = (
     Policy.Liveliness.ManualByTopic,
 )
 _NEVER_NS = 2**63 - 1
+_REQUESTS = 1000
 
 
 def writer_qos(topic: Topic[Any]) -> Qos:
@@ -43,6 +44,24 @@ def discovery_qos(name: str, depth: int) -> Qos:
     """
     history = Policy.History.KeepLast(depth)
     return Qos(_RELIABLE, _TRANSIENT_LOCAL, history, _CDR, Policy.IgnoreLocal.Participant, _user_data(name))
+
+
+def service_qos(name: str, service: str) -> Qos:
+    """Return what ROS 2 has for both ends of a parameter service.
+
+    Args:
+        name: Type of the request or the reply.
+        service: Identifies the service; the same for its reader and its writer.
+    """
+    data = Policy.Userdata(f"serviceid={service};typehash={type_hash(name)};".encode())
+    return Qos(_RELIABLE, _VOLATILE, Policy.History.KeepLast(_REQUESTS), _CDR, data)
+
+
+def user_data(qos: Qos) -> dict[str, str]:
+    """Return what ROS 2 has put into the user data: ``typehash``, ``clientid`` and others."""
+    data = _find(qos, "Userdata")
+    text = data.data.decode("utf-8", "replace") if data is not None else ""
+    return {name: value for name, equals, value in (part.partition("=") for part in text.split(";")) if equals}
 
 
 def describe(qos: Qos) -> str:

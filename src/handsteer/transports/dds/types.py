@@ -29,8 +29,21 @@ _BASES: dict[str, Any] = {
 @functools.cache
 def dds_type(name: str, distribution: str = "jazzy") -> Any:
     """Return the DDS type for the message type ``name``; its instances hold encoded messages in ``raw``."""
+    return _struct(name, distribution, {})
+
+
+@functools.cache
+def service_dds_type(name: str) -> Any:
+    """Return the DDS type for ``name``, a request or a reply, with the 16 bytes before it by which they are told apart.
+
+    Cyclone DDS looks at what it sends and gets, and lets nothing pass that is not of the type.
+    """
+    return _struct(name, "jazzy", {"client": idl.uint64, "number": idl.int64})
+
+
+def _struct(name: str, distribution: str, before: dict[str, Any]) -> Any:
     _, fields = types(distribution).fielddefs[name]
-    members = {field: _idl(kind, distribution) for field, kind in fields}
+    members = {**before, **{field: _idl(kind, distribution) for field, kind in fields}}
     struct = make_idl_struct(name.rpartition("/")[2], dds_type_name(name), members, dataclassify=False)
     for method, passing in _PASSING.items():
         setattr(struct, method, passing)

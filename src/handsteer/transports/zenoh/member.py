@@ -4,12 +4,10 @@ import itertools
 import logging
 import threading
 import time
-from typing import Any
 
 import zenoh
 
 from handsteer.errors import TransportError
-from handsteer.messages import Topic, type_name
 from handsteer.transports.ros2.encoding import type_hash
 from handsteer.transports.ros2.names import NodeName
 from handsteer.transports.ros2.profiles import Profile
@@ -57,20 +55,25 @@ class Member:
         self._neighbours = Neighbours(self.session, network.domain)
         self._token = self.session.liveliness().declare_token(node_token(self._place))
 
-    def key(self, topic: Topic[Any]) -> str:
-        """Return the key expression of ``topic`` as this node names it."""
-        return topic_key(self._network.domain, self.name.topic(topic), type_name(topic.type))
-
-    def introduce(self, kind: str, topic: Topic[Any], profile: Profile) -> tuple[zenoh.LivelinessToken, str]:
-        """Tell others that this node has a publisher or subscriber; return the token that keeps it told, and its text.
+    def key(self, name: str, type_name: str) -> str:
+        """Return the key expression of a topic or service.
 
         Args:
-            kind: ``publisher`` or ``subscriber``.
-            topic: What it publishes or subscribes to.
+            name: Its full name, as ``/r1/image_raw``.
+            type_name: Its type, as ``sensor_msgs/msg/Image``.
+        """
+        return topic_key(self._place.domain, name, type_name)
+
+    def introduce(self, kind: str, name: str, type_name: str, profile: Profile) -> tuple[zenoh.LivelinessToken, str]:
+        """Tell others what this node has; return the token that keeps it told, and its text.
+
+        Args:
+            kind: ``publisher``, ``subscriber`` or ``service``.
+            name: Full name of its topic or service.
+            type_name: Type of that.
             profile: Its quality of service.
         """
-        name = type_name(topic.type)
-        endpoint = Endpoint(kind, self.name.topic(topic), name, type_hash(name))
+        endpoint = Endpoint(kind, name, type_name, type_hash(type_name))
         with self._lock:
             number = next(self._numbers)
         text = endpoint_token(self._place, number, endpoint, profile)

@@ -100,11 +100,12 @@ class ZenohPublisher(Generic[M]):
     def __init__(self, member: Member, topic: Topic[M]) -> None:
         self._topic = topic
         profile = offered(topic)
-        key = member.key(topic)
+        name, kind = _named(member, topic)
+        key = member.key(name, kind)
         self._publisher = member.session.declare_publisher(key, **_options(profile))
         # It keeps messages for late subscribers, but does not know of any: the plain one beside it does.
         self._keeper = _keeper(member.session, key, profile) if profile.latched else None
-        self._token, text = member.introduce("publisher", topic, profile)
+        self._token, text = member.introduce("publisher", name, kind, profile)
         self._gid = gid(text)
         self._lock = threading.Lock()
         self._number = 0
@@ -147,6 +148,11 @@ class ZenohPublisher(Generic[M]):
             self._keeper.undeclare()
 
 
+def _named(member: Member, topic: Topic[Any]) -> tuple[str, str]:
+    """Return the names of a topic and its type, as ``/r1/image_raw`` and ``sensor_msgs/msg/Image``."""
+    return member.name.topic(topic), type_name(topic.type)
+
+
 def _options(profile: Profile) -> dict[str, Any]:
     """Return how messages travel.
 
@@ -187,8 +193,9 @@ class _Reception(Generic[M]):
         self._lateness = None if topic.lifespan_s is None else Lateness(topic.lifespan_s)
         self._was_late = False
         profile = requested(topic)
-        self._subscriber = _subscriber(member, topic, profile)
-        self._token, _ = member.introduce("subscriber", topic, profile)
+        name, kind = _named(member, topic)
+        self._subscriber = _subscriber(member.session, member.key(name, kind), profile)
+        self._token, _ = member.introduce("subscriber", name, kind, profile)
         self._thread = threading.Thread(target=self._run, name=f"zenoh {topic.name}", daemon=True)
         self._thread.start()
 
@@ -239,13 +246,12 @@ class _Reception(Generic[M]):
             self._send(Received(message, capture_time(message, self._clock)))
 
 
-def _subscriber(member: Member, topic: Topic[Any], profile: Profile) -> Any:
+def _subscriber(session: zenoh.Session, key: str, profile: Profile) -> Any:
     ring: zenoh.handlers.RingChannel[zenoh.Sample] = zenoh.handlers.RingChannel(profile.depth)
-    key = member.key(topic)
     if not profile.latched:
-        return member.session.declare_subscriber(key, ring)
+        return session.declare_subscriber(key, ring)
     return zenoh.ext.declare_advanced_subscriber(
-        member.session,
+        session,
         key,
         ring,
         history=zenoh.ext.HistoryConfig(detect_late_publishers=True, max_samples=profile.depth),
