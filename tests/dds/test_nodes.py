@@ -75,14 +75,31 @@ def test_ros2_sees_the_node_by_its_names_types_and_hashes(dds: DdsGraph) -> None
         "typehash=RIHS01_df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18;",
     ]
     eventually(lambda: "rt/base/cmd_vel" in dds.nodes()["/far/driver"]["writers"])
-    eventually(lambda: len(dds.nodes()["/far/driver"]["readers"]) == 2)
+    eventually(lambda: len(topics(dds.nodes()["/far/driver"]["readers"])) == 2)
     node = dds.nodes()["/far/driver"]
     assert node["participant"] == "enclave=/;"
     assert node["writers"]["rt/base/cmd_vel"] == twist
-    assert set(node["writers"]) == {"rt/base/cmd_vel", "rt/diagnostics"}
-    assert node["readers"] == {"rt/far/gesture/hand_sign": string, "rt/far/steering/cmd_vel": twist}
+    assert topics(node["writers"]) == {"rt/base/cmd_vel", "rt/diagnostics", "rt/parameter_events", "rt/rosout"}
+    assert topics(node["readers"]) == {"rt/far/gesture/hand_sign", "rt/far/steering/cmd_vel"}
+    assert node["readers"]["rt/far/gesture/hand_sign"] == string
+    assert node["readers"]["rt/far/steering/cmd_vel"] == twist
     control.signal(signal.SIGTERM)
     assert control.code() == 0
+
+
+def topics(endpoints: dict[str, Any]) -> set[str]:
+    return {name for name in endpoints if name.startswith("rt/")}
+
+
+def test_what_a_node_logs_is_on_rosout_for_who_comes_later_too(dds: DdsGraph, tmp_path: Path) -> None:
+    driver = DdsDriver(dds)
+    driver.show_raw(b"\x00\x01\x00\x00\x03\x00\x00\x00\xff\xfe\x00\x00")
+    text = "/gesture/hand_sign: a message of 12 bytes cannot be read"
+    eventually(lambda: text in driver.process.text)
+    dds.peer.ask("record", topic="/rosout", type="Log", fields=["level", "name", "msg"], latched=True)
+    logged = eventually(lambda: [one for _, one in dds.peer.ask("get", topic="/rosout") if one[2].startswith(text)])
+    assert logged[0][0] == 30
+    assert logged[0][1].endswith(".hand_sign_control")
 
 
 def test_the_discovery_itself_carries_the_hash_of_ros2(tmp_path: Path) -> None:

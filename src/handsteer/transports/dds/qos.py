@@ -9,7 +9,7 @@ from typing import Any
 
 from cyclonedds.core import Policy, Qos
 
-from handsteer.messages import ClockMessage, CompressedImage, Image, JointState, Odometry, Topic, type_name
+from handsteer.messages import ClockMessage, CompressedImage, Image, JointState, Log, Odometry, Topic, type_name
 from handsteer.transports.ros2.encoding import type_hash
 
 _SENSOR_DATA = (Image, CompressedImage, ClockMessage)
@@ -26,11 +26,16 @@ _LIVELINESS = (
 )
 _NEVER_NS = 2**63 - 1
 _REQUESTS = 1000
+_LOG_LIFE_NS = 10_000_000_000
 
 
 def writer_qos(topic: Topic[Any]) -> Qos:
     """Return what a publisher of ``topic`` offers."""
-    return _qos(topic, reliable=topic.type not in _SENSOR_DATA)
+    qos = _qos(topic, reliable=topic.type not in _SENSOR_DATA)
+    # Late subscribers get as many as are kept, unless they are old.
+    kept = Policy.DurabilityService(0, Policy.History.KeepLast(topic.depth), -1, -1, -1)
+    life = Policy.Lifespan(_LOG_LIFE_NS if topic.type is Log else _NEVER_NS)
+    return Qos(*qos, kept, life) if topic.latched else qos
 
 
 def reader_qos(topic: Topic[Any]) -> Qos:

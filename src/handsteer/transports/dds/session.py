@@ -17,6 +17,7 @@ from handsteer.transports.dds.transport import DdsTransport
 from handsteer.transports.ros2.arguments import parse_arguments
 from handsteer.transports.ros2.names import identify
 from handsteer.transports.ros2.parameter_services import PARAMETER_EVENTS, ParameterServices
+from handsteer.transports.ros2.rosout import ROSOUT, RosoutHandler
 
 _CLOCK_SILENCE_S = 2.0
 _DELIVER_S = 0.2
@@ -50,6 +51,9 @@ class DdsSession:
         self.clock: Clock = SimulatedClock() if simulated else WallClock()
         self.transport = DdsTransport(self._participant, self.clock)
         self._servers: list[ServiceServer] = []
+        self._rosout = RosoutHandler(self.name, self._stamp)
+        if said.rosout:
+            self._publish_logs()
         if isinstance(self.clock, SimulatedClock):
             self._follow(self.clock)
         self._was_silent = False
@@ -82,6 +86,7 @@ class DdsSession:
         if self._left.is_set():
             return
         self._left.set()
+        logging.getLogger("handsteer").removeHandler(self._rosout)
         for server in self._servers:
             server.close()
         self.transport.flush(_DELIVER_S)
@@ -96,6 +101,11 @@ class DdsSession:
 
     def _stamp(self) -> Time:
         return self.clock.stamp(self.clock.now())
+
+    def _publish_logs(self) -> None:
+        publisher = self.transport.advertise(self.name, ROSOUT)
+        self._participant.tick(lambda: self._rosout.send(publisher.publish))
+        logging.getLogger("handsteer").addHandler(self._rosout)
 
     def _follow(self, clock: SimulatedClock) -> None:
         self.transport.subscribe("clock", CLOCK, lambda received: clock.tell(to_seconds(received.message.clock)))
