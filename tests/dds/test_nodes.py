@@ -144,6 +144,40 @@ def test_what_does_not_fit_is_said_in_words(tmp_path: Path) -> None:
         assert peer.ask("get", topic="/image_raw") == []
 
 
+def test_raw_images_for_another_machine_are_warned_of_once(tmp_path: Path) -> None:
+    with dds_graph(tmp_path) as graph:
+        near, far, farther = graph.peer, graph.start_peer("far"), graph.start_peer("farther")
+        camera = graph.node("camera", *FORWARD, name="/my_camera")
+        images = {"topic": "/image_raw", "type": "Image", "fields": ["width"], "reliable": False}
+        near.ask("record", **images)
+        near.ask("introduce", name="near")
+        eventually(lambda: near.ask("get", topic="/image_raw"))
+        assert "takes raw images" not in camera.text
+        for peer, name in ((far, "viewer"), (farther, "another")):
+            peer.ask("record", **images)
+            peer.ask("introduce", name=name)
+            eventually(lambda: "/image_raw: /viewer takes raw images" in camera.text, 15.0)
+        eventually(lambda: farther.ask("get", topic="/image_raw"))
+        assert "let it take /image_raw/compressed" in camera.text
+        assert camera.text.count("takes raw images") == 1
+
+
+def test_recognition_takes_compressed_images_beyond_this_machine(tmp_path: Path) -> None:
+    with dds_graph(tmp_path) as graph:
+        images = {"rt/image_raw", "rt/image_raw/compressed"}
+        graph.node("recognition", name="/near/hand_sign_recognition", ros=("-r", "__ns:=/near"))
+        # Wherever the peers of the user's configuration may be, those of this test are here.
+        loopback = "<General><Interfaces><NetworkInterface address='127.0.0.1'/></Interfaces></General>"
+        graph.env["CYCLONEDDS_URI"] = (
+            f"<CycloneDDS><Domain>{loopback}<Discovery><ParticipantIndex>auto</ParticipantIndex>"
+            "<Peers><Peer address='127.0.0.1'/></Peers></Discovery></Domain></CycloneDDS>"
+        )
+        graph.node("recognition", name="/hand_sign_recognition")
+        eventually(lambda: images & set(graph.nodes()["/hand_sign_recognition"]["readers"]))
+        assert images & set(graph.nodes()["/hand_sign_recognition"]["readers"]) == {"rt/image_raw/compressed"}
+        assert "rt/near/image_raw" in graph.nodes()["/near/hand_sign_recognition"]["readers"]
+
+
 def test_simulated_time_is_followed(tmp_path: Path) -> None:
     with dds_graph(tmp_path) as graph:
         graph.peer.ask("advertise", topic="/clock", type="Clock", reliable=False, depth=1)

@@ -72,6 +72,12 @@ def user_data(qos: Qos) -> dict[str, str]:
     return {name: value for name, equals, value in (part.partition("=") for part in text.split(";")) if equals}
 
 
+def host(qos: Qos) -> str | None:
+    """Return the name of the machine that a participant of Cyclone DDS is on; None when it does not say."""
+    found = _find(qos, "Property<__Hostname>")
+    return found.value if found is not None else None
+
+
 def describe(qos: Qos) -> str:
     """Return the profile in words, as ``reliable, volatile, keep last 1``; the depth of others is not known."""
     words = [_reliability(qos), _durability(qos)]
