@@ -101,8 +101,10 @@ class SignsConfig(Section):
         0.5, ge=0, le=10, description="How long the followed hand shows no sign before another that shows one is [s]"
     )
     max_frame_age: float = Field(0.35, gt=0, le=10, description="An older frame counts as no frame [s]")
-    image_transport: Literal["raw", "compressed"] = Field(
-        "raw", description="Which images are recognised: raw is /image_raw, compressed is /image_raw/compressed"
+    image_transport: Literal["auto", "raw", "compressed"] = Field(
+        "auto",
+        description="Which images are recognised: raw is /image_raw, compressed is /image_raw/compressed; "
+        "auto is compressed where others may be on other machines (DDS beyond localhost)",
     )
 
 

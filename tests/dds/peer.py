@@ -150,7 +150,9 @@ RELIABLE, BEST_EFFORT = Policy.Reliability.Reliable(1_000_000_000), Policy.Relia
 CDR = Policy.DataRepresentation(use_cdrv0_representation=True)
 
 domain = Domain(int(sys.argv[1]), LOOPBACK)
-participant = DomainParticipant(int(sys.argv[1]))
+# Cyclone DDS tells others the name of its machine, unless it has been given another.
+machine = [Policy.Property("__Hostname", sys.argv[2], True)] if len(sys.argv) > 2 else []
+participant = DomainParticipant(int(sys.argv[1]), Qos(*machine))
 noted: dict[str, list[Any]] = {}
 readers: dict[str, tuple[Any, list[str]]] = {}
 writers: dict[str, Any] = {}

@@ -32,7 +32,7 @@ class HandSignRecognitionNode(Node):
         transport: Carries the messages.
         clock: The graph's clock.
         recognizer: Does the work.
-        config: Holds the greatest age of a frame.
+        config: Holds the greatest age of a frame, and which images to take.
         annotate: Draws what was understood into a copy of the frame, when anybody looks.
 
     Attributes:
@@ -56,7 +56,8 @@ class HandSignRecognitionNode(Node):
         self._recognition: Recognition | None = None
         self._sign = self.publisher(HAND_SIGN)
         self._annotated = self.publisher(IMAGE_ANNOTATED)
-        if config.image_transport == "compressed":
+        wanted = config.image_transport
+        if wanted == "compressed" or (wanted == "auto" and transport.crosses_network):
             self.subscribe(IMAGE_COMPRESSED, lambda received: self._on_frame(received, jpeg_picture))
         else:
             self.subscribe(IMAGE_RAW, lambda received: self._on_frame(received, bgr_image))

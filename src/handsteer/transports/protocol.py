@@ -58,6 +58,11 @@ class Transport(Protocol):
     an inbox that keeps the newest only (:class:`handsteer.nodes.node.Node`).
     """
 
+    @property
+    def crosses_network(self) -> bool:
+        """Whether it may carry messages to other machines, so that large ones had better be small."""
+        ...
+
     def advertise(self, node: str, topic: Topic[M]) -> Publisher[M]:
         """Return the sending end of ``topic`` for the node named ``node``.
 

@@ -46,6 +46,21 @@ def test_how_often_a_router_is_looked_for(text: str, attempts: int | None) -> No
     assert network({"ZENOH_ROUTER_CHECK_ATTEMPTS": text}).attempts == attempts
 
 
+@pytest.mark.parametrize(
+    ("override", "is_local"),
+    [
+        ("", True),
+        ('connect/endpoints=["tcp/127.0.0.1:7000"]', True),
+        ('listen/endpoints=["tcp/[::]:0"]', False),
+        ('connect/endpoints=["tcp/10.0.0.2:7447"]', False),
+        ('connect/endpoints=["tcp/localhost.example.com:7447"]', False),
+        ("scouting/multicast/enabled=true", False),
+    ],
+)
+def test_whether_others_may_be_on_other_machines(override: str, is_local: bool) -> None:
+    assert network({"ZENOH_CONFIG_OVERRIDE": override}).is_local == is_local
+
+
 def test_the_domain() -> None:
     assert network({}).domain == 0
     assert network({"ROS_DOMAIN_ID": "42"}).domain == 42

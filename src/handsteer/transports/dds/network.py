@@ -20,11 +20,13 @@ class Network:
         domain: Number of the DDS domain, 0 to 232.
         config: Configuration of Cyclone DDS, as XML; None leaves it to the user's ``CYCLONEDDS_URI`` or its defaults.
         distribution: The ROS 2 distribution whose discovery is spoken: ``humble``, or ``jazzy`` for all newer ones.
+        is_local: Whether only this machine is looked at, for sure.
     """
 
     domain: int
     config: str | None
     distribution: str = "jazzy"
+    is_local: bool = False
 
 
 def network(environment: Mapping[str, str]) -> Network:
@@ -44,7 +46,7 @@ def network(environment: Mapping[str, str]) -> Network:
         return Network(domain, None, distribution)
     if environment.get("ROS_LOCALHOST_ONLY") == "1" or reach == "OFF":
         peers = []
-    return Network(domain, _config(reach, peers), distribution)
+    return Network(domain, _config(reach, peers), distribution, is_local=reach != "SUBNET" and not peers)
 
 
 def _range(environment: Mapping[str, str]) -> str:

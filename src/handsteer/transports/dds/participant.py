@@ -29,6 +29,10 @@ _USER_DATA = b"enclave=/;"
 class Participant:
     """A participant of a DDS domain, known to ROS 2 as one node.
 
+    Attributes:
+        name: The node's name.
+        is_local: Whether all others are on this machine, for sure.
+
     Args:
         network: The domain, and where to look for others.
         name: The node's name.
@@ -39,6 +43,7 @@ class Participant:
 
     def __init__(self, network: Network, name: NodeName) -> None:
         self.name = name
+        self.is_local = network.is_local
         try:
             self._domain: Any = None if network.config is None else Domain(network.domain, network.config)
             self._participant: Any = DomainParticipant(network.domain, Qos(Policy.Userdata(_USER_DATA)))

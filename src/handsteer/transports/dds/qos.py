@@ -7,7 +7,7 @@ from typing import Any
 
 from cyclonedds.core import Policy, Qos
 
-from handsteer.messages import Topic, type_name
+from handsteer.messages import Log, Topic, type_name
 from handsteer.transports.ros2.encoding import type_hash
 from handsteer.transports.ros2.profiles import Profile, offered, requested
 
@@ -23,11 +23,16 @@ _LIVELINESS = (
 )
 _NEVER_NS = 2**63 - 1
 _REQUESTS = 1000
+_LOG_LIFE_NS = 10_000_000_000
 
 
 def writer_qos(topic: Topic[Any]) -> Qos:
     """Return what a publisher of ``topic`` offers."""
-    return _qos(topic, offered(topic))
+    qos = _qos(topic, offered(topic))
+    # Late subscribers get as many as are kept, unless they are old.
+    kept = Policy.DurabilityService(0, Policy.History.KeepLast(topic.depth), -1, -1, -1)
+    life = Policy.Lifespan(_LOG_LIFE_NS if topic.type is Log else _NEVER_NS)
+    return Qos(*qos, kept, life) if topic.latched else qos
 
 
 def reader_qos(topic: Topic[Any]) -> Qos:
@@ -62,6 +67,12 @@ def user_data(qos: Qos) -> dict[str, str]:
     data = _find(qos, "Userdata")
     text = data.data.decode("utf-8", "replace") if data is not None else ""
     return {name: value for name, equals, value in (part.partition("=") for part in text.split(";")) if equals}
+
+
+def host(qos: Qos) -> str | None:
+    """Return the name of the machine that a participant of Cyclone DDS is on; None when it does not say."""
+    found = _find(qos, "Property<__Hostname>")
+    return found.value if found is not None else None
 
 
 def describe(qos: Qos) -> str:

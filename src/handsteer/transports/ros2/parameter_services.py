@@ -9,10 +9,9 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 import numpy as np
-from rosbags.typesys.stores.ros2_jazzy import rcl_interfaces__msg__ParameterEvent as ParameterEvent
 
 from handsteer.errors import ConfigError
-from handsteer.messages import Time, Topic
+from handsteer.messages import ParameterEvent, Time, Topic
 from handsteer.parameters import Description, NodeParameters, Value
 from handsteer.transports.ros2.encoding import types
 from handsteer.transports.ros2.service_types import (

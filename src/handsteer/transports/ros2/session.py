@@ -8,12 +8,13 @@ from typing import Any, Protocol
 
 from handsteer.clock import Clock, SimulatedClock, WallClock, to_seconds
 from handsteer.errors import TransportError
-from handsteer.messages import CLOCK, Time
+from handsteer.messages import CLOCK, Log, Time
 from handsteer.parameters import NodeParameters
-from handsteer.transports.protocol import Transport
+from handsteer.transports.protocol import Publisher, Transport
 from handsteer.transports.ros2.arguments import parse_arguments
 from handsteer.transports.ros2.names import NodeName, identify
 from handsteer.transports.ros2.parameter_services import PARAMETER_EVENTS, ParameterServices
+from handsteer.transports.ros2.rosout import ROSOUT, RosoutHandler
 from handsteer.transports.ros2.service_types import Service
 
 _CLOCK_SILENCE_S = 2.0
@@ -63,6 +64,8 @@ class Ros2Session(ABC):
         self.clock: Clock = SimulatedClock() if simulated else WallClock()
         self.transport: Ros2Transport = self._connect(name, self.clock)
         self._servers: list[ServiceServer] = []
+        self._rosout = RosoutHandler(self.name, self._stamp)
+        self._logs = self._publish_logs() if said.rosout else None
         if isinstance(self.clock, SimulatedClock):
             self._follow(self.clock)
         self._was_silent = False
@@ -88,6 +91,7 @@ class Ros2Session(ABC):
         if silent and not self._was_silent:
             log.warning("use_sim_time is set, but /clock stands still: frames count as old, the robot stands")
         self._was_silent = silent
+        self._send_logs()
         return self._left.wait(timeout_s)
 
     def close(self) -> None:
@@ -95,8 +99,10 @@ class Ros2Session(ABC):
         if self._left.is_set():
             return
         self._left.set()
+        logging.getLogger("handsteer").removeHandler(self._rosout)
         for server in self._servers:
             server.close()
+        self._send_logs()
         self.transport.flush(_DELIVER_S)
         self.transport.close()
 
@@ -116,6 +122,15 @@ class Ros2Session(ABC):
 
     def _stamp(self) -> Time:
         return self.clock.stamp(self.clock.now())
+
+    def _publish_logs(self) -> Publisher[Log]:
+        publisher = self.transport.advertise(self.name, ROSOUT)
+        logging.getLogger("handsteer").addHandler(self._rosout)
+        return publisher
+
+    def _send_logs(self) -> None:
+        if self._logs is not None:
+            self._rosout.send(self._logs.publish)
 
     def _follow(self, clock: SimulatedClock) -> None:
         self.transport.subscribe("clock", CLOCK, lambda received: clock.tell(to_seconds(received.message.clock)))

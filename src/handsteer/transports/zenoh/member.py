@@ -23,6 +23,10 @@ log = logging.getLogger(__name__)
 class Member:
     """A session of a Zenoh network, known to ROS 2 as one node.
 
+    Attributes:
+        name: The node's name.
+        is_local: Whether this process reaches this machine only, as far as it knows.
+
     Args:
         network: How to join.
         name: The node's name.
@@ -33,6 +37,7 @@ class Member:
 
     def __init__(self, network: Network, name: NodeName) -> None:
         self.name = name
+        self.is_local = network.is_local
         self._network = network
         zenoh.try_init_log_from_env()
         try:

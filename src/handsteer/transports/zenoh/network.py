@@ -17,6 +17,7 @@ from handsteer.transports.ros2.domain import domain_id
 ROUTER = "tcp/localhost:7447"
 """Where a router listens, unless another place is said."""
 
+_LOOPBACK = re.compile(r"[^/]+/(localhost|127\.\d+\.\d+\.\d+|\[::1\])(:|$)|unixsock|unixpipe")
 _ATTEMPTS = "ZENOH_ROUTER_CHECK_ATTEMPTS"
 _OVERRIDE = "ZENOH_CONFIG_OVERRIDE"
 _COMMON: dict[str, Any] = {
@@ -52,11 +53,13 @@ class Network:
         config: Configuration of the Zenoh session.
         attempts: How often to look for a router before going on without one, once a second; 0 waits for one, None
             does not look.
+        is_local: Whether this process connects and listens within this machine only; a router may lead further.
     """
 
     domain: int
     config: zenoh.Config
     attempts: int | None = 1
+    is_local: bool = True
 
 
 def network(environment: Mapping[str, str]) -> Network:
@@ -70,7 +73,9 @@ def network(environment: Mapping[str, str]) -> Network:
     """
     settings = {**_SESSION, "connect/retry": _RETRY}
     config = _config(environment, "ZENOH_SESSION_CONFIG_URI", settings)
-    return Network(domain_id(environment), config, _attempts(environment))
+    ends = [*_endpoints(config, "connect"), *_endpoints(config, "listen")]
+    is_local = all(_LOOPBACK.match(end) for end in ends) and config.get_json("scouting/multicast/enabled") == "false"
+    return Network(domain_id(environment), config, _attempts(environment), is_local)
 
 
 def router_config(environment: Mapping[str, str], endpoint: str | None = None) -> zenoh.Config:
@@ -93,10 +98,15 @@ def router_config(environment: Mapping[str, str], endpoint: str | None = None) -
 
 def routers(config: zenoh.Config) -> str:
     """Return where a session looks for routers, in words."""
-    endpoints = json.loads(config.get_json("connect/endpoints"))
+    return " or ".join(_endpoints(config, "connect")) or "any address"
+
+
+def _endpoints(config: zenoh.Config, what: str) -> list[str]:
+    """Return where a session is to ``connect`` or ``listen``; they may be given by mode."""
+    endpoints: Any = json.loads(config.get_json(f"{what}/endpoints"))
     if isinstance(endpoints, dict):
         endpoints = endpoints.get(json.loads(config.get_json("mode")) or "peer", [])
-    return " or ".join(endpoints) or "any address"
+    return list(endpoints)
 
 
 def reason(error: zenoh.ZError) -> str:

@@ -49,6 +49,11 @@ class ZenohTransport:
         self._publishers: list[ZenohPublisher[Any]] = []
         self._incoming: dict[str, Fanout[Any]] = {}
 
+    @property
+    def crosses_network(self) -> bool:
+        """Whether others may be on other machines; what a router leads to is not known."""
+        return not self._member.is_local
+
     def advertise(self, node: str, topic: Topic[M]) -> "ZenohPublisher[M]":
         """Return the sending end of ``topic`` for the node named ``node``."""
         self._claim(topic)
