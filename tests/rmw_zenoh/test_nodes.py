@@ -18,7 +18,6 @@ from tests.contracts.node_contract import (
     ControlContract,
     MakeDriver,
     Running,
-    twists,
 )
 from tests.dds.driver import NODE, DdsDriver, driving_chain
 from tests.processes import eventually
@@ -232,10 +231,9 @@ class TestRouter:
             running = driving_chain(graph)
             graph.router.popen.kill()
             eventually(lambda: "the Zenoh router has gone" in running.nodes["control"].text, 10.0)
-            began_m, began_s = running.x_m, time.monotonic()
-            time.sleep(1.0)
-            assert running.x_m - began_m > 0.2
-            assert {twist for at_s, twist in twists(graph.peer) if at_s > began_s} == {(0.3, 0.0)}
+            began_m = running.x_m
+            # A busy machine may make it stop meanwhile, but without the messages it would never go on.
+            eventually(lambda: running.x_m - began_m > 0.3, 20.0, what="the robot to drive on")
             graph.start_router()
             eventually(lambda: "the Zenoh router is there" in running.nodes["control"].text)
 
