@@ -1,6 +1,7 @@
-"""What DDS costs: a Twist's and an image's way from one process to another, and the time to the first command.
+"""What a wire of ROS 2 costs: the way of a Twist and an image between two processes, and the time to the first command.
 
-Run ``python benchmarks/dds.py`` with cyclonedds installed. A second process listens and tells how old each message was
+Run ``python benchmarks/dds.py`` with cyclonedds installed, ``python benchmarks/dds.py --transport zenoh`` with
+eclipse-zenoh; its router runs beside. A second process listens and tells how old each message was
 when a node's callback got it; both read the same monotonic clock. The same is measured within one process, side by
 side, as what the nodes themselves cost. ``--load`` says how busy the machine was.
 """
@@ -12,6 +13,8 @@ import subprocess
 import sys
 import threading
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +23,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # for the domains that the tests use
 
 from tests.dds.graph import free_domain
+from tests.processes import free_port
 
 from handsteer.clock import WallClock
 from handsteer.images import image_message
@@ -59,9 +63,9 @@ def cpu_s() -> float:
     return times.user + times.system
 
 
-def listen(topic: Topic[Any], domain: int) -> None:
+def listen(topic: Topic[Any], transport: str) -> None:
     """Be the second process: listen until the input ends, then tell what came."""
-    session = joined("listener", domain)
+    session = join(transport, "listener", [])
     listener = Listener(session.transport, topic)
     print("ready", flush=True)
     sys.stdin.readline()
@@ -71,9 +75,22 @@ def listen(topic: Topic[Any], domain: int) -> None:
     session.close()
 
 
-def joined(name: str, domain: int) -> Session:
-    os.environ["ROS_DOMAIN_ID"] = str(domain)
-    return join("dds", name, [])
+@contextmanager
+def network(transport: str) -> Iterator[None]:
+    """Let this process and those that it starts have a network of their own, by their environment."""
+    os.environ["ROS_DOMAIN_ID"] = str(free_domain())
+    if transport != "zenoh":
+        yield
+        return
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    command = [sys.executable, "-m", "handsteer", "zenoh-router", "--listen", endpoint]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as router:
+        assert router.stderr is not None
+        assert "listens" in router.stderr.readline()
+        os.environ["ZENOH_CONFIG_OVERRIDE"] = f'connect/endpoints=["{endpoint}"]'
+        yield
+        del os.environ["ZENOH_CONFIG_OVERRIDE"]
+        router.terminate()
 
 
 def send(publisher: Publisher[Any], topic: Topic[Any], count: int, rate: float) -> float:
@@ -91,11 +108,10 @@ def send(publisher: Publisher[Any], topic: Topic[Any], count: int, rate: float) 
     return cpu_s() - began_s
 
 
-def across(topic: Topic[Any], count: int, rate: float) -> dict[str, Any]:
-    """Return what came over DDS from this process to another."""
-    domain = free_domain()
-    command = [sys.executable, __file__, "--listen", topic.name, "--domain", str(domain)]
-    session = joined("talker", domain)
+def across(transport: str, topic: Topic[Any], count: int, rate: float) -> dict[str, Any]:
+    """Return what came from this process to another."""
+    command = [sys.executable, __file__, "--listen", topic.name, "--transport", transport]
+    session = join(transport, "talker", [])
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as other:
         assert other.stdin is not None
         assert other.stdout is not None
@@ -128,15 +144,14 @@ def wait_for(publisher: Publisher[Any]) -> None:
     time.sleep(SETTLE_S)  # the other end has to see this one, too
 
 
-def first_command_s() -> float:
+def first_command_s(transport: str) -> float:
     """Return the seconds from the start of the control's process to its first Twist, signs being shown all the time."""
-    domain = free_domain()
-    session = joined("talker", domain)
+    session: Session = join(transport, "talker", [])
     came = threading.Event()
     session.transport.subscribe("robot", CMD_VEL, lambda _: came.set())
     signs = session.transport.advertise("talker", HAND_SIGN)
     began_s = time.monotonic()
-    with subprocess.Popen([sys.executable, "-m", "handsteer", "control", "--transport", "dds"]) as control:
+    with subprocess.Popen([sys.executable, "-m", "handsteer", "control", "--transport", transport]) as control:
         while not came.wait(1 / 30):
             signs.publish(String(data="Forward"))
         took_s = time.monotonic() - began_s
@@ -146,25 +161,32 @@ def first_command_s() -> float:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description="Measure what DDS costs.")
+    parser = argparse.ArgumentParser(description="Measure what a wire of ROS 2 costs.")
+    parser.add_argument("--transport", choices=("dds", "zenoh"), default="dds")
     parser.add_argument("--twists", type=int, default=2000, help="Twists to send, 200 a second")
     parser.add_argument("--images", type=int, default=300, help="images to send, 30 a second")
     parser.add_argument("--listen", help=argparse.SUPPRESS)
-    parser.add_argument("--domain", type=int, help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.listen:
-        listen(TWISTS if options.listen == TWISTS.name else IMAGE_RAW, options.domain)
+        listen(TWISTS if options.listen == TWISTS.name else IMAGE_RAW, options.transport)
         return
     print(f"load of the machine before: {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores")
-    print("first command after the start of the control: " + ", ".join(f"{first_command_s():.2f} s" for _ in range(3)))
+    with network(options.transport):
+        measure(options)
+
+
+def measure(options: argparse.Namespace) -> None:
+    firsts = ", ".join(f"{first_command_s(options.transport):.2f} s" for _ in range(3))
+    print(f"first command after the start of the control: {firsts}")
     for topic, count, rate in ((TWISTS, options.twists, 200.0), (IMAGE_RAW, options.images, 30.0)):
-        here, there = np.array(within(topic, count, rate)) * 1000, across(topic, count, rate)
+        here = np.array(within(topic, count, rate)) * 1000
+        there = across(options.transport, topic, count, rate)
         ages = np.array(there["ages_s"]) * 1000
         duration_s = count / rate
         print(f"{topic.type.__name__.rpartition('__')[2]}, {rate:.0f} a second: {len(ages)} of {count} came")
         print("                       median      p99")
         print(f"  within one process {np.median(here):8.2f} {np.percentile(here, 99):8.2f} ms")
-        print(f"  over DDS           {np.median(ages):8.2f} {np.percentile(ages, 99):8.2f} ms")
+        print(f"  over {options.transport:13} {np.median(ages):8.2f} {np.percentile(ages, 99):8.2f} ms")
         sender, listener = 100 * there["sender_cpu_s"] / duration_s, 100 * there["cpu_s"] / duration_s
         print(f"  CPU of the sender {sender:.1f} %, of the listener {listener:.1f} % of a core")
 

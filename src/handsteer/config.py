@@ -5,7 +5,7 @@ have them, units are SI (REP 103) and stand in brackets in each description.
 """
 
 from pathlib import Path
-from typing import Any, Literal, TypeVar
+from typing import Any, ClassVar, Literal, TypeVar
 
 import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
@@ -18,8 +18,13 @@ S = TypeVar("S", bound="Section")
 
 
 class Section(BaseModel):
-    """A group of parameters; unknown names and values out of range are refused."""
+    """A group of parameters; unknown names and values out of range are refused.
 
+    Attributes:
+        live: Those that can change while a node runs; the others are read when it starts.
+    """
+
+    live: ClassVar[frozenset[str]] = frozenset()
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, validate_default=True)
 
 
@@ -79,6 +84,10 @@ class LandmarksConfig(Section):
 class SignsConfig(Section):
     """How the sign is told from the landmarks, and when it counts."""
 
+    live = frozenset(
+        {"min_confidence", "keep_confidence", "confirm_time", "bridge_time", "switch_time", "max_frame_age"}
+    )
+
     model: Path | None = Field(
         None, description="File of taught signs, as `handsteer signs train` writes it; none has the shipped signs only"
     )
@@ -92,13 +101,30 @@ class SignsConfig(Section):
         0.5, ge=0, le=10, description="How long the followed hand shows no sign before another that shows one is [s]"
     )
     max_frame_age: float = Field(0.35, gt=0, le=10, description="An older frame counts as no frame [s]")
-    image_transport: Literal["raw", "compressed"] = Field(
-        "raw", description="Which images are recognised: raw is /image_raw, compressed is /image_raw/compressed"
+    image_transport: Literal["auto", "raw", "compressed"] = Field(
+        "auto",
+        description="Which images are recognised: raw is /image_raw, compressed is /image_raw/compressed; "
+        "auto is compressed where others may be on other machines (DDS beyond localhost)",
     )
 
 
 class ControlConfig(Section):
     """How a sign becomes a velocity."""
+
+    live = frozenset(
+        {
+            "ramp",
+            "linear_step",
+            "angular_step",
+            "linear_acceleration",
+            "angular_acceleration",
+            "max_linear",
+            "max_angular",
+            "sign_timeout",
+            "steering_timeout",
+            "actions",
+        }
+    )
 
     ramp: Literal["per_message", "per_second"] = Field(
         "per_message",

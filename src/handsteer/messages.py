@@ -22,6 +22,8 @@ from rosbags.typesys.stores.ros2_jazzy import geometry_msgs__msg__Twist as Twist
 from rosbags.typesys.stores.ros2_jazzy import geometry_msgs__msg__TwistWithCovariance as TwistWithCovariance
 from rosbags.typesys.stores.ros2_jazzy import geometry_msgs__msg__Vector3 as Vector3
 from rosbags.typesys.stores.ros2_jazzy import nav_msgs__msg__Odometry as Odometry
+from rosbags.typesys.stores.ros2_jazzy import rcl_interfaces__msg__Log as Log
+from rosbags.typesys.stores.ros2_jazzy import rcl_interfaces__msg__ParameterEvent as ParameterEvent
 from rosbags.typesys.stores.ros2_jazzy import rosgraph_msgs__msg__Clock as ClockMessage
 from rosbags.typesys.stores.ros2_jazzy import sensor_msgs__msg__CompressedImage as CompressedImage
 from rosbags.typesys.stores.ros2_jazzy import sensor_msgs__msg__Image as Image
@@ -45,10 +47,12 @@ __all__ = [
     "Image",
     "JointState",
     "KeyValue",
+    "Log",
     "Marker",
     "MarkerArray",
     "MeshFile",
     "Odometry",
+    "ParameterEvent",
     "Point",
     "Pose",
     "PoseWithCovariance",

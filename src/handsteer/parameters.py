@@ -1,14 +1,39 @@
-"""Parameters as a graph's own parameter service has them (ROS: private parameters), turned into the configuration.
+"""A node's parameters by name: as a graph's parameter service gives them at the start, and as others see and set them.
 
-A node's own section stands flat, others nested by name: of ``hand_sign_recognition``, ``~min_confidence`` is
-``signs.min_confidence`` and ``~landmarks/model`` is ``landmarks.model``.
+A node's own section stands flat, others are nested by name: of ``hand_sign_recognition``, ``min_confidence`` is
+``signs.min_confidence`` and ``landmarks.model`` is itself.
 """
 
-from collections.abc import Mapping
-from typing import Any
+import threading
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from types import NoneType
+from typing import Any, Literal, get_args, get_origin
+
+from pydantic.fields import FieldInfo
 
 from handsteer.config import Config, Section, validate
 from handsteer.errors import ConfigError
+
+Value = bool | int | float | str
+Kind = Literal["bool", "integer", "double", "string"]
+
+_KINDS: dict[Any, Kind] = {bool: "bool", int: "integer", float: "double", str: "string", Path: "string"}
+_FITTING: dict[Kind, tuple[type, ...]] = {
+    "bool": (bool,),
+    "integer": (int,),
+    "double": (float, int),
+    "string": (str,),
+}
+_WORDS: dict[Kind, str] = {
+    "bool": "true or false",
+    "integer": "a whole number",
+    "double": "a number",
+    "string": "a text",
+}
+_USED_TOGETHER = {"camera": ("virtual_hand",), "signs": ("landmarks",)}
+_AT_START = "it is read when the node starts: give it then"
 
 
 def from_parameters(parameters: Mapping[str, Any], section: str, node: str) -> dict[str, Any]:
@@ -44,8 +69,178 @@ def _checked(section: str, name: str, value: Any, full_name: str) -> Any:
     return value
 
 
-def _fields(section: str) -> list[str]:
+@dataclass(frozen=True)
+class Description:
+    """What there is to know of a parameter.
+
+    Attributes:
+        kind: The type of its values.
+        text: A line for people, with the unit.
+        minimum: The lowest value, or the bound that it must be above; None when there is none.
+        maximum: The highest value; None when there is none.
+        constraint: What else is asked of its values, in words; empty when nothing is.
+        why_fixed: Why it cannot be set while the node runs; None when it can.
+    """
+
+    kind: Kind
+    text: str
+    minimum: float | None = None
+    maximum: float | None = None
+    constraint: str = ""
+    why_fixed: str | None = None
+
+
+class NodeParameters:
+    """The parameters of a running node, which others may read, and set as far as they can change while it runs.
+
+    They are those of the node's own section and of the sections that it uses with it. A parameter that is itself a
+    table, as ``actions``, has one name for each entry: ``actions.Peace``. May be used from any thread.
+
+    Args:
+        config: What the node was started with.
+        section: The node's own section of the configuration.
+        apply: Gets each new configuration, all of it, once it has been checked; returns at once.
+    """
+
+    def __init__(self, config: Config, section: str, apply: Callable[[Config], None]) -> None:
+        self._config = config
+        self._section = section
+        self._sections = (section, *_USED_TOGETHER.get(section, ()))
+        self._apply = apply
+        self._fixed: dict[str, tuple[Value, Description]] = {}
+        self._lock = threading.RLock()
+
+    def add_fixed(self, name: str, value: bool, text: str) -> None:
+        """Add a parameter that is none of the configuration, and was read at the start."""
+        self._fixed[name] = (value, Description("bool", text, why_fixed=_AT_START))
+
+    def values(self) -> dict[str, Value]:
+        """Return all values by name, own ones first."""
+        with self._lock:
+            config = self._config
+            found = {name: value for section in self._sections for name, value in self._entries(config, section)}
+        return found | {name: value for name, (value, _) in self._fixed.items()}
+
+    def describe(self, name: str) -> Description | None:
+        """Return what there is to know of the parameter of this name; None when there is none."""
+        if name in self._fixed:
+            return self._fixed[name][1]
+        place = self._place(name)
+        if place is None or (place.entry is not None and name not in self.values()):
+            return None
+        return _describe(place.model, place.field)
+
+    def set(self, changes: Mapping[str, Value | None]) -> None:
+        """Set parameters, all of them or none; None takes an entry out of a table.
+
+        A value that is the one it has already is taken for any parameter.
+
+        Raises:
+            ConfigError: A name is unknown, a value is not allowed, or a parameter cannot change while the node runs;
+                the message names it.
+        """
+        with self._lock:
+            now = self.values()
+            wanted = {name: value for name, value in changes.items() if name not in now or now[name] != value}
+            if not wanted:
+                return
+            nested = self._config.model_dump()
+            for name, value in wanted.items():
+                self._put(nested, name, value)
+            try:
+                config = validate(Config, nested)
+            except ConfigError as error:
+                raise ConfigError(str(error).removeprefix(f"{self._section}.")) from None
+            self._config = config
+            self._apply(config)
+
+    def _entries(self, config: Config, section: str) -> list[tuple[str, Value]]:
+        prefix = "" if section == self._section else f"{section}."
+        found: list[tuple[str, Value]] = []
+        for field, value in getattr(config, section):
+            if isinstance(value, dict):
+                found += [(f"{prefix}{field}.{entry}", of) for entry, of in value.items()]
+            else:
+                found.append((f"{prefix}{field}", "" if value is None else _plain(value)))
+        return found
+
+    def _put(self, nested: dict[str, Any], name: str, value: Value | None) -> None:
+        place = self._place(name)
+        if name in self._fixed or (place is not None and place.field not in place.model.live):
+            raise ConfigError(f"{name} cannot be set: {_AT_START}")
+        if place is None:
+            raise ConfigError(f"{name}: there is no such parameter; there are {', '.join(self.values())}")
+        table = nested[place.section]
+        key = place.field
+        if place.entry is not None:
+            table, key = table[place.field], place.entry
+        if value is None and place.entry is None:
+            raise ConfigError(f"{name} cannot be taken away, only set to another value")
+        if value is None:
+            table.pop(key, None)
+            return
+        kind = _describe(place.model, place.field).kind
+        if not isinstance(value, _FITTING[kind]) or (isinstance(value, bool) and kind != "bool"):
+            raise ConfigError(f"{name}: {value!r} should be {_WORDS[kind]}")
+        table[key] = value
+
+    def _place(self, name: str) -> "_Place | None":
+        section, rest = self._section, name
+        if name.partition(".")[0] not in _fields(section):
+            section, _, rest = name.partition(".")
+        if section not in self._sections:
+            return None
+        field, _, entry = rest.partition(".")
+        model = _model(section)
+        if field not in model.model_fields or _is_table(model, field) != bool(entry):
+            return None
+        return _Place(section, model, field, entry or None)
+
+
+@dataclass(frozen=True)
+class _Place:
+    """Where a parameter stands in the configuration; ``entry`` is its key when the field is a table."""
+
+    section: str
+    model: type[Section]
+    field: str
+    entry: str | None
+
+
+def _model(section: str) -> type[Section]:
     model = Config.model_fields[section].annotation
     assert isinstance(model, type)
     assert issubclass(model, Section)
-    return list(model.model_fields)
+    return model
+
+
+def _fields(section: str) -> list[str]:
+    return list(_model(section).model_fields)
+
+
+def _is_table(model: type[Section], field: str) -> bool:
+    return get_origin(model.model_fields[field].annotation) is dict
+
+
+def _plain(value: Any) -> Value:
+    return str(value) if isinstance(value, Path) else value
+
+
+def _describe(model: type[Section], name: str) -> Description:
+    field = model.model_fields[name]
+    of = get_args(field.annotation)[1] if _is_table(model, name) else field.annotation
+    choices = get_args(of) if get_origin(of) is Literal else ()
+    kind = "string" if choices else _kind(of)
+    above = _bound(field, "gt")
+    lowest = above if above is not None else _bound(field, "ge")
+    constraint = f"one of {', '.join(choices)}" if choices else f"above {above:g}" if above is not None else ""
+    fixed = None if name in model.live else _AT_START
+    return Description(kind, field.description or "", lowest, _bound(field, "le"), constraint, fixed)
+
+
+def _kind(annotation: Any) -> Kind:
+    return _KINDS[next((one for one in get_args(annotation) if one is not NoneType), annotation)]
+
+
+def _bound(field: FieldInfo, sign: str) -> float | None:
+    return next((bound for limit in field.metadata if (bound := getattr(limit, sign, None)) is not None), None)

@@ -20,25 +20,25 @@ _numbers = itertools.count()
 class DdsDriver(Driver):
     def __init__(self, graph: DdsGraph, *options: str, parameters: Mapping[str, Any] | None = None) -> None:
         namespace = f"/n{next(_numbers)}"
-        self._signs, self._cmd_vel, self._peer = f"{namespace}/gesture/hand_sign", f"{namespace}{CMD_VEL}", graph.peer
-        record_twists(graph.peer, self._cmd_vel)
-        graph.peer.ask("advertise", topic=self._signs, type="String")
+        self.signs, self.cmd_vel, self._peer = f"{namespace}/gesture/hand_sign", f"{namespace}{CMD_VEL}", graph.peer
+        record_twists(graph.peer, self.cmd_vel)
+        graph.peer.ask("advertise", topic=self.signs, type="String")
         words = [word for name, value in (parameters or {}).items() for word in ("-p", f"{name}:={value}")]
         ros = ("-r", f"__ns:={namespace}", *words)
         self.process = graph.node("control", *options, name=f"{namespace}/{NODE}", ros=ros)
-        eventually(lambda: graph.peer.ask("listeners", topic=self._signs) > 0)
-        eventually(lambda: graph.publishes(f"{namespace}/{NODE}", self._cmd_vel))
+        eventually(lambda: graph.peer.ask("listeners", topic=self.signs) > 0)
+        eventually(lambda: graph.publishes(f"{namespace}/{NODE}", self.cmd_vel))
         time.sleep(SETTLE_S)
 
     def show(self, sign: str, count: int = 1, period_s: float = 0.02) -> None:
-        self._peer.ask("publish", topic=self._signs, values={"data": sign}, count=count, period_s=period_s)
+        self._peer.ask("publish", topic=self.signs, values={"data": sign}, count=count, period_s=period_s)
 
     def show_raw(self, raw: bytes) -> None:
-        self._peer.ask("publish_raw", topic=self._signs, hex=raw.hex())
+        self._peer.ask("publish_raw", topic=self.signs, hex=raw.hex())
 
     @property
     def commands(self) -> Twists:
-        return twists(self._peer, self._cmd_vel)
+        return twists(self._peer, self.cmd_vel)
 
 
 def record_twists(peer: Peer, topic: str = CMD_VEL) -> None:

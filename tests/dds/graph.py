@@ -71,10 +71,14 @@ class DdsGraph:
         for process in self._processes:
             process.kill()
 
-    def start_peer(self) -> Peer:
-        """Start a plain program, as ``tests/dds/peer.py`` tells; wait until it is ready."""
+    def start_peer(self, machine: str = "") -> Peer:
+        """Start a plain program, as ``tests/dds/peer.py`` tells; wait until it is ready.
+
+        Args:
+            machine: Name of the machine that it says it is on, if that is not this one.
+        """
         log = self._home / f"peer_{len(self._processes)}.log"
-        peer = Peer([*self._peer_command, str(self.domain)], self.env, log)
+        peer = Peer([*self._peer_command, str(self.domain), "", machine], self.env, log)
         self._processes.append(peer)
         return peer
 

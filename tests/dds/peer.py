@@ -5,9 +5,11 @@ JSON from its input and answers each by one line of JSON. ``record`` (topic, typ
 messages, ``get`` (topic) returns what was noted as ``[time_s, [values]]``. ``advertise`` (topic, type, reliable) comes
 before ``listeners`` (topic), which returns how many listen, ``publish`` (topic, values, count, period_s) and
 ``publish_raw`` (topic, hex). ``introduce`` (name) makes it a node for ROS 2, and ``graph`` and ``user_data``
-(topic) return what a ROS 2 node would know of others.
+(topic) return what a ROS 2 node would know of others. ``call`` (service, type, fields) asks as a client of
+rmw_cyclonedds_cpp does, and returns the reply's fields; ``parameter_client.py`` has its types.
 
-Arguments: the number of the domain, and a configuration of Cyclone DDS where it shall not keep to this machine.
+Arguments: the number of the domain; a configuration of Cyclone DDS where it shall not keep to this machine; the name of
+its machine, if it shall have another.
 """
 
 import json
@@ -32,6 +34,7 @@ from cyclonedds.internal import InvalidSample
 from cyclonedds.pub import DataWriter
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
+from parameter_client import Client, Log, ParameterEvent
 
 LOOPBACK = """<CycloneDDS><Domain><General>
 <Interfaces><NetworkInterface address="127.0.0.1"/></Interfaces><AllowMulticast>false</AllowMulticast>
@@ -173,12 +176,19 @@ class ParticipantEntitiesInfo(IdlStruct, typename="rmw_dds_common::msg::dds_::Pa
     node_entities_info_seq: sequence[NodeEntitiesInfo]
 
 
-TYPES = {kind.__name__: kind for kind in (String, Image, CompressedImage, Twist, Odometry, DiagnosticArray, Clock)}
+TYPES = {
+    kind.__name__: kind
+    for kind in (String, Image, CompressedImage, Twist, Odometry, DiagnosticArray, Clock, Log, ParameterEvent)
+}
 RELIABLE, BEST_EFFORT = Policy.Reliability.Reliable(1_000_000_000), Policy.Reliability.BestEffort
 CDR = Policy.DataRepresentation(use_cdrv0_representation=True)
 
-domain = Domain(int(sys.argv[1]), sys.argv[2] if len(sys.argv) > 2 else LOOPBACK)
-participant = DomainParticipant(int(sys.argv[1]))
+number, config, hostname = (*sys.argv[1:], "", "")[:3]
+domain = Domain(int(number), config or LOOPBACK)
+# Cyclone DDS tells others the name of its machine, unless it has been given another.
+participant = DomainParticipant(
+    int(number), Qos(*([Policy.Property("__Hostname", hostname, True)] if hostname else []))
+)
 noted: dict[str, list[Any]] = {}
 readers: dict[str, tuple[Any, list[str]]] = {}
 writers: dict[str, Any] = {}
@@ -281,13 +291,15 @@ def run_clock(order: dict[str, Any]) -> bool:
     return True
 
 
-def introduce(order: dict[str, Any]) -> bool:
+def introduce(order: dict[str, Any], client: Client | None = None) -> bool:
     """Tell ROS 2 that all publishers and subscribers of this program belong to a node."""
+    own_readers = [client.reader] if client else [reader for reader, _ in readers.values()]
+    own_writers = [client.writer] if client else list(writers.values())
     node = NodeEntitiesInfo(
         node_namespace="/",
         node_name=order["name"],
-        reader_gid_seq=[gid(reader) for reader, _ in readers.values()],
-        writer_gid_seq=[gid(writer) for writer in writers.values()],
+        reader_gid_seq=[gid(reader) for reader in own_readers],
+        writer_gid_seq=[gid(writer) for writer in own_writers],
     )
     introductions.append(DataWriter(participant, discovery_topic, qos=discovery_qos))
     introductions[-1].write(ParticipantEntitiesInfo(gid=gid(participant), node_entities_info_seq=[node]))
@@ -340,13 +352,20 @@ def user_data(order: dict[str, Any]) -> dict[str, list[str]]:
     }
 
 
+def call(order: dict[str, Any]) -> Any:
+    """Ask a service, as a new client each time: a request may come before the other side knows its reader."""
+    client = Client(participant, order["service"], order["type"], identified=order.get("identified", True))
+    introduce({"name": "caller"}, client)
+    return client.call(order["fields"], order.get("timeout_s", 20.0))
+
+
 def text(of: Qos) -> str:
     return of[Policy.Userdata].data.decode() if Policy.Userdata in of else ""
 
 
 ORDERS = {
     order.__name__: order
-    for order in (record, get, advertise, listeners, publish, publish_raw, run_clock, introduce, graph, user_data)
+    for order in (record, get, advertise, listeners, publish, publish_raw, run_clock, introduce, graph, user_data, call)
 }
 
 threading.Thread(target=collect, daemon=True).start()

@@ -75,14 +75,31 @@ def test_ros2_sees_the_node_by_its_names_types_and_hashes(dds: DdsGraph) -> None
         "typehash=RIHS01_df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18;",
     ]
     eventually(lambda: "rt/base/cmd_vel" in dds.nodes()["/far/driver"]["writers"])
-    eventually(lambda: len(dds.nodes()["/far/driver"]["readers"]) == 2)
+    eventually(lambda: len(topics(dds.nodes()["/far/driver"]["readers"])) == 2)
     node = dds.nodes()["/far/driver"]
     assert node["participant"] == "enclave=/;"
     assert node["writers"]["rt/base/cmd_vel"] == twist
-    assert set(node["writers"]) == {"rt/base/cmd_vel", "rt/diagnostics"}
-    assert node["readers"] == {"rt/far/gesture/hand_sign": string, "rt/far/steering/cmd_vel": twist}
+    assert topics(node["writers"]) == {"rt/base/cmd_vel", "rt/diagnostics", "rt/parameter_events", "rt/rosout"}
+    assert topics(node["readers"]) == {"rt/far/gesture/hand_sign", "rt/far/steering/cmd_vel"}
+    assert node["readers"]["rt/far/gesture/hand_sign"] == string
+    assert node["readers"]["rt/far/steering/cmd_vel"] == twist
     control.signal(signal.SIGTERM)
     assert control.code() == 0
+
+
+def topics(endpoints: dict[str, Any]) -> set[str]:
+    return {name for name in endpoints if name.startswith("rt/")}
+
+
+def test_what_a_node_logs_is_on_rosout_for_who_comes_later_too(dds: DdsGraph, tmp_path: Path) -> None:
+    driver = DdsDriver(dds)
+    driver.show_raw(b"\x00\x01\x00\x00\x03\x00\x00\x00\xff\xfe\x00\x00")
+    text = "/gesture/hand_sign: a message of 12 bytes cannot be read"
+    eventually(lambda: text in driver.process.text)
+    dds.peer.ask("record", topic="/rosout", type="Log", fields=["level", "name", "msg"], latched=True)
+    logged = eventually(lambda: [one for _, one in dds.peer.ask("get", topic="/rosout") if one[2].startswith(text)])
+    assert logged[0][0] == 30
+    assert logged[0][1].endswith(".hand_sign_control")
 
 
 def test_the_discovery_itself_carries_the_hash_of_ros2(tmp_path: Path) -> None:
@@ -125,6 +142,40 @@ def test_what_does_not_fit_is_said_in_words(tmp_path: Path) -> None:
         types = "ours has the type std_msgs/msg/String, theirs geometry_msgs/msg/Twist"
         eventually(lambda: types in control.text, 10.0, what=types)
         assert peer.ask("get", topic="/image_raw") == []
+
+
+def test_raw_images_for_another_machine_are_warned_of_once(tmp_path: Path) -> None:
+    with dds_graph(tmp_path) as graph:
+        near, far, farther = graph.peer, graph.start_peer("far"), graph.start_peer("farther")
+        camera = graph.node("camera", *FORWARD, name="/my_camera")
+        images = {"topic": "/image_raw", "type": "Image", "fields": ["width"], "reliable": False}
+        near.ask("record", **images)
+        near.ask("introduce", name="near")
+        eventually(lambda: near.ask("get", topic="/image_raw"))
+        assert "takes raw images" not in camera.text
+        for peer, name in ((far, "viewer"), (farther, "another")):
+            peer.ask("record", **images)
+            peer.ask("introduce", name=name)
+            eventually(lambda: "/image_raw: /viewer takes raw images" in camera.text, 15.0)
+        eventually(lambda: farther.ask("get", topic="/image_raw"))
+        assert "let it take /image_raw/compressed" in camera.text
+        assert camera.text.count("takes raw images") == 1
+
+
+def test_recognition_takes_compressed_images_beyond_this_machine(tmp_path: Path) -> None:
+    with dds_graph(tmp_path) as graph:
+        images = {"rt/image_raw", "rt/image_raw/compressed"}
+        graph.node("recognition", name="/near/hand_sign_recognition", ros=("-r", "__ns:=/near"))
+        # Wherever the peers of the user's configuration may be, those of this test are here.
+        loopback = "<General><Interfaces><NetworkInterface address='127.0.0.1'/></Interfaces></General>"
+        graph.env["CYCLONEDDS_URI"] = (
+            f"<CycloneDDS><Domain>{loopback}<Discovery><ParticipantIndex>auto</ParticipantIndex>"
+            "<Peers><Peer address='127.0.0.1'/></Peers></Discovery></Domain></CycloneDDS>"
+        )
+        graph.node("recognition", name="/hand_sign_recognition")
+        eventually(lambda: images & set(graph.nodes()["/hand_sign_recognition"]["readers"]))
+        assert images & set(graph.nodes()["/hand_sign_recognition"]["readers"]) == {"rt/image_raw/compressed"}
+        assert "rt/near/image_raw" in graph.nodes()["/near/hand_sign_recognition"]["readers"]
 
 
 def test_simulated_time_is_followed(tmp_path: Path) -> None:

@@ -19,7 +19,7 @@ _EXAMPLES = """Examples:
   handsteer recognize photo.jpg                  which sign is it?
   handsteer signs evaluate photos/               how well are signs told?
   handsteer camera --transport ros1              one node, in a ROS 1 graph
-  handsteer camera --transport dds               one node, in a ROS 2 graph
+  handsteer camera --transport dds               one node, in a ROS 2 graph; or --transport zenoh
   handsteer doctor                               what works on this machine
 """
 
@@ -37,6 +37,9 @@ for verb in ("run", "recognize", "models", "doctor"):
 app.command("handsteer.cli.signs:app", name="signs")
 for verb in ("camera", "recognition", "control", "robot", "steering"):
     app.command(f"handsteer.cli.nodes:{verb}", name=verb, group="One node of a graph of several processes")
+app.command(
+    "handsteer.cli.zenoh_router:zenoh_router", name="zenoh-router", group="One node of a graph of several processes"
+)
 
 
 def main(arguments: list[str] | None = None) -> None:

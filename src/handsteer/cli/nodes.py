@@ -14,7 +14,7 @@ from handsteer.clock import Clock
 from handsteer.config import Config
 from handsteer.nodes.node import Node
 from handsteer.nodes.steering import SteeringNode
-from handsteer.parameters import from_parameters
+from handsteer.parameters import NodeParameters, from_parameters
 from handsteer.transports import join
 from handsteer.transports.protocol import Session, Transport
 
@@ -38,7 +38,7 @@ def camera(
         In the transport's own words. ROS 1: topic:=other, __name:=name, __ns:=namespace, _parameter:=value.
         ROS 2: --ros-args -r topic:=other -r __node:=name -r __ns:=/namespace -p parameter:=value --params-file file.
     transport
-        What joins the nodes: dds (ROS 2) or ros1.
+        What joins the nodes: dds or zenoh (both ROS 2), or ros1.
     camera
         auto, virtual, a webcam's index or /dev/videoN, an address (rtsp, http), a video file or a folder of photos.
     config_file
@@ -59,7 +59,7 @@ def recognition(*words: str, transport: str, config_file: ConfigFile = None, par
         In the transport's own words. ROS 1: topic:=other, __name:=name, __ns:=namespace, _parameter:=value.
         ROS 2: --ros-args -r topic:=other -r __node:=name -r __ns:=/namespace -p parameter:=value --params-file file.
     transport
-        What joins the nodes: dds (ROS 2) or ros1.
+        What joins the nodes: dds or zenoh (both ROS 2), or ros1.
     config_file
         YAML file with parameters; ROS parameters go before it, options before both.
     """
@@ -78,7 +78,7 @@ def control(*words: str, transport: str, config_file: ConfigFile = None, paramet
         In the transport's own words. ROS 1: topic:=other, __name:=name, __ns:=namespace, _parameter:=value.
         ROS 2: --ros-args -r topic:=other -r __node:=name -r __ns:=/namespace -p parameter:=value --params-file file.
     transport
-        What joins the nodes: dds (ROS 2) or ros1.
+        What joins the nodes: dds or zenoh (both ROS 2), or ros1.
     config_file
         YAML file with parameters; ROS parameters go before it, options before both.
     """
@@ -103,7 +103,7 @@ def robot(
         In the transport's own words. ROS 1: topic:=other, __name:=name, __ns:=namespace, _parameter:=value.
         ROS 2: --ros-args -r topic:=other -r __node:=name -r __ns:=/namespace -p parameter:=value --params-file file.
     transport
-        What joins the nodes: dds (ROS 2) or ros1.
+        What joins the nodes: dds or zenoh (both ROS 2), or ros1.
     world
         Name of a shipped world, or a YAML file.
     config_file
@@ -130,7 +130,7 @@ def steering(
         In the transport's own words. ROS 1: topic:=other, __name:=name, __ns:=namespace, _parameter:=value.
         ROS 2: --ros-args -r topic:=other -r __node:=name -r __ns:=/namespace -p parameter:=value --params-file file.
     transport
-        What joins the nodes: dds (ROS 2) or ros1.
+        What joins the nodes: dds or zenoh (both ROS 2), or ros1.
     port
         Port of the page on 127.0.0.1; 0 takes a free one.
     config_file
@@ -193,6 +193,7 @@ def _run(job: _Job, transport: str, words: tuple[str, ...]) -> int:
     try:
         config = job.settings(from_parameters(session.parameters, job.section, session.name))
         node = job.make(config, session.transport, session.clock)
+        session.serve(NodeParameters(config, job.section, node.reconfigure))
         _run_until_end(node, session, job.beside(node, config))
     except KeyboardInterrupt:
         pass  # the ordinary end of a node

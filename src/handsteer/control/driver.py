@@ -58,6 +58,17 @@ class Driver:
         self.source = "nobody" if self._signs.silent else "signs"
         return self._say(velocity)
 
+    def reconfigure(self, config: ControlConfig) -> Velocity | None:
+        """Go on with other limits, steps, times and actions; nothing gets faster by it.
+
+        Returns:
+            The velocity to command now, where the one commanded last is beyond the limits; else None.
+        """
+        self._config = config
+        self._signs.reconfigure(config)
+        within = self._velocity.clamped(config.max_linear, config.max_angular)
+        return self._say(within if self.source != "nobody" and within != self._velocity else None)
+
     def halt(self) -> Velocity | None:
         """Stop whoever drives; return one zero, or None when nobody does."""
         was_driving = self.source != "nobody"

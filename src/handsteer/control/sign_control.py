@@ -87,6 +87,11 @@ class SignControl:
         commanded = self._boosted() if action == "turbo" else self.velocity
         return commanded if commanded.is_finite else self.halt()
 
+    def reconfigure(self, config: ControlConfig) -> None:
+        """Go on with another configuration; :attr:`velocity` is clamped to its limits."""
+        self._config = config
+        self.velocity = self.velocity.clamped(config.max_linear, config.max_angular)
+
     def halt(self) -> Velocity | None:
         """Forget the velocity; return one zero, or None when that has been said already."""
         was_silent = self.silent

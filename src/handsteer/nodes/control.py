@@ -1,7 +1,7 @@
 """The node ``hand_sign_control``: signs in, one velocity command out for each."""
 
 from handsteer.clock import Clock
-from handsteer.config import ControlConfig
+from handsteer.config import Config, ControlConfig
 from handsteer.control.driver import Driver
 from handsteer.control.sign_control import Velocity
 from handsteer.messages import CMD_VEL, HAND_SIGN, STEERING_CMD_VEL, String, Twist, twist
@@ -33,6 +33,12 @@ class HandSignControlNode(Node):
         self.subscribe(HAND_SIGN, self._on_sign)
         self.every(_WATCHDOG_PERIOD_S, self._watch)
         self.every(_DIAGNOSE_PERIOD_S, self._report)
+
+    def on_reconfigure(self, config: Config) -> None:
+        """Take all of ``control``; a robot that is faster than new limits allow is told so at once."""
+        self._config = config.control
+        self._interruption.limit_s = config.control.sign_timeout
+        self._publish(self._driver.reconfigure(config.control))
 
     def on_stop(self) -> None:
         """Leave the robot standing."""

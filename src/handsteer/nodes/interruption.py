@@ -10,18 +10,18 @@ class Interruption:
     Commands without a time of their own would be obeyed late otherwise, however old they are.
 
     Args:
-        limit_s: A longer gap between two calls of :meth:`note` is an interruption.
+        limit_s: A longer gap between two calls of :meth:`note` is an interruption; may be set later, too.
         now_s: The time now, in seconds of the graph's clock.
     """
 
     def __init__(self, limit_s: float, now_s: float) -> None:
-        self._limit_s = limit_s
+        self.limit_s = limit_s
         self._noted_s = now_s
         self._distrust_until_s = now_s
 
     def note(self, now_s: float) -> bool:
         """Note that the node runs; return whether it has just come out of an interruption."""
-        interrupted = now_s - self._noted_s > self._limit_s
+        interrupted = now_s - self._noted_s > self.limit_s
         self._noted_s = now_s
         if interrupted:
             self._distrust_until_s = now_s + _DISTRUST_S

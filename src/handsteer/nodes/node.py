@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any, Generic, TypeVar
 
 from handsteer.clock import Clock
+from handsteer.config import Config
 from handsteer.messages import DIAGNOSTICS, DiagnosticArray, DiagnosticStatus, Header, KeyValue, Topic
 from handsteer.transports.protocol import Publisher, Received, Subscription, Transport
 
@@ -71,6 +72,7 @@ class Node:
         self.transport = transport
         self._inboxes: list[_Inbox[Any]] = []
         self._timers: list[Timer] = []
+        self._new_config: Config | None = None
         self._subscriptions: list[Subscription] = []
         self._wake = threading.Condition()
         self._running = False
@@ -113,6 +115,16 @@ class Node:
         self._timers.append(timer)
         return timer
 
+    def reconfigure(self, config: Config) -> None:
+        """Take the parameters that can change while the node runs (``live`` of each section) from ``config``.
+
+        Returns at once; the node takes them on its own thread, before whatever comes next. May be called from any
+        thread.
+        """
+        with self._wake:
+            self._new_config = config
+            self._wake.notify()
+
     def diagnose(self, level: int, message: str, **values: object) -> None:
         """Publish this node's state on ``/diagnostics``: a level, a sentence for people, and named values."""
         if self._diagnostics.wanted:
@@ -129,9 +141,16 @@ class Node:
         return min((timer.due_s for timer in self._timers), default=None)
 
     def spin_once(self) -> bool:
-        """Run the callbacks whose message has come and the timers that are due; return whether there were any."""
+        """Take a new configuration, run the callbacks whose message has come and the timers that are due.
+
+        Returns:
+            Whether there were any.
+        """
         with self._wake:
+            config, self._new_config = self._new_config, None
             work = [(inbox, received) for inbox in self._inboxes for received in inbox.take()]
+        if config is not None:
+            self._guard("reconfigure", self.on_reconfigure, config)
         for inbox, received in work:
             self._guard(inbox.topic, inbox.callback, received)
         now = self.clock.now()
@@ -139,7 +158,7 @@ class Node:
         for timer in due:
             timer.schedule_next(now)
             self._guard("timer", timer.callback)
-        return bool(work or due)
+        return bool(work or due or config is not None)
 
     def start(self) -> None:
         """Serve callbacks and timers on a thread of its own."""
@@ -166,6 +185,9 @@ class Node:
             self.stuck = self._thread.is_alive()
         self._guard("stop", self.on_stop)
 
+    def on_reconfigure(self, config: Config) -> None:
+        """Take the parameters that can change from ``config``; by default there are none."""
+
     def on_stop(self) -> None:
         """Leave things as they should be left; called last, also after an exception."""
 
@@ -176,7 +198,8 @@ class Node:
 
     def _wait(self) -> None:
         with self._wake:
-            if self._running and not any(inbox.filled for inbox in self._inboxes):
+            idle = self._new_config is None and not any(inbox.filled for inbox in self._inboxes)
+            if self._running and idle:
                 due = self.next_due_s
                 self.clock.wait(self._wake, None if due is None else max(0.0, due - self.clock.now()))
 

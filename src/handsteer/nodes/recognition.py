@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handsteer.clock import Clock
-from handsteer.config import SignsConfig
+from handsteer.config import Config, SignsConfig
 from handsteer.images import bgr_image, image_message, jpeg_picture
 from handsteer.messages import HAND_SIGN, IMAGE_ANNOTATED, IMAGE_COMPRESSED, IMAGE_RAW, CompressedImage, Image, String
 from handsteer.nodes.frame_age import FrameAge
@@ -33,7 +33,7 @@ class HandSignRecognitionNode(Node):
         transport: Carries the messages.
         clock: The graph's clock.
         recognizer: Does the work.
-        config: Holds the greatest age of a frame.
+        config: Holds the greatest age of a frame, and which images to take.
         annotate: Draws what was understood into a copy of the frame, when anybody looks.
 
     Attributes:
@@ -59,12 +59,18 @@ class HandSignRecognitionNode(Node):
         self._recognition: Recognition | None = None
         self._sign = self.publisher(HAND_SIGN)
         self._annotated = self.publisher(IMAGE_ANNOTATED)
-        if config.image_transport == "compressed":
+        wanted = config.image_transport
+        if wanted == "compressed" or (wanted == "auto" and transport.crosses_network):
             self.subscribe(IMAGE_COMPRESSED, lambda received: self._on_frame(received, jpeg_picture))
         else:
             self.subscribe(IMAGE_RAW, lambda received: self._on_frame(received, bgr_image))
         self.every(_WATCH_PERIOD_S, self._watch)
         self.every(_DIAGNOSE_PERIOD_S, self._report)
+
+    def on_reconfigure(self, config: Config) -> None:
+        """Take the confidences and times of ``signs``."""
+        self._config = config.signs
+        self._recognizer.reconfigure(config.signs)
 
     def _on_frame(self, received: Received[M], picture_of: Callable[[M], NDArray[np.uint8]]) -> None:
         began_s = self.clock.now()

@@ -50,6 +50,10 @@ class SignFilter:
             self.sign = NONE
         return self.sign
 
+    def reconfigure(self, config: SignsConfig) -> None:
+        """Go on with other times; the sign that counts stays."""
+        self._config = config
+
     def reset(self) -> None:
         """Forget everything: the next sign starts from ``NONE``."""
         self._accept(NONE)

@@ -52,6 +52,10 @@ class Operator:
         self._config = config
         self.reset()
 
+    def reconfigure(self, config: SignsConfig) -> None:
+        """Go on with other times; the hand that is followed stays."""
+        self._config = config
+
     def reset(self) -> None:
         """Forget the hand that is followed."""
         self._followed: Place | None = None

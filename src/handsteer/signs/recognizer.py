@@ -80,6 +80,12 @@ class Recognizer:
             self._landmarker.follow_only(hand)
         return Recognition(sign, guess.sign, guess.confidence, self._filter.progress, hand)
 
+    def reconfigure(self, config: SignsConfig) -> None:
+        """Go on with other confidences and times; what is followed and what counts stays."""
+        self._config = config
+        self._filter.reconfigure(config)
+        self._operator.reconfigure(config)
+
     def reset(self) -> None:
         """Forget the stream: no hand is followed and no sign counts."""
         self._landmarker.reset()

@@ -34,14 +34,33 @@ def _dds(node: str, arguments: Sequence[str]) -> Session:
     try:
         from handsteer.transports.dds.session import DdsSession  # noqa: PLC0415
     except ModuleNotFoundError as problem:
-        if (problem.name or "").partition(".")[0] != "cyclonedds":
-            raise
-        raise TransportError(
+        raise _lacking(
+            problem,
             "the transport dds needs the package cyclonedds: run pip install 'cyclonedds>=11,<12' beside handsteer "
-            "(there is none for Python 3.14 and newer, nor for Linux on ARM)"
+            "(there is none for Python 3.14 and newer, nor for Linux on ARM; --transport zenoh works there)",
+            "cyclonedds",
         ) from None
     return DdsSession(node, arguments)
 
 
-TRANSPORTS: dict[str, Callable[[str, Sequence[str]], Session]] = {"ros1": _ros1, "dds": _dds}
+def _zenoh(node: str, arguments: Sequence[str]) -> Session:
+    try:
+        from handsteer.transports.zenoh.session import ZenohSession  # noqa: PLC0415
+    except ModuleNotFoundError as problem:
+        raise _lacking(problem, WITHOUT_ZENOH, "zenoh", "xxhash") from None
+    return ZenohSession(node, arguments)
+
+
+def _lacking(problem: ModuleNotFoundError, message: str, *modules: str) -> Exception:
+    """Return ``message`` as an error when what is missing is one of ``modules``, else ``problem`` itself."""
+    return TransportError(message) if (problem.name or "").partition(".")[0] in modules else problem
+
+
+WITHOUT_ZENOH = (
+    "the transport zenoh needs the packages eclipse-zenoh and xxhash: "
+    "run pip install 'eclipse-zenoh>=1.10,<2' xxhash beside handsteer"
+)
+"""What is said where Zenoh is not installed."""
+
+TRANSPORTS: dict[str, Callable[[str, Sequence[str]], Session]] = {"ros1": _ros1, "dds": _dds, "zenoh": _zenoh}
 """What joins a graph of several processes, by name."""

@@ -13,6 +13,8 @@ M = TypeVar("M")
 class InProcessTransport:
     """A :class:`~handsteer.transports.protocol.Transport` for the nodes of one process."""
 
+    crosses_network = False
+
     def __init__(self) -> None:
         self._types = TopicTypes()
         self._lock = threading.Lock()

@@ -6,6 +6,7 @@ from typing import Any, Generic, Protocol, TypeVar
 
 from handsteer.clock import Clock
 from handsteer.messages import Topic
+from handsteer.parameters import NodeParameters
 
 M = TypeVar("M")
 M_contra = TypeVar("M_contra", contravariant=True)
@@ -57,6 +58,11 @@ class Transport(Protocol):
     an inbox that keeps the newest only (:class:`handsteer.nodes.node.Node`).
     """
 
+    @property
+    def crosses_network(self) -> bool:
+        """Whether it may carry messages to other machines, so that large ones had better be small."""
+        ...
+
     def advertise(self, node: str, topic: Topic[M]) -> Publisher[M]:
         """Return the sending end of ``topic`` for the node named ``node``.
 
@@ -103,6 +109,10 @@ class Session(Protocol):
 
     @property
     def transport(self) -> Transport: ...  # noqa: D102
+
+    def serve(self, parameters: NodeParameters) -> None:
+        """Let others see and set the parameters of this process's node, where the graph has a way to do so."""
+        ...
 
     def wait(self, timeout_s: float) -> bool:
         """Wait for at most ``timeout_s`` seconds; return whether the graph has asked this process to end.

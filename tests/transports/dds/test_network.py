@@ -68,6 +68,22 @@ def test_the_users_configuration_wins() -> None:
     assert network({"ROS_AUTOMATIC_DISCOVERY_RANGE": "SYSTEM_DEFAULT"}).config is None
 
 
+@pytest.mark.parametrize(
+    ("environment", "local"),
+    [
+        ({}, True),
+        ({"ROS_AUTOMATIC_DISCOVERY_RANGE": "OFF"}, True),
+        ({"ROS_LOCALHOST_ONLY": "1", "ROS_STATIC_PEERS": "10.0.0.1"}, True),
+        ({"ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"}, False),
+        ({"ROS_STATIC_PEERS": "10.0.0.1"}, False),
+        ({"CYCLONEDDS_URI": "file:///my.xml"}, False),
+        ({"ROS_AUTOMATIC_DISCOVERY_RANGE": "SYSTEM_DEFAULT"}, False),
+    ],
+)
+def test_whether_others_may_be_on_other_machines(environment: dict[str, str], local: bool) -> None:
+    assert network(environment).is_local is local
+
+
 def test_domain_and_distribution() -> None:
     assert network({}).domain == 0
     assert network({"ROS_DOMAIN_ID": "42", "CYCLONEDDS_URI": "x"}).domain == 42

@@ -25,14 +25,13 @@ class Dispatcher:
 
     Args:
         participant: Whose readers are served.
-        tick: Called four times a second, too.
     """
 
-    def __init__(self, participant: DomainParticipant, tick: Callable[[], None]) -> None:
+    def __init__(self, participant: DomainParticipant) -> None:
         self._waitset = WaitSet(participant)
         self._guard = GuardCondition(participant)
         self._waitset.attach(self._guard)
-        self._tick = tick
+        self._ticks: tuple[Callable[[], None], ...] = ()
         self._lock = threading.Lock()
         self._served: dict[DataReader[Any], tuple[ReadCondition, Callable[[], None]]] = {}
         self._closing = threading.Event()
@@ -48,6 +47,11 @@ class Dispatcher:
         with self._lock:
             self._served[reader] = (condition, serve)
             self._waitset.attach(condition)
+
+    def tick(self, call: Callable[[], None]) -> None:
+        """Call ``call`` four times a second, and whenever something has come."""
+        with self._lock:
+            self._ticks = (*self._ticks, call)
 
     def remove(self, reader: DataReader[Any]) -> None:
         """Serve ``reader`` no more; one call may still be under way."""
@@ -69,7 +73,8 @@ class Dispatcher:
         while not self._closing.is_set():
             self._guarded(self._wait)
             self._serve_all()
-            self._guarded(self._tick)
+            for call in self._ticks:
+                self._guarded(call)
 
     def _wait(self) -> None:
         self._waitset.wait(round(_TICK_S * _NS_PER_S))

@@ -1,4 +1,7 @@
-"""Says in words why a publisher and a subscriber of one topic are not connected; DDS itself keeps silent."""
+"""Says in words why a publisher and a subscriber of one topic are not connected; DDS itself keeps silent.
+
+It also says when raw images go to where many of them are lost, though they could go as JPEG.
+"""
 
 import logging
 import threading
@@ -7,18 +10,31 @@ import uuid
 from dataclasses import dataclass
 from typing import Any
 
-from cyclonedds.builtin import BuiltinDataReader, BuiltinTopicDcpsPublication, BuiltinTopicDcpsSubscription
+from cyclonedds.builtin import (
+    BuiltinDataReader,
+    BuiltinTopicDcpsParticipant,
+    BuiltinTopicDcpsPublication,
+    BuiltinTopicDcpsSubscription,
+)
 from cyclonedds.core import Qos
 from cyclonedds.domain import DomainParticipant
 
+from handsteer.messages import Image, type_name
 from handsteer.transports.dds.discovery import DISCOVERY_TOPIC, RosGraph
-from handsteer.transports.dds.qos import describe, misfits
+from handsteer.transports.dds.qos import describe, host, misfits
+from handsteer.transports.ros2.encoding import dds_type_name, ros_type_name
 
 log = logging.getLogger(__name__)
 
 _AT_ONCE = 64
 # A node tells its name after its publishers and subscribers: Cyclone DDS at once, Fast DDS up to three seconds later.
 _NAME_DUE_S = 4.0
+_IMAGE = dds_type_name(type_name(Image))
+_COMPRESSED = "/compressed"
+# Identifiers begin with the number of the vendor, and with twelve bytes that all of a participant have (RTPS 2.5, 9.3).
+_FAST_DDS = b"\x01\x0f"
+_PREFIX_BYTES = 12
+_PARTICIPANTS = 1000
 
 
 @dataclass(frozen=True)
@@ -59,6 +75,8 @@ class Matching:
         self._theirs: dict[uuid.UUID, Endpoint] = {}
         self._pending: dict[uuid.UUID, float] = {}
         self._said: set[uuid.UUID] = set()
+        self._advised = False
+        self._participants: Any = BuiltinDataReader(participant, BuiltinTopicDcpsParticipant)
         self.publications: Any = BuiltinDataReader(participant, BuiltinTopicDcpsPublication)
         self.subscriptions: Any = BuiltinDataReader(participant, BuiltinTopicDcpsSubscription)
 
@@ -82,7 +100,7 @@ class Matching:
         now = time.monotonic()
         with self._lock:
             due = [key for key, due_s in self._pending.items() if due_s <= now or self._graph.node_of(key)]
-            lines = [self._line(key) for key in due]
+            lines = [line for key in due if (line := self._line(key))]
             for key in due:
                 del self._pending[key]
         for line in lines:
@@ -90,7 +108,7 @@ class Matching:
 
     def close(self) -> None:
         """Look no more; may be called twice."""
-        self.publications = self.subscriptions = None
+        self.publications = self.subscriptions = self._participants = None
 
     def _serve(self, reader: Any, *, publishes: bool) -> None:
         for seen in reader.take(_AT_ONCE):
@@ -110,14 +128,39 @@ class Matching:
 
     def _compare(self, key: uuid.UUID) -> None:
         ours = self._ours_for(key)
-        if ours is not None and key not in self._said and reasons(ours, self._theirs[key]):
+        if ours is None or key in self._said:
+            return
+        if reasons(ours, self._theirs[key]) or (ours.type == _IMAGE and ours.publishes):
             self._said.add(key)
             self._pending[key] = time.monotonic() + _NAME_DUE_S
 
-    def _line(self, key: uuid.UUID) -> str:
+    def _line(self, key: uuid.UUID) -> str | None:
         ours = self._ours_for(key)
         assert ours is not None
-        return explain(ours, self._theirs[key], self._graph.node_of(key))
+        node = self._graph.node_of(key)
+        if reasons(ours, self._theirs[key]):
+            return explain(ours, self._theirs[key], node)
+        has_compressed = (f"{ours.topic}{_COMPRESSED}", True) in self._ours
+        if self._advised or not has_compressed or not self._loses_images(key):
+            return None
+        self._advised = True
+        name = ours.topic.removeprefix("rt")
+        return (
+            f"{name}: {node or 'a node without a name'} takes raw images, many of which are lost on the way to another "
+            f"machine or to Fast DDS: let it take {name}{_COMPRESSED}"
+        )
+
+    def _loses_images(self, key: uuid.UUID) -> bool:
+        """Return whether raw images may be lost on the way to another's subscriber."""
+        if key.bytes.startswith(_FAST_DDS):
+            return True
+        hosts = {
+            seen.key.bytes[:_PREFIX_BYTES]: host(seen.qos)
+            for seen in self._participants.read(_PARTICIPANTS)
+            if seen.sample_info.valid_data
+        }
+        theirs, ours = (hosts.get(one.bytes[:_PREFIX_BYTES]) for one in (key, self._own))
+        return theirs is not None and theirs != ours
 
     def _forget(self, key: uuid.UUID) -> None:
         gone = self._theirs.pop(key, None)
@@ -130,7 +173,7 @@ class Matching:
 def reasons(ours: Endpoint, theirs: Endpoint) -> list[str]:
     """Return why a publisher and a subscriber of one topic are not connected, in words; empty when they are."""
     if ours.type != theirs.type:
-        return [f"ours has the type {_ros_type(ours.type)}, theirs {_ros_type(theirs.type)}"]
+        return [f"ours has the type {ros_type_name(ours.type)}, theirs {ros_type_name(theirs.type)}"]
     return misfits(ours.qos, theirs.qos) if ours.publishes else misfits(theirs.qos, ours.qos)
 
 
@@ -141,7 +184,3 @@ def explain(ours: Endpoint, theirs: Endpoint, node: str | None) -> str:
         f"{ours.topic.removeprefix('rt')}: nothing passes between our {ours.kind} and the {theirs.kind} of {who}: "
         f"{'; '.join(reasons(ours, theirs))} (ours: {describe(ours.qos)}; theirs: {describe(theirs.qos)})"
     )
-
-
-def _ros_type(name: str) -> str:
-    return name.replace("::dds_::", "::").replace("::", "/").removesuffix("_")

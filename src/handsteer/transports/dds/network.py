@@ -5,9 +5,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from handsteer.errors import TransportError
+from handsteer.transports.ros2.domain import domain_id
 
 _RANGES = ("LOCALHOST", "SUBNET", "OFF", "SYSTEM_DEFAULT")
-_LARGEST_DOMAIN = 232  # those above have no UDP ports
 _ADDRESS = re.compile(r"[A-Za-z0-9_.:%\[\]-]+")
 # How soon others find us again after a cut that was so long that they gave us up: Cyclone's default is half a minute.
 _ANNOUNCE_S = 2
@@ -24,11 +24,13 @@ class Network:
         domain: Number of the DDS domain, 0 to 232.
         config: Configuration of Cyclone DDS, as XML; None leaves it to the user's ``CYCLONEDDS_URI`` or its defaults.
         distribution: The ROS 2 distribution whose discovery is spoken: ``humble``, or ``jazzy`` for all newer ones.
+        is_local: Whether only this machine is looked at, for sure.
     """
 
     domain: int
     config: str | None
     distribution: str = "jazzy"
+    is_local: bool = False
 
 
 def network(environment: Mapping[str, str]) -> Network:
@@ -40,7 +42,7 @@ def network(environment: Mapping[str, str]) -> Network:
     Raises:
         TransportError: A variable has a value that is not allowed.
     """
-    domain = _domain(environment.get("ROS_DOMAIN_ID", ""))
+    domain = domain_id(environment)
     distribution = "humble" if environment.get("ROS_DISTRO") == "humble" else "jazzy"
     reach = _range(environment)
     peers = _peers(environment.get("ROS_STATIC_PEERS", ""))
@@ -48,15 +50,7 @@ def network(environment: Mapping[str, str]) -> Network:
         return Network(domain, None, distribution)
     if environment.get("ROS_LOCALHOST_ONLY") == "1" or reach == "OFF":
         peers = []
-    return Network(domain, _config(reach, peers), distribution)
-
-
-def _domain(text: str) -> int:
-    if not text:
-        return 0
-    if not (text.isascii() and text.isdigit() and int(text) <= _LARGEST_DOMAIN):
-        raise TransportError(f"ROS_DOMAIN_ID is {text!r}: it should be a whole number from 0 to {_LARGEST_DOMAIN}")
-    return int(text)
+    return Network(domain, _config(reach, peers), distribution, is_local=reach != "SUBNET" and not peers)
 
 
 def _range(environment: Mapping[str, str]) -> str:

@@ -1,5 +1,6 @@
 """This process as a participant of a DDS domain and a node of ROS 2: what it publishes and subscribes to."""
 
+import itertools
 import threading
 from collections.abc import Callable
 from typing import Any
@@ -16,15 +17,21 @@ from handsteer.transports.dds.discovery import RosGraph
 from handsteer.transports.dds.dispatcher import Dispatcher
 from handsteer.transports.dds.matching import Endpoint, Matching
 from handsteer.transports.dds.network import Network
-from handsteer.transports.dds.qos import reader_qos, writer_qos
-from handsteer.transports.dds.types import dds_type, dds_type_name
+from handsteer.transports.dds.qos import reader_qos, service_qos, writer_qos
+from handsteer.transports.dds.types import dds_type, service_dds_type
+from handsteer.transports.ros2.encoding import dds_type_name
 from handsteer.transports.ros2.names import NodeName
+from handsteer.transports.ros2.service_types import Service
 
 _USER_DATA = b"enclave=/;"
 
 
 class Participant:
     """A participant of a DDS domain, known to ROS 2 as one node.
+
+    Attributes:
+        name: The node's name.
+        is_local: Whether all others are on this machine, for sure.
 
     Args:
         network: The domain, and where to look for others.
@@ -36,6 +43,7 @@ class Participant:
 
     def __init__(self, network: Network, name: NodeName) -> None:
         self.name = name
+        self.is_local = network.is_local
         try:
             self._domain: Any = None if network.config is None else Domain(network.domain, network.config)
             self._participant: Any = DomainParticipant(network.domain, Qos(Policy.Userdata(_USER_DATA)))
@@ -46,9 +54,11 @@ class Participant:
             ) from None
         self._lock = threading.Lock()
         self._topics: dict[str, Any] = {}
+        self._service_numbers = itertools.count(1)
         self._graph = RosGraph(self._participant, name, network.distribution)
         self._matching = Matching(self._participant, self._graph)
-        self._dispatcher = Dispatcher(self._participant, self._matching.tick)
+        self._dispatcher = Dispatcher(self._participant)
+        self._dispatcher.tick(self._matching.tick)
         self._dispatcher.add(self._graph.reader, self._graph.serve)
         self._dispatcher.add(self._matching.publications, self._matching.serve_publications)
         self._dispatcher.add(self._matching.subscriptions, self._matching.serve_subscriptions)
@@ -69,6 +79,23 @@ class Participant:
         self._graph.add(reader)
         self._matching.add(self._endpoint(topic, qos, publishes=False))
         return reader
+
+    def service(self, name: str, service: Service) -> tuple[DataReader[Any], DataWriter[Any]]:
+        """Return a new reader of the requests and a new writer of the replies of the service of this full name."""
+        # As ROS 2 makes them: the participant's part of an identifier, and a number.
+        number = next(self._service_numbers).to_bytes(4, "big")
+        identity = ".".join(f"{byte:x}" for byte in self._participant.guid.bytes[:12] + number)
+        requests = DdsTopic(self._participant, f"rq{name}Request", service_dds_type(service.request))
+        replies = DdsTopic(self._participant, f"rr{name}Reply", service_dds_type(service.reply))
+        reader: DataReader[Any] = DataReader(self._participant, requests, qos=service_qos(service.request, identity))
+        writer: DataWriter[Any] = DataWriter(self._participant, replies, qos=service_qos(service.reply, identity))
+        self._graph.add(reader)
+        self._graph.add(writer)
+        return reader, writer
+
+    def tick(self, call: Callable[[], None]) -> None:
+        """Call ``call`` on the DDS thread, four times a second and whenever something has come."""
+        self._dispatcher.tick(call)
 
     def serve(self, reader: DataReader[Any], serve: Callable[[], None]) -> None:
         """Call ``serve`` on the DDS thread whenever ``reader`` has something, until it is released."""

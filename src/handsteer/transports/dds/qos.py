@@ -1,20 +1,17 @@
-"""Quality of service: what we offer and request for each kind of topic, and why two ends do not fit.
+"""Quality of service in DDS: our profiles in its terms, and why two ends do not fit.
 
-Commands, signs and what follows from them are reliable. Images and ``/clock`` are best effort, as ROS 2's
-``sensor_data`` has it: a late one is of no use. Of a robot's state we offer reliable and request best effort, which
-fits with any robot. A writer never waits for a slow reader. Commands and signs have a lifespan, so that a link that
-comes back does not bring old ones.
+A writer never waits for a slow reader. Commands and signs have a lifespan, so that a link that comes back does not
+bring old ones; the log has one, so that who comes late gets what is new.
 """
 
 from typing import Any
 
 from cyclonedds.core import Policy, Qos
 
-from handsteer.messages import ClockMessage, CompressedImage, Image, JointState, Odometry, Topic, type_name
+from handsteer.messages import Topic, type_name
 from handsteer.transports.ros2.encoding import type_hash
+from handsteer.transports.ros2.profiles import Profile, offered, requested
 
-_SENSOR_DATA = (Image, CompressedImage, ClockMessage)
-_STATE = (Odometry, JointState)
 _RELIABLE = Policy.Reliability.Reliable(0)
 _BEST_EFFORT = Policy.Reliability.BestEffort
 _VOLATILE, _TRANSIENT_LOCAL = Policy.Durability.Volatile, Policy.Durability.TransientLocal
@@ -27,18 +24,22 @@ _LIVELINESS = (
 )
 _NEVER_NS = 2**63 - 1
 _NS_PER_S = 1_000_000_000
+_REQUESTS = 1000
 
 
 def writer_qos(topic: Topic[Any]) -> Qos:
     """Return what a publisher of ``topic`` offers."""
-    offered = _qos(topic, reliable=topic.type not in _SENSOR_DATA)
-    lifespan_s = topic.lifespan_s
-    return offered if lifespan_s is None else Qos(Policy.Lifespan(round(lifespan_s * _NS_PER_S)), base=offered)
+    policies = list(_qos(topic, offered(topic)))
+    if topic.latched:  # late subscribers get as many as are kept
+        policies.append(Policy.DurabilityService(0, Policy.History.KeepLast(topic.depth), -1, -1, -1))
+    if topic.lifespan_s is not None:
+        policies.append(Policy.Lifespan(round(topic.lifespan_s * _NS_PER_S)))
+    return Qos(*policies)
 
 
 def reader_qos(topic: Topic[Any]) -> Qos:
     """Return what a subscriber of ``topic`` requests."""
-    return _qos(topic, reliable=topic.type not in (*_SENSOR_DATA, *_STATE))
+    return _qos(topic, requested(topic))
 
 
 def discovery_qos(name: str, depth: int) -> Qos:
@@ -50,6 +51,30 @@ def discovery_qos(name: str, depth: int) -> Qos:
     """
     history = Policy.History.KeepLast(depth)
     return Qos(_RELIABLE, _TRANSIENT_LOCAL, history, _CDR, Policy.IgnoreLocal.Participant, _user_data(name))
+
+
+def service_qos(name: str, service: str) -> Qos:
+    """Return what ROS 2 has for both ends of a parameter service.
+
+    Args:
+        name: Type of the request or the reply.
+        service: Identifies the service; the same for its reader and its writer.
+    """
+    data = Policy.Userdata(f"serviceid={service};typehash={type_hash(name)};".encode())
+    return Qos(_RELIABLE, _VOLATILE, Policy.History.KeepLast(_REQUESTS), _CDR, data)
+
+
+def user_data(qos: Qos) -> dict[str, str]:
+    """Return what ROS 2 has put into the user data: ``typehash``, ``clientid`` and others."""
+    data = _find(qos, "Userdata")
+    text = data.data.decode("utf-8", "replace") if data is not None else ""
+    return {name: value for name, equals, value in (part.partition("=") for part in text.split(";")) if equals}
+
+
+def host(qos: Qos) -> str | None:
+    """Return the name of the machine that a participant of Cyclone DDS is on; None when it does not say."""
+    found = _find(qos, "Property<__Hostname>")
+    return found.value if found is not None else None
 
 
 def describe(qos: Qos) -> str:
@@ -85,11 +110,11 @@ def misfits(offered: Qos, requested: Qos) -> list[str]:
 _CDR = Policy.DataRepresentation(use_cdrv0_representation=True)
 
 
-def _qos(topic: Topic[Any], *, reliable: bool) -> Qos:
+def _qos(topic: Topic[Any], profile: Profile) -> Qos:
     return Qos(
-        _RELIABLE if reliable else _BEST_EFFORT,
-        _TRANSIENT_LOCAL if topic.latched else _VOLATILE,
-        Policy.History.KeepLast(topic.depth),
+        _RELIABLE if profile.reliable else _BEST_EFFORT,
+        _TRANSIENT_LOCAL if profile.latched else _VOLATILE,
+        Policy.History.KeepLast(profile.depth),
         _CDR,
         _user_data(type_name(topic.type)),
     )

@@ -1,76 +1,30 @@
-"""This process as a node of a ROS 2 graph over DDS: name, parameters and time."""
+"""This process as a node of a ROS 2 graph over DDS."""
 
-import logging
 import os
-import threading
-from collections.abc import Sequence
+from collections.abc import Callable
 from typing import Any
 
-from handsteer.clock import Clock, SimulatedClock, WallClock, to_seconds
-from handsteer.errors import TransportError
-from handsteer.messages import CLOCK
+from handsteer.clock import Clock
 from handsteer.transports.dds.network import network
 from handsteer.transports.dds.participant import Participant
+from handsteer.transports.dds.services import ServiceServer
 from handsteer.transports.dds.transport import DdsTransport
-from handsteer.transports.ros2.arguments import parse_arguments
-from handsteer.transports.ros2.names import identify
-
-_CLOCK_SILENCE_S = 2.0
-_DELIVER_S = 0.2
-_LEVELS = {"debug": 10, "info": 20, "warn": 30, "error": 40, "fatal": 50}
-
-log = logging.getLogger(__name__)
+from handsteer.transports.ros2.names import NodeName
+from handsteer.transports.ros2.service_types import Service
+from handsteer.transports.ros2.session import Ros2Session
 
 
-class DdsSession:
-    """A :class:`~handsteer.transports.protocol.Session` of ROS 2, over DDS.
-
-    Args:
-        node: Name of the node, unless ``arguments`` rename it.
-        arguments: ROS 2's own: ``--ros-args -r topic:=other -r __node:=name -r __ns:=/r1 -p parameter:=value
-            --params-file file.yaml``.
-
-    Raises:
-        TransportError: The domain cannot be joined, or an argument or one of ROS 2's environment variables is wrong.
-    """
-
-    def __init__(self, node: str, arguments: Sequence[str]) -> None:
-        said = parse_arguments(arguments)
-        name = identify(node, said.remaps)
-        self.name = name.full
-        self.parameters: dict[str, Any] = said.parameters(self.name)
-        simulated = self.parameters.pop("use_sim_time", False)
-        if not isinstance(simulated, bool):
-            raise TransportError(f"parameter use_sim_time is {simulated!r}: it should be true or false")
-        if said.log_level:
-            logging.getLogger("handsteer").setLevel(_LEVELS[said.log_level])
-        self._participant = Participant(network(os.environ), name)
-        self.clock: Clock = SimulatedClock() if simulated else WallClock()
-        self.transport = DdsTransport(self._participant, self.clock)
-        if isinstance(self.clock, SimulatedClock):
-            self._follow(self.clock)
-        self._was_silent = False
-        self._left = threading.Event()
-
-    def wait(self, timeout_s: float) -> bool:
-        """Wait for at most ``timeout_s`` seconds; return whether this session has been closed.
-
-        ROS 2 itself asks no node to end.
-        """
-        silent = isinstance(self.clock, SimulatedClock) and self.clock.silence_s > _CLOCK_SILENCE_S
-        if silent and not self._was_silent:
-            log.warning("use_sim_time is set, but /clock stands still: frames count as old, the robot stands")
-        self._was_silent = silent
-        return self._left.wait(timeout_s)
+class DdsSession(Ros2Session):
+    """A :class:`~handsteer.transports.protocol.Session` of ROS 2, over DDS."""
 
     def close(self) -> None:
         """Deliver what was published, then leave the graph; may be called twice."""
-        if self._left.is_set():
-            return
-        self._left.set()
-        self.transport.flush(_DELIVER_S)
-        self.transport.close()
+        super().close()
         self._participant.close()
 
-    def _follow(self, clock: SimulatedClock) -> None:
-        self.transport.subscribe("clock", CLOCK, lambda received: clock.tell(to_seconds(received.message.clock)))
+    def _connect(self, name: NodeName, clock: Clock) -> DdsTransport:
+        self._participant = Participant(network(os.environ), name)
+        return DdsTransport(self._participant, clock)
+
+    def _answer(self, name: str, service: Service, answer: Callable[[Any], Any]) -> ServiceServer:
+        return ServiceServer(self._participant, name, service, answer)

@@ -43,6 +43,11 @@ class DdsTransport:
         self._publishers: list[DdsPublisher[Any]] = []
         self._incoming: dict[str, Fanout[Any]] = {}
 
+    @property
+    def crosses_network(self) -> bool:
+        """Whether others may be on other machines."""
+        return not self._participant.is_local
+
     def advertise(self, node: str, topic: Topic[M]) -> "DdsPublisher[M]":
         """Return the sending end of ``topic`` for the node named ``node``."""
         self._claim(topic)

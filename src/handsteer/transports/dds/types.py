@@ -11,7 +11,7 @@ import cyclonedds.idl.types
 from cyclonedds.idl import make_idl_struct
 from rosbags.interfaces import Nodetype
 
-from handsteer.transports.ros2.encoding import types
+from handsteer.transports.ros2.encoding import dds_type_name, types
 
 idl: Any = cyclonedds.idl.types
 
@@ -26,17 +26,24 @@ _BASES: dict[str, Any] = {
 }
 
 
-def dds_type_name(name: str) -> str:
-    """Return ROS 2's name in DDS for a type: ``geometry_msgs::msg::dds_::Twist_`` for ``geometry_msgs/msg/Twist``."""
-    package, kind, message = name.split("/")
-    return f"{package}::{kind}::dds_::{message}_"
-
-
 @functools.cache
 def dds_type(name: str, distribution: str = "jazzy") -> Any:
     """Return the DDS type for the message type ``name``; its instances hold encoded messages in ``raw``."""
+    return _struct(name, distribution, {})
+
+
+@functools.cache
+def service_dds_type(name: str) -> Any:
+    """Return the DDS type for ``name``, a request or a reply, with the 16 bytes before it by which they are told apart.
+
+    Cyclone DDS looks at what it sends and gets, and lets nothing pass that is not of the type.
+    """
+    return _struct(name, "jazzy", {"client": idl.uint64, "number": idl.int64})
+
+
+def _struct(name: str, distribution: str, before: dict[str, Any]) -> Any:
     _, fields = types(distribution).fielddefs[name]
-    members = {field: _idl(kind, distribution) for field, kind in fields}
+    members = {**before, **{field: _idl(kind, distribution) for field, kind in fields}}
     struct = make_idl_struct(name.rpartition("/")[2], dds_type_name(name), members, dataclassify=False)
     for method, passing in _PASSING.items():
         setattr(struct, method, passing)

@@ -9,6 +9,7 @@ from typing import Any
 
 from handsteer.clock import Clock, SimulatedClock, WallClock
 from handsteer.errors import TransportError
+from handsteer.parameters import NodeParameters
 
 try:
     import rosgraph
@@ -59,6 +60,9 @@ class Ros1Session:
         self.transport = Ros1Transport(self.clock)
         self._watcher = threading.Thread(target=self._watch, name="ros1_session", daemon=True)
         self._watcher.start()
+
+    def serve(self, parameters: NodeParameters) -> None:
+        """Do nothing: ROS 1 has its parameters on the master, and nodes read them when they start."""
 
     def wait(self, timeout_s: float) -> bool:
         """Wait for at most ``timeout_s`` seconds; return whether ROS has asked this process to end (`rosnode kill`).

@@ -17,10 +17,9 @@ from handsteer.transports.ros2.names import Remap
 
 _RULE = re.compile(r"(?:(?P<node>[A-Za-z_]\w*):(?!//))?(?P<name>[^:]+|rostopic://[^:]+|rosservice://[^:]+)")
 _PARAMETER = re.compile(r"(?:(?P<node>/?[A-Za-z_][\w/]*):)?(?P<name>[A-Za-z_][\w.]*)")
+_ROSOUT = {"--enable-rosout-logs": True, "--disable-rosout-logs": False}
 _WITHOUT_VALUE = frozenset(
-    f"--{switch}-{what}"
-    for switch in ("enable", "disable")
-    for what in ("rosout-logs", "stdout-logs", "external-lib-logs")
+    f"--{switch}-{what}" for switch in ("enable", "disable") for what in ("stdout-logs", "external-lib-logs")
 )
 _VALUES = {
     "-r": "a rule as image_raw:=camera/image, __node:=name or __ns:=/r1",
@@ -62,11 +61,13 @@ class Arguments:
         remaps: Rules for names, in their order.
         rules: Parameters, in their order; later ones win.
         log_level: How much is logged: debug, info, warn, error or fatal; None when it was not said.
+        rosout: Whether what is logged is published on ``/rosout``, too.
     """
 
     remaps: list[Remap] = field(default_factory=list)
     rules: list[ParameterRule] = field(default_factory=list)
     log_level: str | None = None
+    rosout: bool = True
 
     def parameters(self, node: str) -> dict[str, Any]:
         """Return the parameters of the node of this full name; those with dots are nested."""
@@ -103,6 +104,8 @@ def parse_arguments(words: Sequence[str]) -> Arguments:
             found.rules.extend(_parameter_file(Path(value).expanduser()))
         elif flag == "--log-level":
             found.log_level = _log_level(value) or found.log_level
+        elif flag in _ROSOUT:
+            found.rosout = _ROSOUT[flag]
     return found
 
 
@@ -122,6 +125,8 @@ def _pairs(words: Sequence[str]) -> Iterator[tuple[str, str]]:
             if value is None or value in {"--ros-args", "--"}:
                 raise TransportError(f"{word} lacks its value: {_VALUES[flag]}")
             yield flag, value
+        elif word in _ROSOUT:
+            yield word, ""
         elif word not in _WITHOUT_VALUE:
             known = ", ".join(_VALUES)
             raise TransportError(f"{word!r} is no argument of ROS 2: after --ros-args there may be {known}")

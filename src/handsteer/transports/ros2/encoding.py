@@ -6,6 +6,8 @@ from typing import Any
 from rosbags.typesys import Stores, get_typestore
 from rosbags.typesys.store import Typestore
 
+from handsteer.transports.ros2.service_types import register_services
+
 _DISCOVERY = "rmw_dds_common/msg/ParticipantEntitiesInfo"
 # The hash leaves out what rosbags cannot tell: that ROS 2 makes a uint8 of a char.
 _KNOWN_HASHES = {_DISCOVERY: "RIHS01_91a0593bacdcc50ea9bdcf849a938b128412cc1ea821245c663bcd26f83c295e"}
@@ -13,8 +15,15 @@ _KNOWN_HASHES = {_DISCOVERY: "RIHS01_91a0593bacdcc50ea9bdcf849a938b128412cc1ea82
 
 @functools.cache
 def types(distribution: str = "jazzy") -> Typestore:
-    """Return the message types of a ROS 2 distribution: ``humble`` or newer ones, which are alike, ``jazzy``."""
-    return get_typestore(Stores.ROS2_HUMBLE if distribution == "humble" else Stores.ROS2_JAZZY)
+    """Return the message types of a ROS 2 distribution: ``humble`` or newer ones, which are alike, ``jazzy``.
+
+    The types of the parameter services are with ``jazzy``, and are the same in both.
+    """
+    if distribution == "humble":
+        return get_typestore(Stores.ROS2_HUMBLE)
+    store = get_typestore(Stores.ROS2_JAZZY)
+    register_services(store)
+    return store
 
 
 def encode(message: Any) -> bytes:
@@ -32,5 +41,16 @@ def decode(raw: bytes, name: str) -> Any:
 
 
 def type_hash(name: str) -> str:
-    """Return the hash of the type ``name``, as ``RIHS01_df66…`` (ROS REP 2016)."""
+    """Return the hash of the message, request, reply or service ``name``, as ``RIHS01_df66…`` (ROS REP 2016)."""
     return _KNOWN_HASHES.get(name) or types().hash_rihs01(name)
+
+
+def dds_type_name(name: str) -> str:
+    """Return ROS 2's name in DDS for a type: ``geometry_msgs::msg::dds_::Twist_`` for ``geometry_msgs/msg/Twist``."""
+    package, kind, message = name.split("/")
+    return f"{package}::{kind}::dds_::{message}_"
+
+
+def ros_type_name(dds_name: str) -> str:
+    """Return the type's name in ROS 2, ``geometry_msgs/msg/Twist``, for its name in DDS."""
+    return dds_name.replace("::dds_::", "::").replace("::", "/").removesuffix("_")

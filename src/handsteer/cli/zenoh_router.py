@@ -1,0 +1,43 @@
+"""``handsteer zenoh-router``: where nodes over Zenoh find each other."""
+
+import os
+import threading
+from typing import Any
+
+from handsteer.cli.options import say
+from handsteer.errors import TransportError
+from handsteer.transports import WITHOUT_ZENOH
+
+
+def zenoh_router(*, listen: str | None = None) -> int:
+    """Be the router by which nodes over Zenoh find each other, until you press Ctrl-C.
+
+    ROS 2's own, ros2 run rmw_zenoh_cpp rmw_zenohd, does the same; one of them is enough for a machine.
+
+    Example: handsteer zenoh-router
+
+    Parameters
+    ----------
+    listen
+        Where to listen: tcp/localhost:7447, for this machine only, unless given. tcp/[::]:7447 lets others in.
+    """
+    router = _open(listen)
+    try:
+        say(f"the Zenoh router listens at {' and '.join(router.endpoints)}")
+        threading.Event().wait()
+    except KeyboardInterrupt:
+        pass  # the ordinary end of a router
+    finally:
+        router.close()
+    return 0
+
+
+def _open(listen: str | None) -> Any:
+    try:
+        # Zenoh is not everywhere, and is loaded only when it is used.
+        from handsteer.transports.zenoh.router import Router  # noqa: PLC0415
+    except ModuleNotFoundError as problem:
+        if (problem.name or "").partition(".")[0] != "zenoh":
+            raise
+        raise TransportError(WITHOUT_ZENOH) from None
+    return Router(os.environ, listen)

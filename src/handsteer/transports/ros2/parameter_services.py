@@ -1,0 +1,201 @@
+"""What a ROS 2 node answers when others ask for its parameters, as ``ros2 param`` does: a request in, a reply out.
+
+The rules are those of rclcpp's and rclpy's own parameter services: who asks for several values of which one is unknown
+gets an empty list; ``set_parameters`` sets one at a time, ``set_parameters_atomically`` all or none. Types are strict,
+but a whole number does for a double, as on the command line.
+"""
+
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any
+
+import numpy as np
+
+from handsteer.errors import ConfigError
+from handsteer.messages import ParameterEvent, Time, Topic
+from handsteer.parameters import Description, NodeParameters, Value
+from handsteer.transports.ros2.encoding import types
+from handsteer.transports.ros2.service_types import (
+    DESCRIBE_PARAMETERS,
+    GET_PARAMETER_TYPES,
+    GET_PARAMETERS,
+    LIST_PARAMETERS,
+    SET_PARAMETERS,
+    SET_PARAMETERS_ATOMICALLY,
+    Service,
+)
+
+PARAMETER_EVENTS = Topic("/parameter_events", ParameterEvent, is_global=True, depth=1000)
+"""Which parameters of which node have changed."""
+
+NOT_SET = 0
+_TYPES = {"bool": 1, "integer": 2, "double": 3, "string": 4}
+_FIELDS = {1: "bool_value", 2: "integer_value", 3: "double_value", 4: "string_value"}
+_ARRAYS = ("byte_array_value", "bool_array_value", "integer_array_value", "double_array_value", "string_array_value")
+_INTERFACES = "rcl_interfaces/msg"
+
+
+class ParameterServices:
+    """Answers for one node.
+
+    Args:
+        node: Full name of the node, as ``/r1/hand_sign_control``.
+        parameters: Its parameters.
+        now: Returns the time as ROS has it.
+        tell: Publishes an event on :data:`PARAMETER_EVENTS`, after each change.
+    """
+
+    def __init__(
+        self,
+        node: str,
+        parameters: NodeParameters,
+        now: Callable[[], Time],
+        tell: Callable[[ParameterEvent], None],
+    ) -> None:
+        self._node = node
+        self._parameters = parameters
+        self._now = now
+        self._tell = tell
+
+    @property
+    def services(self) -> list[tuple[str, Service, Callable[[Any], Any]]]:
+        """Full name, type, and what turns a request into a reply, of each service."""
+        return [
+            (f"{self._node}/list_parameters", LIST_PARAMETERS, self._list),
+            (f"{self._node}/get_parameters", GET_PARAMETERS, self._get),
+            (f"{self._node}/get_parameter_types", GET_PARAMETER_TYPES, self._get_types),
+            (f"{self._node}/describe_parameters", DESCRIBE_PARAMETERS, self._describe),
+            (f"{self._node}/set_parameters", SET_PARAMETERS, self._set),
+            (f"{self._node}/set_parameters_atomically", SET_PARAMETERS_ATOMICALLY, self._set_atomically),
+        ]
+
+    def _list(self, request: Any) -> Any:
+        names, prefixes = list_names(self._parameters.values(), request.prefixes, request.depth)
+        return _new(LIST_PARAMETERS.reply, result=_message("ListParametersResult", names=names, prefixes=prefixes))
+
+    def _get(self, request: Any) -> Any:
+        values = self._parameters.values()
+        known = all(name in values for name in request.names)
+        found = [_value(self._kind(name), values[name]) for name in request.names] if known else []
+        return _new(GET_PARAMETERS.reply, values=found)
+
+    def _get_types(self, request: Any) -> Any:
+        descriptions = self._descriptions(request.names)
+        return _new(
+            GET_PARAMETER_TYPES.reply, types=np.array([_TYPES[each.kind] for each in descriptions], dtype=np.uint8)
+        )
+
+    def _describe(self, request: Any) -> Any:
+        descriptions = self._descriptions(request.names)
+        descriptors = [_descriptor(name, each) for name, each in zip(request.names, descriptions, strict=False)]
+        return _new(DESCRIBE_PARAMETERS.reply, descriptors=descriptors)
+
+    def _set(self, request: Any) -> Any:
+        return _new(SET_PARAMETERS.reply, results=[self._change([one]) for one in request.parameters])
+
+    def _set_atomically(self, request: Any) -> Any:
+        return _new(SET_PARAMETERS_ATOMICALLY.reply, result=self._change(request.parameters))
+
+    def _change(self, parameters: Sequence[Any]) -> Any:
+        before = self._parameters.values()
+        try:
+            self._parameters.set({one.name: _read(one) for one in parameters})
+        except ConfigError as error:
+            return _message("SetParametersResult", successful=False, reason=str(error))
+        self._tell(self._event(before, parameters))
+        return _message("SetParametersResult", successful=True, reason="")
+
+    def _event(self, before: dict[str, Value], parameters: Sequence[Any]) -> ParameterEvent:
+        after = self._parameters.values()
+        kept = [self._parameter(one.name, after[one.name]) for one in parameters if one.name in after]
+        return ParameterEvent(
+            stamp=self._now(),
+            node=self._node,
+            new_parameters=[one for one in kept if one.name not in before],
+            changed_parameters=[one for one in kept if one.name in before],
+            deleted_parameters=[one for one in parameters if one.name in before and one.name not in after],
+        )
+
+    def _parameter(self, name: str, value: Value) -> Any:
+        return _message("Parameter", name=name, value=_value(self._kind(name), value))
+
+    def _kind(self, name: str) -> str:
+        description = self._parameters.describe(name)
+        return "string" if description is None else description.kind
+
+    def _descriptions(self, names: Iterable[str]) -> list[Description]:
+        found = [self._parameters.describe(name) for name in names]
+        known = [description for description in found if description is not None]
+        return known if len(known) == len(found) else []
+
+
+def list_names(names: Iterable[str], prefixes: Sequence[str], depth: int) -> tuple[list[str], list[str]]:
+    """Return the names that ``list_parameters`` gives, and the prefixes that they have.
+
+    Args:
+        names: All names; their parts have dots between them.
+        prefixes: Only names below these, or equal to one, are wanted; none means all.
+        depth: How many parts a name may have, counted below its prefix; 0 means any number.
+    """
+
+    def shallow(name: str) -> bool:
+        return depth == 0 or name.count(".") < depth
+
+    def below(name: str, prefix: str) -> bool:
+        return name == prefix or (name.startswith(f"{prefix}.") and shallow(name[len(prefix) + 1 :]))
+
+    found = [name for name in names if (any(below(name, prefix) for prefix in prefixes) if prefixes else shallow(name))]
+    return found, list(dict.fromkeys(name.rpartition(".")[0] for name in found if "." in name))
+
+
+def _read(parameter: Any) -> Any:
+    """Return the value of a ``Parameter``; None when it is not set.
+
+    Raises:
+        ConfigError: It is an array, of which the nodes have none.
+    """
+    kind = parameter.value.type
+    if kind == NOT_SET:
+        return None
+    if kind not in _FIELDS:
+        raise ConfigError(f"{parameter.name}: a list should be a single value")
+    return getattr(parameter.value, _FIELDS[kind])
+
+
+def _value(kind: str, value: Value) -> Any:
+    fields: dict[str, Any] = {"bool_value": False, "integer_value": 0, "double_value": 0.0, "string_value": ""}
+    fields |= {name: [] for name in _ARRAYS}
+    fields |= {"byte_array_value": np.zeros(0, np.uint8), "bool_array_value": np.zeros(0, np.bool_)}
+    fields |= {"integer_array_value": np.zeros(0, np.int64), "double_array_value": np.zeros(0, np.float64)}
+    number = _TYPES[kind]
+    fields[_FIELDS[number]] = float(value) if kind == "double" else value
+    return _message("ParameterValue", type=number, **fields)
+
+
+def _descriptor(name: str, description: Description) -> Any:
+    low, high = description.minimum, description.maximum
+    ranges: dict[str, list[Any]] = {"floating_point_range": [], "integer_range": []}
+    if description.kind == "double" and low is not None and high is not None:
+        span = _message("FloatingPointRange", from_value=float(low), to_value=float(high), step=0.0)
+        ranges["floating_point_range"] = [span]
+    elif description.kind == "integer" and low is not None:
+        highest = 2**63 - 1 if high is None else int(high)
+        ranges["integer_range"] = [_message("IntegerRange", from_value=int(low), to_value=highest, step=1)]
+    constraints = [text for text in (description.constraint, description.why_fixed) if text]
+    return _message(
+        "ParameterDescriptor",
+        name=name,
+        type=_TYPES[description.kind],
+        description=description.text,
+        additional_constraints="; ".join(constraints),
+        read_only=description.why_fixed is not None,
+        dynamic_typing=False,
+        **ranges,
+    )
+
+
+def _message(kind: str, /, **fields: Any) -> Any:
+    return _new(f"{_INTERFACES}/{kind}", **fields)
+
+
+def _new(kind: str, /, **fields: Any) -> Any:
+    return types().types[kind](**fields)

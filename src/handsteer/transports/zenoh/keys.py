@@ -1,0 +1,171 @@
+"""The wire format of rmw_zenoh: key expressions, liveliness tokens, identifiers and attachments.
+
+Source of the formats: ros2/rmw_zenoh, docs/design.md, and ``liveliness_utils.cpp`` and ``attachment_helpers.cpp`` of
+rmw_zenoh_cpp 0.2.4 (Jazzy) and newer; older ones had another attachment.
+"""
+
+import struct
+from dataclasses import dataclass
+
+import xxhash
+
+from handsteer.transports.ros2.encoding import dds_type_name, ros_type_name, type_hash
+from handsteer.transports.ros2.names import NodeName
+from handsteer.transports.ros2.profiles import Profile
+
+_ROOT = "@ros2_lv"
+_NODE = "NN"
+_KINDS = {"MP": "publisher", "MS": "subscriber", "SS": "service", "SC": "client"}
+_LETTERS = {words: letters for letters, words in _KINDS.items()}
+# What a profile has by default is left out of its text; rmw_zenoh's default depth is 42.
+_DEFAULT_DEPTH = 42
+_ATTACHMENT = struct.Struct("<qqB16s")
+_GID_BYTES = 16
+_NODE_PARTS, _ENDPOINT_PARTS = 9, 13
+
+
+@dataclass(frozen=True)
+class Endpoint:
+    """A publisher, subscriber, service or client of a node.
+
+    Attributes:
+        kind: ``publisher``, ``subscriber``, ``service`` or ``client``.
+        topic: Full name of the topic or service, as ``/r1/image_raw``.
+        type: Name of its type, as ``sensor_msgs/msg/Image``.
+        type_hash: Hash of its type, as ``RIHS01_df66…``.
+    """
+
+    kind: str
+    topic: str
+    type: str
+    type_hash: str
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where the one node of this process is in the graph.
+
+    Attributes:
+        domain: The ROS 2 domain.
+        zid: Identifier of the Zenoh session.
+        node: The node's name.
+    """
+
+    domain: int
+    zid: str
+    node: NodeName
+
+
+@dataclass(frozen=True)
+class Entity:
+    """What a liveliness token tells: a node, or an endpoint of one.
+
+    Attributes:
+        zid: Identifier of the Zenoh session.
+        node: Full name of the node.
+        endpoint: None when the token is that of the node itself.
+    """
+
+    zid: str
+    node: str
+    endpoint: Endpoint | None = None
+
+
+def topic_key(domain: int, name: str, type_name: str) -> str:
+    """Return the key expression on which messages or requests pass.
+
+    Args:
+        domain: The ROS 2 domain.
+        name: Full name of the topic or service.
+        type_name: Its type, as ``std_msgs/msg/String``.
+    """
+    return f"{domain}{name}/{dds_type_name(type_name)}/{type_hash(type_name)}"
+
+
+def all_tokens(domain: int) -> str:
+    """Return the key expression that takes in every liveliness token of a domain."""
+    return f"{_ROOT}/{domain}/**"
+
+
+def node_token(place: Place) -> str:
+    """Return the liveliness token of a node."""
+    return f"{_ROOT}/{place.domain}/{place.zid}/0/0/{_NODE}/{_name(place.node)}"
+
+
+def endpoint_token(place: Place, number: int, endpoint: Endpoint, profile: Profile) -> str:
+    """Return the liveliness token of an endpoint.
+
+    Args:
+        place: The node that has the endpoint.
+        number: Tells the endpoints of a session apart; from 1.
+        endpoint: What it is.
+        profile: Its quality of service.
+    """
+    who = f"{_ROOT}/{place.domain}/{place.zid}/0/{number}/{_LETTERS[endpoint.kind]}/{_name(place.node)}"
+    what = (_mangled(endpoint.topic), dds_type_name(endpoint.type), endpoint.type_hash, _quality(profile))
+    return f"{who}/{'/'.join(what)}"
+
+
+def read_token(token: str) -> Entity | None:
+    """Return what a liveliness token tells; None when it is none of rmw_zenoh's."""
+    parts = token.split("/")
+    if len(parts) < _NODE_PARTS or parts[0] != _ROOT:
+        return None
+    zid, kind, namespace, name = parts[2], parts[5], _demangled(parts[7]), parts[8]
+    node = f"{namespace.rstrip('/')}/{name}"
+    if kind == _NODE:
+        return Entity(zid, node)
+    if kind not in _KINDS or len(parts) < _ENDPOINT_PARTS:
+        return None
+    topic, dds_type, digest = parts[9:12]
+    return Entity(zid, node, Endpoint(_KINDS[kind], _demangled(topic), ros_type_name(dds_type), digest))
+
+
+def gid(token: str) -> bytes:
+    """Return the 16 bytes that name an endpoint in ROS 2: the XXH3 hash of its liveliness token."""
+    return xxhash.xxh3_128_intdigest(token.encode()).to_bytes(_GID_BYTES, "little")
+
+
+def attachment(number: int, time_ns: int, source: bytes) -> bytes:
+    """Return what goes with each message, request and reply.
+
+    Args:
+        number: Of the message, from 1.
+        time_ns: When it was sent, in nanoseconds of Unix time.
+        source: The identifier of its sender, 16 bytes.
+    """
+    return _ATTACHMENT.pack(number, time_ns, _GID_BYTES, source)
+
+
+def read_attachment(raw: bytes) -> tuple[int, int, bytes]:
+    """Return number, time in nanoseconds and sender of an attachment.
+
+    Raises:
+        ValueError: It is none.
+    """
+    try:
+        number, time_ns, length, source = _ATTACHMENT.unpack(raw)
+    except struct.error:
+        raise ValueError(f"an attachment has {_ATTACHMENT.size} bytes, not {len(raw)}") from None
+    if length != _GID_BYTES:
+        raise ValueError(f"the sender of a message has {_GID_BYTES} bytes, not {length}")
+    return number, time_ns, source
+
+
+def _name(node: NodeName) -> str:
+    enclave = "/"
+    return f"{_mangled(enclave)}/{_mangled(node.namespace)}/{node.name}"
+
+
+def _quality(profile: Profile) -> str:
+    reliability, durability = "" if profile.reliable else "2", "1" if profile.latched else ""
+    depth = "" if profile.depth == _DEFAULT_DEPTH else profile.depth
+    return f"{reliability}:{durability}:,{depth}:,:,:,,"
+
+
+def _mangled(name: str) -> str:
+    return name.replace("/", "%")
+
+
+def _demangled(name: str) -> str:
+    return name.replace("%", "/")

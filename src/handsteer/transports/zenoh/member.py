@@ -1,0 +1,131 @@
+"""This process as a session of Zenoh and a node of ROS 2: what it publishes and subscribes to, and its router."""
+
+import itertools
+import logging
+import threading
+import time
+
+import zenoh
+
+from handsteer.errors import TransportError
+from handsteer.transports.ros2.encoding import type_hash
+from handsteer.transports.ros2.names import NodeName
+from handsteer.transports.ros2.profiles import Profile
+from handsteer.transports.zenoh.keys import Endpoint, Place, endpoint_token, node_token, topic_key
+from handsteer.transports.zenoh.neighbours import Neighbours
+from handsteer.transports.zenoh.network import Network, reason, routers
+
+_LOOK_AGAIN_S = 1.0
+
+log = logging.getLogger(__name__)
+
+
+class Member:
+    """A session of a Zenoh network, known to ROS 2 as one node.
+
+    Attributes:
+        name: The node's name.
+        is_local: Whether this process reaches this machine only, as far as it knows.
+
+    Args:
+        network: How to join.
+        name: The node's name.
+
+    Raises:
+        TransportError: The network cannot be joined.
+    """
+
+    def __init__(self, network: Network, name: NodeName) -> None:
+        self.name = name
+        self.is_local = network.is_local
+        self._network = network
+        zenoh.try_init_log_from_env()
+        try:
+            self.session = zenoh.open(network.config)
+        except zenoh.ZError as error:
+            raise TransportError(
+                f"cannot join Zenoh as {name.full}: looked for a router at {routers(network.config)}; "
+                f"start handsteer zenoh-router, or look at ZENOH_SESSION_CONFIG_URI and ZENOH_CONFIG_OVERRIDE "
+                f"({reason(error)})"
+            ) from None
+        self._had_router = True
+        try:
+            self._look_for_router()
+        except BaseException:
+            self.session.close()
+            raise
+        self._place = Place(network.domain, str(self.session.zid()), name)
+        self._numbers = itertools.count(1)
+        self._lock = threading.Lock()
+        self._neighbours = Neighbours(self.session, network.domain)
+        self._token = self.session.liveliness().declare_token(node_token(self._place))
+
+    def key(self, name: str, type_name: str) -> str:
+        """Return the key expression of a topic or service.
+
+        Args:
+            name: Its full name, as ``/r1/image_raw``.
+            type_name: Its type, as ``sensor_msgs/msg/Image``.
+        """
+        return topic_key(self._place.domain, name, type_name)
+
+    def introduce(self, kind: str, name: str, type_name: str, profile: Profile) -> tuple[zenoh.LivelinessToken, str]:
+        """Tell others what this node has; return the token that keeps it told, and its text.
+
+        Args:
+            kind: ``publisher``, ``subscriber`` or ``service``.
+            name: Full name of its topic or service.
+            type_name: Type of that.
+            profile: Its quality of service.
+        """
+        endpoint = Endpoint(kind, name, type_name, type_hash(type_name))
+        with self._lock:
+            number = next(self._numbers)
+        text = endpoint_token(self._place, number, endpoint, profile)
+        token = self.session.liveliness().declare_token(text)
+        self._neighbours.add(endpoint)
+        return token, text
+
+    def watch_router(self) -> None:
+        """Say it when the router has gone, or is there again; does nothing where none is looked for."""
+        if self._network.attempts is None:
+            return
+        has_router = self._has_router()
+        if has_router != self._had_router:
+            if has_router:
+                log.info("the Zenoh router is there")
+            else:
+                log.warning("%s", self._lonely("the Zenoh router has gone: those who come now are not found"))
+        self._had_router = has_router
+
+    def close(self) -> None:
+        """Leave the network; may be called twice."""
+        if not self.session.is_closed():
+            self._neighbours.close()
+            self.session.close()
+
+    def _look_for_router(self) -> None:
+        attempts = self._network.attempts
+        if attempts is None:
+            return
+        self._had_router = self._has_router()
+        if self._had_router:
+            return
+        waits = "it waits for one" if attempts == 0 else "until there is one, nobody is found"
+        log.warning("%s", self._lonely(f"no Zenoh router answers: {waits}"))
+        for tried in itertools.count(1):
+            if tried == attempts:
+                return
+            time.sleep(_LOOK_AGAIN_S)
+            if self._has_router():
+                self.watch_router()
+                return
+
+    def _lonely(self, what: str) -> str:
+        return (
+            f"{what} (looked at {routers(self._network.config)}); start one with handsteer zenoh-router, "
+            "or where ROS 2 is installed, ros2 run rmw_zenoh_cpp rmw_zenohd"
+        )
+
+    def _has_router(self) -> bool:
+        return bool(self.session.info.routers_zid())

@@ -1,0 +1,74 @@
+"""Who else is in the graph, as their liveliness tokens tell; and why nothing passes where types differ."""
+
+import logging
+import threading
+
+import zenoh
+
+from handsteer.transports.zenoh.keys import Endpoint, Entity, all_tokens, read_token
+
+log = logging.getLogger(__name__)
+
+_OPPOSITE = {"publisher": "subscriber", "subscriber": "publisher"}
+
+
+class Neighbours:
+    """Compares our publishers and subscribers with those of others: Zenoh itself keeps silent about types.
+
+    Args:
+        session: The Zenoh session of this process.
+        domain: The ROS 2 domain.
+    """
+
+    def __init__(self, session: zenoh.Session, domain: int) -> None:
+        self._own = str(session.zid())
+        self._lock = threading.Lock()
+        self._ours: dict[tuple[str, str], Endpoint] = {}
+        self._theirs: dict[str, Entity] = {}
+        self._watch = session.liveliness().declare_subscriber(all_tokens(domain), self._note, history=True)
+
+    def add(self, endpoint: Endpoint) -> None:
+        """Compare a publisher or subscriber of ours with those of others, now and later."""
+        with self._lock:
+            self._ours[endpoint.topic, endpoint.kind] = endpoint
+            theirs = list(self._theirs.values())
+        for entity in theirs:
+            self._compare(entity)
+
+    def close(self) -> None:
+        """Look no more."""
+        self._watch.undeclare()
+
+    def _note(self, sample: zenoh.Sample) -> None:
+        token = str(sample.key_expr)
+        entity = read_token(token)
+        if entity is None or entity.zid == self._own:
+            return
+        came = sample.kind == zenoh.SampleKind.PUT
+        with self._lock:
+            known = token in self._theirs
+            if came:
+                self._theirs[token] = entity
+            else:
+                self._theirs.pop(token, None)
+        if came and not known:
+            self._compare(entity)
+
+    def _compare(self, entity: Entity) -> None:
+        theirs = entity.endpoint
+        if theirs is None:
+            return
+        with self._lock:
+            ours = self._ours.get((theirs.topic, _OPPOSITE.get(theirs.kind, "")))
+        if ours is not None and (ours.type, ours.type_hash) != (theirs.type, theirs.type_hash):
+            log.warning("%s", explain(ours, theirs, entity.node))
+
+
+def explain(ours: Endpoint, theirs: Endpoint, node: str) -> str:
+    """Return one line that says why nothing passes between two ends of a topic."""
+    if ours.type != theirs.type:
+        why = f"ours has the type {ours.type}, theirs {theirs.type}"
+    else:
+        hashes = f"ours: {ours.type_hash}; theirs: {theirs.type_hash}"
+        why = f"both have the type {ours.type}, but it is defined differently ({hashes})"
+    return f"{ours.topic}: nothing passes between our {ours.kind} and the {theirs.kind} of {node}: {why}"

@@ -1,0 +1,159 @@
+"""How to reach a Zenoh network, as rmw_zenoh's environment variables say.
+
+Source: ros2/rmw_zenoh, README.md and its default configurations of sessions and routers.
+"""
+
+import json
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import zenoh
+
+from handsteer.errors import TransportError
+from handsteer.transports.ros2.domain import domain_id
+
+ROUTER = "tcp/localhost:7447"
+"""Where a router listens, unless another place is said."""
+
+_LOOPBACK = re.compile(r"[^/]+/(localhost|127\.\d+\.\d+\.\d+|\[::1\])(:|$)|unixsock|unixpipe")
+_ATTEMPTS = "ZENOH_ROUTER_CHECK_ATTEMPTS"
+_OVERRIDE = "ZENOH_CONFIG_OVERRIDE"
+_COMMON: dict[str, Any] = {
+    "scouting/multicast/enabled": False,
+    "scouting/gossip/enabled": True,
+    # Peers learn of each other by the router; then they connect directly, and each pair only once.
+    "scouting/gossip/target": {"router": ["router", "peer"], "peer": ["router"]},
+    "scouting/gossip/autoconnect": {"router": [], "peer": ["router", "peer"]},
+    "scouting/gossip/autoconnect_strategy": {"peer": {"to_router": "always", "to_peer": "greater-zid"}},
+    # What is kept for late subscribers is ordered by time.
+    "timestamping/enabled": {"router": True, "peer": True, "client": True},
+    "transport/shared_memory/enabled": False,
+}
+_SESSION: dict[str, Any] = {
+    "mode": "peer",
+    "connect/endpoints": [ROUTER],
+    "connect/timeout_ms": {"router": -1, "peer": -1, "client": 0},
+    "connect/exit_on_failure": {"router": False, "peer": False, "client": True},
+    "listen/endpoints": ["tcp/localhost:0"],
+    "queries_default_timeout": 60000,
+    **_COMMON,
+}
+# A router that comes back is found within a second, whatever it took until now.
+_RETRY = {"period_init_ms": 200, "period_max_ms": 1000, "period_increase_factor": 2}
+
+
+@dataclass(frozen=True)
+class Network:
+    """How to join.
+
+    Attributes:
+        domain: The ROS 2 domain, 0 to 232.
+        config: Configuration of the Zenoh session.
+        attempts: How often to look for a router before going on without one, once a second; 0 waits for one, None
+            does not look.
+        is_local: Whether this process connects and listens within this machine only; a router may lead further.
+    """
+
+    domain: int
+    config: zenoh.Config
+    attempts: int | None = 1
+    is_local: bool = True
+
+
+def network(environment: Mapping[str, str]) -> Network:
+    """Return what ``environment`` says; without a word of it, only this machine is listened to.
+
+    ``ROS_DOMAIN_ID``, ``ZENOH_SESSION_CONFIG_URI``, ``ZENOH_CONFIG_OVERRIDE`` and ``ZENOH_ROUTER_CHECK_ATTEMPTS`` count
+    as in rmw_zenoh.
+
+    Raises:
+        TransportError: A variable has a value that is not allowed.
+    """
+    settings = {**_SESSION, "connect/retry": _RETRY}
+    config = _config(environment, "ZENOH_SESSION_CONFIG_URI", settings)
+    ends = [*_endpoints(config, "connect"), *_endpoints(config, "listen")]
+    is_local = all(_LOOPBACK.match(end) for end in ends) and config.get_json("scouting/multicast/enabled") == "false"
+    return Network(domain_id(environment), config, _attempts(environment), is_local)
+
+
+def router_config(environment: Mapping[str, str], endpoint: str | None = None) -> zenoh.Config:
+    """Return the configuration of a router.
+
+    Args:
+        environment: ``ZENOH_ROUTER_CONFIG_URI`` and ``ZENOH_CONFIG_OVERRIDE`` of it count as in rmw_zenoh.
+        endpoint: Where it listens, as ``tcp/[::]:7447``; what a variable says unless given.
+
+    Raises:
+        TransportError: A variable or ``endpoint`` has a value that is not allowed.
+    """
+    config = _config(
+        environment, "ZENOH_ROUTER_CONFIG_URI", {"mode": "router", "listen/endpoints": [ROUTER], **_COMMON}
+    )
+    if endpoint is not None:
+        _set(config, "--listen", "listen/endpoints", json.dumps([endpoint]))
+    return config
+
+
+def routers(config: zenoh.Config) -> str:
+    """Return where a session looks for routers, in words."""
+    return " or ".join(_endpoints(config, "connect")) or "any address"
+
+
+def _endpoints(config: zenoh.Config, what: str) -> list[str]:
+    """Return where a session is to ``connect`` or ``listen``; they may be given by mode."""
+    endpoints: Any = json.loads(config.get_json(f"{what}/endpoints"))
+    if isinstance(endpoints, dict):
+        endpoints = endpoints.get(json.loads(config.get_json("mode")) or "peer", [])
+    return list(endpoints)
+
+
+def reason(error: zenoh.ZError) -> str:
+    """Return what Zenoh says, without the places in its source."""
+    said = re.search(r'msg: "(.*?)"[,}]', str(error))
+    return re.sub(r" at /[^\s\]]+", "", said[1] if said else str(error)).replace(".]", "]").rstrip(". ")
+
+
+def _config(environment: Mapping[str, str], variable: str, settings: Mapping[str, Any]) -> zenoh.Config:
+    file = environment.get(variable, "")
+    if file:
+        try:
+            config = zenoh.Config.from_file(file)
+        except zenoh.ZError as error:
+            raise TransportError(f"{variable} is {file!r}: it is no configuration of Zenoh ({reason(error)})") from None
+    else:
+        config = zenoh.Config()
+        for name, value in settings.items():
+            config.insert_json5(name, json.dumps(value))
+    for name, said in _overrides(environment.get(_OVERRIDE, "")):
+        _set(config, _OVERRIDE, name, said)
+    return config
+
+
+def _overrides(text: str) -> list[tuple[str, str]]:
+    pairs = []
+    for pair in filter(None, (part.strip() for part in text.split(";"))):
+        name, assigned, value = pair.partition("=")
+        if not (assigned and name.strip() and value.strip()):
+            raise TransportError(f'{_OVERRIDE} has {pair!r}: it should be as mode="client";scouting/delay=100')
+        pairs.append((name.strip(), value.strip()))
+    return pairs
+
+
+def _set(config: zenoh.Config, source: str, name: str, value: str) -> None:
+    try:
+        config.insert_json5(name, value)
+    except zenoh.ZError as error:
+        raise TransportError(f"{source} has {name}={value}: that is no setting of Zenoh ({reason(error)})") from None
+
+
+def _attempts(environment: Mapping[str, str]) -> int | None:
+    text = environment.get(_ATTEMPTS, "") or "1"
+    try:
+        number = int(text)
+    except ValueError:
+        raise TransportError(
+            f"{_ATTEMPTS} is {text!r}: it should be a whole number, 0 to wait, -1 not to look"
+        ) from None
+    return None if number < 0 else number

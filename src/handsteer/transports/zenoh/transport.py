@@ -1,0 +1,265 @@
+"""Messages over Zenoh: one ROS 2 node for all nodes of this process."""
+
+import logging
+import threading
+import time
+from collections.abc import Callable
+from functools import partial
+from typing import Any, Generic, TypeVar
+
+import zenoh
+import zenoh.ext
+
+from handsteer.clock import Clock
+from handsteer.errors import TransportError
+from handsteer.messages import Topic, type_name
+from handsteer.transports.channels import Deliver, Fanout, FanoutSubscription, TopicTypes, check_type
+from handsteer.transports.lateness import Lateness
+from handsteer.transports.protocol import Received
+from handsteer.transports.ros2.encoding import decode, encode
+from handsteer.transports.ros2.profiles import Profile, offered, requested
+from handsteer.transports.stamps import capture_time
+from handsteer.transports.zenoh.keys import attachment, gid, read_attachment
+from handsteer.transports.zenoh.member import Member
+
+M = TypeVar("M")
+
+# Zenoh sends on threads of its own and does not tell when they are done.
+_DELIVER_S = 0.1
+_HEARTBEAT_S = 0.5
+
+log = logging.getLogger(__name__)
+
+
+class ZenohTransport:
+    """A :class:`~handsteer.transports.protocol.Transport` over Zenoh, as ROS 2 has it under rmw_zenoh.
+
+    Capture times travel in the stamps of message headers; messages without a header come without one.
+
+    Args:
+        member: This process in its Zenoh network.
+        clock: The graph's clock.
+    """
+
+    def __init__(self, member: Member, clock: Clock) -> None:
+        self._member = member
+        self._clock = clock
+        self._types = TopicTypes()
+        self._lock = threading.Lock()
+        self._publishers: list[ZenohPublisher[Any]] = []
+        self._incoming: dict[str, Fanout[Any]] = {}
+
+    @property
+    def crosses_network(self) -> bool:
+        """Whether others may be on other machines; what a router leads to is not known."""
+        return not self._member.is_local
+
+    def advertise(self, node: str, topic: Topic[M]) -> "ZenohPublisher[M]":
+        """Return the sending end of ``topic`` for the node named ``node``."""
+        self._claim(topic)
+        publisher = ZenohPublisher(self._member, topic)
+        with self._lock:
+            self._publishers.append(publisher)
+        return publisher
+
+    def subscribe(self, node: str, topic: Topic[M], deliver: Deliver[M]) -> FanoutSubscription[M]:
+        """Call ``deliver`` for each message on ``topic`` from now on, on a thread of the topic's own."""
+        name = self._claim(topic)
+        with self._lock:
+            if name not in self._incoming:
+                self._incoming[name] = Fanout(latched=topic.latched, receive=partial(self._receive, topic))
+            fanout: Fanout[M] = self._incoming[name]
+        return fanout.add(deliver)
+
+    def full_name(self, node: str) -> str:
+        """Return the ROS 2 node's name and ``node``, as ROS's own diagnostics do: ``r1/my_camera: my_camera``."""
+        return f"{self._member.name.full.removeprefix('/')}: {node}"
+
+    def flush(self, timeout_s: float) -> None:
+        """Give what was published the time to leave, at most ``timeout_s`` seconds."""
+        time.sleep(min(timeout_s, _DELIVER_S))
+
+    def close(self) -> None:
+        """End all publishing and receiving; may be called twice."""
+        with self._lock:
+            publishers, incoming = self._publishers, list(self._incoming.values())
+            self._publishers = []
+            self._incoming = {}
+        for publisher in publishers:
+            publisher.close()
+        for channel in incoming:
+            channel.close()
+
+    def _claim(self, topic: Topic[Any]) -> str:
+        name = self._member.name.topic(topic)
+        self._types.claim(name, topic)
+        return name
+
+    def _receive(self, topic: Topic[M], send: Deliver[M]) -> Callable[[], None]:
+        return _Reception(self._member, topic, self._clock, send).close
+
+
+class ZenohPublisher(Generic[M]):
+    """The sending end of a topic."""
+
+    def __init__(self, member: Member, topic: Topic[M]) -> None:
+        self._topic = topic
+        profile = offered(topic)
+        name, kind = _named(member, topic)
+        key = member.key(name, kind)
+        self._publisher = member.session.declare_publisher(key, **_options(profile))
+        # It keeps messages for late subscribers, but does not know of any: the plain one beside it does.
+        self._keeper = _keeper(member.session, key, profile) if profile.latched else None
+        self._token, text = member.introduce("publisher", name, kind, profile)
+        self._gid = gid(text)
+        self._lock = threading.Lock()
+        self._number = 0
+        self._is_closed = False
+
+    @property
+    def wanted(self) -> bool:
+        """Whether anybody listens, in this process or another."""
+        with self._lock:
+            if self._is_closed:
+                return False
+            status: Any = self._publisher.matching_status  # no bool, whatever its type hint says
+        return bool(status.matching)
+
+    def publish(self, message: M, captured_s: float | None = None) -> None:
+        """Give ``message`` to the network; a subscriber that is too slow for it goes without."""
+        check_type(self._topic, message)
+        if not (self._topic.latched or self.wanted):
+            return
+        raw = encode(message)
+        with self._lock:
+            if self._is_closed:
+                return
+            self._number += 1
+            put = self._publisher.put if self._keeper is None else self._keeper.put
+            try:
+                put(raw, attachment=attachment(self._number, time.time_ns(), self._gid))
+            except zenoh.ZError as error:
+                raise TransportError(f"{self._topic.name} cannot be published: {error}") from None
+
+    def close(self) -> None:
+        """Send no more; may be called twice."""
+        with self._lock:
+            if self._is_closed:
+                return
+            self._is_closed = True
+        self._token.undeclare()
+        self._publisher.undeclare()
+        if self._keeper is not None:
+            self._keeper.undeclare()
+
+
+def _named(member: Member, topic: Topic[Any]) -> tuple[str, str]:
+    """Return the names of a topic and its type, as ``/r1/image_raw`` and ``sensor_msgs/msg/Image``."""
+    return member.name.topic(topic), type_name(topic.type)
+
+
+def _options(profile: Profile) -> dict[str, Any]:
+    """Return how messages travel.
+
+    As in rmw_zenoh, no publisher waits for a subscriber that hangs: its messages are dropped. Signs and commands
+    overtake images that go the same way, and are not held back to be sent together with others.
+    """
+    return {
+        "congestion_control": zenoh.CongestionControl.DROP,
+        "reliability": zenoh.Reliability.RELIABLE if profile.reliable else zenoh.Reliability.BEST_EFFORT,
+        "priority": zenoh.Priority.INTERACTIVE_HIGH if profile.reliable else zenoh.Priority.DATA,
+        "express": profile.reliable,
+    }
+
+
+def _keeper(session: zenoh.Session, key: str, profile: Profile) -> zenoh.ext.AdvancedPublisher:
+    return zenoh.ext.declare_advanced_publisher(
+        session,
+        key,
+        cache=zenoh.ext.CacheConfig(profile.depth),
+        sample_miss_detection=zenoh.ext.MissDetectionConfig(heartbeat=None, sporadic_heartbeat=_HEARTBEAT_S),
+        publisher_detection=True,
+        **_options(profile),
+    )
+
+
+class _Reception(Generic[M]):
+    """A subscriber, whose messages are decoded and passed on by a thread of its own.
+
+    Zenoh puts them into a ring that keeps the newest, so that neither a queue grows nor others are held up.
+    """
+
+    def __init__(self, member: Member, topic: Topic[M], clock: Clock, send: Deliver[M]) -> None:
+        self._topic = topic
+        self._clock = clock
+        self._send = send
+        self._is_closed = False
+        self._is_broken = False
+        self._lateness = None if topic.lifespan_s is None else Lateness(topic.lifespan_s)
+        self._was_late = False
+        profile = requested(topic)
+        name, kind = _named(member, topic)
+        self._subscriber = _subscriber(member.session, member.key(name, kind), profile)
+        self._token, _ = member.introduce("subscriber", name, kind, profile)
+        self._thread = threading.Thread(target=self._run, name=f"zenoh {topic.name}", daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        """Receive no more."""
+        self._is_closed = True
+        self._token.undeclare()
+        self._subscriber.undeclare()
+
+    def _run(self) -> None:
+        ring = self._subscriber.handler
+        while not self._is_closed:
+            try:
+                sample = ring.recv()
+            except zenoh.ZError:  # it has been closed
+                return
+            if sample.kind == zenoh.SampleKind.PUT and not self._is_late(sample.attachment):
+                self._pass_on(sample.payload.to_bytes())
+
+    def _is_late(self, attached: zenoh.ZBytes | None) -> bool:
+        if self._lateness is None or attached is None:
+            return False
+        try:
+            _, time_ns, sender = read_attachment(attached.to_bytes())
+        except ValueError:
+            return False  # of a sender that is not ROS 2, or of an older one: when it was sent is not known
+        late = self._lateness.is_late(sender, time_ns / 1e9, time.monotonic())
+        if late and not self._was_late:
+            log.warning(
+                "%s: messages come over %g s late and are not obeyed: has the link stood still, or has the clock of "
+                "their sender been set back?",
+                self._topic.name,
+                self._topic.lifespan_s,
+            )
+        self._was_late = late
+        return late
+
+    def _pass_on(self, raw: bytes) -> None:
+        try:
+            message = decode(raw, type_name(self._topic.type))
+        except Exception as error:
+            # Whatever the network brings must not end the receiving.
+            if not self._is_broken:
+                log.warning("%s: a message of %d bytes cannot be read: %s", self._topic.name, len(raw), error)
+            self._is_broken = True
+            return
+        if not self._is_closed:
+            self._send(Received(message, capture_time(message, self._clock)))
+
+
+def _subscriber(session: zenoh.Session, key: str, profile: Profile) -> Any:
+    ring: zenoh.handlers.RingChannel[zenoh.Sample] = zenoh.handlers.RingChannel(profile.depth)
+    if not profile.latched:
+        return session.declare_subscriber(key, ring)
+    return zenoh.ext.declare_advanced_subscriber(
+        session,
+        key,
+        ring,
+        history=zenoh.ext.HistoryConfig(detect_late_publishers=True, max_samples=profile.depth),
+        recovery=zenoh.ext.RecoveryConfig(periodic_queries=None, heartbeat=True),
+        subscriber_detection=True,
+    )

@@ -1,0 +1,246 @@
+"""What a client of ROS 2's parameter services sends and reads over DDS, byte by byte as rmw_cyclonedds_cpp does.
+
+A part of ``peer.py``: types written by hand, encoded by cyclonedds. A request is its body with 16 bytes before it, the
+handle of the client's writer (uint64) and a number (int64); the reply begins with the same. Reader and writer have the
+same ``clientid=`` in their user data.
+"""
+
+import itertools
+import time
+from dataclasses import asdict, dataclass, field, fields
+from typing import Any
+
+from cyclonedds.core import Policy, Qos
+from cyclonedds.domain import DomainParticipant
+from cyclonedds.idl import IdlStruct
+from cyclonedds.idl.types import float64, int32, int64, sequence, uint8, uint32, uint64
+from cyclonedds.internal import InvalidSample
+from cyclonedds.pub import DataWriter
+from cyclonedds.sub import DataReader
+from cyclonedds.topic import Topic
+
+MSG, SRV = "rcl_interfaces::msg::dds_::", "rcl_interfaces::srv::dds_::"
+
+
+@dataclass
+class Time(IdlStruct, typename="builtin_interfaces::msg::dds_::Time_"):
+    sec: int32 = 0
+    nanosec: uint32 = 0
+
+
+@dataclass
+class Log(IdlStruct, typename=f"{MSG}Log_"):
+    stamp: Time
+    level: uint8
+    name: str
+    msg: str
+    file: str
+    function: str
+    line: uint32
+
+
+@dataclass
+class ParameterValue(IdlStruct, typename=f"{MSG}ParameterValue_"):
+    type: uint8 = 0
+    bool_value: bool = False
+    integer_value: int64 = 0
+    double_value: float64 = 0.0
+    string_value: str = ""
+    byte_array_value: sequence[uint8] = field(default_factory=list)
+    bool_array_value: sequence[bool] = field(default_factory=list)
+    integer_array_value: sequence[int64] = field(default_factory=list)
+    double_array_value: sequence[float64] = field(default_factory=list)
+    string_array_value: sequence[str] = field(default_factory=list)
+
+
+@dataclass
+class Parameter(IdlStruct, typename=f"{MSG}Parameter_"):
+    name: str
+    value: ParameterValue
+
+
+@dataclass
+class ParameterEvent(IdlStruct, typename=f"{MSG}ParameterEvent_"):
+    stamp: Time
+    node: str
+    new_parameters: sequence[Parameter]
+    changed_parameters: sequence[Parameter]
+    deleted_parameters: sequence[Parameter]
+
+
+@dataclass
+class FloatingPointRange(IdlStruct, typename=f"{MSG}FloatingPointRange_"):
+    from_value: float64
+    to_value: float64
+    step: float64
+
+
+@dataclass
+class IntegerRange(IdlStruct, typename=f"{MSG}IntegerRange_"):
+    from_value: int64
+    to_value: int64
+    step: uint64
+
+
+@dataclass
+class ParameterDescriptor(IdlStruct, typename=f"{MSG}ParameterDescriptor_"):
+    name: str
+    type: uint8
+    description: str
+    additional_constraints: str
+    read_only: bool
+    dynamic_typing: bool
+    floating_point_range: sequence[FloatingPointRange, 1]
+    integer_range: sequence[IntegerRange, 1]
+
+
+@dataclass
+class ListParametersResult(IdlStruct, typename=f"{MSG}ListParametersResult_"):
+    names: sequence[str]
+    prefixes: sequence[str]
+
+
+@dataclass
+class SetParametersResult(IdlStruct, typename=f"{MSG}SetParametersResult_"):
+    successful: bool
+    reason: str
+
+
+@dataclass
+class ListRequest(IdlStruct, typename=f"{SRV}ListParameters_Request_"):
+    client: uint64
+    number: int64
+    prefixes: sequence[str]
+    depth: uint64
+
+
+@dataclass
+class ListReply(IdlStruct, typename=f"{SRV}ListParameters_Response_"):
+    client: uint64
+    number: int64
+    result: ListParametersResult
+
+
+@dataclass
+class GetRequest(IdlStruct, typename=f"{SRV}GetParameters_Request_"):
+    client: uint64
+    number: int64
+    names: sequence[str]
+
+
+@dataclass
+class GetReply(IdlStruct, typename=f"{SRV}GetParameters_Response_"):
+    client: uint64
+    number: int64
+    values: sequence[ParameterValue]
+
+
+@dataclass
+class TypesRequest(IdlStruct, typename=f"{SRV}GetParameterTypes_Request_"):
+    client: uint64
+    number: int64
+    names: sequence[str]
+
+
+@dataclass
+class TypesReply(IdlStruct, typename=f"{SRV}GetParameterTypes_Response_"):
+    client: uint64
+    number: int64
+    types: sequence[uint8]
+
+
+@dataclass
+class DescribeRequest(IdlStruct, typename=f"{SRV}DescribeParameters_Request_"):
+    client: uint64
+    number: int64
+    names: sequence[str]
+
+
+@dataclass
+class DescribeReply(IdlStruct, typename=f"{SRV}DescribeParameters_Response_"):
+    client: uint64
+    number: int64
+    descriptors: sequence[ParameterDescriptor]
+
+
+@dataclass
+class SetRequest(IdlStruct, typename=f"{SRV}SetParameters_Request_"):
+    client: uint64
+    number: int64
+    parameters: sequence[Parameter]
+
+
+@dataclass
+class SetReply(IdlStruct, typename=f"{SRV}SetParameters_Response_"):
+    client: uint64
+    number: int64
+    results: sequence[SetParametersResult]
+
+
+@dataclass
+class AtomicRequest(IdlStruct, typename=f"{SRV}SetParametersAtomically_Request_"):
+    client: uint64
+    number: int64
+    parameters: sequence[Parameter]
+
+
+@dataclass
+class AtomicReply(IdlStruct, typename=f"{SRV}SetParametersAtomically_Response_"):
+    client: uint64
+    number: int64
+    result: SetParametersResult
+
+
+SERVICES: dict[str, tuple[Any, Any]] = {
+    "ListParameters": (ListRequest, ListReply),
+    "GetParameters": (GetRequest, GetReply),
+    "GetParameterTypes": (TypesRequest, TypesReply),
+    "DescribeParameters": (DescribeRequest, DescribeReply),
+    "SetParameters": (SetRequest, SetReply),
+    "SetParametersAtomically": (AtomicRequest, AtomicReply),
+}
+_numbers = itertools.count(1)
+
+
+class Client:
+    """A client of one service."""
+
+    def __init__(self, participant: DomainParticipant, service: str, kind: str, *, identified: bool) -> None:
+        request, reply = SERVICES[kind]
+        number = next(_numbers).to_bytes(4, "big")
+        identity = ".".join(f"{byte:x}" for byte in participant.guid.bytes[:12] + number)
+        qos = Qos(
+            Policy.Reliability.Reliable(1_000_000_000),
+            Policy.Durability.Volatile,
+            Policy.History.KeepLast(1000),
+            Policy.DataRepresentation(use_cdrv0_representation=True),
+            Policy.Userdata(f"clientid={identity};".encode() if identified else b""),
+        )
+        self.request_type = request
+        self.handle = 0x1122334455667700 + int.from_bytes(number, "big")
+        self.writer: Any = DataWriter(participant, Topic(participant, f"rq{service}Request", request), qos=qos)
+        self.reader: Any = DataReader(participant, Topic(participant, f"rr{service}Reply", reply), qos=qos)
+
+    def call(self, values: dict[str, Any], timeout_s: float) -> Any:
+        """Send a request once a server is seen; return the reply's fields, or None when none comes."""
+        deadline_s = time.monotonic() + timeout_s
+        while not self.writer.get_publication_matched_status().current_count and time.monotonic() < deadline_s:
+            time.sleep(0.005)
+        number = next(_numbers)
+        filled = {name: _filled(name, value) for name, value in values.items()}
+        self.writer.write(self.request_type(client=self.handle, number=number, **filled))
+        while time.monotonic() < deadline_s:
+            for reply in self.reader.take(10):
+                # All clients of a service hear all replies.
+                if not isinstance(reply, InvalidSample) and (reply.client, reply.number) == (self.handle, number):
+                    return asdict(reply)
+            time.sleep(0.002)
+        return None
+
+
+def _filled(name: str, value: Any) -> Any:
+    if name != "parameters":
+        return value
+    known = {one.name for one in fields(ParameterValue)}
+    assert all(set(given) <= known for given in value.values())
+    return [Parameter(name=one, value=ParameterValue(**given)) for one, given in value.items()]

@@ -1,0 +1,291 @@
+"""Our nodes as processes in a Zenoh network, seen by a plain Zenoh program that speaks rmw_zenoh's format by hand."""
+
+import signal
+import struct
+import time
+from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
+
+import pytest
+
+from tests.contracts.node_contract import (
+    CMD_VEL,
+    FORWARD,
+    LIMIT_S,
+    ODOM,
+    ChainContract,
+    ControlContract,
+    MakeDriver,
+    Running,
+)
+from tests.dds.driver import NODE, DdsDriver, driving_chain
+from tests.processes import eventually
+from tests.rmw_zenoh.graph import DOMAIN, ZenohGraph, zenoh_graph
+
+pytest.importorskip("zenoh")
+pytestmark = pytest.mark.slow
+
+TWIST = [
+    "geometry_msgs::msg::dds_::Twist_",
+    "RIHS01_9c45bf16fe0983d80e3cfe750d6835843d265a9a6c46bd2e609fcddde6fb8d2a",
+]
+STRING = [
+    "std_msgs::msg::dds_::String_",
+    "RIHS01_df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18",
+]
+RELIABLE_10, RELIABLE_1, LATCHED_1 = "::,10:,:,:,,", "::,1:,:,:,,", ":1:,1:,:,:,,"
+
+
+@pytest.fixture(scope="module")
+def network(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ZenohGraph]:
+    with zenoh_graph(tmp_path_factory.mktemp("zenoh")) as graph:
+        yield graph
+
+
+class TestControl(ControlContract):
+    @pytest.fixture
+    def drive(self, network: ZenohGraph) -> MakeDriver:
+        return partial(DdsDriver, network)
+
+
+class TestChain(ChainContract):
+    @pytest.fixture
+    def running(self, tmp_path: Path) -> Iterator[Running]:
+        with zenoh_graph(tmp_path) as graph:
+            yield driving_chain(graph)
+
+
+def test_what_is_no_text_does_not_end_the_node(network: ZenohGraph) -> None:
+    driver = DdsDriver(network)
+    driver.show_raw(b"\x00\x01\x00\x00\x03\x00\x00\x00\xff\xfe\x00\x00")
+    driver.show("Turn Left")
+    driver.expect((0.0, 0.1))
+    assert "a message of 12 bytes cannot be read" in driver.process.text
+    assert "Traceback" not in driver.process.text
+
+
+def test_signs_that_were_held_up_on_their_way_are_not_obeyed(network: ZenohGraph) -> None:
+    driver = DdsDriver(network, "--control.sign-timeout", "5")
+    driver.show("Forward", count=2)
+    driver.expect((0.01, 0.0), (0.02, 0.0))
+    old = {"topic": driver.signs, "values": {"data": "Forward"}, "age_s": 0.6}
+    network.peer.ask("publish", count=5, **old)
+    driver.show("Turn Left")
+    driver.expect((0.01, 0.0), (0.02, 0.0), (0.02, 0.1))
+    assert "messages come over 0.35 s late and are not obeyed" in driver.process.text
+
+
+def test_ros2_sees_the_node_by_its_names_types_hashes_and_profiles(network: ZenohGraph) -> None:
+    words = ("-r", "__ns:=/far", "-r", "__node:=driver", "-r", f"{CMD_VEL[1:]}:=/base/cmd_vel")
+    control = network.node("control", name="/far/driver", ros=words)
+    eventually(lambda: len(network.nodes()["/far/driver"]["MS"]) == 2)
+    eventually(lambda: len(network.nodes()["/far/driver"]["MP"]) >= 2)
+    node = network.nodes()["/far/driver"]
+    assert node["alive"]
+    assert node["MP"]["/base/cmd_vel"][:3] == [*TWIST, RELIABLE_10]
+    assert {"/base/cmd_vel", "/diagnostics"} <= set(node["MP"])
+    assert node["MS"]["/far/gesture/hand_sign"][:3] == [*STRING, RELIABLE_10]
+    assert node["MS"]["/far/steering/cmd_vel"][:3] == [*TWIST, RELIABLE_1]
+    token = node["MP"]["/base/cmd_vel"][3].split("/")
+    assert token[:2] == ["@ros2_lv", str(DOMAIN)]
+    assert token[3] == "0"  # the node's own number
+    assert token[5:10] == ["MP", "%", "%far", "driver", "%base%cmd_vel"]
+    control.signal(signal.SIGTERM)
+    assert control.code() == 0
+    eventually(lambda: "/far/driver" not in network.nodes(), what="the node to be gone")
+
+
+def test_every_message_comes_with_rmw_zenohs_attachment(network: ZenohGraph) -> None:
+    driver = DdsDriver(network)
+    driver.show("Forward", count=3)
+    driver.expect((0.01, 0.0), (0.02, 0.0), (0.03, 0.0))
+    raw = [bytes.fromhex(one) for one in network.peer.ask("attachments", topic=driver.cmd_vel)]
+    assert {len(one) for one in raw} == {33}
+    assert [struct.unpack_from("<q", one)[0] for one in raw[:3]] == [1, 2, 3]
+    assert abs(struct.unpack_from("<q", raw[0], 8)[0] / 1e9 - time.time()) < 60
+    assert {one[16] for one in raw} == {16}
+    assert len({one[17:] for one in raw}) == 1
+
+
+def test_ros2_param_gets_and_sets_the_parameters_of_a_running_node(network: ZenohGraph) -> None:
+    driver = DdsDriver(network)
+    node = driver.cmd_vel.removesuffix(CMD_VEL) + f"/{NODE}"
+    header = bytes.fromhex("00010000")
+    name = struct.pack("<I", 12) + b"linear_step\0"
+    eventually(lambda: len(network.nodes()[node]["SS"]) == 6)
+    assert network.nodes()[node]["SS"][f"{node}/get_parameters"][2] == "::,1000:,:,:,,"
+
+    def linear_step() -> float:
+        request = (header + struct.pack("<I", 1) + name).hex()
+        [[reply, attachment]] = network.peer.ask("call", node=node, service="get_parameters", hex=request, number=5)
+        assert bytes.fromhex(attachment)[:8] == struct.pack("<q", 5)  # the request's own number and sender
+        assert bytes.fromhex(attachment)[16:] == bytes([16, *range(16)])
+        count, kind, value = struct.unpack_from("<IB11xd", bytes.fromhex(reply), 4)
+        assert (count, kind) == (1, 3)
+        return float(value)
+
+    assert linear_step() == 0.01
+    double = struct.pack("<BB2xqd", 3, 0, 0, 0.03)
+    no_text, no_arrays = struct.pack("<I4x", 1), bytes(5 * 4)
+    request = (header + struct.pack("<I", 1) + name + double + no_text + no_arrays).hex()
+    [[reply, _]] = network.peer.ask("call", node=node, service="set_parameters", hex=request)
+    assert struct.unpack_from("<IB", bytes.fromhex(reply), 4) == (1, 1), bytes.fromhex(reply)
+    assert linear_step() == 0.03
+    driver.show("Forward")
+    driver.expect((0.03, 0.0))
+    for nonsense in ("", "00010000ffffffff"):
+        assert network.peer.ask("call", node=node, service="set_parameters", hex=nonsense) == []
+    assert "cannot be answered" in driver.process.text
+    assert linear_step() == 0.03
+
+
+def test_a_late_subscriber_gets_the_description_of_the_robot(network: ZenohGraph) -> None:
+    network.node("robot", name="/late/robot", ros=("-r", "__ns:=/late"))
+    topic = "/late/robot_description"
+    eventually(lambda: network.publishes("/late/robot", topic))
+    assert network.nodes()["/late/robot"]["MP"][topic][:3] == [*STRING, LATCHED_1]
+    network.peer.ask("record", topic=topic, type="String", fields=["data"], latched=True)
+    [[_, [description]]] = eventually(lambda: network.peer.ask("get", topic=topic))
+    assert "<robot" in description
+
+
+def test_a_robot_follows_another_programs_twists(network: ZenohGraph) -> None:
+    peer = network.peer
+    network.node("robot", name="/lone/robot", ros=("-r", "__ns:=/lone", "-r", f"{CMD_VEL[1:]}:=/lone/cmd_vel"))
+    fields = ["twist.twist.angular.z", "pose.pose.orientation.z"]
+    peer.ask("record", topic=f"/lone{ODOM}", type="Odometry", fields=fields)
+    peer.ask("advertise", topic="/lone/cmd_vel", type="Twist")
+    eventually(lambda: peer.ask("listeners", topic="/lone/cmd_vel") > 0)
+    eventually(lambda: peer.ask("get", topic=f"/lone{ODOM}"))
+    peer.ask("publish", topic="/lone/cmd_vel", values={"angular.z": 0.5}, count=20, period_s=0.05)
+    turned = peer.ask("get", topic=f"/lone{ODOM}")
+    assert max(speed for _, (speed, _) in turned) == pytest.approx(0.5, abs=0.05)
+    assert turned[-1][1][1] > 0.1  # to the left
+    eventually(lambda: abs(peer.ask("get", topic=f"/lone{ODOM}")[-1][1][0]) < 0.01, 5.0, what="the robot to stand")
+
+
+def test_simulated_time_is_followed(tmp_path: Path) -> None:
+    with zenoh_graph(tmp_path) as graph:
+        graph.peer.ask("advertise", topic="/clock", type="Clock")
+        graph.peer.ask("record", topic="/image_raw", type="Image", fields=["header.stamp"])
+        camera = graph.node("camera", *FORWARD, name="/my_camera", ros=("-p", "use_sim_time:=true"))
+        eventually(lambda: graph.peer.ask("listeners", topic="/clock") > 0)
+        graph.peer.ask("run_clock", from_s=1000.0, seconds=30.0)
+        eventually(lambda: [v for _, (v,) in graph.peer.ask("get", topic="/image_raw") if 1000.0 < v < 1040.0], 15.0)
+        assert camera.running
+
+
+def test_types_that_differ_are_said_in_words(tmp_path: Path) -> None:
+    with zenoh_graph(tmp_path) as graph:
+        graph.peer.ask("introduce", name="talker", topic="/gesture/hand_sign", type="Twist", kind="MP")
+        control = graph.node("control", name=f"/{NODE}")
+        line = (
+            "/gesture/hand_sign: nothing passes between our subscriber and the publisher of /talker: "
+            "ours has the type std_msgs/msg/String, theirs geometry_msgs/msg/Twist"
+        )
+        eventually(lambda: line in control.text, 10.0, what=line)
+        graph.peer.ask("introduce", name="base", topic=CMD_VEL, type="String", kind="MS")
+        line = f"{CMD_VEL}: nothing passes between our publisher and the subscriber of /base: "
+        eventually(lambda: line in control.text, 10.0, what=line)
+
+
+def test_nodes_of_other_domains_are_not_seen(network: ZenohGraph) -> None:
+    other = network.handsteer("control", "--transport", "zenoh", "--ros-args", "-r", "__ns:=/other", ROS_DOMAIN_ID="8")
+    network.node("control", name="/same/hand_sign_control", ros=("-r", "__ns:=/same"))
+    time.sleep(1.0)
+    assert other.running
+    assert "/other/hand_sign_control" not in network.nodes()
+
+
+class TestRouter:
+    def test_without_one_it_says_so_and_joins_when_it_comes(self, tmp_path: Path) -> None:
+        with zenoh_graph(tmp_path) as graph:
+            graph.router.kill()
+            control = graph.handsteer("control", "--transport", "zenoh")
+            eventually(lambda: "no Zenoh router answers: until there is one, nobody is found" in control.text)
+            assert f"(looked at {graph.endpoint}); start one with handsteer zenoh-router" in control.text
+            time.sleep(0.5)
+            assert graph.nodes() == {}
+            graph.start_router()
+            eventually(lambda: f"/{NODE}" in graph.nodes())
+            eventually(lambda: "the Zenoh router is there" in control.text)
+
+    def test_it_can_be_waited_for(self, tmp_path: Path) -> None:
+        with zenoh_graph(tmp_path) as graph:
+            graph.router.kill()
+            control = graph.handsteer("control", "--transport", "zenoh", ZENOH_ROUTER_CHECK_ATTEMPTS="0")
+            eventually(lambda: "no Zenoh router answers: it waits for one" in control.text)
+            graph.start_router()
+            eventually(lambda: f"/{NODE}" in graph.nodes())
+            control.signal(signal.SIGTERM)
+            assert control.code() == 0
+
+    def test_a_second_one_at_the_same_place_is_refused(self, network: ZenohGraph) -> None:
+        second = network.handsteer("zenoh-router", "--listen", network.endpoint)
+        assert second.code() == 2
+        assert f"no Zenoh router can be started at {network.endpoint}: is there one already" in second.text
+
+    def test_where_processes_connect_directly_the_drive_goes_on_without_it(self, tmp_path: Path) -> None:
+        with zenoh_graph(tmp_path) as graph:
+            running = driving_chain(graph)
+            graph.router.popen.kill()
+            eventually(lambda: "the Zenoh router has gone" in running.nodes["control"].text, 10.0)
+            began_m = running.x_m
+            # A busy machine may make it stop meanwhile, but without the messages it would never go on.
+            eventually(lambda: running.x_m - began_m > 0.3, 20.0, what="the robot to drive on")
+            graph.start_router()
+            eventually(lambda: "the Zenoh router is there" in running.nodes["control"].text)
+
+    def test_what_waited_in_a_router_that_stood_still_is_not_obeyed(self, tmp_path: Path) -> None:
+        with zenoh_graph(tmp_path, mode="client") as graph:
+            driver = DdsDriver(graph)
+            driver.show("Forward", count=3)
+            driver.expect((0.01, 0.0), (0.02, 0.0), (0.03, 0.0), (0.0, 0.0))
+            graph.router.freeze()
+            driver.show("Forward", count=30, period_s=0.033)
+            time.sleep(0.5)  # longer than signs live
+            graph.router.signal(signal.SIGCONT)
+            eventually(lambda: "late and are not obeyed" in driver.process.text, 10.0)
+            driver.show("Turn Left")
+            driver.expect((0.01, 0.0), (0.02, 0.0), (0.03, 0.0), (0.0, 0.0), (0.0, 0.1))
+
+    def test_where_all_goes_by_it_the_robot_stops_and_goes_on_with_fresh_signs(self, tmp_path: Path) -> None:
+        with zenoh_graph(tmp_path, mode="client") as graph:
+            running = driving_chain(graph)
+            graph.router.popen.kill()
+            killed_s = time.monotonic()
+            time.sleep(LIMIT_S + 1.0)
+            before = len(running.speeds)
+            back_s = time.monotonic()
+            graph.start_router()
+            eventually(lambda: len(running.speeds) > before, what="the odometry to come again")
+            # What the robot did meanwhile cannot be seen but by where it is: at 0.3 m/s it has not gone on.
+            seen = [(at_s, speed, x) for at_s, (speed, x) in graph.peer.ask("get", topic=ODOM)]
+            last = max(x for at_s, _, x in seen if at_s <= killed_s)
+            first_speed, first_x = next((speed, x) for at_s, speed, x in seen if at_s > back_s)
+            assert abs(first_speed) < 0.3
+            assert first_x - last < 0.3 * (LIMIT_S + 0.4)
+            running.expect_full_speed()
+
+
+@pytest.mark.parametrize(
+    ("env", "message"),
+    [
+        ({"ZENOH_ROUTER_CHECK_ATTEMPTS": "x"}, "ZENOH_ROUTER_CHECK_ATTEMPTS is 'x': it should be a whole number"),
+        ({"ZENOH_SESSION_CONFIG_URI": "/none"}, "ZENOH_SESSION_CONFIG_URI is '/none': it is no configuration of Zenoh"),
+        ({"ZENOH_CONFIG_OVERRIDE": "mode"}, "ZENOH_CONFIG_OVERRIDE has 'mode': it should be as mode="),
+        ({"ZENOH_CONFIG_OVERRIDE": 'mode="x"'}, 'ZENOH_CONFIG_OVERRIDE has mode="x": that is no setting of Zenoh'),
+        ({"ROS_DOMAIN_ID": "233"}, "ROS_DOMAIN_ID is '233': it should be a whole number from 0 to 232"),
+        (
+            {"ZENOH_CONFIG_OVERRIDE": 'mode="client";connect/endpoints=["tcp/127.0.0.1:1"]'},
+            "cannot join Zenoh as /hand_sign_control: looked for a router at tcp/127.0.0.1:1",
+        ),
+    ],
+    ids=lambda value: " ".join(value.values()) if isinstance(value, dict) else None,
+)
+def test_what_is_wrong_is_said_in_one_line(network: ZenohGraph, env: dict[str, str], message: str) -> None:
+    process = network.handsteer("control", "--transport", "zenoh", **env)
+    assert process.code() == 2, process.text
+    assert [line for line in process.text.splitlines() if line.startswith(f"handsteer: {message}")], process.text
+    assert "Traceback" not in process.text
