@@ -135,14 +135,14 @@ def test_raw_images_for_fast_dds_are_warned_of(ros2: Ros2Graph) -> None:
     ros2.peer.ask("record", topic="/raw/image_raw", type="Image", fields=["width"], reliable=False, depth=1)
     camera = ros2.node("camera", *FORWARD, name="/raw/my_camera", ros=("-r", "__ns:=/raw"))
     line = "/raw/image_raw: /looker takes raw images"
-    eventually(lambda: line in camera.text, 15.0, what=line)
+    eventually(lambda: line in camera.text, what=line)
 
 
 def test_what_a_node_logs_is_on_rosout(ros2: Ros2Graph) -> None:
     """The log is latched: what was said before anybody listened is told, too."""
     ros2.peer.ask("record", topic="/told/image_raw", type="Image", fields=["width"], depth=1)
     camera = ros2.node("camera", *FORWARD, name="/told/my_camera", ros=("-r", "__ns:=/told"))
-    eventually(lambda: "nothing passes" in camera.text, 15.0)
+    eventually(lambda: "nothing passes" in camera.text)
     ros2.peer.ask("record", topic="/rosout", type="Log", fields=["level", "name", "msg"], latched=True)
     logged = eventually(lambda: [one for _, one in ros2.peer.ask("get", topic="/rosout") if one[1] == "told.my_camera"])
     assert logged[0][0] == 30
