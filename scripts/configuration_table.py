@@ -27,6 +27,9 @@ ROS graph takes ROS's own parameters too, as `_max_linear:=0.5` (ROS 1) or `--ro
 they go before the file, and options before them. A name that does not exist and a value out of range are refused with
 exit code 2, before anything moves.
 
+Parameters with a star can change while a node runs ([ros2.md](ros2.md#parameters-of-a-running-node)); the others are
+read when it starts.
+
 This page is made from `src/handsteer/config.py` by `make docs`.
 """
 
@@ -39,7 +42,7 @@ def page() -> str:
 
 def _section(name: str, section: Any) -> str:
     assert issubclass(section, Section)
-    rows = [_row(parameter, field) for parameter, field in section.model_fields.items()]
+    rows = [_row(name, field, live=name in section.live) for name, field in section.model_fields.items()]
     head = [
         f"## {name}",
         "",
@@ -51,9 +54,9 @@ def _section(name: str, section: Any) -> str:
     return "\n".join([*head, *rows, ""])
 
 
-def _row(name: str, field: FieldInfo) -> str:
+def _row(name: str, field: FieldInfo, *, live: bool) -> str:
     default = str(field.default).lower() if isinstance(field.default, bool) else field.default
-    return f"| `{name}` | `{default}` | {_allowed(field)} | {field.description} |"
+    return f"| `{name}`{' *' if live else ''} | `{default}` | {_allowed(field)} | {field.description} |"
 
 
 def _allowed(field: FieldInfo) -> str:

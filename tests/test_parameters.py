@@ -5,9 +5,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from handsteer import config
-from handsteer.config import Config
+from handsteer.config import Config, ControlConfig
 from handsteer.errors import ConfigError
-from handsteer.parameters import from_parameters
+from handsteer.parameters import NodeParameters, from_parameters
 
 NODE = "/r1/hand_sign_recognition"
 
@@ -51,3 +51,54 @@ def test_no_parameter_is_hidden_by_a_section_of_the_same_name() -> None:
 def test_the_defaults_of_each_section_pass(section: str) -> None:
     defaults = getattr(Config(), section).model_dump(exclude_none=True)
     assert config.load(None, None, from_parameters(defaults, section, "/node")) == Config()
+
+
+def test_what_is_set_is_what_the_node_gets() -> None:
+    applied: list[Config] = []
+    parameters = NodeParameters(Config(), "signs", applied.append)
+    parameters.set({"min_confidence": 0.9, "confirm_time": 0})
+    assert (applied[0].signs.min_confidence, applied[0].signs.confirm_time) == (0.9, 0.0)
+    assert applied[0].landmarks == Config().landmarks
+    assert parameters.values()["min_confidence"] == 0.9
+
+
+def test_what_is_read_at_the_start_can_only_be_set_to_what_it_is() -> None:
+    parameters = NodeParameters(Config(), "signs", lambda _: None)
+    parameters.set({"landmarks.model": "full", "image_transport": "auto"})
+    with pytest.raises(ConfigError, match=r"^landmarks.model cannot be set: it is read when the node starts"):
+        parameters.set({"landmarks.model": "lite"})
+
+
+@pytest.mark.parametrize("section", list(Config.model_fields))
+def test_every_parameter_of_every_node_has_a_fitting_description(section: str) -> None:
+    parameters = NodeParameters(Config(), section, lambda _: None)
+    kinds = {"bool": bool, "integer": int, "double": float, "string": str}
+    for name, value in parameters.values().items():
+        description = parameters.describe(name)
+        assert description is not None
+        assert type(value) is kinds[description.kind], name
+        assert description.text
+        if description.minimum is not None:
+            assert description.minimum <= value  # type: ignore[operator]
+
+
+LIVE = [name for name in ControlConfig.model_fields if name not in {"ramp", "actions"}]
+
+
+@given(st.dictionaries(st.sampled_from(LIVE), st.floats() | st.integers() | st.booleans() | st.text(max_size=3)))
+def test_whatever_is_set_the_configuration_stays_valid(changes: dict[str, Any]) -> None:
+    applied: list[Config] = []
+    parameters = NodeParameters(Config(), "control", applied.append)
+    before = parameters.values()
+    problem = None
+    try:
+        parameters.set(changes)
+    except ConfigError as error:
+        problem = str(error)
+    if problem is not None:
+        assert any(name in problem for name in changes)
+        assert (parameters.values(), applied) == (before, [])
+    else:
+        after = parameters.values()
+        assert all(after[name] == value for name, value in changes.items())
+        Config.model_validate({"control": {name: after[name] for name in LIVE}})

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from handsteer.config import ControlConfig
 from handsteer.control.driver import Driver
 from handsteer.control.sign_control import ZERO, Velocity
-from handsteer.signs.vocabulary import FORWARD, NONE, STOP
+from handsteer.signs.vocabulary import FORWARD, GO, NONE, STOP
 
 DT = 1 / 30
 
@@ -88,3 +88,58 @@ def test_whatever_comes_the_command_is_finite_and_within_limits(
             assert velocity.is_finite
             assert abs(velocity.linear_mps) <= config.max_linear
             assert abs(velocity.angular_radps) <= config.max_angular
+
+
+def test_a_lower_limit_is_commanded_at_once() -> None:
+    driver = Driver(ControlConfig(linear_step=0.5))
+    driver.step(DT, sign=FORWARD)
+    assert driver.reconfigure(ControlConfig(max_linear=0.2)) == Velocity(0.2, 0.0)
+    assert driver.step(DT, sign=GO) == Velocity(0.2, 0.0)
+
+
+def test_a_higher_limit_says_nothing_and_speeds_up_nothing() -> None:
+    driver = Driver(ControlConfig(linear_step=0.5, max_linear=0.2))
+    driver.step(DT, sign=FORWARD)
+    assert driver.reconfigure(ControlConfig(max_linear=10.0)) is None
+    assert driver.step(DT, sign=GO) == Velocity(0.2, 0.0)
+
+
+def test_steering_is_clamped_by_a_lower_limit_at_once() -> None:
+    driver = Driver(ControlConfig())
+    driver.step(DT, steering=Velocity(-0.8, 1.0))
+    assert driver.reconfigure(ControlConfig(max_linear=0.1, max_angular=0.5)) == Velocity(-0.1, 0.5)
+    assert driver.source == "steering"
+
+
+SIGNS = st.sampled_from([FORWARD, "Backward", "Turn Left", "Turn Right", GO, "Peace", STOP, NONE, None])
+SPEEDS = st.floats(0.01, 3.0)
+
+
+@given(
+    before=st.lists(SIGNS, max_size=20),
+    steering=st.none() | st.builds(Velocity, st.floats(-5, 5), st.floats(-5, 5)),
+    limits=st.tuples(SPEEDS, SPEEDS),
+    ramp=st.sampled_from(["per_message", "per_second"]),
+    action=st.sampled_from(["turbo", "stop", "forward"]),
+)
+def test_no_configuration_sets_a_robot_in_motion_or_makes_it_faster(
+    before: list[str | None], steering: Velocity | None, limits: tuple[float, float], ramp: str, action: str
+) -> None:
+    driver = Driver(ControlConfig(linear_step=0.4, angular_step=0.4, actions={"Peace": "turbo"}))
+    for sign in before:
+        driver.step(DT, sign=sign)
+    if steering is not None:
+        driver.step(DT, steering=steering)
+    was, source = driver.velocity, driver.source
+    config = ControlConfig.model_validate(
+        {"max_linear": limits[0], "max_angular": limits[1], "ramp": ramp, "actions": {"Peace": action}}
+    )
+    said = driver.reconfigure(config)
+    now = driver.velocity
+    assert abs(now.linear_mps) <= min(abs(was.linear_mps), limits[0])
+    assert abs(now.angular_radps) <= min(abs(was.angular_radps), limits[1])
+    assert now.linear_mps * was.linear_mps >= 0
+    assert now.angular_radps * was.angular_radps >= 0
+    assert said == (now if now != was else None)
+    assert driver.source == source
+    assert driver.step(0.0) is None

@@ -156,7 +156,7 @@ def test_raw_images_for_another_machine_are_warned_of_once(tmp_path: Path) -> No
         for peer, name in ((far, "viewer"), (farther, "another")):
             peer.ask("record", **images)
             peer.ask("introduce", name=name)
-            eventually(lambda: "/image_raw: /viewer takes raw images" in camera.text, 15.0)
+            eventually(lambda: "/image_raw: /viewer takes raw images" in camera.text)
         eventually(lambda: farther.ask("get", topic="/image_raw"))
         assert "let it take /image_raw/compressed" in camera.text
         assert camera.text.count("takes raw images") == 1

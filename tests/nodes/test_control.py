@@ -2,7 +2,7 @@ import math
 
 import pytest
 
-from handsteer.config import ControlConfig
+from handsteer.config import Config, ControlConfig
 from handsteer.messages import CMD_VEL, DIAGNOSTICS, HAND_SIGN, STEERING_CMD_VEL, String, twist
 from handsteer.nodes.control import HandSignControlNode
 from handsteer.nodes.steering import SteeringNode
@@ -124,3 +124,46 @@ def test_no_latency_is_told_where_signs_come_without_the_time_of_their_frame(ben
         bench.signs.publish(String(data="Forward"))
         bench.run(1 / 30)
     assert "latency_median_ms" not in {value.key for value in statuses[-1].status[0].values}
+
+
+def reconfigure(bench: ControlBench, **control: object) -> None:
+    bench.control.reconfigure(Config.model_validate({"control": control}))
+    bench.run(0.0)
+
+
+def test_a_lower_limit_is_commanded_before_the_next_sign(bench: ControlBench) -> None:
+    bench.show(*["Forward"] * 10)
+    reconfigure(bench, max_linear=0.05)
+    assert bench.commands[-2:] == [(0.1, 0), (0.05, 0)]
+    bench.show("Forward")
+    assert bench.commands[-1] == (0.05, 0)
+
+
+def test_a_new_configuration_of_a_robot_that_stands_says_nothing(bench: ControlBench) -> None:
+    reconfigure(bench, max_linear=5.0, linear_step=1.0)
+    assert bench.commands == []
+    bench.show("Forward")
+    assert bench.commands == [(1.0, 0)]
+
+
+def test_a_shorter_timeout_counts_at_once(bench: ControlBench) -> None:
+    bench.show("Forward")
+    reconfigure(bench, sign_timeout=0.1)
+    bench.run(0.1)
+    assert bench.commands[-1] == (0, 0)
+
+
+def test_a_longer_timeout_is_no_interruption(bench: ControlBench) -> None:
+    reconfigure(bench, sign_timeout=2.0)
+    bench.show("Forward")
+    bench.clock.advance(1.0)  # longer than the timeout of before
+    bench.show("Forward")
+    assert bench.commands == [(0.01, 0), (0.02, 0)]
+
+
+def test_the_newest_of_several_configurations_counts(bench: ControlBench) -> None:
+    bench.show("Forward")
+    for limit in (0.5, 0.3, 0.005):
+        bench.control.reconfigure(Config.model_validate({"control": {"max_linear": limit}}))
+    bench.run(0.0)
+    assert bench.commands == [(0.01, 0), (0.005, 0)]

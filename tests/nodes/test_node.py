@@ -1,10 +1,12 @@
 import threading
 
 from handsteer.clock import RealClock, SteppedClock
+from handsteer.config import Config
 from handsteer.messages import DIAGNOSTICS, DiagnosticArray, Topic
 from handsteer.nodes.node import OK, WARN, Node
 from handsteer.transports.in_process import InProcessTransport
 from handsteer.transports.protocol import Received
+from tests.processes import eventually
 
 
 def make(name: str = "node") -> tuple[Node, SteppedClock, InProcessTransport]:
@@ -103,3 +105,32 @@ def test_a_callback_that_hangs_does_not_hold_up_the_end() -> None:
     node.stop(timeout_s=0.05)
     assert node.stuck
     let_go.set()
+
+
+def test_a_configuration_is_taken_on_the_nodes_thread_without_waiting_for_anything() -> None:
+    taken: list[tuple[Config, int | None]] = []
+
+    class Taking(Node):
+        def on_reconfigure(self, config: Config) -> None:
+            taken.append((config, threading.get_ident()))
+
+    node = Taking("node", InProcessTransport(), RealClock())
+    node.start()
+    config = Config()
+    node.reconfigure(config)
+    eventually(lambda: taken)
+    node.stop()
+    assert taken[0][0] is config
+    assert taken[0][1] != threading.get_ident()
+
+
+def test_a_configuration_that_fails_is_counted_and_the_node_goes_on() -> None:
+    class Failing(Node):
+        def on_reconfigure(self, config: Config) -> None:
+            raise ValueError("odd")
+
+    node = Failing("node", InProcessTransport(), SteppedClock())
+    node.reconfigure(Config())
+    assert node.spin_once()
+    assert node.callback_errors == 1
+    assert not node.spin_once()

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from handsteer.config import SignsConfig
+from handsteer.config import Config, SignsConfig
 from handsteer.images import image_message, jpeg_message
 from handsteer.landmarks.recorded import RecordedLandmarker
 from handsteer.messages import DIAGNOSTICS, HAND_SIGN, IMAGE_ANNOTATED, IMAGE_COMPRESSED, IMAGE_RAW, Header, Image, Time
@@ -146,4 +146,22 @@ def test_none_comes_within_the_timeout_and_a_moment(bench: RecognitionBench) -> 
     bench.run(0.3)
     assert bench.names[-1] == "Forward"
     bench.run(0.08)
+    assert bench.names[-1] == "NONE"
+
+
+def test_other_confidences_and_times_count_from_the_next_frame(bench: RecognitionBench) -> None:
+    bench.show(frames=6)
+    bench.node.reconfigure(Config.model_validate({"signs": {"min_confidence": 1.0, "keep_confidence": 1.0}}))
+    bench.show(frames=6)
+    assert bench.names[-2:] == ["NONE"] * 2
+    bench.node.reconfigure(Config.model_validate({"signs": {"confirm_time": 0.0}}))
+    bench.show(frames=1)
+    assert bench.names[-1] == "Forward"
+
+
+def test_a_shorter_age_of_frames_counts_at_once(bench: RecognitionBench) -> None:
+    bench.show(frames=6, age_s=0.2)
+    assert bench.names[-1] == "Forward"
+    bench.node.reconfigure(Config.model_validate({"signs": {"max_frame_age": 0.1}}))
+    bench.show(frames=6, age_s=0.2)
     assert bench.names[-1] == "NONE"

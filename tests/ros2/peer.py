@@ -3,7 +3,8 @@
 It reads orders as lines of JSON from its input and answers each by one line of JSON; they are those of
 ``tests/dds/peer.py`` as far as it has them. Beside them, ``endpoints`` (topic) returns what ``ros2 topic info -v``
 says, ``topics`` what ``ros2 topic list -t`` says, ``shift`` (from, to, type) publishes on one topic what comes on
-another, and ``parameters`` (node, names) what ``ros2 param`` would get.
+another, ``services`` (node) returns those of a node, and ``list_parameters`` (node) the names that ``ros2 param list``
+would show, or None when nobody answers within a second.
 """
 
 import json
@@ -18,13 +19,15 @@ import rclpy
 from builtin_interfaces.msg import Time
 from geometry_msgs.msg import Twist, TwistStamped
 from nav_msgs.msg import Odometry
+from rcl_interfaces.msg import Log
+from rcl_interfaces.srv import ListParameters
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import CompressedImage, Image
 from std_msgs.msg import String
 
-TYPES = {kind.__name__: kind for kind in (Clock, CompressedImage, Image, Odometry, String, Twist, TwistStamped)}
+TYPES = {kind.__name__: kind for kind in (Clock, CompressedImage, Image, Log, Odometry, String, Twist, TwistStamped)}
 
 rclpy.init()
 node = rclpy.create_node("looker")
@@ -119,6 +122,22 @@ def topics(_: dict[str, Any]) -> dict[str, list[str]]:
     return dict(node.get_topic_names_and_types())
 
 
+def services(order: dict[str, Any]) -> dict[str, list[str]]:
+    namespace, _, name = order["node"].rpartition("/")
+    return dict(node.get_service_names_and_types_by_node(name, namespace or "/"))
+
+
+def list_parameters(order: dict[str, Any]) -> list[str] | None:
+    client = node.create_client(ListParameters, f"{order['node']}/list_parameters")
+    if not client.wait_for_service(20.0):
+        return None
+    answer = client.call_async(ListParameters.Request())
+    deadline_s = time.monotonic() + 1.0
+    while not answer.done() and time.monotonic() < deadline_s:
+        time.sleep(0.01)
+    return list(answer.result().result.names) if answer.done() else None
+
+
 def endpoints(order: dict[str, Any]) -> list[dict[str, Any]]:
     both = [
         ("publisher", node.get_publishers_info_by_topic(order["topic"])),
@@ -140,7 +159,20 @@ def endpoints(order: dict[str, Any]) -> list[dict[str, Any]]:
 
 ORDERS = {
     order.__name__: order
-    for order in (record, get, advertise, listeners, publish, run_clock, shift, graph, topics, endpoints)
+    for order in (
+        record,
+        get,
+        advertise,
+        listeners,
+        publish,
+        run_clock,
+        shift,
+        graph,
+        topics,
+        services,
+        list_parameters,
+        endpoints,
+    )
 }
 
 

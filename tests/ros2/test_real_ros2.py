@@ -131,6 +131,35 @@ def test_compressed_pictures_reach_rclpy(ros2: Ros2Graph) -> None:
     assert all(1000 < size < 200_000 for _, (_, size) in pictures)
 
 
+def test_raw_images_for_fast_dds_are_warned_of(ros2: Ros2Graph) -> None:
+    ros2.peer.ask("record", topic="/raw/image_raw", type="Image", fields=["width"], reliable=False, depth=1)
+    camera = ros2.node("camera", *FORWARD, name="/raw/my_camera", ros=("-r", "__ns:=/raw"))
+    line = "/raw/image_raw: /looker takes raw images"
+    eventually(lambda: line in camera.text, what=line)
+
+
+def test_what_a_node_logs_is_on_rosout(ros2: Ros2Graph) -> None:
+    """The log is latched: what was said before anybody listened is told, too."""
+    ros2.peer.ask("record", topic="/told/image_raw", type="Image", fields=["width"], depth=1)
+    camera = ros2.node("camera", *FORWARD, name="/told/my_camera", ros=("-r", "__ns:=/told"))
+    eventually(lambda: "nothing passes" in camera.text)
+    ros2.peer.ask("record", topic="/rosout", type="Log", fields=["level", "name", "msg"], latched=True)
+    logged = eventually(lambda: [one for _, one in ros2.peer.ask("get", topic="/rosout") if one[1] == "told.my_camera"])
+    assert logged[0][0] == 30
+    assert logged[0][2].startswith("/told/image_raw: nothing passes")
+
+
+def test_parameter_services_are_seen_though_fast_dds_gets_no_answer(ros2: Ros2Graph) -> None:
+    """Fast DDS tells in RTPS headers who asks, which Cyclone DDS does not show: our node says so."""
+    node = f"/asked/{NODE}"
+    control = ros2.node("control", name=node, ros=("-r", "__ns:=/asked"))
+    eventually(lambda: len(ros2.peer.ask("services", node=node)) == 6)
+    assert ros2.peer.ask("services", node=node)[f"{node}/list_parameters"] == ["rcl_interfaces/srv/ListParameters"]
+    assert ros2.peer.ask("list_parameters", node=node) is None
+    eventually(lambda: "has asked, and cannot be answered: set RMW_IMPLEMENTATION=rmw_cyclonedds_cpp" in control.text)
+    assert "Traceback" not in control.text
+
+
 def test_the_time_of_ros2_is_followed(tmp_path: Path) -> None:
     with ros2_graph(tmp_path) as graph:
         peer = graph.peer

@@ -53,11 +53,13 @@ class ServiceServer:
         self._answer = answer
         # A client may be heard before its reader is known here, and would never get a reply that is sent at once.
         self._waiting: list[_Reply] = []
+        self._clients: set[int] = set()
         self._said = False
         self._reader: Any
         self._writer: Any
         self._reader, self._writer = participant.service(name, service)
         participant.serve(self._reader, self._serve)
+        participant.tick(self._look_for_others)
         participant.tick(self._send_waiting)
 
     def close(self) -> None:
@@ -90,6 +92,16 @@ class ServiceServer:
             log.warning("%s: a request of %d bytes cannot be answered: %s", self._name, len(sample.raw), error)
             return
         self._waiting.append(_Reply(client, reply, time.monotonic() + _WAIT_FOR_READER_S))
+
+    def _look_for_others(self) -> None:
+        """Say it when a client comes that cannot be answered: Cyclone DDS drops its requests, which lack the header."""
+        reader = self._reader
+        handles = set(reader.get_matched_publications()) if reader is not None else set()
+        for handle in handles - self._clients:
+            client = reader.get_matched_publication_data(handle)
+            if client is not None and "clientid" not in user_data(client.qos):
+                self._explain()
+        self._clients = handles
 
     def _send_waiting(self) -> None:
         writer = self._writer
