@@ -125,6 +125,14 @@ class Clock(IdlStruct, typename="rosgraph_msgs::msg::dds_::Clock_"):
 
 
 @dataclass
+class Battery(IdlStruct, typename="my_robot::msg::dds_::Battery_"):
+    """A type of somebody's own, which no library knows."""
+
+    cells: sequence[float64] = field(default_factory=list)
+    charge: int32 = 0
+
+
+@dataclass
 class Gid(IdlStruct, typename="rmw_dds_common::msg::dds_::Gid_"):
     data: array[uint8, 16]
 
@@ -143,7 +151,7 @@ class ParticipantEntitiesInfo(IdlStruct, typename="rmw_dds_common::msg::dds_::Pa
     node_entities_info_seq: sequence[NodeEntitiesInfo]
 
 
-TYPES = {kind.__name__: kind for kind in (String, Image, Twist, Odometry, Clock)}
+TYPES = {kind.__name__: kind for kind in (String, Image, Twist, Odometry, Clock, Battery)}
 RELIABLE, BEST_EFFORT = Policy.Reliability.Reliable(1_000_000_000), Policy.Reliability.BestEffort
 CDR = Policy.DataRepresentation(use_cdrv0_representation=True)
 

@@ -41,6 +41,7 @@ class RosGraph:
         self._writers: list[uuid.UUID] = []
         self._readers: list[uuid.UUID] = []
         self._names: dict[bytes, dict[bytes, str]] = {}
+        self._nodes: dict[bytes, list[str]] = {}
         self._type = dds_type(_INFO, distribution)
         topic = Topic(participant, DISCOVERY_TOPIC, self._type)
         self.reader: Any = DataReader(participant, topic, qos=discovery_qos(_INFO, _AT_ONCE))
@@ -64,6 +65,11 @@ class RosGraph:
         with self._lock:
             return next((nodes[endpoint.bytes] for nodes in self._names.values() if endpoint.bytes in nodes), None)
 
+    def nodes(self) -> list[str]:
+        """Return the full names of the nodes of others; two nodes of one name are there twice."""
+        with self._lock:
+            return [name for names in self._nodes.values() for name in names]
+
     def serve(self) -> None:
         """Learn what others have told."""
         for sample in self.reader.take(_AT_ONCE):
@@ -71,8 +77,9 @@ class RosGraph:
                 continue
             info: Any = self._store.deserialize_cdr(sample.raw, _INFO)
             with self._lock:
+                self._nodes[_bytes(info.gid)] = [_full_name(node) for node in info.node_entities_info_seq]
                 self._names[_bytes(info.gid)] = {
-                    _bytes(gid): f"{node.node_namespace.rstrip('/')}/{node.node_name}"
+                    _bytes(gid): _full_name(node)
                     for node in info.node_entities_info_seq
                     for gid in (*node.reader_gid_seq, *node.writer_gid_seq)
                 }
@@ -80,11 +87,8 @@ class RosGraph:
     def forget(self, endpoint: uuid.UUID) -> None:
         """Forget the nodes of the participant that had ``endpoint``."""
         with self._lock:
-            self._names = {
-                gid: nodes
-                for gid, nodes in self._names.items()
-                if gid[:_PREFIX_BYTES] != endpoint.bytes[:_PREFIX_BYTES]
-            }
+            for gid in [gid for gid in self._names if gid[:_PREFIX_BYTES] == endpoint.bytes[:_PREFIX_BYTES]]:
+                del self._names[gid], self._nodes[gid]
 
     def close(self) -> None:
         """Leave the topic; may be called twice."""
@@ -112,6 +116,10 @@ class RosGraph:
         data = np.zeros(length, np.uint8)
         data[:16] = np.frombuffer(guid.bytes, np.uint8)
         return self._store.types[kind](data=data)
+
+
+def _full_name(node: Any) -> str:
+    return f"{node.node_namespace.rstrip('/')}/{node.node_name}"
 
 
 def _bytes(gid: Any) -> bytes:

@@ -13,6 +13,7 @@ from cyclonedds.domain import DomainParticipant
 
 from handsteer.transports.dds.discovery import DISCOVERY_TOPIC, RosGraph
 from handsteer.transports.dds.qos import describe, misfits
+from handsteer.transports.dds.types import ros_type_name
 
 log = logging.getLogger(__name__)
 
@@ -30,12 +31,14 @@ class Endpoint:
         type: Name of its type in DDS.
         qos: What it offers or requests.
         publishes: Whether it is a publisher.
+        type_id: By what its definition can be asked for; None where its DDS does not tell.
     """
 
     topic: str
     type: str
     qos: Qos
     publishes: bool
+    type_id: Any = None
 
     @property
     def kind(self) -> str:
@@ -77,6 +80,11 @@ class Matching:
         """Note subscribers that have come or gone."""
         self._serve(self.subscriptions, publishes=False)
 
+    def others(self) -> dict[uuid.UUID, Endpoint]:
+        """Return the publishers and subscribers of other processes."""
+        with self._lock:
+            return dict(self._theirs)
+
     def tick(self) -> None:
         """Report what does not fit, once the other's name is known, or after a while without it."""
         now = time.monotonic()
@@ -98,7 +106,9 @@ class Matching:
                 continue
             with self._lock:
                 if seen.sample_info.valid_data and seen.qos is not None:
-                    self._theirs[seen.key] = Endpoint(seen.topic_name, seen.type_name, seen.qos, publishes)
+                    self._theirs[seen.key] = Endpoint(
+                        seen.topic_name, seen.type_name, seen.qos, publishes, seen.type_id
+                    )
                     self._compare(seen.key)
                 else:
                     self._forget(seen.key)
@@ -130,7 +140,7 @@ class Matching:
 def reasons(ours: Endpoint, theirs: Endpoint) -> list[str]:
     """Return why a publisher and a subscriber of one topic are not connected, in words; empty when they are."""
     if ours.type != theirs.type:
-        return [f"ours has the type {_ros_type(ours.type)}, theirs {_ros_type(theirs.type)}"]
+        return [f"ours has the type {ros_type_name(ours.type)}, theirs {ros_type_name(theirs.type)}"]
     return misfits(ours.qos, theirs.qos) if ours.publishes else misfits(theirs.qos, ours.qos)
 
 
@@ -141,7 +151,3 @@ def explain(ours: Endpoint, theirs: Endpoint, node: str | None) -> str:
         f"{ours.topic.removeprefix('rt')}: nothing passes between our {ours.kind} and the {theirs.kind} of {who}: "
         f"{'; '.join(reasons(ours, theirs))} (ours: {describe(ours.qos)}; theirs: {describe(theirs.qos)})"
     )
-
-
-def _ros_type(name: str) -> str:
-    return name.replace("::dds_::", "::").replace("::", "/").removesuffix("_")

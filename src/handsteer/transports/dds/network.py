@@ -10,6 +10,14 @@ _RANGES = ("LOCALHOST", "SUBNET", "OFF", "SYSTEM_DEFAULT")
 _LARGEST_DOMAIN = 232  # those above have no UDP ports
 _ADDRESS = re.compile(r"[A-Za-z0-9_.:%\[\]-]+")
 _LARGEST_INDEX = 32
+_PLACES = {
+    "LOCALHOST": "this machine",
+    "PEERS": "this machine and ROS_STATIC_PEERS",
+    "SUBNET": "the subnet",
+    "OFF": "nobody",
+    "SYSTEM_DEFAULT": "as Cyclone DDS does by itself",
+    "CYCLONEDDS_URI": "as CYCLONEDDS_URI says",
+}
 
 
 @dataclass(frozen=True)
@@ -20,11 +28,18 @@ class Network:
         domain: Number of the DDS domain, 0 to 232.
         config: Configuration of Cyclone DDS, as XML; None leaves it to the user's ``CYCLONEDDS_URI`` or its defaults.
         distribution: The ROS 2 distribution whose discovery is spoken: ``humble``, or ``jazzy`` for all newer ones.
+        reach: One of ROS 2's ranges, ``PEERS`` for this machine and static peers, or ``CYCLONEDDS_URI``.
     """
 
     domain: int
     config: str | None
     distribution: str = "jazzy"
+    reach: str = "LOCALHOST"
+
+    @property
+    def place(self) -> str:
+        """Where is looked, in words."""
+        return f"domain {self.domain}, {_PLACES[self.reach]}"
 
 
 def network(environment: Mapping[str, str]) -> Network:
@@ -40,11 +55,13 @@ def network(environment: Mapping[str, str]) -> Network:
     distribution = "humble" if environment.get("ROS_DISTRO") == "humble" else "jazzy"
     reach = _range(environment)
     peers = _peers(environment.get("ROS_STATIC_PEERS", ""))
-    if environment.get("CYCLONEDDS_URI") or reach == "SYSTEM_DEFAULT":
-        return Network(domain, None, distribution)
+    if environment.get("CYCLONEDDS_URI"):
+        return Network(domain, None, distribution, "CYCLONEDDS_URI")
+    if reach == "SYSTEM_DEFAULT":
+        return Network(domain, None, distribution, reach)
     if environment.get("ROS_LOCALHOST_ONLY") == "1" or reach == "OFF":
         peers = []
-    return Network(domain, _config(reach, peers), distribution)
+    return Network(domain, _config(reach, peers), distribution, "PEERS" if peers and reach == "LOCALHOST" else reach)
 
 
 def _domain(text: str) -> int:

@@ -6,6 +6,7 @@ from typing import Any
 
 from cyclonedds.core import DDSException, Policy, Qos
 from cyclonedds.domain import Domain, DomainParticipant
+from cyclonedds.dynamic import get_types_for_typeid
 from cyclonedds.pub import DataWriter
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic as DdsTopic
@@ -16,11 +17,13 @@ from handsteer.transports.dds.discovery import RosGraph
 from handsteer.transports.dds.dispatcher import Dispatcher
 from handsteer.transports.dds.matching import Endpoint, Matching
 from handsteer.transports.dds.network import Network
-from handsteer.transports.dds.qos import reader_qos, writer_qos
-from handsteer.transports.dds.types import dds_type, dds_type_name
+from handsteer.transports.dds.qos import counter_qos, reader_qos, writer_qos
+from handsteer.transports.dds.types import dds_type, dds_type_name, opaque_type, ros_type_name
+from handsteer.transports.ros2.encoding import types
 from handsteer.transports.ros2.names import NodeName
 
 _USER_DATA = b"enclave=/;"
+_DEFINITION_NS = 500_000_000
 
 
 class Participant:
@@ -74,6 +77,19 @@ class Participant:
         """Call ``serve`` on the DDS thread whenever ``reader`` has something, until it is released."""
         self._dispatcher.add(reader, serve)
 
+    def others(self) -> tuple[list[str], list[tuple[Endpoint, str | None]]]:
+        """Return the nodes of other processes, and their publishers and subscribers with the node of each, if told."""
+        return self._graph.nodes(), [(end, self._graph.node_of(key)) for key, end in self._matching.others().items()]
+
+    def counter(self, writer: Endpoint) -> DataReader[Any]:
+        """Return a reader that gets what ``writer`` sends, of whatever type, and that is told to nobody as our node's.
+
+        Raises:
+            DDSException: There can be none.
+        """
+        topic = DdsTopic(self._participant, writer.topic, self._type_of(writer))
+        return DataReader(self._participant, topic, qos=counter_qos(writer.qos))
+
     def release(self, endpoint: DataWriter[Any] | DataReader[Any]) -> None:
         """Let go of a writer or reader; it is gone when the caller forgets it too."""
         if isinstance(endpoint, DataReader):
@@ -87,6 +103,15 @@ class Participant:
         self._graph.close()
         self._topics.clear()
         self._participant = self._domain = None
+
+    def _type_of(self, endpoint: Endpoint) -> Any:
+        name = ros_type_name(endpoint.type)
+        if name in types().fielddefs:
+            return dds_type(name)
+        if endpoint.type_id is None:
+            return opaque_type(endpoint.type)
+        definition, _ = get_types_for_typeid(self._participant, endpoint.type_id, _DEFINITION_NS)
+        return opaque_type(endpoint.type, definition)
 
     def _topic(self, topic: Topic[Any]) -> DdsTopic[Any]:
         name = self._dds_name(topic)

@@ -25,6 +25,7 @@ _LIVELINESS = (
     Policy.Liveliness.ManualByTopic,
 )
 _NEVER_NS = 2**63 - 1
+_COUNTED_AT_ONCE = 50
 
 
 def writer_qos(topic: Topic[Any]) -> Qos:
@@ -35,6 +36,13 @@ def writer_qos(topic: Topic[Any]) -> Qos:
 def reader_qos(topic: Topic[Any]) -> Qos:
     """Return what a subscriber of ``topic`` requests."""
     return _qos(topic, reliable=topic.type not in (*_SENSOR_DATA, *_STATE))
+
+
+def counter_qos(offered: Qos) -> Qos:
+    """Return what somebody requests who takes whatever comes, from a publisher that offers ``offered``."""
+    ownership = _find(offered, "Ownership", Policy.Ownership.Shared)
+    anyhow = Policy.DataRepresentation(use_cdrv0_representation=True, use_xcdrv2_representation=True)
+    return Qos(_BEST_EFFORT, _VOLATILE, Policy.History.KeepLast(_COUNTED_AT_ONCE), ownership, anyhow)
 
 
 def discovery_qos(name: str, depth: int) -> Qos:

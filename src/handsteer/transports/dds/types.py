@@ -32,12 +32,33 @@ def dds_type_name(name: str) -> str:
     return f"{package}::{kind}::dds_::{message}_"
 
 
+def ros_type_name(name: str) -> str:
+    """Return what :func:`dds_type_name` was made from."""
+    return name.replace("::dds_::", "::").replace("::", "/").removesuffix("_")
+
+
 @functools.cache
 def dds_type(name: str, distribution: str = "jazzy") -> Any:
     """Return the DDS type for the message type ``name``; its instances hold encoded messages in ``raw``."""
     _, fields = types(distribution).fielddefs[name]
     members = {field: _idl(kind, distribution) for field, kind in fields}
     struct = make_idl_struct(name.rpartition("/")[2], dds_type_name(name), members, dataclassify=False)
+    return _passing(struct)
+
+
+def opaque_type(name: str, struct: Any = None) -> Any:
+    """Return a DDS type of the name ``name`` in DDS that lets the bytes of any message pass.
+
+    Args:
+        name: As ``my_robot::msg::dds_::Battery_``.
+        struct: Its definition, where the other side has told one, which cyclonedds then compares; else there is none.
+    """
+    if struct is None:
+        struct = make_idl_struct("Opaque", name, {"raw": idl.uint8}, dataclassify=False)
+    return _passing(struct)
+
+
+def _passing(struct: Any) -> Any:
     for method, passing in _PASSING.items():
         setattr(struct, method, passing)
     return struct
