@@ -29,11 +29,11 @@ class RosGraph:
 
     Args:
         participant: The participant of this process.
-        name: The name of this process's node.
+        name: The name of this process's node; None when it only looks on, and tells nothing.
         distribution: The ROS 2 distribution that is spoken to: identifiers have 24 bytes in ``humble``, 16 since.
     """
 
-    def __init__(self, participant: DomainParticipant, name: NodeName, distribution: str) -> None:
+    def __init__(self, participant: DomainParticipant, name: NodeName | None, distribution: str) -> None:
         self._guid = participant.guid
         self._name = name
         self._store = types(distribution)
@@ -45,7 +45,7 @@ class RosGraph:
         self._type = dds_type(_INFO, distribution)
         topic = Topic(participant, DISCOVERY_TOPIC, self._type)
         self.reader: Any = DataReader(participant, topic, qos=discovery_qos(_INFO, _AT_ONCE))
-        self._writer: Any = DataWriter(participant, topic, qos=discovery_qos(_INFO, 1))
+        self._writer: Any = DataWriter(participant, topic, qos=discovery_qos(_INFO, 1)) if name else None
         self._tell()
 
     def add(self, endpoint: DataWriter[Any] | DataReader[Any]) -> None:
@@ -98,6 +98,8 @@ class RosGraph:
         return self._writers if isinstance(endpoint, DataWriter) else self._readers
 
     def _tell(self) -> None:
+        if self._name is None or self._writer is None:
+            return
         kinds = self._store.types
         node = kinds["rmw_dds_common/msg/NodeEntitiesInfo"](
             node_namespace=self._name.namespace,
@@ -106,8 +108,7 @@ class RosGraph:
             writer_gid_seq=[self._gid(guid) for guid in self._writers],
         )
         info = kinds[_INFO](gid=self._gid(self._guid), node_entities_info_seq=[node])
-        if self._writer is not None:
-            self._writer.write(self._type(bytes(self._store.serialize_cdr(info, _INFO))))
+        self._writer.write(self._type(bytes(self._store.serialize_cdr(info, _INFO))))
 
     def _gid(self, guid: uuid.UUID) -> Any:
         kind = "rmw_dds_common/msg/Gid"

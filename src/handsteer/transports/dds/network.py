@@ -9,7 +9,8 @@ from handsteer.errors import TransportError
 _RANGES = ("LOCALHOST", "SUBNET", "OFF", "SYSTEM_DEFAULT")
 _LARGEST_DOMAIN = 232  # those above have no UDP ports
 _ADDRESS = re.compile(r"[A-Za-z0-9_.:%\[\]-]+")
-_LARGEST_INDEX = 32
+LARGEST_INDEX = 32
+"""Where multicast is not used, 33 participants of a domain find a port of their own on a machine."""
 _PLACES = {
     "LOCALHOST": "this machine",
     "PEERS": "this machine and ROS_STATIC_PEERS",
@@ -35,6 +36,11 @@ class Network:
     config: str | None
     distribution: str = "jazzy"
     reach: str = "LOCALHOST"
+
+    @property
+    def index_is_limited(self) -> bool:
+        """Whether each participant needs one of the few ports at which others look for it."""
+        return self.config is not None and "MaxAutoParticipantIndex" in self.config
 
     @property
     def place(self) -> str:
@@ -100,7 +106,7 @@ def _config(reach: str, peers: list[str]) -> str:
     everyone = [*(["127.0.0.1"] if reach == "LOCALHOST" else []), *peers]
     found = "".join(f'<Peer address="{peer}"/>' for peer in everyone)
     index = (
-        f"<ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>{_LARGEST_INDEX}</MaxAutoParticipantIndex>"
+        f"<ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>{LARGEST_INDEX}</MaxAutoParticipantIndex>"
     )
     return (
         "<CycloneDDS><Domain>"

@@ -32,12 +32,13 @@ class Participant:
     Args:
         network: The domain, and where to look for others.
         name: The node's name.
+        looks_on: Whether it is no node for others, and only looks.
 
     Raises:
         TransportError: The domain cannot be joined.
     """
 
-    def __init__(self, network: Network, name: NodeName) -> None:
+    def __init__(self, network: Network, name: NodeName, *, looks_on: bool = False) -> None:
         self.name = name
         try:
             self._domain: Any = None if network.config is None else Domain(network.domain, network.config)
@@ -49,7 +50,7 @@ class Participant:
             ) from None
         self._lock = threading.Lock()
         self._topics: dict[str, Any] = {}
-        self._graph = RosGraph(self._participant, name, network.distribution)
+        self._graph = RosGraph(self._participant, None if looks_on else name, network.distribution)
         self._matching = Matching(self._participant, self._graph)
         self._dispatcher = Dispatcher(self._participant, self._matching.tick)
         self._dispatcher.add(self._graph.reader, self._graph.serve)
