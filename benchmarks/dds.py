@@ -1,8 +1,8 @@
 """What DDS costs: a Twist's and an image's way from one process to another, and the time to the first command.
 
 Run ``python benchmarks/dds.py`` with cyclonedds installed. A second process listens and tells how old each message was
-when a node's callback got it; both read the same monotonic clock. The same is measured within one process, side by
-side, as what the nodes themselves cost. ``--load`` says how busy the machine was.
+when a node's callback got it; both read the same monotonic clock. The same is measured within one process, message by
+message in turn, as what the nodes themselves cost.
 """
 
 import argparse
@@ -12,6 +12,8 @@ import subprocess
 import sys
 import threading
 import time
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +25,7 @@ from tests.dds.graph import free_domain
 
 from handsteer.clock import WallClock
 from handsteer.images import image_message
-from handsteer.messages import CMD_VEL, HAND_SIGN, IMAGE_RAW, Header, Image, String, Topic, Twist, twist
+from handsteer.messages import CMD_VEL, HAND_SIGN, Header, Image, String, Topic, Twist, twist
 from handsteer.nodes.node import Node
 from handsteer.transports import join
 from handsteer.transports.in_process import InProcessTransport
@@ -33,11 +35,30 @@ WIDTH, HEIGHT = 640, 480
 SETTLE_S = 0.5
 # A Twist's own stamp would change its size; what the robot would do with the time in it does not matter here.
 TWISTS = Topic("/benchmark/twist", Twist, depth=10)
+# Deep enough that one is missing only if it was lost on the way; in a graph a newer one takes its place.
+IMAGES = Topic("/benchmark/image", Image, depth=10)
 
 
 def sent_s(message: Any) -> float:
     """Return when a message was sent, in seconds of the monotonic clock."""
     return message.linear.x if isinstance(message, Twist) else float(message.header.frame_id)
+
+
+@dataclass(frozen=True)
+class Figures:
+    """What one run came to.
+
+    Attributes:
+        here: How old each message was within one process, in milliseconds.
+        there: Likewise over DDS.
+        sender: CPU of the publishing itself, in percent of a core.
+        listener: CPU of the whole other process, likewise.
+    """
+
+    here: np.ndarray
+    there: np.ndarray
+    sender: float
+    listener: float
 
 
 class Listener(Node):
@@ -76,26 +97,35 @@ def joined(name: str, domain: int) -> Session:
     return join("dds", name, [])
 
 
-def send(publisher: Publisher[Any], topic: Topic[Any], count: int, rate: float) -> float:
-    """Send ``count`` messages that say when they were sent; return the CPU seconds that it took."""
+def send(publishers: Sequence[Publisher[Any]], topic: Topic[Any], count: int, rate: float) -> list[float]:
+    """Send ``count`` messages by each publisher, in turn, so that whatever else the machine does meets all alike.
+
+    Returns:
+        The CPU seconds that each took.
+    """
     picture = np.random.default_rng(0).integers(0, 255, (HEIGHT, WIDTH, 3), np.uint8)
-    began_s, due_s = cpu_s(), time.monotonic()
+    spent_s, due_s = [0.0] * len(publishers), time.monotonic()
     for _ in range(count):
-        if topic.type is Image:
-            header = Header(stamp=WallClock().stamp(time.monotonic()), frame_id=repr(time.monotonic()))
-            publisher.publish(image_message(picture, header))
-        else:
-            publisher.publish(twist(time.monotonic(), 0.0))
-        due_s += 1 / rate
-        time.sleep(max(0.0, due_s - time.monotonic()))
-    return cpu_s() - began_s
+        for number, publisher in enumerate(publishers):
+            began_s = time.thread_time()
+            if topic.type is Image:
+                header = Header(stamp=WallClock().stamp(time.monotonic()), frame_id=repr(time.monotonic()))
+                publisher.publish(image_message(picture, header))
+            else:
+                publisher.publish(twist(time.monotonic(), 0.0))
+            spent_s[number] += time.thread_time() - began_s
+            due_s += 1 / rate / len(publishers)
+            time.sleep(max(0.0, due_s - time.monotonic()))
+    return spent_s
 
 
-def across(topic: Topic[Any], count: int, rate: float) -> dict[str, Any]:
-    """Return what came over DDS from this process to another."""
+def measure(topic: Topic[Any], count: int, rate: float) -> Figures:
+    """Return what came over DDS from this process to another, and within this process."""
     domain = free_domain()
     command = [sys.executable, __file__, "--listen", topic.name, "--domain", str(domain)]
     session = joined("talker", domain)
+    transport = InProcessTransport()
+    listener = Listener(transport, topic)
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as other:
         assert other.stdin is not None
         assert other.stdout is not None
@@ -104,22 +134,15 @@ def across(topic: Topic[Any], count: int, rate: float) -> dict[str, Any]:
         wait_for(publisher)
         other.stdin.write("start\n")
         other.stdin.flush()
-        cpu = send(publisher, topic, count, rate)
+        _, spent_s = send([transport.advertise("talker", topic), publisher], topic, count, rate)
         time.sleep(SETTLE_S)
         other.stdin.write("end\n")
         other.stdin.flush()
-        told = dict(json.loads(other.stdout.readline()))
+        told = json.loads(other.stdout.readline())
     session.close()
-    return {**told, "sender_cpu_s": cpu}
-
-
-def within(topic: Topic[Any], count: int, rate: float) -> list[float]:
-    """Return the ages of messages within one process."""
-    transport = InProcessTransport()
-    listener = Listener(transport, topic)
-    send(transport.advertise("talker", topic), topic, count, rate)
     listener.stop()
-    return listener.ages_s
+    here, there = (1000 * np.array(ages_s) for ages_s in (listener.ages_s, told["ages_s"]))
+    return Figures(here, there, 100 * spent_s * rate / count, 100 * told["cpu_s"] * rate / count)
 
 
 def wait_for(publisher: Publisher[Any]) -> None:
@@ -149,24 +172,39 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="Measure what DDS costs.")
     parser.add_argument("--twists", type=int, default=2000, help="Twists to send, 200 a second")
     parser.add_argument("--images", type=int, default=300, help="images to send, 30 a second")
+    parser.add_argument("--runs", type=int, default=3, help="how often all is measured")
     parser.add_argument("--listen", help=argparse.SUPPRESS)
     parser.add_argument("--domain", type=int, help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.listen:
-        listen(TWISTS if options.listen == TWISTS.name else IMAGE_RAW, options.domain)
+        listen(TWISTS if options.listen == TWISTS.name else IMAGES, options.domain)
         return
-    print(f"load of the machine before: {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores")
+    print(f"load of the machine before: {load()}")
     print("first command after the start of the control: " + ", ".join(f"{first_command_s():.2f} s" for _ in range(3)))
-    for topic, count, rate in ((TWISTS, options.twists, 200.0), (IMAGE_RAW, options.images, 30.0)):
-        here, there = np.array(within(topic, count, rate)) * 1000, across(topic, count, rate)
-        ages = np.array(there["ages_s"]) * 1000
-        duration_s = count / rate
-        print(f"{topic.type.__name__.rpartition('__')[2]}, {rate:.0f} a second: {len(ages)} of {count} came")
-        print("                       median      p99")
-        print(f"  within one process {np.median(here):8.2f} {np.percentile(here, 99):8.2f} ms")
-        print(f"  over DDS           {np.median(ages):8.2f} {np.percentile(ages, 99):8.2f} ms")
-        sender, listener = 100 * there["sender_cpu_s"] / duration_s, 100 * there["cpu_s"] / duration_s
-        print(f"  CPU of the sender {sender:.1f} %, of the listener {listener:.1f} % of a core")
+    for topic, count, rate in ((TWISTS, options.twists, 200.0), (IMAGES, options.images, 30.0)):
+        runs = [measure(topic, count, rate) for _ in range(options.runs)]
+        print(f"{topic.type.__name__.rpartition('__')[2]}, {rate:.0f} a second; load of the machine {load()}")
+        print("  came over DDS      " + ", ".join(f"{len(run.there)} of {count}" for run in runs))
+        for name, percent in (("median", 50), ("p99", 99)):
+            here, there = (
+                [float(np.percentile(ages, percent)) for ages in column]
+                for column in zip(*((run.here, run.there) for run in runs), strict=True)
+            )
+            more = [one - other for one, other in zip(there, here, strict=True)]
+            print(f"  {name:6s}  within {row(here)}  over DDS {row(there)}  more {row(more)} ms")
+        print(
+            f"  CPU of the sender {row([run.sender for run in runs])}, of the listener "
+            f"{row([run.listener for run in runs])} % of a core"
+        )
+
+
+def row(values: list[float]) -> str:
+    """Return the median of the runs, and the runs."""
+    return f"{np.median(values):.2f} ({', '.join(f'{value:.2f}' for value in values)})"
+
+
+def load() -> str:
+    return f"{os.getloadavg()[0]:.1f} on {os.cpu_count()} cores"
 
 
 if __name__ == "__main__":
