@@ -33,6 +33,7 @@ from handsteer.transports.protocol import Publisher, Received, Session, Transpor
 
 WIDTH, HEIGHT = 640, 480
 SETTLE_S = 0.5
+MODULES = ("handsteer.cli.main", "handsteer.cli.nodes", "handsteer.transports.dds.session")
 # A Twist's own stamp would change its size; what the robot would do with the time in it does not matter here.
 TWISTS = Topic("/benchmark/twist", Twist, depth=10)
 # Deep enough that one is missing only if it was lost on the way; in a graph a newer one takes its place.
@@ -168,6 +169,13 @@ def first_command_s() -> float:
     return took_s
 
 
+def loading_s() -> float:
+    """Return the seconds that it takes a new process to load what the control needs, and to end."""
+    began_s = time.monotonic()
+    subprocess.run([sys.executable, "-c", f"import {', '.join(MODULES)}"], check=True)
+    return time.monotonic() - began_s
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description="Measure what DDS costs.")
     parser.add_argument("--twists", type=int, default=2000, help="Twists to send, 200 a second")
@@ -180,7 +188,11 @@ def main() -> None:
         listen(TWISTS if options.listen == TWISTS.name else IMAGES, options.domain)
         return
     print(f"load of the machine before: {load()}")
-    print("first command after the start of the control: " + ", ".join(f"{first_command_s():.2f} s" for _ in range(3)))
+    starts = [(first_command_s(), loading_s()) for _ in range(options.runs)]
+    print(
+        f"first command after the start of the control {row([first for first, _ in starts])} s, "
+        f"of which Python's modules take {row([loading for _, loading in starts])} s"
+    )
     for topic, count, rate in ((TWISTS, options.twists, 200.0), (IMAGES, options.images, 30.0)):
         runs = [measure(topic, count, rate) for _ in range(options.runs)]
         print(f"{topic.type.__name__.rpartition('__')[2]}, {rate:.0f} a second; load of the machine {load()}")

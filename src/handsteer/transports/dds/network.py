@@ -11,6 +11,9 @@ _LARGEST_DOMAIN = 232  # those above have no UDP ports
 _ADDRESS = re.compile(r"[A-Za-z0-9_.:%\[\]-]+")
 LARGEST_INDEX = 32
 """Where multicast is not used, 33 participants of a domain find a port of their own on a machine."""
+# Four raw images: with the engine's own 1 MB, a process that is held up for a frame or two loses one. The system gives
+# what it allows (Linux: net.core.rmem_max), and nothing is said where that is less.
+_RECEIVE_BUFFER = "4MiB"
 _PLACES = {
     "LOCALHOST": "this machine",
     "PEERS": "this machine and ROS_STATIC_PEERS",
@@ -112,5 +115,6 @@ def _config(reach: str, peers: list[str]) -> str:
         "<CycloneDDS><Domain>"
         f"<General>{interface if alone else ''}<AllowMulticast>{multicast}</AllowMulticast></General>"
         f"<Discovery>{index if multicast == 'false' or peers else ''}<Peers>{found}</Peers></Discovery>"
+        f'<Internal><SocketReceiveBufferSize min="default" max="{_RECEIVE_BUFFER}"/></Internal>'
         "</Domain></CycloneDDS>"
     )
