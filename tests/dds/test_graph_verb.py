@@ -12,6 +12,7 @@ import pytest
 pytest.importorskip("cyclonedds")
 
 from tests.dds.graph import DdsGraph, dds_graph
+from tests.processes import eventually
 
 CLOCK_HZ = 100.0
 
@@ -46,12 +47,18 @@ def look(domain: DdsGraph, *arguments: str) -> str:
 
 @pytest.fixture(scope="module")
 def seen(domain: DdsGraph) -> dict[str, Any]:
-    domain.peer.ask("run_clock", from_s=100, seconds=60)
-    with ThreadPoolExecutor() as pool:
-        looking = pool.submit(look, domain, "--json")
-        while not looking.done():
-            domain.peer.ask("publish", topic="/battery", values={"charge": 3}, count=10, period_s=0.02)
-    return dict(json.loads(looking.result()))
+    """What is seen while /clock and /battery are published; tried again where a busy machine was late for it."""
+
+    def look_at_all() -> dict[str, Any] | None:
+        domain.peer.ask("run_clock", from_s=100, seconds=15)
+        with ThreadPoolExecutor() as pool:
+            looking = pool.submit(look, domain, "--json")
+            while not looking.done():
+                domain.peer.ask("publish", topic="/battery", values={"charge": 3}, count=10, period_s=0.02)
+        found = dict(json.loads(looking.result()))
+        return found if len(found["nodes"]) == 4 and topics(found)["/battery"]["rate_hz"] else None
+
+    return dict(eventually(look_at_all, what="all nodes to be seen"))
 
 
 def topics(seen: dict[str, Any]) -> dict[str, Any]:
@@ -69,10 +76,10 @@ def test_nodes_and_their_topics(domain: DdsGraph, seen: dict[str, Any]) -> None:
 
 def test_rates_also_of_types_that_no_library_knows(domain: DdsGraph, seen: dict[str, Any]) -> None:
     """A busy machine may slow the talker, but not speed it up."""
-    assert 5 < topics(seen)["/clock"]["rate_hz"] < 1.3 * CLOCK_HZ
+    assert 0 < topics(seen)["/clock"]["rate_hz"] < 1.3 * CLOCK_HZ
     assert topics(seen)["/gesture/hand_sign"]["rate_hz"] is None
     assert topics(seen)["/battery"]["types"] == ["my_robot/msg/Battery"]
-    assert 2 < topics(seen)["/battery"]["rate_hz"] < 1.3 * 50
+    assert 0 < topics(seen)["/battery"]["rate_hz"] < 1.3 * 50
 
 
 def test_what_is_amiss(seen: dict[str, Any]) -> None:
@@ -85,7 +92,13 @@ def test_what_is_amiss(seen: dict[str, Any]) -> None:
 
 
 def test_in_words(domain: DdsGraph) -> None:
-    lines = look(domain, "--seconds", "0").splitlines()
+    lines: list[str] = []
+
+    def look_at_all() -> bool:
+        lines[:] = look(domain, "--seconds", "0").splitlines()
+        return "4 nodes" in lines[0]
+
+    eventually(look_at_all, what="all nodes to be seen")
     assert lines[0] == f"domain {domain.domain}, this machine: 4 nodes, {topic_rows(lines)} topics"
     assert "  subscribes  /r1/gesture/hand_sign" in lines
     assert next(line for line in lines if line.startswith("/clock ")).split() == [
