@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-_TIMEOUT_S = 15.0
+_TIMEOUT_S = 20.0
 # Cyclone DDS begins its lines with the time, the domain and the program.
 _ENGINE_LINE = re.compile(r"^\d+\.\d+ \[\d+\]\s+\S+: (.*)$", re.MULTILINE)
 
