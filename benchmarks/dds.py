@@ -1,9 +1,9 @@
 """What a wire of ROS 2 costs: the way of a Twist and an image between two processes, and the time to the first command.
 
 Run ``python benchmarks/dds.py`` with cyclonedds installed, ``python benchmarks/dds.py --transport zenoh`` with
-eclipse-zenoh; its router runs beside. A second process listens and tells how old each message was
-when a node's callback got it; both read the same monotonic clock. The same is measured within one process, side by
-side, as what the nodes themselves cost. ``--load`` says how busy the machine was.
+eclipse-zenoh, whose router runs beside. A second process listens and tells how old each message was
+when a node's callback got it; both read the same monotonic clock. The same is measured within one process, message by
+message in turn, as what the nodes themselves cost.
 """
 
 import argparse
@@ -13,8 +13,9 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -27,21 +28,41 @@ from tests.processes import free_port
 
 from handsteer.clock import WallClock
 from handsteer.images import image_message
-from handsteer.messages import CMD_VEL, HAND_SIGN, IMAGE_RAW, Header, Image, String, Topic, Twist, twist
+from handsteer.messages import CMD_VEL, HAND_SIGN, Header, Image, String, Topic, Twist, twist
 from handsteer.nodes.node import Node
 from handsteer.transports import join
 from handsteer.transports.in_process import InProcessTransport
-from handsteer.transports.protocol import Publisher, Received, Session, Transport
+from handsteer.transports.protocol import Publisher, Received, Transport
 
 WIDTH, HEIGHT = 640, 480
 SETTLE_S = 0.5
+MODULES = ("handsteer.cli.main", "handsteer.cli.nodes", "handsteer.transports.dds.session")
 # A Twist's own stamp would change its size; what the robot would do with the time in it does not matter here.
 TWISTS = Topic("/benchmark/twist", Twist, depth=10)
+# Deep enough that one is missing only if it was lost on the way; in a graph a newer one takes its place.
+IMAGES = Topic("/benchmark/image", Image, depth=10)
 
 
 def sent_s(message: Any) -> float:
     """Return when a message was sent, in seconds of the monotonic clock."""
     return message.linear.x if isinstance(message, Twist) else float(message.header.frame_id)
+
+
+@dataclass(frozen=True)
+class Figures:
+    """What one run came to.
+
+    Attributes:
+        here: How old each message was within one process, in milliseconds.
+        there: Likewise over DDS.
+        sender: CPU of the publishing itself, in percent of a core.
+        listener: CPU of the whole other process, likewise.
+    """
+
+    here: np.ndarray
+    there: np.ndarray
+    sender: float
+    listener: float
 
 
 class Listener(Node):
@@ -77,7 +98,7 @@ def listen(topic: Topic[Any], transport: str) -> None:
 
 @contextmanager
 def network(transport: str) -> Iterator[None]:
-    """Let this process and those that it starts have a network of their own, by their environment."""
+    """Give this process and those that it starts a network of their own, by their environment."""
     os.environ["ROS_DOMAIN_ID"] = str(free_domain())
     if transport != "zenoh":
         yield
@@ -93,25 +114,34 @@ def network(transport: str) -> Iterator[None]:
         router.terminate()
 
 
-def send(publisher: Publisher[Any], topic: Topic[Any], count: int, rate: float) -> float:
-    """Send ``count`` messages that say when they were sent; return the CPU seconds that it took."""
+def send(publishers: Sequence[Publisher[Any]], topic: Topic[Any], count: int, rate: float) -> list[float]:
+    """Send ``count`` messages by each publisher, in turn, so that whatever else the machine does meets all alike.
+
+    Returns:
+        The CPU seconds that each took.
+    """
     picture = np.random.default_rng(0).integers(0, 255, (HEIGHT, WIDTH, 3), np.uint8)
-    began_s, due_s = cpu_s(), time.monotonic()
+    spent_s, due_s = [0.0] * len(publishers), time.monotonic()
     for _ in range(count):
-        if topic.type is Image:
-            header = Header(stamp=WallClock().stamp(time.monotonic()), frame_id=repr(time.monotonic()))
-            publisher.publish(image_message(picture, header))
-        else:
-            publisher.publish(twist(time.monotonic(), 0.0))
-        due_s += 1 / rate
-        time.sleep(max(0.0, due_s - time.monotonic()))
-    return cpu_s() - began_s
+        for number, publisher in enumerate(publishers):
+            began_s = time.thread_time()
+            if topic.type is Image:
+                header = Header(stamp=WallClock().stamp(time.monotonic()), frame_id=repr(time.monotonic()))
+                publisher.publish(image_message(picture, header))
+            else:
+                publisher.publish(twist(time.monotonic(), 0.0))
+            spent_s[number] += time.thread_time() - began_s
+            due_s += 1 / rate / len(publishers)
+            time.sleep(max(0.0, due_s - time.monotonic()))
+    return spent_s
 
 
-def across(transport: str, topic: Topic[Any], count: int, rate: float) -> dict[str, Any]:
-    """Return what came from this process to another."""
-    command = [sys.executable, __file__, "--listen", topic.name, "--transport", transport]
-    session = join(transport, "talker", [])
+def measure(wire: str, topic: Topic[Any], count: int, rate: float) -> Figures:
+    """Return what came over ``wire`` from this process to another, and within this process."""
+    command = [sys.executable, __file__, "--listen", topic.name, "--transport", wire]
+    session = join(wire, "talker", [])
+    transport = InProcessTransport()
+    listener = Listener(transport, topic)
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as other:
         assert other.stdin is not None
         assert other.stdout is not None
@@ -120,22 +150,15 @@ def across(transport: str, topic: Topic[Any], count: int, rate: float) -> dict[s
         wait_for(publisher)
         other.stdin.write("start\n")
         other.stdin.flush()
-        cpu = send(publisher, topic, count, rate)
+        _, spent_s = send([transport.advertise("talker", topic), publisher], topic, count, rate)
         time.sleep(SETTLE_S)
         other.stdin.write("end\n")
         other.stdin.flush()
-        told = dict(json.loads(other.stdout.readline()))
+        told = json.loads(other.stdout.readline())
     session.close()
-    return {**told, "sender_cpu_s": cpu}
-
-
-def within(topic: Topic[Any], count: int, rate: float) -> list[float]:
-    """Return the ages of messages within one process."""
-    transport = InProcessTransport()
-    listener = Listener(transport, topic)
-    send(transport.advertise("talker", topic), topic, count, rate)
     listener.stop()
-    return listener.ages_s
+    here, there = (1000 * np.array(ages_s) for ages_s in (listener.ages_s, told["ages_s"]))
+    return Figures(here, there, 100 * spent_s * rate / count, 100 * told["cpu_s"] * rate / count)
 
 
 def wait_for(publisher: Publisher[Any]) -> None:
@@ -144,14 +167,14 @@ def wait_for(publisher: Publisher[Any]) -> None:
     time.sleep(SETTLE_S)  # the other end has to see this one, too
 
 
-def first_command_s(transport: str) -> float:
+def first_command_s(wire: str) -> float:
     """Return the seconds from the start of the control's process to its first Twist, signs being shown all the time."""
-    session: Session = join(transport, "talker", [])
+    session = join(wire, "talker", [])
     came = threading.Event()
     session.transport.subscribe("robot", CMD_VEL, lambda _: came.set())
     signs = session.transport.advertise("talker", HAND_SIGN)
     began_s = time.monotonic()
-    with subprocess.Popen([sys.executable, "-m", "handsteer", "control", "--transport", transport]) as control:
+    with subprocess.Popen([sys.executable, "-m", "handsteer", "control", "--transport", wire]) as control:
         while not came.wait(1 / 30):
             signs.publish(String(data="Forward"))
         took_s = time.monotonic() - began_s
@@ -160,35 +183,59 @@ def first_command_s(transport: str) -> float:
     return took_s
 
 
+def loading_s() -> float:
+    """Return the seconds that it takes a new process to load what the control needs, and to end."""
+    began_s = time.monotonic()
+    subprocess.run([sys.executable, "-c", f"import {', '.join(MODULES)}"], check=True)
+    return time.monotonic() - began_s
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description="Measure what a wire of ROS 2 costs.")
     parser.add_argument("--transport", choices=("dds", "zenoh"), default="dds")
     parser.add_argument("--twists", type=int, default=2000, help="Twists to send, 200 a second")
     parser.add_argument("--images", type=int, default=300, help="images to send, 30 a second")
+    parser.add_argument("--runs", type=int, default=3, help="how often all is measured")
     parser.add_argument("--listen", help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.listen:
-        listen(TWISTS if options.listen == TWISTS.name else IMAGE_RAW, options.transport)
+        listen(TWISTS if options.listen == TWISTS.name else IMAGES, options.transport)
         return
-    print(f"load of the machine before: {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores")
     with network(options.transport):
-        measure(options)
+        report(options)
 
 
-def measure(options: argparse.Namespace) -> None:
-    firsts = ", ".join(f"{first_command_s(options.transport):.2f} s" for _ in range(3))
-    print(f"first command after the start of the control: {firsts}")
-    for topic, count, rate in ((TWISTS, options.twists, 200.0), (IMAGE_RAW, options.images, 30.0)):
-        here = np.array(within(topic, count, rate)) * 1000
-        there = across(options.transport, topic, count, rate)
-        ages = np.array(there["ages_s"]) * 1000
-        duration_s = count / rate
-        print(f"{topic.type.__name__.rpartition('__')[2]}, {rate:.0f} a second: {len(ages)} of {count} came")
-        print("                       median      p99")
-        print(f"  within one process {np.median(here):8.2f} {np.percentile(here, 99):8.2f} ms")
-        print(f"  over {options.transport:13} {np.median(ages):8.2f} {np.percentile(ages, 99):8.2f} ms")
-        sender, listener = 100 * there["sender_cpu_s"] / duration_s, 100 * there["cpu_s"] / duration_s
-        print(f"  CPU of the sender {sender:.1f} %, of the listener {listener:.1f} % of a core")
+def report(options: argparse.Namespace) -> None:
+    print(f"load of the machine before: {load()}")
+    starts = [(first_command_s(options.transport), loading_s()) for _ in range(options.runs)]
+    print(
+        f"first command after the start of the control {row([first for first, _ in starts])} s, "
+        f"of which Python's modules take {row([loading for _, loading in starts])} s"
+    )
+    for topic, count, rate in ((TWISTS, options.twists, 200.0), (IMAGES, options.images, 30.0)):
+        runs = [measure(options.transport, topic, count, rate) for _ in range(options.runs)]
+        print(f"{topic.type.__name__.rpartition('__')[2]}, {rate:.0f} a second; load of the machine {load()}")
+        print(f"  came over {options.transport:9}" + ", ".join(f"{len(run.there)} of {count}" for run in runs))
+        for name, percent in (("median", 50), ("p99", 99)):
+            here, there = (
+                [float(np.percentile(ages, percent)) for ages in column]
+                for column in zip(*((run.here, run.there) for run in runs), strict=True)
+            )
+            more = [one - other for one, other in zip(there, here, strict=True)]
+            print(f"  {name:6s}  within {row(here)}  over {options.transport} {row(there)}  more {row(more)} ms")
+        print(
+            f"  CPU of the sender {row([run.sender for run in runs])}, of the listener "
+            f"{row([run.listener for run in runs])} % of a core"
+        )
+
+
+def row(values: list[float]) -> str:
+    """Return the median of the runs, and the runs."""
+    return f"{np.median(values):.2f} ({', '.join(f'{value:.2f}' for value in values)})"
+
+
+def load() -> str:
+    return f"{os.getloadavg()[0]:.1f} on {os.cpu_count()} cores"
 
 
 if __name__ == "__main__":

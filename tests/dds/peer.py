@@ -158,6 +158,14 @@ class Clock(IdlStruct, typename="rosgraph_msgs::msg::dds_::Clock_"):
 
 
 @dataclass
+class Battery(IdlStruct, typename="my_robot::msg::dds_::Battery_"):
+    """A type of somebody's own, which no library knows."""
+
+    cells: sequence[float64] = field(default_factory=list)
+    charge: int32 = 0
+
+
+@dataclass
 class Gid(IdlStruct, typename="rmw_dds_common::msg::dds_::Gid_"):
     data: array[uint8, 16]
 
@@ -178,7 +186,7 @@ class ParticipantEntitiesInfo(IdlStruct, typename="rmw_dds_common::msg::dds_::Pa
 
 TYPES = {
     kind.__name__: kind
-    for kind in (String, Image, CompressedImage, Twist, Odometry, DiagnosticArray, Clock, Log, ParameterEvent)
+    for kind in (String, Image, CompressedImage, Twist, Odometry, DiagnosticArray, Clock, Log, ParameterEvent, Battery)
 }
 RELIABLE, BEST_EFFORT = Policy.Reliability.Reliable(1_000_000_000), Policy.Reliability.BestEffort
 CDR = Policy.DataRepresentation(use_cdrv0_representation=True)

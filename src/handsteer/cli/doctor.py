@@ -27,5 +27,5 @@ def doctor(*, port: int = 8080, json: Flag = False) -> int:
 
 
 def _text(finding: Finding) -> str:
-    mark = {"ok": "ok", "optional": "--", "missing": "!!"}[finding.verdict]
+    mark = {"ok": "ok", "optional": "--", "wrong": "??", "missing": "!!"}[finding.verdict]
     return f"{mark}  {finding.name:8s} {finding.detail}"

@@ -1,8 +1,12 @@
 """How messages travel between nodes."""
 
-from collections.abc import Callable, Sequence
+import os
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 
 from handsteer.errors import TransportError
+from handsteer.transports.dds.network import network
+from handsteer.transports.observed import ObservedGraph
 from handsteer.transports.protocol import Session
 
 
@@ -30,9 +34,39 @@ def _ros1(node: str, arguments: Sequence[str]) -> Session:
     return Ros1Session(node, arguments)
 
 
+def observe(transport: str, seconds: float) -> ObservedGraph:
+    """Look at a graph of several processes without becoming one of its nodes.
+
+    It listens to every topic that somebody publishes, so what is made on demand is made meanwhile.
+
+    Args:
+        transport: Which kind of graph, one of :data:`OBSERVERS`.
+        seconds: For how long the rates are measured; 0 leaves them out.
+
+    Raises:
+        TransportError: There is no such transport or graph.
+    """
+    if transport not in OBSERVERS:
+        raise TransportError(f"a graph of {transport!r} cannot be looked at: use {' or '.join(OBSERVERS)}")
+    return OBSERVERS[transport](seconds)
+
+
 def _dds(node: str, arguments: Sequence[str]) -> Session:
-    try:
+    with _cyclonedds():
         from handsteer.transports.dds.session import DdsSession  # noqa: PLC0415
+    return DdsSession(node, arguments)
+
+
+def _observe_dds(seconds: float) -> ObservedGraph:
+    with _cyclonedds():
+        from handsteer.transports.dds.observer import observe_domain  # noqa: PLC0415
+    return observe_domain(network(os.environ), seconds)
+
+
+@contextmanager
+def _cyclonedds() -> Iterator[None]:
+    try:
+        yield
     except ModuleNotFoundError as problem:
         raise _lacking(
             problem,
@@ -40,7 +74,6 @@ def _dds(node: str, arguments: Sequence[str]) -> Session:
             "(there is none for Python 3.14 and newer, nor for Linux on ARM; --transport zenoh works there)",
             "cyclonedds",
         ) from None
-    return DdsSession(node, arguments)
 
 
 def _zenoh(node: str, arguments: Sequence[str]) -> Session:
@@ -64,3 +97,6 @@ WITHOUT_ZENOH = (
 
 TRANSPORTS: dict[str, Callable[[str, Sequence[str]], Session]] = {"ros1": _ros1, "dds": _dds, "zenoh": _zenoh}
 """What joins a graph of several processes, by name."""
+
+OBSERVERS: dict[str, Callable[[float], ObservedGraph]] = {"dds": _observe_dds}
+"""What looks at a graph of several processes, by name; it is given the seconds for the rates."""

@@ -29,11 +29,11 @@ class RosGraph:
 
     Args:
         participant: The participant of this process.
-        name: The name of this process's node.
+        name: The name of this process's node; None when it only looks on, and tells nothing.
         distribution: The ROS 2 distribution that is spoken to: identifiers have 24 bytes in ``humble``, 16 since.
     """
 
-    def __init__(self, participant: DomainParticipant, name: NodeName, distribution: str) -> None:
+    def __init__(self, participant: DomainParticipant, name: NodeName | None, distribution: str) -> None:
         self._guid = participant.guid
         self._name = name
         self._store = types(distribution)
@@ -41,10 +41,11 @@ class RosGraph:
         self._writers: list[uuid.UUID] = []
         self._readers: list[uuid.UUID] = []
         self._names: dict[bytes, dict[bytes, str]] = {}
+        self._nodes: dict[bytes, list[str]] = {}
         self._type = dds_type(_INFO, distribution)
         topic = Topic(participant, DISCOVERY_TOPIC, self._type)
         self.reader: Any = DataReader(participant, topic, qos=discovery_qos(_INFO, _AT_ONCE))
-        self._writer: Any = DataWriter(participant, topic, qos=discovery_qos(_INFO, 1))
+        self._writer: Any = DataWriter(participant, topic, qos=discovery_qos(_INFO, 1)) if name else None
         self._tell()
 
     def add(self, endpoint: DataWriter[Any] | DataReader[Any]) -> None:
@@ -64,6 +65,11 @@ class RosGraph:
         with self._lock:
             return next((nodes[endpoint.bytes] for nodes in self._names.values() if endpoint.bytes in nodes), None)
 
+    def nodes(self) -> list[str]:
+        """Return the full names of the nodes of others; two nodes of one name are there twice."""
+        with self._lock:
+            return [name for names in self._nodes.values() for name in names]
+
     def serve(self) -> None:
         """Learn what others have told."""
         for sample in self.reader.take(_AT_ONCE):
@@ -71,8 +77,9 @@ class RosGraph:
                 continue
             info: Any = self._store.deserialize_cdr(sample.raw, _INFO)
             with self._lock:
+                self._nodes[_bytes(info.gid)] = [_full_name(node) for node in info.node_entities_info_seq]
                 self._names[_bytes(info.gid)] = {
-                    _bytes(gid): f"{node.node_namespace.rstrip('/')}/{node.node_name}"
+                    _bytes(gid): _full_name(node)
                     for node in info.node_entities_info_seq
                     for gid in (*node.reader_gid_seq, *node.writer_gid_seq)
                 }
@@ -80,11 +87,8 @@ class RosGraph:
     def forget(self, endpoint: uuid.UUID) -> None:
         """Forget the nodes of the participant that had ``endpoint``."""
         with self._lock:
-            self._names = {
-                gid: nodes
-                for gid, nodes in self._names.items()
-                if gid[:_PREFIX_BYTES] != endpoint.bytes[:_PREFIX_BYTES]
-            }
+            for gid in [gid for gid in self._names if gid[:_PREFIX_BYTES] == endpoint.bytes[:_PREFIX_BYTES]]:
+                del self._names[gid], self._nodes[gid]
 
     def close(self) -> None:
         """Leave the topic; may be called twice."""
@@ -94,6 +98,8 @@ class RosGraph:
         return self._writers if isinstance(endpoint, DataWriter) else self._readers
 
     def _tell(self) -> None:
+        if self._name is None or self._writer is None:
+            return
         kinds = self._store.types
         node = kinds["rmw_dds_common/msg/NodeEntitiesInfo"](
             node_namespace=self._name.namespace,
@@ -102,8 +108,7 @@ class RosGraph:
             writer_gid_seq=[self._gid(guid) for guid in self._writers],
         )
         info = kinds[_INFO](gid=self._gid(self._guid), node_entities_info_seq=[node])
-        if self._writer is not None:
-            self._writer.write(self._type(bytes(self._store.serialize_cdr(info, _INFO))))
+        self._writer.write(self._type(bytes(self._store.serialize_cdr(info, _INFO))))
 
     def _gid(self, guid: uuid.UUID) -> Any:
         kind = "rmw_dds_common/msg/Gid"
@@ -112,6 +117,10 @@ class RosGraph:
         data = np.zeros(length, np.uint8)
         data[:16] = np.frombuffer(guid.bytes, np.uint8)
         return self._store.types[kind](data=data)
+
+
+def _full_name(node: Any) -> str:
+    return f"{node.node_namespace.rstrip('/')}/{node.node_name}"
 
 
 def _bytes(gid: Any) -> bytes:

@@ -81,9 +81,11 @@ class Dispatcher:
 
     def _serve_all(self) -> None:
         with self._lock:
-            served = [serve for _, serve in self._served.values()]
-        for serve in served:
-            self._guarded(serve)
+            served = list(self._served.values())
+        for condition, serve in served:
+            # Asking is cheaper than taking nothing, which most have when a message has come for one.
+            if condition.triggered:
+                self._guarded(serve)
 
     def _guarded(self, call: Callable[[], None]) -> None:
         try:

@@ -46,12 +46,14 @@ class Endpoint:
         type: Name of its type in DDS.
         qos: What it offers or requests.
         publishes: Whether it is a publisher.
+        type_id: By what its definition can be asked for; None where its DDS does not tell.
     """
 
     topic: str
     type: str
     qos: Qos
     publishes: bool
+    type_id: Any = None
 
     @property
     def kind(self) -> str:
@@ -95,6 +97,11 @@ class Matching:
         """Note subscribers that have come or gone."""
         self._serve(self.subscriptions, publishes=False)
 
+    def others(self) -> dict[uuid.UUID, Endpoint]:
+        """Return the publishers and subscribers of other processes."""
+        with self._lock:
+            return dict(self._theirs)
+
     def tick(self) -> None:
         """Report what does not fit, once the other's name is known, or after a while without it."""
         now = time.monotonic()
@@ -116,7 +123,9 @@ class Matching:
                 continue
             with self._lock:
                 if seen.sample_info.valid_data and seen.qos is not None:
-                    self._theirs[seen.key] = Endpoint(seen.topic_name, seen.type_name, seen.qos, publishes)
+                    self._theirs[seen.key] = Endpoint(
+                        seen.topic_name, seen.type_name, seen.qos, publishes, seen.type_id
+                    )
                     self._compare(seen.key)
                 else:
                     self._forget(seen.key)

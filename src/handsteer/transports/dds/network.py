@@ -13,7 +13,18 @@ _ADDRESS = re.compile(r"[A-Za-z0-9_.:%\[\]-]+")
 _ANNOUNCE_S = 2
 # Every process of a machine has the two UDP ports of its index: known to firewalls, and to others by address alone.
 # Where others are looked for by address, all their ports are tried, so that there are fewer.
-_LARGEST_INDEX, _LARGEST_INDEX_BY_MULTICAST = 32, 119
+PLACES, PLACES_BY_MULTICAST = 33, 120
+# Four raw images: with the engine's own 1 MB, a process that is held up for a frame or two loses one. The system gives
+# what it allows (Linux: net.core.rmem_max), and nothing is said where that is less.
+_RECEIVE_BUFFER = "4MiB"
+_PLACES = {
+    "LOCALHOST": "this machine",
+    "PEERS": "this machine and ROS_STATIC_PEERS",
+    "SUBNET": "the subnet",
+    "OFF": "nobody",
+    "SYSTEM_DEFAULT": "as Cyclone DDS does by itself",
+    "CYCLONEDDS_URI": "as CYCLONEDDS_URI says",
+}
 
 
 @dataclass(frozen=True)
@@ -24,13 +35,26 @@ class Network:
         domain: Number of the DDS domain, 0 to 232.
         config: Configuration of Cyclone DDS, as XML; None leaves it to the user's ``CYCLONEDDS_URI`` or its defaults.
         distribution: The ROS 2 distribution whose discovery is spoken: ``humble``, or ``jazzy`` for all newer ones.
-        is_local: Whether only this machine is looked at, for sure.
+        reach: One of ROS 2's ranges, ``PEERS`` for this machine and static peers, or ``CYCLONEDDS_URI``.
+        places: How many participants of the domain find ports of their own on this machine; None when it is not ours
+            to say.
     """
 
     domain: int
     config: str | None
     distribution: str = "jazzy"
-    is_local: bool = False
+    reach: str = "LOCALHOST"
+    places: int | None = None
+
+    @property
+    def is_local(self) -> bool:
+        """Whether only this machine is looked at, for sure."""
+        return self.reach in {"LOCALHOST", "OFF"}
+
+    @property
+    def place(self) -> str:
+        """Where is looked, in words."""
+        return f"domain {self.domain}, {_PLACES[self.reach]}"
 
 
 def network(environment: Mapping[str, str]) -> Network:
@@ -46,11 +70,15 @@ def network(environment: Mapping[str, str]) -> Network:
     distribution = "humble" if environment.get("ROS_DISTRO") == "humble" else "jazzy"
     reach = _range(environment)
     peers = _peers(environment.get("ROS_STATIC_PEERS", ""))
-    if environment.get("CYCLONEDDS_URI") or reach == "SYSTEM_DEFAULT":
-        return Network(domain, None, distribution)
+    if environment.get("CYCLONEDDS_URI"):
+        return Network(domain, None, distribution, "CYCLONEDDS_URI")
+    if reach == "SYSTEM_DEFAULT":
+        return Network(domain, None, distribution, reach)
     if environment.get("ROS_LOCALHOST_ONLY") == "1" or reach == "OFF":
         peers = []
-    return Network(domain, _config(reach, peers), distribution, is_local=reach != "SUBNET" and not peers)
+    places = PLACES_BY_MULTICAST if reach == "SUBNET" and not peers else PLACES
+    found = "PEERS" if peers and reach == "LOCALHOST" else reach
+    return Network(domain, _config(reach, peers, places), distribution, found, places)
 
 
 def _range(environment: Mapping[str, str]) -> str:
@@ -74,18 +102,18 @@ def _peers(text: str) -> list[str]:
     return peers
 
 
-def _config(reach: str, peers: list[str]) -> str:
+def _config(reach: str, peers: list[str], places: int) -> str:
     interface = '<Interfaces><NetworkInterface address="127.0.0.1"/></Interfaces>'
     alone = reach in {"LOCALHOST", "OFF"} and not peers
     multicast = "true" if reach == "SUBNET" else "false"
     everyone = [*(["127.0.0.1"] if reach == "LOCALHOST" else []), *peers]
     found = "".join(f'<Peer address="{peer}"/>' for peer in everyone)
-    largest = _LARGEST_INDEX_BY_MULTICAST if reach == "SUBNET" and not peers else _LARGEST_INDEX
-    index = f"<ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>{largest}</MaxAutoParticipantIndex>"
+    index = f"<ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>{places - 1}</MaxAutoParticipantIndex>"
     announce = f"<SPDPInterval>{_ANNOUNCE_S} s</SPDPInterval>"
     return (
         "<CycloneDDS><Domain>"
         f"<General>{interface if alone else ''}<AllowMulticast>{multicast}</AllowMulticast></General>"
         f"<Discovery>{index}{'' if alone else announce}<Peers>{found}</Peers></Discovery>"
+        f'<Internal><SocketReceiveBufferSize min="default" max="{_RECEIVE_BUFFER}"/></Internal>'
         "</Domain></CycloneDDS>"
     )

@@ -45,6 +45,22 @@ def _struct(name: str, distribution: str, before: dict[str, Any]) -> Any:
     _, fields = types(distribution).fielddefs[name]
     members = {**before, **{field: _idl(kind, distribution) for field, kind in fields}}
     struct = make_idl_struct(name.rpartition("/")[2], dds_type_name(name), members, dataclassify=False)
+    return _passing(struct)
+
+
+def opaque_type(name: str, struct: Any = None) -> Any:
+    """Return a DDS type of the name ``name`` in DDS that lets the bytes of any message pass.
+
+    Args:
+        name: As ``my_robot::msg::dds_::Battery_``.
+        struct: Its definition, where the other side has told one, which cyclonedds then compares; else there is none.
+    """
+    if struct is None:
+        struct = make_idl_struct("Opaque", name, {"raw": idl.uint8}, dataclassify=False)
+    return _passing(struct)
+
+
+def _passing(struct: Any) -> Any:
     for method, passing in _PASSING.items():
         setattr(struct, method, passing)
     return struct

@@ -6,31 +6,16 @@ import os
 import platform
 import shutil
 import socket
-from dataclasses import dataclass
-from typing import Literal
 
 from handsteer.cameras.webcam import Webcam, webcams
 from handsteer.clock import RealClock
 from handsteer.config import CameraConfig
+from handsteer.doctor.finding import Finding
+from handsteer.doctor.ros2 import examine_ros2
 from handsteer.errors import CameraError, ModelError
 from handsteer.landmarks.models import MODELS, find_model, models_dir
 
-Verdict = Literal["ok", "optional", "missing"]
-
-
-@dataclass(frozen=True)
-class Finding:
-    """One thing that was looked at.
-
-    Attributes:
-        name: What it is: ``camera``, ``models``, ``port``...
-        verdict: ``ok``; ``optional`` when it is not there, but handsteer works without; ``missing`` when it does not.
-        detail: What was found, and what to do where something is amiss.
-    """
-
-    name: str
-    verdict: Verdict
-    detail: str
+__all__ = ["Finding", "examine"]
 
 
 def examine(port: int) -> list[Finding]:
@@ -39,7 +24,7 @@ def examine(port: int) -> list[Finding]:
     Args:
         port: Where the page would be.
     """
-    return [_python(), _models(), *_cameras(), _port(port), *_ros(), _gl()]
+    return [_python(), _models(), *_cameras(), _port(port), *_ros(), *examine_ros2(os.environ), _gl()]
 
 
 def _python() -> Finding:
@@ -85,7 +70,9 @@ def _port(port: int) -> Finding:
         try:
             probe.bind(("127.0.0.1", port))
         except OSError as error:
-            return Finding("port", "missing", f"port {port}: {error.strerror}; choose another with --port")
+            return Finding(
+                "port", "missing", f"port {port}: {error.strerror}; end who has it, or choose another with --port"
+            )
     return Finding("port", "ok", f"port {port} is free for the page")
 
 

@@ -1,0 +1,134 @@
+"""Whether this machine can be a part of a ROS 2 graph over DDS, and what keeps it from being one."""
+
+import importlib.util
+import platform
+from collections.abc import Mapping
+
+from handsteer.doctor.finding import Finding
+from handsteer.doctor.look import Sight, look
+from handsteer.doctor.network import domains_in_use, multicast_interfaces, places_left, taken_ports
+from handsteer.errors import TransportError
+from handsteer.transports.dds.network import PLACES_BY_MULTICAST, Network, network
+
+_NAME = "dds"
+_NEWEST_PYTHON = (3, 13)
+_DOMAINS_AT_ONCE = 4
+# Linux gives the ports from 32768 on to whoever asks for any.
+_LARGEST_SAFE_DOMAIN = 101
+
+
+def examine_ros2(environment: Mapping[str, str]) -> list[Finding]:
+    """Look at the variables, the DDS engine, the network and the domain.
+
+    Args:
+        environment: ROS 2's environment variables among others.
+    """
+    try:
+        here = network(environment)
+    except TransportError as error:
+        return [_wrong(f"{error}; nothing joins ROS 2 over DDS before that")]
+    odd = [_wrong(words) for words in _oddities(environment, here)]
+    if importlib.util.find_spec("cyclonedds") is None:
+        return [*odd, Finding(_NAME, "optional", _no_engine())]
+    return [*odd, *_multicast(here), *_domain(environment, here)]
+
+
+def _wrong(words: str) -> Finding:
+    return Finding(_NAME, "wrong", words)
+
+
+def _no_engine() -> str:
+    if tuple(map(int, platform.python_version_tuple()[:2])) > _NEWEST_PYTHON:
+        return (
+            f"no cyclonedds, which --transport dds needs: there is none for Python {platform.python_version()}; "
+            "use Python 3.11 to 3.13"
+        )
+    if platform.system() == "Linux" and platform.machine() != "x86_64":
+        return f"no cyclonedds, which --transport dds needs: there is none for Linux on {platform.machine()}"
+    return "no cyclonedds, which --transport dds needs: pip install 'cyclonedds>=11,<12' beside handsteer"
+
+
+def _oddities(environment: Mapping[str, str], here: Network) -> list[str]:
+    said = []
+    if here.domain > _LARGEST_SAFE_DOMAIN:
+        said.append(
+            f"ROS_DOMAIN_ID is {here.domain}: above {_LARGEST_SAFE_DOMAIN} the system may have given a domain's ports "
+            "to others; choose a smaller one"
+        )
+    reach = environment.get("ROS_AUTOMATIC_DISCOVERY_RANGE", "")
+    if environment.get("ROS_LOCALHOST_ONLY") == "1" and reach.upper() not in {"", "LOCALHOST"}:
+        said.append(f"ROS_LOCALHOST_ONLY is 1, so ROS_AUTOMATIC_DISCOVERY_RANGE={reach} does not count: unset one")
+    if environment.get("ROS_STATIC_PEERS") and here.reach in {"LOCALHOST", "OFF"}:
+        said.append(
+            "ROS_STATIC_PEERS does not count, as only this machine is looked at: unset ROS_LOCALHOST_ONLY or OFF"
+        )
+    if environment.get("ROS_DISCOVERY_SERVER"):
+        said.append("ROS_DISCOVERY_SERVER is set: nodes that are found by a server only are not seen; unset it there")
+    middleware = environment.get("RMW_IMPLEMENTATION", "")
+    if middleware and not middleware.startswith(("rmw_cyclonedds", "rmw_fastrtps", "rmw_connextdds")):
+        said.append(f"RMW_IMPLEMENTATION is {middleware}: ROS 2's nodes do not speak DDS then, and are not seen by it")
+    return said
+
+
+def _multicast(here: Network) -> list[Finding]:
+    if here.reach != "SUBNET":
+        return []
+    works = multicast_interfaces()
+    if any(works.values()):
+        heard = ", ".join(name for name, does in works.items() if does)
+        return [Finding(_NAME, "ok", f"multicast works on {heard}, as far as can be told from one machine")]
+    why = f"{', '.join(works)} lets none through (a firewall?)" if works else "no network interface has it"
+    return [
+        _wrong(
+            f"no multicast, by which nodes on the subnet are found: {why}; name the other machines in "
+            "ROS_STATIC_PEERS instead, with ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST"
+        )
+    ]
+
+
+def _domain(environment: Mapping[str, str], here: Network) -> list[Finding]:
+    taken = taken_ports()
+    in_use = domains_in_use(taken, PLACES_BY_MULTICAST)
+    elsewhere = [domain for domain in in_use if domain != here.domain]
+    if here.reach != "LOCALHOST" and here.domain != 0 and 0 not in elsewhere:
+        elsewhere.append(0)  # where ROS 2 is unless it is told otherwise, here on other machines
+    sights = look(dict.fromkeys([here.domain, *elsewhere[:_DOMAINS_AT_ONCE]], environment))
+    ours = sights.pop(here.domain)
+    if ours.graph is None:
+        return [_wrong(_not_joined(ours.problem, here, taken))]
+    found = [_wrong(warning) for warning in ours.graph["warnings"]]
+    if ours.others:
+        return [Finding(_NAME, "ok", f"{here.place}: {_some(ours.others)}"), *found]
+    return [_nobody(here, here.domain in in_use, sights)]
+
+
+def _not_joined(problem: str, here: Network, taken: set[int]) -> str:
+    if here.reach == "CYCLONEDDS_URI":
+        return f"CYCLONEDDS_URI cannot be used: {problem}; mend or unset it"
+    if here.places and taken and not places_left(here.domain, taken, here.places):
+        first = 7410 + 250 * here.domain
+        return (
+            f"all {here.places} places in domain {here.domain} on this machine are taken (UDP ports {first} to "
+            f"{first + 2 * here.places - 1}): end some nodes, or choose another ROS_DOMAIN_ID"
+        )
+    return f"{here.place} cannot be joined: {problem}"
+
+
+def _nobody(here: Network, is_inhabited: bool, elsewhere: Mapping[int, Sight]) -> Finding:
+    seen = {domain: sight.others for domain, sight in elsewhere.items() if sight.others}
+    if is_inhabited and here.reach != "SUBNET":
+        return _wrong(
+            f"{here.place}: somebody is in this domain on this machine, but is not seen; it may look "
+            "at the subnet, as ROS 2 does by itself: set ROS_AUTOMATIC_DISCOVERY_RANGE=SUBNET here, or LOCALHOST there"
+        )
+    if seen:
+        others = "; ".join(f"domain {domain} has {_some(nodes)}" for domain, nodes in seen.items())
+        return _wrong(
+            f"{here.place}: nobody else; but {others}. To meet them, set ROS_DOMAIN_ID={next(iter(seen))} here, or "
+            f"{here.domain} there"
+        )
+    return Finding(_NAME, "ok", f"{here.place}: nobody else is there yet")
+
+
+def _some(nodes: list[str], most: int = 4) -> str:
+    return ", ".join(nodes[:most]) + (f" and {len(nodes) - most} more" if len(nodes) > most else "")
