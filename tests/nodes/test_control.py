@@ -3,7 +3,7 @@ import math
 import pytest
 
 from handsteer.config import ControlConfig
-from handsteer.messages import CMD_VEL, DIAGNOSTICS, HAND_SIGN, STEERING_CMD_VEL, String, twist
+from handsteer.messages import CMD_VEL, DIAGNOSTICS, HAND_SIGN, STEERING_CMD_VEL, String, cmd_vel, twist
 from handsteer.nodes.control import HandSignControlNode
 from handsteer.nodes.steering import SteeringNode
 from tests.nodes.stepping import Bench
@@ -124,3 +124,18 @@ def test_no_latency_is_told_where_signs_come_without_the_time_of_their_frame(ben
         bench.signs.publish(String(data="Forward"))
         bench.run(1 / 30)
     assert "latency_median_ms" not in {value.key for value in statuses[-1].status[0].values}
+
+
+def test_a_stamped_command_has_the_time_of_the_command_and_a_frame() -> None:
+    bench = Bench()
+    bench.clock.advance(7.0)
+    topic, config = cmd_vel("twist_stamped"), ControlConfig(cmd_vel_frame_id="r1/base_link")
+    bench.nodes = [HandSignControlNode(bench.transport, bench.clock, config, topic)]
+    commands = bench.record(topic)
+    bench.transport.advertise("recognition", HAND_SIGN).publish(String(data="Forward"), 6.8)
+    bench.run(0.0)
+    (command,) = commands
+    assert (command.header.stamp.sec, command.header.stamp.nanosec) == (7, 0)
+    assert (command.header.frame_id, command.twist.linear.x) == ("r1/base_link", 0.01)
+    bench.nodes[0].stop()
+    assert commands[-1].twist == twist(0.0, 0.0)

@@ -1,7 +1,7 @@
 import pytest
 
 from handsteer.config import RobotConfig
-from handsteer.messages import CLOCK, CMD_VEL, ODOM, TF, Odometry, twist
+from handsteer.messages import CLOCK, ODOM, TF, Header, Odometry, Time, TwistStamped, cmd_vel, twist
 from handsteer.nodes.robot import RobotNode
 from handsteer.robots import open_robot
 from tests.nodes.stepping import Bench
@@ -14,8 +14,9 @@ class RobotBench(Bench):
         self.odometry = self.record(ODOM)
         self.transforms = self.record(TF)
         config = RobotConfig.model_validate({"world": "empty", **settings})
-        self.nodes = [RobotNode(self.transport, self.clock, open_robot(config), config)]
-        self.commands = self.transport.advertise("control", CMD_VEL)
+        topic = cmd_vel(config.cmd_vel_type)
+        self.nodes = [RobotNode(self.transport, self.clock, open_robot(config), config, topic)]
+        self.commands = self.transport.advertise("control", topic)
 
     def drive(self, seconds: float) -> None:
         for _ in range(round(seconds / 0.1)):
@@ -53,3 +54,16 @@ def test_after_it_was_held_up_it_brakes_and_obeys_nothing_that_waited() -> None:
     assert bench.newest.twist.twist.linear.x == pytest.approx(0.0, abs=0.02)
     bench.drive(1.0)
     assert bench.newest.twist.twist.linear.x == pytest.approx(0.3, abs=0.02)
+
+
+@pytest.mark.parametrize(("age_s", "speed"), [(0.0, 0.3), (0.35, 0.3), (0.45, 0.0), (None, 0.3)])
+def test_a_stamped_command_that_is_old_is_not_obeyed(age_s: float | None, speed: float) -> None:
+    bench = RobotBench(cmd_vel_type="twist_stamped")
+    bench.clock.advance(10.0)
+    bench.run(0.3)
+    for _ in range(20):
+        now = bench.clock.now()
+        stamp = Time(sec=0, nanosec=0) if age_s is None else bench.clock.stamp(now - age_s)
+        bench.commands.publish(TwistStamped(header=Header(stamp=stamp, frame_id="base_link"), twist=twist(0.3, 0.0)))
+        bench.run(0.1)
+    assert bench.newest.twist.twist.linear.x == pytest.approx(speed, abs=0.02)

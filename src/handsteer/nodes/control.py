@@ -1,10 +1,12 @@
 """The node ``hand_sign_control``: signs in, one velocity command out for each."""
 
+from typing import Any
+
 from handsteer.clock import Clock
 from handsteer.config import ControlConfig
 from handsteer.control.driver import Driver
-from handsteer.control.sign_control import Velocity
-from handsteer.messages import CMD_VEL, HAND_SIGN, STEERING_CMD_VEL, String, Twist, twist
+from handsteer.control.sign_control import ZERO, Velocity
+from handsteer.messages import CMD_VEL, HAND_SIGN, STEERING_CMD_VEL, String, Topic, Twist, command
 from handsteer.nodes.interruption import Interruption
 from handsteer.nodes.latency import LatencyLog
 from handsteer.nodes.node import OK, Node
@@ -17,18 +19,27 @@ _DIAGNOSE_PERIOD_S = 0.1
 class HandSignControlNode(Node):
     """Publishes one Twist a sign, one zero when signs stop, and one zero at the end, whatever ends it.
 
+    Args:
+        transport: Carries the messages.
+        clock: The graph's clock.
+        config: Limits, steps and timeouts.
+        cmd_vel: The topic of the commands, of Twist or TwistStamped.
+
     Attributes:
         latency: From the capture of a frame to the Twist that it led to.
     """
 
-    def __init__(self, transport: Transport, clock: Clock, config: ControlConfig) -> None:
+    def __init__(
+        self, transport: Transport, clock: Clock, config: ControlConfig, cmd_vel: Topic[Any] = CMD_VEL
+    ) -> None:
         super().__init__("hand_sign_control", transport, clock)
         self.latency = LatencyLog()
         self._config = config
         self._driver = Driver(config)
         self._last_step_s = clock.now()
         self._interruption = Interruption(config.sign_timeout, clock.now())
-        self._cmd_vel = self.publisher(CMD_VEL)
+        self._topic = cmd_vel
+        self._cmd_vel = self.publisher(cmd_vel)
         self.subscribe(STEERING_CMD_VEL, self._on_steering)
         self.subscribe(HAND_SIGN, self._on_sign)
         self.every(_WATCHDOG_PERIOD_S, self._watch)
@@ -37,7 +48,7 @@ class HandSignControlNode(Node):
     def on_stop(self) -> None:
         """Leave the robot standing."""
         self._driver.halt()
-        self._cmd_vel.publish(twist(0.0, 0.0))
+        self._publish(ZERO)
 
     def _on_sign(self, received: Received[String]) -> None:
         captured_s = received.captured_s
@@ -59,7 +70,9 @@ class HandSignControlNode(Node):
     def _publish(self, velocity: Velocity | None, captured_s: float | None = None) -> None:
         if velocity is None:
             return
-        self._cmd_vel.publish(twist(velocity.linear_mps, velocity.angular_radps), captured_s)
+        stamp, frame_id = self.clock.stamp(self.clock.now()), self._config.cmd_vel_frame_id
+        message = command(self._topic, velocity.linear_mps, velocity.angular_radps, stamp, frame_id)
+        self._cmd_vel.publish(message, captured_s)
         if captured_s is not None:
             self.latency.add(self.clock.now() - captured_s)
 
