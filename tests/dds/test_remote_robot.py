@@ -6,6 +6,7 @@ import signal
 import sys
 import time
 from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -87,9 +88,9 @@ def test_it_is_driven_within_its_limits_and_says_where_it_is(robots: Robots) -> 
     told = robots.told
     assert max(linear for _, linear, _ in told) == pytest.approx(0.2)
     # 0.5 m/s² of the generic robot, told at 50 Hz at most.
-    assert max(after[1] - before[1] for before, after in zip(told, told[1:], strict=False)) <= 0.5 * 0.1 + 1e-9
+    assert max(after[1] - before[1] for before, after in pairwise(told)) <= 0.5 * 0.1 + 1e-9
     moving = [at_s for at_s, linear, _ in told if linear > 0]
-    assert max(b - a for a, b in zip(moving, moving[1:], strict=False)) < STOP_S
+    assert max(b - a for a, b in pairwise(moving)) < STOP_S
     assert [linear for _, linear, _ in told[-3:]] == [0.0, 0.0, 0.0]
 
 

@@ -1,0 +1,101 @@
+"""One hand and three robots in three namespaces, over DDS."""
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from tests.dds.graph import DdsGraph, dds_graph
+from tests.processes import Peer, eventually
+
+pytest.importorskip("cyclonedds")
+pytestmark = pytest.mark.slow
+
+ROBOT = Path(__file__).with_name("robot.py")
+NAMES = ("r1", "r2", "r3")
+CMD_VEL = "robot_diff_drive_controller/cmd_vel"
+SIGNS, SELECT = "/gesture/hand_sign", "/select_robot"
+
+
+@pytest.fixture
+def graph(tmp_path: Path) -> Iterator[DdsGraph]:
+    with dds_graph(tmp_path) as graph:
+        yield graph
+
+
+def show(graph: DdsGraph, sign: str, count: int = 20) -> None:
+    graph.peer.ask("publish", topic=SIGNS, values={"data": sign}, count=count, period_s=0.03)
+
+
+def select(graph: DdsGraph, name: str) -> None:
+    selected = graph.peer.ask("get", topic="/selected_robot")
+    graph.peer.ask("publish", topic=SELECT, values={"data": name})
+    eventually(lambda: len(graph.peer.ask("get", topic="/selected_robot")) > len(selected), 10.0, what=name)
+
+
+def start(graph: DdsGraph, home: Path, *ros: str, stamped: bool = False) -> Peer:
+    robots = Peer([sys.executable, str(ROBOT), str(graph.domain)], graph.env, home / "robots.log")
+    graph.adopt(robots)
+    for name in NAMES:
+        robots.ask("add", name=name, cmd_vel=f"/{name}/{CMD_VEL}", odom=f"/{name}/odom", stamped=stamped)
+    graph.peer.ask("record", topic="/selected_robot", type="String", fields=["data"], latched=True)
+    for topic in (SIGNS, SELECT):
+        graph.peer.ask("advertise", topic=topic, type="String")
+    graph.node("control", name="/hand_sign_control", ros=("-p", f"robots:=[{', '.join(NAMES)}]", *ros))
+    eventually(lambda: all(graph.peer.ask("listeners", topic=topic) for topic in (SIGNS, SELECT)))
+    eventually(lambda: graph.peer.ask("get", topic="/selected_robot"), what="the robot that is selected")
+    # A command reaches each of them: both ends have found each other.
+    for _ in NAMES:
+        told = {name: len(robots.ask("commands", name=name)) for name in NAMES}
+        eventually(lambda told=told: _is_told_more(graph, robots, told), what="a robot that hears the control")
+        select(graph, "next")
+    return robots
+
+
+def _is_told_more(graph: DdsGraph, robots: Peer, told: dict[str, int]) -> bool:
+    show(graph, "Stop", count=1)
+    selected = graph.peer.ask("get", topic="/selected_robot")[-1][1][0]
+    return len(robots.ask("commands", name=selected)) > told[selected]
+
+
+def moving(robots: Peer) -> list[str]:
+    return [name for name in NAMES if robots.ask("state", name=name)[3] != 0.0]
+
+
+def test_only_the_selected_robot_moves_and_only_after_stop(graph: DdsGraph, tmp_path: Path) -> None:
+    robots = start(graph, tmp_path)
+    for name in ("r1", "r2", "r3"):
+        show(graph, "Stop", count=2)
+        show(graph, "Forward")
+        assert moving(robots) == [name]
+        before = len(robots.ask("commands", name=name))
+        select(graph, "next")
+        show(graph, "Forward")
+        assert moving(robots) == []
+        last = [linear for _, linear, *_ in robots.ask("commands", name=name)[before:]]
+        eventually(lambda: moving(robots) == [])
+        assert last[-3:] == [0.0, 0.0, 0.0]
+    names = [name for _, (name,) in graph.peer.ask("get", topic="/selected_robot")]
+    assert names == ["r1", "r2", "r3", "r1", "r2", "r3", "r1"]
+
+
+def test_a_sign_selects_the_next_robot(graph: DdsGraph, tmp_path: Path) -> None:
+    robots = start(
+        graph, tmp_path, "-p", "actions.Peace:=next_robot", "-p", "cmd_vel_type:=twist_stamped", stamped=True
+    )
+    show(graph, "Stop", count=1)
+    show(graph, "Forward")
+    assert moving(robots) == ["r1"]
+    show(graph, "Peace")
+    assert moving(robots) == []
+    show(graph, "Stop", count=1)
+    show(graph, "Forward")
+    assert moving(robots) == ["r2"]
+
+
+def test_robots_that_are_no_names_are_refused(graph: DdsGraph) -> None:
+    process = graph.handsteer("control", "--transport", "dds", "--ros-args", "-p", "robots:=[r1, r1]")
+    assert process.code() == 2
+    assert "ROS parameter /hand_sign_control/robots: " in process.text
+    assert "should name each robot once" in process.text
