@@ -3,8 +3,8 @@
 Types are written by hand, from ROS 2's definitions, and cyclonedds itself encodes them. It reads orders as lines of
 JSON and answers each by one. ``add`` (name, cmd_vel, stamped, odom, turtle) makes a robot, which stops by itself when
 it has heard nothing for half a second. ``state`` (name) returns ``[x, y, yaw, linear, angular]``, ``commands``
-(name) what it was told as ``[time_s, linear, angular, stamp_s, frame]``. ``odometry`` (name, mode) sets what it says of itself:
-the truth (``on``), nothing (``off``), no numbers (``nan``), or a place far away (``far``).
+(name) what it was told as ``[time_s, linear, angular, stamp_s, frame]``. ``odometry`` (name, mode) sets what it says of
+itself: the truth (``on``), nothing (``off``), no numbers (``nan``), or a place far away (``far``).
 """
 
 import json
