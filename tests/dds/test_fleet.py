@@ -1,5 +1,6 @@
 """One hand and three robots in three namespaces, over DDS."""
 
+import signal
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -99,3 +100,18 @@ def test_robots_that_are_no_names_are_refused(graph: DdsGraph) -> None:
     assert process.code() == 2
     assert "ROS parameter /hand_sign_control/robots: " in process.text
     assert "should name each robot once" in process.text
+
+
+def test_several_robots_are_simulated_each_in_its_namespace(graph: DdsGraph) -> None:
+    robots = graph.handsteer("robots", "3", "--transport", "dds", "--world", "empty")
+    eventually(lambda: {"/r1/robot", "/r2/robot", "/r3/robot"} <= set(graph.nodes()) or not robots.running)
+    assert robots.running, robots.text
+    graph.peer.ask("record", topic=f"/r2/{CMD_VEL[:-7]}odom", type="Odometry", fields=["twist.twist.linear.x"])
+    graph.peer.ask("advertise", topic=f"/r2/{CMD_VEL}", type="Twist")
+    eventually(lambda: graph.peer.ask("listeners", topic=f"/r2/{CMD_VEL}"))
+    graph.peer.ask("publish", topic=f"/r2/{CMD_VEL}", values={"linear.x": 0.3}, count=30, period_s=0.05)
+    speeds = [speed for _, (speed,) in graph.peer.ask("get", topic=f"/r2/{CMD_VEL[:-7]}odom")]
+    assert max(speeds) == pytest.approx(0.3, abs=0.05)
+    robots.signal(signal.SIGTERM)
+    assert robots.code() == 0
+    assert "Traceback" not in robots.text

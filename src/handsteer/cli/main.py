@@ -37,6 +37,7 @@ for verb in ("run", "recognize", "models", "doctor"):
 app.command("handsteer.cli.signs:app", name="signs")
 for verb in ("camera", "recognition", "control", "robot", "steering"):
     app.command(f"handsteer.cli.nodes:{verb}", name=verb, group="One node of a graph of several processes")
+app.command("handsteer.cli.robots:robots", name="robots", group="One node of a graph of several processes")
 
 
 def main(arguments: list[str] | None = None) -> None:
