@@ -23,7 +23,7 @@ from handsteer.transports import join
 _TICKS_PER_S = os.sysconf("SC_CLK_TCK")
 _ODOMETRY_HZ = 50
 _COMMAND_PERIOD_S = 1 / 30
-_START_TIMEOUT_S = 60.0
+_START_TIMEOUT_S = 180.0
 
 
 def cpu_s(process: subprocess.Popen[bytes]) -> float:
