@@ -53,7 +53,7 @@ def test_an_empty_file_is_the_defaults(tmp_path: Path) -> None:
         ("camera: {fps: fast}", r"camera.fps: 'fast' should be a valid number"),
         ("control: {ramp: quickly}", r"control.ramp: 'quickly' should be 'per_message' or 'per_second'"),
         ("control: 3", r"control: 3 should be"),
-        ("control: {actions: {Hi: fly}}", r"control.actions.Hi: 'fly' should be 'forward', .* or 'turbo'"),
+        ("control: {actions: {Hi: fly}}", r"control.actions.Hi: 'fly' should be 'forward', .* or 'next_robot'"),
         ("control: {actions: {Stop: go}}", r"control.actions: {'Stop': 'go'} should leave Stop at 'stop'"),
         ("control: {actions: {none: turbo}}", r"control.actions: {'none': 'turbo'} should leave NONE at 'stop'"),
         ("control: {actions: {Go: stop, GO: go}}", r"control.actions: .*should name each sign once, and 'GO' does not"),
