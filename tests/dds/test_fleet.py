@@ -60,23 +60,26 @@ def _is_told_more(graph: DdsGraph, robots: Peer, told: dict[str, int]) -> bool:
     return len(robots.ask("commands", name=selected)) > told[selected]
 
 
-def moving(robots: Peer) -> list[str]:
-    return [name for name in NAMES if robots.ask("state", name=name)[3] != 0.0]
+def moved_by(graph: DdsGraph, robots: Peer, sign: str) -> list[str]:
+    """Show ``sign`` for a while; return which robots were told to move meanwhile, however busy the machine is."""
+    before = {name: len(robots.ask("commands", name=name)) for name in NAMES}
+    selected = graph.peer.ask("get", topic="/selected_robot")[-1][1][0]
+    show(graph, sign)
+    if sign == "Forward":
+        eventually(lambda: len(robots.ask("commands", name=selected)) > before[selected] + 5, what=selected)
+    told = {name: robots.ask("commands", name=name)[before[name] :] for name in NAMES}
+    return [name for name in NAMES if any(linear for _, linear, *_ in told[name])]
 
 
 def test_only_the_selected_robot_moves_and_only_after_stop(graph: DdsGraph, tmp_path: Path) -> None:
     robots = start(graph, tmp_path)
     for name in ("r1", "r2", "r3"):
         show(graph, "Stop", count=2)
-        show(graph, "Forward")
-        assert moving(robots) == [name]
-        before = len(robots.ask("commands", name=name))
+        assert moved_by(graph, robots, "Forward") == [name]
         select(graph, "next")
-        show(graph, "Forward")
-        assert moving(robots) == []
-        last = [linear for _, linear, *_ in robots.ask("commands", name=name)[before:]]
-        eventually(lambda: moving(robots) == [])
-        assert last[-3:] == [0.0, 0.0, 0.0]
+        eventually(lambda name=name: robots.ask("commands", name=name)[-1][1] == 0.0, what=f"{name} to be told zero")
+        assert moved_by(graph, robots, "Forward") == []
+        assert [linear for _, linear, *_ in robots.ask("commands", name=name)[-3:]] == [0.0, 0.0, 0.0]
     names = [name for _, (name,) in graph.peer.ask("get", topic="/selected_robot")]
     assert names == ["r1", "r2", "r3", "r1", "r2", "r3", "r1"]
 
@@ -86,13 +89,13 @@ def test_a_sign_selects_the_next_robot(graph: DdsGraph, tmp_path: Path) -> None:
         graph, tmp_path, "-p", "actions.Peace:=next_robot", "-p", "cmd_vel_type:=twist_stamped", stamped=True
     )
     show(graph, "Stop", count=1)
-    show(graph, "Forward")
-    assert moving(robots) == ["r1"]
+    assert moved_by(graph, robots, "Forward") == ["r1"]
     show(graph, "Peace")
-    assert moving(robots) == []
+    eventually(lambda: graph.peer.ask("get", topic="/selected_robot")[-1][1] == ["r2"])
+    eventually(lambda: robots.ask("commands", name="r1")[-1][1] == 0.0)
+    assert moved_by(graph, robots, "Forward") == []
     show(graph, "Stop", count=1)
-    show(graph, "Forward")
-    assert moving(robots) == ["r2"]
+    assert moved_by(graph, robots, "Forward") == ["r2"]
 
 
 def test_robots_that_are_no_names_are_refused(graph: DdsGraph) -> None:
