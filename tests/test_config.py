@@ -4,8 +4,9 @@ from typing import Any
 import pytest
 
 from handsteer import config
-from handsteer.config import Config
+from handsteer.config import Config, cmd_vel_type, load
 from handsteer.errors import ConfigError
+from handsteer.presets import PRESETS
 
 
 def sections() -> list[tuple[str, Any]]:
@@ -52,7 +53,7 @@ def test_an_empty_file_is_the_defaults(tmp_path: Path) -> None:
         ("camera: {fps: fast}", r"camera.fps: 'fast' should be a valid number"),
         ("control: {ramp: quickly}", r"control.ramp: 'quickly' should be 'per_message' or 'per_second'"),
         ("control: 3", r"control: 3 should be"),
-        ("control: {actions: {Hi: fly}}", r"control.actions.Hi: 'fly' should be 'forward', .* or 'turbo'"),
+        ("control: {actions: {Hi: fly}}", r"control.actions.Hi: 'fly' should be 'forward', .* or 'next_robot'"),
         ("control: {actions: {Stop: go}}", r"control.actions: {'Stop': 'go'} should leave Stop at 'stop'"),
         ("control: {actions: {none: turbo}}", r"control.actions: {'none': 'turbo'} should leave NONE at 'stop'"),
         ("control: {actions: {Go: stop, GO: go}}", r"control.actions: .*should name each sign once, and 'GO' does not"),
@@ -73,3 +74,39 @@ def test_what_is_wrong_in_a_file_is_named(tmp_path: Path, text: str, message: st
 def test_a_file_that_is_not_there() -> None:
     with pytest.raises(ConfigError, match=r"cannot read the configuration gone\.yaml: No such file"):
         config.load(Path("gone.yaml"))
+
+
+def test_a_known_robot_sets_its_limits_and_options_go_before_it() -> None:
+    config = load(None, {"robot": {"kind": "dds", "preset": "turtlebot4"}, "control": {"max_linear": 0.1}})
+    assert (config.robot.max_linear, config.control.max_linear, config.control.max_angular) == (0.306, 0.1, 1.9)
+    assert cmd_vel_type(config) == "twist_stamped"
+
+
+def test_a_robot_of_an_older_distribution_takes_a_bare_twist(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("ROS_DISTRO", "humble")
+    assert cmd_vel_type(load(None, {"robot": {"kind": "dds", "preset": "turtlebot3_burger"}})) == "twist"
+    monkeypatch.setenv("ROS_DISTRO", "jazzy")
+    assert cmd_vel_type(load(None, {"robot": {"kind": "dds", "preset": "turtlebot3_burger"}})) == "twist_stamped"
+    assert cmd_vel_type(load(None, {"robot": {"kind": "ros1", "preset": "turtlebot3_burger"}})) == "twist"
+
+
+def test_both_ends_of_cmd_vel_speak_what_one_was_told() -> None:
+    for section in ("control", "robot"):
+        assert cmd_vel_type(load(None, {section: {"cmd_vel_type": "twist_stamped"}})) == "twist_stamped"
+    given = {"control": {"cmd_vel_type": "twist"}, "robot": {"kind": "dds", "preset": "turtlebot4"}}
+    assert cmd_vel_type(load(None, given)) == "twist"
+    both = {"control": {"cmd_vel_type": "twist"}, "robot": {"cmd_vel_type": "twist_stamped"}}
+    with pytest.raises(ConfigError, match=r"control\.cmd_vel_type is twist and robot.cmd_vel_type twist_stamped"):
+        cmd_vel_type(load(None, both))
+
+
+@pytest.mark.parametrize("name", PRESETS)
+def test_every_known_robot_is_allowed(name: str) -> None:
+    config = load(None, {"robot": {"kind": "dds", "preset": name}})
+    assert config.control.max_linear <= config.robot.max_linear
+
+
+@pytest.mark.parametrize("robots", [["r1", "r1"], ["1r"], ["/r1"], ["r 1"], [""]])
+def test_robots_have_names_that_differ(robots: list[str]) -> None:
+    with pytest.raises(ConfigError, match=r"control.robots: .* should name each robot once"):
+        load(None, {"control": {"robots": robots}})

@@ -4,6 +4,8 @@ The YAML file, the command line and the settings of the page all come from these
 have them, units are SI (REP 103) and stand in brackets in each description.
 """
 
+import os
+import re
 from pathlib import Path
 from typing import Any, ClassVar, Literal, TypeVar
 
@@ -12,9 +14,14 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_valida
 
 from handsteer.control.actions import ALWAYS_STOP, BUILT_IN, Action
 from handsteer.errors import ConfigError
+from handsteer.messages import CmdVelType
+from handsteer.presets import Preset, preset
 from handsteer.signs.vocabulary import find_sign
 
 S = TypeVar("S", bound="Section")
+
+RobotKind = Literal["sim", "dds", "zenoh", "ros1"]
+_NAMESPACE = re.compile(r"[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)
 
 
 class Section(BaseModel):
@@ -143,6 +150,24 @@ class ControlConfig(Section):
     actions: dict[str, Action] = Field(
         {}, description="What further signs do, as {Hi: stop, Peace: turbo}; Stop and NONE always stop"
     )
+    cmd_vel_type: CmdVelType = Field(
+        "twist",
+        description="What commands are sent as: geometry_msgs/Twist or TwistStamped; follows robot.cmd_vel_type",
+    )
+    cmd_vel_frame_id: str = Field("base_link", description="Coordinate frame in the header of a TwistStamped")
+    robots: tuple[str, ...] = Field(
+        (),
+        max_length=32,
+        description="Namespaces of robots that one hand drives in turn, as [r1, r2]; none has one robot, without one",
+    )
+
+    @field_validator("robots")
+    @classmethod
+    def _names_of_robots(cls, robots: tuple[str, ...]) -> tuple[str, ...]:
+        wrong = [name for name in robots if not _NAMESPACE.fullmatch(name) or robots.count(name) > 1]
+        if wrong:
+            raise ValueError(f"should name each robot once, by letters, digits and _, and {wrong[0]!r} is not that")
+        return robots
 
     @field_validator("actions")
     @classmethod
@@ -159,9 +184,28 @@ class ControlConfig(Section):
 
 
 class RobotConfig(Section):
-    """The robot and the world it is simulated in."""
+    """The robot, and the world it is simulated in or the topics it listens to."""
 
-    kind: Literal["sim"] = Field("sim", description="sim is the simulated diff-drive robot")
+    kind: RobotKind = Field(
+        "sim", description="sim is the simulated robot; dds (ROS 2), zenoh and ros1 drive a real one, on its topics"
+    )
+    preset: Preset | None = Field(
+        None, description="A robot whose topics, types and limits are known; a real one is generic unless said"
+    )
+    cmd_vel_type: CmdVelType = Field(
+        "twist", description="What commands it takes: geometry_msgs/Twist or TwistStamped; follows control.cmd_vel_type"
+    )
+    cmd_vel_topic: str = Field("cmd_vel", min_length=1, description="Topic of a real robot's commands")
+    odom_topic: str = Field("odom", description="Topic of a real robot's odometry; none when empty")
+    odom_type: Literal["odometry", "turtlesim_pose"] = Field(
+        "odometry", description="What it carries: nav_msgs/Odometry or turtlesim/Pose"
+    )
+    odom_timeout: float = Field(
+        0.5, gt=0, le=10, description="Odometry of a real robot that stops for this long stops the robot [s]"
+    )
+    command_rate: float = Field(
+        20.0, ge=5, le=50, description="How often a real robot is told again what it is told [1/s]"
+    )
     world: str = Field("obstacles", description="Name of a shipped world, or a YAML file")
     wheel_separation: float = Field(0.45, gt=0, le=10, description="Distance between left and right wheels [m]")
     wheel_radius: float = Field(0.06, gt=0, le=2, description="Radius of the wheels [m]")
@@ -169,7 +213,9 @@ class RobotConfig(Section):
     max_linear_acceleration: float = Field(1.0, gt=0, le=50, description="Limit of the controller [m/s²]")
     max_angular: float = Field(8.0, gt=0, le=50, description="Limit of the controller [rad/s]")
     max_angular_acceleration: float = Field(2.0, gt=0, le=50, description="Limit of the controller [rad/s²]")
-    cmd_vel_timeout: float = Field(0.4, gt=0, le=10, description="Without a command for this long, it brakes [s]")
+    cmd_vel_timeout: float = Field(
+        0.4, gt=0, le=10, description="Without a command for this long, or when a stamped one is older, it brakes [s]"
+    )
     odom_frame_id: str = Field("odom", description="Coordinate frame of the odometry")
     base_frame_id: str = Field("base_link", description="Coordinate frame of the robot")
     publish_clock: bool = Field(False, description="Whether it publishes /clock; it then runs on real time itself")
@@ -208,7 +254,24 @@ def load(path: Path | None = None, base: dict[str, Any] | None = None, *override
     values = _merge(base or {}, _read_yaml(path) if path else {})
     for changes in overrides:
         values = _merge(values, changes)
-    return validate(Config, values, f" (also read: {path})" if path else "")
+    return validate(Config, _merge(_preset(values), values), f" (also read: {path})" if path else "")
+
+
+def cmd_vel_type(config: Config) -> CmdVelType:
+    """Return what both ends of ``cmd_vel`` speak: what one of them was told, the other does too.
+
+    Raises:
+        ConfigError: They were told different things.
+    """
+    control, robot = config.control, config.robot
+    if "cmd_vel_type" not in robot.model_fields_set:
+        return control.cmd_vel_type
+    if "cmd_vel_type" in control.model_fields_set and control.cmd_vel_type != robot.cmd_vel_type:
+        raise ConfigError(
+            f"control.cmd_vel_type is {control.cmd_vel_type} and robot.cmd_vel_type {robot.cmd_vel_type}: "
+            "they should be the same, or the robot would not hear a command"
+        )
+    return robot.cmd_vel_type
 
 
 def validate(section: type[S], values: Any, where: str = "") -> S:
@@ -231,6 +294,18 @@ def describe(error: ValidationError) -> str:
         return f"{field}: there is no such parameter"
     reason = problem["msg"].removeprefix("Input ").removeprefix("Value error, ")
     return f"{field}: {problem['input']!r} {reason}"
+
+
+def _preset(values: dict[str, Any]) -> dict[str, Any]:
+    """Return what is known of the robot that ``values`` name: it goes before the defaults only."""
+    robot, control = (values[name] if isinstance(values.get(name), dict) else {} for name in ("robot", "control"))
+    name, kind = robot.get("preset"), robot.get("kind", "sim")
+    if name is None and kind != "sim":
+        name = "generic"
+    known = preset(name, "noetic" if kind == "ros1" else os.environ.get("ROS_DISTRO", ""))
+    if known and "cmd_vel_type" in control:
+        known["robot"].pop("cmd_vel_type", None)
+    return known
 
 
 def _read_yaml(path: Path) -> dict[str, Any]:

@@ -18,10 +18,11 @@ from typing import Any
 
 from handsteer.cameras.choose import open_camera
 from handsteer.clock import Clock, RealClock, SimulatedClock, SteppedClock, WallClock
-from handsteer.config import Config, SignsConfig
+from handsteer.config import Config, SignsConfig, cmd_vel_type
 from handsteer.errors import ConfigError
 from handsteer.landmarks.mediapipe import MediaPipeLandmarker
 from handsteer.landmarks.protocol import Landmarker
+from handsteer.messages import Topic, cmd_vel
 from handsteer.nodes.camera import CameraNode
 from handsteer.nodes.control import HandSignControlNode
 from handsteer.nodes.node import Node
@@ -38,9 +39,11 @@ from handsteer.signs.teaching.taught import TaughtClassifier, load_taught
 from handsteer.signs.trained import TrainedClassifier
 from handsteer.signs.vocabulary import NONE, find_sign
 from handsteer.transports.in_process import InProcessTransport
-from handsteer.transports.protocol import Transport
+from handsteer.transports.protocol import Session, Transport
 
 log = logging.getLogger(__name__)
+
+_LOOK_PERIOD_S = 0.2
 
 
 class Graph:
@@ -52,21 +55,30 @@ class Graph:
         config: Everything that can be set.
         clock: Real time by default; a :class:`~handsteer.clock.SteppedClock` for :meth:`run_stepped`.
         transport: Within this process by default.
+        link: This process in the graph of a real robot, for ``robot.kind`` other than ``sim``; the caller closes it
+            after this graph.
 
     Raises:
         HandsteerError: A part cannot be used (camera, model, world); the message says what to do.
     """
 
-    def __init__(self, config: Config, clock: Clock | None = None, transport: Transport | None = None) -> None:
+    def __init__(
+        self,
+        config: Config,
+        clock: Clock | None = None,
+        transport: Transport | None = None,
+        link: Session | None = None,
+    ) -> None:
         self.clock = clock or RealClock()
         self.transport = transport or InProcessTransport()
         wires = (self.transport, self.clock)
-        self.robot = make_robot(config, *wires)
+        self.robot = make_robot(config, *wires, link)
         self.recognition = make_recognition(config, *wires)
         self.camera = make_camera(config, *wires)
         self.control = make_control(config, *wires)
         self.steering = make_steering(config, *wires)
         self._added: tuple[Node, ...] = ()
+        self._link = link
         self._began_s = self.clock.now()
 
     @property
@@ -91,8 +103,15 @@ class Graph:
             node.start()
 
     def wait(self, duration_s: float | None = None) -> None:
-        """Wait until ``duration_s`` seconds have passed or the camera's file has ended the run."""
-        self.camera.ended.wait(duration_s)
+        """Wait until ``duration_s`` seconds have passed, or the camera's file or a real robot's graph ends the run.
+
+        Raises:
+            TransportError: The graph of a real robot is gone.
+        """
+        end_s = self.clock.now() + (math.inf if duration_s is None else duration_s)
+        while not self.camera.ended.wait(max(0.0, min(_LOOK_PERIOD_S, end_s - self.clock.now()))):
+            if self.clock.now() >= end_s or (self._link is not None and self._link.wait(0.0)):
+                return
 
     def stop(self) -> None:
         """Stop all nodes and leave the robot standing; may be called twice."""
@@ -135,10 +154,11 @@ class Graph:
             latency_median_ms=self.control.latency.percentile_ms(50) if measured else None,
             latency_p99_ms=self.control.latency.percentile_ms(99) if measured else None,
             signs=dict(self.recognition.counts),
-            final_pose=self.robot.state.truth,
-            odometry=self.robot.state.odometry,
+            final_pose=self.robot.state.truth if self.robot.was_located else None,
+            odometry=self.robot.state.odometry if self.robot.was_located else None,
             path_length_m=self.robot.path_length_m,
             contacts=self.robot.state.collisions,
+            trouble=self.robot.state.trouble,
             callback_errors=sum(node.callback_errors for node in self.nodes),
         )
 
@@ -154,10 +174,11 @@ class Summary:
         latency_median_ms: From the capture of a frame to the Twist that it led to; None when the clock was stepped.
         latency_p99_ms: Likewise, 99 of 100 were faster.
         signs: For how many frames each sign counted, ``NONE`` among them.
-        final_pose: Where the robot really is, in the world.
-        odometry: Where its wheels say that it is.
+        final_pose: Where the robot really is, in the world; a real one's odometry. None when it has not said.
+        odometry: Where its wheels say that it is; None when it has not said.
         path_length_m: How far it has gone.
-        contacts: How often it has begun to touch an obstacle.
+        contacts: How often it has begun to touch an obstacle; None for a real one.
+        trouble: What was wrong with it at the end, as ``is not there: …``; empty when nothing was.
         callback_errors: Callbacks that failed.
     """
 
@@ -167,10 +188,11 @@ class Summary:
     latency_median_ms: float | None
     latency_p99_ms: float | None
     signs: dict[str, int]
-    final_pose: Pose2D
-    odometry: Pose2D
+    final_pose: Pose2D | None
+    odometry: Pose2D | None
     path_length_m: float
-    contacts: int
+    contacts: int | None
+    trouble: str
     callback_errors: int
 
     def as_dict(self) -> dict[str, Any]:
@@ -199,20 +221,42 @@ def make_recognition(config: Config, transport: Transport, clock: Clock) -> Hand
     return HandSignRecognitionNode(transport, clock, recognizer, config.signs, annotate)
 
 
-def make_control(config: Config, transport: Transport, clock: Clock) -> HandSignControlNode:
-    """Return the node ``hand_sign_control``."""
-    return HandSignControlNode(transport, clock, config.control)
-
-
-def make_robot(config: Config, transport: Transport, clock: Clock) -> RobotNode:
-    """Return the node ``robot``; one that publishes ``/clock`` runs on real time, so that it cannot drive itself.
+def cmd_vel_topic(config: Config) -> Topic[Any]:
+    """Return the topic of the commands from control to robot, of Twist or TwistStamped.
 
     Raises:
+        ConfigError: Control and robot were told different types.
+    """
+    return cmd_vel(cmd_vel_type(config))
+
+
+def make_control(config: Config, transport: Transport, clock: Clock) -> HandSignControlNode:
+    """Return the node ``hand_sign_control``.
+
+    Raises:
+        ConfigError: Control and robot were told different types of commands.
+    """
+    return HandSignControlNode(transport, clock, config.control, cmd_vel_topic(config))
+
+
+def make_robot(config: Config, transport: Transport, clock: Clock, link: Session | None = None) -> RobotNode:
+    """Return the node ``robot``; one that publishes ``/clock`` runs on real time, so that it cannot drive itself.
+
+    Args:
+        config: Everything that can be set.
+        transport: Carries the messages.
+        clock: The graph's clock.
+        link: This process in the graph of a real robot.
+
+    Raises:
+        ConfigError: The robot is real, and there is no link to it.
         WorldError: The world of a simulated robot cannot be used.
     """
     if config.robot.publish_clock and isinstance(clock, SimulatedClock):
         clock = WallClock()
-    return RobotNode(transport, clock, open_robot(config.robot), config.robot)
+    topic = cmd_vel_topic(config)
+    robot = open_robot(config.robot, link, topic, config.control.cmd_vel_frame_id)
+    return RobotNode(transport, clock, robot, config.robot, topic)
 
 
 def make_steering(_config: Config, transport: Transport, clock: Clock) -> SteeringNode:

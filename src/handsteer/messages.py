@@ -4,8 +4,9 @@ The message classes are the typed dataclasses of ``rosbags``: the same definitio
 They are used as values: once published, a message is not changed any more.
 """
 
-from dataclasses import dataclass
-from typing import Any, Generic, TypeVar
+import math
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Generic, Literal, TypeVar
 
 from rosbags.typesys.stores.ros2_jazzy import builtin_interfaces__msg__Duration as Duration
 from rosbags.typesys.stores.ros2_jazzy import builtin_interfaces__msg__Time as Time
@@ -19,6 +20,7 @@ from rosbags.typesys.stores.ros2_jazzy import geometry_msgs__msg__Quaternion as 
 from rosbags.typesys.stores.ros2_jazzy import geometry_msgs__msg__Transform as Transform
 from rosbags.typesys.stores.ros2_jazzy import geometry_msgs__msg__TransformStamped as TransformStamped
 from rosbags.typesys.stores.ros2_jazzy import geometry_msgs__msg__Twist as Twist
+from rosbags.typesys.stores.ros2_jazzy import geometry_msgs__msg__TwistStamped as TwistStamped
 from rosbags.typesys.stores.ros2_jazzy import geometry_msgs__msg__TwistWithCovariance as TwistWithCovariance
 from rosbags.typesys.stores.ros2_jazzy import geometry_msgs__msg__Vector3 as Vector3
 from rosbags.typesys.stores.ros2_jazzy import nav_msgs__msg__Odometry as Odometry
@@ -38,6 +40,7 @@ from rosbags.typesys.stores.ros2_jazzy import visualization_msgs__msg__MeshFile 
 
 __all__ = [
     "ClockMessage",
+    "CmdVelType",
     "ColorRGBA",
     "CompressedImage",
     "DiagnosticArray",
@@ -63,14 +66,44 @@ __all__ = [
     "Topic",
     "Transform",
     "TransformStamped",
+    "TurtlePose",
     "Twist",
+    "TwistStamped",
     "TwistWithCovariance",
     "Vector3",
+    "cmd_vel",
+    "command",
     "twist",
+    "twist_in",
     "type_name",
+    "yaw_of",
 ]
 
 M = TypeVar("M")
+
+CmdVelType = Literal["twist", "twist_stamped"]
+"""How a velocity command is sent: geometry_msgs/Twist, or geometry_msgs/TwistStamped."""
+
+
+@dataclass
+class TurtlePose:
+    """``turtlesim/msg/Pose``, which rosbags does not have: where the turtle is, in its own metres, and its velocity.
+
+    Attributes:
+        x: Metres to the right of the lower left corner.
+        y: Metres above it.
+        theta: Yaw in rad, left positive.
+        linear_velocity: Forward, in m/s.
+        angular_velocity: To the left, in rad/s.
+    """
+
+    __msgtype__: ClassVar[str] = "turtlesim/msg/Pose"
+
+    x: float
+    y: float
+    theta: float
+    linear_velocity: float
+    angular_velocity: float
 
 
 @dataclass(frozen=True)
@@ -111,6 +144,8 @@ IMAGE_COMPRESSED = Topic("/image_raw/compressed", CompressedImage, beneath=IMAGE
 HAND_SIGN = Topic("/gesture/hand_sign", String, depth=10, lifespan_s=_COMMAND_LIFESPAN_S)
 IMAGE_ANNOTATED = Topic("/gesture/image_annotated", Image)
 CMD_VEL = Topic("/robot_diff_drive_controller/cmd_vel", Twist, depth=10, lifespan_s=_COMMAND_LIFESPAN_S)
+SELECT_ROBOT = Topic("/select_robot", String, depth=10)
+SELECTED_ROBOT = Topic("/selected_robot", String, latched=True)
 STEERING_CMD_VEL = Topic("/steering/cmd_vel", Twist, lifespan_s=_COMMAND_LIFESPAN_S)
 ODOM = Topic("/robot_diff_drive_controller/odom", Odometry)
 TF = Topic("/tf", TFMessage, is_global=True, depth=10)
@@ -129,3 +164,34 @@ def type_name(message_type: type) -> str:
 def twist(linear_mps: float, angular_radps: float) -> Twist:
     """Return the twist of a robot on a plane: forward in m/s, left turn in rad/s (REP 103)."""
     return Twist(linear=Vector3(linear_mps, 0.0, 0.0), angular=Vector3(0.0, 0.0, angular_radps))
+
+
+def cmd_vel(kind: CmdVelType, topic: Topic[Any] = CMD_VEL) -> Topic[Any]:
+    """Return ``topic``, a topic of velocity commands, with messages of ``kind``."""
+    return replace(topic, type=TwistStamped if kind == "twist_stamped" else Twist)
+
+
+def command(topic: Topic[Any], linear_mps: float, angular_radps: float, stamp: Time, frame_id: str) -> Any:
+    """Return a velocity command for ``topic``: forward in m/s, left turn in rad/s (REP 103).
+
+    Args:
+        topic: Carries Twist or TwistStamped.
+        linear_mps: Forward velocity.
+        angular_radps: Turning velocity, left positive.
+        stamp: When it is commanded, not when a frame was captured; for a TwistStamped.
+        frame_id: Coordinate frame; for a TwistStamped.
+    """
+    bare = twist(linear_mps, angular_radps)
+    return (
+        TwistStamped(header=Header(stamp=stamp, frame_id=frame_id), twist=bare) if topic.type is TwistStamped else bare
+    )
+
+
+def twist_in(message: Twist | TwistStamped) -> Twist:
+    """Return the twist that a velocity command carries."""
+    return message.twist if isinstance(message, TwistStamped) else message
+
+
+def yaw_of(quaternion: Quaternion) -> float:
+    """Return the yaw in rad of a ``quaternion``, of any length, that turns about z only; 0 for the all-zero one."""
+    return 2 * math.atan2(quaternion.z, quaternion.w)

@@ -176,3 +176,30 @@ def test_a_reader_that_leaves_is_no_error(data_dir: Path) -> None:
 @pytest.mark.parametrize(("arguments", "words"), [(["--help"], "Drive the robot"), (["signs"], "Learn the signs of")])
 def test_help_says_what_each_verb_does(capsys: pytest.CaptureFixture[str], arguments: list[str], words: str) -> None:
     assert words in prints(capsys, *arguments)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--robot", "hal"], "robot.kind: 'hal' should be 'sim', 'dds', 'zenoh' or 'ros1'"),
+        (["--robot", "dds", "--fast"], "--fast runs on simulated time, which a real robot (robot.kind dds) does not"),
+        (["--ros-args", "-r", "a:=b"], "'--ros-args': a simulated robot has no graph to take it"),
+        (["--control.cmd-vel-type=twist", "--robot.cmd-vel-type=twist_stamped"], "control.cmd_vel_type is twist and"),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, list) else None,
+)
+def test_what_cannot_be_with_a_robot_is_said(
+    capsys: pytest.CaptureFixture[str], arguments: list[str], message: str
+) -> None:
+    assert fails(capsys, "run", "--headless", *VIRTUAL, *arguments).startswith(message)
+
+
+def test_a_run_drives_one_robot(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    file = tmp_path / "my.yaml"
+    file.write_text("control: {robots: [r1, r2]}")
+    assert "a run drives one robot" in fails(capsys, "run", "--headless", *VIRTUAL, "--config", str(file))
+
+
+def test_how_many_robots_there_can_be(capsys: pytest.CaptureFixture[str]) -> None:
+    assert fails(capsys, "robots", "0", "--transport", "dds") == "0 robots: there should be 1 to 30"
+    assert "there is no transport 'smoke'" in fails(capsys, "robots", "1", "--transport", "smoke")

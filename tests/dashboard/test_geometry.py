@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from handsteer.dashboard.geometry import about_axis, css_colour, from_quaternion, from_rpy, parents_first, yaw_of
-from handsteer.messages import Quaternion
+from handsteer.dashboard.geometry import about_axis, css_colour, from_quaternion, from_rpy, parents_first
+from handsteer.messages import Quaternion, yaw_of
 from handsteer.robots.description import Joint, joints, robot_description
 
 ANGLES = st.floats(-math.pi, math.pi)

@@ -209,3 +209,12 @@ def test_a_bar_stays_in_its_track_and_ends_at_its_value(commanded: float, measur
 )
 def test_reads_only_sound_deflections_of_the_pad(sent: object, read: tuple[float, float]) -> None:
     assert read_deflection(sent) == read
+
+
+def test_what_is_wrong_with_the_robot_is_said_whatever_it_is_told() -> None:
+    for speed in ("0.100", "0.000"):
+        reports = {
+            "hand_sign_control": report("driving: Forward", linear_mps=speed),
+            "robot": report("is not there: nobody listens on /cmd_vel", level=ERROR),
+        }
+        assert explain(reports) == ("trouble", "Trouble", "the robot is not there: nobody listens on /cmd_vel")

@@ -82,6 +82,10 @@ class DdsGraph:
         self._processes.append(peer)
         return peer
 
+    def adopt(self, process: Process) -> None:
+        """End ``process`` with the others."""
+        self._processes.append(process)
+
     def handsteer(self, *arguments: str) -> Process:
         """Start ``handsteer`` with ``arguments`` in this domain."""
         log = self._home / f"process_{len(self._processes)}.log"

@@ -1,9 +1,22 @@
 import math
+from dataclasses import replace
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from handsteer.config import Config, ControlConfig
-from handsteer.messages import CMD_VEL, DIAGNOSTICS, HAND_SIGN, STEERING_CMD_VEL, String, twist
+from handsteer.messages import (
+    CMD_VEL,
+    DIAGNOSTICS,
+    HAND_SIGN,
+    SELECT_ROBOT,
+    SELECTED_ROBOT,
+    STEERING_CMD_VEL,
+    String,
+    cmd_vel,
+    twist,
+)
 from handsteer.nodes.control import HandSignControlNode
 from handsteer.nodes.steering import SteeringNode
 from tests.nodes.stepping import Bench
@@ -167,3 +180,128 @@ def test_the_newest_of_several_configurations_counts(bench: ControlBench) -> Non
         bench.control.reconfigure(Config.model_validate({"control": {"max_linear": limit}}))
     bench.run(0.0)
     assert bench.commands == [(0.01, 0), (0.005, 0)]
+
+
+def test_a_stamped_command_has_the_time_of_the_command_and_a_frame() -> None:
+    bench = Bench()
+    bench.clock.advance(7.0)
+    topic, config = cmd_vel("twist_stamped"), ControlConfig(cmd_vel_frame_id="r1/base_link")
+    bench.nodes = [HandSignControlNode(bench.transport, bench.clock, config, topic)]
+    commands = bench.record(topic)
+    bench.transport.advertise("recognition", HAND_SIGN).publish(String(data="Forward"), 6.8)
+    bench.run(0.0)
+    (command,) = commands
+    assert (command.header.stamp.sec, command.header.stamp.nanosec) == (7, 0)
+    assert (command.header.frame_id, command.twist.linear.x) == ("r1/base_link", 0.01)
+    bench.nodes[0].stop()
+    assert commands[-1].twist == twist(0.0, 0.0)
+
+
+class FleetBench(Bench):
+    NAMES = ("r1", "r2", "r3")
+
+    def __init__(self) -> None:
+        super().__init__()
+        config = ControlConfig.model_validate({"robots": self.NAMES, "actions": {"Peace": "next_robot"}})
+        self.control = HandSignControlNode(self.transport, self.clock, config)
+        self.steering = SteeringNode(self.transport, self.clock)
+        self.nodes = [self.steering, self.control]
+        self.signs = self.transport.advertise("recognition", HAND_SIGN)
+        self.select = self.transport.advertise("operator", SELECT_ROBOT)
+        self.selected = self.record(SELECTED_ROBOT)
+        self.told = {name: self.record(replace(CMD_VEL, name=f"/{name}{CMD_VEL.name}")) for name in self.NAMES}
+
+    def show(self, sign: str, count: int = 1) -> None:
+        for _ in range(count):
+            self.signs.publish(String(data=sign), self.clock.now())
+            self.run(1 / 30)
+
+    def choose(self, name: str) -> None:
+        self.select.publish(String(data=name))
+        self.run(0.02)
+
+    def moving(self) -> list[str]:
+        return [name for name, told in self.told.items() if told and told[-1].linear.x != 0.0]
+
+
+def test_one_robot_of_several_is_driven_and_the_first_is_the_first() -> None:
+    bench = FleetBench()
+    bench.show("Forward", 5)
+    assert bench.moving() == ["r1"]
+    assert (bench.told["r2"], bench.told["r3"]) == ([], [])
+    assert bench.selected[-1].data == "r1"
+
+
+def test_the_old_robot_is_told_to_stand_and_the_new_one_moves_after_stop_only() -> None:
+    bench = FleetBench()
+    bench.show("Forward", 5)
+    bench.choose("r3")
+    assert bench.selected[-1].data == "r3"
+    bench.show("Forward", 20)
+    assert bench.moving() == []
+    assert bench.told["r1"][-10:] == [twist(0.0, 0.0)] * 10
+    assert all(message == twist(0.0, 0.0) for message in bench.told["r3"])
+    bench.show("Stop")
+    bench.show("Forward")
+    assert bench.moving() == ["r3"]
+    assert bench.told["r3"][-1].linear.x == pytest.approx(0.01)
+
+
+def test_a_sign_that_is_held_selects_the_next_robot_once() -> None:
+    bench = FleetBench()
+    bench.show("Peace", 30)
+    assert [message.data for message in bench.selected] == ["r1", "r2"]
+    for _ in range(2):
+        bench.show("NONE", 3)
+        bench.show("Peace", 3)
+    assert [message.data for message in bench.selected] == ["r1", "r2", "r3", "r1"]
+
+
+def test_steering_has_to_let_go_too_before_it_drives_the_next_robot() -> None:
+    bench = FleetBench()
+    bench.steering.steer(0.2, 0.0)
+    bench.run(0.5)
+    assert bench.moving() == ["r1"]
+    bench.choose("next")
+    bench.run(1.0)
+    assert bench.moving() == []
+    bench.steering.release()
+    bench.run(0.05)
+    bench.steering.steer(0.2, 0.0)
+    bench.run(0.5)
+    assert bench.moving() == ["r2"]
+
+
+def test_a_robot_that_is_not_there_is_not_selected(caplog: pytest.LogCaptureFixture) -> None:
+    bench = FleetBench()
+    bench.show("Forward", 5)
+    bench.choose("r9")
+    assert bench.moving() == ["r1"]
+    assert "there is no robot 'r9' to select; there are r1, r2, r3" in caplog.text
+
+
+EVENTS = st.lists(
+    st.sampled_from(
+        ["Forward", "Turn Left", "Stop", "NONE", "Peace", "select r1", "select r2", "select next", "steer"]
+    ),
+    max_size=40,
+)
+
+
+@given(events=EVENTS)
+def test_only_one_robot_is_ever_driven_and_none_before_its_hand_let_go(events: list[str]) -> None:
+    bench = FleetBench()
+    for event in events:
+        before = bench.selected[-1].data
+        if event == "steer":
+            bench.steering.steer(0.2, 0.0)
+        elif event.startswith("select"):
+            bench.choose(event.removeprefix("select "))
+        else:
+            bench.show(event, 3)
+        bench.run(0.05)
+        assert set(bench.moving()) <= {bench.selected[-1].data}
+        if bench.selected[-1].data != before:
+            assert bench.moving() == []
+    bench.control.stop()
+    assert bench.moving() == []

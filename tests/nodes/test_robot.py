@@ -3,7 +3,18 @@ import re
 import pytest
 
 from handsteer.config import RobotConfig
-from handsteer.messages import CLOCK, CMD_VEL, DIAGNOSTICS, ODOM, TF, Odometry, twist
+from handsteer.messages import (
+    CLOCK,
+    DIAGNOSTICS,
+    ODOM,
+    TF,
+    Header,
+    Odometry,
+    Time,
+    TwistStamped,
+    cmd_vel,
+    twist,
+)
 from handsteer.nodes.robot import RobotNode
 from handsteer.robots import open_robot
 from tests.nodes.stepping import Bench
@@ -16,8 +27,9 @@ class RobotBench(Bench):
         self.odometry = self.record(ODOM)
         self.transforms = self.record(TF)
         config = RobotConfig.model_validate({"world": "empty", **settings})
-        self.nodes = [RobotNode(self.transport, self.clock, open_robot(config), config)]
-        self.commands = self.transport.advertise("control", CMD_VEL)
+        topic = cmd_vel(config.cmd_vel_type)
+        self.nodes = [RobotNode(self.transport, self.clock, open_robot(config), config, topic)]
+        self.commands = self.transport.advertise("control", topic)
 
     def drive(self, seconds: float) -> None:
         for _ in range(round(seconds / 0.1)):
@@ -69,3 +81,16 @@ def test_it_says_that_it_stands_for_want_of_commands() -> None:
     bench.commands.publish(twist(0.0, 0.0))
     bench.run(1.0)
     assert reports[-1].status[0].message == "moves freely", "whoever says zero last leaves nothing to be explained"
+
+
+@pytest.mark.parametrize(("age_s", "speed"), [(0.0, 0.3), (0.35, 0.3), (0.45, 0.0), (None, 0.3)])
+def test_a_stamped_command_that_is_old_is_not_obeyed(age_s: float | None, speed: float) -> None:
+    bench = RobotBench(cmd_vel_type="twist_stamped")
+    bench.clock.advance(10.0)
+    bench.run(0.3)
+    for _ in range(20):
+        now = bench.clock.now()
+        stamp = Time(sec=0, nanosec=0) if age_s is None else bench.clock.stamp(now - age_s)
+        bench.commands.publish(TwistStamped(header=Header(stamp=stamp, frame_id="base_link"), twist=twist(0.3, 0.0)))
+        bench.run(0.1)
+    assert bench.newest.twist.twist.linear.x == pytest.approx(speed, abs=0.02)

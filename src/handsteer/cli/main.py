@@ -41,6 +41,7 @@ for verb in ("camera", "recognition", "control", "robot", "steering"):
 app.command(
     "handsteer.cli.zenoh_router:zenoh_router", name="zenoh-router", group="One node of a graph of several processes"
 )
+app.command("handsteer.cli.robots:robots", name="robots", group="One node of a graph of several processes")
 
 
 def main(arguments: list[str] | None = None) -> None:

@@ -1,6 +1,5 @@
 """``handsteer camera``, ``recognition``, ``control``, ``robot``, ``steering``: one node of a graph, as a process."""
 
-import signal
 import webbrowser
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
@@ -9,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from handsteer import graph
-from handsteer.cli.options import ConfigFile, Parameters, say, settings
+from handsteer.cli.options import ConfigFile, Parameters, say, settings, uninterrupted
 from handsteer.clock import Clock
 from handsteer.config import Config
 from handsteer.nodes.node import Node
@@ -150,7 +149,7 @@ def _served(node: SteeringNode, config: Config) -> Iterator[None]:
     # The page's libraries take a second to load, which the other nodes need not wait for.
     from handsteer.dashboard.server import Dashboard  # noqa: PLC0415
 
-    dashboard = Dashboard(node.transport, node.clock, node, config.dashboard)
+    dashboard = Dashboard(node.transport, node.clock, node, config.dashboard, graph.cmd_vel_topic(config))
     url = dashboard.start()
     try:
         say(f"the page is at {url}")
@@ -198,7 +197,8 @@ def _run(job: _Job, transport: str, words: tuple[str, ...]) -> int:
     except KeyboardInterrupt:
         pass  # the ordinary end of a node
     finally:
-        session.close()
+        with uninterrupted():
+            session.close()
     return 0
 
 
@@ -209,7 +209,5 @@ def _run_until_end(node: Node, session: Session, beside: AbstractContextManager[
             while not (node.ended.is_set() or session.wait(_LOOK_PERIOD_S)):
                 pass
     finally:
-        # Whoever presses Ctrl-C twice must not keep the robot from being told to stand.
-        for number in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(number, signal.SIG_IGN)
-        node.stop()
+        with uninterrupted():
+            node.stop()

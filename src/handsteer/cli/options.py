@@ -1,6 +1,9 @@
 """What the verbs share: options that come from the configuration, and how to speak to people."""
 
+import signal
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -36,3 +39,14 @@ def settings(
 def say(message: str) -> None:
     """Tell people something, apart from the output."""
     print(f"handsteer: {message}", file=sys.stderr, flush=True)
+
+
+@contextmanager
+def uninterrupted() -> Iterator[None]:
+    """Ignore Ctrl-C and SIGTERM in this block: whoever presses Ctrl-C twice must not keep a robot from standing."""
+    handlers = {number: signal.signal(number, signal.SIG_IGN) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield
+    finally:
+        for number, handler in handlers.items():
+            signal.signal(number, handler)

@@ -2,17 +2,26 @@
 
 import json as json_format
 import webbrowser
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
 
-from handsteer.cli.options import ConfigFile, Flag, Parameters, say
+from handsteer.cli.options import ConfigFile, Flag, Parameters, say, uninterrupted
 from handsteer.cli.options import settings as make_settings
 from handsteer.clock import RealClock, SteppedClock
 from handsteer.config import Config
 from handsteer.errors import ConfigError
-from handsteer.graph import Graph, Summary
+from handsteer.graph import Graph, Summary, cmd_vel_topic
+from handsteer.parameters import from_parameters
+from handsteer.presets import PRESETS
+from handsteer.transports import join
+from handsteer.transports.protocol import Session
+
+_NODE = "handsteer"
 
 
 def run(
-    *,
+    *words: str,
     camera: str | None = None,
     robot: str | None = None,
     world: str | None = None,
@@ -26,14 +35,18 @@ def run(
 ) -> int:
     """Drive the robot with the signs that the camera sees.
 
-    Example: handsteer run --camera 0 --world obstacles
+    Example: handsteer run --camera 0 --robot turtlebot4
 
     Parameters
     ----------
+    words
+        For a real robot, in the words of its graph. ROS 2: --ros-args -r cmd_vel:=/base/cmd_vel -r __ns:=/r1.
+        ROS 1: cmd_vel:=/base/cmd_vel.
     camera
         auto, virtual, a webcam's index or /dev/videoN, an address (rtsp, http), a video file or a folder of photos.
     robot
-        sim, the simulated diff-drive robot.
+        sim, the simulated one. Or a real one: dds (ROS 2), zenoh or ros1, whatever listens to cmd_vel there; or, in
+        ROS 2, turtlebot3_burger, turtlebot3_waffle, turtlebot4 or turtlesim, whose topics and limits are known.
     world
         Name of a shipped world, or a YAML file.
     port
@@ -50,19 +63,63 @@ def run(
         YAML file with parameters; those given here go before it.
     """
     headless = headless or fast
-    shorthand = {"camera": {"source": camera}, "robot": {"kind": robot, "world": world}, "dashboard": {"port": port}}
-    settings = make_settings(config_file, parameters, shorthand, {"camera": {"at_end": "end"}} if headless else {})
+    shorthand = {
+        "camera": {"source": camera},
+        "robot": {**_robot(robot), "world": world},
+        "dashboard": {"port": port},
+    }
+    base = {"camera": {"at_end": "end"}} if headless else {}
+
+    def settle(service: dict[str, Any]) -> Config:
+        return make_settings(config_file, parameters, shorthand, base, service)
+
     if duration is not None and not duration > 0:
         raise ConfigError(f"--duration: {duration:g} should be greater than 0 seconds")
-    with Graph(settings, SteppedClock() if fast else RealClock()) as graph:
+    with _linked(settle, words, fast=fast) as (settings, link):
+        summary = _drive(settings, link, duration, headless=headless, fast=fast)
+    print(json_format.dumps(summary.as_dict()) if json else _summary_text(summary))
+    return 0
+
+
+def _robot(name: str | None) -> dict[str, str | None]:
+    """Return the parameters that ``--robot name`` is short for: the kind of robot, or one that is known."""
+    return {"kind": "dds", "preset": name} if name in PRESETS else {"kind": name}
+
+
+@contextmanager
+def _linked(
+    settle: Callable[[dict[str, Any]], Config], words: tuple[str, ...], *, fast: bool
+) -> Iterator[tuple[Config, Session | None]]:
+    """Join the graph of a real robot; yield the parameters, those that were given there included, and the link."""
+    settings = settle({})
+    kind = settings.robot.kind
+    if settings.control.robots:
+        raise ConfigError("control.robots is for `handsteer control`: a run drives one robot")
+    if kind == "sim":
+        if words:
+            raise ConfigError(f"{words[0]!r}: a simulated robot has no graph to take it; choose one by --robot dds")
+        yield settings, None
+        return
+    if fast:
+        raise ConfigError(f"--fast runs on simulated time, which a real robot (robot.kind {kind}) does not follow")
+    link = join(kind, _NODE, words)
+    try:
+        yield settle(from_parameters(link.parameters, "robot", link.name)), link
+    finally:
+        with uninterrupted():
+            link.close()
+
+
+def _drive(settings: Config, link: Session | None, duration: float | None, *, headless: bool, fast: bool) -> Summary:
+    with Graph(settings, SteppedClock() if fast else RealClock(), link=link) as graph:
         try:
             _run_until_end(graph, settings, duration, headless=headless, fast=fast)
         except KeyboardInterrupt:
             say("stopping: the robot is told to stand")
-        graph.stop()
-        summary = graph.summary()
-    print(json_format.dumps(summary.as_dict()) if json else _summary_text(summary))
-    return 0
+        finally:
+            with uninterrupted():
+                graph.stop()
+        return graph.summary()
 
 
 def _run_until_end(graph: Graph, settings: Config, duration: float | None, *, headless: bool, fast: bool) -> None:
@@ -76,7 +133,7 @@ def _run_until_end(graph: Graph, settings: Config, duration: float | None, *, he
     # The page's libraries take a second to load, which a headless run need not wait for.
     from handsteer.dashboard.server import Dashboard  # noqa: PLC0415
 
-    dashboard = Dashboard(graph.transport, graph.clock, graph.steering, settings.dashboard)
+    dashboard = Dashboard(graph.transport, graph.clock, graph.steering, settings.dashboard, cmd_vel_topic(settings))
     url = dashboard.start()
     try:
         graph.start()
@@ -85,21 +142,30 @@ def _run_until_end(graph: Graph, settings: Config, duration: float | None, *, he
             webbrowser.open(url)
         graph.wait(duration)
     finally:
-        graph.stop()
-        dashboard.stop()
+        with uninterrupted():
+            graph.stop()
+            dashboard.stop()
 
 
 def _summary_text(summary: Summary) -> str:
-    pose = summary.final_pose
     signs = ", ".join(f"{sign} {count}" for sign, count in sorted(summary.signs.items(), key=lambda item: -item[1]))
     lines = [
         f"ran for {summary.duration_s:.1f} s: {summary.frames} frames, {summary.fps:.1f} frames/s",
         f"signs: {signs or 'none'}",
-        f"the robot went {summary.path_length_m:.2f} m to x {pose.x:.2f} m, y {pose.y:.2f} m, yaw {pose.yaw:.2f} rad, "
-        f"with {summary.contacts} contacts",
+        _way_text(summary),
     ]
+    if summary.trouble:
+        lines.append(f"at the end, the robot {summary.trouble}")
     if summary.latency_median_ms is not None and summary.latency_p99_ms is not None:
         lines.append(
             f"capture to Twist: {summary.latency_median_ms:.1f} ms, 99 of 100 below {summary.latency_p99_ms:.1f} ms"
         )
     return "\n".join(lines)
+
+
+def _way_text(summary: Summary) -> str:
+    pose = summary.final_pose
+    if pose is None:
+        return "the robot has not said where it is"
+    way = f"the robot went {summary.path_length_m:.2f} m to x {pose.x:.2f} m, y {pose.y:.2f} m, yaw {pose.yaw:.2f} rad"
+    return way if summary.contacts is None else f"{way}, with {summary.contacts} contacts"

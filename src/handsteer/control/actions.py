@@ -5,7 +5,7 @@ from typing import Literal, get_args
 
 from handsteer.signs.vocabulary import BACKWARD, FORWARD, GO, NONE, STOP, TURN_LEFT, TURN_RIGHT, find_sign
 
-Action = Literal["forward", "backward", "turn_left", "turn_right", "stop", "go", "turbo"]
+Action = Literal["forward", "backward", "turn_left", "turn_right", "stop", "go", "turbo", "next_robot"]
 """Everything that a sign can do to the velocity."""
 
 ACTIONS: tuple[Action, ...] = get_args(Action)
@@ -20,6 +20,7 @@ EFFECTS: Mapping[Action, str] = {
     "stop": "stops",
     "go": "goes on as it does",
     "turbo": "twice as fast while shown, within the limits",
+    "next_robot": "the next robot is driven, once Stop was shown",
 }
 """What each action makes the robot do, in words."""
 

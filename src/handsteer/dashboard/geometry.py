@@ -36,11 +36,6 @@ def from_quaternion(quaternion: Quaternion) -> Rotation:
     return about_axis(axis, 2 * math.atan2(math.hypot(*axis), quaternion.w))
 
 
-def yaw_of(quaternion: Quaternion) -> float:
-    """Return the yaw in rad of a ``quaternion`` that turns about z only."""
-    return 2 * math.atan2(quaternion.z, quaternion.w)
-
-
 def css_colour(rgb: Iterable[float]) -> str:
     """Return a CSS colour for red, green and blue of 0 to 1; what is beyond is cut off."""
     return "#" + "".join(f"{round(255 * max(0.0, min(part, 1.0))):02x}" for part in rgb)

@@ -2,11 +2,10 @@
 
 from collections import deque
 from dataclasses import dataclass, replace
-from typing import cast
+from typing import Any, cast
 
 from handsteer.clock import Clock, to_seconds
 from handsteer.control.sign_control import Velocity
-from handsteer.dashboard.geometry import yaw_of
 from handsteer.dashboard.state import Observed, PageState, Report, compose, place_in_world
 from handsteer.messages import (
     CMD_VEL,
@@ -22,7 +21,11 @@ from handsteer.messages import (
     MarkerArray,
     Odometry,
     String,
+    Topic,
     Twist,
+    TwistStamped,
+    twist_in,
+    yaw_of,
 )
 from handsteer.nodes.node import Node
 from handsteer.nodes.reporters import split_reporter
@@ -61,11 +64,19 @@ class WorldState:
 class DashboardNode(Node):
     """Keeps the newest of every topic for the page.
 
+    Args:
+        transport: Carries the messages.
+        clock: The graph's clock.
+        steering: Drives when people steer on the page.
+        cmd_vel: The topic of the commands that are shown.
+
     Attributes:
         world: What the 3D view shows.
     """
 
-    def __init__(self, transport: Transport, clock: Clock, steering: SteeringNode) -> None:
+    def __init__(
+        self, transport: Transport, clock: Clock, steering: SteeringNode, cmd_vel: Topic[Any] = CMD_VEL
+    ) -> None:
         super().__init__("dashboard", transport, clock)
         self.world = WorldState()
         self._observed = Observed()
@@ -76,7 +87,7 @@ class DashboardNode(Node):
         self._steering = steering
         self._holder: tuple[str, float] | None = None
         self.subscribe(DIAGNOSTICS, self._on_diagnostics, key=_reporter)
-        self.subscribe(CMD_VEL, self._on_command)
+        self.subscribe(cmd_vel, self._on_command)
         self.subscribe(ODOM, self._on_odometry)
         self.subscribe(JOINT_STATES, self._on_joints)
         self.subscribe(WORLD_MARKERS, self._on_markers)
@@ -135,8 +146,8 @@ class DashboardNode(Node):
         if truth is not None and then:
             self._truth = (truth, then[-1])
 
-    def _on_command(self, received: Received[Twist]) -> None:
-        twist = received.message
+    def _on_command(self, received: Received[Twist | TwistStamped]) -> None:
+        twist = twist_in(received.message)
         command = Velocity(twist.linear.x, twist.angular.z)
         self._observed = replace(self._observed, command=command, command_came_s=self.clock.now())
 

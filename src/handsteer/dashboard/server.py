@@ -7,6 +7,7 @@ import socket
 import threading
 import time
 from pathlib import Path
+from typing import Any
 
 import uvicorn
 from fastapi import FastAPI
@@ -22,6 +23,7 @@ from handsteer.dashboard.page import ASSETS_PATH, ICON, PICTURE_PATH, Page
 from handsteer.dashboard.picture import PictureNode, PictureResponse
 from handsteer.dashboard.watch import WhileWatched
 from handsteer.errors import DashboardError
+from handsteer.messages import CMD_VEL, Topic
 from handsteer.nodes.steering import SteeringNode
 from handsteer.transports.protocol import Transport
 
@@ -47,14 +49,22 @@ class Dashboard:
         clock: The graph's clock.
         steering: Drives when people steer on the page.
         config: Holds the port.
+        cmd_vel: The topic of the commands that are shown.
 
     Attributes:
         node: Listens and steers for the browsers that show the page.
         pictures: Encodes the camera's picture for the browsers that show it.
     """
 
-    def __init__(self, transport: Transport, clock: Clock, steering: SteeringNode, config: DashboardConfig) -> None:
-        self.node = WhileWatched(lambda: DashboardNode(transport, clock, steering))
+    def __init__(
+        self,
+        transport: Transport,
+        clock: Clock,
+        steering: SteeringNode,
+        config: DashboardConfig,
+        cmd_vel: Topic[Any] = CMD_VEL,
+    ) -> None:
+        self.node = WhileWatched(lambda: DashboardNode(transport, clock, steering, cmd_vel))
         self.pictures = WhileWatched(lambda: PictureNode(transport, clock))
         self._port = config.port
         self._server: uvicorn.Server | None = None

@@ -149,8 +149,10 @@ def explain(reports: Mapping[str, Report]) -> tuple[Mood, str, str]:
     if control is None:
         return "waiting", "Waiting", "the node hand_sign_control does not report"
     reason = control.message.partition(": ")[2] or control.message
+    robot = reports.get("robot", _NO_REPORT)
+    if robot.level >= ERROR:
+        return "trouble", "Trouble", f"the robot {robot.message}"
     if control.number("linear_mps") or control.number("angular_radps"):
-        robot = reports.get("robot", _NO_REPORT)
         return "driving", "Driving", reason if robot.level == OK else f"{reason}, but the robot {robot.message}"
     steered = control.values.get("source") == "steering"
     mood, obstacle = ("standing", None) if steered else _why_no_sign(reports)

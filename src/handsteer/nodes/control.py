@@ -1,14 +1,21 @@
 """The node ``hand_sign_control``: signs in, one velocity command out for each."""
 
+import math
+from typing import Any
+
 from handsteer.clock import Clock
 from handsteer.config import Config, ControlConfig
+from handsteer.control.actions import action_of
 from handsteer.control.driver import Driver
-from handsteer.control.sign_control import Velocity
-from handsteer.messages import CMD_VEL, HAND_SIGN, STEERING_CMD_VEL, String, Twist, twist
+from handsteer.control.fleet import NEXT
+from handsteer.control.sign_control import ZERO, Velocity
+from handsteer.messages import CMD_VEL, HAND_SIGN, STEERING_CMD_VEL, String, Topic, Twist, command
 from handsteer.nodes.interruption import Interruption
 from handsteer.nodes.latency import LatencyLog
 from handsteer.nodes.node import OK, Node
-from handsteer.transports.protocol import Received, Transport
+from handsteer.nodes.selection import Selection
+from handsteer.signs.vocabulary import NONE
+from handsteer.transports.protocol import Publisher, Received, Transport
 
 _WATCHDOG_PERIOD_S = 0.02
 _DIAGNOSE_PERIOD_S = 0.1
@@ -17,18 +24,34 @@ _DIAGNOSE_PERIOD_S = 0.1
 class HandSignControlNode(Node):
     """Publishes one Twist a sign, one zero when signs stop, and one zero at the end, whatever ends it.
 
+    With ``config.robots`` it drives one of them at a time; see :class:`~handsteer.nodes.selection.Selection`.
+
+    Args:
+        transport: Carries the messages.
+        clock: The graph's clock.
+        config: Limits, steps and timeouts.
+        cmd_vel: The topic of the commands, of Twist or TwistStamped.
+
     Attributes:
         latency: From the capture of a frame to the Twist that it led to.
     """
 
-    def __init__(self, transport: Transport, clock: Clock, config: ControlConfig) -> None:
+    def __init__(
+        self, transport: Transport, clock: Clock, config: ControlConfig, cmd_vel: Topic[Any] = CMD_VEL
+    ) -> None:
         super().__init__("hand_sign_control", transport, clock)
         self.latency = LatencyLog()
         self._config = config
         self._driver = Driver(config)
         self._last_step_s = clock.now()
         self._interruption = Interruption(config.sign_timeout, clock.now())
-        self._cmd_vel = self.publisher(CMD_VEL)
+        self._topic = cmd_vel
+        self._last_sign = NONE
+        self._last_steering_s = -math.inf
+        self._selection = (
+            Selection(self, config.robots, cmd_vel, self._send, self._on_change) if config.robots else None
+        )
+        self._cmd_vel = self._selection.publisher if self._selection else self.publisher(cmd_vel)
         self.subscribe(STEERING_CMD_VEL, self._on_steering)
         self.subscribe(HAND_SIGN, self._on_sign)
         self.every(_WATCHDOG_PERIOD_S, self._watch)
@@ -41,9 +64,11 @@ class HandSignControlNode(Node):
         self._publish(self._driver.reconfigure(config.control))
 
     def on_stop(self) -> None:
-        """Leave the robot standing."""
+        """Leave the robot standing, and those that it left a moment ago."""
         self._driver.halt()
-        self._cmd_vel.publish(twist(0.0, 0.0))
+        self._publish(ZERO)
+        if self._selection:
+            self._selection.beat()
 
     def _on_sign(self, received: Received[String]) -> None:
         captured_s = received.captured_s
@@ -51,23 +76,56 @@ class HandSignControlNode(Node):
             return  # a stale frame is no frame: the watchdog goes on counting
         elapsed_s = self._elapsed()
         sign = None if self._interruption.distrusts(self.clock.now()) else received.message.data
-        self._publish(self._driver.step(elapsed_s, sign=sign), captured_s)
+        self._publish(self._driver.step(elapsed_s, sign=self._admitted(sign)), captured_s)
 
     def _on_steering(self, received: Received[Twist]) -> None:
         wanted = Velocity(received.message.linear.x, received.message.angular.z)
         elapsed_s = self._elapsed()
-        steering = None if self._interruption.distrusts(self.clock.now()) else wanted
+        steering = None if self._interruption.distrusts(self.clock.now()) else self._steered(wanted)
         self._publish(self._driver.step(elapsed_s, steering=steering))
 
     def _watch(self) -> None:
         self._publish(self._driver.step(self._elapsed()))
+        if self._selection:
+            self._selection.beat()
+
+    def _admitted(self, sign: str | None) -> str | None:
+        """Return the sign to follow: ``NONE`` as long as the robot that was selected waits for one that stops."""
+        if self._selection is None or sign is None:
+            return sign
+        action = action_of(sign, self._config.actions)
+        if action == "next_robot" and sign != self._last_sign:
+            self._selection.select(NEXT)
+        self._last_sign = sign
+        return sign if self._selection.fleet.let_sign_pass(stops=action == "stop") else NONE
+
+    def _steered(self, wanted: Velocity) -> Velocity:
+        """Return the steering to follow: zero as long as the robot that was selected waits for it to let go."""
+        now = self.clock.now()
+        after_pause = now - self._last_steering_s >= self._config.steering_timeout
+        self._last_steering_s = now
+        if self._selection is None:
+            return wanted
+        passes = self._selection.fleet.let_steering_pass(is_zero=wanted.is_zero, after_pause=after_pause)
+        return wanted if passes else ZERO
+
+    def _on_change(self) -> None:
+        """Start from standing with another robot."""
+        assert self._selection is not None
+        self._driver.halt()
+        self._cmd_vel = self._selection.publisher
 
     def _publish(self, velocity: Velocity | None, captured_s: float | None = None) -> None:
         if velocity is None:
             return
-        self._cmd_vel.publish(twist(velocity.linear_mps, velocity.angular_radps), captured_s)
+        self._send(self._cmd_vel, velocity, captured_s)
         if captured_s is not None:
             self.latency.add(self.clock.now() - captured_s)
+
+    def _send(self, publisher: Publisher[Any], velocity: Velocity, captured_s: float | None = None) -> None:
+        stamp, frame_id = self.clock.stamp(self.clock.now()), self._config.cmd_vel_frame_id
+        message = command(self._topic, velocity.linear_mps, velocity.angular_radps, stamp, frame_id)
+        publisher.publish(message, captured_s)
 
     def _elapsed(self) -> float:
         now = self.clock.now()
@@ -79,12 +137,20 @@ class HandSignControlNode(Node):
         velocity = self._driver.velocity
         self.diagnose(
             OK,
-            self._driver.reason,
+            self._reason,
             source=self._driver.source,
             linear_mps=f"{velocity.linear_mps:.3f}",
             angular_radps=f"{velocity.angular_radps:.3f}",
+            **({"robot": self._selection.fleet.selected} if self._selection else {}),
             **self._latencies(),
         )
+
+    @property
+    def _reason(self) -> str:
+        fleet = self._selection.fleet if self._selection else None
+        if fleet and fleet.holds_signs and self._driver.source == "signs":
+            return f"standing: {fleet.selected} was selected, and moves once Stop is shown, or no hand"
+        return self._driver.reason
 
     def _latencies(self) -> dict[str, str]:
         """Return the latency's figures; none where the transport does not carry the frame's time with a sign."""

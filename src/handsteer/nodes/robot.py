@@ -1,6 +1,8 @@
 """The node ``robot``: velocity commands in, odometry, transforms and joint states out."""
 
+import logging
 import math
+from typing import Any
 
 import numpy as np
 
@@ -24,25 +26,34 @@ from handsteer.messages import (
     Quaternion,
     String,
     TFMessage,
+    Time,
+    Topic,
     Transform,
     TransformStamped,
     Twist,
+    TwistStamped,
     TwistWithCovariance,
     Vector3,
     twist,
+    twist_in,
 )
 from handsteer.nodes.interruption import Interruption
-from handsteer.nodes.node import OK, WARN, Node
+from handsteer.nodes.node import ERROR, OK, WARN, Node
 from handsteer.nodes.world_markers import world_markers
 from handsteer.robots.diff_drive import Velocity
 from handsteer.robots.protocol import Pose2D, Robot, RobotState
 from handsteer.transports.protocol import Received, Transport
+
+log = logging.getLogger(__name__)
 
 _PERIOD_S = 0.02
 _MARKERS_PERIOD_S = 0.05
 _DIAGNOSE_PERIOD_S = 0.1
 # A machine that was busy for longer than this lets the simulated robot wait rather than leap.
 _LONGEST_STEP_S = 0.1
+# No robot goes so far within a period: it was put elsewhere, or its odometry was reset.
+_LEAP_M = 0.5
+_NO_STAMP = Time(sec=0, nanosec=0)
 
 # The diagonal that ROS's diff_drive_controller is usually configured with: x, y, z, roll, pitch, yaw.
 _COVARIANCE = np.diag([0.001, 0.001, 1e6, 1e6, 1e6, 1000.0]).reshape(-1)
@@ -56,13 +67,17 @@ class RobotNode(Node):
         clock: The graph's clock.
         robot: What is driven.
         config: Holds the names of the coordinate frames, and whether to publish ``/clock``.
+        cmd_vel: The topic of the commands, of Twist or TwistStamped.
 
     Attributes:
         state: The robot's newest state.
         path_length_m: How far it has really gone, turns in place left out.
+        was_located: Whether it has ever said where it is.
     """
 
-    def __init__(self, transport: Transport, clock: Clock, robot: Robot, config: RobotConfig) -> None:
+    def __init__(
+        self, transport: Transport, clock: Clock, robot: Robot, config: RobotConfig, cmd_vel: Topic[Any] = CMD_VEL
+    ) -> None:
         super().__init__("robot", transport, clock)
         self._robot = robot
         self._config = config
@@ -72,13 +87,15 @@ class RobotNode(Node):
         self._commanded_s = clock.now()
         self.state = robot.step(0.0)
         self.path_length_m = 0.0
+        self.was_located = self.state.located
         self._odom = self.publisher(ODOM)
         self._tf = self.publisher(TF)
         self._joint_states = self.publisher(JOINT_STATES)
         self._clock_out = self.publisher(CLOCK) if config.publish_clock else None
         self._markers = self.publisher(WORLD_MARKERS)
         self.publisher(ROBOT_DESCRIPTION).publish(String(data=robot.description))
-        self.subscribe(CMD_VEL, self._on_command)
+        self._hears_old = False
+        self.subscribe(cmd_vel, self._on_command)
         self.every(_PERIOD_S, self._step)
         self.every(_MARKERS_PERIOD_S, self._publish_markers)
         self.every(_DIAGNOSE_PERIOD_S, self._report)
@@ -88,11 +105,23 @@ class RobotNode(Node):
         self._robot.command(0.0, 0.0)
         self._robot.close()
 
-    def _on_command(self, received: Received[Twist]) -> None:
+    def _on_command(self, received: Received[Twist | TwistStamped]) -> None:
         now = self.clock.now()
         self._notice_interruption(now)
-        if not self._interruption.distrusts(now):
-            self._tell(Velocity(received.message.linear.x, received.message.angular.z))
+        if self._interruption.distrusts(now) or self._is_old(received.message, now):
+            return
+        command = twist_in(received.message)
+        self._tell(Velocity(command.linear.x, command.angular.z))
+
+    def _is_old(self, message: Twist | TwistStamped, now: float) -> bool:
+        """Return whether a stamped command is too old to be obeyed, as ROS's diff_drive_controller has it."""
+        stamp = message.header.stamp if isinstance(message, TwistStamped) else _NO_STAMP
+        age_s = 0.0 if stamp == _NO_STAMP else now - self.clock.time_of(stamp)
+        is_old = age_s > self._config.cmd_vel_timeout
+        if is_old and not self._hears_old:
+            log.warning("a command that was stamped %.1f s ago is not obeyed: do the clocks of both ends agree?", age_s)
+        self._hears_old = is_old
+        return is_old
 
     def _notice_interruption(self, now: float) -> None:
         if self._interruption.note(now):
@@ -106,16 +135,18 @@ class RobotNode(Node):
         now = self.clock.now()
         elapsed_s, self._last_step_s = now - self._last_step_s, now
         self._notice_interruption(now)
-        before = self.state.truth
+        before = self.state
         self.state = self._robot.step(min(elapsed_s, _LONGEST_STEP_S))
-        self.path_length_m += math.hypot(self.state.truth.x - before.x, self.state.truth.y - before.y)
+        self.path_length_m += _distance_m(before, self.state)
+        self.was_located |= self.state.located
         stamp = self.clock.stamp(now)
         header = Header(stamp=stamp, frame_id=self._config.odom_frame_id)
         base = self._config.base_frame_id
         if self._clock_out is not None:
             self._clock_out.publish(ClockMessage(clock=stamp))
-        self._odom.publish(_odometry(header, base, self.state))
-        self._tf.publish(TFMessage(transforms=[_transform(header, base, self.state.odometry)]))
+        if self.state.located:
+            self._odom.publish(_odometry(header, base, self.state))
+            self._tf.publish(TFMessage(transforms=[_transform(header, base, self.state.odometry)]))
         self._joint_states.publish(_joint_state(Header(stamp=stamp, frame_id=""), self.state))
 
     def _publish_markers(self) -> None:
@@ -129,18 +160,26 @@ class RobotNode(Node):
         self.diagnose(
             level,
             message,
-            collisions=state.collisions,
+            **({} if state.collisions is None else {"collisions": state.collisions}),
             path_length_m=f"{self.path_length_m:.2f}",
             truth=f"{state.truth.x:.3f} {state.truth.y:.3f} {state.truth.yaw:.3f}",
         )
 
     def _condition(self) -> tuple[int, str]:
         silence_s = self.clock.now() - self._commanded_s
+        if self.state.trouble:
+            return ERROR, self.state.trouble
         if self.state.contacts:
             return WARN, f"touches {', '.join(self.state.contacts)}"
         if silence_s > self._config.cmd_vel_timeout and self._command != Velocity():
             return WARN, f"standing: no command for {silence_s:.1f} s, and the last one was to drive"
         return OK, "moves freely"
+
+
+def _distance_m(before: RobotState, after: RobotState) -> float:
+    """Return how far the robot has gone; 0 where it was not seen, or was put elsewhere."""
+    distance_m = math.hypot(after.truth.x - before.truth.x, after.truth.y - before.truth.y)
+    return distance_m if before.located and after.located and distance_m < _LEAP_M else 0.0
 
 
 def _odometry(header: Header, base: str, state: RobotState) -> Odometry:

@@ -1,25 +1,35 @@
 """What is driven: a simulated robot, or one behind a topic."""
 
-from collections.abc import Callable
+from typing import Any
 
 from handsteer.config import RobotConfig
+from handsteer.errors import ConfigError
+from handsteer.messages import CMD_VEL, Topic
 from handsteer.robots.protocol import Robot
+from handsteer.robots.remote import RemoteRobot
+from handsteer.transports.protocol import Session
 
 
-def open_robot(config: RobotConfig) -> Robot:
+def open_robot(
+    config: RobotConfig, link: Session | None = None, cmd_vel: Topic[Any] = CMD_VEL, frame_id: str = "base_link"
+) -> Robot:
     """Return the robot that ``config.kind`` names.
 
+    Args:
+        config: Says which.
+        link: This process in the graph of a real robot; not needed by a simulated one.
+        cmd_vel: Carries what a real robot takes, Twist or TwistStamped.
+        frame_id: Coordinate frame of a TwistStamped.
+
     Raises:
+        ConfigError: It is a real robot, and there is no link to it.
         WorldError: The world of a simulated robot cannot be used.
     """
-    return _KINDS[config.kind](config)
-
-
-def _simulated(config: RobotConfig) -> Robot:
+    if config.kind != "sim":
+        if link is None:
+            raise ConfigError(f"robot.kind is {config.kind}: only `handsteer run` drives a real robot; here it is sim")
+        return RemoteRobot(config, cmd_vel, frame_id, link)
     # MuJoCo is loaded only when it is used.
     from handsteer.robots.simulated import SimulatedRobot  # noqa: PLC0415
 
     return SimulatedRobot(config)
-
-
-_KINDS: dict[str, Callable[[RobotConfig], Robot]] = {"sim": _simulated}

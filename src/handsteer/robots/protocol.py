@@ -28,7 +28,9 @@ class RobotState:
         joint_velocities: Wheel speeds in rad/s, by joint name.
         truth: Where it really is, in the world.
         contacts: Names of the obstacles that it touches now.
-        collisions: How many times it has begun to touch an obstacle since the start.
+        collisions: How many times it has begun to touch an obstacle since the start; None where nobody can tell.
+        located: Whether ``odometry`` and ``truth`` are those of now; otherwise they are the last that were known.
+        trouble: What is wrong, as ``is not there: …``, to be read after "the robot"; empty when nothing is.
     """
 
     time_s: float
@@ -39,7 +41,9 @@ class RobotState:
     joint_velocities: dict[str, float]
     truth: Pose2D
     contacts: tuple[str, ...]
-    collisions: int
+    collisions: int | None
+    located: bool = True
+    trouble: str = ""
 
 
 @dataclass(frozen=True)

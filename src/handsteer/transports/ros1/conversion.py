@@ -13,6 +13,8 @@ from rosbags.interfaces import Nodetype
 from rosbags.typesys.stores import ros2_jazzy
 
 from handsteer.errors import TransportError
+from handsteer.messages import TurtlePose
+from handsteer.transports.ros2.encoding import types
 
 _TIMES = ("builtin_interfaces/msg/Time", "builtin_interfaces/msg/Duration")
 _BYTES = ("uint8", "byte", "char", "octet")
@@ -64,7 +66,7 @@ def _writer(name: str) -> Convert:
 
 @functools.cache
 def _reader(name: str) -> Convert:
-    here, there = getattr(ros2_jazzy, name.replace("/", "__")), ros1_type(name)
+    here, there = _ours(name), ros1_type(name)
     steps = [(field, _read_as(kind)) for field, kind in _fields(name) if field in there.__slots__]
     absent = [(field, kind) for field, kind in _fields(name) if field not in there.__slots__]
 
@@ -76,7 +78,11 @@ def _reader(name: str) -> Convert:
 
 
 def _fields(name: str) -> list[tuple[str, Any]]:
-    return list(ros2_jazzy.FIELDDEFS[name][1])
+    return list(types().fielddefs[name][1])
+
+
+def _ours(name: str) -> Any:
+    return TurtlePose if name == TurtlePose.__msgtype__ else getattr(ros2_jazzy, name.replace("/", "__"))
 
 
 def _write_as(kind: Any) -> Convert:
@@ -111,7 +117,7 @@ def _default(kind: Any) -> Any:
     if node == Nodetype.BASE:
         return _EMPTY.get(what[0], 0)
     if node == Nodetype.NAME:
-        here = getattr(ros2_jazzy, what.replace("/", "__"))
+        here = _ours(what)
         return here(**{field: _default(of) for field, of in _fields(what)})
     element, length = what
     if element[0] == Nodetype.NAME or element[1][0] == "string":
@@ -126,7 +132,7 @@ def _write_time(name: str) -> Convert:
 
 
 def _read_time(name: str) -> Convert:
-    here = getattr(ros2_jazzy, name.replace("/", "__"))
+    here = _ours(name)
     return lambda theirs: here(sec=theirs.secs, nanosec=theirs.nsecs)
 
 

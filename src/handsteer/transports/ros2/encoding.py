@@ -1,13 +1,17 @@
 """Messages as ROS 2 has them on the wire: CDR with its header of four bytes, and the names and hashes of types."""
 
+import dataclasses
 import functools
 from typing import Any
 
+from rosbags.interfaces import Nodetype
 from rosbags.typesys import Stores, get_typestore
 from rosbags.typesys.store import Typestore
 
+from handsteer.messages import TurtlePose
 from handsteer.transports.ros2.service_types import register_services
 
+_FLOAT32: Any = (Nodetype.BASE, ("float32", 0))
 _DISCOVERY = "rmw_dds_common/msg/ParticipantEntitiesInfo"
 # The hash leaves out what rosbags cannot tell: that ROS 2 makes a uint8 of a char.
 _KNOWN_HASHES = {_DISCOVERY: "RIHS01_91a0593bacdcc50ea9bdcf849a938b128412cc1ea821245c663bcd26f83c295e"}
@@ -19,10 +23,10 @@ def types(distribution: str = "jazzy") -> Typestore:
 
     The types of the parameter services are with ``jazzy``, and are the same in both.
     """
-    if distribution == "humble":
-        return get_typestore(Stores.ROS2_HUMBLE)
-    store = get_typestore(Stores.ROS2_JAZZY)
-    register_services(store)
+    store = get_typestore(Stores.ROS2_HUMBLE if distribution == "humble" else Stores.ROS2_JAZZY)
+    store.register({TurtlePose.__msgtype__: ([], [(part.name, _FLOAT32) for part in dataclasses.fields(TurtlePose)])})
+    if distribution != "humble":
+        register_services(store)
     return store
 
 

@@ -1,0 +1,104 @@
+"""How many simulated robots a core carries: N processes in N namespaces over DDS, each at 50 Hz.
+
+Run ``python benchmarks/robots.py`` with cyclonedds installed. Each robot is driven by a command 30 times a second, and
+its odometry is received, as it would be. ``in time`` says how many of the 50 odometry messages a second came: robots
+that a core cannot carry fall behind.
+"""
+
+import argparse
+import os
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # for the domains that the tests use
+
+from tests.dds.graph import free_domain
+
+from handsteer.messages import CMD_VEL, ODOM, twist
+from handsteer.transports import join
+
+_TICKS_PER_S = os.sysconf("SC_CLK_TCK")
+_ODOMETRY_HZ = 50
+_COMMAND_PERIOD_S = 1 / 30
+_START_TIMEOUT_S = 180.0
+
+
+def cpu_s(process: subprocess.Popen[bytes]) -> float:
+    """Return the CPU seconds of ``process`` so far."""
+    fields = Path(f"/proc/{process.pid}/stat").read_text().rpartition(") ")[2].split()
+    return (int(fields[11]) + int(fields[12])) / _TICKS_PER_S
+
+
+def memory_mb(process: subprocess.Popen[bytes]) -> float:
+    """Return the resident memory of ``process`` in MB, libraries that it shares with others included."""
+    pages = int(Path(f"/proc/{process.pid}/statm").read_text().split()[1])
+    return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
+
+
+def measure(count: int, seconds: float) -> tuple[float, float, float]:
+    """Return CPU seconds a second and MB of one robot, and the share of its odometry that came, with ``count``."""
+    os.environ["ROS_DOMAIN_ID"] = str(free_domain())
+    names = [f"/r{number}" for number in range(1, count + 1)]
+    session = join("dds", "benchmark", [])
+    commands = [session.transport.advertise("benchmark", replace(CMD_VEL, name=name + CMD_VEL.name)) for name in names]
+    came = dict.fromkeys(names, 0)
+
+    def note(name: str) -> None:
+        came[name] += 1
+
+    for name in names:
+        topic = replace(ODOM, name=name + ODOM.name)
+        session.transport.subscribe("benchmark", topic, lambda _, name=name: note(name))
+    program = [sys.executable, "-m", "handsteer", "robot", "--transport", "dds", "--ros-args", "-r"]
+    robots = [subprocess.Popen([*program, f"__ns:={name}"]) for name in names]
+    try:
+        _wait_until(lambda: all(came.values()))
+        _drive(commands, 2.0)
+        before, first = [cpu_s(robot) for robot in robots], dict(came)
+        took_s = _drive(commands, seconds)
+        used = sum(cpu_s(robot) for robot in robots) - sum(before)
+        share = sum(came[name] - first[name] for name in names) / (count * took_s * _ODOMETRY_HZ)
+        return used / took_s / count, memory_mb(robots[0]), share
+    finally:
+        for robot in robots:
+            robot.terminate()
+        for robot in robots:
+            robot.wait()
+        session.close()
+
+
+def _wait_until(condition) -> None:  # type: ignore[no-untyped-def]
+    deadline_s = time.monotonic() + _START_TIMEOUT_S
+    while not condition():
+        if time.monotonic() > deadline_s:
+            sys.exit("not all robots have started")
+        time.sleep(0.05)
+
+
+def _drive(commands: list, seconds: float) -> float:  # type: ignore[type-arg]
+    """Drive all robots in circles for ``seconds``; return how long it took."""
+    began_s = time.monotonic()
+    while (passed_s := time.monotonic() - began_s) < seconds:
+        for command in commands:
+            command.publish(twist(0.1, 0.5))
+        time.sleep(_COMMAND_PERIOD_S)
+    return passed_s
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--counts", type=int, nargs="+", default=[1, 2, 4, 8])
+    parser.add_argument("--seconds", type=float, default=10.0)
+    arguments = parser.parse_args()
+    print(f"Robots at {_ODOMETRY_HZ} Hz over DDS, {os.cpu_count()} cores; load {os.getloadavg()[0]:.1f} before")
+    print(f"{'robots':>6} {'% of a core each':>17} {'robots a core':>14} {'MB each':>8} {'in time':>8}")
+    for count in arguments.counts:
+        each, memory, share = measure(count, arguments.seconds)
+        print(f"{count:>6} {100 * each:>17.1f} {1 / each:>14.1f} {memory:>8.0f} {100 * share:>7.0f}%")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,1 @@
+"""handsteer's nodes as executables of ROS 2."""

@@ -1,0 +1,76 @@
+"""Sends velocity commands to the one of several robots that is driven, and zeros to those that were."""
+
+import logging
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+from handsteer.control.fleet import Fleet
+from handsteer.control.sign_control import ZERO, Velocity
+from handsteer.messages import SELECT_ROBOT, SELECTED_ROBOT, String, Topic
+from handsteer.nodes.node import Node
+from handsteer.transports.protocol import Publisher, Received
+
+log = logging.getLogger(__name__)
+
+_LAST_ZEROS = 10
+
+Send = Callable[[Publisher[Any], Velocity], None]
+
+
+class Selection:
+    """The robots that one control drives in turn.
+
+    A name on ``/select_robot`` selects one, ``next`` the one after; ``/selected_robot`` tells, to late subscribers too.
+
+    Args:
+        node: The control.
+        names: The robots' namespaces, in their order.
+        cmd_vel: The topic of commands within each.
+        send: Publishes a velocity.
+        on_change: Is called when another robot was selected, before anything is sent to it.
+    """
+
+    def __init__(
+        self, node: Node, names: tuple[str, ...], cmd_vel: Topic[Any], send: Send, on_change: Callable[[], None]
+    ) -> None:
+        self.fleet = Fleet(names)
+        self._publishers: dict[str, Publisher[Any]] = {
+            name: node.publisher(replace(cmd_vel, name=f"/{name}{cmd_vel.name}")) for name in names
+        }
+        self._send = send
+        self._on_change = on_change
+        self._left: dict[str, int] = {}
+        self._selected = node.publisher(SELECTED_ROBOT)
+        self._selected.publish(String(data=self.fleet.selected))
+        node.subscribe(SELECT_ROBOT, self._on_select)
+
+    @property
+    def publisher(self) -> Publisher[Any]:
+        """Where commands to the robot that is driven go."""
+        return self._publishers[self.fleet.selected]
+
+    def select(self, name: str) -> None:
+        """Drive the robot ``name`` (or ``next``); the old one gets a zero first, and some more with the next beats."""
+        before = self.fleet.selected
+        if not self.fleet.select(name):
+            return
+        self._left[before] = _LAST_ZEROS
+        self._left.pop(self.fleet.selected, None)
+        self.beat()
+        self._on_change()
+        self._selected.publish(String(data=self.fleet.selected))
+
+    def beat(self) -> None:
+        """Send a zero to each robot that was left a moment ago."""
+        for name in list(self._left):
+            self._send(self._publishers[name], ZERO)
+            self._left[name] -= 1
+            if not self._left[name]:
+                del self._left[name]
+
+    def _on_select(self, received: Received[String]) -> None:
+        name = received.message.data.strip()
+        self.select(name)
+        if name != self.fleet.selected and name not in (*self.fleet.names, "next"):
+            log.warning("there is no robot %r to select; there are %s", name, ", ".join(self.fleet.names))

@@ -1,0 +1,53 @@
+"""What is known of real robots: topics, types, limits. Each preset goes before the defaults, and after all else.
+
+Sources, by robot:
+
+* TurtleBot 3: ``turtlebot3_teleop`` (highest speeds of each model), ``turtlebot3_node`` (``cmd_vel``, ``odom``; stamped
+  from Jazzy on), ``turtlebot3_navigation2`` (accelerations of 2.5 m/s² and 3.2 rad/s²).
+* TurtleBot 4: the documentation of Create 3, its base (0.306 m/s and 0.9 m/s² while its safety features are on), and
+  ``turtlebot4_navigation`` (1.9 rad/s; stamped from Jazzy on).
+* turtlesim: ``turtlesim/src/turtle.cpp`` (it stops a second after the last command), ``turtle_teleop_key`` (2 m/s and
+  2 rad/s). Its field is 11 of its metres wide.
+* generic: the speeds of ``teleop_twist_keyboard``.
+"""
+
+from typing import Any, Literal, get_args
+
+Preset = Literal["generic", "turtlebot3_burger", "turtlebot3_waffle", "turtlebot4", "turtlesim"]
+PRESETS: tuple[Preset, ...] = get_args(Preset)
+
+# The distributions before TwistStamped became what these robots listen to.
+_BARE_TWIST = ("noetic", "foxy", "galactic", "humble", "iron")
+
+
+def _preset(
+    linear_mps: float, angular_radps: float, linear_mps2: float, angular_radps2: float, **robot: Any
+) -> dict[str, Any]:
+    """Return a preset: the highest speeds of control and robot, and the robot's highest accelerations."""
+    speeds = {"max_linear": linear_mps, "max_angular": angular_radps}
+    accelerations = {"max_linear_acceleration": linear_mps2, "max_angular_acceleration": angular_radps2}
+    return {"control": speeds, "robot": {**speeds, **accelerations, **robot}}
+
+
+_TURTLESIM = {"cmd_vel_topic": "turtle1/cmd_vel", "odom_topic": "turtle1/pose", "odom_type": "turtlesim_pose"}
+_KNOWN: dict[str, dict[str, Any]] = {
+    "generic": _preset(0.5, 1.0, 0.5, 2.0),
+    "turtlebot3_burger": _preset(0.22, 2.84, 2.5, 3.2, cmd_vel_type="twist_stamped"),
+    "turtlebot3_waffle": _preset(0.26, 1.82, 2.5, 3.2, cmd_vel_type="twist_stamped"),
+    "turtlebot4": _preset(0.306, 1.9, 0.9, 3.0, cmd_vel_type="twist_stamped"),
+    "turtlesim": _preset(2.0, 2.0, 2.0, 4.0, **_TURTLESIM),
+}
+
+
+def preset(name: object, distribution: str = "") -> dict[str, Any]:
+    """Return what is known of the robot of this name, nested as in :class:`~handsteer.config.Config`.
+
+    Args:
+        name: One of :data:`PRESETS`; anything else gives nothing, and is refused where values are checked.
+        distribution: The ROS distribution, as ``ROS_DISTRO`` names it: up to Iron, and in ROS 1, robots take Twist.
+    """
+    known = _KNOWN.get(name, {}) if isinstance(name, str) else {}
+    robot = dict(known.get("robot", {}))
+    if distribution in _BARE_TWIST:
+        robot.pop("cmd_vel_type", None)
+    return {**known, "robot": robot} if known else {}

@@ -1,0 +1,101 @@
+"""What a robot behind a topic is told, worked out from the commands that come: no topic, no clock."""
+
+import math
+
+from handsteer.config import RobotConfig
+from handsteer.robots.diff_drive import Velocity
+
+ZERO = Velocity()
+
+_LAST_ZEROS = 10
+"""How many zeros follow the last command: one may be lost, and a publisher keeps ten messages for its subscribers."""
+
+_SLACK_S = 1e-9
+
+
+class Relay:
+    """Passes commands on to a robot, within its limits, and only as long as they come.
+
+    * A command goes out at once, and again ``command_rate`` times a second, so that the robot's own watchdog, which
+      stops it when it hears nothing, is content. After ``cmd_vel_timeout`` without a new one come a few zeros, then
+      nothing, so that others can drive.
+    * Speeds are clamped, and grow no faster than the robot's accelerations. Slower, and to zero, it goes at once: how
+      hard to brake, the robot knows best.
+    * Nothing but zeros is passed on after the link to the robot was cut, until the link is there *and* a zero was
+      asked for: no robot drives off because it can hear again.
+
+    Attributes:
+        velocity: What was passed on last.
+        holds: Whether it waits for a zero before it lets the robot move.
+    """
+
+    def __init__(self, config: RobotConfig) -> None:
+        self._config = config
+        self._wanted = ZERO
+        self._age_s = math.inf
+        self._since_sent_s = math.inf
+        self._zeros_left = 0
+        self._linked = False
+        self.velocity = ZERO
+        self.holds = True
+
+    @property
+    def waits(self) -> bool:
+        """Whether it is asked to move, and does not let the robot."""
+        return self._linked and self.holds and self._wanted != ZERO and self._is_fresh
+
+    @property
+    def _is_fresh(self) -> bool:
+        return self._age_s < self._config.cmd_vel_timeout - _SLACK_S
+
+    def command(self, wanted: Velocity) -> Velocity | None:
+        """Take a command; return what to send now, or None. One that is not finite counts as zero."""
+        is_finite = math.isfinite(wanted.linear_mps) and math.isfinite(wanted.angular_radps)
+        self._wanted = wanted if is_finite else ZERO
+        self._age_s = 0.0
+        self._zeros_left = _LAST_ZEROS
+        if self._linked and self._wanted == ZERO:
+            self.holds = False
+        return self._advance(0.0)
+
+    def step(self, dt_s: float, *, linked: bool) -> Velocity | None:
+        """Let ``dt_s`` seconds pass; return what to send now, or None.
+
+        Args:
+            dt_s: Seconds since the last step, >= 0.
+            linked: Whether the robot can hear, as far as can be told.
+        """
+        self._age_s += dt_s
+        self._since_sent_s += dt_s
+        self._linked = linked
+        self.holds = self.holds or not linked
+        return self._advance(dt_s)
+
+    def _advance(self, dt_s: float) -> Velocity | None:
+        config, now = self._config, self.velocity
+        wanted = self._wanted if self._is_fresh and not self.holds else ZERO
+        self.velocity = Velocity(
+            _approach(wanted.linear_mps, now.linear_mps, config.max_linear, config.max_linear_acceleration * dt_s),
+            _approach(
+                wanted.angular_radps, now.angular_radps, config.max_angular, config.max_angular_acceleration * dt_s
+            ),
+        )
+        is_due = self._since_sent_s >= 1 / config.command_rate - _SLACK_S
+        if not (is_due or self.velocity != now):
+            return None
+        if not self._is_fresh:
+            if not self._zeros_left:
+                return None
+            self._zeros_left -= 1
+        self._since_sent_s = 0.0
+        return self.velocity
+
+
+def _approach(wanted: float, now: float, highest: float, growth: float) -> float:
+    """Return the value nearest to ``wanted`` within ``highest`` whose amount is at most ``growth`` above that of now.
+
+    What is to turn round stands first.
+    """
+    same_way = now if now * wanted > 0 else 0.0
+    limit = min(highest, abs(same_way) + growth)
+    return math.copysign(min(abs(wanted), limit), wanted) if wanted else 0.0

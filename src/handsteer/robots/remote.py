@@ -1,0 +1,180 @@
+"""A robot behind a topic: commands go out, its odometry comes back."""
+
+import logging
+import math
+import time
+from dataclasses import dataclass
+from typing import Any
+
+from handsteer.config import RobotConfig
+from handsteer.messages import CMD_VEL, Odometry, Topic, TurtlePose, command, type_name, yaw_of
+from handsteer.robots.description import robot_description
+from handsteer.robots.diff_drive import Velocity
+from handsteer.robots.protocol import Obstacle, Pose2D, RobotState
+from handsteer.robots.relay import ZERO, Relay
+from handsteer.transports.protocol import Received, Session
+
+log = logging.getLogger(__name__)
+
+_NODE = "robot"
+# Discovery takes a tenth of a second on one machine, and up to a second or two over a network.
+_LOOK_FOR_IT_S = 2.0
+_LOOK_AGAIN_S = 0.02
+_ZEROS_AT_THE_END = 5
+_BETWEEN_ZEROS_S = 0.02
+_ODOMETRY_DUE_S = 3.0
+_ADVICE = {
+    "dds": "is its ROS_DOMAIN_ID the same, and, if it is another machine, ROS_AUTOMATIC_DISCOVERY_RANGE=SUBNET set?",
+    "zenoh": "is it connected to the same Zenoh router?",
+    "ros1": "is its ROS_MASTER_URI the same?",
+}
+
+
+@dataclass(frozen=True)
+class _Seen:
+    """What the robot last said of itself, and when, in seconds of the machine's monotonic clock."""
+
+    pose: Pose2D
+    velocity: Velocity
+    at_s: float
+
+
+class RemoteRobot:
+    """A :class:`~handsteer.robots.protocol.Robot` that listens to a topic in another process.
+
+    What it is told is worked out by :class:`~handsteer.robots.relay.Relay`. Where it is, it says itself: its odometry
+    counts as the truth, and nothing is known of what it touches.
+
+    Args:
+        config: Topics, types, limits and timeouts.
+        cmd_vel: Carries what the robot takes, Twist or TwistStamped.
+        frame_id: Coordinate frame of a TwistStamped.
+        session: This process in the robot's graph; the caller closes it, which delivers the last zeros.
+
+    Attributes:
+        description: The URDF of the robot that stands for it in pictures.
+    """
+
+    def __init__(self, config: RobotConfig, cmd_vel: Topic[Any], frame_id: str, session: Session) -> None:
+        self.description = robot_description()
+        self._config = config
+        self._frame_id = frame_id
+        self._session = session
+        self._relay = Relay(config)
+        self._topic: Topic[Any] = _topic(config.cmd_vel_topic, cmd_vel.type, CMD_VEL.depth)
+        self._odom_topic = _full_name(session, config.odom_topic)
+        self._seen: _Seen | None = None
+        self._senseless = False
+        self._linked_s = 0.0
+        self._time_s = 0.0
+        self._closed = False
+        transport = session.transport
+        self._cmd_vel = transport.advertise(_NODE, self._topic)
+        if config.odom_topic:
+            kind = TurtlePose if config.odom_type == "turtlesim_pose" else Odometry
+            transport.subscribe(_NODE, _topic(config.odom_topic, kind, 1), self._on_odometry)
+        self._look_for_it()
+
+    def command(self, linear_mps: float, angular_radps: float) -> None:
+        """Ask for a velocity in m/s and rad/s; a slower one is passed on at once, a faster one with the next steps."""
+        self._send(self._relay.command(Velocity(linear_mps, angular_radps)))
+
+    def step(self, dt_s: float) -> RobotState:
+        """Let ``dt_s`` seconds pass, pass on what is due, and return what the robot last said of itself."""
+        self._time_s += dt_s
+        listens = self._cmd_vel.wanted
+        self._linked_s = self._linked_s + dt_s if listens else 0.0
+        seen = self._seen
+        is_silent = seen is not None and time.monotonic() - seen.at_s > self._config.odom_timeout
+        self._send(self._relay.step(dt_s, linked=listens and not is_silent))
+        pose, velocity = (seen.pose, seen.velocity) if seen else (Pose2D(0.0, 0.0, 0.0), ZERO)
+        return RobotState(
+            time_s=self._time_s,
+            odometry=pose,
+            linear_mps=0.0 if is_silent else velocity.linear_mps,
+            angular_radps=0.0 if is_silent else velocity.angular_radps,
+            joint_positions={},
+            joint_velocities={},
+            truth=pose,
+            contacts=(),
+            collisions=None,
+            located=seen is not None and not is_silent,
+            trouble=self._trouble(listens=listens, is_silent=is_silent),
+        )
+
+    def obstacles(self) -> list[Obstacle]:
+        """Return an empty list: nothing is known of them."""
+        return []
+
+    def reset(self) -> None:
+        """Let it stand where it is; a real robot cannot be put back."""
+        self.command(0.0, 0.0)
+
+    def close(self) -> None:
+        """Tell it to stand, several times; may be called twice."""
+        if self._closed:
+            return
+        self._closed = True
+        for _ in range(_ZEROS_AT_THE_END):
+            self._send(ZERO)
+            time.sleep(_BETWEEN_ZEROS_S)
+
+    def _look_for_it(self) -> None:
+        deadline_s = time.monotonic() + _LOOK_FOR_IT_S
+        while not self._cmd_vel.wanted and time.monotonic() < deadline_s:
+            time.sleep(_LOOK_AGAIN_S)
+        if not self._cmd_vel.wanted:
+            log.warning("the robot is not there: %s", self._nobody_listens())
+
+    def _send(self, velocity: Velocity | None) -> None:
+        if velocity is not None:
+            clock = self._session.clock
+            stamp, (linear, angular) = clock.stamp(clock.now()), _numbers(velocity)
+            self._cmd_vel.publish(command(self._topic, linear, angular, stamp, self._frame_id))
+
+    def _on_odometry(self, received: Received[Any]) -> None:
+        message = received.message
+        seen = _of_turtle(message) if self._config.odom_type == "turtlesim_pose" else _of_odometry(message)
+        pose = seen.pose
+        self._senseless = not all(map(math.isfinite, (pose.x, pose.y, pose.yaw, *_numbers(seen.velocity))))
+        if not self._senseless:
+            self._seen = seen
+
+    def _trouble(self, *, listens: bool, is_silent: bool) -> str:
+        if not listens:
+            return f"is not there: {self._nobody_listens()}"
+        if self._senseless:
+            return f"sends odometry on {self._odom_topic} that is no number; it is not used"
+        if is_silent:
+            return f"is silent: {self._odom_topic} has stopped, and the robot is told to stand"
+        if self._seen is None and self._config.odom_topic and self._linked_s > _ODOMETRY_DUE_S:
+            return f"does not say where it is: nothing comes on {self._odom_topic} (robot.odom_topic)"
+        return "waits until Stop is shown, or no hand" if self._relay.waits else ""
+
+    def _nobody_listens(self) -> str:
+        name, kind = _full_name(self._session, self._config.cmd_vel_topic), type_name(self._topic.type)
+        return f"nobody listens on {name} for {kind}; is it on, are topic and type right, {_ADVICE[self._config.kind]}"
+
+
+def _topic(name: str, kind: type[Any], depth: int) -> Topic[Any]:
+    """Return the topic of this ROS name: with a slash in front it stays as it is, whatever the node's namespace."""
+    return Topic(f"/{name.removeprefix('/')}", kind, is_global=name.startswith("/"), depth=depth)
+
+
+def _full_name(session: Session, name: str) -> str:
+    return name if name.startswith("/") else f"{session.name.rpartition('/')[0]}/{name}"
+
+
+def _of_odometry(message: Odometry) -> _Seen:
+    at, turned = message.pose.pose.position, message.pose.pose.orientation
+    moving = message.twist.twist
+    return _Seen(Pose2D(at.x, at.y, yaw_of(turned)), Velocity(moving.linear.x, moving.angular.z), time.monotonic())
+
+
+def _of_turtle(message: TurtlePose) -> _Seen:
+    velocity = Velocity(message.linear_velocity, message.angular_velocity)
+    return _Seen(Pose2D(message.x, message.y, message.theta), velocity, time.monotonic())
+
+
+def _numbers(velocity: Velocity) -> tuple[float, float]:
+    return velocity.linear_mps, velocity.angular_radps

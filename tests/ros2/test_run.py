@@ -1,0 +1,48 @@
+"""``handsteer run --robot turtlebot4`` drives a node of a real ROS 2 that stands for the robot."""
+
+import json
+import signal
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from tests.processes import eventually
+from tests.ros2.graph import PYTHON, Ros2Graph, ros2_graph
+
+pytest.importorskip("cyclonedds")
+pytestmark = [
+    pytest.mark.ros2,
+    pytest.mark.slow,
+    pytest.mark.skipif(not PYTHON.exists(), reason="no ROS 2 here: make ros2 installs one for the tests"),
+]
+
+CAMERA = ("--headless", "--json", "--camera", "virtual", "--camera.width", "320", "--camera.height", "240")
+FIELDS = ["twist.linear.x", "header.stamp", "header.frame_id"]
+
+
+@pytest.fixture
+def ros2(tmp_path: Path) -> Iterator[Ros2Graph]:
+    with ros2_graph(tmp_path) as graph:
+        yield graph
+
+
+def test_a_robot_of_a_real_ros2_is_driven(ros2: Ros2Graph) -> None:
+    peer = ros2.peer
+    peer.ask("record", topic="/cmd_vel", type="TwistStamped", fields=FIELDS)
+    peer.ask("advertise", topic="/odom", type="Odometry", depth=5)
+    words = ("--virtual-hand.script", "Forward:60", "--control.max-linear", "0.1", "--robot.odom-timeout", "10")
+    process = ros2.handsteer("run", *CAMERA, "--robot", "turtlebot4", *words)
+    eventually(lambda: peer.ask("listeners", topic="/odom") or not process.running)
+    assert process.running, process.text
+    peer.ask("publish", topic="/odom", values={"pose.pose.position.x": 1.5}, count=20, period_s=0.05)
+    eventually(lambda: peer.ask("get", topic="/cmd_vel")[-1:] and peer.ask("get", topic="/cmd_vel")[-1][1][0] == 0.1)
+    _, (_, stamp_s, frame) = peer.ask("get", topic="/cmd_vel")[-1]
+    assert abs(stamp_s - time.time()) < 5.0
+    assert frame == "base_link"
+    process.signal(signal.SIGTERM)
+    assert process.code() == 0, process.text
+    summary = json.loads(next(line for line in process.text.splitlines() if line.startswith("{")))
+    assert summary["final_pose"] == {"x": 1.5, "y": 0.0, "yaw": 0.0}
+    eventually(lambda: [speed for _, (speed, *_) in peer.ask("get", topic="/cmd_vel")][-3:] == [0.0] * 3, 5.0)

@@ -1,0 +1,118 @@
+"""The ROS 2 package: what it installs, what its launch files start, and its executables with the words of a launch."""
+
+import ast
+import os
+import subprocess
+import sys
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+import yaml
+
+from handsteer.parameters import from_parameters
+from handsteer.transports.ros2.arguments import parse_arguments
+
+PACKAGE = Path(__file__).resolve().parents[2] / "ros" / "handsteer_ros2"
+SECTIONS = {
+    "my_camera": "camera",
+    "hand_sign_recognition": "signs",
+    "hand_sign_control": "control",
+    "robot": "robot",
+}
+LAUNCHES = sorted((PACKAGE / "launch").glob("*.launch.py"))
+
+
+def strings(path: Path, keyword: str) -> set[str]:
+    """Return what ``path`` gives for ``keyword`` as plain strings."""
+    calls = [node for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, ast.Call)]
+    return {
+        argument.value.value
+        for call in calls
+        for argument in call.keywords
+        if argument.arg == keyword and isinstance(argument.value, ast.Constant)
+    }
+
+
+def executables() -> set[str]:
+    tree = ast.parse((PACKAGE / "handsteer_ros2" / "nodes.py").read_text())
+    return {node.name for node in tree.body if isinstance(node, ast.FunctionDef) and not node.name.startswith("_")}
+
+
+def test_the_manifest_names_the_package_and_how_it_is_built() -> None:
+    manifest = ElementTree.parse(PACKAGE / "package.xml").getroot()
+    assert manifest.findtext("name") == PACKAGE.name
+    assert manifest.findtext("export/build_type") == "ament_python"
+    assert (PACKAGE / "resource" / PACKAGE.name).exists()
+
+
+def test_there_is_an_executable_for_each_node() -> None:
+    assert executables() == {"camera", "recognition", "control", "robot", "steering"}
+
+
+@pytest.mark.parametrize("launch", LAUNCHES, ids=lambda path: path.name)
+def test_a_launch_file_starts_executables_that_are_there(launch: Path) -> None:
+    namespace: dict[str, object] = {}
+    constants = [node for node in ast.parse(launch.read_text()).body if isinstance(node, ast.Assign)]
+    for constant in constants:
+        if isinstance(constant.value, (ast.Dict, ast.Constant)):
+            exec(compile(ast.Module([constant], []), str(launch), "exec"), namespace)
+    verbs = strings(launch, "executable") | set(namespace.get("NODES", {}))  # type: ignore[call-overload]
+    assert verbs
+    assert verbs <= executables()
+    assert namespace["PACKAGE"] == PACKAGE.name
+    assert (PACKAGE / "config" / launch.name.replace(".launch.py", ".yaml")).exists()
+
+
+@pytest.mark.parametrize("file", sorted((PACKAGE / "config").glob("*.yaml")), ids=lambda path: path.name)
+def test_every_parameter_of_the_files_is_one_of_the_nodes(file: Path) -> None:
+    said = parse_arguments(["--ros-args", "--params-file", str(file)])
+    for pattern in yaml.safe_load(file.read_text()):
+        node = pattern.rpartition("/")[2]
+        parameters = said.parameters(f"/r1/{node}")
+        assert parameters
+        from_parameters(parameters, SECTIONS[node], node)
+
+
+@pytest.fixture(scope="module")
+def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    pytest.importorskip("setuptools")
+    home = tmp_path_factory.mktemp("package")
+    command = [sys.executable, "setup.py", "-q", "egg_info", "--egg-base", str(home), "build", "--build-base"]
+    command += [str(home / "build"), "install", "--prefix", str(home / "it"), "--record", str(home / "files")]
+    subprocess.run(
+        [*command, "--single-version-externally-managed"], cwd=PACKAGE, check=True, capture_output=True, timeout=120
+    )
+    return home / "it"
+
+
+def test_what_is_installed_is_where_ros2_looks(installed: Path) -> None:
+    assert (installed / "share/ament_index/resource_index/packages/handsteer_ros2").exists()
+    assert {path.name for path in (installed / "lib/handsteer_ros2").iterdir()} == executables()
+    share = installed / "share/handsteer_ros2"
+    assert {path.name for path in (share / "launch").iterdir()} == {path.name for path in LAUNCHES}
+
+
+def run(installed: Path, *words: str, **env: str) -> subprocess.CompletedProcess[str]:
+    packages = next((installed / "lib").glob("python3*")) / "site-packages"
+    environment = {**os.environ, "PYTHONPATH": f"{packages}{os.pathsep}{os.environ.get('PYTHONPATH', '')}", **env}
+    script = installed / "lib/handsteer_ros2/control"
+    return subprocess.run(
+        [sys.executable, str(script), *words], env=environment, capture_output=True, text=True, timeout=60, check=False
+    )
+
+
+def test_an_executable_is_the_node_with_all_words_of_a_launch(installed: Path, tmp_path: Path) -> None:
+    program = tmp_path / "handsteer"
+    program.write_text(f'#!/bin/sh\nexec "{sys.executable}" -m handsteer "$@"\n')
+    program.chmod(0o755)
+    words = ["--transport", "dds", "--ros-args", "-r", "__node:=hand_sign_control", "-r", "__ns:=/r1"]
+    done = run(installed, *words, "-p", "linear_step:=7", HANDSTEER=str(program))
+    assert done.returncode == 2
+    assert "ROS parameter /r1/hand_sign_control/linear_step: 7 should be less than or equal to 1" in done.stderr
+
+
+def test_where_handsteer_is_not_installed_it_says_so(installed: Path) -> None:
+    done = run(installed, HANDSTEER="no_such_program")
+    assert done.returncode == 1
+    assert "there is no program no_such_program: install handsteer, or set HANDSTEER to its path" in done.stderr
