@@ -16,6 +16,7 @@ def run(
     camera: str | None = None,
     robot: str | None = None,
     world: str | None = None,
+    host: str | None = None,
     port: int | None = None,
     headless: Flag = False,
     duration: float | None = None,
@@ -36,8 +37,10 @@ def run(
         sim, the simulated diff-drive robot.
     world
         Name of a shipped world, or a YAML file.
+    host
+        Address of this machine that the page is served on; 0.0.0.0 lets other machines in, with a token.
     port
-        Port of the page on 127.0.0.1; 0 takes a free one.
+        Port of the page; 0 takes a free one.
     headless
         Without the page.
     duration
@@ -50,7 +53,11 @@ def run(
         YAML file with parameters; those given here go before it.
     """
     headless = headless or fast
-    shorthand = {"camera": {"source": camera}, "robot": {"kind": robot, "world": world}, "dashboard": {"port": port}}
+    shorthand = {
+        "camera": {"source": camera},
+        "robot": {"kind": robot, "world": world},
+        "dashboard": {"host": host, "port": port},
+    }
     settings = make_settings(config_file, parameters, shorthand, {"camera": {"at_end": "end"}} if headless else {})
     if duration is not None and not duration > 0:
         raise ConfigError(f"--duration: {duration:g} should be greater than 0 seconds")
