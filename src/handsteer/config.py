@@ -31,7 +31,8 @@ class CameraConfig(Section):
 
     source: str = Field(
         "auto",
-        description="auto, virtual, a webcam's index or /dev/videoN, an address (rtsp, http), a video file or a folder",
+        description="auto, virtual, browser (that of whoever looks at the page), a webcam's index or /dev/videoN, "
+        "an address (rtsp, http), a video file or a folder",
     )
     width: int = Field(640, ge=64, le=4096, description="Width asked of a webcam or drawn by the virtual hand [px]")
     height: int = Field(480, ge=48, le=4096, description="Height asked of a webcam or drawn by the virtual hand [px]")

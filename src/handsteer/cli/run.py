@@ -32,7 +32,8 @@ def run(
     Parameters
     ----------
     camera
-        auto, virtual, a webcam's index or /dev/videoN, an address (rtsp, http), a video file or a folder of photos.
+        auto, virtual, browser (that of whoever looks at the page), a webcam's index or /dev/videoN, an address (rtsp,
+        http), a video file or a folder of photos.
     robot
         sim, the simulated diff-drive robot.
     world
@@ -59,6 +60,8 @@ def run(
         "dashboard": {"host": host, "port": port},
     }
     settings = make_settings(config_file, parameters, shorthand, {"camera": {"at_end": "end"}} if headless else {})
+    if headless and settings.camera.source == "browser":
+        raise ConfigError("--camera browser needs the page, which --headless and --fast leave out")
     if duration is not None and not duration > 0:
         raise ConfigError(f"--duration: {duration:g} should be greater than 0 seconds")
     with Graph(settings, SteppedClock() if fast else RealClock()) as graph:
@@ -83,7 +86,7 @@ def _run_until_end(graph: Graph, settings: Config, duration: float | None, *, he
     # The page's libraries take a second to load, which a headless run need not wait for.
     from handsteer.dashboard.server import Dashboard  # noqa: PLC0415
 
-    dashboard = Dashboard(graph.transport, graph.clock, graph.steering, settings.dashboard)
+    dashboard = Dashboard(graph.transport, graph.clock, graph.steering, settings.dashboard, graph.cameras)
     url = dashboard.start()
     try:
         graph.start()

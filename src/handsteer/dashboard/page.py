@@ -2,6 +2,7 @@
 
 from nicegui import ui
 
+from handsteer.cameras.browser import ChoiceOfCameras
 from handsteer.dashboard.node import DashboardNode
 from handsteer.dashboard.panels import (
     Banner,
@@ -16,6 +17,7 @@ from handsteer.dashboard.scene import WorldView
 from handsteer.dashboard.watch import WhileWatched
 
 PICTURE_PATH = "/camera.mjpg"
+WEBCAM_PATH = "/camera"
 ASSETS_PATH = "/assets"
 
 _WORLD_PERIOD_S = 0.05
@@ -38,19 +40,21 @@ class Page:
 
     Args:
         node: Is joined for as long as the browser shows the page.
+        cameras: The graph's camera, which this browser's may stand in for; None where that cannot be.
     """
 
-    def __init__(self, node: WhileWatched[DashboardNode]) -> None:
+    def __init__(self, node: WhileWatched[DashboardNode], cameras: ChoiceOfCameras | None) -> None:
         self._client = ui.context.client
         self._node = node
         self._client.on_disconnect(self._leave)
         self._client.on_delete(self._leave)
         ui.add_head_html(
             f'<link rel="stylesheet" href="{ASSETS_PATH}/page.css"><script src="{ASSETS_PATH}/page.js" defer></script>'
+            f'<script src="{ASSETS_PATH}/webcam.js" defer></script>'
         )
         self._top()
         self._banner = Banner()
-        self._camera = CameraPanel(PICTURE_PATH)
+        self._camera = CameraPanel(PICTURE_PATH, cameras)
         with ui.element("section").classes("card viewer world"):
             with ui.element("div").classes("stage"):
                 self._world = WorldView()

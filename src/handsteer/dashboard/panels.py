@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from nicegui import ui
 
+from handsteer.cameras.browser import ChoiceOfCameras
 from handsteer.dashboard.legend import LEGEND
 from handsteer.dashboard.state import PageState
 from handsteer.signs.vocabulary import NONE
@@ -42,9 +43,15 @@ class Banner:
 
 
 class CameraPanel:
-    """The mirrored picture, and what was understood of it."""
+    """The mirrored picture, what was understood of it, and whose camera it is from.
 
-    def __init__(self, picture_url: str) -> None:
+    Args:
+        picture_url: Where the stream of pictures is.
+        cameras: What there is to choose from; None where there is no choice.
+    """
+
+    def __init__(self, picture_url: str, cameras: ChoiceOfCameras | None) -> None:
+        self._cameras = cameras
         with ui.element("section").classes("card viewer camera"):
             with _box("stage"):
                 # Lazy, because a page counts as loaded only when its other pictures have come.
@@ -59,6 +66,8 @@ class CameraPanel:
                     self._confidence = _box("")
                 self._percent = _text("percent", "")
                 self._hand = _text("hand", "")
+            if cameras is not None:
+                self._choice(cameras)
         self._width = 0
 
     def update(self, state: PageState) -> None:
@@ -75,6 +84,23 @@ class CameraPanel:
             self._width = percent
         self._excuse.set_text(state.no_picture)
         _switch(self._veil, "off", on=not state.no_picture)
+        if self._cameras is not None:
+            self._show_choice(self._cameras.source)
+
+    def _choice(self, cameras: ChoiceOfCameras) -> None:
+        self._chosen = ""
+        with _box("foot choice"):
+            self._browsers = _button("Use this device's camera", 'data-camera="browser"')
+            self._own = _button("Use the robot's camera", 'data-camera="own"')
+            self._trouble = _text("trouble", "").props('role="alert"')
+        self._own.on("click", lambda: cameras.choose("own"))
+        ui.on("webcam", lambda event: self._trouble.set_text(str(event.args.get("words", ""))))
+
+    def _show_choice(self, source: str) -> None:
+        if source != self._chosen:
+            self._chosen = source
+            _switch(self._browsers, "hidden", on=source == "browser")
+            _switch(self._own, "hidden", on=source == "own")
 
 
 class RobotFoot:
@@ -260,6 +286,12 @@ def _fact(name: str) -> ui.label:
 
 def _switch(element: ui.element, name: str, *, on: bool) -> None:
     element.classes(add=name if on else "", remove="" if on else name)
+
+
+def _button(text: str, props: str) -> ui.element:
+    with ui.element("button").classes("text-button").props(f'type="button" {props}') as button:
+        ui.label(text).style("display: inline")
+    return button
 
 
 def _box(classes: str) -> ui.element:

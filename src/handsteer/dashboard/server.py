@@ -14,14 +14,17 @@ from fastapi import FastAPI
 from nicegui import ui
 from starlette.responses import Response
 from starlette.staticfiles import StaticFiles
+from starlette.websockets import WebSocket
 
+from handsteer.cameras.browser import LARGEST_BYTES, ChoiceOfCameras
 from handsteer.clock import Clock
 from handsteer.config import DashboardConfig
 from handsteer.dashboard.access import Access, AccessMiddleware
 from handsteer.dashboard.node import DashboardNode
-from handsteer.dashboard.page import ASSETS_PATH, ICON, PICTURE_PATH, Page
+from handsteer.dashboard.page import ASSETS_PATH, ICON, PICTURE_PATH, WEBCAM_PATH, Page
 from handsteer.dashboard.picture import PictureNode, PictureResponse
 from handsteer.dashboard.watch import WhileWatched
+from handsteer.dashboard.webcam import FrameSocket
 from handsteer.errors import DashboardError
 from handsteer.nodes.steering import SteeringNode
 from handsteer.transports.protocol import Transport
@@ -46,15 +49,27 @@ class Dashboard:
         clock: The graph's clock.
         steering: Drives when people steer on the page.
         config: Where the page is served, and how.
+        cameras: The camera of this process, which a browser's may stand in for; None where it is in another.
 
     Attributes:
         node: Listens and steers for the browsers that show the page.
         pictures: Encodes the camera's picture for the browsers that show it.
+        cameras: The camera of this process, or None.
+        webcam: Takes the frames of a browser's own camera.
     """
 
-    def __init__(self, transport: Transport, clock: Clock, steering: SteeringNode, config: DashboardConfig) -> None:
+    def __init__(
+        self,
+        transport: Transport,
+        clock: Clock,
+        steering: SteeringNode,
+        config: DashboardConfig,
+        cameras: ChoiceOfCameras | None = None,
+    ) -> None:
         self.node = WhileWatched(lambda: DashboardNode(transport, clock, steering))
         self.pictures = WhileWatched(lambda: PictureNode(transport, clock))
+        self.cameras = cameras
+        self.webcam = FrameSocket(cameras)
         self._config = config
         self._server: uvicorn.Server | None = None
         self._thread: threading.Thread | None = None
@@ -84,6 +99,7 @@ class Dashboard:
             log_config=None,
             access_log=False,
             lifespan="on",
+            ws_max_size=2 * LARGEST_BYTES,
             ssl_certfile=config.certificate,
             ssl_keyfile=config.private_key,
         )
@@ -174,9 +190,13 @@ def _application() -> FastAPI:
     async def picture() -> Response:
         return PictureResponse(application.state.dashboard.pictures)
 
+    @application.websocket(WEBCAM_PATH)
+    async def webcam(socket: WebSocket) -> None:
+        await application.state.dashboard.webcam.serve(socket)
+
     @ui.page("/")
     def index() -> None:
-        Page(application.state.dashboard.node)
+        Page(application.state.dashboard.node, application.state.dashboard.cameras)
 
     ui.run_with(
         application,
