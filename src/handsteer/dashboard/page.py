@@ -8,6 +8,7 @@ from handsteer.dashboard.panels import (
     Banner,
     CameraPanel,
     RobotFoot,
+    SeatPanel,
     SignsPanel,
     SteerPanel,
     TimingPanel,
@@ -75,6 +76,7 @@ class Page:
                 ui.html("<h1>handsteer</h1>", sanitize=False)
                 ui.label("drive a robot with your hand signs").classes("tagline")
             with ui.element("div").classes("right"):
+                self._driving = SeatPanel(self._ask, self._answer)
                 self._source = ui.label("").classes("chip")
                 with ui.element("button").classes("icon-button theme").props('aria-label="Light or dark"'):
                     ui.html(_THEME_ICON, sanitize=False)
@@ -87,6 +89,7 @@ class Page:
         node = self._joined()
         if node is None:
             return
+        self._driving.update(node.seat.place_of(self._client.id, node.clock.now()))
         state = node.state()
         self._source.set_text(state.camera)
         for panel in (self._banner, self._camera, self._robot, self._velocity, self._timing, self._signs):
@@ -100,9 +103,19 @@ class Page:
         if node := self._joined():
             node.release(self._client.id)
 
+    def _ask(self) -> None:
+        if node := self._joined():
+            node.seat.ask(self._client.id, node.clock.now())
+
+    def _answer(self, hand_over: bool) -> None:
+        if node := self._joined():
+            node.seat.answer(self._client.id, hand_over=hand_over)
+
     def _joined(self) -> DashboardNode | None:
         """Return the node while the browser is connected and the page is served."""
         return self._node.join(self._client.id) if self._client.has_socket_connection else None
 
     def _leave(self) -> None:
+        if self._node.is_watched_by(self._client.id) and (node := self._node.join(self._client.id)):
+            node.leave(self._client.id)
         self._node.leave(self._client.id)

@@ -3,11 +3,13 @@
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from typing import ClassVar
 
 from nicegui import ui
 
 from handsteer.cameras.browser import ChoiceOfCameras
 from handsteer.dashboard.legend import LEGEND
+from handsteer.dashboard.seat import Place, Role
 from handsteer.dashboard.state import PageState
 from handsteer.signs.vocabulary import NONE
 
@@ -101,6 +103,36 @@ class CameraPanel:
             self._chosen = source
             _switch(self._browsers, "hidden", on=source == "browser")
             _switch(self._own, "hidden", on=source == "own")
+
+
+class SeatPanel:
+    """Whether this viewer drives, and the way to the driver's seat.
+
+    Args:
+        ask: Is called to ask for it.
+        answer: Is called with True to hand it over, with False to keep it.
+    """
+
+    _WORDS: ClassVar[dict[Role, str]] = {"driver": "you drive", "watcher": "you watch", "free": "nobody drives"}
+
+    def __init__(self, ask: Callable[[], None], answer: Callable[[bool], None]) -> None:
+        with _box("seat"):
+            self._question = _text("question", "")
+            self._words = _text("role chip", "")
+            self._ask = _button("Ask to drive", "").on("click", ask)
+            self._yes = _button("Hand over", "").on("click", lambda: answer(True))
+            self._no = _button("Keep", "").on("click", lambda: answer(False))
+
+    def update(self, place: Place) -> None:
+        """Show what the seat is for this viewer."""
+        is_driver = place.role == "driver"
+        asks = f"Somebody asks to drive; unanswered, they do in {place.left_s:.0f} s"
+        waits = f"You drive in {place.left_s:.0f} s, or sooner"
+        self._question.set_text((asks if is_driver else waits) if place.asked else "")
+        self._words.set_text(self._WORDS[place.role])
+        _switch(self._ask, "hidden", on=is_driver or place.asked)
+        for button in (self._yes, self._no):
+            _switch(button, "hidden", on=not (is_driver and place.asked))
 
 
 class RobotFoot:
