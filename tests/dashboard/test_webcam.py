@@ -105,15 +105,21 @@ def wait_until_stands(graph: Graph) -> None:
     pytest.fail("the robot drives on")
 
 
-def test_a_second_browser_is_told_that_another_gives_its_camera(graph: Graph, url: str, browser: Browser) -> None:
+def test_only_who_drives_gives_a_camera(graph: Graph, url: str, browser: Browser) -> None:
     first, second = show(browser, url), show(browser, url)
     buttons = [page.get_by_text("Use this device's camera") for page in (first, second)]
     for button in buttons:
         button.wait_for()
     buttons[0].click()
     wait_for_words(first, ".camera .sign", "Forward")
-    second.evaluate("giveCamera()")
-    wait_for_words(second, ".camera .trouble", "another browser gives its camera already")
+    viewer = second.locator("[data-camera=browser]").get_attribute("data-viewer")
+    second.evaluate("viewer => giveCamera(viewer)", viewer)
+    wait_for_words(second, ".camera .trouble", "only who drives may give a camera")
+    second.get_by_role("button", name="Ask to drive").click()
+    first.get_by_text("Hand over").click()
+    wait_for_words(first, ".camera .trouble", "somebody else drives now")
+    second.evaluate("viewer => giveCamera(viewer)", viewer)
+    wait_for_words(second, ".camera .sign", "Forward")
 
 
 def test_a_browser_without_a_webcam_says_so(url: str) -> None:

@@ -47,6 +47,7 @@ class Page:
     def __init__(self, node: WhileWatched[DashboardNode], cameras: ChoiceOfCameras | None) -> None:
         self._client = ui.context.client
         self._node = node
+        self._cameras = cameras
         self._client.on_disconnect(self._leave)
         self._client.on_delete(self._leave)
         ui.add_head_html(
@@ -55,7 +56,7 @@ class Page:
         )
         self._top()
         self._banner = Banner()
-        self._camera = CameraPanel(PICTURE_PATH, cameras)
+        self._camera = CameraPanel(PICTURE_PATH, cameras, self._client.id, self._use_own_camera)
         with ui.element("section").classes("card viewer world"):
             with ui.element("div").classes("stage"):
                 self._world = WorldView()
@@ -102,6 +103,11 @@ class Page:
     def _release(self) -> None:
         if node := self._joined():
             node.release(self._client.id)
+
+    def _use_own_camera(self) -> None:
+        node = self._joined()
+        if node and self._cameras and node.seat.take(self._client.id, node.clock.now()):
+            self._cameras.choose("own")
 
     def _ask(self) -> None:
         if node := self._joined():

@@ -50,9 +50,13 @@ class CameraPanel:
     Args:
         picture_url: Where the stream of pictures is.
         cameras: What there is to choose from; None where there is no choice.
+        viewer: Who looks at this page.
+        use_own: Is called to choose the camera of the machine that handsteer runs on.
     """
 
-    def __init__(self, picture_url: str, cameras: ChoiceOfCameras | None) -> None:
+    def __init__(
+        self, picture_url: str, cameras: ChoiceOfCameras | None, viewer: str, use_own: Callable[[], None]
+    ) -> None:
         self._cameras = cameras
         with ui.element("section").classes("card viewer camera"):
             with _box("stage"):
@@ -69,7 +73,7 @@ class CameraPanel:
                 self._percent = _text("percent", "")
                 self._hand = _text("hand", "")
             if cameras is not None:
-                self._choice(cameras)
+                self._choice(viewer, use_own)
         self._width = 0
 
     def update(self, state: PageState) -> None:
@@ -89,13 +93,13 @@ class CameraPanel:
         if self._cameras is not None:
             self._show_choice(self._cameras.source)
 
-    def _choice(self, cameras: ChoiceOfCameras) -> None:
+    def _choice(self, viewer: str, use_own: Callable[[], None]) -> None:
         self._chosen = ""
         with _box("foot choice"):
-            self._browsers = _button("Use this device's camera", 'data-camera="browser"')
+            self._browsers = _button("Use this device's camera", f'data-camera="browser" data-viewer="{viewer}"')
             self._own = _button("Use the robot's camera", 'data-camera="own"')
             self._trouble = _text("trouble", "").props('role="alert"')
-        self._own.on("click", lambda: cameras.choose("own"))
+        self._own.on("click", use_own)
         ui.on("webcam", lambda event: self._trouble.set_text(str(event.args.get("words", ""))))
 
     def _show_choice(self, source: str) -> None:

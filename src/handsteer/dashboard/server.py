@@ -69,7 +69,7 @@ class Dashboard:
         self.node = WhileWatched(lambda: DashboardNode(transport, clock, steering))
         self.pictures = WhileWatched(lambda: PictureNode(transport, clock))
         self.cameras = cameras
-        self.webcam = FrameSocket(cameras)
+        self.webcam = FrameSocket(cameras, self._drives)
         self._config = config
         self._server: uvicorn.Server | None = None
         self._thread: threading.Thread | None = None
@@ -121,6 +121,12 @@ class Dashboard:
             self._thread.join(_STOP_TIMEOUT_S)
             self._server = None
             _one_at_a_time.release()
+
+    def _drives(self, viewer: str) -> bool:
+        if not self.node.is_watched_by(viewer):
+            return False
+        node = self.node.join(viewer)
+        return node is not None and node.seat.take(viewer, node.clock.now())
 
     def _wait_until_served(self) -> None:
         server, thread = self._server, self._thread

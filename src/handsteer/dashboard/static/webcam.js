@@ -12,10 +12,10 @@ function sayCamera(state, words = "") {
   emitEvent("webcam", { state, words });
 }
 
-async function giveCamera() {
+async function giveCamera(viewer) {
   if (giving) return;
   if (!navigator.mediaDevices?.getUserMedia) {
-    sayCamera("off", "browsers give a camera only to pages from https or localhost: docs/webcam.md says how");
+    sayCamera("off", "browsers give a camera only to pages from https or localhost: docs/page.md says how");
     return;
   }
   giving = { video: document.createElement("video") };
@@ -29,12 +29,13 @@ async function giveCamera() {
     return;
   }
   for (const track of giving.stream.getTracks()) track.onended = () => keepCamera("the camera was taken away");
-  sendFrames();
+  sendFrames(viewer);
 }
 
-function sendFrames() {
+function sendFrames(viewer) {
   const { video } = giving;
-  const address = new URL("camera", location.href);
+  const address = new URL("camera", location.origin);
+  address.searchParams.set("viewer", viewer);
   address.protocol = address.protocol.replace("http", "ws");
   // A worker, because a page that draws a lot lets pictures wait for their encoding for up to a second.
   const sender = giving.sender = new Worker("/assets/webcam-sender.js");
@@ -65,7 +66,7 @@ function keepCamera(words = "") {
 document.addEventListener("click", (event) => {
   const button = event.target.closest?.("[data-camera]");
   if (!button) return;
-  if (button.dataset.camera === "browser") giveCamera();
+  if (button.dataset.camera === "browser") giveCamera(button.dataset.viewer);
   else keepCamera();
 });
 window.addEventListener("pagehide", () => keepCamera());
