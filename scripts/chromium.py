@@ -3,6 +3,7 @@
 import ctypes
 import shutil
 import sys
+from pathlib import Path
 
 from playwright.sync_api import Browser, Playwright
 
@@ -27,8 +28,13 @@ def find() -> str | None:
     return next((path for name in NAMES if (path := shutil.which(name))), None)
 
 
-def launch(playwright: Playwright) -> Browser:
+def launch(playwright: Playwright, webcam: Path | None = None) -> Browser:
     """Return a Chromium with a fresh profile and software WebGL.
+
+    Args:
+        playwright: Starts it.
+        webcam: A file of JPEG pictures, one behind the other (``.mjpeg``), that its webcam shows over and over; without
+            one it has no webcam.
 
     Raises:
         FileNotFoundError: There is none on this machine.
@@ -39,4 +45,8 @@ def launch(playwright: Playwright) -> Browser:
     if sys.platform == "linux":
         # As root, Chromium gives its drawing, which here takes all processors, the right of way before the graph.
         ctypes.CDLL(None).prctl(_PR_CAPBSET_DROP, _CAP_SYS_NICE)
-    return playwright.chromium.launch(executable_path=path, args=_FLAGS)
+    flags = [*_FLAGS]
+    if webcam is not None:
+        flags += ["--use-fake-device-for-media-stream", "--use-fake-ui-for-media-stream"]
+        flags += [f"--use-file-for-fake-video-capture={webcam}"]
+    return playwright.chromium.launch(executable_path=path, args=flags)

@@ -43,7 +43,8 @@ class CameraConfig(Section):
 
     source: str = Field(
         "auto",
-        description="auto, virtual, a webcam's index or /dev/videoN, an address (rtsp, http), a video file or a folder",
+        description="auto, virtual, browser (that of whoever looks at the page), a webcam's index or /dev/videoN, "
+        "an address (rtsp, http), a video file or a folder",
     )
     width: int = Field(640, ge=64, le=4096, description="Width asked of a webcam or drawn by the virtual hand [px]")
     height: int = Field(480, ge=48, le=4096, description="Height asked of a webcam or drawn by the virtual hand [px]")
@@ -224,7 +225,17 @@ class RobotConfig(Section):
 class DashboardConfig(Section):
     """The web page."""
 
-    port: int = Field(8080, ge=0, le=65535, description="Port on 127.0.0.1; 0 takes a free one")
+    host: str = Field(
+        "127.0.0.1",
+        min_length=1,
+        description="Address of this machine that the page is served on; any other than 127.0.0.1 lets other machines "
+        "in, who need the token that stands in the printed address",
+    )
+    port: int = Field(8080, ge=0, le=65535, description="Port of the page; 0 takes a free one")
+    certificate: Path | None = Field(
+        None, description="PEM file with the certificate for https, which browsers want before they give a camera away"
+    )
+    private_key: Path | None = Field(None, description="PEM file with its key, unless the certificate's file has it")
     open_browser: bool = Field(True, description="Whether run opens the page in a browser")
 
 

@@ -16,7 +16,9 @@ import math
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from handsteer.cameras.browser import BrowserCamera, ChoiceOfCameras, NoCamera
 from handsteer.cameras.choose import open_camera
+from handsteer.cameras.protocol import Camera
 from handsteer.clock import Clock, RealClock, SimulatedClock, SteppedClock, WallClock
 from handsteer.config import Config, SignsConfig, cmd_vel_type
 from handsteer.errors import ConfigError
@@ -74,7 +76,8 @@ class Graph:
         wires = (self.transport, self.clock)
         self.robot = make_robot(config, *wires, link)
         self.recognition = make_recognition(config, *wires)
-        self.camera = make_camera(config, *wires)
+        self.cameras = open_cameras(config, self.clock)
+        self.camera = make_camera(config, *wires, self.cameras)
         self.control = make_control(config, *wires)
         self.steering = make_steering(config, *wires)
         self._added: tuple[Node, ...] = ()
@@ -200,14 +203,31 @@ class Summary:
         return asdict(self)
 
 
-def make_camera(config: Config, transport: Transport, clock: Clock) -> CameraNode:
+def make_camera(config: Config, transport: Transport, clock: Clock, camera: Camera | None = None) -> CameraNode:
     """Return the node ``my_camera``.
+
+    Args:
+        config: Everything that can be set.
+        transport: Carries the node's messages.
+        clock: The graph's clock.
+        camera: What gives the frames; None opens the one that ``config`` names.
 
     Raises:
         CameraError: The camera cannot be used.
     """
-    camera = open_camera(config.camera, config.virtual_hand, clock)
+    camera = camera or open_camera(config.camera, config.virtual_hand, clock)
     return CameraNode(transport, clock, camera, config.camera.frame_id)
+
+
+def open_cameras(config: Config, clock: Clock) -> ChoiceOfCameras:
+    """Return this machine's own camera and that of whoever looks at the page, of which one is chosen at a time.
+
+    Raises:
+        CameraError: The machine's own cannot be used.
+    """
+    if config.camera.source == "browser":
+        return ChoiceOfCameras(NoCamera(), BrowserCamera(clock), "browser")
+    return ChoiceOfCameras(open_camera(config.camera, config.virtual_hand, clock), BrowserCamera(clock))
 
 
 def make_recognition(config: Config, transport: Transport, clock: Clock) -> HandSignRecognitionNode:

@@ -121,6 +121,34 @@ def test_drives_while_the_pad_is_held_and_stops_when_it_is_let_go(visit: Visit) 
     assert robot.state.angular_radps == pytest.approx(0, abs=0.01)
 
 
+@pytest.mark.parametrize("visit", ["NONE:60"], indirect=True)
+def test_a_second_browser_watches_until_the_first_hands_over(visit: Visit) -> None:
+    robot = visit.graph.robot
+    first, second = visit.page, visit.page.context.browser.new_page()
+    second.goto(first.url)
+    for page in (first, second):
+        page.locator(".seat .role", has_text="nobody drives").wait_for()
+    first.get_by_text("Ask to drive").click()
+    first.locator(".seat .role", has_text="you drive").wait_for()
+    second.locator(".seat .role", has_text="you watch").wait_for()
+
+    second.locator(".pad").focus()
+    second.keyboard.down("ArrowUp")
+    second.wait_for_timeout(500)
+    assert robot.state.linear_mps == pytest.approx(0, abs=0.01)
+    second.keyboard.up("ArrowUp")
+
+    second.get_by_text("Ask to drive").click()
+    first.locator(".seat .question", has_text="Somebody asks to drive").wait_for()
+    first.get_by_text("Hand over").click()
+    second.locator(".seat .role", has_text="you drive").wait_for()
+    second.locator(".pad").focus()
+    second.keyboard.down("ArrowUp")
+    visit.wait_until(lambda: robot.state.linear_mps > 0.2)
+    second.close()
+    visit.wait_until(lambda: robot.state.linear_mps == pytest.approx(0, abs=0.01))
+
+
 @pytest.mark.parametrize("visit", ["Stop:60"], indirect=True)
 def test_fits_a_phone_and_turns_dark_and_stays_so(visit: Visit) -> None:
     visit.wait_until(lambda: visit.text(".camera .sign") == "Stop")

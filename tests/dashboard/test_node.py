@@ -168,6 +168,25 @@ def test_one_viewer_cannot_stop_what_another_one_steers(bench: Bench) -> None:
     assert bench.steered == [(0.3, 0.0)]
 
 
+def test_who_watches_cannot_steer_until_the_driver_has_left(bench: Bench) -> None:
+    bench.node.steer("driver", 0.3, 0.0)
+    bench.node.steer("watcher", -0.4, 0.0)
+    assert bench.steered == [(0.3, 0.0)]
+    bench.node.leave("driver")
+    assert bench.steered[-1] == (0.0, 0.0)
+    bench.node.steer("watcher", -0.4, 0.0)
+    assert bench.steered[-1] == (-0.4, 0.0)
+
+
+def test_the_robot_stops_when_another_takes_over(bench: Bench) -> None:
+    bench.node.steer("driver", 0.3, 0.0)
+    bench.node.seat.ask("watcher", bench.clock.now())
+    bench.node.seat.answer("driver", hand_over=True)
+    bench.node.steer("driver", 0.3, 0.0)
+    bench.step(0.1)
+    assert bench.steered[-1] == (0.0, 0.0)
+
+
 def test_leaves_nothing_in_motion_when_it_stops(bench: Bench) -> None:
     bench.node.steer("me", 0.3, 0.0)
     bench.node.stop()

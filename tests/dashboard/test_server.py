@@ -10,50 +10,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from handsteer.clock import RealClock
-from handsteer.config import DashboardConfig
 from handsteer.dashboard.picture import next_quality, shrink
-from handsteer.dashboard.server import Dashboard
 from handsteer.errors import DashboardError
-from handsteer.images import image_message
-from handsteer.messages import DIAGNOSTICS, IMAGE_ANNOTATED, Header
-from handsteer.nodes.steering import SteeringNode
-from handsteer.transports.in_process import InProcessTransport
-
-PATIENCE_S = 20.0
-
-
-class Site:
-    """A page that is served, and a camera picture that is published as long as the site is."""
-
-    def __init__(self, port: int = 0) -> None:
-        self.clock = RealClock()
-        self.transport = InProcessTransport()
-        steering = SteeringNode(self.transport, self.clock)
-        self.dashboard = Dashboard(self.transport, self.clock, steering, DashboardConfig(port=port))
-        self.pictures = self.transport.advertise("hand_sign_recognition", IMAGE_ANNOTATED)
-        self.reports = self.transport.advertise("robot", DIAGNOSTICS)
-        self.image = np.full((480, 640, 3), (40, 160, 220), np.uint8)
-        self.url = self.dashboard.start()
-        self.port = int(self.url.rpartition(":")[2])
-        self._ended = threading.Event()
-        self._camera = threading.Thread(target=self._publish)
-        self._camera.start()
-
-    def _publish(self) -> None:
-        while not self._ended.wait(0.02):
-            header = Header(self.clock.stamp(self.clock.now()), "camera")
-            self.pictures.publish(image_message(self.image, header))
-
-    def get(self, path: str, **headers: str) -> http.client.HTTPResponse:
-        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=PATIENCE_S)
-        connection.request("GET", path, headers=headers)
-        return connection.getresponse()
-
-    def close(self) -> None:
-        self.dashboard.stop()
-        self._ended.set()
-        self._camera.join()
+from tests.dashboard.served import PATIENCE_S, Site
 
 
 @pytest.fixture
@@ -171,25 +130,18 @@ def test_may_be_stopped_twice_and_served_again_on_the_same_port() -> None:
     first = Site()
     first.close()
     first.dashboard.stop()
-    second = Site(first.port)
+    second = Site(port=first.port)
     try:
         assert second.get("/").status == 200
     finally:
         second.close()
 
 
-def test_is_there_for_this_machine_only(site: Site) -> None:
-    assert site.url == f"http://127.0.0.1:{site.port}"
-    assert site.get("/", Host="127.0.0.1").status == 200
-    assert site.get("/", Host="evil.example").status == 400
-    assert site.get("/camera.mjpg", Host="evil.example").status == 400
-
-
 def test_a_port_in_use_is_named_with_a_way_out() -> None:
     with socket.create_server(("127.0.0.1", 0)) as other:
         port = other.getsockname()[1]
         with pytest.raises(DashboardError, match=rf"^port {port} on 127\.0\.0\.1 is in use: .*--port"):
-            Site(port)
+            Site(port=port)
 
 
 def test_one_process_serves_one_page_at_a_time(site: Site) -> None:

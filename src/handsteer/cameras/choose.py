@@ -25,6 +25,8 @@ def open_camera(config: CameraConfig, virtual_hand: VirtualHandConfig, clock: Cl
     source = config.source
     if source == "auto":
         return _first_webcam(config, clock) or _virtual(config, virtual_hand, clock)
+    if source == "browser":
+        raise CameraNotFound("the browser's camera is there only beside the page: handsteer run --camera browser")
     if source == "virtual":
         return _virtual(config, virtual_hand, clock)
     if is_device(source) or is_address(source):
@@ -56,7 +58,8 @@ def _virtual(config: CameraConfig, virtual_hand: VirtualHandConfig, clock: Clock
 def _file(path: Path, config: CameraConfig, clock: Clock) -> Camera:
     if not path.exists():
         raise CameraNotFound(
-            f"there is no camera {path}: give auto, virtual, a webcam's number, an address, a video file or a folder"
+            f"there is no camera {path}: give auto, virtual, browser, a webcam's number, an address, a video file "
+            "or a folder"
         )
     if path.is_dir() or path.suffix.lower() in PHOTO_SUFFIXES:
         return PhotoFolder(path, clock, photo_duration_s=config.photo_duration, fps=config.fps, at_end=config.at_end)

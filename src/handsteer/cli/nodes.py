@@ -115,6 +115,7 @@ def robot(
 def steering(
     *words: str,
     transport: str,
+    host: str | None = None,
     port: int | None = None,
     config_file: ConfigFile = None,
     parameters: Parameters = None,
@@ -130,12 +131,14 @@ def steering(
         ROS 2: --ros-args -r topic:=other -r __node:=name -r __ns:=/namespace -p parameter:=value --params-file file.
     transport
         What joins the nodes: dds or zenoh (both ROS 2), or ros1.
+    host
+        Address of this machine that the page is served on; 0.0.0.0 lets other machines in, with a token.
     port
-        Port of the page on 127.0.0.1; 0 takes a free one.
+        Port of the page; 0 takes a free one.
     config_file
         YAML file with parameters; ROS parameters go before it, options before both.
     """
-    shorthand = {"dashboard": {"port": port}}
+    shorthand = {"dashboard": {"host": host, "port": port}}
     job = _Job("steering", "dashboard", graph.make_steering, config_file, parameters, shorthand, _served)
     return _run(job, transport, words)
 

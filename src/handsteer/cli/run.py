@@ -25,6 +25,7 @@ def run(
     camera: str | None = None,
     robot: str | None = None,
     world: str | None = None,
+    host: str | None = None,
     port: int | None = None,
     headless: Flag = False,
     duration: float | None = None,
@@ -43,14 +44,17 @@ def run(
         For a real robot, in the words of its graph. ROS 2: --ros-args -r cmd_vel:=/base/cmd_vel -r __ns:=/r1.
         ROS 1: cmd_vel:=/base/cmd_vel.
     camera
-        auto, virtual, a webcam's index or /dev/videoN, an address (rtsp, http), a video file or a folder of photos.
+        auto, virtual, browser (that of whoever looks at the page), a webcam's index or /dev/videoN, an address (rtsp,
+        http), a video file or a folder of photos.
     robot
         sim, the simulated one. Or a real one: dds (ROS 2), zenoh or ros1, whatever listens to cmd_vel there; or, in
         ROS 2, turtlebot3_burger, turtlebot3_waffle, turtlebot4 or turtlesim, whose topics and limits are known.
     world
         Name of a shipped world, or a YAML file.
+    host
+        Address of this machine that the page is served on; 0.0.0.0 lets other machines in, with a token.
     port
-        Port of the page on 127.0.0.1; 0 takes a free one.
+        Port of the page; 0 takes a free one.
     headless
         Without the page.
     duration
@@ -66,13 +70,15 @@ def run(
     shorthand = {
         "camera": {"source": camera},
         "robot": {**_robot(robot), "world": world},
-        "dashboard": {"port": port},
+        "dashboard": {"host": host, "port": port},
     }
     base = {"camera": {"at_end": "end"}} if headless else {}
 
     def settle(service: dict[str, Any]) -> Config:
         return make_settings(config_file, parameters, shorthand, base, service)
 
+    if headless and settle({}).camera.source == "browser":
+        raise ConfigError("--camera browser needs the page, which --headless and --fast leave out")
     if duration is not None and not duration > 0:
         raise ConfigError(f"--duration: {duration:g} should be greater than 0 seconds")
     with _linked(settle, words, fast=fast) as (settings, link):
@@ -133,7 +139,9 @@ def _run_until_end(graph: Graph, settings: Config, duration: float | None, *, he
     # The page's libraries take a second to load, which a headless run need not wait for.
     from handsteer.dashboard.server import Dashboard  # noqa: PLC0415
 
-    dashboard = Dashboard(graph.transport, graph.clock, graph.steering, settings.dashboard, cmd_vel_topic(settings))
+    dashboard = Dashboard(
+        graph.transport, graph.clock, graph.steering, settings.dashboard, cmd_vel_topic(settings), graph.cameras
+    )
     url = dashboard.start()
     try:
         graph.start()

@@ -6,6 +6,7 @@ from typing import Any, cast
 
 from handsteer.clock import Clock, to_seconds
 from handsteer.control.sign_control import Velocity
+from handsteer.dashboard.seat import Seat
 from handsteer.dashboard.state import Observed, PageState, Report, compose, place_in_world
 from handsteer.messages import (
     CMD_VEL,
@@ -33,10 +34,10 @@ from handsteer.nodes.steering import SteeringNode
 from handsteer.robots.protocol import Pose2D
 from handsteer.transports.protocol import Received, Transport
 
-HOLD_TIMEOUT_S = 0.4
+HOLD_TIMEOUT_S = 0.3
 """Steering ends when the page has not repeated it for this long: the tab was closed, or the network lost."""
 
-_WATCH_PERIOD_S = 0.1
+_WATCH_PERIOD_S = 0.05
 _FRAME_COUNTS_KEPT = 6
 _ODOMETRY_KEPT = 16
 
@@ -72,6 +73,7 @@ class DashboardNode(Node):
 
     Attributes:
         world: What the 3D view shows.
+        seat: Who of the viewers drives.
     """
 
     def __init__(
@@ -79,6 +81,7 @@ class DashboardNode(Node):
     ) -> None:
         super().__init__("dashboard", transport, clock)
         self.world = WorldState()
+        self.seat = Seat()
         self._observed = Observed()
         self._namespace, _ = split_reporter(transport.full_name(self.name))
         self._frame_counts: deque[tuple[float, float]] = deque(maxlen=_FRAME_COUNTS_KEPT)
@@ -99,9 +102,13 @@ class DashboardNode(Node):
         return compose(self._observed, self.clock.now())
 
     def steer(self, viewer: str, linear_mps: float, angular_radps: float) -> None:
-        """Drive at this velocity; ``viewer`` has to repeat it within :data:`HOLD_TIMEOUT_S` for it to last."""
-        self._holder = (viewer, self.clock.now())
-        self._steering.steer(linear_mps, angular_radps)
+        """Drive at this velocity, if ``viewer`` has the driver's seat or nobody has.
+
+        It lasts while the viewer repeats it within :data:`HOLD_TIMEOUT_S`.
+        """
+        if self.seat.take(viewer, self.clock.now()):
+            self._holder = (viewer, self.clock.now())
+            self._steering.steer(linear_mps, angular_radps)
 
     def release(self, viewer: str) -> None:
         """Stop, if it is ``viewer`` who steers."""
@@ -110,14 +117,20 @@ class DashboardNode(Node):
             self._holder = None
             self._steering.release()
 
+    def leave(self, viewer: str) -> None:
+        """Stop if it is ``viewer`` who steers, and let others drive."""
+        self.release(viewer)
+        self.seat.leave(viewer)
+
     def on_stop(self) -> None:
         """Leave nothing in motion that was steered from here."""
         if self._holder is not None:
             self.release(self._holder[0])
 
     def _watch(self) -> None:
+        self.seat.tick(self.clock.now())
         holder = self._holder
-        if holder is not None and self.clock.now() - holder[1] > HOLD_TIMEOUT_S:
+        if holder is not None and (self.clock.now() - holder[1] > HOLD_TIMEOUT_S or not self.seat.drives(holder[0])):
             self.release(holder[0])
 
     def _on_diagnostics(self, received: Received[DiagnosticArray]) -> None:

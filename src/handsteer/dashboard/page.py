@@ -2,11 +2,13 @@
 
 from nicegui import ui
 
+from handsteer.cameras.browser import ChoiceOfCameras
 from handsteer.dashboard.node import DashboardNode
 from handsteer.dashboard.panels import (
     Banner,
     CameraPanel,
     RobotFoot,
+    SeatPanel,
     SignsPanel,
     SteerPanel,
     TimingPanel,
@@ -16,6 +18,7 @@ from handsteer.dashboard.scene import WorldView
 from handsteer.dashboard.watch import WhileWatched
 
 PICTURE_PATH = "/camera.mjpg"
+WEBCAM_PATH = "/camera"
 ASSETS_PATH = "/assets"
 
 _WORLD_PERIOD_S = 0.05
@@ -38,19 +41,22 @@ class Page:
 
     Args:
         node: Is joined for as long as the browser shows the page.
+        cameras: The graph's camera, which this browser's may stand in for; None where that cannot be.
     """
 
-    def __init__(self, node: WhileWatched[DashboardNode]) -> None:
+    def __init__(self, node: WhileWatched[DashboardNode], cameras: ChoiceOfCameras | None) -> None:
         self._client = ui.context.client
         self._node = node
+        self._cameras = cameras
         self._client.on_disconnect(self._leave)
         self._client.on_delete(self._leave)
         ui.add_head_html(
             f'<link rel="stylesheet" href="{ASSETS_PATH}/page.css"><script src="{ASSETS_PATH}/page.js" defer></script>'
+            f'<script src="{ASSETS_PATH}/webcam.js" defer></script>'
         )
         self._top()
         self._banner = Banner()
-        self._camera = CameraPanel(PICTURE_PATH)
+        self._camera = CameraPanel(PICTURE_PATH, cameras, self._client.id, self._use_own_camera)
         with ui.element("section").classes("card viewer world"):
             with ui.element("div").classes("stage"):
                 self._world = WorldView()
@@ -71,6 +77,7 @@ class Page:
                 ui.html("<h1>handsteer</h1>", sanitize=False)
                 ui.label("drive a robot with your hand signs").classes("tagline")
             with ui.element("div").classes("right"):
+                self._driving = SeatPanel(self._ask, self._answer)
                 self._source = ui.label("").classes("chip")
                 with ui.element("button").classes("icon-button theme").props('aria-label="Light or dark"'):
                     ui.html(_THEME_ICON, sanitize=False)
@@ -83,6 +90,7 @@ class Page:
         node = self._joined()
         if node is None:
             return
+        self._driving.update(node.seat.place_of(self._client.id, node.clock.now()))
         state = node.state()
         self._source.set_text(state.camera)
         for panel in (self._banner, self._camera, self._robot, self._velocity, self._timing, self._signs):
@@ -96,9 +104,24 @@ class Page:
         if node := self._joined():
             node.release(self._client.id)
 
+    def _use_own_camera(self) -> None:
+        node = self._joined()
+        if node and self._cameras and node.seat.take(self._client.id, node.clock.now()):
+            self._cameras.choose("own")
+
+    def _ask(self) -> None:
+        if node := self._joined():
+            node.seat.ask(self._client.id, node.clock.now())
+
+    def _answer(self, hand_over: bool) -> None:
+        if node := self._joined():
+            node.seat.answer(self._client.id, hand_over=hand_over)
+
     def _joined(self) -> DashboardNode | None:
         """Return the node while the browser is connected and the page is served."""
         return self._node.join(self._client.id) if self._client.has_socket_connection else None
 
     def _leave(self) -> None:
+        if self._node.is_watched_by(self._client.id) and (node := self._node.join(self._client.id)):
+            node.leave(self._client.id)
         self._node.leave(self._client.id)

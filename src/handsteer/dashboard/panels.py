@@ -3,10 +3,13 @@
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from typing import ClassVar
 
 from nicegui import ui
 
+from handsteer.cameras.browser import ChoiceOfCameras
 from handsteer.dashboard.legend import LEGEND
+from handsteer.dashboard.seat import Place, Role
 from handsteer.dashboard.state import PageState
 from handsteer.signs.vocabulary import NONE
 
@@ -42,9 +45,19 @@ class Banner:
 
 
 class CameraPanel:
-    """The mirrored picture, and what was understood of it."""
+    """The mirrored picture, what was understood of it, and whose camera it is from.
 
-    def __init__(self, picture_url: str) -> None:
+    Args:
+        picture_url: Where the stream of pictures is.
+        cameras: What there is to choose from; None where there is no choice.
+        viewer: Who looks at this page.
+        use_own: Is called to choose the camera of the machine that handsteer runs on.
+    """
+
+    def __init__(
+        self, picture_url: str, cameras: ChoiceOfCameras | None, viewer: str, use_own: Callable[[], None]
+    ) -> None:
+        self._cameras = cameras
         with ui.element("section").classes("card viewer camera"):
             with _box("stage"):
                 # Lazy, because a page counts as loaded only when its other pictures have come.
@@ -59,6 +72,8 @@ class CameraPanel:
                     self._confidence = _box("")
                 self._percent = _text("percent", "")
                 self._hand = _text("hand", "")
+            if cameras is not None:
+                self._choice(viewer, use_own)
         self._width = 0
 
     def update(self, state: PageState) -> None:
@@ -75,6 +90,53 @@ class CameraPanel:
             self._width = percent
         self._excuse.set_text(state.no_picture)
         _switch(self._veil, "off", on=not state.no_picture)
+        if self._cameras is not None:
+            self._show_choice(self._cameras.source)
+
+    def _choice(self, viewer: str, use_own: Callable[[], None]) -> None:
+        self._chosen = ""
+        with _box("foot choice"):
+            self._browsers = _button("Use this device's camera", f'data-camera="browser" data-viewer="{viewer}"')
+            self._own = _button("Use the robot's camera", 'data-camera="own"')
+            self._trouble = _text("trouble", "").props('role="alert"')
+        self._own.on("click", use_own)
+        ui.on("webcam", lambda event: self._trouble.set_text(str(event.args.get("words", ""))))
+
+    def _show_choice(self, source: str) -> None:
+        if source != self._chosen:
+            self._chosen = source
+            _switch(self._browsers, "hidden", on=source == "browser")
+            _switch(self._own, "hidden", on=source == "own")
+
+
+class SeatPanel:
+    """Whether this viewer drives, and the way to the driver's seat.
+
+    Args:
+        ask: Is called to ask for it.
+        answer: Is called with True to hand it over, with False to keep it.
+    """
+
+    _WORDS: ClassVar[dict[Role, str]] = {"driver": "you drive", "watcher": "you watch", "free": "nobody drives"}
+
+    def __init__(self, ask: Callable[[], None], answer: Callable[[bool], None]) -> None:
+        with _box("seat"):
+            self._question = _text("question", "")
+            self._words = _text("role chip", "")
+            self._ask = _button("Ask to drive", "").on("click", ask)
+            self._yes = _button("Hand over", "").on("click", lambda: answer(True))
+            self._no = _button("Keep", "").on("click", lambda: answer(False))
+
+    def update(self, place: Place) -> None:
+        """Show what the seat is for this viewer."""
+        is_driver = place.role == "driver"
+        asks = f"Somebody asks to drive; unanswered, they do in {place.left_s:.0f} s"
+        waits = f"You drive in {place.left_s:.0f} s, or sooner"
+        self._question.set_text((asks if is_driver else waits) if place.asked else "")
+        self._words.set_text(self._WORDS[place.role])
+        _switch(self._ask, "hidden", on=is_driver or place.asked)
+        for button in (self._yes, self._no):
+            _switch(button, "hidden", on=not (is_driver and place.asked))
 
 
 class RobotFoot:
@@ -260,6 +322,12 @@ def _fact(name: str) -> ui.label:
 
 def _switch(element: ui.element, name: str, *, on: bool) -> None:
     element.classes(add=name if on else "", remove="" if on else name)
+
+
+def _button(text: str, props: str) -> ui.element:
+    with ui.element("button").classes("text-button").props(f'type="button" {props}') as button:
+        ui.label(text).style("display: inline")
+    return button
 
 
 def _box(classes: str) -> ui.element:

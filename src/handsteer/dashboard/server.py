@@ -4,6 +4,7 @@ import errno
 import functools
 import os
 import socket
+import ssl
 import threading
 import time
 from pathlib import Path
@@ -12,22 +13,23 @@ from typing import Any
 import uvicorn
 from fastapi import FastAPI
 from nicegui import ui
-from starlette.middleware.trustedhost import TrustedHostMiddleware
 from starlette.responses import Response
 from starlette.staticfiles import StaticFiles
+from starlette.websockets import WebSocket
 
+from handsteer.cameras.browser import LARGEST_BYTES, ChoiceOfCameras
 from handsteer.clock import Clock
 from handsteer.config import DashboardConfig
+from handsteer.dashboard.access import Access, AccessMiddleware
 from handsteer.dashboard.node import DashboardNode
-from handsteer.dashboard.page import ASSETS_PATH, ICON, PICTURE_PATH, Page
+from handsteer.dashboard.page import ASSETS_PATH, ICON, PICTURE_PATH, WEBCAM_PATH, Page
 from handsteer.dashboard.picture import PictureNode, PictureResponse
 from handsteer.dashboard.watch import WhileWatched
+from handsteer.dashboard.webcam import FrameSocket
 from handsteer.errors import DashboardError
 from handsteer.messages import CMD_VEL, Topic
 from handsteer.nodes.steering import SteeringNode
 from handsteer.transports.protocol import Transport
-
-HOST = "127.0.0.1"
 
 _START_TIMEOUT_S = 20.0
 _STOP_TIMEOUT_S = 3.0
@@ -48,12 +50,15 @@ class Dashboard:
         transport: Carries the graph's messages.
         clock: The graph's clock.
         steering: Drives when people steer on the page.
-        config: Holds the port.
+        config: Where the page is served, and how.
         cmd_vel: The topic of the commands that are shown.
+        cameras: The camera of this process, which a browser's may stand in for; None where it is in another.
 
     Attributes:
         node: Listens and steers for the browsers that show the page.
         pictures: Encodes the camera's picture for the browsers that show it.
+        cameras: The camera of this process, or None.
+        webcam: Takes the frames of a browser's own camera.
     """
 
     def __init__(
@@ -63,35 +68,53 @@ class Dashboard:
         steering: SteeringNode,
         config: DashboardConfig,
         cmd_vel: Topic[Any] = CMD_VEL,
+        cameras: ChoiceOfCameras | None = None,
     ) -> None:
         self.node = WhileWatched(lambda: DashboardNode(transport, clock, steering, cmd_vel))
         self.pictures = WhileWatched(lambda: PictureNode(transport, clock))
-        self._port = config.port
+        self.cameras = cameras
+        self.webcam = FrameSocket(cameras, self._drives)
+        self._config = config
         self._server: uvicorn.Server | None = None
         self._thread: threading.Thread | None = None
 
     def start(self) -> str:
-        """Serve the page on 127.0.0.1 and return its address once it answers.
+        """Serve the page and return its address once it answers; it holds the token where one is needed.
 
         Raises:
-            DashboardError: The port is in use or not allowed, or this process serves another page.
+            DashboardError: The address, the port or the certificate cannot be used, or this process serves another
+                page.
         """
         if not _one_at_a_time.acquire(blocking=False):
             raise DashboardError("this process serves a page already: stop that one first")
+        config = self._config
         try:
-            listener = _listen(self._port)
+            _check_certificate(config)
+            listener = _listen(config.host, config.port)
         except DashboardError:
             _one_at_a_time.release()
             raise
+        access = Access.to(config.host)
         application = _application()
         application.state.dashboard = self
-        settings = uvicorn.Config(application, log_config=None, access_log=False, lifespan="on")
+        application.state.access = access
+        settings = uvicorn.Config(
+            application,
+            log_config=None,
+            access_log=False,
+            lifespan="on",
+            ws_max_size=2 * LARGEST_BYTES,
+            ssl_certfile=config.certificate,
+            ssl_keyfile=config.private_key,
+        )
         settings.timeout_graceful_shutdown = _GRACE_S  # type: ignore[assignment] # fractions work as well
         self._server = uvicorn.Server(settings)
         self._thread = threading.Thread(target=self._server.run, args=([listener],), name="dashboard", daemon=True)
         self._thread.start()
         self._wait_until_served()
-        return f"http://{HOST}:{listener.getsockname()[1]}"
+        scheme = "https" if config.certificate else "http"
+        address = f"{scheme}://{_shown(config.host)}:{listener.getsockname()[1]}"
+        return f"{address}/?token={access.token}" if access.token else address
 
     def stop(self) -> None:
         """End the page, open connections too; may be called twice."""
@@ -103,6 +126,12 @@ class Dashboard:
             self._server = None
             _one_at_a_time.release()
 
+    def _drives(self, viewer: str) -> bool:
+        if not self.node.is_watched_by(viewer):
+            return False
+        node = self.node.join(viewer)
+        return node is not None and node.seat.take(viewer, node.clock.now())
+
     def _wait_until_served(self) -> None:
         server, thread = self._server, self._thread
         deadline_s = time.monotonic() + _START_TIMEOUT_S
@@ -113,36 +142,71 @@ class Dashboard:
             time.sleep(0.01)
 
 
-def _listen(port: int) -> socket.socket:
-    listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+def _listen(host: str, port: int) -> socket.socket:
+    try:
+        family, _, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)[0]
+    except OSError as error:
+        raise DashboardError(f"--host {host} is no address of this machine: {error.strerror}") from None
+    listener = socket.socket(family, socket.SOCK_STREAM)
     if os.name == "posix":  # elsewhere this option would let two programs have the same port
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BUFFER_BYTES)
     try:
-        listener.bind((HOST, port))
+        listener.bind(address)
         listener.listen()
     except OSError as error:
         listener.close()
+        if error.errno == errno.EADDRNOTAVAIL:
+            raise DashboardError(
+                f"--host {host} is no address of this machine: 0.0.0.0 stands for all it has"
+            ) from None
         problem = "is in use" if error.errno == errno.EADDRINUSE else f"cannot be used ({error.strerror})"
-        raise DashboardError(f"port {port} on {HOST} {problem}: choose another with --port N (0: a free one)") from None
+        raise DashboardError(f"port {port} on {host} {problem}: choose another with --port N (0: a free one)") from None
     return listener
+
+
+def _shown(host: str) -> str:
+    """Return what others find this machine by when it serves the page on ``host``."""
+    if host in {"0.0.0.0", "::", ""}:
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+            try:
+                probe.connect(("203.0.113.1", 9))  # sends nothing: only asks which way it would go
+                host = str(probe.getsockname()[0])
+            except OSError:  # no network
+                host = socket.gethostname()
+    return f"[{host}]" if ":" in host else host
+
+
+def _check_certificate(config: DashboardConfig) -> None:
+    if config.certificate is None:
+        if config.private_key is not None:
+            raise DashboardError("dashboard.private_key is of no use without dashboard.certificate: give both")
+        return
+    try:
+        ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER).load_cert_chain(config.certificate, config.private_key)
+    except OSError as error:  # ssl's own errors are of this kind, too
+        reason = error.strerror or error
+        raise DashboardError(f"the certificate {config.certificate} cannot be used for https: {reason}") from None
 
 
 @functools.cache
 def _application() -> FastAPI:
     """Return the web application, made once per process, as NiceGUI wants it; ``state.dashboard`` is what it serves."""
     application = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
-    # Keeps foreign pages from reaching the robot by a host name of theirs that resolves to this machine.
-    application.add_middleware(TrustedHostMiddleware, allowed_hosts=[HOST, "localhost"])
+    application.add_middleware(AccessMiddleware, state=application.state)
     application.mount(ASSETS_PATH, StaticFiles(directory=Path(__file__).parent / "static"))
 
     @application.get(PICTURE_PATH)
     async def picture() -> Response:
         return PictureResponse(application.state.dashboard.pictures)
 
+    @application.websocket(WEBCAM_PATH)
+    async def webcam(socket: WebSocket) -> None:
+        await application.state.dashboard.webcam.serve(socket)
+
     @ui.page("/")
     def index() -> None:
-        Page(application.state.dashboard.node)
+        Page(application.state.dashboard.node, application.state.dashboard.cameras)
 
     ui.run_with(
         application,

@@ -33,13 +33,15 @@ class PictureModel:
         except (RuntimeError, ValueError) as error:
             raise ModelCorrupt(f"{path}: not a model that can be run ({str(error).splitlines()[0]})") from None
         (picture,) = self._interpreter.get_input_details()
-        # Both are functions that return a view of the interpreter's own memory; a view must not outlive the call.
-        self._input = self._interpreter.tensor(picture["index"])
-        self._outputs = [self._interpreter.tensor(output["index"]) for output in self._interpreter.get_output_details()]
+        self._input: int = picture["index"]
+        self._outputs: list[int] = [output["index"] for output in self._interpreter.get_output_details()]
         self.side: int = int(picture["shape"][1])
+        self._levels = np.empty((1, self.side, self.side, 3), np.float32)
 
     def run(self, picture: NDArray[np.uint8]) -> list[NDArray[np.float32]]:
         """Return the model's outputs for ``picture``, (side, side, 3) uint8 BGR; each without the batch dimension."""
-        np.multiply(cv2.cvtColor(picture, cv2.COLOR_BGR2RGB), _PER_LEVEL, out=self._input()[0])
+        np.multiply(cv2.cvtColor(picture, cv2.COLOR_BGR2RGB), _PER_LEVEL, out=self._levels[0])
+        # Copies: the interpreter refuses to run while anything, such as a logged error, holds a view of its memory.
+        self._interpreter.set_tensor(self._input, self._levels)
         self._interpreter.invoke()
-        return [output()[0].copy() for output in self._outputs]
+        return [self._interpreter.get_tensor(output)[0] for output in self._outputs]

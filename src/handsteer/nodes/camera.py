@@ -11,6 +11,7 @@ from handsteer.nodes.node import ERROR, OK, Node
 from handsteer.transports.protocol import Transport
 
 _DIAGNOSE_PERIOD_S = 0.5
+_SILENT_AFTER_S = 1.0
 _FIRST_RETRY_S = 0.5
 _LONGEST_RETRY_S = 8.0
 
@@ -38,6 +39,7 @@ class CameraNode(Node):
         self._frame_id = frame_id
         self._retry_s = _FIRST_RETRY_S
         self._state = (OK, f"{camera.name}: waiting for the first frame")
+        self._last_frame_s = clock.now()
         self._image = self.publisher(IMAGE_RAW)
         self._compressed = self.publisher(IMAGE_COMPRESSED)
         self._reading = self.every(camera.period_s or 0.0, self._read)
@@ -72,6 +74,7 @@ class CameraNode(Node):
             log.warning("%s is back", self._camera.name)
         self._retry_s = _FIRST_RETRY_S
         self.frames += 1
+        self._last_frame_s = self.clock.now()
         self._state = (OK, f"{self._camera.name}: delivers frames")
         header = Header(stamp=self.clock.stamp(frame.captured_s), frame_id=self._frame_id)
         self._image.publish(image_message(frame.image, header), frame.captured_s)
@@ -86,4 +89,7 @@ class CameraNode(Node):
 
     def _report(self) -> None:
         level, message = self._state
+        silence_s = self.clock.now() - self._last_frame_s
+        if level == OK and silence_s > _SILENT_AFTER_S:
+            message = f"{self._camera.name}: no frame for {silence_s:.0f} s"
         self.diagnose(level, message, frames=self.frames)

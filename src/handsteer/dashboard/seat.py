@@ -1,0 +1,103 @@
+"""Who of those who look at the page may drive: one at a time, the others watch and may ask."""
+
+import threading
+from dataclasses import dataclass
+from typing import Literal
+
+ANSWER_S = 10.0
+"""A driver who does not answer for so long hands over."""
+
+Role = Literal["driver", "watcher", "free"]
+
+
+@dataclass(frozen=True)
+class Place:
+    """What the seat is for one viewer.
+
+    Attributes:
+        role: Whether it drives, watches another one, or nobody drives.
+        asked: For the driver: somebody asks to drive. For a watcher: it has asked itself.
+        left_s: Seconds until an unanswered request is granted.
+    """
+
+    role: Role
+    asked: bool = False
+    left_s: float = 0.0
+
+
+class Seat:
+    """The driver's seat; may be used from any thread.
+
+    Who drives keeps the seat until it leaves, hands over, or does not answer a request in time. A refused viewer may
+    ask again.
+    """
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._driver: str | None = None
+        self._request: tuple[str, float] | None = None
+
+    def take(self, viewer: str, now_s: float) -> bool:
+        """Return whether ``viewer`` drives; it sits down if nobody else does."""
+        with self._lock:
+            self._hand_over_if_due(now_s)
+            if self._driver is None:
+                self._driver = viewer
+            return self._driver == viewer
+
+    def drives(self, viewer: str) -> bool:
+        """Return whether ``viewer`` has the seat."""
+        return self._driver == viewer
+
+    def ask(self, viewer: str, now_s: float) -> None:
+        """Ask the driver for the seat; the first who asks is answered first."""
+        with self._lock:
+            self._hand_over_if_due(now_s)
+            if self._driver is None:
+                self._driver = viewer
+            elif self._driver != viewer and self._request is None:
+                self._request = (viewer, now_s + ANSWER_S)
+
+    def answer(self, viewer: str, *, hand_over: bool) -> bool:
+        """Grant or refuse the request, if ``viewer`` is the driver; return whether the driver has changed."""
+        with self._lock:
+            if self._driver != viewer or self._request is None:
+                return False
+            asker, self._request = self._request[0], None
+            if hand_over:
+                self._driver = asker
+            return hand_over
+
+    def leave(self, viewer: str) -> bool:
+        """Let go of the seat and of a request; return whether ``viewer`` was the driver."""
+        with self._lock:
+            if self._request is not None and self._request[0] == viewer:
+                self._request = None
+            if self._driver != viewer:
+                return False
+            # Whoever has asked has been waiting for it.
+            self._driver = self._request[0] if self._request else None
+            self._request = None
+            return True
+
+    def tick(self, now_s: float) -> bool:
+        """Grant a request that has not been answered in time; return whether the driver has changed."""
+        with self._lock:
+            return self._hand_over_if_due(now_s)
+
+    def place_of(self, viewer: str, now_s: float) -> Place:
+        """Return what the seat is for ``viewer``."""
+        with self._lock:
+            asker, due_s = self._request or (None, now_s)
+            left_s = max(0.0, due_s - now_s)
+            if self._driver is None:
+                return Place("free")
+            if self._driver == viewer:
+                return Place("driver", asker is not None, left_s)
+            return Place("watcher", asker == viewer, left_s)
+
+    def _hand_over_if_due(self, now_s: float) -> bool:
+        if self._request is None or now_s < self._request[1]:
+            return False
+        self._driver, self._request = self._request[0], None
+        return True

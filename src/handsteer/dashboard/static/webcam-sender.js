@@ -1,0 +1,30 @@
+// Sends pictures as the server wants them: 8 bytes with the time of capture in milliseconds, then a JPEG file.
+
+const MOST_PIXELS = 640 * 480, QUALITY = 0.8, HEADER_BYTES = 8;
+
+let socket = null;
+let canvas = null;
+
+onmessage = ({ data }) => {
+  if (data.address) connect(data.address);
+  else send(data.picture, data.capturedMs);
+};
+
+function connect(address) {
+  socket = new WebSocket(address);
+  socket.onopen = socket.onmessage = () => postMessage({});
+  socket.onclose = (event) => postMessage({ closed: event.reason || "the connection was lost" });
+}
+
+async function send(picture, capturedMs) {
+  const scale = Math.min(1, Math.sqrt(MOST_PIXELS / (picture.width * picture.height)));
+  const width = Math.round(picture.width * scale), height = Math.round(picture.height * scale);
+  if (canvas?.width !== width || canvas?.height !== height) canvas = new OffscreenCanvas(width, height);
+  canvas.getContext("2d").drawImage(picture, 0, 0, width, height);
+  picture.close();
+  const jpeg = await canvas.convertToBlob({ type: "image/jpeg", quality: QUALITY });
+  const frame = new Uint8Array(HEADER_BYTES + jpeg.size);
+  new DataView(frame.buffer).setFloat64(0, capturedMs, true);
+  frame.set(new Uint8Array(await jpeg.arrayBuffer()), HEADER_BYTES);
+  if (socket.readyState === WebSocket.OPEN) socket.send(frame);
+}

@@ -1,0 +1,72 @@
+// Gives this browser's webcam to handsteer: the newest picture, whenever the last one has arrived.
+
+const WHY_NOT = {
+  NotAllowedError: "the browser was told not to give its camera away: allow it beside the address, then try again",
+  NotFoundError: "this device has no camera",
+  NotReadableError: "another program uses the camera",
+};
+
+let giving = null; // {stream, video, sender} while the camera is given
+
+function sayCamera(state, words = "") {
+  emitEvent("webcam", { state, words });
+}
+
+async function giveCamera(viewer) {
+  if (giving) return;
+  if (!navigator.mediaDevices?.getUserMedia) {
+    sayCamera("off", "browsers give a camera only to pages from https or localhost: docs/page.md says how");
+    return;
+  }
+  giving = { video: document.createElement("video") };
+  try {
+    const wanted = { width: { ideal: 640 }, height: { ideal: 480 }, frameRate: { ideal: 30 } };
+    giving.stream = await navigator.mediaDevices.getUserMedia({ video: wanted, audio: false });
+    Object.assign(giving.video, { muted: true, playsInline: true, srcObject: giving.stream });
+    await giving.video.play();
+  } catch (problem) {
+    keepCamera(WHY_NOT[problem.name] ?? `the browser gives no camera: ${problem.message}`);
+    return;
+  }
+  for (const track of giving.stream.getTracks()) track.onended = () => keepCamera("the camera was taken away");
+  sendFrames(viewer);
+}
+
+function sendFrames(viewer) {
+  const { video } = giving;
+  const address = new URL("camera", location.origin);
+  address.searchParams.set("viewer", viewer);
+  address.protocol = address.protocol.replace("http", "ws");
+  // A worker, because a page that draws a lot lets pictures wait for their encoding for up to a second.
+  const sender = giving.sender = new Worker("/assets/webcam-sender.js");
+  sender.postMessage({ address: address.href });
+  sender.onmessage = ({ data }) => {
+    if (data.closed !== undefined) keepCamera(data.closed);
+    // A picture that is sent twice would only look newer than it is.
+    else if (video.requestVideoFrameCallback) video.requestVideoFrameCallback(send);
+    else setTimeout(send, 33);
+  };
+  const send = async () => {
+    const capturedMs = performance.now();
+    const picture = await createImageBitmap(video);
+    sender.postMessage({ picture, capturedMs }, [picture]);
+  };
+  sayCamera("on");
+}
+
+function keepCamera(words = "") {
+  if (!giving) return;
+  const { stream, sender } = giving;
+  giving = null;
+  for (const track of stream?.getTracks() ?? []) track.stop();
+  sender?.terminate();
+  sayCamera("off", words);
+}
+
+document.addEventListener("click", (event) => {
+  const button = event.target.closest?.("[data-camera]");
+  if (!button) return;
+  if (button.dataset.camera === "browser") giveCamera(button.dataset.viewer);
+  else keepCamera();
+});
+window.addEventListener("pagehide", () => keepCamera());

@@ -1,0 +1,151 @@
+import struct
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from handsteer.cameras.browser import LARGEST_BYTES, BrowserCamera, ChoiceOfCameras, NoCamera, jpeg_size
+from handsteer.cameras.protocol import Camera, Frame
+from handsteer.cameras.virtual import VirtualHandCamera
+from handsteer.clock import SteppedClock
+from handsteer.config import VirtualHandConfig
+from handsteer.errors import FrameError
+from tests.contracts.camera_contract import CameraContract
+
+
+def jpeg(width: int = 32, height: int = 24, value: int = 90) -> bytes:
+    return cv2.imencode(".jpg", np.full((height, width, 3), value, np.uint8))[1].tobytes()
+
+
+def sent(at_s: float, **picture: int) -> bytes:
+    """Return a frame as a browser sends it, whose clock says ``at_s``."""
+    return struct.pack("<d", 1000 * at_s) + jpeg(**picture)
+
+
+class Sending:
+    """A browser's camera whose browser sends a frame whenever one is read, without delay."""
+
+    def __init__(self, clock: SteppedClock) -> None:
+        self._clock = clock
+        self._cameras = choice(clock)
+        self._cameras.choose("browser")
+        self.name, self.period_s = self._cameras.name, self._cameras.period_s
+        self.close = self._cameras.close
+
+    def read(self) -> Frame | None:
+        self._cameras.browser.offer(sent(self._clock.now() - 77.0))
+        return self._cameras.read()
+
+
+def choice(clock: SteppedClock) -> ChoiceOfCameras:
+    own = VirtualHandCamera(VirtualHandConfig(), width=64, height=48, fps=30, clock=clock)
+    return ChoiceOfCameras(own, BrowserCamera(clock))
+
+
+class TestBrowserCamera(CameraContract):
+    @pytest.fixture
+    def camera(self, clock: SteppedClock) -> Camera:
+        return Sending(clock)
+
+
+def test_the_newest_frame_is_read_once() -> None:
+    browser = BrowserCamera(SteppedClock(5.0))
+    browser.offer(sent(1.0, value=10))
+    browser.offer(sent(1.1, value=200))
+    frame = browser.read(0.0)
+    assert frame is not None
+    assert frame.image.mean() == pytest.approx(200, abs=2)
+    assert browser.read(0.0) is None
+
+
+def test_a_frame_that_was_held_up_is_as_old_as_it_is() -> None:
+    clock = SteppedClock(100.0)
+    browser = BrowserCamera(clock)
+    browser.offer(sent(3.0))
+    clock.advance(0.9)
+    browser.offer(sent(3.1))  # was under way for 0.8 s longer than the first one
+    frame = browser.read(0.0)
+    assert frame is not None
+    assert clock.now() - frame.captured_s == pytest.approx(0.8, abs=0.002)
+
+
+def test_clocks_that_drift_apart_make_no_frame_old() -> None:
+    clock = SteppedClock(0.0)
+    browser = BrowserCamera(clock)
+    for step in range(3600):  # an hour, in which the browser's clock loses 0.3 s
+        clock.advance(1.0)
+        browser.offer(sent(step * (1 - 0.0001)))
+    frame = browser.read(0.0)
+    assert frame is not None
+    assert clock.now() - frame.captured_s < 0.05
+
+
+def test_another_browser_starts_with_a_clock_of_its_own() -> None:
+    clock = SteppedClock(100.0)
+    browser = BrowserCamera(clock)
+    browser.offer(sent(50.0))
+    browser.forget()
+    assert browser.read(0.0) is None
+    browser.offer(sent(2.0))
+    frame = browser.read(0.0)
+    assert frame is not None
+    assert frame.captured_s == pytest.approx(100.0)
+
+
+def test_the_machines_own_camera_comes_back_only_when_it_is_chosen() -> None:
+    cameras = choice(SteppedClock(0.0))
+    assert (cameras.source, cameras.name) == ("own", "virtual hand")
+    assert cameras.read() is not None
+    cameras.choose("browser")
+    assert (cameras.source, cameras.name) == ("browser", "browser's camera")
+    assert cameras.read() is None
+    cameras.choose("own")
+    assert cameras.read() is not None
+
+
+def test_a_device_is_closed_while_the_browser_is_chosen_so_that_it_keeps_no_old_frame() -> None:
+    class Device(NoCamera):
+        closed = 0
+
+        def close(self) -> None:
+            self.closed += 1
+
+    device = Device()
+    cameras = ChoiceOfCameras(device, BrowserCamera(SteppedClock(0.0)))
+    cameras.choose("browser")
+    cameras.read()
+    cameras.read()
+    assert device.closed == 1
+
+
+@pytest.mark.parametrize(
+    ("data", "message"),
+    [
+        (b"", "a frame of 0 bytes"),
+        (bytes(LARGEST_BYTES + 1), "at most 1000000"),
+        (struct.pack("<d", float("nan")) + jpeg(), "without the time"),
+        (struct.pack("<d", 1.0) + b"GIF89a", "no JPEG"),
+        (sent(0.0, width=4000, height=3000), "4000x3000: it should have at most 1920x1080"),
+    ],
+    ids=["empty", "large", "timeless", "gif", "huge"],
+)
+def test_what_is_no_frame_is_refused(data: bytes, message: str) -> None:
+    with pytest.raises(FrameError, match=message):
+        BrowserCamera(SteppedClock(0.0)).offer(data)
+
+
+@given(width=st.integers(1, 300), height=st.integers(1, 300))
+def test_the_size_of_a_jpeg_file_is_read_from_its_head(width: int, height: int) -> None:
+    assert jpeg_size(jpeg(width, height)) == (width, height)
+
+
+@given(st.binary(max_size=200).map(lambda rest: b"\xff\xd8\xff" + rest))
+def test_no_bytes_do_harm(data: bytes) -> None:
+    browser = BrowserCamera(SteppedClock(0.0))
+    try:
+        browser.offer(struct.pack("<d", 1.0) + data)
+    except FrameError:
+        return
+    browser.read(0.0)

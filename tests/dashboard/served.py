@@ -1,0 +1,52 @@
+"""A page that tests ask things of."""
+
+import http.client
+import threading
+from typing import Any
+from urllib.parse import urlsplit
+
+import numpy as np
+from numpy.typing import NDArray
+
+from handsteer.clock import RealClock
+from handsteer.config import DashboardConfig
+from handsteer.dashboard.server import Dashboard
+from handsteer.images import image_message
+from handsteer.messages import DIAGNOSTICS, IMAGE_ANNOTATED, Header
+from handsteer.nodes.steering import SteeringNode
+from handsteer.transports.in_process import InProcessTransport
+
+PATIENCE_S = 20.0
+
+
+class Site:
+    """A page that is served, and a camera picture that is published as long as the site is."""
+
+    def __init__(self, **config: Any) -> None:
+        self.clock = RealClock()
+        self.transport = InProcessTransport()
+        steering = SteeringNode(self.transport, self.clock)
+        self.dashboard = Dashboard(self.transport, self.clock, steering, DashboardConfig(**{"port": 0, **config}))
+        self.pictures = self.transport.advertise("hand_sign_recognition", IMAGE_ANNOTATED)
+        self.reports = self.transport.advertise("robot", DIAGNOSTICS)
+        self.image: NDArray[np.uint8] = np.full((480, 640, 3), (40, 160, 220), np.uint8)
+        self.url = self.dashboard.start()
+        self.port = urlsplit(self.url).port or 0
+        self._ended = threading.Event()
+        self._camera = threading.Thread(target=self._publish)
+        self._camera.start()
+
+    def _publish(self) -> None:
+        while not self._ended.wait(0.02):
+            header = Header(self.clock.stamp(self.clock.now()), "camera")
+            self.pictures.publish(image_message(self.image, header))
+
+    def get(self, path: str, **headers: str) -> http.client.HTTPResponse:
+        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=PATIENCE_S)
+        connection.request("GET", path, headers=headers)
+        return connection.getresponse()
+
+    def close(self) -> None:
+        self.dashboard.stop()
+        self._ended.set()
+        self._camera.join()

@@ -1,0 +1,155 @@
+import asyncio
+import http.client
+import ssl
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+from urllib.parse import urlsplit
+
+import pytest
+import websockets
+from hypothesis import given
+from hypothesis import strategies as st
+
+from handsteer.dashboard.access import Access, is_loopback
+from handsteer.errors import DashboardError
+from tests.dashboard.served import PATIENCE_S, Site
+
+PLACES = ("/", "/camera.mjpg", "/assets/page.js", "/_nicegui_ws/socket.io/?EIO=4&transport=polling")
+
+
+@pytest.fixture
+def site() -> Iterator[Site]:
+    site = Site()
+    try:
+        yield site
+    finally:
+        site.close()
+
+
+@pytest.fixture
+def open_site() -> Iterator[Site]:
+    """One that other machines may reach."""
+    site = Site(host="0.0.0.0")
+    try:
+        yield site
+    finally:
+        site.close()
+
+
+def token_of(site: Site) -> str:
+    return urlsplit(site.url).query.removeprefix("token=")
+
+
+def status_of_websocket(site: Site, **headers: str) -> int:
+    """Return 101 when the page's own websocket opens, else the status of the answer."""
+
+    async def knock() -> int:
+        address = f"ws://127.0.0.1:{site.port}/_nicegui_ws/socket.io/?EIO=4&transport=websocket"
+        try:
+            async with websockets.connect(address, additional_headers=headers, open_timeout=PATIENCE_S):
+                return 101
+        except websockets.InvalidStatus as refusal:
+            return refusal.response.status_code
+
+    return asyncio.run(knock())
+
+
+def test_this_machine_alone_is_served_by_default_and_needs_no_token(site: Site) -> None:
+    assert site.url == f"http://127.0.0.1:{site.port}"
+    for path in PLACES:
+        response = site.get(path, Host="localhost")
+        assert response.status == 200
+        response.close()
+        assert site.get(path, Host="evil.example").status == 400
+    assert status_of_websocket(site) == 101
+
+
+def test_pages_of_other_sites_are_kept_out(site: Site) -> None:
+    host = f"127.0.0.1:{site.port}"
+    for path in PLACES:
+        assert site.get(path, Origin="https://evil.example").status == 403
+        assert site.get(path, Origin="null").status == 403
+        assert site.get(path, **{"Sec-Fetch-Site": "cross-site", "Sec-Fetch-Mode": "no-cors"}).status == 403
+    assert site.get("/", **{"Sec-Fetch-Site": "cross-site", "Sec-Fetch-Mode": "navigate"}).status == 200
+    assert site.get("/", Host=host, Origin=f"http://{host}").status == 200
+    assert status_of_websocket(site, Origin="https://evil.example") == 403
+    assert status_of_websocket(site, Origin=f"http://{host}") == 101
+
+
+def test_from_elsewhere_nothing_is_to_be_had_without_the_token(open_site: Site) -> None:
+    wrong = "x" * len(token_of(open_site))
+    for path in PLACES:
+        assert open_site.get(path).status == 401
+        assert open_site.get(path, Authorization=f"Bearer {wrong}").status == 401
+        assert open_site.get(path, Cookie=f"handsteer_{open_site.port}={wrong}").status == 401
+        response = open_site.get(path, Authorization=f"Bearer {token_of(open_site)}")
+        assert response.status == 200
+        response.close()
+    assert open_site.get(f"/?token={wrong}").status == 401
+    assert status_of_websocket(open_site) == 401
+    assert status_of_websocket(open_site, Cookie=f"handsteer_{open_site.port}={wrong}") == 401
+
+
+def test_the_printed_address_lets_a_browser_in_and_hides_its_token(open_site: Site) -> None:
+    response = open_site.get(f"/?token={token_of(open_site)}")
+    assert response.status == 303
+    assert response.headers["Location"] == "/"
+    cookie = response.headers["Set-Cookie"]
+    assert "HttpOnly" in cookie
+    assert "SameSite=lax" in cookie
+    pair = cookie.partition(";")[0]
+    assert open_site.get("/", Cookie=pair).status == 200
+    assert status_of_websocket(open_site, Cookie=pair) == 101
+    assert status_of_websocket(open_site, Cookie=pair, Origin="https://evil.example") == 403
+
+
+def test_https_with_a_certificate_of_ones_own(tmp_path: Path) -> None:
+    key, certificate = tmp_path / "key.pem", tmp_path / "certificate.pem"
+    command = ["openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-days", "1", "-subj", "/CN=localhost"]
+    subprocess.run(
+        [*command, "-addext", "subjectAltName=DNS:localhost", "-keyout", key, "-out", certificate],
+        check=True,
+        capture_output=True,
+    )
+    site = Site(certificate=certificate, private_key=key)
+    try:
+        assert site.url == f"https://127.0.0.1:{site.port}"
+        trust = ssl.create_default_context(cafile=str(certificate))
+        connection = http.client.HTTPSConnection("localhost", site.port, timeout=PATIENCE_S, context=trust)
+        connection.request("GET", "/")
+        assert connection.getresponse().status == 200
+    finally:
+        site.close()
+
+
+def test_a_certificate_that_cannot_be_used_is_named(tmp_path: Path) -> None:
+    with pytest.raises(DashboardError, match=r"gone\.pem cannot be used for https: No such file"):
+        Site(certificate=tmp_path / "gone.pem")
+    (tmp_path / "no.pem").write_text("no certificate")
+    with pytest.raises(DashboardError, match=r"no\.pem cannot be used for https"):
+        Site(certificate=tmp_path / "no.pem")
+    with pytest.raises(DashboardError, match=r"private_key is of no use without"):
+        Site(private_key=tmp_path / "no.pem")
+
+
+@pytest.mark.parametrize("host", ["203.0.113.7", "no.such.host.invalid"])
+def test_an_address_of_another_machine_is_named(host: str) -> None:
+    with pytest.raises(DashboardError, match=rf"^--host {host} is no address of this machine"):
+        Site(host=host)
+
+
+@pytest.mark.parametrize(
+    ("host", "alone"), [("127.0.0.1", True), ("::1", True), ("localhost", True), ("0.0.0.0", False)]
+)
+def test_what_only_this_machine_can_reach(host: str, alone: bool) -> None:
+    assert is_loopback(host) is alone
+    assert (Access.to(host).token is None) is alone
+
+
+@given(st.text())
+def test_only_the_token_is_admitted(given_text: str) -> None:
+    access = Access.to("0.0.0.0")
+    assert not access.admits(given_text)
+    assert not access.admits(None)
+    assert access.admits(access.token)

@@ -1,0 +1,131 @@
+"""The browser's own webcam, in a real browser that plays a real recording as one."""
+
+import csv
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+
+import cv2
+import pytest
+from playwright.sync_api import Browser, Page, sync_playwright
+from scripts import chromium
+
+from handsteer.config import load
+from handsteer.dashboard.server import Dashboard
+from handsteer.graph import Graph
+
+PATIENCE_MS = 60_000
+
+pytestmark = [
+    pytest.mark.browser,
+    pytest.mark.slow,
+    pytest.mark.skipif(chromium.find() is None, reason=f"no browser found: none of {', '.join(chromium.NAMES)}"),
+]
+
+
+def recording(slideshow: Path, sign: str, path: Path) -> Path:
+    """Write the frames of the slide show with ``sign`` as a file that Chromium takes for a webcam."""
+    with slideshow.with_suffix(".labels.csv").open() as file:
+        wanted = {int(row["frame"]) for row in csv.DictReader(file) if row["sign"] == sign}
+    video = cv2.VideoCapture(str(slideshow))
+    with path.open("wb") as out:
+        for number in range(max(wanted) + 1):
+            image = video.read()[1]
+            if number in wanted:
+                out.write(cv2.imencode(".jpg", image)[1].tobytes())
+    return path
+
+
+@pytest.fixture
+def graph() -> Iterator[Graph]:
+    config = load(base={"camera": {"source": "virtual"}, "virtual_hand": {"script": "NONE:60"}})
+    with Graph(config) as graph:
+        graph.start()
+        yield graph
+
+
+@pytest.fixture
+def url(graph: Graph) -> Iterator[str]:
+    config = load(base={"dashboard": {"port": 0}}).dashboard
+    dashboard = Dashboard(graph.transport, graph.clock, graph.steering, config, cameras=graph.cameras)
+    try:
+        yield dashboard.start()
+    finally:
+        dashboard.stop()
+
+
+@pytest.fixture
+def browser(slideshow: Path, tmp_path: Path) -> Iterator[Browser]:
+    webcam = recording(slideshow, "Forward", tmp_path / "forward.mjpeg")
+    with sync_playwright() as playwright:
+        browser = chromium.launch(playwright, webcam)
+        yield browser
+        browser.close()
+
+
+def show(browser: Browser, url: str) -> Page:
+    page = browser.new_page()
+    page.set_default_timeout(PATIENCE_MS)
+    page.goto(url)
+    return page
+
+
+def wait_for_words(page: Page, selector: str, words: str) -> None:
+    page.wait_for_function(
+        "([selector, words]) => document.querySelector(selector)?.innerText.includes(words)", arg=[selector, words]
+    )
+
+
+def test_the_browsers_webcam_drives_until_its_page_is_closed(graph: Graph, url: str, browser: Browser) -> None:
+    page = show(browser, url)
+    wait_for_words(page, ".banner", "no hand is in view")
+    page.get_by_text("Use this device's camera").click()
+    wait_for_words(page, ".camera .sign", "Forward")
+    wait_for_words(page, ".chip", "browser's camera")
+    wait_for_words(page, ".banner .headline", "Driving")
+    assert page.get_by_text("Use the robot's camera").is_visible()
+
+    second = show(browser, url)
+    second.get_by_text("Use this device's camera").wait_for(state="hidden")
+    page.close()
+    wait_until_stands(graph)
+    # The robot's own camera does not come back by itself, whatever it sees.
+    assert graph.cameras.source == "browser"
+    wait_for_words(second, ".banner", "no frame")
+    second.get_by_text("Use the robot's camera").click()
+    wait_for_words(second, ".banner", "no hand is in view")
+
+
+def wait_until_stands(graph: Graph) -> None:
+    waiting = threading.Event()
+    for _ in range(PATIENCE_MS // 50):
+        if graph.robot.state.linear_mps == pytest.approx(0, abs=0.01):
+            return
+        waiting.wait(0.05)
+    pytest.fail("the robot drives on")
+
+
+def test_only_who_drives_gives_a_camera(graph: Graph, url: str, browser: Browser) -> None:
+    first, second = show(browser, url), show(browser, url)
+    buttons = [page.get_by_text("Use this device's camera") for page in (first, second)]
+    for button in buttons:
+        button.wait_for()
+    buttons[0].click()
+    wait_for_words(first, ".camera .sign", "Forward")
+    viewer = second.locator("[data-camera=browser]").get_attribute("data-viewer")
+    second.evaluate("viewer => giveCamera(viewer)", viewer)
+    wait_for_words(second, ".camera .trouble", "only who drives may give a camera")
+    second.get_by_role("button", name="Ask to drive").click()
+    first.get_by_text("Hand over").click()
+    wait_for_words(first, ".camera .trouble", "somebody else drives now")
+    second.evaluate("viewer => giveCamera(viewer)", viewer)
+    wait_for_words(second, ".camera .sign", "Forward")
+
+
+def test_a_browser_without_a_webcam_says_so(url: str) -> None:
+    with sync_playwright() as playwright:
+        browser = chromium.launch(playwright)
+        page = show(browser, url)
+        page.get_by_text("Use this device's camera").click()
+        wait_for_words(page, ".camera .trouble", "this device has no camera")
+        browser.close()
