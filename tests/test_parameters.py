@@ -72,7 +72,7 @@ def test_what_is_read_at_the_start_can_only_be_set_to_what_it_is() -> None:
 @pytest.mark.parametrize("section", list(Config.model_fields))
 def test_every_parameter_of_every_node_has_a_fitting_description(section: str) -> None:
     parameters = NodeParameters(Config(), section, lambda _: None)
-    kinds = {"bool": bool, "integer": int, "double": float, "string": str}
+    kinds = {"bool": bool, "integer": int, "double": float, "string": str, "strings": list}
     for name, value in parameters.values().items():
         description = parameters.describe(name)
         assert description is not None
@@ -82,7 +82,7 @@ def test_every_parameter_of_every_node_has_a_fitting_description(section: str) -
             assert description.minimum <= value  # type: ignore[operator]
 
 
-LIVE = [name for name in ControlConfig.model_fields if name not in {"ramp", "actions"}]
+LIVE = sorted(ControlConfig.live - {"ramp", "actions"})
 
 
 @given(st.dictionaries(st.sampled_from(LIVE), st.floats() | st.integers() | st.booleans() | st.text(max_size=3)))

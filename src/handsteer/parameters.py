@@ -16,21 +16,30 @@ from pydantic.fields import FieldInfo
 from handsteer.config import Config, Section, validate
 from handsteer.errors import ConfigError
 
-Value = bool | int | float | str
-Kind = Literal["bool", "integer", "double", "string"]
+Value = bool | int | float | str | list[str]
+Kind = Literal["bool", "integer", "double", "string", "strings"]
 
-_KINDS: dict[Any, Kind] = {bool: "bool", int: "integer", float: "double", str: "string", Path: "string"}
+_KINDS: dict[Any, Kind] = {
+    bool: "bool",
+    int: "integer",
+    float: "double",
+    str: "string",
+    Path: "string",
+    tuple[str, ...]: "strings",
+}
 _FITTING: dict[Kind, tuple[type, ...]] = {
     "bool": (bool,),
     "integer": (int,),
     "double": (float, int),
     "string": (str,),
+    "strings": (list,),
 }
 _WORDS: dict[Kind, str] = {
     "bool": "true or false",
     "integer": "a whole number",
     "double": "a number",
     "string": "a text",
+    "strings": "a list of texts",
 }
 _USED_TOGETHER = {"camera": ("virtual_hand",), "signs": ("landmarks",)}
 _AT_START = "it is read when the node starts: give it then"
@@ -223,14 +232,14 @@ def _is_table(model: type[Section], field: str) -> bool:
 
 
 def _plain(value: Any) -> Value:
-    return str(value) if isinstance(value, Path) else value
+    return str(value) if isinstance(value, Path) else list(value) if isinstance(value, tuple) else value
 
 
 def _describe(model: type[Section], name: str) -> Description:
     field = model.model_fields[name]
-    of = get_args(field.annotation)[1] if _is_table(model, name) else field.annotation
+    of = _without_none(get_args(field.annotation)[1] if _is_table(model, name) else field.annotation)
     choices = get_args(of) if get_origin(of) is Literal else ()
-    kind = "string" if choices else _kind(of)
+    kind = "string" if choices else _KINDS[of]
     above = _bound(field, "gt")
     lowest = above if above is not None else _bound(field, "ge")
     constraint = f"one of {', '.join(choices)}" if choices else f"above {above:g}" if above is not None else ""
@@ -238,8 +247,10 @@ def _describe(model: type[Section], name: str) -> Description:
     return Description(kind, field.description or "", lowest, _bound(field, "le"), constraint, fixed)
 
 
-def _kind(annotation: Any) -> Kind:
-    return _KINDS[next((one for one in get_args(annotation) if one is not NoneType), annotation)]
+def _without_none(annotation: Any) -> Any:
+    """Return what an optional ``annotation`` is when it is set."""
+    parts = [part for part in get_args(annotation) if part is not NoneType]
+    return parts[0] if NoneType in get_args(annotation) else annotation
 
 
 def _bound(field: FieldInfo, sign: str) -> float | None:

@@ -44,7 +44,10 @@ def prints(capsys: pytest.CaptureFixture[str], *arguments: str, code: int = 0) -
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["run", "--camera", "gone.mp4"], r"there is no camera gone\.mp4: give auto, virtual, a webcam's number"),
+        (
+            ["run", "--camera", "gone.mp4"],
+            r"there is no camera gone\.mp4: give auto, virtual, browser, a webcam",
+        ),
         (["run", "--camera", "97"], r"there is no webcam /dev/video97: "),
         (["run", "--camera", __file__], r"test_cli\.py is not a video that can be decoded: try an mp4"),
         (["run", "--camera", str(Path(__file__).parent)], r"there are no photos in "),

@@ -139,9 +139,8 @@ def _run_until_end(graph: Graph, settings: Config, duration: float | None, *, he
     # The page's libraries take a second to load, which a headless run need not wait for.
     from handsteer.dashboard.server import Dashboard  # noqa: PLC0415
 
-    dashboard = Dashboard(
-        graph.transport, graph.clock, graph.steering, settings.dashboard, cmd_vel_topic(settings), graph.cameras
-    )
+    wires = (graph.transport, graph.clock, graph.steering)
+    dashboard = Dashboard(*wires, settings.dashboard, cmd_vel=cmd_vel_topic(settings), cameras=graph.cameras)
     url = dashboard.start()
     try:
         graph.start()

@@ -67,6 +67,7 @@ class Dashboard:
         clock: Clock,
         steering: SteeringNode,
         config: DashboardConfig,
+        *,
         cmd_vel: Topic[Any] = CMD_VEL,
         cameras: ChoiceOfCameras | None = None,
     ) -> None:

@@ -16,12 +16,13 @@ class FrameAge:
         limit_s: Greatest age of a frame in seconds; a frame that is ahead of us by more is refused, too.
 
     Attributes:
+        limit_s: As above; may be changed.
         age_s: Age of the last frame, at least.
         ahead_s: By how much the camera's clock is ahead of ours, at least.
     """
 
     def __init__(self, limit_s: float) -> None:
-        self._limit_s = limit_s
+        self.limit_s = limit_s
         self._noted_s: float | None = None
         self.age_s = 0.0
         self.ahead_s = 0.0
@@ -37,11 +38,11 @@ class FrameAge:
         self._noted_s = now_s
         self.ahead_s = max(0.0, self.ahead_s - _LEAK * elapsed_s)
         by_stamp_s = now_s - captured_s
-        if by_stamp_s < -self._limit_s:
+        if by_stamp_s < -self.limit_s:
             return f"frames are stamped {-by_stamp_s:.1f} s ahead of our clock: are the clocks of the machines in step?"
         self.ahead_s = max(self.ahead_s, -by_stamp_s)
         self.age_s = by_stamp_s + self.ahead_s
-        if self.age_s <= self._limit_s:
+        if self.age_s <= self.limit_s:
             return None
         ahead = f" by a clock that is {self.ahead_s:.1f} s ahead of ours" if self.ahead_s >= 0.05 else ""
         return f"frames come {self.age_s:.1f} s after their stamp{ahead}: are the clocks of the machines in step?"

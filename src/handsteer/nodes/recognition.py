@@ -70,6 +70,7 @@ class HandSignRecognitionNode(Node):
     def on_reconfigure(self, config: Config) -> None:
         """Take the confidences and times of ``signs``."""
         self._config = config.signs
+        self._age.limit_s = config.signs.max_frame_age
         self._recognizer.reconfigure(config.signs)
 
     def _on_frame(self, received: Received[M], picture_of: Callable[[M], NDArray[np.uint8]]) -> None:

@@ -28,8 +28,8 @@ PARAMETER_EVENTS = Topic("/parameter_events", ParameterEvent, is_global=True, de
 """Which parameters of which node have changed."""
 
 NOT_SET = 0
-_TYPES = {"bool": 1, "integer": 2, "double": 3, "string": 4}
-_FIELDS = {1: "bool_value", 2: "integer_value", 3: "double_value", 4: "string_value"}
+_TYPES = {"bool": 1, "integer": 2, "double": 3, "string": 4, "strings": 9}
+_FIELDS = {1: "bool_value", 2: "integer_value", 3: "double_value", 4: "string_value", 9: "string_array_value"}
 _ARRAYS = ("byte_array_value", "bool_array_value", "integer_array_value", "double_array_value", "string_array_value")
 _INTERFACES = "rcl_interfaces/msg"
 
@@ -151,14 +151,15 @@ def _read(parameter: Any) -> Any:
     """Return the value of a ``Parameter``; None when it is not set.
 
     Raises:
-        ConfigError: It is an array, of which the nodes have none.
+        ConfigError: It is an array of numbers, of which the nodes have none.
     """
     kind = parameter.value.type
     if kind == NOT_SET:
         return None
     if kind not in _FIELDS:
-        raise ConfigError(f"{parameter.name}: a list should be a single value")
-    return getattr(parameter.value, _FIELDS[kind])
+        raise ConfigError(f"{parameter.name}: a list of numbers should be a single value")
+    value = getattr(parameter.value, _FIELDS[kind])
+    return list(value) if kind == _TYPES["strings"] else value
 
 
 def _value(kind: str, value: Value) -> Any:
@@ -167,7 +168,7 @@ def _value(kind: str, value: Value) -> Any:
     fields |= {"byte_array_value": np.zeros(0, np.uint8), "bool_array_value": np.zeros(0, np.bool_)}
     fields |= {"integer_array_value": np.zeros(0, np.int64), "double_array_value": np.zeros(0, np.float64)}
     number = _TYPES[kind]
-    fields[_FIELDS[number]] = float(value) if kind == "double" else value
+    fields[_FIELDS[number]] = float(value) if isinstance(value, int | float) and kind == "double" else value
     return _message("ParameterValue", type=number, **fields)
 
 
