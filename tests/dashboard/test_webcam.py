@@ -81,7 +81,7 @@ def test_the_browsers_webcam_drives_until_its_page_is_closed(graph: Graph, url: 
     wait_for_words(page, ".banner", "no hand is in view")
     page.get_by_text("Use this device's camera").click()
     wait_for_words(page, ".camera .sign", "Forward")
-    wait_for_words(page, ".chip", "browser's camera")
+    wait_for_words(page, ".source", "browser's camera")
     wait_for_words(page, ".banner .headline", "Driving")
     assert page.get_by_text("Use the robot's camera").is_visible()
 

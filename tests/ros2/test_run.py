@@ -36,7 +36,8 @@ def test_a_robot_of_a_real_ros2_is_driven(ros2: Ros2Graph) -> None:
     process = ros2.handsteer("run", *CAMERA, "--robot", "turtlebot4", *words)
     eventually(lambda: peer.ask("listeners", topic="/odom") or not process.running)
     assert process.running, process.text
-    peer.ask("publish", topic="/odom", values={"pose.pose.position.x": 1.5}, count=20, period_s=0.05)
+    # Both ends have found each other only when each has seen the other, which takes Fast DDS up to three seconds.
+    peer.ask("publish", topic="/odom", values={"pose.pose.position.x": 1.5}, count=100, period_s=0.05)
     eventually(lambda: peer.ask("get", topic="/cmd_vel")[-1:] and peer.ask("get", topic="/cmd_vel")[-1][1][0] == 0.1)
     _, (_, stamp_s, frame) = peer.ask("get", topic="/cmd_vel")[-1]
     assert abs(stamp_s - time.time()) < 5.0

@@ -78,7 +78,7 @@ class Page:
                 ui.label("drive a robot with your hand signs").classes("tagline")
             with ui.element("div").classes("right"):
                 self._driving = SeatPanel(self._ask, self._answer)
-                self._source = ui.label("").classes("chip")
+                self._source = ui.label("").classes("source chip")
                 with ui.element("button").classes("icon-button theme").props('aria-label="Light or dark"'):
                     ui.html(_THEME_ICON, sanitize=False)
 
