@@ -13,7 +13,7 @@ from typing import Any
 from cyclonedds.core import Policy, Qos
 from cyclonedds.domain import DomainParticipant
 from cyclonedds.idl import IdlStruct
-from cyclonedds.idl.types import float64, int32, int64, sequence, uint8, uint32, uint64
+from cyclonedds.idl.types import byte, float64, int32, int64, sequence, uint8, uint32, uint64
 from cyclonedds.internal import InvalidSample
 from cyclonedds.pub import DataWriter
 from cyclonedds.sub import DataReader
@@ -46,7 +46,7 @@ class ParameterValue(IdlStruct, typename=f"{MSG}ParameterValue_"):
     integer_value: int64 = 0
     double_value: float64 = 0.0
     string_value: str = ""
-    byte_array_value: sequence[uint8] = field(default_factory=list)
+    byte_array_value: sequence[byte] = field(default_factory=list)
     bool_array_value: sequence[bool] = field(default_factory=list)
     integer_array_value: sequence[int64] = field(default_factory=list)
     double_array_value: sequence[float64] = field(default_factory=list)

@@ -153,15 +153,13 @@ def test_after_its_odometry_stopped_it_moves_only_with_a_fresh_sign(robots: Robo
 
 def test_a_robot_that_comes_back_from_the_dead_waits_for_a_fresh_sign(robots: Robots) -> None:
     robots.add()
-    process = robots.run("--robot", "dds", "--control.max-linear", "0.1", script="Forward:8 Stop:1 Forward:60")
+    process = robots.run("--robot", "dds", "--control.max-linear", "0.1")
     robots.expect_speed(0.1)
     robots.robot.kill()
     robots.robot = robots.start_robot()
     robots.add()
-    eventually(lambda: len(robots.told) > 10, what="commands for the robot that came back")
-    robots.expect_speed(0.1)
-    told = [linear for _, linear, _ in robots.told]
-    assert told[:10] == [0.0] * 10
+    eventually(lambda: len(robots.told) > 30, what="commands for the robot that came back")
+    assert {linear for _, linear, _ in robots.told} == {0.0}
     assert process.running
 
 
