@@ -156,6 +156,7 @@ def test_a_robot_that_comes_back_from_the_dead_waits_for_a_fresh_sign(robots: Ro
     process = robots.run("--robot", "dds", "--control.max-linear", "0.1")
     robots.expect_speed(0.1)
     robots.robot.kill()
+    time.sleep(1.0)  # no robot is back sooner
     robots.robot = robots.start_robot()
     robots.add()
     eventually(lambda: len(robots.told) > 30, what="commands for the robot that came back")

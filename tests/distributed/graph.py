@@ -193,6 +193,7 @@ class Drive:
 
     def assert_standing(self, seconds: float) -> None:
         """See that the robot stands for so long, by what it says itself."""
+        self.until(self.odometry, "the robot to say something")  # its clock need not be ours
         since_s = self._last().at_s
         time.sleep(seconds)
         assert len(self.odometry(since_s)) > seconds, "the robot has fallen silent"
