@@ -30,6 +30,7 @@ from rosbags.typesys.stores.ros2_jazzy import rosgraph_msgs__msg__Clock as Clock
 from rosbags.typesys.stores.ros2_jazzy import sensor_msgs__msg__CompressedImage as CompressedImage
 from rosbags.typesys.stores.ros2_jazzy import sensor_msgs__msg__Image as Image
 from rosbags.typesys.stores.ros2_jazzy import sensor_msgs__msg__JointState as JointState
+from rosbags.typesys.stores.ros2_jazzy import std_msgs__msg__Bool as Bool
 from rosbags.typesys.stores.ros2_jazzy import std_msgs__msg__ColorRGBA as ColorRGBA
 from rosbags.typesys.stores.ros2_jazzy import std_msgs__msg__Header as Header
 from rosbags.typesys.stores.ros2_jazzy import std_msgs__msg__String as String
@@ -39,6 +40,7 @@ from rosbags.typesys.stores.ros2_jazzy import visualization_msgs__msg__MarkerArr
 from rosbags.typesys.stores.ros2_jazzy import visualization_msgs__msg__MeshFile as MeshFile
 
 __all__ = [
+    "Bool",
     "ClockMessage",
     "CmdVelType",
     "ColorRGBA",
@@ -146,6 +148,8 @@ IMAGE_ANNOTATED = Topic("/gesture/image_annotated", Image)
 CMD_VEL = Topic("/robot_diff_drive_controller/cmd_vel", Twist, depth=10, lifespan_s=_COMMAND_LIFESPAN_S)
 SELECT_ROBOT = Topic("/select_robot", String, depth=10)
 SELECTED_ROBOT = Topic("/selected_robot", String, latched=True)
+# True stops the robot, whoever drives; false lets it drive again. No stop may get lost.
+STOP = Topic("/stop", Bool, depth=10)
 STEERING_CMD_VEL = Topic("/steering/cmd_vel", Twist, lifespan_s=_COMMAND_LIFESPAN_S)
 ODOM = Topic("/robot_diff_drive_controller/odom", Odometry)
 TF = Topic("/tf", TFMessage, is_global=True, depth=10)

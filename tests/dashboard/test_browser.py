@@ -121,6 +121,41 @@ def test_drives_while_the_pad_is_held_and_stops_when_it_is_let_go(visit: Visit) 
     assert robot.state.angular_radps == pytest.approx(0, abs=0.01)
 
 
+@pytest.mark.parametrize("visit", ["Forward:6 NONE:1 Forward:60"], indirect=True)
+def test_stop_holds_until_it_is_reset_and_a_reset_alone_moves_nothing(visit: Visit) -> None:
+    robot, page = visit.graph.robot, visit.page
+    visit.wait_until(lambda: robot.state.linear_mps > 0.05)
+    page.keyboard.press("Space")
+    visit.wait_until(lambda: visit.text(".banner .headline") == "Stopped")
+    visit.wait_until(lambda: robot.state.linear_mps == pytest.approx(0, abs=0.01))
+    visit.wait_until(lambda: visit.text(".camera .sign") == "No sign")  # the hand has let go meanwhile
+    visit.wait_until(lambda: visit.text(".camera .sign") == "Forward")
+    page.wait_for_timeout(500)
+    assert robot.state.linear_mps == pytest.approx(0, abs=0.01)
+
+    page.get_by_role("button", name="Reset").click()
+    visit.wait_until(lambda: "moves once Stop is shown" in visit.text(".banner .reason"))
+    page.wait_for_timeout(500)
+    assert robot.state.linear_mps == pytest.approx(0, abs=0.01)
+    assert visit.troubles == []
+
+
+@pytest.mark.parametrize("visit", ["Forward:60"], indirect=True)
+def test_whoever_watches_may_stop_but_only_the_driver_resets(visit: Visit) -> None:
+    first, second = visit.page, visit.page.context.browser.new_page()
+    first.get_by_text("Ask to drive").click()
+    first.locator(".seat .role", has_text="you drive").wait_for()
+    second.goto(first.url)
+    second.get_by_role("button", name="Stop the robot").click()
+    for page in (first, second):
+        page.locator(".banner .headline", has_text="Stopped").wait_for()
+    second.get_by_role("button", name="Reset").click()
+    second.wait_for_timeout(500)
+    assert second.locator(".banner .headline").inner_text() == "Stopped"
+    first.get_by_role("button", name="Reset").click()
+    first.locator(".banner .headline", has_text="Standing").wait_for()
+
+
 @pytest.mark.parametrize("visit", ["NONE:60"], indirect=True)
 def test_a_second_browser_watches_until_the_first_hands_over(visit: Visit) -> None:
     robot = visit.graph.robot

@@ -13,6 +13,8 @@ from handsteer.messages import (
     SELECT_ROBOT,
     SELECTED_ROBOT,
     STEERING_CMD_VEL,
+    STOP,
+    Bool,
     String,
     cmd_vel,
     twist,
@@ -195,6 +197,80 @@ def test_a_stamped_command_has_the_time_of_the_command_and_a_frame() -> None:
     assert (command.header.frame_id, command.twist.linear.x) == ("r1/base_link", 0.01)
     bench.nodes[0].stop()
     assert commands[-1].twist == twist(0.0, 0.0)
+
+
+def stop(bench: ControlBench, value: bool) -> None:
+    bench.transport.advertise("page", STOP).publish(Bool(data=value))
+    bench.run(0.0)
+
+
+def test_stop_holds_against_signs_and_steering(bench: ControlBench) -> None:
+    bench.show(*["Forward"] * 3)
+    stop(bench, True)
+    assert bench.commands[-1] == (0, 0)
+    bench.show(*["Forward"] * 3)
+    bench.transport.advertise("slider", STEERING_CMD_VEL).publish(twist(0.5, 0.0))
+    bench.run(0.0)
+    assert set(bench.commands[3:]) == {(0, 0)}
+
+
+def test_a_reset_alone_moves_nothing(bench: ControlBench) -> None:
+    bench.show(*["Forward"] * 3)
+    stop(bench, True)
+    stop(bench, False)
+    bench.show(*["Forward"] * 5)
+    assert set(bench.commands[3:]) == {(0, 0)}
+    bench.show("NONE", "Forward")
+    assert bench.commands[-1] == (0.01, 0)
+
+
+def test_steering_that_was_held_through_a_reset_has_to_let_go(bench: ControlBench) -> None:
+    slider = bench.transport.advertise("slider", STEERING_CMD_VEL)
+
+    def steer(speed: float) -> None:
+        slider.publish(twist(speed, 0.0))
+        bench.run(0.1)
+
+    steer(0.5)
+    stop(bench, True)
+    steer(0.5)
+    stop(bench, False)
+    steer(0.5)
+    assert bench.commands[-1] == (0, 0)
+    steer(0.0)
+    steer(0.5)
+    assert bench.commands[-1] == (0.5, 0)
+
+
+def test_a_reset_without_a_stop_changes_nothing(bench: ControlBench) -> None:
+    bench.show(*["Forward"] * 3)
+    stop(bench, False)
+    bench.show("Forward")
+    assert bench.commands[-1] == (0.04, 0)
+
+
+STOP_EVENTS = st.lists(st.sampled_from(["Forward", "Backward", "NONE", "Stop", "steer", "pause", "stop", "reset"]))
+
+
+@given(events=STOP_EVENTS)
+def test_whatever_happens_a_stopped_robot_stands(events: list[str]) -> None:
+    bench, is_stopped = ControlBench(), False
+    for event in events:
+        if event in {"stop", "reset"}:
+            before = bench.commands[-1:]
+            is_stopped = event == "stop"
+            stop(bench, is_stopped)
+            if event == "reset":
+                assert bench.commands[-1:] == before
+        elif event == "pause":
+            bench.run(1.0)
+        elif event == "steer":
+            bench.transport.advertise("slider", STEERING_CMD_VEL).publish(twist(0.5, 0.0))
+            bench.run(0.0)
+        else:
+            bench.show(event)
+        if is_stopped:
+            assert bench.commands[-1] == (0, 0)
 
 
 class FleetBench(Bench):

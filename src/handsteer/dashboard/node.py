@@ -117,6 +117,16 @@ class DashboardNode(Node):
             self._holder = None
             self._steering.release()
 
+    def halt(self) -> None:
+        """Stop the robot, whoever drives and whoever asks."""
+        self._holder = None
+        self._steering.halt()
+
+    def reset(self, viewer: str) -> None:
+        """Let the robot be driven again, if ``viewer`` has the driver's seat or nobody has."""
+        if self.seat.take(viewer, self.clock.now()):
+            self._steering.reset()
+
     def leave(self, viewer: str) -> None:
         """Stop if it is ``viewer`` who steers, and let others drive."""
         self.release(viewer)

@@ -55,7 +55,7 @@ class Page:
             f'<script src="{ASSETS_PATH}/webcam.js" defer></script>'
         )
         self._top()
-        self._banner = Banner()
+        self._banner = Banner(self._halt, self._reset)
         self._camera = CameraPanel(PICTURE_PATH, cameras, self._client.id, self._use_own_camera)
         with ui.element("section").classes("card viewer world"):
             with ui.element("div").classes("stage"):
@@ -103,6 +103,14 @@ class Page:
     def _release(self) -> None:
         if node := self._joined():
             node.release(self._client.id)
+
+    def _halt(self) -> None:
+        if node := self._joined():
+            node.halt()
+
+    def _reset(self) -> None:
+        if node := self._joined():
+            node.reset(self._client.id)
 
     def _use_own_camera(self) -> None:
         node = self._joined()

@@ -78,6 +78,7 @@ class PageState:
         no_picture: Why no pictures come; empty when they come.
         camera: Short name of the camera.
         driver: Who drives: ``signs``, ``steering`` or ``nobody``.
+        stopped: Whether somebody has stopped the robot until it is reset.
         commanded: The velocity that the robot is told, zero when it is told nothing.
         measured: The velocity that odometry says.
         latency_median_ms: From capture to command; None when not known yet.
@@ -97,6 +98,7 @@ class PageState:
     no_picture: str
     camera: str
     driver: str
+    stopped: bool
     commanded: Velocity
     measured: Velocity
     latency_median_ms: float | None
@@ -126,6 +128,7 @@ def compose(observed: Observed, now_s: float) -> PageState:
         no_picture="" if "seen" in seen.values else camera.message if camera.level >= ERROR else seen.message,
         camera=camera_name(camera.message),
         driver=control.values.get("source", "nobody"),
+        stopped=control.values.get("stopped") == str(True),
         commanded=observed.command if now_s - observed.command_came_s < _COMMAND_HOLDS_S else ZERO,
         measured=observed.measured,
         latency_median_ms=control.number("latency_median_ms") or None,
@@ -152,6 +155,8 @@ def explain(reports: Mapping[str, Report]) -> tuple[Mood, str, str]:
     robot = reports.get("robot", _NO_REPORT)
     if robot.level >= ERROR:
         return "trouble", "Trouble", f"the robot {robot.message}"
+    if control.values.get("stopped") == str(True):
+        return "trouble", "Stopped", reason
     if control.number("linear_mps") or control.number("angular_radps"):
         return "driving", "Driving", reason if robot.level == OK else f"{reason}, but the robot {robot.message}"
     steered = control.values.get("source") == "steering"

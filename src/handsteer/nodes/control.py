@@ -8,8 +8,9 @@ from handsteer.config import Config, ControlConfig
 from handsteer.control.actions import action_of
 from handsteer.control.driver import Driver
 from handsteer.control.fleet import NEXT
+from handsteer.control.hold import Hold
 from handsteer.control.sign_control import ZERO, Velocity
-from handsteer.messages import CMD_VEL, HAND_SIGN, STEERING_CMD_VEL, String, Topic, Twist, command
+from handsteer.messages import CMD_VEL, HAND_SIGN, STEERING_CMD_VEL, STOP, Bool, String, Topic, Twist, command
 from handsteer.nodes.interruption import Interruption
 from handsteer.nodes.latency import LatencyLog
 from handsteer.nodes.node import OK, Node
@@ -24,6 +25,7 @@ _DIAGNOSE_PERIOD_S = 0.1
 class HandSignControlNode(Node):
     """Publishes one Twist a sign, one zero when signs stop, and one zero at the end, whatever ends it.
 
+    True on ``/stop`` stops the robot whoever drives, until false comes; then signs and steering have to begin anew.
     With ``config.robots`` it drives one of them at a time; see :class:`~handsteer.nodes.selection.Selection`.
 
     Args:
@@ -43,6 +45,8 @@ class HandSignControlNode(Node):
         self.latency = LatencyLog()
         self._config = config
         self._driver = Driver(config)
+        self._hold = Hold()
+        self._is_stopped = False
         self._last_step_s = clock.now()
         self._interruption = Interruption(config.sign_timeout, clock.now())
         self._topic = cmd_vel
@@ -52,6 +56,7 @@ class HandSignControlNode(Node):
             Selection(self, config.robots, cmd_vel, self._send, self._on_change) if config.robots else None
         )
         self._cmd_vel = self._selection.publisher if self._selection else self.publisher(cmd_vel)
+        self.subscribe(STOP, self._on_stop_or_reset)
         self.subscribe(STEERING_CMD_VEL, self._on_steering)
         self.subscribe(HAND_SIGN, self._on_sign)
         self.every(_WATCHDOG_PERIOD_S, self._watch)
@@ -69,6 +74,14 @@ class HandSignControlNode(Node):
         self._publish(ZERO)
         if self._selection:
             self._selection.beat()
+
+    def _on_stop_or_reset(self, received: Received[Bool]) -> None:
+        was_stopped, self._is_stopped = self._is_stopped, bool(received.message.data)
+        if self._is_stopped:
+            self._driver.halt()
+            self._publish(ZERO)
+        elif was_stopped:
+            self._hold.begin()
 
     def _on_sign(self, received: Received[String]) -> None:
         captured_s = received.captured_s
@@ -90,29 +103,29 @@ class HandSignControlNode(Node):
             self._selection.beat()
 
     def _admitted(self, sign: str | None) -> str | None:
-        """Return the sign to follow: ``NONE`` as long as the robot that was selected waits for one that stops."""
-        if self._selection is None or sign is None:
-            return sign
+        """Return the sign to follow: ``NONE`` while the robot is stopped, or waits for a sign that stops."""
+        if sign is None:
+            return None
         action = action_of(sign, self._config.actions)
-        if action == "next_robot" and sign != self._last_sign:
+        if self._selection and action == "next_robot" and sign != self._last_sign:
             self._selection.select(NEXT)
         self._last_sign = sign
-        return sign if self._selection.fleet.let_sign_pass(stops=action == "stop") else NONE
+        passes = self._hold.let_sign_pass(stops=action == "stop")
+        return sign if passes and not self._is_stopped else NONE
 
     def _steered(self, wanted: Velocity) -> Velocity:
-        """Return the steering to follow: zero as long as the robot that was selected waits for it to let go."""
+        """Return the steering to follow: zero while the robot is stopped, or waits for the steering to let go."""
         now = self.clock.now()
         after_pause = now - self._last_steering_s >= self._config.steering_timeout
         self._last_steering_s = now
-        if self._selection is None:
-            return wanted
-        passes = self._selection.fleet.let_steering_pass(is_zero=wanted.is_zero, after_pause=after_pause)
-        return wanted if passes else ZERO
+        passes = self._hold.let_steering_pass(is_zero=wanted.is_zero, after_pause=after_pause)
+        return wanted if passes and not self._is_stopped else ZERO
 
     def _on_change(self) -> None:
         """Start from standing with another robot."""
         assert self._selection is not None
         self._driver.halt()
+        self._hold.begin()
         self._cmd_vel = self._selection.publisher
 
     def _publish(self, velocity: Velocity | None, captured_s: float | None = None) -> None:
@@ -139,6 +152,7 @@ class HandSignControlNode(Node):
             OK,
             self._reason,
             source=self._driver.source,
+            stopped=self._is_stopped,
             linear_mps=f"{velocity.linear_mps:.3f}",
             angular_radps=f"{velocity.angular_radps:.3f}",
             **({"robot": self._selection.fleet.selected} if self._selection else {}),
@@ -147,9 +161,11 @@ class HandSignControlNode(Node):
 
     @property
     def _reason(self) -> str:
-        fleet = self._selection.fleet if self._selection else None
-        if fleet and fleet.holds_signs and self._driver.source == "signs":
-            return f"standing: {fleet.selected} was selected, and moves once Stop is shown, or no hand"
+        if self._is_stopped:
+            return "standing: stopped by you, until you reset it"
+        if self._hold.signs and self._driver.source == "signs":
+            chosen = f"{self._selection.fleet.selected} was selected, and" if self._selection else "it was stopped, and"
+            return f"standing: {chosen} moves once Stop is shown, or no hand"
         return self._driver.reason
 
     def _latencies(self) -> dict[str, str]:

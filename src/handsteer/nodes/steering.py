@@ -1,8 +1,8 @@
-"""The node ``steering``: drives by hand, as ``rqt_robot_steering`` does."""
+"""The node ``steering``: drives by hand, as ``rqt_robot_steering`` does, and stops the robot whoever drives."""
 
 from handsteer.clock import Clock
 from handsteer.control.sign_control import ZERO, Velocity
-from handsteer.messages import STEERING_CMD_VEL, twist
+from handsteer.messages import STEERING_CMD_VEL, STOP, Bool, twist
 from handsteer.nodes.node import Node
 from handsteer.transports.protocol import Transport
 
@@ -12,13 +12,15 @@ _PERIOD_S = 0.1
 class SteeringNode(Node):
     """Repeats the velocity asked for by :meth:`steer` until :meth:`release`; silent otherwise.
 
-    Both may be called from any thread.
+    All may be called from any thread.
     """
 
     def __init__(self, transport: Transport, clock: Clock) -> None:
         super().__init__("steering", transport, clock)
         self._wanted: Velocity | None = None
+        self._halted = False
         self._cmd_vel = self.publisher(STEERING_CMD_VEL)
+        self._stop = self.publisher(STOP)
         self.every(_PERIOD_S, self._repeat)
 
     def steer(self, linear_mps: float, angular_radps: float) -> None:
@@ -32,11 +34,24 @@ class SteeringNode(Node):
             self._wanted = None
             self._publish(ZERO)
 
+    def halt(self) -> None:
+        """Stop the robot, whoever drives, until :meth:`reset`; said again and again, for a control that starts anew."""
+        self._wanted = None
+        self._halted = True
+        self._stop.publish(Bool(data=True))
+
+    def reset(self) -> None:
+        """Let the robot be driven again; nothing moves before whoever drives has let go and begins anew."""
+        self._halted = False
+        self._stop.publish(Bool(data=False))
+
     def on_stop(self) -> None:
         """Leave nothing in motion."""
         self.release()
 
     def _repeat(self) -> None:
+        if self._halted:
+            self._stop.publish(Bool(data=True))
         wanted = self._wanted
         if wanted is not None:
             self._publish(wanted)

@@ -71,6 +71,17 @@ function followKeys(event) {
 document.addEventListener("keydown", followKeys);
 document.addEventListener("keyup", followKeys);
 
+// Wherever the focus is, but not where a space is typed; a button would take it as a click.
+document.addEventListener("keydown", (event) => {
+  if (event.code !== "Space" || event.target.closest?.("input, textarea, select, [contenteditable]")) return;
+  event.preventDefault();
+  release();
+  if (!event.repeat) emitEvent("space");
+}, true);
+document.addEventListener("keyup", (event) => {
+  if (event.code === "Space" && event.target.closest?.("button")) event.preventDefault();
+}, true);
+
 document.addEventListener("focusout", (event) => event.target.closest?.(".pad") && release());
 document.addEventListener("visibilitychange", () => document.hidden && release());
 window.addEventListener("blur", release);
