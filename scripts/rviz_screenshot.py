@@ -20,7 +20,7 @@ PICTURE = ROOT / "docs" / "images" / "rviz.png"
 SIZE = "1280x800"
 LARGEST_BYTES = 400_000
 DRIVEN_M = 1.0
-PATIENCE_S = 120.0
+PATIENCE_S = 240.0
 PROGRAMS = ("roscore", "roslaunch", "rostopic", "rviz", "Xvfb", "import")
 ODOM = "/robot_diff_drive_controller/odom"
 

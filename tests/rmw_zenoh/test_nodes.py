@@ -217,7 +217,7 @@ class TestRouter:
             control = graph.handsteer("control", "--transport", "zenoh", ZENOH_ROUTER_CHECK_ATTEMPTS="0")
             eventually(lambda: "no Zenoh router answers: it waits for one" in control.text)
             graph.start_router()
-            eventually(lambda: f"/{NODE}" in graph.nodes())
+            eventually(lambda: "/gesture/hand_sign" in graph.nodes().get(f"/{NODE}", {}).get("MS", {}))
             control.signal(signal.SIGTERM)
             assert control.code() == 0
 

@@ -332,7 +332,7 @@ def test_parameters_on_the_server_count(ros: LaunchGraph) -> None:
 )
 def test_rviz_shows_the_robot_driving(tmp_path: Path) -> None:
     path = tmp_path / "rviz.png"
-    run(sys.executable, str(ROOT / "scripts" / "rviz_screenshot.py"), str(path), env=dict(os.environ), timeout_s=240)
+    run(sys.executable, str(ROOT / "scripts" / "rviz_screenshot.py"), str(path), env=dict(os.environ), timeout_s=400)
     picture = cv2.imread(str(path))
     assert picture is not None
     assert picture.shape == (800, 1280, 3)

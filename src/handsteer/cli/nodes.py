@@ -191,8 +191,9 @@ class _Job:
 
 def _run(job: _Job, transport: str, words: tuple[str, ...]) -> int:
     job.settings()  # what is wrong already is said before others see this node
-    session = join(transport, job.node, words)
+    session: Session | None = None
     try:
+        session = join(transport, job.node, words)
         config = job.settings(from_parameters(session.parameters, job.section, session.name))
         node = job.make(config, session.transport, session.clock)
         session.serve(NodeParameters(config, job.section, node.reconfigure))
@@ -200,8 +201,9 @@ def _run(job: _Job, transport: str, words: tuple[str, ...]) -> int:
     except KeyboardInterrupt:
         pass  # the ordinary end of a node
     finally:
-        with uninterrupted():
-            session.close()
+        if session is not None:
+            with uninterrupted():
+                session.close()
     return 0
 
 

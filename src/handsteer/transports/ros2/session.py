@@ -62,14 +62,19 @@ class Ros2Session(ABC):
         if said.log_level:
             logging.getLogger("handsteer").setLevel(_LEVELS[said.log_level])
         self.clock: Clock = SimulatedClock() if simulated else WallClock()
-        self.transport: Ros2Transport = self._connect(name, self.clock)
         self._servers: list[ServiceServer] = []
         self._rosout = RosoutHandler(self.name, self._stamp)
-        self._logs = self._publish_logs() if said.rosout else None
-        if isinstance(self.clock, SimulatedClock):
-            self._follow(self.clock)
+        self._logs: Publisher[Log] | None = None
         self._was_silent = False
         self._left = threading.Event()
+        self.transport: Ros2Transport = self._connect(name, self.clock)
+        try:
+            self._logs = self._publish_logs() if said.rosout else None
+            if isinstance(self.clock, SimulatedClock):
+                self._follow(self.clock)
+        except BaseException:  # an interrupt too: what stays open keeps the process from ending
+            self.close()
+            raise
 
     def serve(self, parameters: NodeParameters) -> None:
         """Answer ``ros2 param``, unless the parameter ``start_parameter_services`` is false."""

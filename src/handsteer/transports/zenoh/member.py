@@ -49,16 +49,17 @@ class Member:
                 f"({reason(error)})"
             ) from None
         self._had_router = True
-        try:
-            self._look_for_router()
-        except BaseException:
-            self.session.close()
-            raise
         self._place = Place(network.domain, str(self.session.zid()), name)
         self._numbers = itertools.count(1)
         self._lock = threading.Lock()
-        self._neighbours = Neighbours(self.session, network.domain)
-        self._token = self.session.liveliness().declare_token(node_token(self._place))
+        self._neighbours: Neighbours | None = None
+        try:
+            self._look_for_router()
+            self._neighbours = Neighbours(self.session, network.domain)
+            self._token = self.session.liveliness().declare_token(node_token(self._place))
+        except BaseException:  # an interrupt too: a session that stays open keeps the process from ending
+            self.close()
+            raise
 
     def key(self, name: str, type_name: str) -> str:
         """Return the key expression of a topic or service.
@@ -83,7 +84,8 @@ class Member:
             number = next(self._numbers)
         text = endpoint_token(self._place, number, endpoint, profile)
         token = self.session.liveliness().declare_token(text)
-        self._neighbours.add(endpoint)
+        if self._neighbours is not None:
+            self._neighbours.add(endpoint)
         return token, text
 
     def watch_router(self) -> None:
@@ -101,7 +103,8 @@ class Member:
     def close(self) -> None:
         """Leave the network; may be called twice."""
         if not self.session.is_closed():
-            self._neighbours.close()
+            if self._neighbours is not None:
+                self._neighbours.close()
             self.session.close()
 
     def _look_for_router(self) -> None:
