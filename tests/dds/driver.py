@@ -28,7 +28,14 @@ class DdsDriver(Driver):
         self.process = graph.node("control", *options, name=f"{namespace}/{NODE}", ros=ros)
         eventually(lambda: graph.peer.ask("listeners", topic=self.signs) > 0)
         eventually(lambda: graph.publishes(f"{namespace}/{NODE}", self.cmd_vel))
-        time.sleep(SETTLE_S)
+        # One end sees the other first; with Fast DDS the other follows up to three seconds later.
+        eventually(self._is_heard, what="the control to hear the signs")
+        time.sleep(2 * SETTLE_S)
+        self._before = len(twists(self._peer, self.cmd_vel))
+
+    def _is_heard(self) -> bool:
+        self.show("NONE")
+        return bool(twists(self._peer, self.cmd_vel))
 
     def show(self, sign: str, count: int = 1, period_s: float = 0.02) -> None:
         self._peer.ask("publish", topic=self.signs, values={"data": sign}, count=count, period_s=period_s)
@@ -38,7 +45,7 @@ class DdsDriver(Driver):
 
     @property
     def commands(self) -> Twists:
-        return twists(self._peer, self.cmd_vel)
+        return twists(self._peer, self.cmd_vel)[self._before :]
 
 
 def record_twists(peer: Peer, topic: str = CMD_VEL) -> None:
