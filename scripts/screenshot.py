@@ -27,7 +27,7 @@ CONFIG = {
 def main() -> None:
     config = load(base=CONFIG)
     with Graph(config) as graph, sync_playwright() as playwright:
-        dashboard = Dashboard(graph.transport, graph.clock, graph.steering, config.dashboard)
+        dashboard = Dashboard.of(graph)
         url = dashboard.start()
         try:
             browser = launch(playwright)

@@ -71,6 +71,7 @@ class Graph:
         transport: Transport | None = None,
         link: Session | None = None,
     ) -> None:
+        self.config = config
         self.clock = clock or RealClock()
         self.transport = transport or InProcessTransport()
         wires = (self.transport, self.clock)

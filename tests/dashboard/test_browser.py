@@ -61,7 +61,7 @@ def visit(request: pytest.FixtureRequest) -> Iterator[Visit]:
         }
     )
     with Graph(config) as graph, sync_playwright() as playwright:
-        dashboard = Dashboard(graph.transport, graph.clock, graph.steering, config.dashboard)
+        dashboard = Dashboard.of(graph)
         url = dashboard.start()
         graph.start()
         browser = chromium.launch(playwright)

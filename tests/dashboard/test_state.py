@@ -5,7 +5,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from handsteer.control.sign_control import ZERO, Velocity
-from handsteer.dashboard.panels import bar, read_deflection
+from handsteer.dashboard.panels.steer import read_deflection
+from handsteer.dashboard.panels.velocity import bar
 from handsteer.dashboard.state import (
     STALE_S,
     Observed,

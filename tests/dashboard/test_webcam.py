@@ -38,7 +38,8 @@ def recording(slideshow: Path, sign: str, path: Path) -> Path:
 
 @pytest.fixture
 def graph() -> Iterator[Graph]:
-    config = load(base={"camera": {"source": "virtual"}, "virtual_hand": {"script": "NONE:60"}})
+    hand = {"camera": {"source": "virtual"}, "virtual_hand": {"script": "NONE:60"}}
+    config = load(base={**hand, "dashboard": {"port": 0}})
     with Graph(config) as graph:
         graph.start()
         yield graph
@@ -46,8 +47,7 @@ def graph() -> Iterator[Graph]:
 
 @pytest.fixture
 def url(graph: Graph) -> Iterator[str]:
-    config = load(base={"dashboard": {"port": 0}}).dashboard
-    dashboard = Dashboard(graph.transport, graph.clock, graph.steering, config, cameras=graph.cameras)
+    dashboard = Dashboard.of(graph)
     try:
         yield dashboard.start()
     finally:

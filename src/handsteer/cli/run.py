@@ -11,7 +11,7 @@ from handsteer.cli.options import settings as make_settings
 from handsteer.clock import RealClock, SteppedClock
 from handsteer.config import Config
 from handsteer.errors import ConfigError
-from handsteer.graph import Graph, Summary, cmd_vel_topic
+from handsteer.graph import Graph, Summary
 from handsteer.parameters import from_parameters
 from handsteer.presets import PRESETS
 from handsteer.transports import join
@@ -139,8 +139,7 @@ def _run_until_end(graph: Graph, settings: Config, duration: float | None, *, he
     # The page's libraries take a second to load, which a headless run need not wait for.
     from handsteer.dashboard.server import Dashboard  # noqa: PLC0415
 
-    wires = (graph.transport, graph.clock, graph.steering)
-    dashboard = Dashboard(*wires, settings.dashboard, cmd_vel=cmd_vel_topic(settings), cameras=graph.cameras)
+    dashboard = Dashboard.of(graph)
     url = dashboard.start()
     try:
         graph.start()

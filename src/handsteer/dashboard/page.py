@@ -1,27 +1,21 @@
-"""The page ``/``: what the camera sees, what was understood, what the robot does, and a pad to steer it."""
+"""What every page has: the head with the way to the others, the sentence with the Stop button, and who drives."""
+
+from dataclasses import dataclass
+from typing import ClassVar
 
 from nicegui import ui
 
 from handsteer.cameras.browser import ChoiceOfCameras
 from handsteer.dashboard.node import DashboardNode
-from handsteer.dashboard.panels import (
-    Banner,
-    CameraPanel,
-    RobotFoot,
-    SeatPanel,
-    SignsPanel,
-    SteerPanel,
-    TimingPanel,
-    VelocityPanel,
-)
-from handsteer.dashboard.scene import WorldView
+from handsteer.dashboard.panels.banner import Banner
+from handsteer.dashboard.panels.seat import SeatPanel
+from handsteer.dashboard.state import PageState
 from handsteer.dashboard.watch import WhileWatched
 
 PICTURE_PATH = "/camera.mjpg"
 WEBCAM_PATH = "/camera"
 ASSETS_PATH = "/assets"
 
-_WORLD_PERIOD_S = 0.05
 _WORDS_PERIOD_S = 0.1
 
 ICON = (
@@ -36,100 +30,98 @@ _THEME_ICON = (
 )
 
 
+@dataclass(frozen=True)
+class Served:
+    """What the pages are made of.
+
+    Attributes:
+        node: Is joined for as long as a browser shows a page.
+        cameras: The graph's camera, which a browser's may stand in for; None where that cannot be.
+    """
+
+    node: WhileWatched[DashboardNode]
+    cameras: ChoiceOfCameras | None
+
+
 class Page:
     """One browser's view; its timers run while the browser is connected.
 
     Args:
-        node: Is joined for as long as the browser shows the page.
-        cameras: The graph's camera, which this browser's may stand in for; None where that cannot be.
+        served: What the page is made of.
+        path: Where the page is, which its link in the head says.
     """
 
-    def __init__(self, node: WhileWatched[DashboardNode], cameras: ChoiceOfCameras | None) -> None:
-        self._client = ui.context.client
-        self._node = node
-        self._cameras = cameras
-        self._client.on_disconnect(self._leave)
-        self._client.on_delete(self._leave)
+    LINKS: ClassVar[tuple[tuple[str, str], ...]] = (("/", "Drive"),)
+
+    def __init__(self, served: Served, path: str) -> None:
+        self.client = ui.context.client
+        self._served = served
+        self.client.on_disconnect(self._leave)
+        self.client.on_delete(self._leave)
         ui.add_head_html(
             f'<link rel="stylesheet" href="{ASSETS_PATH}/page.css"><script src="{ASSETS_PATH}/page.js" defer></script>'
-            f'<script src="{ASSETS_PATH}/webcam.js" defer></script>'
         )
-        self._top()
+        self._top(path)
         self._banner = Banner(self._halt, self._reset)
-        self._camera = CameraPanel(PICTURE_PATH, cameras, self._client.id, self._use_own_camera)
-        with ui.element("section").classes("card viewer world"):
-            with ui.element("div").classes("stage"):
-                self._world = WorldView()
-                ui.label("drag to look around").classes("caption")
-            self._robot = RobotFoot()
-        with ui.element("div").classes("panels"):
-            self._velocity = VelocityPanel()
-            self._timing = TimingPanel()
-            SteerPanel(self._steer, self._release)
-            self._signs = SignsPanel()
-        ui.timer(_WORLD_PERIOD_S, self._update_world)
-        ui.timer(_WORDS_PERIOD_S, self._update_words)
+        ui.timer(_WORDS_PERIOD_S, self._update)
 
-    def _top(self) -> None:
+    def show(self, node: DashboardNode, state: PageState) -> None:
+        """Show what is new, ten times a second; a page adds its own to it."""
+        self._driving.update(node.seat.place_of(self.client.id, node.clock.now()))
+        self._source.set_text(state.camera)
+        self._banner.update(state)
+
+    @property
+    def joined(self) -> DashboardNode | None:
+        """The node while the browser is connected and the page is served, else None."""
+        return self._served.node.join(self.client.id) if self.client.has_socket_connection else None
+
+    def drives(self) -> bool:
+        """Return whether this viewer has the driver's seat, which it is given if it is free."""
+        node = self.joined
+        return node is not None and node.seat.take(self.client.id, node.clock.now())
+
+    def _top(self, path: str) -> None:
         with ui.element("header").classes("top"):
             ui.html(ICON, sanitize=False)
             with ui.element("div"):
                 ui.html("<h1>handsteer</h1>", sanitize=False)
                 ui.label("drive a robot with your hand signs").classes("tagline")
+            if len(self.LINKS) > 1:
+                self._links(path)
             with ui.element("div").classes("right"):
                 self._driving = SeatPanel(self._ask, self._answer)
                 self._source = ui.label("").classes("source chip")
                 with ui.element("button").classes("icon-button theme").props('aria-label="Light or dark"'):
                     ui.html(_THEME_ICON, sanitize=False)
 
-    def _update_world(self) -> None:
-        if node := self._joined():
-            self._world.update(node.world)
+    def _links(self, path: str) -> None:
+        with ui.element("nav").classes("links"):
+            for target, name in self.LINKS:
+                ui.link(name, target).props('aria-current="page"' if target == path else "")
 
-    def _update_words(self) -> None:
-        node = self._joined()
-        if node is None:
-            return
-        self._driving.update(node.seat.place_of(self._client.id, node.clock.now()))
-        state = node.state()
-        self._source.set_text(state.camera)
-        for panel in (self._banner, self._camera, self._robot, self._velocity, self._timing, self._signs):
-            panel.update(state)
-
-    def _steer(self, linear_mps: float, angular_radps: float) -> None:
-        if node := self._joined():
-            node.steer(self._client.id, linear_mps, angular_radps)
-
-    def _release(self) -> None:
-        if node := self._joined():
-            node.release(self._client.id)
+    def _update(self) -> None:
+        if node := self.joined:
+            self.show(node, node.state())
 
     def _halt(self) -> None:
-        if node := self._joined():
+        if node := self.joined:
             node.halt()
 
     def _reset(self) -> None:
-        if node := self._joined():
-            node.reset(self._client.id)
-
-    def _use_own_camera(self) -> None:
-        node = self._joined()
-        if node and self._cameras and node.seat.take(self._client.id, node.clock.now()):
-            self._cameras.choose("own")
+        if node := self.joined:
+            node.reset(self.client.id)
 
     def _ask(self) -> None:
-        if node := self._joined():
-            node.seat.ask(self._client.id, node.clock.now())
+        if node := self.joined:
+            node.seat.ask(self.client.id, node.clock.now())
 
     def _answer(self, hand_over: bool) -> None:
-        if node := self._joined():
-            node.seat.answer(self._client.id, hand_over=hand_over)
-
-    def _joined(self) -> DashboardNode | None:
-        """Return the node while the browser is connected and the page is served."""
-        return self._node.join(self._client.id) if self._client.has_socket_connection else None
+        if node := self.joined:
+            node.seat.answer(self.client.id, hand_over=hand_over)
 
     def _leave(self) -> None:
-        if self._node.is_watched_by(self._client.id) and (node := self._node.join(self._client.id)):
-            node.leave(self._client.id)
-        self._node.leave(self._client.id)
+        watched = self._served.node
+        if watched.is_watched_by(self.client.id) and (node := watched.join(self.client.id)):
+            node.leave(self.client.id)
+        watched.leave(self.client.id)

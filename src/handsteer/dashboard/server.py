@@ -21,12 +21,14 @@ from handsteer.cameras.browser import LARGEST_BYTES, ChoiceOfCameras
 from handsteer.clock import Clock
 from handsteer.config import DashboardConfig
 from handsteer.dashboard.access import Access, AccessMiddleware
+from handsteer.dashboard.drive import DrivePage
 from handsteer.dashboard.node import DashboardNode
-from handsteer.dashboard.page import ASSETS_PATH, ICON, PICTURE_PATH, WEBCAM_PATH, Page
+from handsteer.dashboard.page import ASSETS_PATH, ICON, PICTURE_PATH, WEBCAM_PATH, Served
 from handsteer.dashboard.picture import PictureNode, PictureResponse
 from handsteer.dashboard.watch import WhileWatched
 from handsteer.dashboard.webcam import FrameSocket
 from handsteer.errors import DashboardError
+from handsteer.graph import Graph, cmd_vel_topic
 from handsteer.messages import CMD_VEL, Topic
 from handsteer.nodes.steering import SteeringNode
 from handsteer.transports.protocol import Transport
@@ -42,7 +44,7 @@ _one_at_a_time = threading.Lock()
 
 
 class Dashboard:
-    """Serves the page of a graph; it knows the graph by its topics only.
+    """Serves the page of a graph.
 
     NiceGUI keeps its state per process, so one page can be served at a time; another may follow it.
 
@@ -57,7 +59,7 @@ class Dashboard:
     Attributes:
         node: Listens and steers for the browsers that show the page.
         pictures: Encodes the camera's picture for the browsers that show it.
-        cameras: The camera of this process, or None.
+        served: What the pages are made of.
         webcam: Takes the frames of a browser's own camera.
     """
 
@@ -73,11 +75,18 @@ class Dashboard:
     ) -> None:
         self.node = WhileWatched(lambda: DashboardNode(transport, clock, steering, cmd_vel))
         self.pictures = WhileWatched(lambda: PictureNode(transport, clock))
-        self.cameras = cameras
+        self.served = Served(self.node, cameras)
         self.webcam = FrameSocket(cameras, self._drives)
         self._config = config
         self._server: uvicorn.Server | None = None
         self._thread: threading.Thread | None = None
+
+    @classmethod
+    def of(cls, graph: Graph) -> "Dashboard":
+        """Return the page of a graph whose nodes are all in this process."""
+        topic = cmd_vel_topic(graph.config)
+        wires = (graph.transport, graph.clock, graph.steering)
+        return cls(*wires, graph.config.dashboard, cmd_vel=topic, cameras=graph.cameras)
 
     def start(self) -> str:
         """Serve the page and return its address once it answers; it holds the token where one is needed.
@@ -207,7 +216,7 @@ def _application() -> FastAPI:
 
     @ui.page("/")
     def index() -> None:
-        Page(application.state.dashboard.node, application.state.dashboard.cameras)
+        DrivePage(application.state.dashboard.served)
 
     ui.run_with(
         application,

@@ -1,0 +1,62 @@
+"""The page ``/``: what the camera sees, what was understood, what the robot does, and a pad to steer it."""
+
+from nicegui import ui
+
+from handsteer.dashboard.node import DashboardNode
+from handsteer.dashboard.page import ASSETS_PATH, PICTURE_PATH, Page, Served
+from handsteer.dashboard.panels.camera import CameraPanel
+from handsteer.dashboard.panels.robot import RobotFoot
+from handsteer.dashboard.panels.signs import SignsPanel
+from handsteer.dashboard.panels.steer import SteerPanel
+from handsteer.dashboard.panels.timing import TimingPanel
+from handsteer.dashboard.panels.velocity import VelocityPanel
+from handsteer.dashboard.scene import WorldView
+from handsteer.dashboard.state import PageState
+
+_WORLD_PERIOD_S = 0.05
+
+
+class DrivePage(Page):
+    """Drive, and see why the robot does what it does."""
+
+    def __init__(self, served: Served) -> None:
+        super().__init__(served, "/")
+        ui.add_head_html(
+            f'<link rel="stylesheet" href="{ASSETS_PATH}/drive.css">'
+            f'<script src="{ASSETS_PATH}/webcam.js" defer></script>'
+        )
+        self._cameras = served.cameras
+        self._camera = CameraPanel(PICTURE_PATH, served.cameras, self.client.id, self._use_own_camera)
+        with ui.element("section").classes("card viewer world"):
+            with ui.element("div").classes("stage"):
+                self._world = WorldView()
+                ui.label("drag to look around").classes("caption")
+            self._robot = RobotFoot()
+        with ui.element("div").classes("panels"):
+            self._velocity = VelocityPanel()
+            self._timing = TimingPanel()
+            SteerPanel(self._steer, self._release)
+            self._signs = SignsPanel()
+        ui.timer(_WORLD_PERIOD_S, self._update_world)
+
+    def show(self, node: DashboardNode, state: PageState) -> None:
+        """Show what is new."""
+        super().show(node, state)
+        for panel in (self._camera, self._robot, self._velocity, self._timing, self._signs):
+            panel.update(state)
+
+    def _update_world(self) -> None:
+        if node := self.joined:
+            self._world.update(node.world)
+
+    def _steer(self, linear_mps: float, angular_radps: float) -> None:
+        if node := self.joined:
+            node.steer(self.client.id, linear_mps, angular_radps)
+
+    def _release(self) -> None:
+        if node := self.joined:
+            node.release(self.client.id)
+
+    def _use_own_camera(self) -> None:
+        if self._cameras and self.drives():
+            self._cameras.choose("own")

@@ -1,0 +1,75 @@
+"""The camera's picture, and whose camera it is from."""
+
+from collections.abc import Callable
+
+from nicegui import ui
+
+from handsteer.cameras.browser import ChoiceOfCameras
+from handsteer.dashboard.panels.elements import box, button, switch, text
+from handsteer.dashboard.state import PageState
+from handsteer.signs.vocabulary import NONE
+
+
+class CameraPanel:
+    """The mirrored picture, what was understood of it, and whose camera it is from.
+
+    Args:
+        picture_url: Where the stream of pictures is.
+        cameras: What there is to choose from; None where there is no choice.
+        viewer: Who looks at this page.
+        use_own: Is called to choose the camera of the machine that handsteer runs on.
+    """
+
+    def __init__(
+        self, picture_url: str, cameras: ChoiceOfCameras | None, viewer: str, use_own: Callable[[], None]
+    ) -> None:
+        self._cameras = cameras
+        with ui.element("section").classes("card viewer camera"):
+            with box("stage"):
+                # Lazy, because a page counts as loaded only when its other pictures have come.
+                picture = ui.element("img").props('loading="lazy" alt="What the camera sees, mirrored"')
+                picture.props(f'src="{picture_url}"')
+                with box("veil") as self._veil:
+                    self._excuse = text("", "waiting for the first picture")
+                text("caption", "as in a mirror")
+            with box("foot"):
+                self._sign = text("sign", "No sign")
+                with box("meter"):
+                    self._confidence = box("")
+                self._percent = text("percent", "")
+                self._hand = text("hand", "")
+            if cameras is not None:
+                self._choice(viewer, use_own)
+        self._width = 0
+
+    def update(self, state: PageState) -> None:
+        """Show ``state``."""
+        # A sign that counts goes on counting for a moment in which it is not seen.
+        shown = state.sign if state.seen == NONE else state.seen
+        self._sign.set_text("No sign" if shown == NONE else shown)
+        switch(self._sign, "pending", on=shown != state.sign)
+        self._hand.set_text(f"{state.handedness} hand" if state.handedness else "No hand")
+        percent = round(100 * state.confidence) if state.seen != NONE else 0
+        self._percent.set_text(f"{percent} %" if percent else "")
+        if percent != self._width:
+            self._confidence.style(f"width: {percent}%")
+            self._width = percent
+        self._excuse.set_text(state.no_picture)
+        switch(self._veil, "off", on=not state.no_picture)
+        if self._cameras is not None:
+            self._show_choice(self._cameras.source)
+
+    def _choice(self, viewer: str, use_own: Callable[[], None]) -> None:
+        self._chosen = ""
+        with box("foot choice"):
+            self._browsers = button("Use this device's camera", f'data-camera="browser" data-viewer="{viewer}"')
+            self._own = button("Use the robot's camera", 'data-camera="own"')
+            self._trouble = text("trouble", "").props('role="alert"')
+        self._own.on("click", use_own)
+        ui.on("webcam", lambda event: self._trouble.set_text(str(event.args.get("words", ""))))
+
+    def _show_choice(self, source: str) -> None:
+        if source != self._chosen:
+            self._chosen = source
+            switch(self._browsers, "hidden", on=source == "browser")
+            switch(self._own, "hidden", on=source == "own")

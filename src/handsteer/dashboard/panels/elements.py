@@ -1,0 +1,46 @@
+"""The elements that panels are built of."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from nicegui import ui
+
+UNKNOWN = "--"
+"""Stands for a figure that is not known."""
+
+
+@contextmanager
+def card(title: str, classes: str) -> Iterator[None]:
+    """Put what follows into a card with a heading."""
+    with ui.element("section").classes(f"card {classes}"):
+        tag("h2", "", title)
+        yield
+
+
+def box(classes: str) -> ui.element:
+    """Return an empty ``div``."""
+    return ui.element("div").classes(classes)
+
+
+def text(classes: str, words: str) -> ui.label:
+    """Return a ``div`` with ``words``."""
+    return ui.label(words).classes(classes)
+
+
+def tag(name: str, classes: str, words: str) -> ui.label:
+    """Return an element of the tag ``name`` with ``words``."""
+    label = ui.label(words).classes(classes)
+    label.tag = name
+    return label
+
+
+def button(words: str, props: str) -> ui.element:
+    """Return a button with ``words``; a screen reader is told ``aria-label`` of ``props`` if that says more."""
+    with ui.element("button").classes("text-button").props(f'type="button" {props}') as element:
+        ui.label(words).style("display: inline")
+    return element
+
+
+def switch(element: ui.element, name: str, *, on: bool) -> None:
+    """Give ``element`` the class ``name``, or take it away."""
+    element.classes(add=name if on else "", remove="" if on else name)
