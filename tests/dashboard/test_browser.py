@@ -1,84 +1,23 @@
 """The page in a real browser, on the whole graph with the virtual hand."""
 
 import threading
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from collections.abc import Iterator
 
 import pytest
-from playwright.sync_api import ConsoleMessage, Page, Request, sync_playwright
-from scripts import chromium
+from playwright.sync_api import Page
 
-from handsteer.config import load
-from handsteer.dashboard.server import Dashboard
-from handsteer.graph import Graph
+from tests.dashboard.visits import NEEDS_A_BROWSER, PATIENCE_MS, Visit, visiting
 
-PATIENCE_MS = 60_000
-
-pytestmark = [
-    pytest.mark.browser,
-    pytest.mark.slow,
-    pytest.mark.skipif(chromium.find() is None, reason=f"no browser found: none of {', '.join(chromium.NAMES)}"),
-]
-
-
-@dataclass
-class Visit:
-    """A browser that shows the page of a running graph, and what went wrong in it."""
-
-    page: Page
-    graph: Graph
-    troubles: list[str] = field(default_factory=list)
-
-    def text(self, selector: str) -> str:
-        return self.page.locator(selector).first.inner_text()
-
-    def number(self, selector: str) -> float:
-        return float(self.text(selector).split()[-1])
-
-    def wait_until(self, condition: Callable[[], bool]) -> None:
-        for _ in range(PATIENCE_MS // 50):
-            if condition():
-                return
-            self.page.wait_for_timeout(50)
-        pytest.fail(f"waited in vain; the page says: {self.text('body')}; {self.troubles}")
-
-    def note_message(self, message: ConsoleMessage) -> None:
-        if message.type in ("error", "warning") and "GPU stall" not in message.text:
-            self.troubles.append(message.text)
-
-    def note_request(self, request: Request) -> None:
-        if not request.url.startswith(("http://127.0.0.1:", "data:", "blob:")):
-            self.troubles.append(f"asks for {request.url}")
+pytestmark = NEEDS_A_BROWSER
 
 
 @pytest.fixture
 def visit(request: pytest.FixtureRequest) -> Iterator[Visit]:
-    config = load(
-        base={
-            "camera": {"source": "virtual", "width": 320, "height": 240, "fps": 15},
-            "virtual_hand": {"script": request.param},
-            "dashboard": {"port": 0},
-        }
-    )
-    with Graph(config) as graph, sync_playwright() as playwright:
-        dashboard = Dashboard.of(graph)
-        url = dashboard.start()
-        graph.start()
-        browser = chromium.launch(playwright)
-        try:
-            visit = Visit(browser.new_page(viewport={"width": 1280, "height": 800}), graph)
-            visit.page.set_default_timeout(PATIENCE_MS)
-            visit.page.on("console", visit.note_message)
-            visit.page.on("pageerror", lambda error: visit.troubles.append(str(error)))
-            visit.page.on("request", visit.note_request)
-            visit.page.goto(url)
-            yield visit
-        finally:
-            browser.close()
-            dashboard.stop()
+    with visiting(request.param) as visit:
+        yield visit
 
 
-@pytest.mark.parametrize("visit", ["Forward:4 Stop:1"], indirect=True)
+@pytest.mark.parametrize("visit", ["Forward:4 Stop:3"], indirect=True)
 def test_shows_what_is_seen_and_what_the_robot_does(visit: Visit) -> None:
     visit.wait_until(lambda: visit.text(".camera .sign") == "Forward")
     visit.wait_until(lambda: visit.text(".banner .headline") == "Driving")
@@ -93,7 +32,7 @@ def test_shows_what_is_seen_and_what_the_robot_does(visit: Visit) -> None:
     assert visit.troubles == []
 
 
-@pytest.mark.parametrize("visit", ["NONE:60"], indirect=True)
+@pytest.mark.parametrize("visit", ["NONE:600"], indirect=True)
 def test_drives_while_the_pad_is_held_and_stops_when_it_is_let_go(visit: Visit) -> None:
     robot = visit.graph.robot
     visit.wait_until(lambda: visit.text(".banner .reason") == "no hand is in view")
@@ -121,7 +60,7 @@ def test_drives_while_the_pad_is_held_and_stops_when_it_is_let_go(visit: Visit) 
     assert robot.state.angular_radps == pytest.approx(0, abs=0.01)
 
 
-@pytest.mark.parametrize("visit", ["Forward:6 NONE:1 Forward:60"], indirect=True)
+@pytest.mark.parametrize("visit", ["Forward:6 NONE:3 Forward:600"], indirect=True)
 def test_stop_holds_until_it_is_reset_and_a_reset_alone_moves_nothing(visit: Visit) -> None:
     robot, page = visit.graph.robot, visit.page
     visit.wait_until(lambda: robot.state.linear_mps > 0.05)
@@ -140,7 +79,7 @@ def test_stop_holds_until_it_is_reset_and_a_reset_alone_moves_nothing(visit: Vis
     assert visit.troubles == []
 
 
-@pytest.mark.parametrize("visit", ["Forward:60"], indirect=True)
+@pytest.mark.parametrize("visit", ["Forward:600"], indirect=True)
 def test_whoever_watches_may_stop_but_only_the_driver_resets(visit: Visit) -> None:
     first, second = visit.page, visit.page.context.browser.new_page()
     first.get_by_text("Ask to drive").click()
@@ -156,7 +95,7 @@ def test_whoever_watches_may_stop_but_only_the_driver_resets(visit: Visit) -> No
     first.locator(".banner .headline", has_text="Standing").wait_for()
 
 
-@pytest.mark.parametrize("visit", ["NONE:60"], indirect=True)
+@pytest.mark.parametrize("visit", ["NONE:600"], indirect=True)
 def test_a_second_browser_watches_until_the_first_hands_over(visit: Visit) -> None:
     robot = visit.graph.robot
     first, second = visit.page, visit.page.context.browser.new_page()

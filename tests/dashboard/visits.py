@@ -1,0 +1,87 @@
+"""A browser that looks at the page of a running graph."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import pytest
+from playwright.sync_api import ConsoleMessage, Page, Request, sync_playwright
+from scripts import chromium
+
+from handsteer.config import load
+from handsteer.dashboard.server import Dashboard
+from handsteer.graph import Graph
+
+PATIENCE_MS = 60_000
+
+NEEDS_A_BROWSER = [
+    pytest.mark.browser,
+    pytest.mark.slow,
+    pytest.mark.skipif(chromium.find() is None, reason=f"no browser found: none of {', '.join(chromium.NAMES)}"),
+]
+
+
+@dataclass
+class Visit:
+    """A browser that shows the page of a running graph, and what went wrong in it."""
+
+    page: Page
+    graph: Graph
+    troubles: list[str] = field(default_factory=list)
+
+    def text(self, selector: str) -> str:
+        return self.page.locator(selector).first.inner_text()
+
+    def number(self, selector: str) -> float:
+        return float(self.text(selector).split()[-1])
+
+    def wait_until(self, condition: Callable[[], bool]) -> None:
+        for _ in range(PATIENCE_MS // 50):
+            if condition():
+                return
+            self.page.wait_for_timeout(50)
+        pytest.fail(f"waited in vain; the page says: {self.text('body')}; {self.troubles}")
+
+    def note_message(self, message: ConsoleMessage) -> None:
+        if message.type in ("error", "warning") and "GPU stall" not in message.text:
+            self.troubles.append(message.text)
+
+    def note_request(self, request: Request) -> None:
+        if not request.url.startswith(("http://127.0.0.1:", "data:", "blob:")):
+            self.troubles.append(f"asks for {request.url}")
+
+
+@contextmanager
+def visiting(script: str, path: str = "/", webcam: Path | None = None, **sections: dict[str, Any]) -> Iterator[Visit]:
+    """Show a page of a whole graph that sees the virtual hand; the hand begins once the browser shows the page.
+
+    Args:
+        script: What the virtual hand shows.
+        path: Which page.
+        webcam: The video that the browser takes for its own camera.
+        sections: Further configuration by section.
+    """
+    base = {
+        "camera": {"source": "virtual", "width": 320, "height": 240, "fps": 15},
+        "virtual_hand": {"script": script},
+        "dashboard": {"port": 0},
+    }
+    with Graph(load(None, base, sections)) as graph, sync_playwright() as playwright:
+        dashboard = Dashboard.of(graph)
+        url = dashboard.start()
+        browser = chromium.launch(playwright, webcam)
+        try:
+            visit = Visit(browser.new_page(viewport={"width": 1280, "height": 800}), graph)
+            visit.page.set_default_timeout(PATIENCE_MS)
+            visit.page.on("console", visit.note_message)
+            visit.page.on("pageerror", lambda error: visit.troubles.append(str(error)))
+            visit.page.on("request", visit.note_request)
+            visit.page.goto(url + path)
+            visit.page.locator(".banner").wait_for()
+            graph.start()
+            yield visit
+        finally:
+            browser.close()
+            dashboard.stop()
