@@ -3,8 +3,8 @@
 import signal
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 import pytest
@@ -133,11 +133,20 @@ class Running:
 
     Attributes:
         peer: Has recorded ``CMD_VEL`` (linear.x, angular.z) and ``ODOM`` (twist.twist.linear.x, pose.pose.position.x).
-        nodes: The processes: robot, control with a limit of 0.3 m/s, recognition, camera that shows Forward.
+        start: Starts each process: robot, control with a limit of 0.3 m/s, recognition, camera that shows Forward.
+        nodes: Those that were started, by the same names.
     """
 
     peer: Peer
-    nodes: dict[str, Process]
+    start: Mapping[str, Callable[[], Process]]
+    nodes: dict[str, Process] = field(default_factory=dict)
+
+    def revive(self) -> "Running":
+        """Start what does not run."""
+        for name, start in self.start.items():
+            if name not in self.nodes or not self.nodes[name].running:
+                self.nodes[name] = start()
+        return self
 
     @property
     def speeds(self) -> list[tuple[float, float]]:
@@ -160,11 +169,17 @@ class Running:
 
 
 class ChainContract:
-    """Inherit, and provide ``running``, a chain that drives at full speed."""
+    """Inherit, and provide ``chain``; the tests go on with it, and start again what they killed."""
+
+    @pytest.fixture(scope="class")
+    @classmethod
+    def chain(cls) -> Iterator[Running]:
+        raise NotImplementedError
 
     @pytest.fixture
-    def running(self) -> Iterator[Running]:
-        raise NotImplementedError
+    def running(self, chain: Running) -> Running:
+        """The chain while it drives at full speed."""
+        return chain.revive().expect_full_speed()
 
     @pytest.mark.parametrize("victim", ["camera", "recognition", "control"])
     def test_kill_9_of_any_node_stops_the_robot(self, running: Running, victim: str) -> None:

@@ -190,9 +190,10 @@ def test_simulated_time_is_followed(tmp_path: Path) -> None:
 
 
 class TestChain(ChainContract):
-    @pytest.fixture
-    def running(self, tmp_path: Path) -> Iterator[Running]:
-        with dds_graph(tmp_path) as graph:
+    @pytest.fixture(scope="class")
+    @classmethod
+    def chain(cls, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Running]:
+        with dds_graph(tmp_path_factory.mktemp("chain")) as graph:
             yield driving_chain(graph)
 
 

@@ -50,9 +50,10 @@ class TestControl(ControlContract):
 
 
 class TestChain(ChainContract):
-    @pytest.fixture
-    def running(self, tmp_path: Path) -> Iterator[Running]:
-        with zenoh_graph(tmp_path) as graph:
+    @pytest.fixture(scope="class")
+    @classmethod
+    def chain(cls, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Running]:
+        with zenoh_graph(tmp_path_factory.mktemp("chain")) as graph:
             yield driving_chain(graph)
 
 
@@ -228,7 +229,7 @@ class TestRouter:
 
     def test_where_processes_connect_directly_the_drive_goes_on_without_it(self, tmp_path: Path) -> None:
         with zenoh_graph(tmp_path) as graph:
-            running = driving_chain(graph)
+            running = driving_chain(graph).revive().expect_full_speed()
             graph.router.popen.kill()
             eventually(lambda: "the Zenoh router has gone" in running.nodes["control"].text, 10.0)
             began_m = running.x_m
@@ -252,7 +253,7 @@ class TestRouter:
 
     def test_where_all_goes_by_it_the_robot_stops_and_goes_on_with_fresh_signs(self, tmp_path: Path) -> None:
         with zenoh_graph(tmp_path, mode="client") as graph:
-            running = driving_chain(graph)
+            running = driving_chain(graph).revive().expect_full_speed()
             graph.router.popen.kill()
             killed_s = time.monotonic()
             time.sleep(LIMIT_S + 1.0)

@@ -7,7 +7,6 @@ import sys
 import urllib.request
 from collections.abc import Iterator, Mapping
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -161,20 +160,21 @@ def test_when_the_master_goes_away_the_robot_is_stopped(tmp_path: Any) -> None:
 
 
 class TestChain(ChainContract):
-    @pytest.fixture
-    def running(self, tmp_path: Path) -> Iterator[Running]:
-        with ros1_graph(tmp_path) as graph:
+    @pytest.fixture(scope="class")
+    @classmethod
+    def chain(cls, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Running]:
+        with ros1_graph(tmp_path_factory.mktemp("chain")) as graph:
             peer = graph.peer()
             record_twists(peer)
             fields = ["twist.twist.linear.x", "pose.pose.position.x"]
             peer.ask("record", topic=ODOM, package="nav_msgs", type="Odometry", fields=fields)
-            nodes = {
-                "robot": graph.node("robot", name="/robot"),
-                "control": graph.node("control", "_max_linear:=0.3", name=f"/{NODE}"),
-                "recognition": graph.node("recognition", name="/hand_sign_recognition"),
-                "camera": graph.node("camera", *FORWARD, SCRIPT, name="/my_camera"),
+            start = {
+                "robot": lambda: graph.node("robot", name="/robot"),
+                "control": lambda: graph.node("control", "_max_linear:=0.3", name=f"/{NODE}"),
+                "recognition": lambda: graph.node("recognition", name="/hand_sign_recognition"),
+                "camera": lambda: graph.node("camera", *FORWARD, SCRIPT, name="/my_camera"),
             }
-            yield Running(peer, nodes).expect_full_speed()
+            yield Running(peer, start)
 
 
 def test_the_page_is_served_and_knows_the_nodes(ros1: Ros1Graph) -> None:

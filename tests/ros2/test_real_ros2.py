@@ -42,9 +42,10 @@ class TestControl(ControlContract):
 
 
 class TestChain(ChainContract):
-    @pytest.fixture
-    def running(self, tmp_path: Path) -> Iterator[Running]:
-        with ros2_graph(tmp_path) as graph:
+    @pytest.fixture(scope="class")
+    @classmethod
+    def chain(cls, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Running]:
+        with ros2_graph(tmp_path_factory.mktemp("chain")) as graph:
             yield driving_chain(graph)
 
 
