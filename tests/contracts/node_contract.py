@@ -1,5 +1,6 @@
 """What our nodes must do as processes, whatever joins them; each transport's own test module inherits it."""
 
+import json
 import signal
 import time
 from abc import ABC, abstractmethod
@@ -207,3 +208,29 @@ class ChainContract:
         running.expect_rest()
         stood_s = next(at_s for at_s, speed in running.speeds if at_s > resumed_s and abs(speed) < 0.01)
         assert stood_s - resumed_s < 0.6  # 0.3 m/s at 1 m/s², and no more
+
+
+RUN = ("--headless", "--json", *FORWARD, "--virtual-hand.script", "Forward:600", "--control.max-linear", "0.1")
+"""A run that drives a robot of another process, at 0.1 m/s in the end."""
+
+
+def expect_a_run_to_drive(run: Process, peer: Peer, odom: str) -> None:
+    """The robot drives at the run's limit, and stands once the run has ended, which says where it is.
+
+    Args:
+        run: Was started by :data:`RUN` and the words of its transport.
+        peer: Has recorded ``odom`` (twist.twist.linear.x, pose.pose.position.x).
+        odom: The topic of the robot's odometry.
+    """
+
+    def newest() -> tuple[float, float]:
+        noted = peer.ask("get", topic=odom)
+        return tuple(noted[-1][1]) if noted else (0.0, 0.0)
+
+    eventually(lambda: newest()[0] == pytest.approx(0.1, abs=0.01) or not run.running, what="the robot to drive")
+    assert run.running, run.text
+    run.signal(signal.SIGTERM)
+    assert run.code() == 0, run.text
+    eventually(lambda: abs(newest()[0]) < 0.01, 5.0, what="the robot to stand")
+    summary = json.loads(next(line for line in run.text.splitlines() if line.startswith("{")))
+    assert 0.0 < summary["final_pose"]["x"] <= newest()[1] + 0.01

@@ -14,10 +14,12 @@ from tests.contracts.node_contract import (
     FORWARD,
     LIMIT_S,
     ODOM,
+    RUN,
     ChainContract,
     ControlContract,
     MakeDriver,
     Running,
+    expect_a_run_to_drive,
 )
 from tests.dds.driver import NODE, DdsDriver, driving_chain
 from tests.processes import eventually
@@ -55,6 +57,14 @@ class TestChain(ChainContract):
     def chain(cls, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Running]:
         with zenoh_graph(tmp_path_factory.mktemp("chain")) as graph:
             yield driving_chain(graph)
+
+
+def test_a_run_drives_a_robot_of_the_network(network: ZenohGraph) -> None:
+    odom = f"/real{ODOM}"
+    network.peer.ask("record", topic=odom, type="Odometry", fields=["twist.twist.linear.x", "pose.pose.position.x"])
+    network.node("robot", name="/real/robot", ros=("-r", "__ns:=/real"))
+    words = ("--ros-args", "-r", f"cmd_vel:=/real{CMD_VEL}", "-r", f"odom:={odom}")
+    expect_a_run_to_drive(network.handsteer("run", *RUN, "--robot", "zenoh", *words), network.peer, odom)
 
 
 def test_what_is_no_text_does_not_end_the_node(network: ZenohGraph) -> None:

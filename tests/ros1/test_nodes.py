@@ -15,12 +15,14 @@ from tests.contracts.node_contract import (
     CMD_VEL,
     FORWARD,
     ODOM,
+    RUN,
     ChainContract,
     ControlContract,
     Driver,
     MakeDriver,
     Running,
     Twists,
+    expect_a_run_to_drive,
     twists,
 )
 from tests.processes import Peer, eventually
@@ -175,6 +177,15 @@ class TestChain(ChainContract):
                 "camera": lambda: graph.node("camera", *FORWARD, SCRIPT, name="/my_camera"),
             }
             yield Running(peer, start)
+
+
+def test_a_run_drives_a_robot_of_the_graph(ros1: Ros1Graph) -> None:
+    odom, peer = f"/real{ODOM}", ros1.peer()
+    fields = ["twist.twist.linear.x", "pose.pose.position.x"]
+    peer.ask("record", topic=odom, package="nav_msgs", type="Odometry", fields=fields)
+    ros1.node("robot", "__ns:=/real", name="/real/robot")
+    words = (f"cmd_vel:=/real{CMD_VEL}", f"odom:={odom}")
+    expect_a_run_to_drive(ros1.handsteer("run", *RUN, "--robot", "ros1", *words), peer, odom)
 
 
 def test_the_page_is_served_and_knows_the_nodes(ros1: Ros1Graph) -> None:
