@@ -3,6 +3,8 @@
 VENV := .venv
 BIN := $(VENV)/bin
 ARGS ?=
+# NumPy's threads would wait for one another: the matrices are small, and tests run side by side.
+export OPENBLAS_NUM_THREADS := 1
 
 .PHONY: help run test ros1 test-ros1 ros2 test-ros2 lint unit format lock bench bench-signs signs-model models docs screenshots \
 	screenshots-ros1 clean
