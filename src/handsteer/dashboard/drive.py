@@ -1,5 +1,7 @@
 """The page ``/``: what the camera sees, what was understood, what the robot does, and a pad to steer it."""
 
+import time
+
 from nicegui import ui
 
 from handsteer.dashboard.node import DashboardNode
@@ -14,6 +16,7 @@ from handsteer.dashboard.scene import WorldView
 from handsteer.dashboard.state import PageState
 
 _WORLD_PERIOD_S = 0.05
+_PLOT_PERIOD_S = 0.2
 
 
 class DrivePage(Page):
@@ -23,6 +26,8 @@ class DrivePage(Page):
         super().__init__(served, "/")
         ui.add_head_html(
             f'<link rel="stylesheet" href="{ASSETS_PATH}/drive.css">'
+            f'<link rel="stylesheet" href="{ASSETS_PATH}/steer.css">'
+            f'<script src="{ASSETS_PATH}/steer.js" defer></script>'
             f'<script src="{ASSETS_PATH}/webcam.js" defer></script>'
         )
         self._cameras = served.cameras
@@ -35,19 +40,25 @@ class DrivePage(Page):
         with ui.element("div").classes("panels"):
             self._velocity = VelocityPanel()
             self._timing = TimingPanel()
-            SteerPanel(self._steer, self._release)
+            self._steering = SteerPanel(self._steer, self._release, time.monotonic)
             self._signs = SignsPanel()
         ui.timer(_WORLD_PERIOD_S, self._update_world)
+        ui.timer(_PLOT_PERIOD_S, self._update_plot)
 
     def show(self, node: DashboardNode, state: PageState) -> None:
         """Show what is new."""
         super().show(node, state)
         for panel in (self._camera, self._robot, self._velocity, self._timing, self._signs):
             panel.update(state)
+        self._steering.update(state, node.seat.place_of(self.client.id, node.clock.now()))
 
     def _update_world(self) -> None:
         if node := self.joined:
             self._world.update(node.world)
+
+    def _update_plot(self) -> None:
+        if node := self.joined:
+            self._velocity.draw(node.history, node.clock.now())
 
     def _steer(self, linear_mps: float, angular_radps: float) -> None:
         if node := self.joined:

@@ -1,13 +1,25 @@
 """The node ``dashboard``: listens to all that the page shows, and steers for the people who look at it."""
 
+import math
 from collections import deque
 from dataclasses import dataclass, replace
 from typing import Any, cast
 
 from handsteer.clock import Clock, to_seconds
 from handsteer.control.sign_control import Velocity
+from handsteer.dashboard.history import PERIOD_S, Sample, VelocityHistory
+from handsteer.dashboard.manual import HOLD_TIMEOUT_S
 from handsteer.dashboard.seat import Seat
-from handsteer.dashboard.state import Observed, PageState, Report, compose, place_in_world
+from handsteer.dashboard.state import (
+    COMMAND_HOLDS_S,
+    Observed,
+    PageState,
+    Person,
+    Report,
+    Viewers,
+    compose,
+    place_in_world,
+)
 from handsteer.messages import (
     CMD_VEL,
     DIAGNOSTICS,
@@ -34,12 +46,10 @@ from handsteer.nodes.steering import SteeringNode
 from handsteer.robots.protocol import Pose2D
 from handsteer.transports.protocol import Received, Transport
 
-HOLD_TIMEOUT_S = 0.3
-"""Steering ends when the page has not repeated it for this long: the tab was closed, or the network lost."""
-
 _WATCH_PERIOD_S = 0.05
 _FRAME_COUNTS_KEPT = 6
 _ODOMETRY_KEPT = 16
+_ODOMETRY_HOLDS_S = 0.5
 
 
 _START = Pose2D(0.0, 0.0, 0.0)
@@ -70,18 +80,26 @@ class DashboardNode(Node):
         clock: The graph's clock.
         steering: Drives when people steer on the page.
         cmd_vel: The topic of the commands that are shown.
+        history: Keeps the velocities, also those from before this node; a new one by default.
 
     Attributes:
         world: What the 3D view shows.
         seat: Who of the viewers drives.
+        history: The velocities of the last 30 s.
     """
 
     def __init__(
-        self, transport: Transport, clock: Clock, steering: SteeringNode, cmd_vel: Topic[Any] = CMD_VEL
+        self,
+        transport: Transport,
+        clock: Clock,
+        steering: SteeringNode,
+        cmd_vel: Topic[Any] = CMD_VEL,
+        history: VelocityHistory | None = None,
     ) -> None:
         super().__init__("dashboard", transport, clock)
         self.world = WorldState()
         self.seat = Seat()
+        self.history = history or VelocityHistory()
         self._observed = Observed()
         self._namespace, _ = split_reporter(transport.full_name(self.name))
         self._frame_counts: deque[tuple[float, float]] = deque(maxlen=_FRAME_COUNTS_KEPT)
@@ -89,6 +107,8 @@ class DashboardNode(Node):
         self._truth: tuple[Pose2D, Pose2D] | None = None
         self._steering = steering
         self._holder: tuple[str, float] | None = None
+        self._stopper: str | None = None
+        self._odometry_came_s = -math.inf
         self.subscribe(DIAGNOSTICS, self._on_diagnostics, key=_reporter)
         self.subscribe(cmd_vel, self._on_command)
         self.subscribe(ODOM, self._on_odometry)
@@ -96,10 +116,14 @@ class DashboardNode(Node):
         self.subscribe(WORLD_MARKERS, self._on_markers)
         self.subscribe(ROBOT_DESCRIPTION, self._on_description)
         self.every(_WATCH_PERIOD_S, self._watch)
+        self.every(PERIOD_S, self._sample)
 
-    def state(self) -> PageState:
-        """Return what the page says now."""
-        return compose(self._observed, self.clock.now())
+    def state(self, viewer: str = "") -> PageState:
+        """Return what the page says now to ``viewer``."""
+        now, holder = self.clock.now(), self._holder
+        may_reset = self.seat.place_of(viewer, now).role != "watcher"
+        viewers = Viewers(_person(holder and holder[0], viewer), _person(self._stopper, viewer), may_reset)
+        return compose(self._observed, now, viewers)
 
     def steer(self, viewer: str, linear_mps: float, angular_radps: float) -> None:
         """Drive at this velocity, if ``viewer`` has the driver's seat or nobody has.
@@ -117,14 +141,16 @@ class DashboardNode(Node):
             self._holder = None
             self._steering.release()
 
-    def halt(self) -> None:
-        """Stop the robot, whoever drives and whoever asks."""
+    def halt(self, viewer: str = "") -> None:
+        """Stop the robot, whoever drives; ``viewer`` is who asks."""
         self._holder = None
+        self._stopper = viewer or None
         self._steering.halt()
 
     def reset(self, viewer: str) -> None:
         """Let the robot be driven again, if ``viewer`` has the driver's seat or nobody has."""
         if self.seat.take(viewer, self.clock.now()):
+            self._stopper = None
             self._steering.reset()
 
     def leave(self, viewer: str) -> None:
@@ -142,6 +168,12 @@ class DashboardNode(Node):
         holder = self._holder
         if holder is not None and (self.clock.now() - holder[1] > HOLD_TIMEOUT_S or not self.seat.drives(holder[0])):
             self.release(holder[0])
+
+    def _sample(self) -> None:
+        now, observed = self.clock.now(), self._observed
+        commanded = observed.command if now - observed.command_came_s < COMMAND_HOLDS_S else None
+        measured = observed.measured if now - self._odometry_came_s < _ODOMETRY_HOLDS_S else None
+        self.history.add(Sample(now, commanded, measured))
 
     def _on_diagnostics(self, received: Received[DiagnosticArray]) -> None:
         now = self.clock.now()
@@ -178,6 +210,7 @@ class DashboardNode(Node):
         odometry = received.message
         measured = Velocity(odometry.twist.twist.linear.x, odometry.twist.twist.angular.z)
         self._observed = replace(self._observed, measured=measured)
+        self._odometry_came_s = self.clock.now()
         pose = _pose_of(odometry)
         self._odometry.append((to_seconds(odometry.header.stamp), pose))
         self.world = replace(self.world, robot=place_in_world(*self._truth, pose) if self._truth else pose)
@@ -192,6 +225,10 @@ class DashboardNode(Node):
 
     def _on_description(self, received: Received[String]) -> None:
         self.world = replace(self.world, description=received.message.data)
+
+
+def _person(who: str | None, viewer: str) -> Person:
+    return "" if not who else "you" if who == viewer else "another viewer"
 
 
 def _reporter(message: DiagnosticArray) -> tuple[str, ...]:

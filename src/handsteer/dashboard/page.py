@@ -102,11 +102,11 @@ class Page:
 
     def _update(self) -> None:
         if node := self.joined:
-            self.show(node, node.state())
+            self.show(node, node.state(self.client.id))
 
     def _halt(self) -> None:
         if node := self.joined:
-            node.halt()
+            node.halt(self.client.id)
 
     def _reset(self) -> None:
         if node := self.joined:

@@ -22,6 +22,7 @@ from handsteer.clock import Clock
 from handsteer.config import DashboardConfig
 from handsteer.dashboard.access import Access, AccessMiddleware
 from handsteer.dashboard.drive import DrivePage
+from handsteer.dashboard.history import VelocityHistory
 from handsteer.dashboard.node import DashboardNode
 from handsteer.dashboard.page import ASSETS_PATH, ICON, PICTURE_PATH, WEBCAM_PATH, Served
 from handsteer.dashboard.picture import PictureNode, PictureResponse
@@ -73,7 +74,8 @@ class Dashboard:
         cmd_vel: Topic[Any] = CMD_VEL,
         cameras: ChoiceOfCameras | None = None,
     ) -> None:
-        self.node = WhileWatched(lambda: DashboardNode(transport, clock, steering, cmd_vel))
+        history = VelocityHistory()  # outlives the node, so that a page that is loaded anew shows it
+        self.node = WhileWatched(lambda: DashboardNode(transport, clock, steering, cmd_vel, history))
         self.pictures = WhileWatched(lambda: PictureNode(transport, clock))
         self.served = Served(self.node, cameras)
         self.webcam = FrameSocket(cameras, self._drives)

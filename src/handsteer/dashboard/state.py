@@ -15,7 +15,7 @@ Mood = Literal["driving", "standing", "trouble", "waiting"]
 STALE_S = 2.0
 """A node that has not reported for this long counts as silent; the slowest reports twice a second."""
 
-_COMMAND_HOLDS_S = 0.4
+COMMAND_HOLDS_S = 0.4
 """A command counts for this long, as in the robot's controller; then nothing is commanded."""
 
 
@@ -42,6 +42,28 @@ class Report:
         except (KeyError, ValueError):
             return None
         return number if math.isfinite(number) else None
+
+
+Person = Literal["", "you", "another viewer"]
+"""Who of the viewers did it, for the one who is told; empty when none of them did."""
+
+
+@dataclass(frozen=True)
+class Viewers:
+    """What the viewers of the page do, as one of them is told.
+
+    Attributes:
+        steers: Who steers by hand on the page.
+        stopped: Who pressed Stop last, on the page.
+        may_reset: Whether the one who is told may reset it.
+    """
+
+    steers: Person = ""
+    stopped: Person = ""
+    may_reset: bool = True
+
+
+NOBODY = Viewers()
 
 
 @dataclass(frozen=True)
@@ -86,6 +108,10 @@ class PageState:
         fps: Frames a second of the camera; None when not known yet.
         path_length_m: How far the robot has gone; None when it does not say.
         collisions: How often it has begun to touch an obstacle; None when it does not say.
+        confirmed: 0 to 1, how far ``seen`` is on its way to count; 1 when it counts.
+        viewers: What the viewers of the page do.
+        max_linear_mps: The highest speed that control lets through, either way; None when it does not say.
+        max_angular_radps: Likewise, for turning.
     """
 
     mood: Mood
@@ -106,16 +132,20 @@ class PageState:
     fps: float | None
     path_length_m: float | None
     collisions: int | None
+    confirmed: float
+    viewers: Viewers
+    max_linear_mps: float | None
+    max_angular_radps: float | None
 
 
-def compose(observed: Observed, now_s: float) -> PageState:
-    """Return what the page says at ``now_s``, in seconds of the graph's clock."""
+def compose(observed: Observed, now_s: float, viewers: Viewers = NOBODY) -> PageState:
+    """Return what the page says at ``now_s``, in seconds of the graph's clock, to one of its ``viewers``."""
     reports = {name: report for name, report in observed.reports.items() if now_s - report.came_s < STALE_S}
     seen = reports.get("hand_sign_recognition", _NO_REPORT)
     control = reports.get("hand_sign_control", _NO_REPORT)
     robot = reports.get("robot", _NO_REPORT)
     camera = reports.get("my_camera", _NO_REPORT)
-    mood, headline, reason = explain(reports)
+    mood, headline, reason = explain(reports, viewers)
     collisions = robot.number("collisions")
     return PageState(
         mood=mood,
@@ -129,17 +159,31 @@ def compose(observed: Observed, now_s: float) -> PageState:
         camera=camera_name(camera.message),
         driver=control.values.get("source", "nobody"),
         stopped=control.values.get("stopped") == str(True),
-        commanded=observed.command if now_s - observed.command_came_s < _COMMAND_HOLDS_S else ZERO,
+        commanded=observed.command if now_s - observed.command_came_s < COMMAND_HOLDS_S else ZERO,
         measured=observed.measured,
         latency_median_ms=control.number("latency_median_ms") or None,
         latency_p99_ms=control.number("latency_p99_ms") or None,
         fps=frame_rate(observed.frame_counts, now_s),
         path_length_m=robot.number("path_length_m"),
         collisions=None if collisions is None else int(collisions),
+        confirmed=confirmed(seen),
+        viewers=viewers,
+        max_linear_mps=control.number("max_linear") or None,
+        max_angular_radps=control.number("max_angular") or None,
     )
 
 
-def explain(reports: Mapping[str, Report]) -> tuple[Mood, str, str]:
+def confirmed(recognition: Report) -> float:
+    """Return how far the sign that ``recognition`` sees is on its way to count, 0 to 1."""
+    seen = recognition.values.get("seen", NONE)
+    if seen == NONE:
+        return 0.0
+    if seen == recognition.values.get("sign"):
+        return 1.0
+    return max(0.0, min(recognition.number("progress") or 0.0, 1.0))
+
+
+def explain(reports: Mapping[str, Report], viewers: Viewers = NOBODY) -> tuple[Mood, str, str]:
     """Return in words what the robot does and why: mood, headline, reason.
 
     Control knows whether the robot is told to move. When it is not, because no sign counts, the reason lies further
@@ -147,6 +191,7 @@ def explain(reports: Mapping[str, Report]) -> tuple[Mood, str, str]:
 
     Args:
         reports: The reports of the nodes that are not silent, by name of node.
+        viewers: What the viewers of the page do, of which control does not know.
     """
     control = reports.get("hand_sign_control")
     if control is None:
@@ -156,7 +201,8 @@ def explain(reports: Mapping[str, Report]) -> tuple[Mood, str, str]:
     if robot.level >= ERROR:
         return "trouble", "Trouble", f"the robot {robot.message}"
     if control.values.get("stopped") == str(True):
-        return "trouble", "Stopped", reason
+        by = f"stopped by {viewers.stopped}" if viewers.stopped else "stopped"
+        return "trouble", "Stopped", f"{by}, until {'you reset' if viewers.may_reset else 'the driver resets'} it"
     if control.number("linear_mps") or control.number("angular_radps"):
         return "driving", "Driving", reason if robot.level == OK else f"{reason}, but the robot {robot.message}"
     steered = control.values.get("source") == "steering"

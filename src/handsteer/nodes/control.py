@@ -155,6 +155,8 @@ class HandSignControlNode(Node):
             stopped=self._is_stopped,
             linear_mps=f"{velocity.linear_mps:.3f}",
             angular_radps=f"{velocity.angular_radps:.3f}",
+            max_linear=self._config.max_linear,
+            max_angular=self._config.max_angular,
             **({"robot": self._selection.fleet.selected} if self._selection else {}),
             **self._latencies(),
         )
@@ -162,11 +164,17 @@ class HandSignControlNode(Node):
     @property
     def _reason(self) -> str:
         if self._is_stopped:
-            return "standing: stopped by you, until you reset it"
-        if self._hold.signs and self._driver.source == "signs":
-            chosen = f"{self._selection.fleet.selected} was selected, and" if self._selection else "it was stopped, and"
-            return f"standing: {chosen} moves once Stop is shown, or no hand"
+            return "standing: stopped, until it is reset"
+        source = self._driver.source
+        if self._hold.signs and source == "signs":
+            return f"standing: {self._disarmed}, moves once Stop is shown, or no hand"
+        if self._hold.steering and source == "steering":
+            return f"standing: {self._disarmed}, steers once the steering has been let go"
         return self._driver.reason
+
+    @property
+    def _disarmed(self) -> str:
+        return f"{self._selection.fleet.selected} was selected and is disarmed" if self._selection else "disarmed"
 
     def _latencies(self) -> dict[str, str]:
         """Return the latency's figures; none where the transport does not carry the frame's time with a sign."""

@@ -21,6 +21,7 @@ from handsteer.transports.protocol import Received, Transport
 _WATCH_PERIOD_S = 0.02
 _SILENCE_PERIOD_S = 0.1
 _DIAGNOSE_PERIOD_S = 0.1
+_SHORTLY_S = 3.0
 
 M = TypeVar("M", Image, CompressedImage)
 Annotate = Callable[[NDArray[np.uint8], Recognition], NDArray[np.uint8]]
@@ -53,6 +54,7 @@ class HandSignRecognitionNode(Node):
         self._last_captured_s: float | None = None
         self._last_frame_s = clock.now()
         self._last_none_s = -math.inf
+        self._last_hand_s: float | None = None
         self._age = FrameAge(config.max_frame_age)
         self._refused: str | None = None
         self._refused_s = -math.inf
@@ -88,6 +90,8 @@ class HandSignRecognitionNode(Node):
             raise
         self._last_frame_s = began_s
         self._recognition = recognition
+        if recognition.hand is not None:
+            self._last_hand_s = began_s
         self.counts[recognition.sign] = self.counts.get(recognition.sign, 0) + 1
         self._sign.publish(String(data=recognition.sign), received.captured_s)
         self.processing.add(self.clock.now() - began_s)
@@ -119,7 +123,7 @@ class HandSignRecognitionNode(Node):
             return
         self.diagnose(
             OK,
-            seen.reason,
+            self._reason(seen),
             sign=seen.sign,
             seen=seen.seen,
             confidence=f"{seen.confidence:.2f}",
@@ -130,6 +134,13 @@ class HandSignRecognitionNode(Node):
             frame_age_ms=f"{self._age.age_s * 1000:.0f}",
             clock_ahead_ms=f"{self._age.ahead_s * 1000:.0f}",
         )
+
+    def _reason(self, seen: Recognition) -> str:
+        if seen.hand is not None or self._last_hand_s is None:
+            return seen.reason
+        unseen_s = self.clock.now() - self._last_hand_s
+        # Tenths matter for a hand that was lost; nobody reads them of one that has left.
+        return f"no hand seen for {unseen_s:.{1 if unseen_s < _SHORTLY_S else 0}f} s"
 
     def _why_no_frame(self) -> str:
         now = self.clock.now()

@@ -33,6 +33,7 @@ class CameraPanel:
                     self._excuse = text("", "waiting for the first picture")
                 text("caption", "as in a mirror")
             with box("foot"):
+                self._ring = box("ring").props('role="progressbar" aria-label="Confirmed" aria-valuemax="100"')
                 self._sign = text("sign", "No sign")
                 with box("meter"):
                     self._confidence = box("")
@@ -41,6 +42,7 @@ class CameraPanel:
             if cameras is not None:
                 self._choice(viewer, use_own)
         self._width = 0
+        self._confirmed = -1
 
     def update(self, state: PageState) -> None:
         """Show ``state``."""
@@ -48,6 +50,7 @@ class CameraPanel:
         shown = state.sign if state.seen == NONE else state.seen
         self._sign.set_text("No sign" if shown == NONE else shown)
         switch(self._sign, "pending", on=shown != state.sign)
+        self._show_confirmed(round(100 * state.confirmed))
         self._hand.set_text(f"{state.handedness} hand" if state.handedness else "No hand")
         percent = round(100 * state.confidence) if state.seen != NONE else 0
         self._percent.set_text(f"{percent} %" if percent else "")
@@ -58,6 +61,12 @@ class CameraPanel:
         switch(self._veil, "off", on=not state.no_picture)
         if self._cameras is not None:
             self._show_choice(self._cameras.source)
+
+    def _show_confirmed(self, percent: int) -> None:
+        if percent != self._confirmed:
+            self._confirmed = percent
+            self._ring.style(f"--confirmed: {percent}%").props(f"aria-valuenow={percent}")
+            switch(self._ring, "whole", on=percent == 100)
 
     def _choice(self, viewer: str, use_own: Callable[[], None]) -> None:
         self._chosen = ""

@@ -10,11 +10,11 @@ UNKNOWN = "--"
 
 
 @contextmanager
-def card(title: str, classes: str) -> Iterator[None]:
-    """Put what follows into a card with a heading."""
-    with ui.element("section").classes(f"card {classes}"):
+def card(title: str, classes: str) -> Iterator[ui.element]:
+    """Put what follows into a card with a heading, and yield the card."""
+    with ui.element("section").classes(f"card {classes}") as element:
         tag("h2", "", title)
-        yield
+        yield element
 
 
 def box(classes: str) -> ui.element:

@@ -1,0 +1,49 @@
+"""The velocities of the last 30 s, as the plot shows them."""
+
+import threading
+from collections import deque
+from dataclasses import dataclass
+
+from handsteer.control.sign_control import Velocity
+
+SPAN_S = 30.0
+PERIOD_S = 0.05
+"""How often a sample is taken."""
+
+
+@dataclass(frozen=True)
+class Sample:
+    """Both velocities at one moment.
+
+    Attributes:
+        at_s: When, in seconds of the graph's clock.
+        commanded: What the robot was told; None while it was told nothing.
+        measured: What odometry said; None while it said nothing.
+    """
+
+    at_s: float
+    commanded: Velocity | None
+    measured: Velocity | None
+
+
+class VelocityHistory:
+    """Keeps the samples of the last :data:`SPAN_S` seconds; may be used from any thread."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._samples: deque[Sample] = deque(maxlen=round(SPAN_S / PERIOD_S) + 1)
+        self._count = 0
+
+    def add(self, sample: Sample) -> None:
+        """Keep ``sample`` as the newest, unless the last one is younger than half of :data:`PERIOD_S`."""
+        with self._lock:
+            if not self._samples or sample.at_s - self._samples[-1].at_s >= PERIOD_S / 2:
+                self._samples.append(sample)
+                self._count += 1
+
+    def since(self, count: int, now_s: float) -> tuple[int, list[Sample]]:
+        """Return how many samples there have ever been, and those after the first ``count`` that are young enough."""
+        with self._lock:
+            fresh = min(self._count - count, len(self._samples))
+            samples = list(self._samples)[len(self._samples) - fresh :] if fresh > 0 else []
+            return self._count, [sample for sample in samples if now_s - sample.at_s <= SPAN_S]

@@ -1,0 +1,84 @@
+"""What one page asks for by hand, and for how long: the pad while it is held, the sliders as long as the page lives."""
+
+import math
+
+from handsteer.control.sign_control import ZERO, Velocity
+from handsteer.transports.lateness import Lateness
+
+HOLD_TIMEOUT_S = 0.3
+"""Steering ends when the page has not repeated it for this long: the tab was closed, or the network lost."""
+
+SLIDERS_TIMEOUT_S = 0.5
+"""Sliders go to zero when the page has not been heard of for this long."""
+
+_LATE_S = 0.2
+_LATE_IN_A_ROW = 5
+_PAGE = b"page"
+
+
+class Manual:
+    """Tells which velocity a page asks for now; one source at a time, the newest.
+
+    The pad asks for a velocity each time it is heard. The sliders keep theirs for as long as the page says, again and
+    again, that it is open and in front. What a page said late, because its network stood still, is left out.
+
+    Attributes:
+        sliders: Where the sliders are.
+    """
+
+    def __init__(self) -> None:
+        self.sliders = ZERO
+        self._heard_s = -math.inf
+        self._lateness = Lateness(_LATE_S)
+        self._late = 0
+
+    @property
+    def is_late(self) -> bool:
+        """Whether what the page says comes late again and again."""
+        return self._late >= _LATE_IN_A_ROW
+
+    def hold_pad(self, wanted: Velocity, sent: object, now_s: float) -> Velocity | None:
+        """Take the pad, which sets the sliders to zero; return the velocity to steer at, None when it came late.
+
+        Args:
+            wanted: What the pad asks for.
+            sent: When the page said so, in ms of its own clock, as it came from the browser.
+            now_s: Seconds of our monotonic clock.
+        """
+        self.sliders = ZERO
+        return wanted if self._is_timely(sent, now_s) else None
+
+    def slide(self, wanted: Velocity, now_s: float) -> None:
+        """Set the sliders; the robot follows once the page says that it is in front."""
+        if self.sliders.is_zero:
+            self._heard_s = now_s
+        self.sliders = wanted
+
+    def keep_on(self, sent: object, now_s: float) -> Velocity | None:
+        """Take the page's word that it is in front; return the velocity to steer at, None for none.
+
+        Args:
+            sent: When the page said so, in ms of its own clock, as it came from the browser.
+            now_s: Seconds of our monotonic clock.
+        """
+        self.end_if_silent(now_s)
+        if not self._is_timely(sent, now_s):
+            return None
+        self._heard_s = now_s
+        return None if self.sliders.is_zero else self.sliders
+
+    def end_if_silent(self, now_s: float) -> None:
+        """Set the sliders to zero if the page has not been heard of for :data:`SLIDERS_TIMEOUT_S`."""
+        if now_s - self._heard_s > SLIDERS_TIMEOUT_S:
+            self.sliders = ZERO
+
+    def let_go(self) -> None:
+        """Set the sliders to zero."""
+        self.sliders = ZERO
+
+    def _is_timely(self, sent: object, now_s: float) -> bool:
+        if isinstance(sent, bool) or not isinstance(sent, int | float) or not math.isfinite(sent):
+            return False
+        is_late = self._lateness.is_late(_PAGE, sent / 1000, now_s)
+        self._late = self._late + 1 if is_late else 0
+        return not is_late

@@ -1,0 +1,112 @@
+// What a page from Python cannot feel: how long the pad or a key is held, and whether the page is in front.
+
+const REPEAT_MS = 100; // the server stops the robot when it hears nothing for 300 ms
+const KEYS = {
+  ArrowUp: [0, 1], KeyW: [0, 1], ArrowDown: [0, -1], KeyS: [0, -1],
+  ArrowLeft: [-1, 0], KeyA: [-1, 0], ArrowRight: [1, 0], KeyD: [1, 0],
+};
+const TYPED_IN = "input, textarea, select, [contenteditable]";
+
+let held = null; // the pad that is held: {pad, timer, x, y}, x to the right and y up, -1 to 1
+const pressed = new Set();
+
+// What cannot be sent now must not be sent later. The time is the day's, which goes on while a laptop sleeps.
+function say(name, what = {}) {
+  if (window.socket?.connected) emitEvent(name, { ...what, at: Date.now() });
+}
+
+function hold(pad, x, y) {
+  const length = Math.max(1, Math.hypot(x, y));
+  const fresh = held === null;
+  held = { pad, timer: held?.timer, x: x / length, y: y / length };
+  pad.classList.add("held");
+  const reach = (pad.clientWidth - pad.querySelector(".knob").clientWidth) / 2;
+  pad.querySelector(".knob").style.transform = `translate(${held.x * reach}px, ${-held.y * reach}px)`;
+  if (fresh) {
+    sayHeld();
+    held.timer = setInterval(sayHeld, REPEAT_MS);
+  }
+}
+
+function sayHeld() {
+  say("pad_held", { x: held.x, y: held.y });
+}
+
+function releasePad() {
+  pressed.clear();
+  if (held === null) return;
+  clearInterval(held.timer);
+  held.pad.classList.remove("held");
+  held.pad.querySelector(".knob").style.transform = "";
+  held = null;
+  say("let_go");
+}
+
+// Sliders stay where they are set, but only while somebody looks.
+const slidersInUse = () => document.querySelector(".sliders.set, .sliders:focus-within") !== null;
+setInterval(() => {
+  if (slidersInUse() && !document.hidden && document.hasFocus()) say("sliders_held");
+}, REPEAT_MS);
+
+function letGo() {
+  releasePad();
+  if (document.querySelector(".sliders.set")) say("let_go");
+}
+
+function followPointer(event, pad) {
+  const box = pad.getBoundingClientRect();
+  const reach = (box.width - pad.querySelector(".knob").clientWidth) / 2;
+  hold(pad, (event.clientX - box.left - box.width / 2) / reach, -(event.clientY - box.top - box.height / 2) / reach);
+}
+
+document.addEventListener("pointerdown", (event) => {
+  const pad = event.target.closest?.(".pad");
+  if (!pad || event.button !== 0) return;
+  pad.setPointerCapture(event.pointerId);
+  pad.focus({ preventScroll: true });
+  followPointer(event, pad);
+});
+document.addEventListener("pointermove", (event) => {
+  const pad = event.target.closest?.(".pad");
+  if (held && pad && pad.hasPointerCapture(event.pointerId)) followPointer(event, pad);
+});
+for (const type of ["pointerup", "pointercancel", "lostpointercapture"]) {
+  document.addEventListener(type, (event) => event.target.closest?.(".pad") && releasePad());
+}
+
+// Arrows scroll the page and move sliders, so they steer on the pad only; letters steer anywhere for who drives.
+function padOf(event) {
+  const anywhere = event.code.startsWith("Key") && !event.target.closest?.(TYPED_IN);
+  return event.target.closest?.(".pad") ?? (anywhere ? document.querySelector(".steer.yours .pad") : null);
+}
+
+document.addEventListener("keydown", (event) => {
+  if (event.ctrlKey || event.altKey || event.metaKey) releasePad(); // with these, some systems tell of no keyup
+  else if (event.code in KEYS) pressKey(event);
+});
+
+function pressKey(event) {
+  const pad = padOf(event);
+  if (!pad) return;
+  event.preventDefault();
+  pressed.add(event.code);
+  followKeys(pad);
+}
+document.addEventListener("keyup", (event) => {
+  if (!pressed.delete(event.code)) return;
+  event.preventDefault();
+  followKeys(held?.pad);
+});
+
+function followKeys(pad) {
+  const codes = [...pressed];
+  const sum = (axis) => Math.sign(codes.reduce((total, code) => total + KEYS[code][axis], 0));
+  if (codes.length && pad) hold(pad, sum(0), sum(1));
+  else releasePad();
+}
+
+document.addEventListener("keydown", (event) => event.code === "Space" && letGo(), true);
+document.addEventListener("focusout", (event) => event.target.closest?.(".pad") && releasePad());
+document.addEventListener("visibilitychange", () => document.hidden && letGo());
+window.addEventListener("blur", letGo);
+window.addEventListener("pagehide", letGo);
