@@ -280,9 +280,13 @@ def make_robot(config: Config, transport: Transport, clock: Clock, link: Session
     return RobotNode(transport, clock, robot, config.robot, topic)
 
 
-def make_steering(_config: Config, transport: Transport, clock: Clock) -> SteeringNode:
-    """Return the node ``steering``; people steer by its methods, as the page does."""
-    return SteeringNode(transport, clock)
+def make_steering(config: Config, transport: Transport, clock: Clock) -> SteeringNode:
+    """Return the node ``steering``; people steer by its methods, as the page does.
+
+    Raises:
+        ConfigError: Control and robot were told different types of commands.
+    """
+    return SteeringNode(transport, clock, config.control, cmd_vel_topic(config))
 
 
 def _warn_of_unknown_signs(config: Config, signs: tuple[str, ...]) -> None:

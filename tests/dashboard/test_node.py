@@ -5,8 +5,10 @@ import pytest
 
 from handsteer.clock import SteppedClock
 from handsteer.config import ControlConfig
+from handsteer.control.sign_control import Velocity
 from handsteer.dashboard.node import HOLD_TIMEOUT_S, DashboardNode
 from handsteer.dashboard.watch import WhileWatched
+from handsteer.errors import TransportError
 from handsteer.messages import (
     CMD_VEL,
     DIAGNOSTICS,
@@ -228,3 +230,38 @@ def test_nodes_of_processes_are_known_by_their_role_and_those_of_other_namespace
     assert bench.node.state().camera == "webcam 0"
     bench.report("r2/my_camera: my_camera", "webcam 9: delivers frames")
     assert bench.node.state().camera == "webcam 0"
+
+
+def test_tells_each_viewer_who_steers_and_who_stopped(bench: Bench) -> None:
+    bench.report("hand_sign_control", "standing: stopped, until it is reset", stopped="True")
+    bench.node.steer("me", 0.1, 0.0)
+    assert [bench.node.state(who).viewers.steers for who in ("me", "you")] == ["you", "another viewer"]
+    bench.node.halt("you")
+    assert bench.node.state("you").reason == "stopped by you, until the driver resets it"
+    assert bench.node.state("me").reason == "stopped by another viewer, until you reset it"
+    bench.node.reset("me")
+    assert bench.node.state("me").viewers.stopped == ""
+
+
+def test_keeps_the_velocities_and_gaps_where_nothing_was_said(bench: Bench) -> None:
+    bench.publish(CMD_VEL, twist(0.5, 0.25))
+    bench.odometry(0.0, speed=0.4)
+    for _ in range(20):
+        bench.step(0.1)
+    _, samples = bench.node.history.since(0, bench.clock.now())
+    assert samples[0].commanded == Velocity(0.5, 0.25)
+    assert samples[1].measured == Velocity(0.4, 0.0)
+    assert (samples[-1].commanded, samples[-1].measured) == (None, None)
+
+
+def test_only_who_drives_chooses_the_topic_and_not_while_stopped(bench: Bench) -> None:
+    bench.node.steer("me", 0.1, 0.0)
+    with pytest.raises(TransportError, match="only who drives"):
+        bench.node.steer_on("you", "/cmd_vel")
+    bench.report("hand_sign_control", "standing: stopped, until it is reset", stopped="True")
+    with pytest.raises(TransportError, match="is stopped"):
+        bench.node.steer_on("me", "/cmd_vel")
+    bench.report("hand_sign_control", "standing: no sign is seen", stopped="False")
+    bench.node.steer_on("me", "/cmd_vel")
+    assert bench.steered[-1] == (0.0, 0.0)
+    assert bench.node.state("me").viewers.topic == "/cmd_vel"

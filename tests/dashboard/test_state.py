@@ -5,12 +5,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from handsteer.control.sign_control import ZERO, Velocity
+from handsteer.dashboard.panels.mux import entries
+from handsteer.dashboard.panels.sliders import read_limit
 from handsteer.dashboard.panels.steer import read_deflection
-from handsteer.dashboard.panels.velocity import bar
 from handsteer.dashboard.state import (
     STALE_S,
     Observed,
     Report,
+    Viewers,
     camera_name,
     compose,
     explain,
@@ -187,15 +189,6 @@ def test_the_robot_goes_on_from_its_true_pose_as_its_wheels_count(truth: Pose2D,
     assert placed.yaw == pytest.approx(truth.yaw, abs=1e-9)
 
 
-@given(commanded=FINITE, measured=FINITE, scale=st.sampled_from([1.0, 2.0, -2.0]))
-def test_a_bar_stays_in_its_track_and_ends_at_its_value(commanded: float, measured: float, scale: float) -> None:
-    shown = bar(commanded, measured, scale)
-    assert 0 <= shown.left <= shown.left + shown.width <= 100.1
-    assert 0 <= shown.mark <= 100
-    end = shown.left if measured / scale < 0 else shown.left + shown.width
-    assert end == pytest.approx(50 + 50 * max(-1, min(measured / scale, 1)), abs=0.11)
-
-
 @pytest.mark.parametrize(
     ("sent", "read"),
     [
@@ -219,3 +212,81 @@ def test_what_is_wrong_with_the_robot_is_said_whatever_it_is_told() -> None:
             "robot": report("is not there: nobody listens on /cmd_vel", level=ERROR),
         }
         assert explain(reports) == ("trouble", "Trouble", "the robot is not there: nobody listens on /cmd_vel")
+
+
+STOPPED = {"hand_sign_control": report("standing: stopped, until it is reset", stopped="True")}
+
+
+@pytest.mark.parametrize(
+    ("viewers", "says"),
+    [
+        (Viewers(), "stopped, until you reset it"),
+        (Viewers(stopped="you"), "stopped by you, until you reset it"),
+        (Viewers(stopped="you", may_reset=False), "stopped by you, until the driver resets it"),
+        (Viewers(stopped="another viewer"), "stopped by another viewer, until you reset it"),
+    ],
+)
+def test_says_who_stopped_the_robot_and_who_may_reset_it(viewers: Viewers, says: str) -> None:
+    assert explain(STOPPED, viewers) == ("trouble", "Stopped", says)
+    assert compose(Observed(STOPPED), 0.1, viewers).stopped
+
+
+def test_steering_past_the_control_is_said_whatever_the_control_says() -> None:
+    direct = Viewers(steers="you", topic="/cmd_vel")
+    standing = {"hand_sign_control": control("standing: no sign is seen"), "hand_sign_recognition": NO_HAND}
+    for reports in (standing, {}):
+        assert explain(reports, direct) == ("driving", "Driving", "steered by hand, straight on /cmd_vel")
+    halted = Viewers(topic="/cmd_vel", stopped="you", stands=True)
+    assert explain({}, halted) == ("trouble", "Stopped", "stopped by you, until you reset it")
+    assert compose(Observed(), 0.1, halted).stopped
+
+
+@pytest.mark.parametrize(
+    ("stopped", "source", "viewers", "holds"),
+    [
+        ("False", "nobody", Viewers(), None),
+        ("False", "signs", Viewers(), "Signs"),
+        ("False", "steering", Viewers(steers="you"), "By hand: you"),
+        ("False", "steering", Viewers(steers="another viewer"), "By hand: another viewer"),
+        ("False", "steering", Viewers(), "By hand: another node"),
+        ("False", "signs", Viewers(steers="you", topic="/cmd_vel"), "By hand: you"),
+        ("True", "steering", Viewers(steers="you", stopped="another viewer"), "Stop: another viewer"),
+        ("True", "signs", Viewers(), "Stop"),
+    ],
+)
+def test_at_most_one_source_has_the_robot(stopped: str, source: str, viewers: Viewers, holds: str | None) -> None:
+    reports = {"hand_sign_control": report("standing: x", stopped=stopped, source=source)}
+    shown = entries(compose(Observed(reports), 0.1, viewers))
+    assert [entry.name for entry in shown] == ["Stop", "By hand", "Signs"]
+    holding = [entry.name + (f": {entry.whose}" if entry.whose else "") for entry in shown if entry.holds]
+    assert holding == ([holds] if holds else [])
+
+
+@pytest.mark.parametrize(
+    ("values", "confirmed"),
+    [
+        ({"sign": "NONE", "seen": "NONE", "progress": "0.00"}, 0.0),
+        ({"sign": "NONE", "seen": "Forward", "progress": "0.67"}, 0.67),
+        ({"sign": "Go", "seen": "Forward", "progress": "0.10"}, 0.1),
+        ({"sign": "Forward", "seen": "Forward", "progress": "0.00"}, 1.0),
+        ({"sign": "NONE", "seen": "Forward", "progress": "7"}, 1.0),
+        ({"sign": "NONE", "seen": "Forward"}, 0.0),
+        ({}, 0.0),
+    ],
+)
+def test_tells_how_far_a_sign_is_confirmed(values: dict[str, str], confirmed: float) -> None:
+    assert compose(Observed({"hand_sign_recognition": report("", **values)}), 0.1).confirmed == confirmed
+
+
+def test_knows_the_limits_of_the_control() -> None:
+    state = compose(Observed({"hand_sign_control": report("", max_linear="0.3", max_angular="1.5")}), 0.1)
+    assert (state.max_linear_mps, state.max_angular_radps) == (0.3, 1.5)
+
+
+@given(
+    sent=st.one_of(st.none(), st.booleans(), st.text(), st.floats(), st.integers()),
+    low=st.floats(-5, 0),
+    high=st.floats(0, 5),
+)
+def test_a_number_of_a_browser_is_within_limits_whatever_was_sent(sent: object, low: float, high: float) -> None:
+    assert low <= read_limit(sent, low, high, 0.0) <= high

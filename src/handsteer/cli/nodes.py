@@ -152,7 +152,8 @@ def _served(node: SteeringNode, config: Config) -> Iterator[None]:
     # The page's libraries take a second to load, which the other nodes need not wait for.
     from handsteer.dashboard.server import Dashboard  # noqa: PLC0415
 
-    dashboard = Dashboard(node.transport, node.clock, node, config.dashboard, cmd_vel=graph.cmd_vel_topic(config))
+    wires = (node.transport, node.clock, node)
+    dashboard = Dashboard(*wires, config.dashboard, cmd_vel=graph.cmd_vel_topic(config), topics=True)
     url = dashboard.start()
     try:
         say(f"the page is at {url}")

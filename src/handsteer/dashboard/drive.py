@@ -40,7 +40,8 @@ class DrivePage(Page):
         with ui.element("div").classes("panels"):
             self._velocity = VelocityPanel()
             self._timing = TimingPanel()
-            self._steering = SteerPanel(self._steer, self._release, time.monotonic)
+            choose_topic = self._steer_on if served.topics else None
+            self._steering = SteerPanel(self._steer, self._release, time.monotonic, choose_topic)
             self._signs = SignsPanel()
         ui.timer(_WORLD_PERIOD_S, self._update_world)
         ui.timer(_PLOT_PERIOD_S, self._update_plot)
@@ -63,6 +64,11 @@ class DrivePage(Page):
     def _steer(self, linear_mps: float, angular_radps: float) -> None:
         if node := self.joined:
             node.steer(self.client.id, linear_mps, angular_radps)
+
+    def _steer_on(self, topic: str) -> None:
+        if node := self.joined:
+            self._steering.let_go()
+            node.steer_on(self.client.id, topic)
 
     def _release(self) -> None:
         if node := self.joined:

@@ -20,6 +20,7 @@ from handsteer.dashboard.state import (
     compose,
     place_in_world,
 )
+from handsteer.errors import TransportError
 from handsteer.messages import (
     CMD_VEL,
     DIAGNOSTICS,
@@ -122,7 +123,14 @@ class DashboardNode(Node):
         """Return what the page says now to ``viewer``."""
         now, holder = self.clock.now(), self._holder
         may_reset = self.seat.place_of(viewer, now).role != "watcher"
-        viewers = Viewers(_person(holder and holder[0], viewer), _person(self._stopper, viewer), may_reset)
+        directly = self._steering.is_direct
+        viewers = Viewers(
+            steers=_person(holder and holder[0], viewer),
+            stopped=_person(self._stopper, viewer),
+            may_reset=may_reset,
+            topic=self._steering.topic if directly else "",
+            stands=directly and self._steering.is_stopped,
+        )
         return compose(self._observed, now, viewers)
 
     def steer(self, viewer: str, linear_mps: float, angular_radps: float) -> None:
@@ -140,6 +148,24 @@ class DashboardNode(Node):
         if holder is not None and holder[0] == viewer:
             self._holder = None
             self._steering.release()
+
+    @property
+    def steering_topic(self) -> str:
+        """The topic that steering by hand goes to."""
+        return self._steering.topic
+
+    def steer_on(self, viewer: str, topic: str) -> None:
+        """Let steering by hand go to ``topic``, if ``viewer`` has the driver's seat or nobody has.
+
+        Raises:
+            TransportError: It is no such topic, or somebody else drives, or the robot is stopped.
+        """
+        if not self.seat.take(viewer, self.clock.now()):
+            raise TransportError("only who drives may choose the topic: ask to drive first")
+        if self.state().stopped:
+            raise TransportError("the robot is stopped: reset it, then choose the topic")
+        self._holder = None
+        self._steering.send_to(topic)
 
     def halt(self, viewer: str = "") -> None:
         """Stop the robot, whoever drives; ``viewer`` is who asks."""

@@ -37,10 +37,12 @@ class Served:
     Attributes:
         node: Is joined for as long as a browser shows a page.
         cameras: The graph's camera, which a browser's may stand in for; None where that cannot be.
+        topics: Whether steering by hand may go to other topics than the control's.
     """
 
     node: WhileWatched[DashboardNode]
     cameras: ChoiceOfCameras | None
+    topics: bool = False
 
 
 class Page:

@@ -56,6 +56,7 @@ class Dashboard:
         config: Where the page is served, and how.
         cmd_vel: The topic of the commands that are shown.
         cameras: The camera of this process, which a browser's may stand in for; None where it is in another.
+        topics: Whether steering by hand may go to other topics than the control's, where other robots may be.
 
     Attributes:
         node: Listens and steers for the browsers that show the page.
@@ -73,11 +74,12 @@ class Dashboard:
         *,
         cmd_vel: Topic[Any] = CMD_VEL,
         cameras: ChoiceOfCameras | None = None,
+        topics: bool = False,
     ) -> None:
         history = VelocityHistory()  # outlives the node, so that a page that is loaded anew shows it
         self.node = WhileWatched(lambda: DashboardNode(transport, clock, steering, cmd_vel, history))
         self.pictures = WhileWatched(lambda: PictureNode(transport, clock))
-        self.served = Served(self.node, cameras)
+        self.served = Served(self.node, cameras, topics)
         self.webcam = FrameSocket(cameras, self._drives)
         self._config = config
         self._server: uvicorn.Server | None = None

@@ -56,11 +56,15 @@ class Viewers:
         steers: Who steers by hand on the page.
         stopped: Who pressed Stop last, on the page.
         may_reset: Whether the one who is told may reset it.
+        topic: Where the steering goes past control; empty where it does not.
+        stands: Whether the steering stands there, because the robot was stopped.
     """
 
     steers: Person = ""
     stopped: Person = ""
     may_reset: bool = True
+    topic: str = ""
+    stands: bool = False
 
 
 NOBODY = Viewers()
@@ -158,7 +162,7 @@ def compose(observed: Observed, now_s: float, viewers: Viewers = NOBODY) -> Page
         no_picture="" if "seen" in seen.values else camera.message if camera.level >= ERROR else seen.message,
         camera=camera_name(camera.message),
         driver=control.values.get("source", "nobody"),
-        stopped=control.values.get("stopped") == str(True),
+        stopped=viewers.stands or control.values.get("stopped") == str(True),
         commanded=observed.command if now_s - observed.command_came_s < COMMAND_HOLDS_S else ZERO,
         measured=observed.measured,
         latency_median_ms=control.number("latency_median_ms") or None,
@@ -193,16 +197,18 @@ def explain(reports: Mapping[str, Report], viewers: Viewers = NOBODY) -> tuple[M
         reports: The reports of the nodes that are not silent, by name of node.
         viewers: What the viewers of the page do, of which control does not know.
     """
+    if viewers.topic and viewers.steers:
+        return "driving", "Driving", f"steered by hand, straight on {viewers.topic}"
     control = reports.get("hand_sign_control")
-    if control is None:
-        return "waiting", "Waiting", "the node hand_sign_control does not report"
-    reason = control.message.partition(": ")[2] or control.message
     robot = reports.get("robot", _NO_REPORT)
+    if control is None and not viewers.stands:
+        return "waiting", "Waiting", "the node hand_sign_control does not report"
     if robot.level >= ERROR:
         return "trouble", "Trouble", f"the robot {robot.message}"
-    if control.values.get("stopped") == str(True):
+    if control is None or viewers.stands or control.values.get("stopped") == str(True):
         by = f"stopped by {viewers.stopped}" if viewers.stopped else "stopped"
         return "trouble", "Stopped", f"{by}, until {'you reset' if viewers.may_reset else 'the driver resets'} it"
+    reason = control.message.partition(": ")[2] or control.message
     if control.number("linear_mps") or control.number("angular_radps"):
         return "driving", "Driving", reason if robot.level == OK else f"{reason}, but the robot {robot.message}"
     steered = control.values.get("source") == "steering"

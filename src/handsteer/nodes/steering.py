@@ -1,44 +1,124 @@
 """The node ``steering``: drives by hand, as ``rqt_robot_steering`` does, and stops the robot whoever drives."""
 
+import math
+import re
+import threading
+from dataclasses import dataclass
+from typing import Any
+
 from handsteer.clock import Clock
+from handsteer.config import Config, ControlConfig
+from handsteer.control.hold import Hold
 from handsteer.control.sign_control import ZERO, Velocity
-from handsteer.messages import STEERING_CMD_VEL, STOP, Bool, twist
+from handsteer.errors import TransportError
+from handsteer.messages import CMD_VEL, STEERING_CMD_VEL, STOP, Bool, Topic, command
 from handsteer.nodes.node import Node
-from handsteer.transports.protocol import Transport
+from handsteer.transports.protocol import Publisher, Received, Transport
 
 _PERIOD_S = 0.1
+_TOPIC_NAME = re.compile(r"/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)
+_LONGEST_NAME = 200
+_MOST_TOPICS = 8
+
+
+@dataclass(frozen=True)
+class _Target:
+    name: str
+    topic: Topic[Any]
+    publisher: Publisher[Any]
+
+    @property
+    def is_direct(self) -> bool:
+        return self.topic is not STEERING_CMD_VEL
 
 
 class SteeringNode(Node):
     """Repeats the velocity asked for by :meth:`steer` until :meth:`release`; silent otherwise.
 
+    It speaks to ``hand_sign_control``, which lets steering go before signs, and stops both. It can be sent to another
+    topic instead (:meth:`send_to`). There it keeps to the limits itself, and stands while the robot is stopped.
+
     All may be called from any thread.
+
+    Args:
+        transport: Carries the messages.
+        clock: The graph's clock.
+        config: Limits on another topic; the defaults of ``control`` when None.
+        cmd_vel: A topic of the type that robots are told, of Twist or TwistStamped, for other topics.
     """
 
-    def __init__(self, transport: Transport, clock: Clock) -> None:
+    def __init__(
+        self, transport: Transport, clock: Clock, config: ControlConfig | None = None, cmd_vel: Topic[Any] = CMD_VEL
+    ) -> None:
         super().__init__("steering", transport, clock)
+        self._config = config or ControlConfig()
+        self._type = cmd_vel.type
+        self._lock = threading.RLock()
         self._wanted: Velocity | None = None
         self._halted = False
-        self._cmd_vel = self.publisher(STEERING_CMD_VEL)
+        self._heard_stop: bool | None = None
+        self._hold = Hold()
+        self._last_steered_s = -math.inf
+        self._target = _Target(STEERING_CMD_VEL.name, STEERING_CMD_VEL, self.publisher(STEERING_CMD_VEL))
+        self._targets = {self._target.name: self._target}
         self._stop = self.publisher(STOP)
         self.every(_PERIOD_S, self._repeat)
 
+    @property
+    def topic(self) -> str:
+        """The name of the topic that commands go to."""
+        return self._target.name
+
+    @property
+    def is_direct(self) -> bool:
+        """Whether commands go past ``hand_sign_control``."""
+        return self._target.is_direct
+
+    @property
+    def is_stopped(self) -> bool:
+        """Whether somebody has stopped the robot: here, or on ``/stop`` since commands went to another topic."""
+        return self._halted or bool(self._heard_stop)
+
+    def send_to(self, name: str) -> None:
+        """Send commands to the topic ``name`` from now on; the one before is told to stand first.
+
+        Nothing moves on the new one before who steers has let go and begins anew.
+
+        Args:
+            name: As ``/cmd_vel``, or relative to the namespace of this node, as ``cmd_vel``.
+
+        Raises:
+            TransportError: It is no name of a topic, or the topic carries something else.
+        """
+        with self._lock:
+            target = self._targets.get(name) or self._find(name)
+            self.release()
+            self._hold.begin()
+            self._target = target
+
+    def on_reconfigure(self, config: Config) -> None:
+        """Take the limits of ``control``."""
+        self._config = config.control
+
     def steer(self, linear_mps: float, angular_radps: float) -> None:
         """Drive at this velocity from now on: m/s forward, rad/s to the left."""
-        self._wanted = Velocity(linear_mps, angular_radps)
-        self._publish(self._wanted)
+        with self._lock:
+            self._wanted = self._admitted(Velocity(linear_mps, angular_radps))
+            self._publish(self._wanted)
 
     def release(self) -> None:
         """Stop, and let others drive."""
-        if self._wanted is not None:
-            self._wanted = None
-            self._publish(ZERO)
+        with self._lock:
+            if self._wanted is not None:
+                self._wanted = None
+                self._publish(ZERO)
 
     def halt(self) -> None:
         """Stop the robot, whoever drives, until :meth:`reset`; said again and again, for a control that starts anew."""
-        self._wanted = None
-        self._halted = True
-        self._stop.publish(Bool(data=True))
+        with self._lock:
+            self._halted = True
+            self._stand()
+            self._stop.publish(Bool(data=True))
 
     def reset(self) -> None:
         """Let the robot be driven again; nothing moves before whoever drives has let go and begins anew."""
@@ -49,12 +129,57 @@ class SteeringNode(Node):
         """Leave nothing in motion."""
         self.release()
 
+    def _find(self, name: str) -> _Target:
+        if len(name) > _LONGEST_NAME or not _TOPIC_NAME.fullmatch(name):
+            raise TransportError(
+                f"{name[:_LONGEST_NAME]!r} is no topic's name: letters, digits and _ between slashes, as in /cmd_vel"
+            )
+        if len(self._targets) > _MOST_TOPICS:
+            raise TransportError(f"steering has had {_MOST_TOPICS} topics already: start it again for another")
+        is_global = name.startswith("/")
+        topic = Topic(name if is_global else f"/{name}", self._type, is_global=is_global, depth=CMD_VEL.depth)
+        target = _Target(name, topic, self.publisher(topic))
+        if self._heard_stop is None:
+            self._heard_stop = False
+            self.subscribe(STOP, self._on_stop_or_reset)
+        self._targets[name] = target
+        return target
+
+    def _admitted(self, wanted: Velocity) -> Velocity:
+        """Return what may be sent; ``hand_sign_control`` sees to that where it is not passed by."""
+        now = self.clock.now()
+        after_pause = now - self._last_steered_s >= self._config.steering_timeout
+        self._last_steered_s = now
+        if not self.is_direct:
+            return wanted
+        passes = self._hold.let_steering_pass(is_zero=wanted.is_zero, after_pause=after_pause)
+        if not passes or self.is_stopped or not wanted.is_finite:
+            return ZERO
+        return wanted.clamped(self._config.max_linear, self._config.max_angular)
+
+    def _on_stop_or_reset(self, received: Received[Bool]) -> None:
+        with self._lock:
+            self._heard_stop = bool(received.message.data)
+            if self._heard_stop:
+                self._stand()
+
+    def _stand(self) -> None:
+        """Ask for nothing any more; a robot that is steered past the control is told to stand here."""
+        self._wanted = None
+        self._hold.begin()
+        if self.is_direct:
+            self._publish(ZERO)
+
     def _repeat(self) -> None:
         if self._halted:
             self._stop.publish(Bool(data=True))
-        wanted = self._wanted
-        if wanted is not None:
-            self._publish(wanted)
+        with self._lock:
+            if self._wanted is not None:
+                self._publish(self._wanted)
+            elif self.is_direct and self.is_stopped:
+                self._publish(ZERO)
 
     def _publish(self, velocity: Velocity) -> None:
-        self._cmd_vel.publish(twist(velocity.linear_mps, velocity.angular_radps))
+        stamp, frame_id = self.clock.stamp(self.clock.now()), self._config.cmd_vel_frame_id
+        message = command(self._target.topic, velocity.linear_mps, velocity.angular_radps, stamp, frame_id)
+        self._target.publisher.publish(message)

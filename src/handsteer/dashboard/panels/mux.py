@@ -23,8 +23,9 @@ class Entry:
 
 def entries(state: PageState) -> tuple[Entry, ...]:
     """Return the sources of commands, the first before the second and so on; at most one of them holds."""
-    by_hand = not state.stopped and state.driver == "steering"
-    by_signs = not state.stopped and state.driver == "signs"
+    directly = bool(state.viewers.topic and state.viewers.steers)
+    by_hand = not state.stopped and (directly or state.driver == "steering")
+    by_signs = not state.stopped and not by_hand and state.driver == "signs"
     return (
         Entry("Stop", state.stopped, state.viewers.stopped),
         Entry("By hand", by_hand, state.viewers.steers or "another node"),

@@ -19,6 +19,9 @@ class Sliders:
 
     Args:
         change: Is called with the velocity that both ask for when one of them was moved.
+
+    Attributes:
+        across: Holds the angular slider, with room for more below it.
     """
 
     def __init__(self, change: Callable[[Velocity], None]) -> None:
@@ -28,7 +31,8 @@ class Sliders:
             names = ("Linear", "m/s", ("max", "min"), ("faster forward", "slower, then backward"))
             self._linear = _Axis("linear", *names, reach=_LINEAR_MPS, change=self._read, upright=True)
             names = ("Angular", "rad/s", ("left", "right"), ("more to the left", "more to the right"))
-            self._angular = _Axis("angular", *names, reach=_ANGULAR_RADPS, change=self._read, upright=False)
+            with box("across") as self.across:
+                self._angular = _Axis("angular", *names, reach=_ANGULAR_RADPS, change=self._read, upright=False)
 
     def show(self, velocity: Velocity) -> None:
         """Put both sliders where ``velocity`` is."""

@@ -6,9 +6,10 @@ from nicegui import ui
 
 from handsteer.control.sign_control import Velocity
 from handsteer.dashboard.manual import Manual
-from handsteer.dashboard.panels.elements import box, card, switch, text
+from handsteer.dashboard.panels.elements import box, button, card, switch, text
 from handsteer.dashboard.panels.mux import MuxPanel
 from handsteer.dashboard.panels.sliders import Sliders
+from handsteer.dashboard.panels.topic import TopicBox
 from handsteer.dashboard.seat import Place
 from handsteer.dashboard.state import PageState
 
@@ -27,12 +28,17 @@ class SteerPanel:
         steer: Is called with m/s forward and rad/s to the left again and again while the robot is to go on.
         release: Is called when it is to stop.
         now: Returns seconds of a monotonic clock.
+        choose_topic: Is called with the name of another topic to steer on; None where there is no choice.
     """
 
     _TURN_PER_SPEED = 2.0  # rad/s to the left at full deflection for each m/s of top speed
 
     def __init__(
-        self, steer: Callable[[float, float], None], release: Callable[[], None], now: Callable[[], float]
+        self,
+        steer: Callable[[float, float], None],
+        release: Callable[[], None],
+        now: Callable[[], float],
+        choose_topic: Callable[[str], None] | None,
     ) -> None:
         self._steer = steer
         self._release = release
@@ -52,6 +58,9 @@ class SteerPanel:
                     self._speed = ui.slider(min=0.1, max=1.0, step=0.1, value=0.5, on_change=self._show_speed)
                     self._speed.props('aria-label="Top speed of the pad in metres a second"')
                 self._sliders = Sliders(self._slide)
+                with self._sliders.across:
+                    button("Both to 0", "").on("click", self.let_go)
+                    self._topic = TopicBox(choose_topic)
             self._hint = text("hint", _HINTS["free"])
         self._show_speed()
         ui.on("pad_held", lambda event: self._hold(event.args))
@@ -61,6 +70,7 @@ class SteerPanel:
     def update(self, state: PageState, place: Place) -> None:
         """Show ``state`` to a viewer who has ``place``; sliders of others, and of a robot that is stopped, are at 0."""
         self._mux.update(state)
+        self._topic.update(state)
         watches = place.role == "watcher"
         self._manual.end_if_silent(self._now())
         if watches or state.stopped:
