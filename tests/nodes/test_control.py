@@ -242,6 +242,34 @@ def test_steering_that_was_held_through_a_reset_has_to_let_go(bench: ControlBenc
     assert bench.commands[-1] == (0.5, 0)
 
 
+def test_says_that_it_is_stopped_and_then_disarmed_and_how_it_moves_again(bench: ControlBench) -> None:
+    statuses = bench.record(DIAGNOSTICS)
+
+    def says() -> str:
+        bench.run(0.1)
+        return statuses[-1].status[0].message
+
+    bench.show(*["Forward"] * 3)
+    stop(bench, True)
+    assert says() == "standing: stopped, until it is reset"
+    stop(bench, False)
+    bench.show("Forward")
+    assert says() == "standing: disarmed, moves once Stop is shown, or no hand"
+    bench.steering.steer(0.5, 0.0)
+    stop(bench, True)
+    stop(bench, False)
+    assert says() == "standing: disarmed, steers once the steering has been let go"
+    bench.steering.release()
+    assert says() == "standing: steered by hand, at zero"
+
+
+def test_tells_its_limits(bench: ControlBench) -> None:
+    statuses = bench.record(DIAGNOSTICS)
+    bench.run(0.2)
+    values = {value.key: value.value for value in statuses[-1].status[0].values}
+    assert (values["max_linear"], values["max_angular"]) == ("1.0", "2.0")
+
+
 def test_a_reset_without_a_stop_changes_nothing(bench: ControlBench) -> None:
     bench.show(*["Forward"] * 3)
     stop(bench, False)

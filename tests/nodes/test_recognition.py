@@ -98,6 +98,15 @@ def test_diagnostics_tell_what_is_seen(bench: RecognitionBench) -> None:
     assert statuses[-1].status[0].message.startswith("no frame for")
 
 
+def test_tells_for_how_long_no_hand_was_seen(bench: RecognitionBench) -> None:
+    statuses = bench.record(DIAGNOSTICS)
+    bench.show(frames=100)
+    bench.show(frames=12)  # the recording has no more hands
+    assert statuses[-1].status[0].message == "no hand seen for 0.4 s"
+    bench.show(frames=150)
+    assert statuses[-1].status[0].message == "no hand seen for 5 s"
+
+
 def test_frames_that_come_late_are_told_from_none() -> None:
     bench = RecognitionBench()
     statuses = bench.record(DIAGNOSTICS)

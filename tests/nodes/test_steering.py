@@ -69,11 +69,12 @@ def test_who_steers_begins_anew_on_another_topic(bench: Bench) -> None:
     assert bench.robot[-1] == (0.3, 0.0)
 
 
-def test_it_goes_back_to_the_control(bench: Bench) -> None:
+@pytest.mark.parametrize("name", ["/steering/cmd_vel", "steering/cmd_vel"])
+def test_it_goes_back_to_the_control(bench: Bench, name: str) -> None:
     bench.node.send_to("/cmd_vel")
     let_go_once(bench)
     bench.node.steer(0.3, 0.0)
-    bench.node.send_to("/steering/cmd_vel")
+    bench.node.send_to(name)
     assert bench.robot[-1] == (0.0, 0.0)
     bench.node.steer(0.2, 0.0)
     assert (bench.mux, bench.node.is_direct) == ([(0.2, 0.0)], False)

@@ -90,6 +90,8 @@ class SteeringNode(Node):
         Raises:
             TransportError: It is no name of a topic, or the topic carries something else.
         """
+        if name == STEERING_CMD_VEL.ros_name:
+            name = STEERING_CMD_VEL.name
         with self._lock:
             target = self._targets.get(name) or self._find(name)
             self.release()

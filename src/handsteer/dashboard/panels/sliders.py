@@ -121,8 +121,8 @@ class _Axis:
                 step.props("" if on else "disabled", remove="disabled" if on else "")
 
     def _show_bound(self) -> None:
-        self._highest.props(f"min=0 max={self._bound}")
-        self._lowest.props(f"min={-self._bound} max=0")
+        self._highest.min, self._highest.max = 0.0, self._bound
+        self._lowest.min, self._lowest.max = -self._bound, 0.0
 
     def _number(self, name: str, value: float, change: Callable[[], None]) -> ui.number:
         number = ui.number(name, value=value, step=_STEP, format="%.2f", on_change=change)
@@ -131,7 +131,8 @@ class _Axis:
     def _on_limits(self) -> None:
         self._high = read_limit(self._highest.value, 0.0, self._bound, self._high)
         self._low = read_limit(self._lowest.value, -self._bound, 0.0, self._low)
-        self._slider.props(f"max={self._high} min={self._low}")
+        self._slider.props["max"] = self._high
+        self._slider.props["min"] = self._low
         self._take(self.value)
 
     def _on_slide(self) -> None:

@@ -59,9 +59,10 @@ class SteerPanel:
                     self._speed.props('aria-label="Top speed of the pad in metres a second"')
                 self._sliders = Sliders(self._slide)
                 with self._sliders.across:
-                    button("Both to 0", "").on("click", self.let_go)
                     self._topic = TopicBox(choose_topic)
-            self._hint = text("hint", _HINTS["free"])
+            with box("last"):
+                button("Both to 0", "").on("click", self.let_go)
+                self._hint = text("hint", _HINTS["free"])
         self._show_speed()
         ui.on("pad_held", lambda event: self._hold(event.args))
         ui.on("sliders_held", lambda event: self._keep_on(event.args))

@@ -1,0 +1,186 @@
+"""Steering by hand in a real browser: sliders, keys, limits, another topic, and the plot of what follows."""
+
+import time
+from collections.abc import Iterator
+from contextlib import suppress
+
+import pytest
+from playwright.sync_api import Error, Page, sync_playwright
+from scripts import chromium
+
+from handsteer.config import load
+from handsteer.dashboard.server import Dashboard
+from handsteer.graph import Graph, cmd_vel_topic
+from tests.dashboard.visits import NEEDS_A_BROWSER, PATIENCE_MS, Visit, visiting
+
+pytestmark = NEEDS_A_BROWSER
+
+FASTER, LINEAR_TO_0 = "faster forward", "Linear to 0"
+BLUR = "window.dispatchEvent(new Event('blur'))"
+
+
+@pytest.fixture
+def visit() -> Iterator[Visit]:
+    with visiting("NONE:600") as visit:
+        yield visit
+
+
+def press(page: Page, name: str) -> None:
+    page.get_by_role("button", name=name, exact=True).click()
+
+
+def slider(page: Page) -> float:
+    return float(page.locator(".slider.linear .value").inner_text())
+
+
+def take_seat(visit: Visit) -> None:
+    """Ask for the seat, again after a page that was slow to load has loaded itself anew."""
+    ask = visit.page.get_by_role("button", name="Ask to drive")
+
+    def is_taken() -> bool:
+        if ask.is_visible():
+            with suppress(Error):  # taken meanwhile
+                ask.click(timeout=1000)
+        return visit.page.locator(".steer.yours").count() > 0
+
+    visit.wait_until(is_taken)
+
+
+def set_slider(visit: Visit, linear_mps: float = 0.1) -> None:
+    """Set the slider; on a machine that is busy the page may be silent for so long that it goes back to zero."""
+    while slider(visit.page) < linear_mps - 0.01:
+        press(visit.page, FASTER)
+        visit.page.wait_for_timeout(20)
+
+
+def speed(visit: Visit) -> float:
+    return visit.graph.robot.state.linear_mps
+
+
+def drives_on(visit: Visit, seconds: float) -> bool:
+    """Return whether the robot moved all the time, nobody touching anything."""
+    end_s = time.monotonic() + seconds
+    while time.monotonic() < end_s:
+        if speed(visit) < 0.04:
+            return False
+        visit.page.wait_for_timeout(20)
+    return True
+
+
+def stands(visit: Visit) -> bool:
+    return abs(speed(visit)) < 0.01
+
+
+def is_kept_driving(visit: Visit) -> bool:
+    set_slider(visit)
+    visit.page.wait_for_timeout(300)
+    return drives_on(visit, 1.0)
+
+
+def test_a_slider_drives_until_it_is_at_zero_or_the_page_is_left(visit: Visit) -> None:
+    page = visit.page
+    visit.wait_until(lambda: visit.text(".banner .headline") == "Standing")
+    visit.wait_until(lambda: is_kept_driving(visit))
+    visit.wait_until(lambda: set_slider(visit) or visit.text(".mux .holds") == "By hand: you")
+    press(page, LINEAR_TO_0)
+    visit.wait_until(lambda: stands(visit))
+
+    visit.wait_until(lambda: is_kept_driving(visit))
+    page.evaluate(BLUR)
+    visit.wait_until(lambda: stands(visit) and slider(page) == 0)
+
+    page.get_by_label("Linear: max").fill("0.05")
+    press(page, FASTER)
+    press(page, FASTER)
+    assert slider(page) <= 0.05
+    page.get_by_label("Linear: max").fill("7")  # the control lets 1 m/s through
+    for _ in range(12):
+        press(page, FASTER)
+    visit.wait_until(lambda: page.locator(".slider.linear .q-slider").get_attribute("aria-valuemax") == "1")
+    assert slider(page) <= 1.0
+
+    set_slider(visit)
+    page.keyboard.press("Space")
+    visit.wait_until(lambda: visit.text(".banner .headline") == "Stopped" and slider(page) == 0)
+    assert visit.text(".banner .reason") == "stopped by you, until you reset it"
+    assert page.get_by_role("button", name=FASTER).is_disabled()
+    visit.wait_until(lambda: stands(visit))
+    assert visit.troubles == []
+
+
+def test_letters_drive_wherever_the_focus_is_once_one_drives_and_the_plot_shows_it(visit: Visit) -> None:
+    page = visit.page
+    visit.wait_until(lambda: visit.text(".seat .role") == "nobody drives")
+    page.keyboard.down("KeyW")
+    page.wait_for_timeout(500)
+    assert stands(visit), "who does not drive is not taken at a letter's word"
+    page.keyboard.up("KeyW")
+    take_seat(visit)
+    page.keyboard.down("KeyW")
+    visit.wait_until(lambda: speed(visit) > 0.2)
+    page.keyboard.down("KeyA")
+    visit.wait_until(lambda: visit.graph.robot.state.angular_radps > 0.2)
+    page.evaluate(BLUR)  # the keys are still held
+    visit.wait_until(lambda: stands(visit))
+
+    def reach(line: str) -> float:
+        path = page.locator(f".axis:has-text('Linear') .plot .{line}").get_attribute("d") or ""
+        return max((50 - float(point.split(" ")[1]) for point in path.replace("M", "L").split("L") if point), default=0)
+
+    for line in ("commanded", "measured"):
+        visit.wait_until(lambda line=line: reach(line) > 15)
+    page.reload()
+    visit.wait_until(lambda: reach("measured") > 15)
+    assert visit.troubles == []
+
+
+def test_sliders_of_who_watches_do_nothing(visit: Visit) -> None:
+    first, second = visit.page, visit.page.context.browser.new_page()
+    take_seat(visit)
+    second.goto(first.url)
+    second.locator(".steer .hint", has_text="You watch").wait_for()
+    assert second.get_by_role("button", name=FASTER).is_disabled()
+    assert second.locator(".slider.linear .q-slider").get_attribute("aria-disabled") == "true"
+    second.evaluate(
+        """() => {
+            for (const name of ["sliders_held", "pad_held"]) emitEvent(name, {x: 0, y: 1, at: Date.now()});
+        }"""
+    )
+    second.wait_for_timeout(500)
+    assert stands(visit)
+    visit.wait_until(lambda: is_kept_driving(visit))
+    second.locator(".mux .holds", has_text="By hand: another viewer").wait_for(timeout=PATIENCE_MS)
+
+
+def test_another_topic_is_steered_past_the_control_and_stops_as_well() -> None:
+    sections = {"virtual_hand": {"script": "NONE:600"}, "camera": {"source": "virtual", "width": 320, "height": 240}}
+    config = load(None, {**sections, "dashboard": {"port": 0}})
+    with Graph(config) as graph, sync_playwright() as playwright:
+        topic = cmd_vel_topic(config)
+        wires = (graph.transport, graph.clock, graph.steering)
+        dashboard = Dashboard(*wires, config.dashboard, cmd_vel=topic, topics=True)
+        url = dashboard.start()
+        browser = chromium.launch(playwright)
+        try:
+            visit = Visit(browser.new_page(), graph)
+            visit.page.set_default_timeout(PATIENCE_MS)
+            visit.page.goto(url)
+            graph.start()
+            visit.wait_until(lambda: visit.text(".banner .headline") == "Standing")
+            choose(visit, "/cmd vel")
+            visit.wait_until(lambda: "is no topic's name" in visit.text(".steer .trouble"))
+            choose(visit, topic.name)
+            visit.wait_until(lambda: "Past the control" in visit.text(".topic-words"))
+            reason = f"steered by hand, straight on {topic.name}"
+            visit.wait_until(lambda: set_slider(visit) or visit.text(".banner .reason") == reason)
+            visit.wait_until(lambda: set_slider(visit) or speed(visit) > 0.02)
+            visit.page.keyboard.press("Space")
+            visit.wait_until(lambda: visit.text(".banner .headline") == "Stopped" and stands(visit))
+        finally:
+            browser.close()
+            dashboard.stop()
+
+
+def choose(visit: Visit, topic: str) -> None:
+    visit.page.get_by_label("topic", exact=True).fill(topic)
+    press(visit.page, "Steer on this topic")
