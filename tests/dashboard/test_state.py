@@ -237,8 +237,17 @@ def test_steering_past_the_control_is_said_whatever_the_control_says() -> None:
     for reports in (standing, {}):
         assert explain(reports, direct) == ("driving", "Driving", "steered by hand, straight on /cmd_vel")
     halted = Viewers(topic="/cmd_vel", stopped="you", stands=True)
-    assert explain({}, halted) == ("trouble", "Stopped", "stopped by you, until you reset it")
-    assert compose(Observed(), 0.1, halted).stopped
+    for reports in (standing, {}):
+        assert explain(reports, halted) == ("trouble", "Stopped", "stopped by you, until you reset it")
+        assert compose(Observed(reports), 0.1, halted).stopped
+
+
+def test_a_stop_is_said_once_the_control_obeys_it_or_when_there_is_no_control() -> None:
+    halted = Viewers(stopped="you", stands=True)
+    assert not compose(Observed({"hand_sign_control": control("driving: Forward", linear="0.1")}), 0.1, halted).stopped
+    assert compose(Observed(STOPPED), 0.1, halted).stopped
+    assert compose(Observed(), 0.1, halted).headline == "Stopped"
+    assert compose(Observed(), 0.1).headline == "Waiting"
 
 
 @pytest.mark.parametrize(

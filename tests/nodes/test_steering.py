@@ -76,8 +76,9 @@ def test_it_goes_back_to_the_control(bench: Bench, name: str) -> None:
     bench.node.steer(0.3, 0.0)
     bench.node.send_to(name)
     assert bench.robot[-1] == (0.0, 0.0)
+    let_go_once(bench)
     bench.node.steer(0.2, 0.0)
-    assert (bench.mux, bench.node.is_direct) == ([(0.2, 0.0)], False)
+    assert (bench.mux, bench.node.is_direct) == ([(0.0, 0.0), (0.2, 0.0)], False)
 
 
 def test_past_the_control_it_keeps_to_the_limits_itself() -> None:
@@ -162,3 +163,16 @@ def test_ends_at_zero_on_the_topic_that_it_steers(bench: Bench) -> None:
     bench.node.steer(0.2, 0.0)
     bench.node.stop()
     assert bench.robot[-1] == (0.0, 0.0)
+
+
+def test_after_a_stop_it_stands_also_where_its_own_topic_was_given_to_a_robot(bench: Bench) -> None:
+    bench.node.steer(0.3, 0.0)
+    bench.node.halt()
+    heard = len(bench.mux)
+    bench.node.steer(0.3, 0.0)
+    bench.node.reset()
+    bench.node.steer(0.3, 0.0)
+    assert set(bench.mux[heard:]) == {(0.0, 0.0)}
+    let_go_once(bench)
+    bench.node.steer(0.3, 0.0)
+    assert bench.mux[-1] == (0.3, 0.0)

@@ -123,13 +123,12 @@ class DashboardNode(Node):
         """Return what the page says now to ``viewer``."""
         now, holder = self.clock.now(), self._holder
         may_reset = self.seat.place_of(viewer, now).role != "watcher"
-        directly = self._steering.is_direct
         viewers = Viewers(
             steers=_person(holder and holder[0], viewer),
             stopped=_person(self._stopper, viewer),
             may_reset=may_reset,
-            topic=self._steering.topic if directly else "",
-            stands=directly and self._steering.is_stopped,
+            topic=self._steering.topic if self._steering.is_direct else "",
+            stands=self._steering.is_stopped,
         )
         return compose(self._observed, now, viewers)
 

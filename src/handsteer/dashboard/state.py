@@ -57,7 +57,7 @@ class Viewers:
         stopped: Who pressed Stop last, on the page.
         may_reset: Whether the one who is told may reset it.
         topic: Where the steering goes past control; empty where it does not.
-        stands: Whether the steering stands there, because the robot was stopped.
+        stands: Whether the steering stands because the robot was stopped; counts where no control says so.
     """
 
     steers: Person = ""
@@ -162,7 +162,7 @@ def compose(observed: Observed, now_s: float, viewers: Viewers = NOBODY) -> Page
         no_picture="" if "seen" in seen.values else camera.message if camera.level >= ERROR else seen.message,
         camera=camera_name(camera.message),
         driver=control.values.get("source", "nobody"),
-        stopped=viewers.stands or control.values.get("stopped") == str(True),
+        stopped=is_stopped(reports.get("hand_sign_control"), viewers),
         commanded=observed.command if now_s - observed.command_came_s < COMMAND_HOLDS_S else ZERO,
         measured=observed.measured,
         latency_median_ms=control.number("latency_median_ms") or None,
@@ -175,6 +175,12 @@ def compose(observed: Observed, now_s: float, viewers: Viewers = NOBODY) -> Page
         max_linear_mps=control.number("max_linear") or None,
         max_angular_radps=control.number("max_angular") or None,
     )
+
+
+def is_stopped(control: Report | None, viewers: Viewers) -> bool:
+    """Return whether the robot is stopped until it is reset, by what ``control`` reports, or the steering past it."""
+    says_so = control is not None and control.values.get("stopped") == str(True)
+    return says_so or (viewers.stands and (control is None or bool(viewers.topic)))
 
 
 def confirmed(recognition: Report) -> float:
@@ -200,12 +206,13 @@ def explain(reports: Mapping[str, Report], viewers: Viewers = NOBODY) -> tuple[M
     if viewers.topic and viewers.steers:
         return "driving", "Driving", f"steered by hand, straight on {viewers.topic}"
     control = reports.get("hand_sign_control")
-    robot = reports.get("robot", _NO_REPORT)
-    if control is None and not viewers.stands:
+    stopped = is_stopped(control, viewers)
+    if control is None and not stopped:
         return "waiting", "Waiting", "the node hand_sign_control does not report"
+    robot = reports.get("robot", _NO_REPORT)
     if robot.level >= ERROR:
         return "trouble", "Trouble", f"the robot {robot.message}"
-    if control is None or viewers.stands or control.values.get("stopped") == str(True):
+    if control is None or stopped:
         by = f"stopped by {viewers.stopped}" if viewers.stopped else "stopped"
         return "trouble", "Stopped", f"{by}, until {'you reset' if viewers.may_reset else 'the driver resets'} it"
     reason = control.message.partition(": ")[2] or control.message

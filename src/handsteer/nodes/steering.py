@@ -35,8 +35,9 @@ class _Target:
 class SteeringNode(Node):
     """Repeats the velocity asked for by :meth:`steer` until :meth:`release`; silent otherwise.
 
-    It speaks to ``hand_sign_control``, which lets steering go before signs, and stops both. It can be sent to another
-    topic instead (:meth:`send_to`). There it keeps to the limits itself, and stands while the robot is stopped.
+    It speaks to ``hand_sign_control``, which lets steering go before signs, keeps to the limits, and stops both. It can
+    be sent to another topic instead (:meth:`send_to`), where it sees to limits and Stop itself. After :meth:`halt` it
+    stands whatever its topic is, which ROS may have renamed to that of a robot.
 
     All may be called from any thread.
 
@@ -148,14 +149,16 @@ class SteeringNode(Node):
         return target
 
     def _admitted(self, wanted: Velocity) -> Velocity:
-        """Return what may be sent; ``hand_sign_control`` sees to that where it is not passed by."""
+        """Return what may be sent; the limits are ``hand_sign_control``'s affair where it is not passed by."""
         now = self.clock.now()
         after_pause = now - self._last_steered_s >= self._config.steering_timeout
         self._last_steered_s = now
+        passes = self._hold.let_steering_pass(is_zero=wanted.is_zero, after_pause=after_pause)
+        if not passes or self.is_stopped:
+            return ZERO
         if not self.is_direct:
             return wanted
-        passes = self._hold.let_steering_pass(is_zero=wanted.is_zero, after_pause=after_pause)
-        if not passes or self.is_stopped or not wanted.is_finite:
+        if not wanted.is_finite:
             return ZERO
         return wanted.clamped(self._config.max_linear, self._config.max_angular)
 
