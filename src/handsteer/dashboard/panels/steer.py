@@ -16,7 +16,7 @@ from handsteer.dashboard.state import PageState
 _HINTS = {
     "free": "Hold the pad, or its arrow keys. Sliders stay, until you leave this page.",
     "driver": "Hold the pad, or W A S D anywhere. Sliders stay, until you leave this page.",
-    "watcher": "You watch: ask to drive first.",
+    "watcher": "You watch: ask for the seat, at the top.",
 }
 _LATE = "What you asked for came too late, and was left out: is the network slow? Else load the page anew."
 
