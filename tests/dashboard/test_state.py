@@ -5,6 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from handsteer.control.sign_control import ZERO, Velocity
+from handsteer.dashboard.panels.banner import spoken
 from handsteer.dashboard.panels.mux import entries
 from handsteer.dashboard.panels.sliders import read_limit
 from handsteer.dashboard.panels.steer import read_deflection
@@ -299,3 +300,11 @@ def test_knows_the_limits_of_the_control() -> None:
 )
 def test_a_number_of_a_browser_is_within_limits_whatever_was_sent(sent: object, low: float, high: float) -> None:
     assert low <= read_limit(sent, low, high, 0.0) <= high
+
+
+def test_a_screen_reader_is_not_told_each_tenth_of_a_second() -> None:
+    def said(reason: str) -> str:
+        reports = {"hand_sign_control": control("standing: no sign is seen"), "my_camera": CAMERA}
+        return spoken(compose(Observed({**reports, "hand_sign_recognition": report(reason, sign="NONE")}), 0.1))
+
+    assert said("no hand seen for 0.4 s") == said("no hand seen for 12 s") == "Standing: no hand seen"

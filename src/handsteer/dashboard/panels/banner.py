@@ -1,11 +1,19 @@
 """The sentence at the top, and the button that stops the robot."""
 
+import re
 from collections.abc import Callable
 
 from nicegui import ui
 
 from handsteer.dashboard.panels.elements import box, button, switch, text
 from handsteer.dashboard.state import PageState
+
+_TIME = re.compile(r" for \d+(\.\d+)? s\b")
+
+
+def spoken(state: PageState) -> str:
+    """Return the sentence for a screen reader, which would read out each tenth of a second of a time that passes."""
+    return f"{state.headline}: {_TIME.sub('', state.reason)}"
 
 
 class Banner:
@@ -17,7 +25,8 @@ class Banner:
     """
 
     def __init__(self, halt: Callable[[], None], reset: Callable[[], None]) -> None:
-        with ui.element("section").classes("card banner").props('role="status"') as self._banner:
+        with ui.element("section").classes("card banner") as self._banner:
+            self._spoken = text("spoken", "").props('role="status"')
             box("lamp")
             self._headline = text("headline", "Starting")
             self._reason = text("reason", "waiting for the first report")
@@ -32,6 +41,7 @@ class Banner:
         """Show ``state``."""
         self._headline.set_text(state.headline)
         self._reason.set_text(state.reason)
+        self._spoken.set_text(spoken(state))
         switch(self._reset, "hidden", on=not state.stopped)
         if state.mood != self._mood:
             self._banner.classes(remove=self._mood, add=state.mood)
