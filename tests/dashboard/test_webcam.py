@@ -93,7 +93,7 @@ def test_the_browsers_webcam_drives_until_its_page_is_closed(graph: Graph, url: 
     assert graph.cameras.source == "browser"
     wait_for_words(second, ".banner", "no frame")
     second.get_by_text("Use the robot's camera").click()
-    wait_for_words(second, ".banner", "no hand is in view")
+    wait_for_words(second, ".banner", "no hand seen for")
 
 
 def wait_until_stands(graph: Graph) -> None:
