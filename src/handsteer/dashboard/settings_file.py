@@ -32,9 +32,9 @@ class SettingsFile:
         self._known = self._content() if is_read else None
 
     @property
-    def exists(self) -> bool:
-        """Whether there is such a file."""
-        return self.path.exists()
+    def is_read(self) -> bool:
+        """Whether its parameters were read, or it was saved to."""
+        return self._known is not None
 
     def load(self) -> Config:
         """Return what the file says, defaults for the rest.

@@ -44,13 +44,13 @@ class Settings:
         self._running = running
         self._apply = apply
         self._followed = self.wanted
-        self._saved: Config | None = self.wanted if file.exists else None
+        self._saved = file.load() if file.is_read else Config()
         self._lock = threading.RLock()
 
     @property
     def is_saved(self) -> bool:
         """Whether the file says what is wanted."""
-        return self.wanted == (self._saved or Config())
+        return self.wanted == self._saved
 
     def follow(self) -> None:
         """Take over what others have changed in what runs."""
@@ -58,7 +58,9 @@ class Settings:
             running = self._running()
             if running is self._followed:
                 return
-            different = [field for field in FIELDS.values() if field.value_in(running) != field.value_in(self._followed)]
+            different = [
+                field for field in FIELDS.values() if field.value_in(running) != field.value_in(self._followed)
+            ]
             self._followed = running
             if different:
                 values = _with(changed(self.wanted), {field: field.value_in(running) for field in different})
@@ -126,8 +128,9 @@ class Settings:
             self._saved = self.wanted
 
     def _want(self, values: dict[str, dict[str, Any]], edited: Iterable[FormField]) -> None:
+        edited = tuple(edited)
         wanted = load(None, None, values)
-        _check(wanted)
+        _check(wanted, edited)
         self.wanted = wanted
         self.revision += 1
         running = self._running()
@@ -165,21 +168,34 @@ def _of_robot(config: Config) -> dict[str, dict[str, Any]]:
     return _with({}, {field: field.value_in(config) for field in named})
 
 
-def _check(config: Config) -> None:
+def _check(config: Config, edited: Iterable[FormField]) -> None:
     """Refuse what the next start would refuse."""
     cmd_vel_type(config)
     if config.dashboard.private_key is not None and config.dashboard.certificate is None:
-        raise ConfigError("dashboard.private_key: is of no use without dashboard.certificate: give both")
-    if config.control.robots:
-        raise ConfigError("control.robots: is for `handsteer control`: a run drives one robot")
-    for path, check in (
-        ("virtual_hand.script", lambda: parse_script(config.virtual_hand.script)),
-        ("robot.world", lambda: load_world(config.robot.world)),
-    ):
+        raise ConfigError("dashboard.private_key: is of no use without dashboard.certificate: give that first")
+    for field in edited:
         try:
-            check()
+            _CHECKS.get(field.path, _nothing)(config)
         except HandsteerError as error:
-            raise ConfigError(f"{path}: {error}") from None
+            raise ConfigError(f"{field.path}: {error}") from None
+
+
+def _nothing(_config: Config) -> None:
+    pass
+
+
+def _no_fleet(config: Config) -> None:
+    if config.control.robots:
+        raise ConfigError("is for `handsteer control`: a run drives one robot")
+
+
+_CHECKS: Mapping[str, Callable[[Config], object]] = MappingProxyType(
+    {
+        "control.robots": _no_fleet,
+        "robot.world": lambda config: load_world(config.robot.world),
+        "virtual_hand.script": lambda config: parse_script(config.virtual_hand.script),
+    }
+)
 
 
 def _with(values: Mapping[str, Mapping[str, Any]], fresh: Mapping[FormField, Any]) -> dict[str, dict[str, Any]]:
