@@ -25,6 +25,9 @@ from handsteer.dashboard.drive import DrivePage
 from handsteer.dashboard.node import DashboardNode
 from handsteer.dashboard.page import ASSETS_PATH, ICON, PICTURE_PATH, WEBCAM_PATH, Served
 from handsteer.dashboard.picture import PictureNode, PictureResponse
+from handsteer.dashboard.settings import SettingsPage
+from handsteer.dashboard.settings_file import DEFAULT_FILE, SettingsFile
+from handsteer.dashboard.settings_store import Settings
 from handsteer.dashboard.watch import WhileWatched
 from handsteer.dashboard.webcam import FrameSocket
 from handsteer.errors import DashboardError
@@ -55,6 +58,7 @@ class Dashboard:
         config: Where the page is served, and how.
         cmd_vel: The topic of the commands that are shown.
         cameras: The camera of this process, which a browser's may stand in for; None where it is in another.
+        settings: The parameters of the graph; None where its nodes are in other processes.
 
     Attributes:
         node: Listens and steers for the browsers that show the page.
@@ -72,21 +76,33 @@ class Dashboard:
         *,
         cmd_vel: Topic[Any] = CMD_VEL,
         cameras: ChoiceOfCameras | None = None,
+        settings: Settings | None = None,
     ) -> None:
         self.node = WhileWatched(lambda: DashboardNode(transport, clock, steering, cmd_vel))
         self.pictures = WhileWatched(lambda: PictureNode(transport, clock))
-        self.served = Served(self.node, cameras)
+        self.served = Served(self.node, cameras, settings)
         self.webcam = FrameSocket(cameras, self._drives)
         self._config = config
         self._server: uvicorn.Server | None = None
         self._thread: threading.Thread | None = None
 
     @classmethod
-    def of(cls, graph: Graph) -> "Dashboard":
-        """Return the page of a graph whose nodes are all in this process."""
+    def of(cls, graph: Graph, file: Path | None = None) -> "Dashboard":
+        """Return the page of a graph whose nodes are all in this process.
+
+        Args:
+            graph: What the page is of.
+            file: The YAML file that its parameters were read from, which settings are saved to; without one,
+                :data:`~handsteer.dashboard.settings_file.DEFAULT_FILE`.
+
+        Raises:
+            ConfigError: The file cannot be read any more.
+        """
+        settings_file = SettingsFile(file or DEFAULT_FILE, is_read=file is not None)
+        settings = Settings(lambda: graph.config, graph.reconfigure, settings_file)
         topic = cmd_vel_topic(graph.config)
         wires = (graph.transport, graph.clock, graph.steering)
-        return cls(*wires, graph.config.dashboard, cmd_vel=topic, cameras=graph.cameras)
+        return cls(*wires, graph.config.dashboard, cmd_vel=topic, cameras=graph.cameras, settings=settings)
 
     def start(self) -> str:
         """Serve the page and return its address once it answers; it holds the token where one is needed.
@@ -217,6 +233,10 @@ def _application() -> FastAPI:
     @ui.page("/")
     def index() -> None:
         DrivePage(application.state.dashboard.served)
+
+    @ui.page("/settings")
+    def settings() -> None:
+        SettingsPage(application.state.dashboard.served)
 
     ui.run_with(
         application,

@@ -60,6 +60,11 @@ class FormField:
         """The full name, as ``control.max_linear``."""
         return f"{self.section}.{self.name}"
 
+    def matches(self, words: str) -> bool:
+        """Return whether each of ``words``, whatever its case, is in its name or its meaning."""
+        said = f"{self.path} {self.path.replace('_', ' ')} {self.text} {self.unit}".casefold()
+        return all(word in said for word in words.casefold().split())
+
     def value_in(self, config: Config) -> Any:
         """Return its value in ``config``."""
         return getattr(getattr(config, self.section), self.name)

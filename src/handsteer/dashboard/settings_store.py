@@ -34,14 +34,14 @@ class Settings:
     Attributes:
         file: Is saved to.
         wanted: What is in the form: what the next start would have, once it is saved.
-        revision: Counts the changes.
+        revision: Counts the changes, and saves.
     """
 
     def __init__(self, running: Callable[[], Config], apply: Callable[[Config], None], file: SettingsFile) -> None:
         self.file = file
-        self.wanted = running()
         self.revision = 0
         self._running = running
+        self._note(running())
         self._apply = apply
         self._followed = self.wanted
         self._saved = file.load() if file.is_read else Config()
@@ -63,13 +63,12 @@ class Settings:
             ]
             self._followed = running
             if different:
-                values = _with(changed(self.wanted), {field: field.value_in(running) for field in different})
-                self.wanted = load(None, None, values)
-                self.revision += 1
+                values = _with(self._changed, {field: field.value_in(running) for field in different})
+                self._note(load(None, None, values))
 
     def is_changed(self, field: FormField) -> bool:
         """Return whether the value that is wanted is another than the default."""
-        return field.name in changed(self.wanted).get(field.section, {})
+        return field.name in self._changed.get(field.section, {})
 
     def waits(self, field: FormField) -> bool:
         """Return whether the value that is wanted is used from the next start on only."""
@@ -77,7 +76,7 @@ class Settings:
 
     def default(self, field: FormField) -> Any:
         """Return the value that a reset gives: the robot that is chosen may have its own."""
-        return field.value_in(defaults(self.wanted))
+        return field.value_in(self._defaults)
 
     def set(self, field: FormField, text: str) -> None:
         """Set a parameter to what ``text`` means.
@@ -88,7 +87,7 @@ class Settings:
         with self._lock:
             self.follow()
             value = field.parse(text, field.value_in(self.wanted))
-            self._want(_with(changed(self.wanted), {field: value}), [field])
+            self._want(_with(self._changed, {field: value}), [field])
 
     def reset(self, *fields: FormField) -> None:
         """Set these parameters to their defaults.
@@ -98,7 +97,7 @@ class Settings:
         """
         with self._lock:
             self.follow()
-            self._want(_without(changed(self.wanted), fields), fields)
+            self._want(_without(self._changed, fields), fields)
 
     def save(self) -> str:
         """Write what differs from the defaults to the file; return in words what was done.
@@ -108,7 +107,7 @@ class Settings:
         """
         with self._lock:
             self.follow()
-            said = self.file.save(changed(self.wanted))
+            said = self.file.save(self._changed)
             self._saved = self.wanted
             self.revision += 1
             return said
@@ -127,12 +126,17 @@ class Settings:
             self._want(changed(config), different)
             self._saved = self.wanted
 
+    def _note(self, wanted: Config) -> None:
+        self.wanted = wanted
+        self._changed = changed(wanted)
+        self._defaults = defaults(wanted)
+        self.revision += 1
+
     def _want(self, values: dict[str, dict[str, Any]], edited: Iterable[FormField]) -> None:
         edited = tuple(edited)
         wanted = load(None, None, values)
         _check(wanted, edited)
-        self.wanted = wanted
-        self.revision += 1
+        self._note(wanted)
         running = self._running()
         # Another robot's defaults are for the next start, as that robot is.
         base = defaults(running)
