@@ -98,6 +98,16 @@ def test_another_robot_brings_its_own_defaults_at_the_next_start_only(bench: Ben
     assert bench.running.control.max_linear == 1.8
 
 
+def test_what_a_node_cannot_take_changes_nothing(bench: Bench) -> None:
+    def refuse(_config: Config) -> None:
+        raise ConfigError("signs.model: no such file")
+
+    settings = Settings(lambda: bench.running, refuse, SettingsFile(bench.path, is_read=False))
+    with pytest.raises(ConfigError, match="no such file"):
+        settings.set(FIELDS["control.max_linear"], "0.5")
+    assert settings.wanted == Config()
+
+
 def test_what_is_changed_elsewhere_is_taken_over(bench: Bench) -> None:
     bench.set("camera.fps", "15")
     bench.running = load(None, None, {"control": {"actions": {"Peace": "turbo"}}})

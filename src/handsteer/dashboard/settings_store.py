@@ -136,7 +136,6 @@ class Settings:
         edited = tuple(edited)
         wanted = load(None, None, values)
         _check(wanted, edited)
-        self._note(wanted)
         running = self._running()
         # Another robot's defaults are for the next start, as that robot is.
         base = defaults(running)
@@ -147,8 +146,10 @@ class Settings:
         }
         changing = {field: value for field, value in fresh.items() if value != field.value_in(running)}
         if changing:
-            self._followed = _updated(running, changing)
-            self._apply(self._followed)
+            applied = _updated(running, changing)
+            self._apply(applied)
+            self._followed = applied
+        self._note(wanted)
 
 
 def defaults(config: Config) -> Config:
