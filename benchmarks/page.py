@@ -24,10 +24,10 @@ import numpy as np
 import socketio
 from playwright.sync_api import Browser, Page, sync_playwright
 
-ROOT = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(ROOT))  # for the relay and the browser that the tests use
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # for the relay and the browser that the tests use
 
 from scripts import chromium
+from tests.dashboard.network import Relay, client_of, deaf, deaf_page, join_query
 
 from handsteer.config import load
 from handsteer.dashboard.server import Dashboard
@@ -35,7 +35,6 @@ from handsteer.graph import Graph
 from handsteer.messages import CMD_VEL, Twist
 from handsteer.nodes.latency import LatencyLog
 from handsteer.transports.protocol import Received
-from tests.dashboard.network import Relay, client_of, deaf, deaf_page, join_query
 
 LIMIT_BYTES_PER_S = 2_000_000
 LIMIT_SLOWER = 0.10
@@ -114,15 +113,22 @@ def load_now() -> str:
 
 
 def count_bytes(duration_s: float) -> None:
-    """Print what one real browser is sent."""
-    with served("Forward:3 Turn Left:3 Stop:2") as page, browser() as chrome, Relay(page.port) as relay:
-        visit(chrome, relay.port)
-        time.sleep(3.0)
-        sent, began_s = relay.to_browser, time.monotonic()
-        fps, _ = page.recognise(duration_s)
-        rate = (relay.to_browser - sent) / (time.monotonic() - began_s)
+    """Print what one viewer is sent: a real browser, and a plain one who takes every picture however busy all is."""
+    with served("Forward:3 Turn Left:3 Stop:2") as page, Relay(page.port) as relay:
+        with browser() as chrome:
+            visit(chrome, relay.port)
+            print_bytes("a browser", page, relay, duration_s)
+        with plain_viewers(relay.port, 1):
+            print_bytes("a plain viewer", page, relay, duration_s)
+
+
+def print_bytes(who: str, page: Served, relay: Relay, duration_s: float) -> None:
+    time.sleep(3.0)
+    sent, began_s = relay.to_browser, time.monotonic()
+    fps, _ = page.recognise(duration_s)
+    rate = (relay.to_browser - sent) / (time.monotonic() - began_s)
     print(
-        f"bytes: {rate / 1e6:.2f} MB/s to one browser at {fps:.1f} recognised frames/s (limit "
+        f"bytes: {rate / 1e6:.2f} MB/s to {who} at {fps:.1f} recognised frames/s (limit "
         f"{LIMIT_BYTES_PER_S / 1e6:.0f}), {load_now()}"
     )
 
@@ -176,14 +182,14 @@ def count_deaf(rounds: int, duration_s: float) -> None:
         time.sleep(5.0)
         before_mb = resident_mb()
         for _ in range(rounds):
-            for with_deaf in figures:
+            for with_deaf, measured in figures.items():
                 with ExitStack() as stack:
                     for _ in range(4 if with_deaf else 0):
                         stack.enter_context(deaf(page.port, "/camera.mjpg"))
                         with urllib.request.urlopen(page.url) as answer:
                             stack.enter_context(deaf_page(page.port, answer.read().decode()))
                     time.sleep(1.0)
-                    figures[with_deaf].append(page.recognise(duration_s))
+                    measured.append(page.recognise(duration_s))
         grown_mb = resident_mb() - before_mb
     (fps, ms), (deaf_fps, deaf_ms) = (np.median(each, axis=0) for each in figures.values())
     print(
@@ -198,7 +204,9 @@ def count_gone(trials: int) -> None:
     with served("NONE:3600") as served_page, browser() as chrome:
         for _ in range(trials):
             for how, each in times.items():
-                each.append(stop_ms(served_page, chrome, how))
+                while (gone_ms := stop_ms(served_page, chrome, how)) is None:
+                    pass
+                each.append(gone_ms)
     for how, each in times.items():
         low, median, high = np.percentile(each, (0, 50, 100))
         print(
@@ -207,14 +215,15 @@ def count_gone(trials: int) -> None:
         )
 
 
-def stop_ms(graph: Served, chrome: Browser, how: str) -> float:
+def stop_ms(graph: Served, chrome: Browser, how: str) -> float | None:
+    """Return how long after the driver was gone zero was commanded; None if the robot had paused before."""
     with Relay(graph.port) as relay:
         page = visit(chrome, relay.port)
         page.locator(".pad").focus()
         page.keyboard.down("ArrowUp")
         wait_until(lambda: bool(graph.commands) and graph.commands[-1][1] > 0.1)
         page.wait_for_timeout(float(np.random.default_rng().uniform(300, 800)))
-        gone_s = time.monotonic()
+        gone_s, was_moving = time.monotonic(), graph.commands[-1][1] > 0
         if how == "tab closed":
             page.close()
         else:
@@ -225,7 +234,7 @@ def stop_ms(graph: Served, chrome: Browser, how: str) -> float:
     moved_s = max(at_s for at_s, speed in graph.commands if speed)
     zero_s = min(at_s for at_s, speed in graph.commands if at_s > moved_s)
     graph.commands.clear()
-    return max(0.0, zero_s - gone_s) * 1000
+    return (zero_s - gone_s) * 1000 if was_moving and zero_s > gone_s else None
 
 
 def wait_until(condition: Callable[[], bool]) -> None:
