@@ -44,6 +44,14 @@ def test_the_driver_sets_what_the_robot_does_and_saves_it(tmp_path: Path, monkey
         page.get_by_role("option", name="turtlebot4").click()
         expect(of(page, "robot.max_linear")).to_have_value("0.306")
 
+        of(page, "robot.cmd_vel_type").click()
+        page.get_by_role("option", name="twist", exact=True).click()
+        expect(row(page, "robot.cmd_vel_type")).to_contain_text("changed")
+        of(page, "control.cmd_vel_type").click()
+        page.get_by_role("option", name="twist_stamped").click()
+        expect(row(page, "control.cmd_vel_type")).to_contain_text("they should be the same")
+        expect(of(page, "control.cmd_vel_type")).to_have_value("twist")
+
         page.get_by_label("Search the parameters").fill("highest turning")
         expect(page.locator(".setting:visible")).to_have_count(1)
         page.get_by_label("Search the parameters").fill("")

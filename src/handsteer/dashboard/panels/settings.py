@@ -29,6 +29,7 @@ class SettingRow:
         self._settings = settings
         self._commit = commit
         self._is_edited = False
+        self._is_being_put = False
         self._shown: tuple[object, ...] = ()
         with box("setting") as self.element:
             with box("about"):
@@ -89,13 +90,12 @@ class SettingRow:
         return str(value).lower() if isinstance(value, bool) else value if isinstance(value, str) else ""
 
     def _put(self, value: str) -> None:
-        self._is_edited = True  # what is put here is not to be taken for what somebody typed
+        self._is_being_put = True  # and not to be taken for what somebody chose
         if isinstance(self._input, ui.switch):
             self._input.set_value(value == "true")
         else:
             self._input.set_value(value)
-            self._input.error = None
-        self._is_edited = False
+        self._is_being_put = False
 
     def _check(self, _value: object) -> str | None:
         """Return at each key why the text cannot be taken; None when it can."""
@@ -113,27 +113,28 @@ class SettingRow:
         return bool(self._shown) and self._text == self._shown[0]
 
     def _take(self) -> None:
-        is_being_put = self._is_edited and not isinstance(self._input, ui.input)
-        if is_being_put or self._is_current:
+        if self._is_being_put:
+            return
+        if self._is_current:
             self._give_up()
             return
         typed = self._text
         problem = self._commit(lambda: self._settings.set(self.field, typed))
         self._shown = ()
-        if problem is None:
-            self._is_edited = False
-        else:
-            self._refuse(problem)
-            self._is_edited = isinstance(self._input, ui.input)
+        self._refuse(problem)
+        # What was typed stays, to be mended; what was chosen goes back to what is set.
+        self._is_edited = problem is not None and isinstance(self._input, ui.input)
 
     def _give_up(self) -> None:
         """Show what is set instead of what was typed."""
         self._is_edited = False
         self._shown = ()
+        self._refuse(None)
 
     def _to_default(self) -> None:
-        self._refuse(self._commit(lambda: self._settings.reset(self.field)))
+        problem = self._commit(lambda: self._settings.reset(self.field))
         self._give_up()
+        self._refuse(problem)
 
     def _refuse(self, problem: str | None) -> None:
         if not isinstance(self._input, ui.switch):
