@@ -240,9 +240,9 @@ def stop_ms(graph: Served, chrome: Browser, how: str) -> float | None:
             relay.freeze()
         if not comes_true(lambda: graph.stands_since_s() < time.monotonic() - SETTLED_S):
             sys.exit("the robot goes on without its driver")
+        zero_s = graph.stands_since_s()
         if not page.is_closed():
             page.close()
-    zero_s = graph.stands_since_s()
     graph.commands.clear()
     return (zero_s - gone_s) * 1000 if was_moving and zero_s > gone_s else None
 

@@ -50,10 +50,10 @@ class Relay:
 
     def __exit__(self, *_: object) -> None:
         self._ended.set()
-        self._flows.set()
         self._listener.close()
         for each in self._sockets:
             each.close()
+        self._flows.set()  # what has waited finds no way any more
 
     def _accept(self) -> None:
         while not self._ended.is_set():
