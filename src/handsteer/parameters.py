@@ -137,7 +137,7 @@ class NodeParameters:
         place = self._place(name)
         if place is None or (place.entry is not None and name not in self.values()):
             return None
-        return _describe(place.model, place.field)
+        return describe(place.model, place.field)
 
     def set(self, changes: Mapping[str, Value | None]) -> None:
         """Set parameters, all of them or none; None takes an entry out of a table.
@@ -188,7 +188,7 @@ class NodeParameters:
         if value is None:
             table.pop(key, None)
             return
-        kind = _describe(place.model, place.field).kind
+        kind = describe(place.model, place.field).kind
         if not isinstance(value, _FITTING[kind]) or (isinstance(value, bool) and kind != "bool"):
             raise ConfigError(f"{name}: {value!r} should be {_WORDS[kind]}")
         table[key] = value
@@ -235,7 +235,8 @@ def _plain(value: Any) -> Value:
     return str(value) if isinstance(value, Path) else list(value) if isinstance(value, tuple) else value
 
 
-def _describe(model: type[Section], name: str) -> Description:
+def describe(model: type[Section], name: str) -> Description:
+    """Return what there is to know of the parameter ``name`` of a section; of a table, what its values are."""
     field = model.model_fields[name]
     of = _without_none(get_args(field.annotation)[1] if _is_table(model, name) else field.annotation)
     choices = get_args(of) if get_origin(of) is Literal else ()

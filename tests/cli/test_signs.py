@@ -107,7 +107,7 @@ def test_list_says_what_each_sign_does(capsys: pytest.CaptureFixture[str]) -> No
     }
     assert [sign for sign, entry in listed.items() if not entry["known"]] == ["Peace"]
     text = prints(capsys, "signs", "list", *actions)
-    assert "Peace       turbo       twice as fast while shown, within the limits (but the model does not know" in text
+    assert "Peace       turbo       twice as fast while shown, within the limits (up to 1 m/s) (but the model" in text
 
 
 def test_list_needs_no_landmark_models(

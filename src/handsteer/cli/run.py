@@ -4,6 +4,7 @@ import json as json_format
 import webbrowser
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 from handsteer.cli.options import ConfigFile, Flag, Parameters, say, uninterrupted
@@ -82,7 +83,7 @@ def run(
     if duration is not None and not duration > 0:
         raise ConfigError(f"--duration: {duration:g} should be greater than 0 seconds")
     with _linked(settle, words, fast=fast) as (settings, link):
-        summary = _drive(settings, link, duration, headless=headless, fast=fast)
+        summary = _drive(settings, link, duration, config_file, headless=headless, fast=fast)
     print(json_format.dumps(summary.as_dict()) if json else _summary_text(summary))
     return 0
 
@@ -116,10 +117,12 @@ def _linked(
             link.close()
 
 
-def _drive(settings: Config, link: Session | None, duration: float | None, *, headless: bool, fast: bool) -> Summary:
+def _drive(
+    settings: Config, link: Session | None, duration: float | None, file: Path | None, *, headless: bool, fast: bool
+) -> Summary:
     with Graph(settings, SteppedClock() if fast else RealClock(), link=link) as graph:
         try:
-            _run_until_end(graph, settings, duration, headless=headless, fast=fast)
+            _run_until_end(graph, duration, file, headless=headless, fast=fast)
         except KeyboardInterrupt:
             say("stopping: the robot is told to stand")
         finally:
@@ -128,7 +131,7 @@ def _drive(settings: Config, link: Session | None, duration: float | None, *, he
         return graph.summary()
 
 
-def _run_until_end(graph: Graph, settings: Config, duration: float | None, *, headless: bool, fast: bool) -> None:
+def _run_until_end(graph: Graph, duration: float | None, file: Path | None, *, headless: bool, fast: bool) -> None:
     if fast:
         graph.run_stepped(*([] if duration is None else [duration]))
         return
@@ -139,12 +142,12 @@ def _run_until_end(graph: Graph, settings: Config, duration: float | None, *, he
     # The page's libraries take a second to load, which a headless run need not wait for.
     from handsteer.dashboard.server import Dashboard  # noqa: PLC0415
 
-    dashboard = Dashboard.of(graph)
+    dashboard = Dashboard.of(graph, file)
     url = dashboard.start()
     try:
         graph.start()
         say(f"the page is at {url}; Ctrl-C ends")
-        if settings.dashboard.open_browser:
+        if graph.config.dashboard.open_browser:
             webbrowser.open(url)
         graph.wait(duration)
     finally:

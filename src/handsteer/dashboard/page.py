@@ -9,6 +9,7 @@ from handsteer.cameras.browser import ChoiceOfCameras
 from handsteer.dashboard.node import DashboardNode
 from handsteer.dashboard.panels.banner import Banner
 from handsteer.dashboard.panels.seat import SeatPanel
+from handsteer.dashboard.settings_store import Settings
 from handsteer.dashboard.state import PageState
 from handsteer.dashboard.watch import WhileWatched
 
@@ -38,11 +39,13 @@ class Served:
         node: Is joined for as long as a browser shows a page.
         cameras: The graph's camera, which a browser's may stand in for; None where that cannot be.
         topics: Whether steering by hand may go to other topics than the control's.
+        settings: The graph's parameters; None where they are in other processes.
     """
 
     node: WhileWatched[DashboardNode]
     cameras: ChoiceOfCameras | None
     topics: bool = False
+    settings: Settings | None = None
 
 
 class Page:
@@ -53,7 +56,7 @@ class Page:
         path: Where the page is, which its link in the head says.
     """
 
-    LINKS: ClassVar[tuple[tuple[str, str], ...]] = (("/", "Drive"),)
+    LINKS: ClassVar[tuple[tuple[str, str], ...]] = (("/", "Drive"), ("/settings", "Settings"))
 
     def __init__(self, served: Served, path: str) -> None:
         self.client = ui.context.client

@@ -26,6 +26,9 @@ from handsteer.dashboard.history import VelocityHistory
 from handsteer.dashboard.node import DashboardNode
 from handsteer.dashboard.page import ASSETS_PATH, ICON, PICTURE_PATH, WEBCAM_PATH, Served
 from handsteer.dashboard.picture import PictureNode, PictureResponse
+from handsteer.dashboard.settings import SettingsPage
+from handsteer.dashboard.settings_file import DEFAULT_FILE, SettingsFile
+from handsteer.dashboard.settings_store import Settings
 from handsteer.dashboard.watch import WhileWatched
 from handsteer.dashboard.webcam import FrameSocket
 from handsteer.errors import DashboardError
@@ -57,6 +60,7 @@ class Dashboard:
         cmd_vel: The topic of the commands that are shown.
         cameras: The camera of this process, which a browser's may stand in for; None where it is in another.
         topics: Whether steering by hand may go to other topics than the control's, where other robots may be.
+        settings: The parameters of the graph; None where its nodes are in other processes.
 
     Attributes:
         node: Listens and steers for the browsers that show the page.
@@ -75,22 +79,34 @@ class Dashboard:
         cmd_vel: Topic[Any] = CMD_VEL,
         cameras: ChoiceOfCameras | None = None,
         topics: bool = False,
+        settings: Settings | None = None,
     ) -> None:
         history = VelocityHistory()  # outlives the node, so that a page that is loaded anew shows it
         self.node = WhileWatched(lambda: DashboardNode(transport, clock, steering, cmd_vel, history))
         self.pictures = WhileWatched(lambda: PictureNode(transport, clock))
-        self.served = Served(self.node, cameras, topics)
+        self.served = Served(self.node, cameras, topics=topics, settings=settings)
         self.webcam = FrameSocket(cameras, self._drives)
         self._config = config
         self._server: uvicorn.Server | None = None
         self._thread: threading.Thread | None = None
 
     @classmethod
-    def of(cls, graph: Graph) -> "Dashboard":
-        """Return the page of a graph whose nodes are all in this process."""
+    def of(cls, graph: Graph, file: Path | None = None) -> "Dashboard":
+        """Return the page of a graph whose nodes are all in this process.
+
+        Args:
+            graph: What the page is of.
+            file: The YAML file that its parameters were read from, which settings are saved to; without one,
+                :data:`~handsteer.dashboard.settings_file.DEFAULT_FILE`.
+
+        Raises:
+            ConfigError: The file cannot be read any more.
+        """
+        settings_file = SettingsFile(file or DEFAULT_FILE, is_read=file is not None)
+        settings = Settings(lambda: graph.config, graph.reconfigure, settings_file)
         topic = cmd_vel_topic(graph.config)
         wires = (graph.transport, graph.clock, graph.steering)
-        return cls(*wires, graph.config.dashboard, cmd_vel=topic, cameras=graph.cameras)
+        return cls(*wires, graph.config.dashboard, cmd_vel=topic, cameras=graph.cameras, settings=settings)
 
     def start(self) -> str:
         """Serve the page and return its address once it answers; it holds the token where one is needed.
@@ -221,6 +237,10 @@ def _application() -> FastAPI:
     @ui.page("/")
     def index() -> None:
         DrivePage(application.state.dashboard.served)
+
+    @ui.page("/settings")
+    def settings() -> None:
+        SettingsPage(application.state.dashboard.served)
 
     ui.run_with(
         application,

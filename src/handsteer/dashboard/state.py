@@ -1,14 +1,17 @@
 """What the page says, worked out of what the topics said: pure functions, no page and no transport."""
 
+import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
+from handsteer.config import ControlConfig
+from handsteer.control.effects import told
 from handsteer.control.sign_control import ZERO, Velocity
 from handsteer.nodes.node import ERROR, OK
 from handsteer.robots.protocol import Pose2D
-from handsteer.signs.vocabulary import NONE
+from handsteer.signs.vocabulary import NONE, SIGNS
 
 Mood = Literal["driving", "standing", "trouble", "waiting"]
 
@@ -101,6 +104,8 @@ class PageState:
         seen: The sign that the newest frame alone shows.
         confidence: 0 to 1, how sure ``seen`` is.
         handedness: ``Left``, ``Right`` or empty.
+        signs: Those that the recogniser can tell, as it last said.
+        rule: What decides what signs do, as the control last said; None when it has not.
         no_picture: Why no pictures come; empty when they come.
         camera: Short name of the camera.
         driver: Who drives: ``signs``, ``steering`` or ``nobody``.
@@ -125,6 +130,8 @@ class PageState:
     seen: str
     confidence: float
     handedness: str
+    signs: tuple[str, ...]
+    rule: ControlConfig | None
     no_picture: str
     camera: str
     driver: str
@@ -159,6 +166,8 @@ def compose(observed: Observed, now_s: float, viewers: Viewers = NOBODY) -> Page
         seen=seen.values.get("seen", NONE),
         confidence=seen.number("confidence") or 0.0,
         handedness=seen.values.get("handedness", ""),
+        signs=known_signs(observed.reports.get("hand_sign_recognition", _NO_REPORT).values),
+        rule=told(observed.reports.get("hand_sign_control", _NO_REPORT).values),
         no_picture="" if "seen" in seen.values else camera.message if camera.level >= ERROR else seen.message,
         camera=camera_name(camera.message),
         driver=control.values.get("source", "nobody"),
@@ -236,6 +245,15 @@ def _why_no_sign(reports: Mapping[str, Report]) -> tuple[Mood, str | None]:
 def camera_name(message: str) -> str:
     """Return the name of the camera in its ``message``: no folders, and no address, which may hold a password."""
     return message.partition(": ")[0].rstrip("/").rpartition("/")[2]
+
+
+def known_signs(values: Mapping[str, str]) -> tuple[str, ...]:
+    """Return the signs that a report of the recogniser names; those that are shipped when it names none."""
+    try:
+        names = json.loads(values["signs"])
+    except (KeyError, ValueError):
+        return SIGNS
+    return tuple(str(name) for name in names) if isinstance(names, list) and names else SIGNS
 
 
 def frame_rate(counts: Sequence[tuple[float, float]], now_s: float) -> float | None:

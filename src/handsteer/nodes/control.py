@@ -7,6 +7,7 @@ from handsteer.clock import Clock
 from handsteer.config import Config, ControlConfig
 from handsteer.control.actions import action_of
 from handsteer.control.driver import Driver
+from handsteer.control.effects import tell
 from handsteer.control.fleet import NEXT
 from handsteer.control.hold import Hold
 from handsteer.control.sign_control import ZERO, Velocity
@@ -158,6 +159,7 @@ class HandSignControlNode(Node):
             max_linear=self._config.max_linear,
             max_angular=self._config.max_angular,
             **({"robot": self._selection.fleet.selected} if self._selection else {}),
+            **tell(self._config),
             **self._latencies(),
         )
 

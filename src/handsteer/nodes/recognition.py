@@ -1,5 +1,6 @@
 """The node ``hand_sign_recognition``: a frame in, the name of a sign out."""
 
+import json
 import math
 from collections.abc import Callable
 from typing import TypeVar
@@ -118,13 +119,15 @@ class HandSignRecognitionNode(Node):
 
     def _report(self) -> None:
         seen = self._recognition
+        signs = json.dumps(self._recognizer.signs)
         if seen is None:
-            self.diagnose(WARN, self._why_no_frame(), sign=NONE)
+            self.diagnose(WARN, self._why_no_frame(), sign=NONE, signs=signs)
             return
         self.diagnose(
             OK,
             self._reason(seen),
             sign=seen.sign,
+            signs=signs,
             seen=seen.seen,
             confidence=f"{seen.confidence:.2f}",
             progress=f"{seen.progress:.2f}",

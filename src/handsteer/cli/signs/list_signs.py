@@ -4,7 +4,8 @@ import json as json_format
 
 from handsteer.cli.options import ConfigFile, Flag, Parameters, settings
 from handsteer.cli.signs.tables import table
-from handsteer.control.actions import EFFECTS, action_of
+from handsteer.control.actions import action_of
+from handsteer.control.effects import effect_of
 from handsteer.graph import open_classifier
 from handsteer.signs.vocabulary import NONE, find_sign
 
@@ -26,7 +27,7 @@ def list_signs(*, json: Flag = False, config_file: ConfigFile = None, parameters
     known = (*open_classifier(config.signs).signs, NONE)
     named = [sign for sign in actions if find_sign(sign, known) is None]
     signs = [
-        {"sign": sign, "action": action, "effect": EFFECTS[action], "known": sign in known}
+        {"sign": sign, "action": action, "effect": effect_of(action, config.control), "known": sign in known}
         for sign in (*known, *named)
         for action in [action_of(sign, actions)]
     ]

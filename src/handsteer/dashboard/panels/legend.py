@@ -1,7 +1,11 @@
-"""The signs as small drawings, for people who see the page for the first time."""
+"""The signs as small drawings, with what each does now."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
+from handsteer.config import ControlConfig
+from handsteer.control.actions import EFFECTS, action_of
+from handsteer.control.effects import figures_of
 from handsteer.signs.vocabulary import BACKWARD, FORWARD, GO, STOP, TURN_LEFT, TURN_RIGHT
 
 # The user's right hand as a mirror shows it, in a box of 64 x 64: palm, then the fingers as thick lines. The thumb is
@@ -29,12 +33,14 @@ class LegendEntry:
         sign: Its name on ``/gesture/hand_sign``.
         pose: How to hold the hand.
         effect: What the robot does.
+        figures: By how much, and up to what; empty where that means nothing.
         drawing: SVG.
     """
 
     sign: str
     pose: str
     effect: str
+    figures: str
     drawing: str
 
 
@@ -42,11 +48,32 @@ def _svg(shapes: str, transform: str = "") -> str:
     return f'<svg viewBox="0 0 64 64" aria-hidden="true"><g transform="{transform}">{shapes}</g></svg>'
 
 
-LEGEND: tuple[LegendEntry, ...] = (
-    LegendEntry(FORWARD, "index finger up", "faster forward", _svg(_INDEX_UP)),
-    LegendEntry(BACKWARD, "index finger down", "slower, then back", _svg(_INDEX_UP, "rotate(180 32 32)")),
-    LegendEntry(STOP, "open palm", "stop at once", _svg(_OPEN_PALM)),
-    LegendEntry(TURN_LEFT, "thumb to your left", "turn left", _svg(_TURN_LEFT)),
-    LegendEntry(TURN_RIGHT, "thumb to your right", "turn right", _svg(_TURN_LEFT, "matrix(-1 0 0 1 64 0)")),
-    LegendEntry(GO, "closed fist", "keep going", _svg(_FIST + _TUCKED_THUMB)),
-)
+_DRAWN: Mapping[str, tuple[str, str]] = {
+    FORWARD: ("index finger up", _svg(_INDEX_UP)),
+    BACKWARD: ("index finger down", _svg(_INDEX_UP, "rotate(180 32 32)")),
+    STOP: ("open palm", _svg(_OPEN_PALM)),
+    TURN_LEFT: ("thumb to your left", _svg(_TURN_LEFT)),
+    TURN_RIGHT: ("thumb to your right", _svg(_TURN_LEFT, "matrix(-1 0 0 1 64 0)")),
+    GO: ("closed fist", _svg(_FIST + _TUCKED_THUMB)),
+}
+# A sign that was taught may have any shape.
+_TAUGHT = ("taught", f'<svg viewBox="0 0 64 64" aria-hidden="true" class="taught">{_OPEN_PALM}</svg>')
+
+
+def legend(signs: tuple[str, ...], rule: ControlConfig | None) -> tuple[LegendEntry, ...]:
+    """Return what there is to know of ``signs``: those that are shipped first, in the page's order.
+
+    Args:
+        signs: Those that the recogniser can tell.
+        rule: What decides what they do; None when that is not known, and what is built in is said, without figures.
+    """
+    order = [*(sign for sign in _DRAWN if sign in signs), *(sign for sign in signs if sign not in _DRAWN)]
+    return tuple(LegendEntry(sign, *_entry(sign, rule)) for sign in order)
+
+
+def _entry(sign: str, rule: ControlConfig | None) -> tuple[str, str, str, str]:
+    pose, drawing = _DRAWN.get(sign, _TAUGHT)
+    action = action_of(sign, rule.actions if rule else {})
+    # What does not change is left out, so that the rest is read.
+    effect = EFFECTS[action].partition(";")[0]
+    return pose, effect, figures_of(action, rule) if rule else "", drawing

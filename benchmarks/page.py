@@ -1,0 +1,322 @@
+"""What the page costs, and how soon a robot stands whose driver is gone.
+
+Run ``python benchmarks/page.py``; parts by name: ``bytes``, ``viewers``, ``deaf``, ``gone``. The whole graph runs in
+this process, at 640x480 and 30 frames a second. One real Chromium tells the bytes and the stopping times. What viewers
+cost is told with plain ones, in a process of their own, who read the pictures and the page's socket as a browser does
+but draw nothing: a browser that draws on the same processors would only tell what drawing costs. Rounds with none, one
+and four of them alternate, so that a busy machine slows all alike.
+"""
+
+import argparse
+import asyncio
+import math
+import os
+import subprocess
+import sys
+import threading
+import time
+import urllib.request
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from urllib.parse import urlsplit
+
+import numpy as np
+import socketio
+from playwright.sync_api import Browser, Page, sync_playwright
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # for the relay and the browser that the tests use
+
+from scripts import chromium
+from tests.dashboard.network import Relay, client_of, deaf, deaf_page, join_query
+
+from handsteer.config import load
+from handsteer.dashboard.server import Dashboard
+from handsteer.graph import Graph
+from handsteer.messages import CMD_VEL, Twist
+from handsteer.nodes.latency import LatencyLog
+from handsteer.transports.protocol import Received
+
+LIMIT_BYTES_PER_S = 2_000_000
+LIMIT_SLOWER = 0.10
+LIMIT_STOP_MS = 500
+PATIENCE_S = 60.0
+SETTLED_S = 1.0
+ACK_PERIOD_S = 3.0  # as NiceGUI's own script does it
+
+
+class Served:
+    """A graph and its page, and what its nodes were seen to do.
+
+    Args:
+        script: What the virtual hand shows.
+    """
+
+    def __init__(self, script: str) -> None:
+        settings = {
+            "camera": {"source": "virtual"},
+            "virtual_hand": {"script": script, "background": "cluttered"},
+            "dashboard": {"port": 0},
+        }
+        self.graph = Graph(load(None, None, settings))
+        self.commands: list[tuple[float, float]] = []
+        self.graph.transport.subscribe("benchmark", CMD_VEL, self._on_command)
+        self._dashboard = Dashboard.of(self.graph)
+        self.url = self._dashboard.start()
+        self.port = urlsplit(self.url).port or 0
+        self.graph.start()
+
+    def close(self) -> None:
+        self.graph.stop()
+        self._dashboard.stop()
+
+    def _on_command(self, received: Received[Twist]) -> None:
+        self.commands.append((time.monotonic(), received.message.linear.x))
+
+    def stands_since_s(self) -> float:
+        """Return when zero was commanded last after something else; infinity while the robot is to move."""
+        commands = list(self.commands)
+        moves = [number for number, (_, speed) in enumerate(commands) if speed]
+        return commands[moves[-1] + 1][0] if moves[-1] + 1 < len(commands) else math.inf
+
+    def recognise(self, duration_s: float) -> tuple[float, float]:
+        """Return frames recognised a second, and the median time of one in ms, over ``duration_s``."""
+        recognition = self.graph.recognition
+        recognition.processing = processing = LatencyLog()
+        began_s, before = time.monotonic(), sum(recognition.counts.values())
+        time.sleep(duration_s)
+        frames = sum(recognition.counts.values()) - before
+        return frames / (time.monotonic() - began_s), processing.percentile_ms(50)
+
+
+@contextmanager
+def served(script: str) -> Iterator[Served]:
+    graph = Served(script)
+    try:
+        yield graph
+    finally:
+        graph.close()
+
+
+@contextmanager
+def browser() -> Iterator[Browser]:
+    with sync_playwright() as playwright:
+        chrome = chromium.launch(playwright)
+        try:
+            yield chrome
+        finally:
+            chrome.close()
+
+
+def visit(chrome: Browser, port: int) -> Page:
+    page = chrome.new_page(viewport={"width": 1280, "height": 800})
+    page.set_default_timeout(PATIENCE_S * 1000)
+    page.goto(f"http://127.0.0.1:{port}/")
+    page.locator(".pad").wait_for()
+    return page
+
+
+def load_now() -> str:
+    return f"load {os.getloadavg()[0]:.1f}"
+
+
+def count_bytes(duration_s: float) -> None:
+    """Print what one viewer is sent: a real browser, and a plain one who takes every picture however busy all is."""
+    with served("Forward:3 Turn Left:3 Stop:2") as page, Relay(page.port) as relay:
+        with browser() as chrome:
+            visit(chrome, relay.port)
+            print_bytes("a browser", page, relay, duration_s)
+        with plain_viewers(relay.port, 1):
+            print_bytes("a plain viewer", page, relay, duration_s)
+
+
+def print_bytes(who: str, page: Served, relay: Relay, duration_s: float) -> None:
+    time.sleep(3.0)
+    sent, began_s = relay.to_browser, time.monotonic()
+    fps, _ = page.recognise(duration_s)
+    rate = (relay.to_browser - sent) / (time.monotonic() - began_s)
+    print(
+        f"bytes: {rate / 1e6:.2f} MB/s to {who} at {fps:.1f} recognised frames/s (limit "
+        f"{LIMIT_BYTES_PER_S / 1e6:.0f}), {load_now()}"
+    )
+
+
+@contextmanager
+def plain_viewers(port: int, count: int) -> Iterator[None]:
+    """Let ``count`` viewers look in a process of their own."""
+    if not count:
+        yield
+        return
+    command = [sys.executable, __file__, "--look", str(port), str(count)]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
+        assert process.stdin
+        assert process.stdout
+        assert process.stdout.readline().strip() == b"looking"
+        try:
+            yield
+        finally:
+            process.stdin.close()
+
+
+def count_viewers(rounds: int, duration_s: float) -> None:
+    """Print how much viewers slow the recognition."""
+    figures: dict[int, list[tuple[float, float]]] = {0: [], 1: [], 4: []}
+    with served("Forward:3 Turn Left:3 Stop:2") as page:
+        time.sleep(3.0)
+        for number in range(rounds):
+            for count in list(figures)[:: 1 if number % 2 else -1]:
+                with plain_viewers(page.port, count):
+                    time.sleep(1.0)
+                    figures[count].append(page.recognise(duration_s))
+    base_fps, base_ms = np.median(figures[0], axis=0)
+    for count, each in figures.items():
+        fps, ms = np.median(each, axis=0)
+        ratios = [ms_with / ms_without for (_, ms_with), (_, ms_without) in zip(each, figures[0], strict=True)]
+        print(
+            f"{count} viewers: {fps:5.1f} frames/s ({fps / base_fps - 1:+.1%}), {ms:5.1f} ms a frame "
+            f"({ms / base_ms - 1:+.1%}; by round {' '.join(f'{ratio - 1:+.0%}' for ratio in ratios)})"
+        )
+    print(f"(limit for 4: {LIMIT_SLOWER:.0%} slower; {rounds} rounds of {duration_s:.0f} s each, {load_now()})")
+
+
+def resident_mb() -> float:
+    return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6
+
+
+def count_deaf(rounds: int, duration_s: float) -> None:
+    """Print what viewers cost who do not read, beside one who does."""
+    figures: dict[bool, list[tuple[float, float]]] = {False: [], True: []}
+    with served("Forward:3 Turn Left:3 Stop:2") as page, plain_viewers(page.port, 1):
+        time.sleep(5.0)
+        before_mb = resident_mb()
+        for _ in range(rounds):
+            for with_deaf, measured in figures.items():
+                with ExitStack() as stack:
+                    for _ in range(4 if with_deaf else 0):
+                        stack.enter_context(deaf(page.port, "/camera.mjpg"))
+                        with urllib.request.urlopen(page.url) as answer:
+                            stack.enter_context(deaf_page(page.port, answer.read().decode()))
+                    time.sleep(1.0)
+                    measured.append(page.recognise(duration_s))
+        grown_mb = resident_mb() - before_mb
+    (fps, ms), (deaf_fps, deaf_ms) = (np.median(each, axis=0) for each in figures.values())
+    print(
+        f"4 who read nothing: {deaf_fps:.1f} frames/s ({deaf_fps / fps - 1:+.1%}), {deaf_ms:.1f} ms a frame "
+        f"({deaf_ms / ms - 1:+.1%}), {grown_mb:+.1f} MB after {rounds} times; {load_now()}"
+    )
+
+
+def count_gone(trials: int) -> None:
+    """Print how long after the driver has gone zero is commanded."""
+    times: dict[str, list[float]] = {"tab closed": [], "network lost": []}
+    with served("NONE:3600") as served_page, browser() as chrome:
+        for _ in range(trials):
+            for how, each in times.items():
+                gone_ms = stop_ms(served_page, chrome, how)
+                if gone_ms is not None:
+                    each.append(gone_ms)
+    for how, each in times.items():
+        low, median, high = np.percentile(each, (0, 50, 100))
+        print(
+            f"{how}: zero is commanded after {low:.0f} / {median:.0f} / {high:.0f} ms (least, median, most of "
+            f"{len(each)}; limit {LIMIT_STOP_MS}), {load_now()}"
+        )
+
+
+def stop_ms(graph: Served, chrome: Browser, how: str) -> float | None:
+    """Return how long after the driver was gone zero was commanded; None if the robot did not drive then."""
+    with Relay(graph.port) as relay:
+        page = visit(chrome, relay.port)
+        page.locator(".pad").focus()
+        page.keyboard.down("ArrowUp")
+        if not comes_true(lambda: bool(graph.commands) and graph.commands[-1][1] > 0.1):
+            page.close()  # the browser was too busy to hold the key
+            return None
+        page.wait_for_timeout(float(np.random.default_rng().uniform(300, 800)))
+        gone_s, was_moving = time.monotonic(), graph.commands[-1][1] > 0
+        if how == "tab closed":
+            page.close()
+        else:
+            relay.freeze()
+        if not comes_true(lambda: graph.stands_since_s() < time.monotonic() - SETTLED_S):
+            sys.exit("the robot goes on without its driver")
+        zero_s = graph.stands_since_s()
+        if not page.is_closed():
+            page.close()
+    graph.commands.clear()
+    return (zero_s - gone_s) * 1000 if was_moving and zero_s > gone_s else None
+
+
+def comes_true(condition: Callable[[], bool], within_s: float = 15.0) -> bool:
+    end_s = time.monotonic() + within_s
+    while not condition():
+        if time.monotonic() > end_s:
+            return False
+        time.sleep(0.01)
+    return True
+
+
+def look(port: int, count: int) -> None:
+    """Look at the page ``count`` times until the input ends."""
+    joined = threading.Semaphore(0)
+    for _ in range(count):
+        threading.Thread(target=read_pictures, args=(port,), daemon=True).start()
+        threading.Thread(target=lambda: asyncio.run(read_page(port, joined)), daemon=True).start()
+    for _ in range(count):
+        joined.acquire()
+    print("looking", flush=True)
+    sys.stdin.read()
+    os._exit(0)
+
+
+def read_pictures(port: int) -> None:
+    with urllib.request.urlopen(f"http://127.0.0.1:{port}/camera.mjpg") as pictures:
+        while pictures.read1(65536):
+            pass
+
+
+async def read_page(port: int, joined: threading.Semaphore) -> None:
+    """Join the page as its own script does, and take what it sends."""
+    address = f"http://127.0.0.1:{port}"
+    with urllib.request.urlopen(address) as answer:
+        client = client_of(answer.read().decode())
+    page = socketio.AsyncClient()
+    newest = 0
+
+    async def take(_event: str, message: object) -> None:
+        nonlocal newest
+        if isinstance(message, dict):
+            newest = message.get("_id", newest)
+
+    page.on("*", take)
+    await page.connect(
+        f"{address}?{join_query(client)}", transports=["websocket"], socketio_path="/_nicegui_ws/socket.io"
+    )
+    joined.release()
+    while True:
+        await page.sleep(ACK_PERIOD_S)
+        await page.emit("ack", {"client_id": client, "next_message_id": newest + 1})
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description="Tell what the page costs.")
+    parser.add_argument("parts", nargs="*", help="bytes, viewers, deaf, gone; all of them by default")
+    parser.add_argument("--rounds", type=int, default=5, help="of each number of viewers")
+    parser.add_argument("--duration", type=float, default=10.0, help="seconds of each measurement")
+    parser.add_argument("--trials", type=int, default=20, help="of each way to be gone")
+    parser.add_argument("--look", nargs=2, type=int, metavar=("PORT", "COUNT"), help=argparse.SUPPRESS)
+    options = parser.parse_args()
+    if options.look:
+        look(*options.look)
+    parts = {
+        "bytes": lambda: count_bytes(2 * options.duration),
+        "viewers": lambda: count_viewers(options.rounds, options.duration),
+        "deaf": lambda: count_deaf(options.rounds, options.duration),
+        "gone": lambda: count_gone(options.trials),
+    }
+    for part in options.parts or parts:
+        parts[part]()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,50 @@
+"""What a sign does in words, with the figures that hold; and these as a node reports them."""
+
+import json
+from collections.abc import Mapping
+
+from handsteer.config import ControlConfig, validate
+from handsteer.control.actions import EFFECTS, Action
+from handsteer.errors import ConfigError
+
+_TOLD = (
+    "ramp",
+    "linear_step",
+    "angular_step",
+    "linear_acceleration",
+    "angular_acceleration",
+    "max_linear",
+    "max_angular",
+    "actions",
+)
+
+
+def effect_of(action: Action, rule: ControlConfig) -> str:
+    """Return what ``action`` makes the robot do under ``rule``, as ``stops``, with its steps and limits."""
+    figures = figures_of(action, rule)
+    return f"{EFFECTS[action]} ({figures})" if figures else EFFECTS[action]
+
+
+def tell(rule: ControlConfig) -> dict[str, str]:
+    """Return what decides what signs do, as values of a report on ``/diagnostics``."""
+    return {name: json.dumps(getattr(rule, name)) for name in _TOLD}
+
+
+def told(values: Mapping[str, str]) -> ControlConfig | None:
+    """Return what a report of :func:`tell` says, defaults for the rest; None when it says nothing that holds."""
+    try:
+        return validate(ControlConfig, {name: json.loads(values[name]) for name in _TOLD})
+    except (KeyError, ValueError, ConfigError):
+        return None
+
+
+def figures_of(action: Action, rule: ControlConfig) -> str:
+    """Return the step and the limit of ``action`` under ``rule``; empty where it has none."""
+    is_timed = rule.ramp == "per_second"
+    linear = f"{rule.linear_acceleration:g} m/s a second" if is_timed else f"{rule.linear_step:g} m/s a frame"
+    angular = f"{rule.angular_acceleration:g} rad/s a second" if is_timed else f"{rule.angular_step:g} rad/s a frame"
+    if action in ("forward", "backward"):
+        return f"{linear}, up to {rule.max_linear:g} m/s"
+    if action in ("turn_left", "turn_right"):
+        return f"{angular}, up to {rule.max_angular:g} rad/s"
+    return f"up to {rule.max_linear:g} m/s" if action == "turbo" else ""

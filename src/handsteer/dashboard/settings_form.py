@@ -1,0 +1,228 @@
+"""The fields that the page's settings are made of, worked out of the configuration's models: no page, no files."""
+
+import re
+from dataclasses import dataclass
+from typing import Any, Literal, get_args
+from urllib.parse import urlsplit
+
+import yaml
+
+from handsteer.config import Config, Section, validate
+from handsteer.errors import ConfigError
+from handsteer.parameters import Description, describe
+
+FieldKind = Literal["switch", "choice", "number", "text", "list", "table"]
+"""How a field is edited; what a list and a table hold is separated by commas."""
+
+LONGEST_TEXT = 2000
+"""No field takes more characters."""
+
+MASK = "•••"
+"""Stands for what is not shown: passwords in the address of a camera."""
+
+_FOR_THE_DRIVER = frozenset({("dashboard", "certificate"), ("dashboard", "private_key")})
+_UNIT = re.compile(r" \[([^\]]+)\]$")
+_SCALAR = re.compile(r"[-+.\w]+")
+_PASSWORD = re.compile(
+    r"(?<=://)[^/@:\s]*:(?P<user>[^/\s]*)(?=@)|[?&][^=&]*(?:pass|pwd|token|secret|key|auth)[^=&]*=(?P<query>[^&\s]+)",
+    re.IGNORECASE,
+)
+
+
+@dataclass(frozen=True)
+class FormField:
+    """One parameter, as a form shows it.
+
+    Attributes:
+        section: Its section of the configuration.
+        name: Its name there.
+        text: A line for people.
+        unit: The unit of its values; empty when there is none.
+        allowed: The range or the choices in words; empty when anything is.
+        kind: How it is edited.
+        choices: What there is to choose from, of a choice; of a table, its values may be these.
+        optional: Whether it may be empty, which means none.
+        live: Whether it can change while the nodes run; else it is read at the next start.
+    """
+
+    section: str
+    name: str
+    text: str
+    unit: str
+    allowed: str
+    kind: FieldKind
+    choices: tuple[str, ...]
+    optional: bool
+    live: bool
+
+    @property
+    def path(self) -> str:
+        """The full name, as ``control.max_linear``."""
+        return f"{self.section}.{self.name}"
+
+    def matches(self, words: str) -> bool:
+        """Return whether each of ``words``, whatever its case, is in its name or its meaning."""
+        said = f"{self.path} {self.path.replace('_', ' ')} {self.text} {self.unit}".casefold()
+        return all(word in said for word in words.casefold().split())
+
+    def value_in(self, config: Config) -> Any:
+        """Return its value in ``config``."""
+        return getattr(getattr(config, self.section), self.name)
+
+    def show(self, value: Any, *, to_driver: bool = True) -> str:
+        """Return ``value`` as it is edited: passwords are masked, and paths of keys from those who only watch."""
+        if value is None:
+            return ""
+        if (self.section, self.name) in _FOR_THE_DRIVER and not to_driver:
+            return MASK
+        if isinstance(value, bool):
+            return str(value).lower()
+        if isinstance(value, float):
+            return repr(value).removesuffix(".0")
+        if isinstance(value, tuple | dict):
+            return _flow(list(value) if isinstance(value, tuple) else value)
+        return mask(str(value)) if self.kind == "text" else str(value)
+
+    def parse(self, text: str, current: Any = None) -> Any:
+        """Return the value that ``text`` means, checked as the same value in a YAML file would be.
+
+        Args:
+            text: What :meth:`show` returns, or people have typed.
+            current: The value so far, which has the passwords that were masked.
+
+        Raises:
+            ConfigError: It means nothing, or a value that is not allowed; in the words that the file would get.
+        """
+        if len(text) > LONGEST_TEXT:
+            raise ConfigError(f"{self.path}: should have at most {LONGEST_TEXT} characters, and has {len(text)}")
+        checked = validate(Config, {self.section: {self.name: self._read(text, current)}})
+        return self.value_in(checked)
+
+    def _read(self, text: str, current: Any) -> Any:
+        if not text and self.optional:
+            return None
+        if self.kind in ("number", "switch"):
+            return _number_or_switch(text)
+        if self.kind == "list":
+            return self._scalars(f"[{text}]")
+        if self.kind == "table":
+            pairs = iter(self._scalars(f"{{{text}}}"))
+            return dict(zip(pairs, pairs, strict=True))
+        return self._unmasked(text, current) if MASK in text else text
+
+    def _scalars(self, flow: str) -> list[str]:
+        # By events, because a loader would follow aliases and nesting as deep as they go.
+        try:
+            events = list(yaml.parse(flow, yaml.BaseLoader))
+        except yaml.YAMLError:
+            events = []
+        inner = events[3:-3]
+        if not events or not all(isinstance(event, yaml.ScalarEvent) for event in inner):
+            example = "Peace: turbo, Hi: stop" if self.kind == "table" else "r1, r2"
+            raise ConfigError(f"{self.path}: {flow[1:-1]!r} should be written as in: {example}")
+        return [event.value for event in inner if isinstance(event, yaml.ScalarEvent)]
+
+    def _unmasked(self, text: str, current: Any) -> str:
+        hidden = _passwords(str(current or ""))
+        parts = text.split(MASK)
+        if len(parts) != len(hidden) + 1 or _host(text) != _host(mask(str(current or ""))):
+            raise ConfigError(f"{self.path}: this is another address, so {MASK} should be its password")
+        return "".join(part + secret for part, secret in zip(parts, [*hidden, ""], strict=True))
+
+
+def mask(address: str) -> str:
+    """Return ``address`` with :data:`MASK` for its passwords: ``rtsp://me:•••@10.0.0.5/``."""
+    shown, at = "", 0
+    for begin, end in _spans(address):
+        shown, at = shown + address[at:begin] + MASK, end
+    return shown + address[at:]
+
+
+def form() -> dict[str, tuple[FormField, ...]]:
+    """Return the fields of every section of the configuration, in its order."""
+    return {name: tuple(_field(name, field) for field in section_model(name).model_fields) for name in _sections()}
+
+
+def section_model(name: str) -> type[Section]:
+    """Return the model of the section ``name``."""
+    model = Config.model_fields[name].annotation
+    assert isinstance(model, type)
+    assert issubclass(model, Section)
+    return model
+
+
+def _sections() -> list[str]:
+    return list(Config.model_fields)
+
+
+def _field(section: str, name: str) -> FormField:
+    model = section_model(section)
+    field = model.model_fields[name]
+    known = describe(model, name)
+    unit = _UNIT.search(known.text)
+    choices = tuple(known.constraint.removeprefix("one of ").split(", ")) if "one of " in known.constraint else ()
+    return FormField(
+        section=section,
+        name=name,
+        text=_UNIT.sub("", known.text),
+        unit=unit.group(1) if unit else "",
+        allowed=_allowed(known),
+        kind=_kind(field.annotation, known, choices),
+        choices=choices,
+        optional=type(None) in get_args(field.annotation),
+        live=known.why_fixed is None,
+    )
+
+
+def _kind(annotation: Any, known: Description, choices: tuple[str, ...]) -> FieldKind:
+    if getattr(annotation, "__origin__", None) is dict:
+        return "table"
+    if choices:
+        return "choice"
+    kinds: dict[str, FieldKind] = {"bool": "switch", "integer": "number", "double": "number", "strings": "list"}
+    return kinds.get(known.kind, "text")
+
+
+def _allowed(known: Description) -> str:
+    if known.kind not in ("integer", "double"):
+        return known.constraint
+    lowest = known.constraint or ("" if known.minimum is None else f"at least {known.minimum:g}")
+    highest = "" if known.maximum is None else f"at most {known.maximum:g}"
+    if lowest.startswith("at least") and highest:
+        return f"{known.minimum:g} to {known.maximum:g}"
+    return ", ".join(part for part in (lowest, highest) if part)
+
+
+def _flow(value: Any) -> str:
+    text: str = yaml.safe_dump(value, default_flow_style=True, allow_unicode=True, sort_keys=False, width=float("inf"))
+    return text.strip()[1:-1]
+
+
+def _number_or_switch(text: str) -> Any:
+    """Return the number or the truth value that YAML finds in ``text``, else ``text``."""
+    if not _SCALAR.fullmatch(text.strip()):
+        return text
+    try:
+        value = yaml.safe_load(text)
+    except (yaml.YAMLError, ValueError):  # such as 0o9
+        return text
+    return value if isinstance(value, bool | int | float) else text
+
+
+def _spans(address: str) -> list[tuple[int, int]]:
+    if "://" not in address:
+        return []
+    return [match.span(match.lastgroup or 0) for match in _PASSWORD.finditer(address)]
+
+
+def _passwords(address: str) -> list[str]:
+    return [address[begin:end] for begin, end in _spans(address)]
+
+
+def _host(address: str) -> tuple[str, str]:
+    """Return scheme and host: where an address sends its password."""
+    try:
+        parts = urlsplit(address)
+    except ValueError:
+        return "", ""
+    return parts.scheme, parts.netloc
