@@ -1,3 +1,4 @@
+import json
 import math
 from itertools import pairwise
 
@@ -6,7 +7,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from handsteer.config import RobotConfig
-from handsteer.robots.course import BUMP_S, LEAP_M, MISS_S, CourseState, Referee, crosses
+from handsteer.robots.course import BUMP_S, LEAP_M, MISS_S, CourseState, Referee, crosses, read_course, stopwatch
 from handsteer.robots.protocol import Pose2D
 from handsteer.robots.simulated import SimulatedRobot
 from handsteer.robots.world import Gate, load_world
@@ -137,3 +138,42 @@ def test_the_shipped_slalom_can_be_driven_cleanly() -> None:
         seen = referee.step(state.truth, state.collisions or 0, state.time_s)
     assert (seen.phase, seen.passed, seen.missed, seen.bumps) == ("finished", 8, frozenset(), 0)
     assert 10 < seen.time_s < 60
+
+
+@given(
+    state=st.builds(
+        CourseState,
+        gates=st.integers(1, 20),
+        next_gate=st.integers(0, 20),
+        missed=st.frozensets(st.integers(0, 19)),
+        bumps=st.integers(0, 99),
+        time_s=st.integers(0, 99999).map(lambda hundredths: hundredths / 100),
+        phase=st.sampled_from(["ready", "running", "finished"]),
+    )
+)
+def test_a_state_travels_as_values(state: CourseState) -> None:
+    assert read_course(state.as_values()) == state
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [{"course_gates": "many"}, {"course_missed": "a"}, {"course_time_s": "nan"}, {"course_phase": "over"}],
+)
+def test_values_that_are_something_else_are_no_state(wrong: dict[str, str]) -> None:
+    assert read_course({}) is None
+    assert read_course({**CourseState(3).as_values(), **wrong}) is None
+
+
+@pytest.mark.parametrize(
+    ("time_s", "shown"), [(0.0, "0:00.0"), (23.49, "0:23.4"), (65.3, "1:05.3"), (600.0, "10:00.0")]
+)
+def test_a_stopwatch_shows_whole_tenths(time_s: float, shown: str) -> None:
+    assert stopwatch(time_s) == shown
+
+
+def test_a_state_in_words_and_in_json() -> None:
+    state = CourseState(8, 8, frozenset({3}), 2, 23.4, "finished")
+    assert str(state) == "gates 7/8, missed 1, bumps 2, 0:23.4, score 37.4 s"
+    assert str(CourseState(8)) == "gates 0/8, bumps 0, 0:00.0"
+    assert json.loads(json.dumps(state.as_dict()))["score_s"] == pytest.approx(37.4)
+    assert state.as_dict()["missed"] == [3]

@@ -8,9 +8,9 @@ The score is seconds, the fewer the better: the time, :data:`BUMP_S` for each bu
 """
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Literal
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import Any, Literal
 
 from handsteer.robots.protocol import Pose2D
 from handsteer.robots.world import Gate
@@ -25,6 +25,7 @@ LEAP_M = 0.5
 """No robot goes so far between two looks at it: it was put elsewhere, and has crossed nothing."""
 
 Phase = Literal["ready", "running", "finished"]
+_PHASES: dict[str, Phase] = {"ready": "ready", "running": "running", "finished": "finished"}
 
 
 @dataclass(frozen=True)
@@ -56,6 +57,45 @@ class CourseState:
     def score_s(self) -> float:
         """The score so far, in seconds."""
         return self.time_s + BUMP_S * self.bumps + MISS_S * len(self.missed)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return it as plain values, with the score, for JSON."""
+        return {**asdict(self), "missed": sorted(self.missed), "passed": self.passed, "score_s": self.score_s}
+
+    def __str__(self) -> str:
+        """Return it in words, as ``gates 8/8, missed 1, bumps 2, 0:23.4, score 37.4 s``."""
+        missed = f", missed {len(self.missed)}" if self.missed else ""
+        score = f", score {self.score_s:.1f} s" if self.phase == "finished" else ""
+        return f"gates {self.passed}/{self.gates}{missed}, bumps {self.bumps}, {stopwatch(self.time_s)}{score}"
+
+    def as_values(self) -> dict[str, str]:
+        """Return it as named values, for diagnostics; :func:`read_course` reads them."""
+        return {
+            "course_gates": str(self.gates),
+            "course_next": str(self.next_gate),
+            "course_missed": " ".join(str(index) for index in sorted(self.missed)),
+            "course_bumps": str(self.bumps),
+            "course_time_s": f"{self.time_s:.2f}",
+            "course_phase": self.phase,
+        }
+
+
+def read_course(values: Mapping[str, str]) -> CourseState | None:
+    """Return what :meth:`CourseState.as_values` has written; None where that is not there, or is something else."""
+    try:
+        gates, next_gate, bumps = (int(values[f"course_{name}"]) for name in ("gates", "next", "bumps"))
+        missed = frozenset(int(index) for index in values["course_missed"].split())
+        time_s = float(values["course_time_s"])
+    except (KeyError, ValueError):
+        return None
+    phase = _PHASES.get(values.get("course_phase", ""))
+    return CourseState(gates, next_gate, missed, bumps, time_s, phase) if phase and math.isfinite(time_s) else None
+
+
+def stopwatch(time_s: float) -> str:
+    """Return seconds as minutes, seconds and tenths, as ``1:05.3``; what is not a whole tenth is cut off."""
+    tenths = int(time_s * 10 + 1e-6)
+    return f"{tenths // 600}:{tenths // 10 % 60:02d}.{tenths % 10}"
 
 
 class Referee:
