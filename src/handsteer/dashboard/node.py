@@ -8,6 +8,7 @@ from handsteer.clock import Clock, to_seconds
 from handsteer.control.sign_control import Velocity
 from handsteer.dashboard.seat import Seat
 from handsteer.dashboard.state import Observed, PageState, Report, compose, place_in_world
+from handsteer.dashboard.trail import Trail
 from handsteer.messages import (
     CMD_VEL,
     DIAGNOSTICS,
@@ -43,6 +44,7 @@ _ODOMETRY_KEPT = 16
 
 
 _START = Pose2D(0.0, 0.0, 0.0)
+_NO_TRAIL = Trail()
 
 
 @dataclass(frozen=True)
@@ -54,12 +56,14 @@ class WorldState:
         joints: Joint angles in rad by name.
         markers: The obstacles by namespace and id.
         description: The robot's URDF; empty as long as it is not known.
+        trail: Where the robot has gone while the page was looked at.
     """
 
     robot: Pose2D = _START
     joints: tuple[tuple[str, float], ...] = ()
     markers: tuple[Marker, ...] = ()
     description: str = ""
+    trail: Trail = _NO_TRAIL
 
 
 class DashboardNode(Node):
@@ -87,6 +91,7 @@ class DashboardNode(Node):
         self._frame_counts: deque[tuple[float, float]] = deque(maxlen=_FRAME_COUNTS_KEPT)
         self._odometry: deque[tuple[float, Pose2D]] = deque(maxlen=_ODOMETRY_KEPT)
         self._truth: tuple[Pose2D, Pose2D] | None = None
+        self._path_length_m = 0.0
         self._steering = steering
         self._holder: tuple[str, float] | None = None
         self.subscribe(DIAGNOSTICS, self._on_diagnostics, key=_reporter)
@@ -156,6 +161,7 @@ class DashboardNode(Node):
                 self._count_frames(report)
             if name == "robot":
                 self._take_truth(report, stamp_s)
+                self._notice_restart(report)
 
     def _count_frames(self, report: Report) -> None:
         frames = report.number("frames")
@@ -169,6 +175,11 @@ class DashboardNode(Node):
         if truth is not None and then:
             self._truth = (truth, then[-1])
 
+    def _notice_restart(self, report: Report) -> None:
+        before_m, self._path_length_m = self._path_length_m, report.number("path_length_m") or 0.0
+        if self._path_length_m < before_m:
+            self.world = replace(self.world, trail=self.world.trail.anew())
+
     def _on_command(self, received: Received[Twist | TwistStamped]) -> None:
         twist = twist_in(received.message)
         command = Velocity(twist.linear.x, twist.angular.z)
@@ -180,7 +191,8 @@ class DashboardNode(Node):
         self._observed = replace(self._observed, measured=measured)
         pose = _pose_of(odometry)
         self._odometry.append((to_seconds(odometry.header.stamp), pose))
-        self.world = replace(self.world, robot=place_in_world(*self._truth, pose) if self._truth else pose)
+        robot = place_in_world(*self._truth, pose) if self._truth else pose
+        self.world = replace(self.world, robot=robot, trail=self.world.trail.to(robot))
 
     def _on_joints(self, received: Received[JointState]) -> None:
         names, positions = received.message.name, received.message.position.tolist()

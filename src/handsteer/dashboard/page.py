@@ -11,6 +11,7 @@ from handsteer.dashboard.panels.banner import Banner
 from handsteer.dashboard.panels.seat import SeatPanel
 from handsteer.dashboard.state import PageState
 from handsteer.dashboard.watch import WhileWatched
+from handsteer.nodes.robot import RobotNode
 
 PICTURE_PATH = "/camera.mjpg"
 WEBCAM_PATH = "/camera"
@@ -37,10 +38,12 @@ class Served:
     Attributes:
         node: Is joined for as long as a browser shows a page.
         cameras: The graph's camera, which a browser's may stand in for; None where that cannot be.
+        robot: The node of the robot, whose world people edit; None where it is in another process.
     """
 
     node: WhileWatched[DashboardNode]
     cameras: ChoiceOfCameras | None
+    robot: RobotNode | None = None
 
 
 class Page:

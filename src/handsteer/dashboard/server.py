@@ -30,6 +30,7 @@ from handsteer.dashboard.webcam import FrameSocket
 from handsteer.errors import DashboardError
 from handsteer.graph import Graph, cmd_vel_topic
 from handsteer.messages import CMD_VEL, Topic
+from handsteer.nodes.robot import RobotNode
 from handsteer.nodes.steering import SteeringNode
 from handsteer.transports.protocol import Transport
 
@@ -55,6 +56,7 @@ class Dashboard:
         config: Where the page is served, and how.
         cmd_vel: The topic of the commands that are shown.
         cameras: The camera of this process, which a browser's may stand in for; None where it is in another.
+        robot: The robot of this process, whose world people edit; None where it is in another.
 
     Attributes:
         node: Listens and steers for the browsers that show the page.
@@ -72,10 +74,11 @@ class Dashboard:
         *,
         cmd_vel: Topic[Any] = CMD_VEL,
         cameras: ChoiceOfCameras | None = None,
+        robot: RobotNode | None = None,
     ) -> None:
         self.node = WhileWatched(lambda: DashboardNode(transport, clock, steering, cmd_vel))
         self.pictures = WhileWatched(lambda: PictureNode(transport, clock))
-        self.served = Served(self.node, cameras)
+        self.served = Served(self.node, cameras, robot)
         self.webcam = FrameSocket(cameras, self._drives)
         self._config = config
         self._server: uvicorn.Server | None = None
@@ -86,7 +89,7 @@ class Dashboard:
         """Return the page of a graph whose nodes are all in this process."""
         topic = cmd_vel_topic(graph.config)
         wires = (graph.transport, graph.clock, graph.steering)
-        return cls(*wires, graph.config.dashboard, cmd_vel=topic, cameras=graph.cameras)
+        return cls(*wires, graph.config.dashboard, cmd_vel=topic, cameras=graph.cameras, robot=graph.robot)
 
     def start(self) -> str:
         """Serve the page and return its address once it answers; it holds the token where one is needed.

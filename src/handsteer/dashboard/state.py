@@ -7,6 +7,7 @@ from typing import Literal
 
 from handsteer.control.sign_control import ZERO, Velocity
 from handsteer.nodes.node import ERROR, OK
+from handsteer.robots.course import CourseState, read_course
 from handsteer.robots.protocol import Pose2D
 from handsteer.signs.vocabulary import NONE
 
@@ -86,6 +87,7 @@ class PageState:
         fps: Frames a second of the camera; None when not known yet.
         path_length_m: How far the robot has gone; None when it does not say.
         collisions: How often it has begun to touch an obstacle; None when it does not say.
+        course: How far it is on the course of its world; None where there is none.
     """
 
     mood: Mood
@@ -106,6 +108,7 @@ class PageState:
     fps: float | None
     path_length_m: float | None
     collisions: int | None
+    course: CourseState | None = None
 
 
 def compose(observed: Observed, now_s: float) -> PageState:
@@ -136,6 +139,7 @@ def compose(observed: Observed, now_s: float) -> PageState:
         fps=frame_rate(observed.frame_counts, now_s),
         path_length_m=robot.number("path_length_m"),
         collisions=None if collisions is None else int(collisions),
+        course=read_course(robot.values),
     )
 
 
