@@ -44,7 +44,7 @@ class WorldPanel:
                         self._views[view] = button(name, "").on("click", lambda view=view: self.look(view))
                 self._course = CourseLine()
                 with box("tools"):
-                    self._restart = button("Back to start", 'aria-label="Put the robot back to its start"')
+                    self._restart = button("Back to start", "")
                     self._edit = button("Edit world", 'aria-expanded="false"').on("click", self._toggle)
             self._foot = RobotFoot()
             self._editor = WorldEditor(robot, may, self._view)

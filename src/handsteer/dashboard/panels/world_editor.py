@@ -96,7 +96,9 @@ class WorldEditor:
     async def drop(self, index: int, x: float, y: float) -> None:
         """Put the obstacle with this index to x and y in metres, if that is not where it is."""
         world = self._world()
-        if world is None or index >= len(world.obstacles) or not (math.isfinite(x) and math.isfinite(y)):
+        # A browser may send anything.
+        is_place = all(isinstance(value, int | float) and math.isfinite(value) for value in (x, y))
+        if world is None or index >= len(world.obstacles) or not is_place:
             return
         thing = world.obstacles[index]
         if math.dist(thing.position, (x, y)) > _STILL_M:
