@@ -4,7 +4,7 @@ import pytest
 
 from handsteer.clock import to_stamp
 from handsteer.messages import Header, yaw_of
-from handsteer.nodes.world_markers import gate_strips, world_markers
+from handsteer.nodes.world_markers import Touches, gate_strips, world_markers
 from handsteer.robots.course import CourseState
 from handsteer.robots.protocol import Obstacle
 from handsteer.robots.world import Gate
@@ -22,6 +22,16 @@ def test_what_is_touched_is_red() -> None:
     assert (one.color.r, one.color.g) == (0.5, 0.5)
     assert two.color.r > 0.9
     assert two.color.g < 0.3
+
+
+def test_a_touch_is_seen_for_a_moment() -> None:
+    touches = Touches()
+    touches.note(["a"], 0.0)
+    touches.note(["b"], 0.5)
+    touches.note([], 0.6)
+    assert touches.shown(0.6) == ["a", "b"]
+    assert touches.shown(0.8) == ["b"]
+    assert touches.shown(2.0) == []
 
 
 def test_what_is_gone_is_deleted() -> None:

@@ -43,7 +43,7 @@ from handsteer.messages import (
 from handsteer.nodes.interruption import Interruption
 from handsteer.nodes.node import ERROR, OK, WARN, Node
 from handsteer.nodes.world_changes import WorldChanges
-from handsteer.nodes.world_markers import gate_strips, world_markers
+from handsteer.nodes.world_markers import Touches, gate_strips, world_markers
 from handsteer.robots.course import CourseState, Referee
 from handsteer.robots.diff_drive import Velocity
 from handsteer.robots.editing import Change, InWorld
@@ -101,6 +101,7 @@ class RobotNode(Node):
         self._clock_out = self.publisher(CLOCK) if config.publish_clock else None
         self._markers = self.publisher(WORLD_MARKERS)
         self._most_markers = 0
+        self._touches = Touches()
         self._in_world = robot if isinstance(robot, InWorld) else None
         self._changes = WorldChanges()
         self._referee = Referee(self._in_world.world.gates if self._in_world else ())
@@ -213,11 +214,13 @@ class RobotNode(Node):
         self._joint_states.publish(_joint_state(Header(stamp=stamp, frame_id=""), self.state))
 
     def _publish_markers(self) -> None:
+        now = self.clock.now()
+        self._touches.note(self.state.contacts, now)
         if self._markers.wanted:
-            header = Header(stamp=self.clock.stamp(self.clock.now()), frame_id=self._config.odom_frame_id)
+            header = Header(stamp=self.clock.stamp(now), frame_id=self._config.odom_frame_id)
             strips = gate_strips(self.world.gates, self._referee.state) if self.world else []
             self._markers.publish(
-                world_markers(header, self._robot.obstacles(), strips, self.state.contacts, self._most_markers)
+                world_markers(header, self._robot.obstacles(), strips, self._touches.shown(now), self._most_markers)
             )
             # Whoever draws them keeps each until it is told otherwise.
             self._most_markers = max(self._most_markers, len(self._robot.obstacles()))

@@ -1,7 +1,7 @@
 """The obstacles and gates of a world as markers, which RViz and the page can draw."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -35,9 +35,26 @@ _NEXT_GATE = (1.0, 0.8, 0.1, 1.0)
 _PASSED_GATE = (0.16, 0.6, 0.35, 1.0)
 _MISSED_GATE = (0.8, 0.25, 0.2, 1.0)
 _LATER_GATE = (0.4, 0.47, 0.6, 1.0)
+_FLASH_S = 0.7
 _STRIP_WIDTH_M = 0.06
 _STRIP_HEIGHT_M = 0.01
 _GONE = Obstacle("", "box", (1.0, 1.0, 1.0), (0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))
+
+
+class Touches:
+    """Remembers for a moment what the robot has touched, so that people see it."""
+
+    def __init__(self) -> None:
+        self._until_s: dict[str, float] = {}
+
+    def note(self, contacts: Iterable[str], now_s: float) -> None:
+        """Note the names of what the robot touches at ``now_s``."""
+        self._until_s.update(dict.fromkeys(contacts, now_s + _FLASH_S))
+
+    def shown(self, now_s: float) -> list[str]:
+        """Return the names of what it touches, or did a moment ago."""
+        self._until_s = {name: until_s for name, until_s in self._until_s.items() if until_s > now_s}
+        return [*self._until_s]
 
 
 def world_markers(
@@ -53,7 +70,7 @@ def world_markers(
         header: Of each marker.
         obstacles: Those of the namespace ``world``.
         strips: Those of the namespace ``gates``.
-        touched: Names of obstacles that are red, for the robot touches them.
+        touched: Names of obstacles that are red.
         most: How many obstacles there have ever been: those that are gone are deleted.
     """
     markers = [
