@@ -3,7 +3,7 @@ from pathlib import Path
 
 import pytest
 import yaml
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from handsteer.errors import WorldError
@@ -116,6 +116,7 @@ def test_any_yaml_is_read_or_refused(tmp_path: Path, values: object) -> None:
         load_world(path)
 
 
+TOP = {"shape": "sphere", "radius": 1.0, "position": [0.0, 0.0]}
 numbers = st.floats(-1000, 1000)
 metres = st.floats(0.005, 100)
 places = st.tuples(numbers, numbers)
@@ -152,6 +153,7 @@ worlds = st.builds(
 
 
 @given(world=worlds)
+@example(world=World.model_validate({"obstacles": [{**TOP, "name": "\x85"}, {**TOP, "name": "Größe 中\u2028\n: #{'"}]}))
 def test_a_world_that_is_written_is_read_as_the_same(world: World) -> None:
     text = write_world(world)
     assert parse_world(text, "mine") == world

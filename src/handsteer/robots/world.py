@@ -198,7 +198,11 @@ def write_world(world: World) -> str:
 
 
 def _one_line(values: dict[str, Any]) -> str:
-    return yaml.safe_dump(values, default_flow_style=True, sort_keys=False, allow_unicode=True, width=math.inf).strip()
+    # What is not printable is escaped: some such characters break lines, and would come back as a space.
+    readable = all(value.isprintable() for value in values.values() if isinstance(value, str))
+    return yaml.safe_dump(
+        values, default_flow_style=True, sort_keys=False, allow_unicode=readable, width=math.inf
+    ).strip()
 
 
 def describe_problem(error: ValidationError, values: Any) -> str:
