@@ -32,6 +32,7 @@ from handsteer.nodes.recognition import HandSignRecognitionNode
 from handsteer.nodes.robot import RobotNode
 from handsteer.nodes.steering import SteeringNode
 from handsteer.robots import open_robot
+from handsteer.robots.course import CourseState
 from handsteer.robots.protocol import Pose2D
 from handsteer.signs.drawing import annotate
 from handsteer.signs.model import load_model
@@ -171,6 +172,7 @@ class Graph:
             odometry=self.robot.state.odometry if self.robot.was_located else None,
             path_length_m=self.robot.path_length_m,
             contacts=self.robot.state.collisions,
+            course=self.robot.course,
             trouble=self.robot.state.trouble,
             callback_errors=sum(node.callback_errors for node in self.nodes),
         )
@@ -191,6 +193,7 @@ class Summary:
         odometry: Where its wheels say that it is; None when it has not said.
         path_length_m: How far it has gone.
         contacts: How often it has begun to touch an obstacle; None for a real one.
+        course: Gates, bumps and time on its world's course, with the score in seconds; None where there is no course.
         trouble: What was wrong with it at the end, as ``is not there: …``; empty when nothing was.
         callback_errors: Callbacks that failed.
     """
@@ -205,12 +208,13 @@ class Summary:
     odometry: Pose2D | None
     path_length_m: float
     contacts: int | None
+    course: CourseState | None
     trouble: str
     callback_errors: int
 
     def as_dict(self) -> dict[str, Any]:
         """Return the figures as plain values, for JSON."""
-        return asdict(self)
+        return {**asdict(self), "course": self.course and self.course.as_dict()}
 
 
 def make_camera(config: Config, transport: Transport, clock: Clock, camera: Camera | None = None) -> CameraNode:

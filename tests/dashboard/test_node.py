@@ -33,6 +33,7 @@ from handsteer.messages import (
 )
 from handsteer.nodes.control import HandSignControlNode
 from handsteer.nodes.steering import SteeringNode
+from handsteer.robots.course import CourseState
 from handsteer.robots.description import robot_description
 from handsteer.robots.protocol import Pose2D
 from handsteer.transports.in_process import InProcessTransport
@@ -122,6 +123,26 @@ def test_places_the_robot_by_its_true_pose_and_odometry_since_then(bench: Bench)
     assert bench.node.world.robot == Pose2D(
         pytest.approx(5.0), pytest.approx(2.5), pytest.approx(math.pi / 2)
     )  # half a metre on, which is along y there
+
+
+def test_keeps_the_way_until_the_robot_is_put_back(bench: Bench) -> None:
+    bench.report("robot", "moves freely", path_length_m="0.00")
+    for x in (0.0, 0.1, 0.2, 0.2):
+        bench.odometry(x)
+    assert bench.node.world.trail.points == ((0.0, 0.0), (0.1, 0.0), (0.2, 0.0))
+    bench.report("robot", "moves freely", path_length_m="0.20")
+    assert len(bench.node.world.trail.points) == 3
+    bench.report("robot", "moves freely", path_length_m="0.00")
+    bench.odometry(0.0)
+    assert bench.node.world.trail.points == ((0.0, 0.0),)
+
+
+def test_knows_how_far_the_robot_is_on_its_course(bench: Bench) -> None:
+    bench.report("robot", "moves freely")
+    assert bench.node.state().course is None
+    course = CourseState(8, 2, frozenset({1}), 3, 12.5, "running")
+    bench.report("robot", "moves freely", **course.as_values())
+    assert bench.node.state().course == course
 
 
 def test_a_truth_that_is_none_is_not_taken(bench: Bench) -> None:

@@ -3,11 +3,13 @@ import re
 import pytest
 
 from handsteer.config import RobotConfig
+from handsteer.errors import WorldError
 from handsteer.messages import (
     CLOCK,
     DIAGNOSTICS,
     ODOM,
     TF,
+    WORLD_MARKERS,
     Header,
     Odometry,
     Time,
@@ -17,7 +19,13 @@ from handsteer.messages import (
 )
 from handsteer.nodes.robot import RobotNode
 from handsteer.robots import open_robot
+from handsteer.robots.course import CourseState, read_course
+from handsteer.robots.editing import add, edit, remove
+from handsteer.robots.protocol import Pose2D
+from handsteer.robots.world import load_world
 from tests.nodes.stepping import Bench
+
+START = Pose2D(0.0, 0.0, 0.0)
 
 
 class RobotBench(Bench):
@@ -94,3 +102,73 @@ def test_a_stamped_command_that_is_old_is_not_obeyed(age_s: float | None, speed:
         bench.commands.publish(TwistStamped(header=Header(stamp=stamp, frame_id="base_link"), twist=twist(0.3, 0.0)))
         bench.run(0.1)
     assert bench.newest.twist.twist.linear.x == pytest.approx(speed, abs=0.02)
+
+
+def test_the_world_changes_while_the_robot_drives_and_it_stands_then() -> None:
+    bench = RobotBench()
+    (robot,) = bench.nodes
+    assert isinstance(robot, RobotNode)
+    markers = bench.record(WORLD_MARKERS)
+    bench.drive(1.0)
+    where = robot.state.truth
+    done = robot.change_world(lambda world: add(world, "box", where))
+    assert not done.done()
+    bench.run(0.06)
+    assert done.result(0) is None
+    assert [thing.name for thing in robot.world.obstacles] == ["box 1"]
+    assert abs(robot.state.linear_mps) < 0.02
+    assert robot.state.truth.x == pytest.approx(where.x, abs=0.02)
+    assert len(markers[-1].markers) == 1
+    robot.change_world(lambda world: remove(world, "box 1"))
+    bench.run(0.1)
+    assert [marker.action for marker in markers[-1].markers] == [2]
+
+
+def test_a_change_that_is_refused_changes_nothing() -> None:
+    bench = RobotBench()
+    (robot,) = bench.nodes
+    refused = [
+        robot.change_world(lambda world: edit(add(world, "box", START), "box 1", {"position": [0, 0]})),
+        robot.change_world(lambda world: remove(world, "ghost")),
+    ]
+    bench.run(0.1)
+    for future, words in zip(refused, ("overlaps the robot", "nothing called 'ghost'"), strict=True):
+        with pytest.raises(WorldError, match=words):
+            future.result(0)
+    assert robot.world == load_world("empty")
+    assert robot.callback_errors == 0
+
+
+def test_changes_that_nobody_makes_do_not_pile_up() -> None:
+    bench = RobotBench()
+    (robot,) = bench.nodes
+    last = [robot.change_world(lambda world: world) for _ in range(20)][-1]
+    with pytest.raises(WorldError, match="too many changes wait"):
+        last.result(0)
+
+
+def test_back_at_the_start_everything_counts_anew() -> None:
+    bench = RobotBench(world="slalom")
+    (robot,) = bench.nodes
+    bench.drive(6.0)
+    assert (robot.course.phase, robot.course.passed) == ("running", 1)
+    robot.reset()
+    bench.run(0.1)
+    assert (robot.state.truth.x, robot.state.truth.y, robot.path_length_m) == pytest.approx((0.0, 0.0, 0.0), abs=1e-3)
+    assert (robot.course.phase, robot.course.time_s, robot.state.collisions) == ("ready", 0.0, 0)
+    assert bench.newest.twist.twist.linear.x == pytest.approx(0.0, abs=1e-3)
+
+
+def test_another_world_brings_its_course() -> None:
+    bench = RobotBench()
+    (robot,) = bench.nodes
+    reports = bench.record(DIAGNOSTICS)
+    bench.drive(1.0)
+    assert robot.course is None
+    robot.enter_world(load_world("slalom"))
+    bench.run(0.3)
+    assert robot.world == load_world("slalom")
+    assert robot.course == CourseState(8)
+    values = {pair.key: pair.value for pair in reports[-1].status[0].values}
+    assert read_course(values) == CourseState(8)
+    assert robot.state.truth.x == pytest.approx(0.0, abs=1e-3)

@@ -3,11 +3,11 @@ from pathlib import Path
 
 import pytest
 import yaml
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from handsteer.errors import WorldError
-from handsteer.robots.world import load_world, shipped_worlds
+from handsteer.robots.world import World, load_world, parse_world, shipped_worlds, write_world
 
 BOX = "name: a, shape: box, size: [1, 1, 1], position: [3, 0]"
 
@@ -17,7 +17,7 @@ def thing(fields: str) -> str:
 
 
 def test_shipped_worlds() -> None:
-    assert shipped_worlds() == ["empty", "obstacles"]
+    assert shipped_worlds() == ["empty", "obstacles", "slalom"]
     assert load_world("empty").obstacles == ()
     things = load_world("obstacles").obstacles
     assert {thing.shape for thing in things} == {"box", "cylinder", "sphere"}
@@ -40,7 +40,9 @@ def test_an_empty_file_is_an_empty_world(tmp_path: Path) -> None:
 
 
 def test_an_unknown_name_lists_the_known_ones() -> None:
-    with pytest.raises(WorldError, match=r"no world 'moon'; use empty or obstacles, or the path of a \.yaml file"):
+    with pytest.raises(
+        WorldError, match=r"no world 'moon'; use empty or obstacles or slalom, or the path of a \.yaml file"
+    ):
         load_world("moon")
 
 
@@ -72,6 +74,8 @@ def test_an_unknown_name_lists_the_known_ones() -> None:
         (thing(BOX).replace("[3, 0]", "[3, 1e9]"), "'a' position.1"),
         (thing(BOX).replace("[3, 0]", "here"), "'a' position"),
         (thing(BOX) + "  - {" + BOX + "}", "two are called 'a'"),
+        ("gates: [{name: g, left: [1, 0], right: [1, 0.05]}]", "gates[0] 'g': left and right should be at least 0.1 m"),
+        ("gates: [{name: g, left: [1, 0]}]", "gates[0] 'g' right: is missing"),
     ],
 )
 def test_a_bad_file_is_refused_in_one_line_that_names_file_and_field(tmp_path: Path, text: str, words: str) -> None:
@@ -110,3 +114,56 @@ def test_any_yaml_is_read_or_refused(tmp_path: Path, values: object) -> None:
     path.write_text(yaml.safe_dump(values), encoding="utf-8")
     with suppress(WorldError):
         load_world(path)
+
+
+TOP = {"shape": "sphere", "radius": 1.0, "position": [0.0, 0.0]}
+numbers = st.floats(-1000, 1000)
+metres = st.floats(0.005, 100)
+places = st.tuples(numbers, numbers)
+colours = st.from_regex(r"\A#[0-9a-f]{6}\Z")
+common = {
+    "name": st.text(st.characters(codec="utf-8"), min_size=1, max_size=60),
+    "position": places,
+    "yaw": st.floats(-6.28, 6.28),
+    "colour": colours,
+    "movable": st.booleans(),
+    "mass": st.floats(0.01, 1000),
+}
+things = st.one_of(
+    st.fixed_dictionaries({"shape": st.just("box"), "size": st.tuples(metres, metres, metres), **common}),
+    st.fixed_dictionaries({"shape": st.just("cylinder"), "radius": metres, "height": metres, **common}),
+    st.fixed_dictionaries({"shape": st.just("sphere"), "radius": metres, **common}),
+)
+gates = st.builds(
+    lambda name, left, way: {"name": name, "left": left, "right": (left[0] + way, left[1])},
+    common["name"],
+    st.tuples(st.floats(-900, 900), numbers),
+    st.floats(0.2, 90),
+)
+worlds = st.builds(
+    World.model_validate,
+    st.fixed_dictionaries(
+        {
+            "floor": st.fixed_dictionaries({"size": st.tuples(metres, metres), "colour": colours}),
+            "obstacles": st.lists(things, max_size=5, unique_by=lambda thing: thing["name"]),
+            "gates": st.lists(gates, max_size=4, unique_by=lambda gate: gate["name"]),
+        }
+    ),
+)
+
+
+@given(world=worlds)
+@example(world=World.model_validate({"obstacles": [{**TOP, "name": "\x85"}, {**TOP, "name": "Größe 中\u2028\n: #{'"}]}))
+def test_a_world_that_is_written_is_read_as_the_same(world: World) -> None:
+    text = write_world(world)
+    assert parse_world(text, "mine") == world
+    assert text.encode("utf-8").decode("utf-8") == text
+
+
+@pytest.mark.parametrize("name", shipped_worlds())
+def test_shipped_worlds_are_written_one_line_a_thing(name: str) -> None:
+    world = load_world(name)
+    text = write_world(world)
+    assert parse_world(text, "mine") == world
+    headings = sum(bool(part) for part in (world.obstacles, world.gates))
+    assert len(text.splitlines()) == 1 + headings + len(world.obstacles) + len(world.gates)

@@ -163,6 +163,8 @@ def _summary_text(summary: Summary) -> str:
         f"signs: {signs or 'none'}",
         _way_text(summary),
     ]
+    if summary.course:
+        lines.append(f"course: {summary.course}")
     if summary.trouble:
         lines.append(f"at the end, the robot {summary.trouble}")
     if summary.latency_median_ms is not None and summary.latency_p99_ms is not None:

@@ -7,12 +7,11 @@ from nicegui import ui
 from handsteer.dashboard.node import DashboardNode
 from handsteer.dashboard.page import ASSETS_PATH, PICTURE_PATH, Page, Served
 from handsteer.dashboard.panels.camera import CameraPanel
-from handsteer.dashboard.panels.robot import RobotFoot
 from handsteer.dashboard.panels.signs import SignsPanel
 from handsteer.dashboard.panels.steer import SteerPanel
 from handsteer.dashboard.panels.timing import TimingPanel
 from handsteer.dashboard.panels.velocity import VelocityPanel
-from handsteer.dashboard.scene import WorldView
+from handsteer.dashboard.panels.world import WorldPanel
 from handsteer.dashboard.state import PageState
 
 _WORLD_PERIOD_S = 0.05
@@ -28,15 +27,12 @@ class DrivePage(Page):
             f'<link rel="stylesheet" href="{ASSETS_PATH}/drive.css">'
             f'<link rel="stylesheet" href="{ASSETS_PATH}/steer.css">'
             f'<script src="{ASSETS_PATH}/steer.js" defer></script>'
+            f'<link rel="stylesheet" href="{ASSETS_PATH}/world.css">'
             f'<script src="{ASSETS_PATH}/webcam.js" defer></script>'
         )
         self._cameras = served.cameras
         self._camera = CameraPanel(PICTURE_PATH, served.cameras, self.client.id, self._use_own_camera)
-        with ui.element("section").classes("card viewer world"):
-            with ui.element("div").classes("stage"):
-                self._world = WorldView()
-                ui.label("drag to look around").classes("caption")
-            self._robot = RobotFoot()
+        self._world = WorldPanel(served.robot, self.drives, self._watches)
         with ui.element("div").classes("panels"):
             self._velocity = VelocityPanel()
             self._timing = TimingPanel()
@@ -49,13 +45,17 @@ class DrivePage(Page):
     def show(self, node: DashboardNode, state: PageState) -> None:
         """Show what is new."""
         super().show(node, state)
-        for panel in (self._camera, self._robot, self._velocity, self._timing, self._signs):
+        for panel in (self._camera, self._world, self._velocity, self._timing, self._signs):
             panel.update(state)
         self._steering.update(state, node.seat.place_of(self.client.id, node.clock.now()))
 
     def _update_world(self) -> None:
         if node := self.joined:
-            self._world.update(node.world)
+            self._world.draw(node.world)
+
+    def _watches(self) -> bool:
+        node = self.joined
+        return node is not None and node.seat.place_of(self.client.id, node.clock.now()).role == "watcher"
 
     def _update_plot(self) -> None:
         if node := self.joined:

@@ -20,6 +20,7 @@ from handsteer.dashboard.state import (
     compose,
     place_in_world,
 )
+from handsteer.dashboard.trail import Trail
 from handsteer.errors import TransportError
 from handsteer.messages import (
     CMD_VEL,
@@ -54,6 +55,7 @@ _ODOMETRY_HOLDS_S = 0.5
 
 
 _START = Pose2D(0.0, 0.0, 0.0)
+_NO_TRAIL = Trail()
 
 
 @dataclass(frozen=True)
@@ -65,12 +67,14 @@ class WorldState:
         joints: Joint angles in rad by name.
         markers: The obstacles by namespace and id.
         description: The robot's URDF; empty as long as it is not known.
+        trail: Where the robot has gone while the page was looked at.
     """
 
     robot: Pose2D = _START
     joints: tuple[tuple[str, float], ...] = ()
     markers: tuple[Marker, ...] = ()
     description: str = ""
+    trail: Trail = _NO_TRAIL
 
 
 class DashboardNode(Node):
@@ -106,6 +110,7 @@ class DashboardNode(Node):
         self._frame_counts: deque[tuple[float, float]] = deque(maxlen=_FRAME_COUNTS_KEPT)
         self._odometry: deque[tuple[float, Pose2D]] = deque(maxlen=_ODOMETRY_KEPT)
         self._truth: tuple[Pose2D, Pose2D] | None = None
+        self._path_length_m = 0.0
         self._steering = steering
         self._holder: tuple[str, float] | None = None
         self._stopper: str | None = None
@@ -213,6 +218,7 @@ class DashboardNode(Node):
                 self._count_frames(report)
             if name == "robot":
                 self._take_truth(report, stamp_s)
+                self._notice_restart(report)
 
     def _count_frames(self, report: Report) -> None:
         frames = report.number("frames")
@@ -226,6 +232,11 @@ class DashboardNode(Node):
         if truth is not None and then:
             self._truth = (truth, then[-1])
 
+    def _notice_restart(self, report: Report) -> None:
+        before_m, self._path_length_m = self._path_length_m, report.number("path_length_m") or 0.0
+        if self._path_length_m < before_m:
+            self.world = replace(self.world, trail=self.world.trail.anew())
+
     def _on_command(self, received: Received[Twist | TwistStamped]) -> None:
         twist = twist_in(received.message)
         command = Velocity(twist.linear.x, twist.angular.z)
@@ -238,7 +249,8 @@ class DashboardNode(Node):
         self._odometry_came_s = self.clock.now()
         pose = _pose_of(odometry)
         self._odometry.append((to_seconds(odometry.header.stamp), pose))
-        self.world = replace(self.world, robot=place_in_world(*self._truth, pose) if self._truth else pose)
+        robot = place_in_world(*self._truth, pose) if self._truth else pose
+        self.world = replace(self.world, robot=robot, trail=self.world.trail.to(robot))
 
     def _on_joints(self, received: Received[JointState]) -> None:
         names, positions = received.message.name, received.message.position.tolist()

@@ -12,6 +12,7 @@ from handsteer.dashboard.panels.seat import SeatPanel
 from handsteer.dashboard.settings_store import Settings
 from handsteer.dashboard.state import PageState
 from handsteer.dashboard.watch import WhileWatched
+from handsteer.nodes.robot import RobotNode
 
 PICTURE_PATH = "/camera.mjpg"
 WEBCAM_PATH = "/camera"
@@ -40,12 +41,14 @@ class Served:
         cameras: The graph's camera, which a browser's may stand in for; None where that cannot be.
         topics: Whether steering by hand may go to other topics than the control's.
         settings: The graph's parameters; None where they are in other processes.
+        robot: The node of the robot, whose world people edit; None where it is in another process.
     """
 
     node: WhileWatched[DashboardNode]
     cameras: ChoiceOfCameras | None
     topics: bool = False
     settings: Settings | None = None
+    robot: RobotNode | None = None
 
 
 class Page:

@@ -1,22 +1,26 @@
-"""The 3D view: the robot in the middle, and the world that moves past it.
+"""The 3D view: a world that stands still, the robot that drives in it, and a camera that goes along.
 
-The robot stays where it is and the world is moved instead. So the view follows the robot, and people can still turn
-and zoom it as they like.
+The world does not move, so that people can drag what is in it; the camera moves in the browser, so that they can also
+turn and zoom it as they like (:mod:`handsteer.dashboard.scene_objects`).
 """
 
 import logging
 import math
 from collections import defaultdict
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 
 import numpy as np
 from nicegui import ui
 from nicegui.elements.scene.scene_object3d import Object3D
+from nicegui.events import SceneDragEventArguments
 
 from handsteer.dashboard.geometry import Rotation, about_axis, css_colour, from_quaternion, from_rpy, parents_first
 from handsteer.dashboard.node import WorldState
+from handsteer.dashboard.scene_objects import RobotRig, TrailLine, View
+from handsteer.dashboard.trail import MOST_POINTS, Trail
 from handsteer.errors import WorldError
 from handsteer.messages import Marker
+from handsteer.nodes.world_markers import OBSTACLES
 from handsteer.robots.description import Joint, Vector, Visual, joints, visuals
 
 log = logging.getLogger(__name__)
@@ -27,9 +31,18 @@ _LINES = "#2b3c63"
 _FLOOR_RADIUS_M = 12
 _LINE_WIDTH_M = 0.015
 _FRAMES_PER_S = 20
+_TRAIL = "#7aa7ff"
+_TRAIL_WIDTH_M = 0.05
+_TRAIL_HEIGHT_M = 0.004
+_RING = "#ffd24a"
+_RING_INNER = 0.44
+_RING_SPARE = 1.35
+_SMALLEST_RING_M = 0.3
+_RING_HEIGHT_M = 0.02
 
 # Shapes of visualization_msgs/Marker. Each is made with unit size, and its size is a scale.
 _CUBE, _SPHERE, _CYLINDER = 1, 2, 3
+_ADD = 0
 
 _TURNING = {"continuous", "revolute"}
 
@@ -38,20 +51,37 @@ _Z_TO_Y: Rotation = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]
 
 
 class WorldView:
-    """Shows a :class:`~handsteer.dashboard.node.WorldState`, and then moves only what has moved."""
+    """Shows a :class:`~handsteer.dashboard.node.WorldState`, and then moves only what has moved.
 
-    def __init__(self) -> None:
+    Args:
+        on_pick: Is called with the index of an obstacle that is taken hold of, while the view is editable.
+        on_drop: Is called with its index, and x and y in metres, when it is let go elsewhere.
+    """
+
+    def __init__(
+        self,
+        on_pick: Callable[[int], None] | None = None,
+        on_drop: Callable[[int, float, float], Awaitable[None]] | None = None,
+    ) -> None:
         camera = ui.scene.perspective_camera(fov=45, near=0.05, far=200)
         scene = ui.scene(grid=False, camera=camera, background_color=_SKY, fps=_FRAMES_PER_S, click_events=[])
+        scene.on_drag_start(self._picked).on_drag_end(self._dropped)
+        self._on_pick, self._on_drop = on_pick, on_drop
         self._scene = scene
         self._shown = WorldState()
         self._obstacles: dict[tuple[str, int], tuple[int, Object3D]] = {}
         self._joints: dict[str, tuple[Joint, Object3D]] = {}
+        self._view: View = "orbit"
+        self._editable = False
+        self._chosen: int | None = None
         with scene:
-            with scene.group() as self._world, scene.group() as self._floor:
+            with scene.group() as self._floor:
                 _draw_floor(scene)
-            self._robot = scene.group()
-        scene.move_camera(x=-1.6, y=-0.7, z=1.05, look_at_x=0.6, look_at_y=0.1, look_at_z=0.0, duration=0)
+            self._trail = TrailLine(MOST_POINTS, _TRAIL_WIDTH_M).material(_TRAIL, 0.75, "both").move(z=_TRAIL_HEIGHT_M)
+            self._ring = scene.ring(_RING_INNER, 0.5, 48).material(_RING, 1.0, "both").visible(False)
+            self._robot = RobotRig(scene)
+        # After the scene's own, which puts the camera elsewhere.
+        scene.on("init", lambda: self._robot.look(self._view))
 
     def update(self, world: WorldState) -> None:
         """Show ``world``."""
@@ -61,11 +91,58 @@ class WorldView:
         if world.joints is not shown.joints:
             self._turn_joints(dict(world.joints))
         if world.robot != shown.robot:
-            self._world.move(-world.robot.x, -world.robot.y)
+            self._robot.go(world.robot.x, world.robot.y, world.robot.yaw)
             self._floor.move(round(world.robot.x), round(world.robot.y))
-            self._robot.rotate(0.0, 0.0, world.robot.yaw)
+        if world.trail is not shown.trail:
+            self._draw_trail(shown.trail, world.trail)
         if world.markers is not shown.markers:
             self._show_obstacles(world.markers)
+            self._show_ring()
+
+    def look(self, view: View) -> None:
+        """Look at the robot from where ``view`` begins."""
+        self._view = view
+        self._robot.look(view)
+
+    def edit(self, *, on: bool) -> None:
+        """Let obstacles be dragged, or no longer."""
+        self._editable = on
+        for (namespace, _), (_, shape) in self._obstacles.items():
+            shape.draggable(on and namespace == OBSTACLES)
+        self.choose(None)
+
+    def choose(self, index: int | None) -> None:
+        """Put a ring around an obstacle, or around none."""
+        self._chosen = index
+        self._show_ring()
+
+    def _picked(self, event: SceneDragEventArguments) -> None:
+        index = self._index(event.object_id)
+        if index is not None and self._on_pick:
+            self._on_pick(index)
+
+    async def _dropped(self, event: SceneDragEventArguments) -> None:
+        index = self._index(event.object_id)
+        if index is not None and self._on_drop:
+            await self._on_drop(index, event.x, event.y)
+
+    def _index(self, object_id: object) -> int | None:
+        found = (index for (namespace, index), (_, shape) in self._obstacles.items() if shape.id == object_id)
+        return next(found, None) if self._editable else None
+
+    def _draw_trail(self, shown: Trail, trail: Trail) -> None:
+        if trail.number != shown.number:
+            self._trail.clear()
+            shown = Trail()
+        if points := trail.since(shown):
+            self._trail.extend(points)
+
+    def _show_ring(self) -> None:
+        chosen = [marker for marker in self._shown.markers if (marker.ns, marker.id) == (OBSTACLES, self._chosen)]
+        self._ring.visible(bool(chosen))
+        for marker in chosen:
+            size = max(_RING_SPARE * math.hypot(marker.scale.x, marker.scale.y), _SMALLEST_RING_M)
+            self._ring.move(marker.pose.position.x, marker.pose.position.y, _RING_HEIGHT_M).scale(size, size, 1.0)
 
     def _draw_robot(self, description: str) -> None:
         for link in self._robot.children:
@@ -95,7 +172,9 @@ class WorldView:
                 link.rotate_R((from_rpy(joint.rpy) @ about_axis(joint.axis, angles[name])).round(4).tolist())
 
     def _show_obstacles(self, markers: tuple[Marker, ...]) -> None:
-        known = {(marker.ns, marker.id): marker for marker in markers if marker.type in _SHAPES}
+        known = {
+            (marker.ns, marker.id): marker for marker in markers if marker.type in _SHAPES and marker.action == _ADD
+        }
         for key in self._obstacles.keys() - known.keys():
             self._obstacles.pop(key)[1].delete()
         for key, marker in known.items():
@@ -106,8 +185,9 @@ class WorldView:
     def _make_obstacle(self, key: tuple[str, int], shape: int) -> None:
         if key in self._obstacles:
             self._obstacles.pop(key)[1].delete()
-        with self._scene, self._world:
-            self._obstacles[key] = (shape, _SHAPES[shape](self._scene))
+        with self._scene:
+            made = _SHAPES[shape](self._scene).draggable(self._editable and key[0] == OBSTACLES)
+        self._obstacles[key] = (shape, made)
 
 
 def _draw(scene: ui.scene, visual: Visual) -> None:
@@ -126,14 +206,15 @@ _SHAPES: dict[int, Callable[[ui.scene], Object3D]] = {
 
 def _place(shape: Object3D, marker: Marker) -> None:
     position, size = marker.pose.position, (marker.scale.x, marker.scale.y, marker.scale.z)
-    shape.move(position.x, position.y, position.z)
+    shape.move(round(position.x, 3), round(position.y, 3), round(position.z, 3))
     _resize(shape, size, from_quaternion(marker.pose.orientation), is_cylinder=marker.type == _CYLINDER)
     shape.material(css_colour((marker.color.r, marker.color.g, marker.color.b)), marker.color.a)
 
 
 def _resize(shape: Object3D, size: Vector, turn: Rotation, *, is_cylinder: bool) -> None:
     x, y, z = size
-    shape.scale(*((x, z, y) if is_cylinder else size)).rotate_R((turn @ _Z_TO_Y if is_cylinder else turn).tolist())
+    shape.scale(*((x, z, y) if is_cylinder else size))
+    shape.rotate_R((turn @ _Z_TO_Y if is_cylinder else turn).round(4).tolist())
 
 
 def _draw_floor(scene: ui.scene) -> None:

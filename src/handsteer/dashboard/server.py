@@ -34,6 +34,7 @@ from handsteer.dashboard.webcam import FrameSocket
 from handsteer.errors import DashboardError
 from handsteer.graph import Graph, cmd_vel_topic
 from handsteer.messages import CMD_VEL, Topic
+from handsteer.nodes.robot import RobotNode
 from handsteer.nodes.steering import SteeringNode
 from handsteer.transports.protocol import Transport
 
@@ -61,6 +62,7 @@ class Dashboard:
         cameras: The camera of this process, which a browser's may stand in for; None where it is in another.
         topics: Whether steering by hand may go to other topics than the control's, where other robots may be.
         settings: The parameters of the graph; None where its nodes are in other processes.
+        robot: The robot of this process, whose world people edit; None where it is in another.
 
     Attributes:
         node: Listens and steers for the browsers that show the page.
@@ -80,11 +82,12 @@ class Dashboard:
         cameras: ChoiceOfCameras | None = None,
         topics: bool = False,
         settings: Settings | None = None,
+        robot: RobotNode | None = None,
     ) -> None:
         history = VelocityHistory()  # outlives the node, so that a page that is loaded anew shows it
         self.node = WhileWatched(lambda: DashboardNode(transport, clock, steering, cmd_vel, history))
         self.pictures = WhileWatched(lambda: PictureNode(transport, clock))
-        self.served = Served(self.node, cameras, topics=topics, settings=settings)
+        self.served = Served(self.node, cameras, topics=topics, settings=settings, robot=robot)
         self.webcam = FrameSocket(cameras, self._drives)
         self._config = config
         self._server: uvicorn.Server | None = None
@@ -106,7 +109,14 @@ class Dashboard:
         settings = Settings(lambda: graph.config, graph.reconfigure, settings_file)
         topic = cmd_vel_topic(graph.config)
         wires = (graph.transport, graph.clock, graph.steering)
-        return cls(*wires, graph.config.dashboard, cmd_vel=topic, cameras=graph.cameras, settings=settings)
+        return cls(
+            *wires,
+            graph.config.dashboard,
+            cmd_vel=topic,
+            cameras=graph.cameras,
+            settings=settings,
+            robot=graph.robot,
+        )
 
     def start(self) -> str:
         """Serve the page and return its address once it answers; it holds the token where one is needed.

@@ -10,6 +10,7 @@ from handsteer.config import ControlConfig
 from handsteer.control.effects import told
 from handsteer.control.sign_control import ZERO, Velocity
 from handsteer.nodes.node import ERROR, OK
+from handsteer.robots.course import CourseState, read_course
 from handsteer.robots.protocol import Pose2D
 from handsteer.signs.vocabulary import NONE, SIGNS
 
@@ -121,6 +122,7 @@ class PageState:
         viewers: What the viewers of the page do.
         max_linear_mps: The highest speed that control lets through, either way; None when it does not say.
         max_angular_radps: Likewise, for turning.
+        course: How far it is on the course of its world; None where there is none.
     """
 
     mood: Mood
@@ -147,6 +149,7 @@ class PageState:
     viewers: Viewers
     max_linear_mps: float | None
     max_angular_radps: float | None
+    course: CourseState | None = None
 
 
 def compose(observed: Observed, now_s: float, viewers: Viewers = NOBODY) -> PageState:
@@ -183,6 +186,7 @@ def compose(observed: Observed, now_s: float, viewers: Viewers = NOBODY) -> Page
         viewers=viewers,
         max_linear_mps=control.number("max_linear") or None,
         max_angular_radps=control.number("max_angular") or None,
+        course=read_course(robot.values),
     )
 
 

@@ -2,12 +2,15 @@
 
 import logging
 import math
+from collections.abc import Callable
+from concurrent.futures import Future
 from typing import Any
 
 import numpy as np
 
 from handsteer.clock import Clock
 from handsteer.config import RobotConfig
+from handsteer.errors import WorldError
 from handsteer.messages import (
     CLOCK,
     CMD_VEL,
@@ -39,9 +42,13 @@ from handsteer.messages import (
 )
 from handsteer.nodes.interruption import Interruption
 from handsteer.nodes.node import ERROR, OK, WARN, Node
-from handsteer.nodes.world_markers import world_markers
+from handsteer.nodes.world_changes import WorldChanges
+from handsteer.nodes.world_markers import Touches, gate_strips, world_markers
+from handsteer.robots.course import CourseState, Referee
 from handsteer.robots.diff_drive import Velocity
+from handsteer.robots.editing import Change, InWorld
 from handsteer.robots.protocol import Pose2D, Robot, RobotState
+from handsteer.robots.world import World
 from handsteer.transports.protocol import Received, Transport
 
 log = logging.getLogger(__name__)
@@ -93,12 +100,46 @@ class RobotNode(Node):
         self._joint_states = self.publisher(JOINT_STATES)
         self._clock_out = self.publisher(CLOCK) if config.publish_clock else None
         self._markers = self.publisher(WORLD_MARKERS)
+        self._most_markers = 0
+        self._touches = Touches()
+        self._in_world = robot if isinstance(robot, InWorld) else None
+        self._changes = WorldChanges()
+        self._referee = Referee(self._in_world.world.gates if self._in_world else ())
         self.publisher(ROBOT_DESCRIPTION).publish(String(data=robot.description))
         self._hears_old = False
         self.subscribe(cmd_vel, self._on_command)
         self.every(_PERIOD_S, self._step)
         self.every(_MARKERS_PERIOD_S, self._publish_markers)
         self.every(_DIAGNOSE_PERIOD_S, self._report)
+
+    @property
+    def world(self) -> World | None:
+        """The world that the robot is in, all things where they were at the start; None for a real one's."""
+        return self._in_world.world if self._in_world else None
+
+    @property
+    def course(self) -> CourseState | None:
+        """How far it is on its world's course; None where there is none."""
+        return self._referee.state if self._referee.state.gates else None
+
+    def change_world(self, change: Change) -> Future[None]:
+        """Let the robot stand, and change the world around it; may be called from any thread.
+
+        Args:
+            change: Takes the world and returns the one that shall be; runs on this node's thread.
+
+        Returns:
+            What becomes of it: done, or the :class:`~handsteer.errors.WorldError` that says why nothing has changed.
+        """
+        return self._changes.ask(lambda: self._change_world(change))
+
+    def enter_world(self, world: World) -> Future[None]:
+        """Put the robot to the start of another world; else as :meth:`change_world`."""
+        return self._changes.ask(lambda: self._start_anew(lambda robot: robot.enter(world)))
+
+    def reset(self) -> Future[None]:
+        """Put the robot and all things to where they were at the start; else as :meth:`change_world`."""
+        return self._changes.ask(lambda: self._start_anew(lambda robot: robot.reset()))
 
     def on_stop(self) -> None:
         """Leave it standing."""
@@ -131,7 +172,29 @@ class RobotNode(Node):
         self._command, self._commanded_s = velocity, self.clock.now()
         self._robot.command(velocity.linear_mps, velocity.angular_radps)
 
+    def _editable(self) -> InWorld:
+        if self._in_world is None:
+            raise WorldError("a real robot has no world that could be changed, and cannot be put to its start")
+        return self._in_world
+
+    def _change_world(self, change: Change) -> None:
+        robot = self._editable()
+        gates, world = robot.world.gates, change(robot.world)
+        self._tell(Velocity())
+        robot.change(world)
+        if world.gates != gates:
+            self._referee = Referee(world.gates)
+
+    def _start_anew(self, begin: Callable[[InWorld], None]) -> None:
+        robot = self._editable()
+        self._tell(Velocity())
+        begin(robot)
+        self._referee = Referee(robot.world.gates)
+        self.state = robot.step(0.0)
+        self.path_length_m = 0.0
+
     def _step(self) -> None:
+        self._changes.make()
         now = self.clock.now()
         elapsed_s, self._last_step_s = now - self._last_step_s, now
         self._notice_interruption(now)
@@ -139,6 +202,7 @@ class RobotNode(Node):
         self.state = self._robot.step(min(elapsed_s, _LONGEST_STEP_S))
         self.path_length_m += _distance_m(before, self.state)
         self.was_located |= self.state.located
+        self._referee.step(self.state.truth, self.state.collisions or 0, self.state.time_s)
         stamp = self.clock.stamp(now)
         header = Header(stamp=stamp, frame_id=self._config.odom_frame_id)
         base = self._config.base_frame_id
@@ -150,9 +214,16 @@ class RobotNode(Node):
         self._joint_states.publish(_joint_state(Header(stamp=stamp, frame_id=""), self.state))
 
     def _publish_markers(self) -> None:
+        now = self.clock.now()
+        self._touches.note(self.state.contacts, now)
         if self._markers.wanted:
-            header = Header(stamp=self.clock.stamp(self.clock.now()), frame_id=self._config.odom_frame_id)
-            self._markers.publish(world_markers(header, self._robot.obstacles()))
+            header = Header(stamp=self.clock.stamp(now), frame_id=self._config.odom_frame_id)
+            strips = gate_strips(self.world.gates, self._referee.state) if self.world else []
+            self._markers.publish(
+                world_markers(header, self._robot.obstacles(), strips, self._touches.shown(now), self._most_markers)
+            )
+            # Whoever draws them keeps each until it is told otherwise.
+            self._most_markers = max(self._most_markers, len(self._robot.obstacles()))
 
     def _report(self) -> None:
         state = self.state
@@ -163,6 +234,7 @@ class RobotNode(Node):
             **({} if state.collisions is None else {"collisions": state.collisions}),
             path_length_m=f"{self.path_length_m:.2f}",
             truth=f"{state.truth.x:.3f} {state.truth.y:.3f} {state.truth.yaw:.3f}",
+            **({} if self.course is None else self.course.as_values()),
         )
 
     def _condition(self) -> tuple[int, str]:

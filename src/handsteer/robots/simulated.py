@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from handsteer.config import RobotConfig
 from handsteer.errors import WorldError
 from handsteer.robots import diff_drive
+from handsteer.robots.contacts import Contacts
 from handsteer.robots.description import robot_description
 from handsteer.robots.diff_drive import DriveState, Velocity
 from handsteer.robots.physics import ROBOT_JOINT, TIMESTEP_S, WHEEL_JOINTS, compile_model, thing_name
@@ -44,21 +45,16 @@ class SimulatedRobot:
         Raises:
             WorldError: The world cannot be read, or an obstacle in it overlaps the robot.
         """
-        self.world = load_world(config.world) if world is None else world
         self.description = robot_description()
-        self.model = compile_model(self.description, self.world)
-        self.data = mujoco.MjData(self.model)
         self._config = config
-        joints = [self.model.joint(name) for name in WHEEL_JOINTS]
-        self._wheel_angles = np.array([joint.qposadr[0] for joint in joints])
-        self._wheel_speeds = np.array([joint.dofadr[0] for joint in joints])
-        self._pose_at = int(self.model.joint(ROBOT_JOINT).qposadr[0])
-        self._thing_of_geom, self._is_robot_geom = _tell_geoms_apart(self.model, self.world)
         self._asked_s = 0.0
         self._steps = 0
         self._command: Velocity | None = None
+        world = load_world(config.world) if world is None else world
+        self._take(world, compile_model(self.description, world))
         self.reset()
-        self._refuse_overlap(config.world)
+        if touched := self._contacts.touched(self.data):
+            raise WorldError(f"world {config.world}: {_at_start(touched[0])}")
 
     def command(self, linear_mps: float, angular_radps: float) -> None:
         """Ask for a velocity in m/s and rad/s; see :func:`handsteer.robots.diff_drive.step` for what becomes of it."""
@@ -79,6 +75,46 @@ class SimulatedRobot:
             for index, thing in enumerate(self.world.obstacles)
         ]
 
+    def enter(self, world: World) -> None:
+        """Stand at the start of another world; as :meth:`reset`.
+
+        Raises:
+            WorldError: MuJoCo refuses it, or an obstacle in it overlaps the robot at the start; all is as before.
+        """
+        model = compile_model(self.description, world)
+        if touched := _touched_at_start(model, world):
+            raise WorldError(_at_start(touched[0]))
+        self._take(world, model)
+        self.reset()
+
+    def change(self, world: World) -> None:
+        """Stand still where it is, with ``world`` around it instead.
+
+        Odometry, wheel angles and collisions go on. Things that are the same in both worlds stay where they are, also
+        those that were pushed.
+
+        Raises:
+            WorldError: MuJoCo refuses it, or something that is new in it overlaps the robot or the place where it
+                starts; all is as before.
+        """
+        model = compile_model(self.description, world)
+        before = {thing.name: (index, thing) for index, thing in enumerate(self.world.obstacles)}
+        same = {
+            index: before[thing.name][0]
+            for index, thing in enumerate(world.obstacles)
+            if thing.name in before and before[thing.name][1] == thing
+        }
+        new = {thing.name for index, thing in enumerate(world.obstacles) if index not in same}
+        if touched := new.intersection(_touched_at_start(model, world)):
+            raise WorldError(_at_start(min(touched)))
+        data = self._carried_over(model, {now: then for now, then in same.items() if world.obstacles[now].movable})
+        if touched := new.intersection(Contacts(model, world).touched(data)):
+            raise WorldError(f"{min(touched)!r} would overlap the robot: keep 0.35 m around it free")
+        self._take(world, model)
+        self.data = data
+        self._command = None
+        self._stop()
+
     def reset(self) -> None:
         """Stand still at the start again, obstacles too; odometry and collisions are 0 again, the time goes on."""
         mujoco.mj_resetData(self.model, self.data)
@@ -93,6 +129,31 @@ class SimulatedRobot:
         """Forget the last command, so that it stands at once; may be called twice."""
         self._command = None
         self._stop()
+
+    def _take(self, world: World, model: mujoco.MjModel) -> None:
+        self.world = world
+        self.model = model
+        self.data = mujoco.MjData(model)
+        joints = [model.joint(name) for name in WHEEL_JOINTS]
+        self._wheel_angles = np.array([joint.qposadr[0] for joint in joints])
+        self._wheel_speeds = np.array([joint.dofadr[0] for joint in joints])
+        self._contacts = Contacts(model, world)
+        self._pose_at = int(model.joint(ROBOT_JOINT).qposadr[0])
+
+    def _carried_over(self, model: mujoco.MjModel, same: dict[int, int]) -> mujoco.MjData:
+        """Return the state of ``model`` at rest, with the robot where it is now.
+
+        Args:
+            model: The new one.
+            same: What also stays where it is: index in the new world to index in the present one; movable.
+        """
+        data = mujoco.MjData(model)
+        joints = {name: name for name in (ROBOT_JOINT, *WHEEL_JOINTS)}
+        joints |= {thing_name(now): thing_name(then) for now, then in same.items()}
+        for now, then in joints.items():
+            data.joint(now).qpos[:] = self.data.joint(then).qpos
+        mujoco.mj_forward(model, data)
+        return data
 
     def _step_once(self) -> None:
         self._drive = diff_drive.step(self._drive, self._command, TIMESTEP_S, self._config)
@@ -134,14 +195,8 @@ class SimulatedRobot:
         x, y, _, qw, qx, qy, qz = self.data.qpos[self._pose_at : self._pose_at + 7].tolist()
         return Pose2D(x, y, float(np.arctan2(2 * (qw * qz + qx * qy), 1 - 2 * (qy * qy + qz * qz))))
 
-    def _touched(self) -> list[str]:
-        """Return the names of the obstacles that the robot touches, in the order of the world."""
-        geoms = self.data.contact.geom
-        touched = self._thing_of_geom[geoms[:, ::-1]][self._is_robot_geom[geoms]]
-        return [self.world.obstacles[index].name for index in sorted(set(touched.tolist())) if index >= 0]
-
     def _count_collisions(self) -> None:
-        for name in self._touched():
+        for name in self._contacts.touched(self.data):
             if self._touched_until.get(name, 0) <= self._steps:
                 self._collisions += 1
             self._touched_until[name] = self._steps + round(_TOUCH_S / TIMESTEP_S)
@@ -155,13 +210,6 @@ class SimulatedRobot:
             (x, y, z), (qw, qx, qy, qz) = geom.pos.tolist(), geom.quat.tolist()
         return (x, y, z), (qx, qy, qz, qw)
 
-    def _refuse_overlap(self, name: str) -> None:
-        if touched := self._touched():
-            raise WorldError(
-                f"world {name}: position of obstacle {touched[0]!r} overlaps the robot, which starts at 0, 0; "
-                "keep 0.35 m around it free"
-            )
-
 
 def _sides(wheels: NDArray[np.float64]) -> tuple[float, float]:
     """Return the means of the left and the right wheels; ``wheels`` is (4,), as WHEEL_JOINTS."""
@@ -169,11 +217,11 @@ def _sides(wheels: NDArray[np.float64]) -> tuple[float, float]:
     return (front_left + rear_left) / 2, (front_right + rear_right) / 2
 
 
-def _tell_geoms_apart(model: mujoco.MjModel, world: World) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-    """Return for each geom the index of the obstacle that it is, or -1; and whether it is a part of the robot."""
-    thing_of_geom = np.full(model.ngeom, -1)
-    for index in range(len(world.obstacles)):
-        thing_of_geom[model.geom(thing_name(index)).id] = index
-    robot = model.joint(ROBOT_JOINT).id
-    is_robot_geom = model.body_rootid[model.geom_bodyid] == model.jnt_bodyid[robot]
-    return thing_of_geom, is_robot_geom
+def _at_start(name: str) -> str:
+    return f"position of obstacle {name!r} overlaps the robot, which starts at 0, 0; keep 0.35 m around it free"
+
+
+def _touched_at_start(model: mujoco.MjModel, world: World) -> list[str]:
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    return Contacts(model, world).touched(data)

@@ -1,4 +1,4 @@
-"""The world that the simulated robot drives in, as a YAML file: a floor, and things on it that are fixed or movable.
+"""The world that the simulated robot drives in, as a YAML file: a floor, things on it, and the gates of a course.
 
 ::
 
@@ -7,6 +7,8 @@
       - {name: wall, shape: box, size: [0.2, 4, 0.6], position: [4, 0], yaw: 0.3}
       - {name: barrel, shape: cylinder, radius: 0.2, height: 0.5, position: [2, 1], movable: true, mass: 2}
       - {name: ball, shape: sphere, radius: 0.15, position: [2, -1], movable: true}
+    gates:
+      - {name: start, left: [1, 0.5], right: [1, -0.5]}
 
 The robot starts at the origin, facing +x. Metres, kilograms and radians; x forward, y left (REP 103).
 """
@@ -23,6 +25,8 @@ from handsteer.errors import WorldError
 from handsteer.robots.protocol import Shape
 
 _SHIPPED = Path(__file__).parent / "worlds"
+
+_NARROWEST_GATE_M = 0.1
 
 Metres = Annotated[float, Field(ge=0.005, le=100)]
 Coordinate = Annotated[float, Field(ge=-1000, le=1000)]
@@ -93,17 +97,35 @@ class Sphere(_Thing):
 Thing = Annotated[Box | Cylinder | Sphere, Field(discriminator="shape")]
 
 
+class Gate(Section):
+    """A line on the floor to drive across, forward as its ends say; the posts beside it, if any, are obstacles."""
+
+    name: str = Field(min_length=1, max_length=60, description="What it is called")
+    left: tuple[Coordinate, Coordinate] = Field(description="x and y of the end that the robot has on its left [m]")
+    right: tuple[Coordinate, Coordinate] = Field(description="x and y of the other end [m]")
+
+    @model_validator(mode="after")
+    def _has_a_width(self) -> "Gate":
+        if math.dist(self.left, self.right) < _NARROWEST_GATE_M:
+            raise ValueError(f"left and right should be at least {_NARROWEST_GATE_M} m apart")
+        return self
+
+
 class World(Section):
-    """A floor and what stands on it."""
+    """A floor, what stands on it, and the gates of a course in the order in which they are to be passed."""
 
     floor: Floor = Floor()
     obstacles: tuple[Thing, ...] = ()
+    gates: tuple[Gate, ...] = Field((), max_length=100)
 
     @model_validator(mode="after")
     def _names_differ(self) -> "World":
-        names = [thing.name for thing in self.obstacles]
-        if twice := sorted({name for name in names if names.count(name) > 1}):
-            raise ValueError(f"two are called {twice[0]!r}; every obstacle needs a name of its own")
+        for kind, named in (("obstacle", self.obstacles), ("gate", self.gates)):
+            seen: set[str] = set()
+            for thing in named:
+                if thing.name in seen:
+                    raise ValueError(f"two are called {thing.name!r}; every {kind} needs a name of its own")
+                seen.add(thing.name)
         return self
 
 
@@ -134,25 +156,56 @@ def read_world(path: Path) -> World:
     Raises:
         WorldError: As :func:`load_world`.
     """
-    values = _read_yaml(path)
     try:
-        return World.model_validate({} if values is None else values)
-    except ValidationError as error:
-        raise WorldError(f"{path}: {_describe(error, values)}") from None
-
-
-def _read_yaml(path: Path) -> Any:
-    try:
-        return yaml.safe_load(path.read_text(encoding="utf-8"))
+        text = path.read_text(encoding="utf-8")
     except OSError as error:
         raise WorldError(f"cannot read the world {path}: {error.strerror}") from None
+    except ValueError:
+        raise WorldError(f"{path}: not valid YAML") from None
+    return parse_world(text, str(path))
+
+
+def parse_world(text: str, source: str) -> World:
+    """Return the world that is written in ``text``.
+
+    Args:
+        text: YAML.
+        source: What errors call it, such as the name of a file.
+
+    Raises:
+        WorldError: It is no YAML, or a field in it is wrong; the message names ``source`` and the field.
+    """
+    try:
+        values = yaml.safe_load(text)
     except (yaml.YAMLError, ValueError, RecursionError) as error:
         line = getattr(getattr(error, "problem_mark", None), "line", None)
         at = f", line {line + 1}" if line is not None else ""
-        raise WorldError(f"{path}{at}: not valid YAML") from None
+        raise WorldError(f"{source}{at}: not valid YAML") from None
+    try:
+        return World.model_validate({} if values is None else values)
+    except ValidationError as error:
+        raise WorldError(f"{source}: {describe_problem(error, values)}") from None
 
 
-def _describe(error: ValidationError, values: Any) -> str:
+def write_world(world: World) -> str:
+    """Return ``world`` as YAML that :func:`parse_world` turns into the same world: one line a thing."""
+    parts = world.model_dump(exclude_defaults=True)
+    lines = [f"floor: {_one_line(world.floor.model_dump())}"]
+    for section in ("obstacles", "gates"):
+        if things := parts.get(section):
+            lines += [f"{section}:", *(f"  - {_one_line(thing)}" for thing in things)]
+    return "\n".join(lines) + "\n"
+
+
+def _one_line(values: dict[str, Any]) -> str:
+    # What is not printable is escaped: some such characters break lines, and would come back as a space.
+    readable = all(value.isprintable() for value in values.values() if isinstance(value, str))
+    return yaml.safe_dump(
+        values, default_flow_style=True, sort_keys=False, allow_unicode=readable, width=math.inf
+    ).strip()
+
+
+def describe_problem(error: ValidationError, values: Any) -> str:
     """Return the first problem in one line: where, what is wrong, what is allowed."""
     problem = error.errors(include_url=False)[0]
     where = _where(problem["loc"], values)
@@ -172,12 +225,12 @@ def _describe(error: ValidationError, values: Any) -> str:
 def _where(location: tuple[int | str, ...], values: Any) -> str:
     """Return a path such as ``obstacles[2] 'ball' radius``."""
     match location:
-        case ("obstacles", int(index), *rest):
-            thing = values["obstacles"][index]
+        case ("obstacles" | "gates" as section, int(index), *rest):
+            thing = values[section][index]
             name = thing.get("name") if isinstance(thing, dict) else None
             shapes: tuple[Shape, ...] = ("box", "cylinder", "sphere")
             fields = [str(part) for part in rest if part not in shapes]
-            return " ".join([f"obstacles[{index}]", *([repr(name)] if name else []), *(".".join(fields),)]).rstrip()
+            return " ".join([f"{section}[{index}]", *([repr(name)] if name else []), *(".".join(fields),)]).rstrip()
         case ():
             return "obstacles" if isinstance(values, dict) else "world"
         case _:

@@ -1,0 +1,231 @@
+"""The editor of the world: puts things in, changes them, takes them out, loads and saves."""
+
+import asyncio
+import math
+from collections.abc import Callable
+from concurrent.futures import Future
+from typing import Any, get_args
+
+from nicegui import ui
+
+from handsteer.dashboard.panels.elements import box, button, switch, tag, text
+from handsteer.dashboard.panels.thing_form import ThingForm
+from handsteer.dashboard.scene import WorldView
+from handsteer.errors import WorldError
+from handsteer.nodes.robot import RobotNode
+from handsteer.robots.editing import MOST_OBSTACLES, Change, add, edit, remove
+from handsteer.robots.protocol import Shape
+from handsteer.robots.world import Thing, World, load_world, parse_world, shipped_worlds, write_world
+
+LARGEST_FILE_BYTES = 64 * 1024
+"""A world file that is opened from a browser has at most so many; 200 things need half of it."""
+
+_PATIENCE_S = 5.0
+_STILL_M = 0.02
+
+_READ_FILE = f"""async (event) => {{
+    const file = event.target.files[0];
+    event.target.value = "";
+    if (file) emit({{ name: file.name, text: file.size > {LARGEST_FILE_BYTES} ? null : await file.text() }});
+}}"""
+
+
+class WorldEditor:
+    """Changes the world of a simulated robot, for whoever drives.
+
+    Args:
+        robot: The node of the robot, if it is in this process.
+        may: Returns whether this viewer drives.
+        view: Shows the world.
+    """
+
+    def __init__(self, robot: RobotNode | None, may: Callable[[], bool], view: WorldView) -> None:
+        self._robot = robot
+        self._may = may
+        self._view = view
+        self._chosen: str | None = None
+        self.is_open = False
+        with box("editor off") as self._box:
+            with box("row"):
+                tag("h3", "", "Add")
+                for shape in get_args(Shape):
+                    button(shape.capitalize(), f'aria-label="Add a {shape}"').on(
+                        "click", lambda shape=shape: self._add(shape)
+                    )
+            with box("row"):
+                tag("h3", "", "Thing")
+                self._things = ui.select([], on_change=self._on_choice).props(
+                    'outlined dense options-dense aria-label="Which thing to change"'
+                )
+                self._delete = button("Delete", 'aria-label="Delete the chosen thing"').on("click", self._remove)
+            self._form = ThingForm(self._edit)
+            with box("row"):
+                tag("h3", "", "World")
+                self._worlds = ui.select(shipped_worlds(), value=shipped_worlds()[0]).props(
+                    'outlined dense options-dense aria-label="Which world to load"'
+                )
+                button("Load", 'aria-label="Load the chosen world"').on("click", self._load)
+                file = ui.element("input").props(
+                    'type="file" accept=".yaml,.yml" aria-label="World file" tabindex="-1"'
+                )
+                file.classes("file").on("change", lambda event: self._open_file(event.args), js_handler=_READ_FILE)
+                button("Open file", "").on("click", js_handler=f"() => getHtmlElement({file.id}).click()")
+                button("Save file", "").on("click", self._save)
+        self._message = text("message", "").props('role="status"')
+
+    def open(self) -> bool:
+        """Begin to edit; return False, and say why, if that cannot be."""
+        if self._world() is None or not self._allowed():
+            return False
+        self._set_open(on=True)
+        self._say("Drag things where you want them, or choose one and change its figures.")
+        self._refresh()
+        return True
+
+    def close(self, why: str) -> None:
+        """Edit no more, and say ``why``."""
+        self._set_open(on=False)
+        self._say(why)
+
+    def pick(self, index: int) -> None:
+        """Choose the obstacle with this index."""
+        world = self._world()
+        if world and index < len(world.obstacles):
+            self._things.set_value(world.obstacles[index].name)
+
+    async def drop(self, index: int, x: float, y: float) -> None:
+        """Put the obstacle with this index to x and y in metres, if that is not where it is."""
+        world = self._world()
+        # A browser may send anything.
+        is_place = all(isinstance(value, int | float) and math.isfinite(value) for value in (x, y))
+        if world is None or index >= len(world.obstacles) or not is_place:
+            return
+        thing = world.obstacles[index]
+        if math.dist(thing.position, (x, y)) > _STILL_M:
+            await self._edit(thing.name, {"position": (round(x, 2), round(y, 2))})
+
+    async def restart(self) -> None:
+        """Put the robot and all things back to the start."""
+        if self._world() is not None and self._robot and self._allowed():
+            await self._wait_for(self._robot.reset(), "The robot and all things are where they started.")
+
+    def _set_open(self, *, on: bool) -> None:
+        self.is_open = on
+        switch(self._box, "off", on=not on)
+        self._view.edit(on=on)
+
+    def _world(self) -> World | None:
+        """Return the robot's world; if there is none, say so."""
+        world = self._robot.world if self._robot else None
+        if self._robot is None:
+            self._say("The robot runs in another process; its world can be edited on the page of `handsteer run` only.")
+        elif world is None:
+            self._say("This is a real robot: its world cannot be edited, nor can it be put back by a button.")
+        return world
+
+    def _allowed(self) -> bool:
+        if self._may():
+            return True
+        self._say("Somebody else drives: ask to drive before you change the world.")
+        return False
+
+    async def _add(self, shape: Shape) -> None:
+        if (robot := self._robot) is None or (before := self._world()) is None:
+            return
+        if await self._change(lambda world: add(world, shape, robot.state.truth), ""):
+            known = {thing.name for thing in before.obstacles}
+            world = robot.world or before
+            new = [thing.name for thing in world.obstacles if thing.name not in known]
+            self._things.set_value(new[-1] if new else None)
+            self._say(f"Added {new[-1]}." if new else "")
+
+    async def _edit(self, name: str, fields: dict[str, Any]) -> None:
+        await self._change(lambda world: edit(world, name, fields), "")
+
+    async def _remove(self) -> None:
+        if name := self._chosen:
+            await self._change(lambda world: remove(world, name), f"Deleted {name}.")
+
+    async def _load(self) -> None:
+        await self._enter(load_world(self._worlds.value), self._worlds.value)
+
+    async def _open_file(self, sent: object) -> None:
+        if not self._allowed():
+            return
+        try:
+            name, words = read_file(sent)
+            world = await asyncio.to_thread(parse_world, words, name)
+            if len(world.obstacles) > MOST_OBSTACLES:
+                raise WorldError(f"{name}: has {len(world.obstacles)} things; the page takes {MOST_OBSTACLES} at most")
+        except WorldError as error:
+            self._say(str(error))
+            return
+        await self._enter(world, name)
+
+    def _save(self) -> None:
+        if world := self._world():
+            ui.download.content(write_world(world), "world.yaml", "application/yaml")
+
+    async def _enter(self, world: World, name: str) -> None:
+        if self._robot and self._allowed():
+            await self._wait_for(self._robot.enter_world(world), f"Loaded {name}; the robot is at the start.")
+
+    async def _change(self, change: Change, done: str) -> bool:
+        return bool(self._robot and self._allowed() and await self._wait_for(self._robot.change_world(change), done))
+
+    async def _wait_for(self, change: Future[None], done: str) -> bool:
+        """Return whether ``change`` was made; say ``done``, or why it was not."""
+        try:
+            await asyncio.wait_for(asyncio.wrap_future(change), _PATIENCE_S)
+        except WorldError as error:
+            self._say(str(error))
+            return False
+        except TimeoutError:
+            self._say("The robot does not answer; nothing has changed.")
+            return False
+        finally:
+            self._refresh()
+        self._say(done)
+        return True
+
+    def _refresh(self) -> None:
+        world = self._robot.world if self._robot else None
+        names = [thing.name for thing in world.obstacles] if world else []
+        value = self._chosen if self._chosen in names else None
+        if names != self._things.options or value != self._things.value:
+            self._things.set_options(names, value=value)
+        self._show_choice()
+
+    def _on_choice(self) -> None:
+        self._chosen = self._things.value
+        self._show_choice()
+
+    def _show_choice(self) -> None:
+        world = self._robot.world if self._robot else None
+        things: list[tuple[int, Thing]] = [
+            (index, thing) for index, thing in enumerate(world.obstacles if world else ()) if thing.name == self._chosen
+        ]
+        index, thing = things[0] if things else (None, None)
+        self._form.show(thing)
+        switch(self._delete, "hidden", on=thing is None)
+        if self.is_open:
+            self._view.choose(index)
+
+    def _say(self, words: str) -> None:
+        self._message.set_text(words)
+
+
+def read_file(sent: object) -> tuple[str, str]:
+    """Return name and text of a file as a browser sent it.
+
+    Raises:
+        WorldError: It is too large, or none.
+    """
+    values = sent if isinstance(sent, dict) else {}
+    name, words = values.get("name"), values.get("text")
+    if not isinstance(name, str) or not isinstance(words, str | None):
+        raise WorldError("that was no file")
+    name = name[:60]
+    if words is None or len(words.encode(errors="replace")) > LARGEST_FILE_BYTES:
+        raise WorldError(f"{name}: is larger than {LARGEST_FILE_BYTES // 1024} kB, which no world should be")
+    return name, words

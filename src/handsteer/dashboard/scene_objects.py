@@ -1,0 +1,59 @@
+"""What the 3D view has beyond NiceGUI's objects: the robot with its camera, and its way. Each has a small script."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Literal
+
+from nicegui import ui
+from nicegui.elements.scene.scene_object3d import Object3D
+
+View = Literal["orbit", "follow", "top"]
+"""``orbit`` goes along with the robot; ``follow`` also turns with it; ``top`` looks down on it, north (+y) up."""
+
+_STATIC = Path(__file__).parent / "static"
+
+
+class RobotRig(Object3D, component=_STATIC / "robot-rig.js"):
+    """The robot, which takes the camera along with it.
+
+    Args:
+        scene: Is that of the camera.
+    """
+
+    def __init__(self, scene: ui.scene) -> None:
+        super().__init__(scene.id, "orbit", 0.0, 0.0, 0.0)
+
+    def go(self, x: float, y: float, yaw: float) -> None:
+        """Stand at x and y in metres, turned by ``yaw`` in rad."""
+        pose = [round(x, 3), round(y, 3), round(yaw, 3)]
+        if pose != self.args[2:]:
+            self.args[2:] = pose
+            self.run_method("go", *pose)
+
+    def look(self, view: View) -> None:
+        """Let the camera stand where ``view`` begins."""
+        self.args[1] = view
+        self.run_method("look", view)
+
+
+class TrailLine(Object3D, component=_STATIC / "trail.js"):
+    """The robot's way.
+
+    Args:
+        most: How many points there are at most; older ones go.
+        width_m: Width in metres.
+    """
+
+    def __init__(self, most: int, width_m: float) -> None:
+        super().__init__([], most, width_m)
+
+    def extend(self, points: Sequence[tuple[float, float]]) -> None:
+        """Let it go on through ``points``, x and y in metres."""
+        new = [[round(x, 2), round(y, 2)] for x, y in points]
+        self.args[0] = [*self.args[0], *new][-self.args[1] :]
+        self.run_method("extend", new)
+
+    def clear(self) -> None:
+        """Let it begin anew."""
+        self.args[0] = []
+        self.run_method("clear")

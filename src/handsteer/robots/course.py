@@ -1,0 +1,171 @@
+"""The referee of a course: counts gates, bumps and time as the robot drives. Pure, no clock and no simulator.
+
+The first gate is the start line, the last one the finish. The stopwatch runs from the one to the other. A gate counts
+when the robot's centre crosses the line between its ends forward, which is with its left end on the left. Gates are
+passed in order: whoever passes a later one has missed those between. Backwards, or a second time, counts nothing.
+
+The score is seconds, the fewer the better: the time, :data:`BUMP_S` for each bump, :data:`MISS_S` for each missed gate.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import Any, Literal
+
+from handsteer.robots.protocol import Pose2D
+from handsteer.robots.world import Gate
+
+BUMP_S = 2.0
+"""What each bump costs."""
+
+MISS_S = 10.0
+"""What each missed gate costs."""
+
+LEAP_M = 0.5
+"""No robot goes so far between two looks at it: it was put elsewhere, and has crossed nothing."""
+
+Phase = Literal["ready", "running", "finished"]
+_PHASES: dict[str, Phase] = {"ready": "ready", "running": "running", "finished": "finished"}
+
+
+@dataclass(frozen=True)
+class CourseState:
+    """How far the robot is on a course.
+
+    Attributes:
+        gates: How many gates the course has.
+        next_gate: Index of the gate to pass next; ``gates`` once the course is finished.
+        missed: Indices of the gates that were left out.
+        bumps: How often it has begun to touch an obstacle since the start.
+        time_s: What the stopwatch shows.
+        phase: ``ready`` before the start gate, then ``running``, ``finished`` behind the last one.
+    """
+
+    gates: int
+    next_gate: int = 0
+    missed: frozenset[int] = frozenset()
+    bumps: int = 0
+    time_s: float = 0.0
+    phase: Phase = "ready"
+
+    @property
+    def passed(self) -> int:
+        """How many gates were passed."""
+        return self.next_gate - len(self.missed)
+
+    @property
+    def score_s(self) -> float:
+        """The score so far, in seconds."""
+        return self.time_s + BUMP_S * self.bumps + MISS_S * len(self.missed)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return it as plain values, with the score, for JSON."""
+        return {**asdict(self), "missed": sorted(self.missed), "passed": self.passed, "score_s": self.score_s}
+
+    def __str__(self) -> str:
+        """Return it in words, as ``gates 8/8, missed 1, bumps 2, 0:23.4, score 37.4 s``."""
+        missed = f", missed {len(self.missed)}" if self.missed else ""
+        score = f", score {self.score_s:.1f} s" if self.phase == "finished" else ""
+        return f"gates {self.passed}/{self.gates}{missed}, bumps {self.bumps}, {stopwatch(self.time_s)}{score}"
+
+    def as_values(self) -> dict[str, str]:
+        """Return it as named values, for diagnostics; :func:`read_course` reads them."""
+        return {
+            "course_gates": str(self.gates),
+            "course_next": str(self.next_gate),
+            "course_missed": " ".join(str(index) for index in sorted(self.missed)),
+            "course_bumps": str(self.bumps),
+            "course_time_s": f"{self.time_s:.2f}",
+            "course_phase": self.phase,
+        }
+
+
+def read_course(values: Mapping[str, str]) -> CourseState | None:
+    """Return what :meth:`CourseState.as_values` has written; None where that is not there, or is something else."""
+    try:
+        gates, next_gate, bumps = (int(values[f"course_{name}"]) for name in ("gates", "next", "bumps"))
+        missed = frozenset(int(index) for index in values["course_missed"].split())
+        time_s = float(values["course_time_s"])
+    except (KeyError, ValueError):
+        return None
+    phase = _PHASES.get(values.get("course_phase", ""))
+    return CourseState(gates, next_gate, missed, bumps, time_s, phase) if phase and math.isfinite(time_s) else None
+
+
+def stopwatch(time_s: float) -> str:
+    """Return seconds as minutes, seconds and tenths, as ``1:05.3``; what is not a whole tenth is cut off."""
+    tenths = int(time_s * 10 + 1e-6)
+    return f"{tenths // 600}:{tenths // 10 % 60:02d}.{tenths % 10}"
+
+
+class Referee:
+    """Watches one robot on one course.
+
+    Args:
+        gates: In the order in which they are to be passed.
+
+    Attributes:
+        state: What it has seen so far.
+    """
+
+    def __init__(self, gates: Sequence[Gate]) -> None:
+        self._gates = tuple(gates)
+        self.state = CourseState(len(self._gates))
+        self._pose: Pose2D | None = None
+        self._collisions = 0
+        self._time_s = 0.0
+
+    def restart(self) -> None:
+        """Forget everything: the robot stands before the start again."""
+        self.state = CourseState(len(self._gates))
+        self._pose = None
+
+    def step(self, pose: Pose2D, collisions: int, time_s: float) -> CourseState:
+        """Take the robot's next pose and return what has become of the course.
+
+        Args:
+            pose: Where the robot is in the world.
+            collisions: How often it has begun to touch an obstacle, counted from any moment on.
+            time_s: The robot's own time; it never goes back.
+        """
+        before, self._pose = self._pose, pose
+        bumps, self._collisions = collisions - self._collisions, collisions
+        elapsed_s, self._time_s = time_s - self._time_s, time_s
+        if before is None or self.state.phase == "finished":
+            return self.state
+        if self.state.phase == "running":
+            state = self.state
+            self.state = replace(state, time_s=state.time_s + elapsed_s, bumps=state.bumps + max(0, bumps))
+        self._pass_gates(before, pose)
+        return self.state
+
+    def _pass_gates(self, before: Pose2D, now: Pose2D) -> None:
+        # The start cannot be missed: nothing counts before it.
+        end = len(self._gates) if self.state.phase == "running" else min(1, len(self._gates))
+        for index in range(self.state.next_gate, end):
+            if crosses(self._gates[index], before, now):
+                missed = self.state.missed.union(range(self.state.next_gate, index))
+                phase: Phase = "finished" if index + 1 == len(self._gates) else "running"
+                self.state = replace(self.state, next_gate=index + 1, missed=missed, phase=phase)
+
+
+def crosses(gate: Gate, before: Pose2D, now: Pose2D) -> bool:
+    """Return whether the way from ``before`` to ``now`` crosses ``gate`` forward.
+
+    A pose on the line counts as behind it, so that a way in several pieces crosses once.
+    """
+    if math.hypot(now.x - before.x, now.y - before.y) > LEAP_M:
+        return False
+    (left_x, left_y), (right_x, right_y) = gate.left, gate.right
+    along_x, along_y = right_x - left_x, right_y - left_y
+
+    def beyond(pose: Pose2D) -> float:
+        return along_x * (pose.y - left_y) - along_y * (pose.x - left_x)
+
+    start, end = beyond(before), beyond(now)
+    if not start < 0 <= end:
+        return False
+    part = start / (start - end)
+    x, y = before.x + part * (now.x - before.x), before.y + part * (now.y - before.y)
+    share = ((x - left_x) * along_x + (y - left_y) * along_y) / (along_x**2 + along_y**2)
+    return 0 <= share <= 1

@@ -1,0 +1,144 @@
+"""Changes of a world, one thing at a time: pure functions from a world to a world."""
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Any, Protocol, runtime_checkable
+
+from pydantic import ValidationError
+
+from handsteer.errors import WorldError
+from handsteer.robots.protocol import Pose2D, Robot, Shape
+from handsteer.robots.world import Thing, World, describe_problem
+
+Change = Callable[[World], World]
+
+MOST_OBSTACLES = 200
+"""So many can be put into a world by hand: a browser has to draw each."""
+
+_NEW: dict[Shape, dict[str, Any]] = {
+    "box": {"size": (0.4, 0.4, 0.4), "colour": "#b5793f"},
+    "cylinder": {"radius": 0.15, "height": 0.6, "colour": "#d9822b"},
+    "sphere": {"radius": 0.18, "colour": "#e8c547", "movable": True, "mass": 0.3},
+}
+_ROBOT_RADIUS_M = 0.4
+_GAP_M = 0.1
+_RING_M = 0.5
+
+
+@runtime_checkable
+class InWorld(Robot, Protocol):
+    """A robot in a world that can be changed, as a simulated one is.
+
+    Attributes:
+        world: The world that it is in, with all things where they were at the start.
+    """
+
+    @property
+    def world(self) -> World: ...  # noqa: D102
+
+    def enter(self, world: World) -> None:
+        """Stand at the start of another world; odometry and collisions are 0 again.
+
+        Raises:
+            WorldError: The world cannot be used; all is as before.
+        """
+        ...
+
+    def change(self, world: World) -> None:
+        """Stand still where it is, with ``world`` around it instead.
+
+        Things that are the same in both worlds stay where they are.
+
+        Raises:
+            WorldError: Something that is new would overlap the robot, or the place where it starts; all is as before.
+        """
+        ...
+
+
+def add(world: World, shape: Shape, robot: Pose2D) -> World:
+    """Return ``world`` with one thing more, at the first free place in front of ``robot``, under a name of its own.
+
+    Raises:
+        WorldError: There are too many already.
+    """
+    if len(world.obstacles) >= MOST_OBSTACLES:
+        raise WorldError(f"the world is full: {MOST_OBSTACLES} things are the most that can be put in by hand")
+    fields = {"name": unique_name(world, shape), "shape": shape, "position": (0.0, 0.0), **_NEW[shape]}
+    radius = footprint_m(_checked(world, [fields]).obstacles[-1])
+    return _checked(world, [*_dumped(world), {**fields, "position": free_place(world, robot, radius)}])
+
+
+def edit(world: World, name: str, fields: Mapping[str, Any]) -> World:
+    """Return ``world`` with other ``fields`` of the thing called ``name``, as they stand in a world file.
+
+    Raises:
+        WorldError: There is no such thing, or a field is wrong; the message names it.
+    """
+    index = _index(world, name)
+    things = _dumped(world)
+    things[index] = {**things[index], **fields}
+    return _checked(world, things)
+
+
+def remove(world: World, name: str) -> World:
+    """Return ``world`` without the thing called ``name``.
+
+    Raises:
+        WorldError: There is no such thing.
+    """
+    index = _index(world, name)
+    return world.model_copy(update={"obstacles": world.obstacles[:index] + world.obstacles[index + 1 :]})
+
+
+def unique_name(world: World, word: str) -> str:
+    """Return ``word`` with the first number that makes it the name of nothing in ``world``."""
+    taken = {thing.name for thing in world.obstacles}
+    number = 1
+    while f"{word} {number}" in taken:
+        number += 1
+    return f"{word} {number}"
+
+
+def footprint_m(thing: Thing) -> float:
+    """Return the radius of the circle about ``thing`` on the floor, in metres."""
+    x, y, _ = thing.extent
+    return math.hypot(x, y) / 2 if thing.shape == "box" else x / 2
+
+
+def free_place(world: World, robot: Pose2D, radius_m: float) -> tuple[float, float]:
+    """Return x and y of a place for a thing of ``radius_m`` near the robot, in front of it if there is one.
+
+    The places are looked at in rings about the robot, each from its front to both sides. Circles stand for the things.
+    """
+    kept_free = [(robot.x, robot.y, _ROBOT_RADIUS_M), (0.0, 0.0, _ROBOT_RADIUS_M)]
+    kept_free += [(*thing.position, footprint_m(thing)) for thing in world.obstacles]
+    ring = 2
+    while True:
+        reach_m = ring * _RING_M + radius_m
+        for step in range(2 * ring + 1):
+            for side in (1, -1):
+                bearing = robot.yaw + side * step * math.pi / (2 * ring)
+                x = round(robot.x + reach_m * math.cos(bearing), 2)
+                y = round(robot.y + reach_m * math.sin(bearing), 2)
+                if all(math.dist((x, y), (cx, cy)) >= r + radius_m + _GAP_M for cx, cy, r in kept_free):
+                    return x, y
+        ring += 1
+
+
+def _index(world: World, name: str) -> int:
+    for index, thing in enumerate(world.obstacles):
+        if thing.name == name:
+            return index
+    raise WorldError(f"there is nothing called {name!r} in the world any more")
+
+
+def _dumped(world: World) -> list[dict[str, Any]]:
+    return [thing.model_dump() for thing in world.obstacles]
+
+
+def _checked(world: World, things: list[dict[str, Any]]) -> World:
+    values = {"floor": world.floor.model_dump(), "obstacles": things, "gates": [g.model_dump() for g in world.gates]}
+    try:
+        return World.model_validate(values)
+    except ValidationError as error:
+        raise WorldError(describe_problem(error, values)) from None
