@@ -93,7 +93,7 @@ class SignsConfig(Section):
     """How the sign is told from the landmarks, and when it counts."""
 
     live = frozenset(
-        {"min_confidence", "keep_confidence", "confirm_time", "bridge_time", "switch_time", "max_frame_age"}
+        {"model", "min_confidence", "keep_confidence", "confirm_time", "bridge_time", "switch_time", "max_frame_age"}
     )
 
     model: Path | None = Field(
@@ -114,6 +114,12 @@ class SignsConfig(Section):
         description="Which images are recognised: raw is /image_raw, compressed is /image_raw/compressed; "
         "auto is compressed where others may be on other machines (DDS beyond localhost)",
     )
+
+    @field_validator("model", mode="before")
+    @classmethod
+    def _empty_is_none(cls, model: object) -> object:
+        # The parameters of ROS have no null.
+        return None if model == "" else model
 
 
 class ControlConfig(Section):

@@ -239,7 +239,9 @@ def make_recognition(config: Config, transport: Transport, clock: Clock) -> Hand
     """
     recognizer = open_recognizer(config)
     _warn_of_unknown_signs(config, recognizer.signs)
-    return HandSignRecognitionNode(transport, clock, recognizer, config.signs, annotate)
+    return HandSignRecognitionNode(
+        transport, clock, recognizer, config.signs, annotate, open_classifier=open_classifier
+    )
 
 
 def cmd_vel_topic(config: Config) -> Topic[Any]:
