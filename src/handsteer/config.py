@@ -228,6 +228,21 @@ class RobotConfig(Section):
     publish_clock: bool = Field(False, description="Whether it publishes /clock; it then runs on real time itself")
 
 
+class TeachConfig(Section):
+    """Signs that are taught on the page."""
+
+    dataset: Path = Field(
+        Path("signs.npz"), description="File that the takes are added to, as `handsteer signs collect` does"
+    )
+    model: Path = Field(
+        Path("my-signs.npz"),
+        description="File that what is learnt is written to, as `handsteer signs train` does; signs.model goes before",
+    )
+    takes: int = Field(5, ge=2, le=50, description="How many takes to collect of a sign")
+    take_time: float = Field(3.0, ge=0.2, le=60, description="How long each is [s]")
+    countdown: float = Field(3.0, ge=0, le=60, description="How long to wait before each [s]")
+
+
 class DashboardConfig(Section):
     """The web page."""
 
@@ -254,6 +269,7 @@ class Config(Section):
     signs: SignsConfig = SignsConfig()
     control: ControlConfig = ControlConfig()
     robot: RobotConfig = RobotConfig()
+    teach: TeachConfig = TeachConfig()
     dashboard: DashboardConfig = DashboardConfig()
 
 
