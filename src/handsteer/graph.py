@@ -54,7 +54,7 @@ class Graph:
     Use it as a context manager: whatever ends the block, the robot is told to stand.
 
     Args:
-        config: Everything that can be set.
+        config: Everything that can be set; :meth:`reconfigure` sets another.
         clock: Real time by default; a :class:`~handsteer.clock.SteppedClock` for :meth:`run_stepped`.
         transport: Within this process by default.
         link: This process in the graph of a real robot, for ``robot.kind`` other than ``sim``; the caller closes it
@@ -122,6 +122,20 @@ class Graph:
         for node in self.nodes:
             node.stop()
         self.transport.close()
+
+    def reconfigure(self, config: Config) -> None:
+        """Let the nodes take what can change while they run (``live`` of each section) from ``config``.
+
+        Returns at once; may be called from any thread.
+
+        Raises:
+            ConfigError: A node cannot take it, as a file that it names is broken; nothing has changed.
+        """
+        for node in self.nodes:
+            node.check(config)
+        self.config = config
+        for node in self.nodes:
+            node.reconfigure(config)
 
     def run_stepped(self, duration_s: float = math.inf) -> None:
         """Run all nodes in turn on this thread, as fast as they go, on the graph's stepped clock.

@@ -131,11 +131,6 @@ class NodeParameters:
         """Add a parameter that is none of the configuration, and was read at the start."""
         self._fixed[name] = (value, Description("bool", text, why_fixed=_AT_START))
 
-    @property
-    def config(self) -> Config:
-        """The configuration as it is now."""
-        return self._config
-
     def values(self) -> dict[str, Value]:
         """Return all values by name, own ones first."""
         with self._lock:
@@ -171,9 +166,9 @@ class NodeParameters:
                 self._put(nested, name, value)
             try:
                 config = validate(Config, nested)
+                self._check(config)
             except ConfigError as error:
                 raise ConfigError(str(error).removeprefix(f"{self._section}.")) from None
-            self._check(config)
             self._config = config
             self._apply(config)
 

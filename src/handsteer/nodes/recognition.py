@@ -87,7 +87,7 @@ class HandSignRecognitionNode(Node):
             try:
                 self._open_classifier(config.signs)
             except ModelError as error:
-                raise ConfigError(f"model: {error}") from None
+                raise ConfigError(f"signs.model: {error}") from None
 
     def on_reconfigure(self, config: Config) -> None:
         """Take the confidences and times of ``signs``, and its model if that is another file, or was written anew."""

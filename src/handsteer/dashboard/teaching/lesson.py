@@ -152,6 +152,7 @@ class Lesson:
         """
         if self.step != "collect":
             return _READY
+        self._status = _READY
         if self._collector is not None:
             self._status = self._collector.step(hand, dt_s)
             self._note(hand)

@@ -38,7 +38,7 @@ class TrainingApart:
         self._work = (dataset, tuple(sided))
         self._lock = threading.Lock()
         self._process: subprocess.Popen[bytes] | None = None
-        self._cancelled = False
+        self._cancelled = threading.Event()
 
     def run(self, progress: Progress = lambda _done, _of: None) -> tuple[TaughtModel, TeachingReport] | None:
         """Train, and return what was learnt; None when it was cancelled meanwhile.
@@ -50,7 +50,7 @@ class TrainingApart:
             TrainingError: As by ``train_signs``; or the process ended before it was done.
         """
         with self._lock:
-            if self._cancelled:
+            if self._cancelled.is_set():
                 return None
             command = [sys.executable, "-m", __name__]
             self._process = subprocess.Popen(
@@ -61,19 +61,19 @@ class TrainingApart:
                 said = _follow(process, self._work, progress)
             finally:
                 process.kill()
+        if self._cancelled.is_set():
+            return None
         if isinstance(said, TrainingError):
             raise said
-        if said is None and not self._cancelled:
+        if said is None:
             raise TrainingError(f"the training ended before it was done, with exit code {process.returncode}")
-        if self._cancelled:
-            return None
         learnt: tuple[TaughtModel, TeachingReport] = said
         return learnt
 
     def cancel(self) -> None:
         """End the training, if it has not ended; may be called from any thread."""
         with self._lock:
-            self._cancelled = True
+            self._cancelled.set()
             if self._process is not None:
                 self._process.kill()
 

@@ -66,9 +66,7 @@ def lookalikes(dataset: Dataset, labels: Sequence[str], shipped: Classifier) -> 
             if not take.is_flat
             for guess in map(shipped.classify, take.hands)
         ]
-        found += [
-            Lookalike(label, sign, Share(told.count(sign), len(told))) for sign in shipped.signs if sign in told
-        ]
+        found += [Lookalike(label, sign, Share(told.count(sign), len(told))) for sign in shipped.signs if sign in told]
     return tuple(found)
 
 
