@@ -10,6 +10,7 @@ from handsteer.dashboard.node import DashboardNode
 from handsteer.dashboard.panels.banner import Banner
 from handsteer.dashboard.panels.seat import SeatPanel
 from handsteer.dashboard.state import PageState
+from handsteer.dashboard.teaching.teaching import Teaching
 from handsteer.dashboard.watch import WhileWatched
 
 PICTURE_PATH = "/camera.mjpg"
@@ -37,10 +38,12 @@ class Served:
     Attributes:
         node: Is joined for as long as a browser shows a page.
         cameras: The graph's camera, which a browser's may stand in for; None where that cannot be.
+        teaching: Gives the lessons; None where the graph is in other processes.
     """
 
     node: WhileWatched[DashboardNode]
     cameras: ChoiceOfCameras | None
+    teaching: Teaching | None = None
 
 
 class Page:
@@ -51,7 +54,7 @@ class Page:
         path: Where the page is, which its link in the head says.
     """
 
-    LINKS: ClassVar[tuple[tuple[str, str], ...]] = (("/", "Drive"),)
+    LINKS: ClassVar[tuple[tuple[str, str], ...]] = (("/", "Drive"), ("/teach", "Teach"))
 
     def __init__(self, served: Served, path: str) -> None:
         self.client = ui.context.client

@@ -25,6 +25,8 @@ from handsteer.dashboard.drive import DrivePage
 from handsteer.dashboard.node import DashboardNode
 from handsteer.dashboard.page import ASSETS_PATH, ICON, PICTURE_PATH, WEBCAM_PATH, Served
 from handsteer.dashboard.picture import PictureNode, PictureResponse
+from handsteer.dashboard.teach import TeachPage
+from handsteer.dashboard.teaching.teaching import Teaching
 from handsteer.dashboard.watch import WhileWatched
 from handsteer.dashboard.webcam import FrameSocket
 from handsteer.errors import DashboardError
@@ -55,6 +57,7 @@ class Dashboard:
         config: Where the page is served, and how.
         cmd_vel: The topic of the commands that are shown.
         cameras: The camera of this process, which a browser's may stand in for; None where it is in another.
+        teaching: Gives lessons on the graph; None where its nodes are in other processes.
 
     Attributes:
         node: Listens and steers for the browsers that show the page.
@@ -72,10 +75,11 @@ class Dashboard:
         *,
         cmd_vel: Topic[Any] = CMD_VEL,
         cameras: ChoiceOfCameras | None = None,
+        teaching: Teaching | None = None,
     ) -> None:
         self.node = WhileWatched(lambda: DashboardNode(transport, clock, steering, cmd_vel))
         self.pictures = WhileWatched(lambda: PictureNode(transport, clock))
-        self.served = Served(self.node, cameras)
+        self.served = Served(self.node, cameras, teaching=teaching)
         self.webcam = FrameSocket(cameras, self._drives)
         self._config = config
         self._server: uvicorn.Server | None = None
@@ -86,7 +90,8 @@ class Dashboard:
         """Return the page of a graph whose nodes are all in this process."""
         topic = cmd_vel_topic(graph.config)
         wires = (graph.transport, graph.clock, graph.steering)
-        return cls(*wires, graph.config.dashboard, cmd_vel=topic, cameras=graph.cameras)
+        teaching = Teaching.of(graph)
+        return cls(*wires, graph.config.dashboard, cmd_vel=topic, cameras=graph.cameras, teaching=teaching)
 
     def start(self) -> str:
         """Serve the page and return its address once it answers; it holds the token where one is needed.
@@ -130,6 +135,8 @@ class Dashboard:
         """End the page, open connections too; may be called twice."""
         self.node.close()
         self.pictures.close()
+        if self.served.teaching is not None:
+            self.served.teaching.close()
         if self._server is not None and self._thread is not None:
             self._server.should_exit = True
             self._thread.join(_STOP_TIMEOUT_S)
@@ -217,6 +224,10 @@ def _application() -> FastAPI:
     @ui.page("/")
     def index() -> None:
         DrivePage(application.state.dashboard.served)
+
+    @ui.page("/teach")
+    def teach() -> None:
+        TeachPage(application.state.dashboard.served)
 
     ui.run_with(
         application,

@@ -18,6 +18,9 @@ class CameraPanel:
         cameras: What there is to choose from; None where there is no choice.
         viewer: Who looks at this page.
         use_own: Is called to choose the camera of the machine that handsteer runs on.
+
+    Attributes:
+        stage: Holds the picture, and what lies over it.
     """
 
     def __init__(
@@ -25,7 +28,7 @@ class CameraPanel:
     ) -> None:
         self._cameras = cameras
         with ui.element("section").classes("card viewer camera"):
-            with box("stage"):
+            with box("stage") as self.stage:
                 # Lazy, because a page counts as loaded only when its other pictures have come.
                 picture = ui.element("img").props('loading="lazy" alt="What the camera sees, mirrored"')
                 picture.props(f'src="{picture_url}"')

@@ -222,9 +222,5 @@ def thumbnail(image: NDArray[np.uint8], hand: Hand) -> bytes:
     """Return a small, mirrored JPEG file of ``image``, (height, width, 3) uint8, BGR, with the skeleton of ``hand``."""
     height, width = image.shape[:2]
     size = (max(1, round(width * _THUMBNAIL_HEIGHT / height)), _THUMBNAIL_HEIGHT)
-    small = np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)
-    return encode_jpeg(draw_hand(small, _scaled(hand, size)), 75).tobytes()
-
-
-def _scaled(hand: Hand, size: tuple[int, int]) -> Hand:
-    return Hand(hand.points, hand.world, hand.handedness, hand.handedness_score, hand.presence, size)
+    small = np.asarray(cv2.resize(draw_hand(image, hand), size, interpolation=cv2.INTER_AREA), np.uint8)
+    return encode_jpeg(small, 75).tobytes()

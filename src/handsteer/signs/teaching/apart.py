@@ -11,6 +11,7 @@ import subprocess
 import sys
 import threading
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any, Final
 
 from handsteer.errors import TrainingError
@@ -23,7 +24,7 @@ from handsteer.signs.trained import TrainedClassifier
 Progress = Callable[[int, int], object]
 
 _ONE_THREAD: Final = {name: "1" for name in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")}
-_NICE: Final = 5
+_ROOT: Final = Path(__file__).parents[3]
 
 
 class TrainingApart:
@@ -52,10 +53,10 @@ class TrainingApart:
         with self._lock:
             if self._cancelled.is_set():
                 return None
-            command = [sys.executable, "-m", __name__]
-            self._process = subprocess.Popen(
-                command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, env={**os.environ, **_ONE_THREAD}
-            )
+            command = [sys.executable, "-P", "-m", __name__]
+            path = os.pathsep.join(filter(None, [str(_ROOT), os.environ.get("PYTHONPATH")]))
+            environment = {**os.environ, **_ONE_THREAD, "PYTHONPATH": path}
+            self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=environment)
         with self._process as process:
             try:
                 said = _follow(process, self._work, progress)
@@ -99,8 +100,6 @@ def _main() -> None:
     """Take the work from standard input, and tell the progress and what comes of it on standard output."""
     # Whatever else is printed must not get between.
     out, sys.stdout = sys.stdout.buffer, sys.stderr
-    if hasattr(os, "nice"):
-        os.nice(_NICE)  # the graph has the right of way
 
     def tell(kind: str, said: object) -> None:
         pickle.dump((kind, said), out)
