@@ -60,10 +60,10 @@ class CameraPanel:
         self._excuse.set_text(state.no_picture)
         switch(self._veil, "off", on=not state.no_picture)
         if self._cameras is not None:
-            self._show_choice(self._cameras.source)
+            self._show_choice(self._cameras.source, is_given=self._cameras.browser.is_given)
 
     def _choice(self, viewer: str, use_own: Callable[[], None]) -> None:
-        self._chosen = ""
+        self._chosen = ("", False)
         with box("foot choice"):
             self._browsers = button("Use this device's camera", f'data-camera="browser" data-viewer="{viewer}"')
             self._own = button("Use the robot's camera", 'data-camera="own"')
@@ -71,8 +71,8 @@ class CameraPanel:
         self._own.on("click", use_own)
         ui.on("webcam", lambda event: self._trouble.set_text(str(event.args.get("words", ""))))
 
-    def _show_choice(self, source: str) -> None:
-        if source != self._chosen:
-            self._chosen = source
-            switch(self._browsers, "hidden", on=source == "browser")
+    def _show_choice(self, source: str, *, is_given: bool) -> None:
+        if (source, is_given) != self._chosen:
+            self._chosen = (source, is_given)
+            switch(self._browsers, "hidden", on=source == "browser" and is_given)
             switch(self._own, "hidden", on=source == "own")
