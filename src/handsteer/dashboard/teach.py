@@ -102,7 +102,11 @@ class _LessonCard:
             )
             self._train = TrainPanel(self._do(LessonNode.go_back))
             self._result = ResultPanel(
-                teaching.actions(), keep=self._keep, more=self._do(LessonNode.go_back), discard=self._discard
+                teaching.actions(),
+                action_of=teaching.action_of,
+                keep=self._keep,
+                more=self._do(LessonNode.go_back),
+                discard=self._discard,
             )
             self._kept_panel = KeptPanel(self._again)
         self._said = ""
@@ -156,7 +160,7 @@ class _LessonCard:
             mark.props('aria-current="step"') if name == step else mark.props(remove="aria-current")
         self._title.set_text(view.label if view else "")
         if view is not None and view.step == "try":
-            self._result.fill(view, self._teaching.action_of(view.label), self._teaching.lost())
+            self._result.fill(view, self._teaching.lost())
 
     def _others(self, view: View | None) -> str:
         label = self._teaching.label

@@ -5,7 +5,7 @@ from typing import Any
 
 from nicegui import ui
 
-from handsteer.control.actions import EFFECTS, Action, action_of
+from handsteer.control.actions import EFFECTS, Action
 from handsteer.dashboard.panels.elements import box, button, switch, tag, text
 from handsteer.dashboard.teaching.lesson import View
 from handsteer.dashboard.teaching.teaching import Kept
@@ -20,6 +20,7 @@ class ResultPanel:
 
     Args:
         actions: What a sign can be given to do.
+        action_of: Returns what a sign does now.
         keep: Is called with the action.
         more: Is called to collect further takes.
         discard: Is called to end the lesson.
@@ -29,12 +30,12 @@ class ResultPanel:
         self,
         actions: Sequence[Action],
         *,
+        action_of: Callable[[str], Action],
         keep: Callable[[str], Any],
         more: Callable[[], None],
         discard: Callable[[], None],
     ) -> None:
-        self._report: TeachingReport | None = None
-        self._label = NONE
+        self._action_of = action_of
         with box("step result hidden") as self.element:
             tag("h3", "", "Try it")
             with box("opinion").props('role="status"'):
@@ -52,13 +53,15 @@ class ResultPanel:
 
     def update(self, view: View) -> None:
         """Show ``view``."""
-        sign, would = opinion(view.seen, view.label, self._action.value)
+        sign, would = opinion(
+            view.seen, view.label, lambda sign: self._action.value if sign == view.label else self._action_of(sign)
+        )
         self._sign.set_text(sign)
         self._would.set_text(would)
 
-    def fill(self, view: View, action: Action, lost: Sequence[str]) -> None:
+    def fill(self, view: View, lost: Sequence[str]) -> None:
         """Show the figures of ``view``, what the sign does so far, and which signs would be lost."""
-        self._action.set_value(action)
+        self._action.set_value(self._action_of(view.label))
         switch(self._action, "hidden", on=view.label == NONE)
         words = f"There are no takes of {', '.join(lost)}: what was learnt before of it would be lost." if lost else ""
         self._lost.set_text(words)
@@ -92,8 +95,10 @@ class KeptPanel:
 
     def fill(self, kept: Kept) -> None:
         """Show what was kept."""
-        doing = f"the robot {EFFECTS[kept.action]}" if kept.action else "it shall not count"
-        self._words.set_text(f"{kept.label} is learnt: {doing}")
+        if kept.action is None:
+            self._words.set_text("What shall not count is learnt")
+        else:
+            self._words.set_text(f"{kept.label} is learnt, and means: {EFFECTS[kept.action]}")
         self._lines.set_text(kept.lines)
         self._files.set_text(f"The takes are in {kept.dataset}, what was learnt from them in {kept.model}.")
 
@@ -103,13 +108,13 @@ def worded(action: Action) -> str:
     return f"{action.replace('_', ' ')}: {EFFECTS[action]}"
 
 
-def opinion(seen: Recognition | None, label: str, action: Action) -> tuple[str, str]:
+def opinion(seen: Recognition | None, label: str, does: Callable[[str], Action]) -> tuple[str, str]:
     """Return in words what the hand is told as by what was learnt, and what the robot would do.
 
     Args:
         seen: What was understood of the newest frame; None when there is none.
         label: The sign that is taught.
-        action: What it shall do.
+        does: Returns what a sign does, or shall do.
     """
     if seen is None:
         return "No picture", ""
@@ -117,8 +122,7 @@ def opinion(seen: Recognition | None, label: str, action: Action) -> tuple[str, 
         return "No hand", "no hand is in view"
     if seen.seen == NONE:
         return "No sign", f"show {label}" if label != NONE else "as it shall be"
-    does = action if seen.seen == label else action_of(seen.seen, {})
-    return f"{seen.seen}, {seen.confidence:.0%}", f"the robot would do this: {EFFECTS[does]}"
+    return f"{seen.seen}, {seen.confidence:.0%}", f"would mean: {EFFECTS[does(seen.seen)]}"
 
 
 def _figures(report: TeachingReport) -> None:
