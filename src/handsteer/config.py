@@ -93,7 +93,7 @@ class SignsConfig(Section):
     """How the sign is told from the landmarks, and when it counts."""
 
     live = frozenset(
-        {"min_confidence", "keep_confidence", "confirm_time", "bridge_time", "switch_time", "max_frame_age"}
+        {"model", "min_confidence", "keep_confidence", "confirm_time", "bridge_time", "switch_time", "max_frame_age"}
     )
 
     model: Path | None = Field(
@@ -114,6 +114,12 @@ class SignsConfig(Section):
         description="Which images are recognised: raw is /image_raw, compressed is /image_raw/compressed; "
         "auto is compressed where others may be on other machines (DDS beyond localhost)",
     )
+
+    @field_validator("model", mode="before")
+    @classmethod
+    def _empty_is_none(cls, model: object) -> object:
+        # The parameters of ROS have no null.
+        return None if model == "" else model
 
 
 class ControlConfig(Section):
@@ -222,6 +228,21 @@ class RobotConfig(Section):
     publish_clock: bool = Field(False, description="Whether it publishes /clock; it then runs on real time itself")
 
 
+class TeachConfig(Section):
+    """Signs that are taught on the page."""
+
+    dataset: Path = Field(
+        Path("signs.npz"), description="File that the takes are added to, as `handsteer signs collect` does"
+    )
+    model: Path = Field(
+        Path("my-signs.npz"),
+        description="File that what is learnt is written to, as `handsteer signs train` does; signs.model goes before",
+    )
+    takes: int = Field(5, ge=2, le=50, description="How many takes to collect of a sign")
+    take_time: float = Field(3.0, ge=0.2, le=60, description="How long each is [s]")
+    countdown: float = Field(3.0, ge=0, le=60, description="How long to wait before each [s]")
+
+
 class DashboardConfig(Section):
     """The web page."""
 
@@ -248,6 +269,7 @@ class Config(Section):
     signs: SignsConfig = SignsConfig()
     control: ControlConfig = ControlConfig()
     robot: RobotConfig = RobotConfig()
+    teach: TeachConfig = TeachConfig()
     dashboard: DashboardConfig = DashboardConfig()
 
 

@@ -128,7 +128,12 @@ class Graph:
         """Let the nodes take what can change while they run (``live`` of each section) from ``config``.
 
         Returns at once; may be called from any thread.
+
+        Raises:
+            ConfigError: A node cannot take it, as a file that it names is broken; nothing has changed.
         """
+        for node in self.nodes:
+            node.check(config)
         self.config = config
         for node in self.nodes:
             node.reconfigure(config)
@@ -252,7 +257,9 @@ def make_recognition(config: Config, transport: Transport, clock: Clock) -> Hand
     """
     recognizer = open_recognizer(config)
     _warn_of_unknown_signs(config, recognizer.signs)
-    return HandSignRecognitionNode(transport, clock, recognizer, config.signs, annotate)
+    return HandSignRecognitionNode(
+        transport, clock, recognizer, config.signs, annotate, open_classifier=open_classifier
+    )
 
 
 def cmd_vel_topic(config: Config) -> Topic[Any]:

@@ -109,10 +109,18 @@ class NodeParameters:
         config: What the node was started with.
         section: The node's own section of the configuration.
         apply: Gets each new configuration, all of it, once it has been checked; returns at once.
+        check: Raises ConfigError for what only the node can tell of a new configuration, as of a file that it names.
     """
 
-    def __init__(self, config: Config, section: str, apply: Callable[[Config], None]) -> None:
+    def __init__(
+        self,
+        config: Config,
+        section: str,
+        apply: Callable[[Config], None],
+        check: Callable[[Config], None] = lambda _: None,
+    ) -> None:
         self._config = config
+        self._check = check
         self._section = section
         self._sections = (section, *_USED_TOGETHER.get(section, ()))
         self._apply = apply
@@ -142,7 +150,7 @@ class NodeParameters:
     def set(self, changes: Mapping[str, Value | None]) -> None:
         """Set parameters, all of them or none; None takes an entry out of a table.
 
-        A value that is the one it has already is taken for any parameter.
+        A value that is the one it has already is taken for any parameter. A file that is named again is read again.
 
         Raises:
             ConfigError: A name is unknown, a value is not allowed, or a parameter cannot change while the node runs;
@@ -151,13 +159,14 @@ class NodeParameters:
         with self._lock:
             now = self.values()
             wanted = {name: value for name, value in changes.items() if name not in now or now[name] != value}
-            if not wanted:
+            if not wanted and not any(self._names_file(name) for name in changes):
                 return
             nested = self._config.model_dump()
             for name, value in wanted.items():
                 self._put(nested, name, value)
             try:
                 config = validate(Config, nested)
+                self._check(config)
             except ConfigError as error:
                 raise ConfigError(str(error).removeprefix(f"{self._section}.")) from None
             self._config = config
@@ -192,6 +201,11 @@ class NodeParameters:
         if not isinstance(value, _FITTING[kind]) or (isinstance(value, bool) and kind != "bool"):
             raise ConfigError(f"{name}: {value!r} should be {_WORDS[kind]}")
         table[key] = value
+
+    def _names_file(self, name: str) -> bool:
+        place = self._place(name)
+        annotation = place.model.model_fields[place.field].annotation if place else None
+        return place is not None and _without_none(annotation) is Path and place.field in place.model.live
 
     def _place(self, name: str) -> "_Place | None":
         section, rest = self._section, name

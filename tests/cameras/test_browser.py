@@ -86,7 +86,9 @@ def test_another_browser_starts_with_a_clock_of_its_own() -> None:
     clock = SteppedClock(100.0)
     browser = BrowserCamera(clock)
     browser.offer(sent(50.0))
+    assert browser.is_given
     browser.forget()
+    assert not browser.is_given
     assert browser.read(0.0) is None
     browser.offer(sent(2.0))
     frame = browser.read(0.0)

@@ -1,18 +1,26 @@
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from handsteer.config import Config, SignsConfig
+from handsteer.errors import ConfigError
+from handsteer.graph import open_classifier
 from handsteer.images import image_message, jpeg_message
+from handsteer.landmarks.protocol import Hand
 from handsteer.landmarks.recorded import RecordedLandmarker
 from handsteer.messages import DIAGNOSTICS, HAND_SIGN, IMAGE_ANNOTATED, IMAGE_COMPRESSED, IMAGE_RAW, Header, Image, Time
 from handsteer.nodes.recognition import HandSignRecognitionNode
+from handsteer.parameters import NodeParameters
 from handsteer.signs.drawing import annotate
 from handsteer.signs.model import load_model
 from handsteer.signs.recognizer import Recognizer
+from handsteer.signs.teaching.taught import save_taught
 from handsteer.signs.trained import TrainedClassifier
 from handsteer.signs.vocabulary import FORWARD
 from tests.nodes.stepping import Bench
-from tests.signs.hands import show_sign
+from tests.signs.hands import show_fingers, show_sign
+from tests.signs.teaching.models import model
 
 HEADER = Header(stamp=Time(0, 0), frame_id="camera")
 IMAGE = image_message(np.zeros((480, 640, 3), np.uint8), HEADER)
@@ -20,12 +28,14 @@ BROKEN = Image(HEADER, 480, 640, "bgr8", 0, 1920, np.zeros(5, np.uint8))
 
 
 class RecognitionBench(Bench):
-    def __init__(self, config: SignsConfig | None = None) -> None:
+    def __init__(self, config: SignsConfig | None = None, hand: Hand | None = None) -> None:
         super().__init__()
         config = config or SignsConfig()
-        landmarker = RecordedLandmarker([[show_sign(FORWARD)]] * 100)
+        landmarker = RecordedLandmarker([[hand or show_sign(FORWARD)]] * 100)
         recognizer = Recognizer(landmarker, TrainedClassifier(load_model()), config)
-        self.node = HandSignRecognitionNode(self.transport, self.clock, recognizer, config, annotate)
+        self.node = HandSignRecognitionNode(
+            self.transport, self.clock, recognizer, config, annotate, open_classifier=open_classifier
+        )
         self.nodes = [self.node]
         self.images = self.transport.advertise("camera", IMAGE_RAW)
         self.signs = self.record(HAND_SIGN)
@@ -174,3 +184,51 @@ def test_a_shorter_age_of_frames_counts_at_once(bench: RecognitionBench) -> None
     bench.node.reconfigure(Config.model_validate({"signs": {"max_frame_age": 0.1}}))
     bench.show(frames=6, age_s=0.2)
     assert bench.names[-1] == "NONE"
+
+
+def with_model(path: Path) -> Config:
+    return Config.model_validate({"signs": {"model": path}})
+
+
+def test_another_model_counts_from_the_next_frame_and_a_sign_is_confirmed_anew(tmp_path: Path) -> None:
+    path = tmp_path / "mine.npz"
+    save_taught(model(hi=0.99), path)
+    bench = RecognitionBench(hand=show_fingers("index", "little"))
+    bench.show(frames=5)
+    assert set(bench.names) == {"NONE"}
+    bench.node.check(with_model(path))
+    bench.node.reconfigure(with_model(path))
+    bench.show(frames=6)
+    assert (bench.names[-6], bench.names[-1]) == ("NONE", "Hi")
+    path.unlink()
+    bench.node.check(with_model(path))
+    bench.node.reconfigure(with_model(path))
+    bench.show()
+    assert bench.names[-1] == "Hi", "a file that has gone since it was read is still in use"
+
+    save_taught(model(hi=0.01, ho=0.98), path)
+    bench.node.reconfigure(with_model(path))
+    bench.show(frames=6)
+    assert (bench.names[-6], bench.names[-1]) == ("NONE", "Ho"), "a file that was written anew is read again"
+    bench.node.reconfigure(Config())
+    bench.show(frames=5)
+    assert set(bench.names[-5:]) == {"NONE"}
+    assert bench.node.callback_errors == 0
+
+
+def test_a_model_that_cannot_be_used_is_refused_before_anything_changes(tmp_path: Path) -> None:
+    path = tmp_path / "bad.npz"
+    path.write_bytes(b"no model")
+    bench = RecognitionBench()
+    applied: list[Config] = []
+    parameters = NodeParameters(Config(), "signs", applied.append, bench.node.check)
+    with pytest.raises(ConfigError, match=r"^model: .*bad.npz: not a model of taught signs"):
+        parameters.set({"model": str(path), "min_confidence": 0.9})
+    with pytest.raises(ConfigError, match=r"^model: cannot read the model of taught signs .*gone.npz"):
+        parameters.set({"model": str(tmp_path / "gone.npz")})
+    assert (applied, parameters.values()["model"]) == ([], "")
+    save_taught(model(), path)
+    parameters.set({"model": str(path)})
+    parameters.set({"model": str(path)})  # again, as it may have been written anew
+    parameters.set({"model": ""})
+    assert [config.signs.model for config in applied] == [path, path, None]

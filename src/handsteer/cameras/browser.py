@@ -60,6 +60,11 @@ class BrowserCamera:
             self._newest = (data[HEADER_BYTES:], sent_s + self._offset_s)
             self._news.notify()
 
+    @property
+    def is_given(self) -> bool:
+        """Whether a browser has sent frames, and has not been forgotten since."""
+        return math.isfinite(self._heard_s)
+
     def forget(self) -> None:
         """Drop the newest frame, and what is known of the browser's clock: another browser may follow."""
         with self._news:

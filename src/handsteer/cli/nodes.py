@@ -197,7 +197,7 @@ def _run(job: _Job, transport: str, words: tuple[str, ...]) -> int:
         session = join(transport, job.node, words)
         config = job.settings(from_parameters(session.parameters, job.section, session.name))
         node = job.make(config, session.transport, session.clock)
-        session.serve(NodeParameters(config, job.section, node.reconfigure))
+        session.serve(NodeParameters(config, job.section, node.reconfigure, node.check))
         _run_until_end(node, session, job.beside(node, config))
     except KeyboardInterrupt:
         pass  # the ordinary end of a node

@@ -11,6 +11,7 @@ from handsteer.dashboard.panels.banner import Banner
 from handsteer.dashboard.panels.seat import SeatPanel
 from handsteer.dashboard.settings_store import Settings
 from handsteer.dashboard.state import PageState
+from handsteer.dashboard.teaching.teaching import Teaching
 from handsteer.dashboard.watch import WhileWatched
 from handsteer.nodes.robot import RobotNode
 
@@ -42,6 +43,7 @@ class Served:
         topics: Whether steering by hand may go to other topics than the control's.
         settings: The graph's parameters; None where they are in other processes.
         robot: The node of the robot, whose world people edit; None where it is in another process.
+        teaching: Gives the lessons; None where the graph is in other processes.
     """
 
     node: WhileWatched[DashboardNode]
@@ -49,6 +51,7 @@ class Served:
     topics: bool = False
     settings: Settings | None = None
     robot: RobotNode | None = None
+    teaching: Teaching | None = None
 
 
 class Page:
@@ -59,7 +62,7 @@ class Page:
         path: Where the page is, which its link in the head says.
     """
 
-    LINKS: ClassVar[tuple[tuple[str, str], ...]] = (("/", "Drive"), ("/settings", "Settings"))
+    LINKS: ClassVar[tuple[tuple[str, str], ...]] = (("/", "Drive"), ("/teach", "Teach"), ("/settings", "Settings"))
 
     def __init__(self, served: Served, path: str) -> None:
         self.client = ui.context.client

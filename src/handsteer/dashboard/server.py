@@ -29,6 +29,8 @@ from handsteer.dashboard.picture import PictureNode, PictureResponse
 from handsteer.dashboard.settings import SettingsPage
 from handsteer.dashboard.settings_file import DEFAULT_FILE, SettingsFile
 from handsteer.dashboard.settings_store import Settings
+from handsteer.dashboard.teach import TeachPage
+from handsteer.dashboard.teaching.teaching import Teaching
 from handsteer.dashboard.watch import WhileWatched
 from handsteer.dashboard.webcam import FrameSocket
 from handsteer.errors import DashboardError
@@ -63,6 +65,7 @@ class Dashboard:
         topics: Whether steering by hand may go to other topics than the control's, where other robots may be.
         settings: The parameters of the graph; None where its nodes are in other processes.
         robot: The robot of this process, whose world people edit; None where it is in another.
+        teaching: Gives lessons on the graph; None where its nodes are in other processes.
 
     Attributes:
         node: Listens and steers for the browsers that show the page.
@@ -83,11 +86,12 @@ class Dashboard:
         topics: bool = False,
         settings: Settings | None = None,
         robot: RobotNode | None = None,
+        teaching: Teaching | None = None,
     ) -> None:
         history = VelocityHistory()  # outlives the node, so that a page that is loaded anew shows it
         self.node = WhileWatched(lambda: DashboardNode(transport, clock, steering, cmd_vel, history))
         self.pictures = WhileWatched(lambda: PictureNode(transport, clock))
-        self.served = Served(self.node, cameras, topics=topics, settings=settings, robot=robot)
+        self.served = Served(self.node, cameras, topics, settings, robot, teaching)
         self.webcam = FrameSocket(cameras, self._drives)
         self._config = config
         self._server: uvicorn.Server | None = None
@@ -116,6 +120,7 @@ class Dashboard:
             cameras=graph.cameras,
             settings=settings,
             robot=graph.robot,
+            teaching=Teaching.of(graph),
         )
 
     def start(self) -> str:
@@ -160,6 +165,8 @@ class Dashboard:
         """End the page, open connections too; may be called twice."""
         self.node.close()
         self.pictures.close()
+        if self.served.teaching is not None:
+            self.served.teaching.close()
         if self._server is not None and self._thread is not None:
             self._server.should_exit = True
             self._thread.join(_STOP_TIMEOUT_S)
@@ -251,6 +258,10 @@ def _application() -> FastAPI:
     @ui.page("/settings")
     def settings() -> None:
         SettingsPage(application.state.dashboard.served)
+
+    @ui.page("/teach")
+    def teach() -> None:
+        TeachPage(application.state.dashboard.served)
 
     ui.run_with(
         application,

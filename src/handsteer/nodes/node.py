@@ -185,6 +185,9 @@ class Node:
             self.stuck = self._thread.is_alive()
         self._guard("stop", self.on_stop)
 
+    def check(self, config: Config) -> None:
+        """Raise ConfigError if :meth:`reconfigure` could not take ``config``; may be called from any thread."""
+
     def on_reconfigure(self, config: Config) -> None:
         """Take the parameters that can change from ``config``; by default there are none."""
 

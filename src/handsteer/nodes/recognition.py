@@ -3,6 +3,7 @@
 import json
 import math
 from collections.abc import Callable
+from pathlib import Path
 from typing import TypeVar
 
 import numpy as np
@@ -10,11 +11,13 @@ from numpy.typing import NDArray
 
 from handsteer.clock import Clock
 from handsteer.config import Config, SignsConfig
+from handsteer.errors import ConfigError, ModelError
 from handsteer.images import bgr_image, image_message, jpeg_picture
 from handsteer.messages import HAND_SIGN, IMAGE_ANNOTATED, IMAGE_COMPRESSED, IMAGE_RAW, CompressedImage, Image, String
 from handsteer.nodes.frame_age import FrameAge
 from handsteer.nodes.latency import LatencyLog
 from handsteer.nodes.node import OK, WARN, Node
+from handsteer.signs.protocol import Classifier
 from handsteer.signs.recognizer import Recognition, Recognizer
 from handsteer.signs.vocabulary import NONE
 from handsteer.transports.protocol import Received, Transport
@@ -26,6 +29,7 @@ _SHORTLY_S = 3.0
 
 M = TypeVar("M", Image, CompressedImage)
 Annotate = Callable[[NDArray[np.uint8], Recognition], NDArray[np.uint8]]
+OpenClassifier = Callable[[SignsConfig], Classifier]
 
 
 class HandSignRecognitionNode(Node):
@@ -37,6 +41,7 @@ class HandSignRecognitionNode(Node):
         recognizer: Does the work.
         config: Holds the greatest age of a frame, and which images to take.
         annotate: Draws what was understood into a copy of the frame, when anybody looks.
+        open_classifier: Opens the classifier of ``signs.model`` when that changes while the node runs.
 
     Attributes:
         counts: How many frames each sign counted for.
@@ -44,7 +49,14 @@ class HandSignRecognitionNode(Node):
     """
 
     def __init__(
-        self, transport: Transport, clock: Clock, recognizer: Recognizer, config: SignsConfig, annotate: Annotate
+        self,
+        transport: Transport,
+        clock: Clock,
+        recognizer: Recognizer,
+        config: SignsConfig,
+        annotate: Annotate,
+        *,
+        open_classifier: OpenClassifier,
     ) -> None:
         super().__init__("hand_sign_recognition", transport, clock)
         self.counts: dict[str, int] = {}
@@ -52,6 +64,8 @@ class HandSignRecognitionNode(Node):
         self._recognizer = recognizer
         self._config = config
         self._annotate = annotate
+        self._open_classifier = open_classifier
+        self._model = _version_of(config.model)
         self._last_captured_s: float | None = None
         self._last_frame_s = clock.now()
         self._last_none_s = -math.inf
@@ -70,11 +84,29 @@ class HandSignRecognitionNode(Node):
         self.every(_WATCH_PERIOD_S, self._watch)
         self.every(_DIAGNOSE_PERIOD_S, self._report)
 
+    def check(self, config: Config) -> None:
+        """Raise ConfigError if the file of ``signs.model`` is another one than before and cannot be used."""
+        if self._has_other_model(config.signs):
+            try:
+                self._open_classifier(config.signs)
+            except ModelError as error:
+                raise ConfigError(f"signs.model: {error}") from None
+
     def on_reconfigure(self, config: Config) -> None:
-        """Take the confidences and times of ``signs``."""
+        """Take the confidences and times of ``signs``, and its model if that is another file, or was written anew."""
+        if self._has_other_model(config.signs):
+            version = _version_of(config.signs.model)
+            self._recognizer.use(self._open_classifier(config.signs))
+            self._model = version
         self._config = config.signs
         self._age.limit_s = config.signs.max_frame_age
         self._recognizer.reconfigure(config.signs)
+
+    def _has_other_model(self, config: SignsConfig) -> bool:
+        version, mine = _version_of(config.model), self._model
+        if version is not None and mine is not None and version == (mine[0], *_GONE):
+            return False  # what was read before it went stays in use
+        return version != mine
 
     def _on_frame(self, received: Received[M], picture_of: Callable[[M], NDArray[np.uint8]]) -> None:
         began_s = self.clock.now()
@@ -150,3 +182,17 @@ class HandSignRecognitionNode(Node):
         if self._refused is not None and now - self._refused_s <= self._config.max_frame_age:
             return self._refused
         return f"no frame for {now - max(self._last_frame_s, self._refused_s):.1f} s"
+
+
+_GONE = (-1, -1)
+
+
+def _version_of(model: Path | None) -> tuple[Path, int, int] | None:
+    """Return what tells a file, and what was last written to it, from others: path, inode and time in ns."""
+    if model is None:
+        return None
+    try:
+        facts = model.expanduser().stat()
+    except OSError:
+        return (model, *_GONE)
+    return (model, facts.st_ino, facts.st_mtime_ns)

@@ -86,6 +86,11 @@ class Recognizer:
         self._filter.reconfigure(config)
         self._operator.reconfigure(config)
 
+    def use(self, classifier: Classifier) -> None:
+        """Tell the signs by ``classifier`` from the next frame on; no sign counts until it is confirmed anew."""
+        self._classifier = classifier
+        self.reset()
+
     def reset(self) -> None:
         """Forget the stream: no hand is followed and no sign counts."""
         self._landmarker.reset()

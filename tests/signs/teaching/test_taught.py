@@ -8,24 +8,12 @@ from hypothesis import strategies as st
 from handsteer.errors import ModelCorrupt, ModelError, ModelMissing
 from handsteer.landmarks.protocol import Hand
 from handsteer.signs.model import DEFAULT_MODEL, load_model
-from handsteer.signs.network import Network
-from handsteer.signs.novelty import Novelty
 from handsteer.signs.protocol import SignGuess
-from handsteer.signs.teaching.features import FEATURE_COUNTS
-from handsteer.signs.teaching.taught import TaughtClassifier, TaughtModel, load_taught, save_taught
+from handsteer.signs.teaching.taught import TaughtClassifier, load_taught, save_taught
 from handsteer.signs.trained import TrainedClassifier
 from handsteer.signs.vocabulary import NONE, SIGNS
 from tests.signs.hands import show_sign
-
-COUNT = FEATURE_COUNTS["full"]
-
-
-def model(*, hi: float = 0.9, limit: float = 1e9, threshold: float = 0.8) -> TaughtModel:
-    """Return a model that takes every hand for Hi, with that likelihood."""
-    biases = np.log([hi, (1 - hi) / 2, (1 - hi) / 2])
-    network = Network(np.zeros(COUNT), np.ones(COUNT), (np.zeros((COUNT, 3)),), (biases,))
-    novelty = Novelty(network.mean, network.scale, np.zeros((2, COUNT)), np.eye(COUNT), limit)
-    return TaughtModel(("Hi", "Ho"), "full", network, novelty, np.array([threshold, 0.8]), {"persons": 1})
+from tests.signs.teaching.models import COUNT, model
 
 
 class Says:

@@ -12,7 +12,7 @@ from handsteer.cli.options import ConfigFile, Flag, Parameters, say, settings
 from handsteer.cli.signs.tables import dataset_table
 from handsteer.cli.terminal import Keys, TerminalPicture
 from handsteer.clock import RealClock
-from handsteer.config import Config
+from handsteer.config import Config, TeachConfig
 from handsteer.errors import DatasetError
 from handsteer.graph import open_landmarker
 from handsteer.landmarks.protocol import Hand
@@ -20,17 +20,19 @@ from handsteer.signs.drawing import draw_hand
 from handsteer.signs.teaching.collect import Collector, Facts, Status, collect_live, collect_recorded
 from handsteer.signs.teaching.dataset import Dataset, label_for, load_dataset, save_dataset
 
+_DEFAULTS = TeachConfig()
+
 
 def collect(
     *,
     label: str | None = None,
-    dataset: Path = Path("signs.npz"),
+    dataset: Path = _DEFAULTS.dataset,
     camera: str | None = None,
     person: str = "me",
     session: str | None = None,
-    takes: int = 5,
-    take_time: float = 3.0,
-    countdown: float = 3.0,
+    takes: int = _DEFAULTS.takes,
+    take_time: float = _DEFAULTS.take_time,
+    countdown: float = _DEFAULTS.countdown,
     hold: Flag = False,
     undo: Flag = False,
     config_file: ConfigFile = None,

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from handsteer.signs.figures import SIZES, Confusion, PhotoReport, Share
 from handsteer.signs.teaching.dataset import Dataset, summarise
 from handsteer.signs.teaching.train import TeachingReport
+from handsteer.signs.teaching.words import false_hands, how_it_was_tried, mistakes
 from handsteer.signs.video_figures import Event, LabelledFigures, VideoReport
 
 
@@ -57,10 +58,10 @@ def teaching_tables(report: TeachingReport) -> str:
         for sign in report.signs
     ]
     parts = [
-        f"How well hands are told that were held out, one {report.held_out} after the other"
-        + ("" if report.held_out == "person" else "; how well those of others are told, nobody knows yet"),
+        how_it_was_tried(report),
         table(["sign", "takes", "hands", "persons", "hand", "right", "of", "recall"], rows),
-        f"Of made hands of all shapes, {_rate(report.made)} are told as one of these signs; some of them do show it.",
+        false_hands(report),
+        *mistakes(report),
     ]
     return "\n\n".join([*parts, *_confusion("hands", report.confusion)])
 

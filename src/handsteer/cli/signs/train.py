@@ -10,7 +10,7 @@ from tqdm import tqdm
 
 from handsteer.cli.options import Flag, say
 from handsteer.cli.signs.tables import teaching_tables
-from handsteer.config import SignsConfig
+from handsteer.config import SignsConfig, TeachConfig
 from handsteer.errors import TrainingError
 from handsteer.graph import open_classifier
 from handsteer.signs.teaching.dataset import Dataset, load_dataset
@@ -18,11 +18,12 @@ from handsteer.signs.teaching.taught import save_taught
 from handsteer.signs.teaching.train import train_signs
 
 _LOW_RECALL = 0.8
+_DEFAULTS = TeachConfig()
 
 
 def train(
     *datasets: Path,
-    output: Path = Path("my-signs.npz"),
+    output: Path = _DEFAULTS.model,
     sided: Annotated[list[str] | None, Parameter(consume_multiple=True)] = None,
     json: Flag = False,
 ) -> int:
@@ -48,7 +49,7 @@ def train(
     """
     if not output.absolute().parent.is_dir():
         raise TrainingError(f"--output: there is no folder {output.absolute().parent} for {output.name}")
-    takes = [take for path in datasets or (Path("signs.npz"),) for take in load_dataset(path).takes]
+    takes = [take for path in datasets or (_DEFAULTS.dataset,) for take in load_dataset(path).takes]
     with tqdm(unit=" steps", file=sys.stderr, disable=not sys.stderr.isatty()) as bar:
 
         def progress(done: int, of: int) -> None:

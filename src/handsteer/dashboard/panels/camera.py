@@ -18,6 +18,9 @@ class CameraPanel:
         cameras: What there is to choose from; None where there is no choice.
         viewer: Who looks at this page.
         use_own: Is called to choose the camera of the machine that handsteer runs on.
+
+    Attributes:
+        stage: Holds the picture, and what lies over it.
     """
 
     def __init__(
@@ -25,7 +28,7 @@ class CameraPanel:
     ) -> None:
         self._cameras = cameras
         with ui.element("section").classes("card viewer camera"):
-            with box("stage"):
+            with box("stage") as self.stage:
                 # Lazy, because a page counts as loaded only when its other pictures have come.
                 picture = ui.element("img").props('loading="lazy" alt="What the camera sees, mirrored"')
                 picture.props(f'src="{picture_url}"')
@@ -60,7 +63,7 @@ class CameraPanel:
         self._excuse.set_text(state.no_picture)
         switch(self._veil, "off", on=not state.no_picture)
         if self._cameras is not None:
-            self._show_choice(self._cameras.source)
+            self._show_choice(self._cameras.source, is_given=self._cameras.browser.is_given)
 
     def _show_confirmed(self, percent: int) -> None:
         if percent != self._confirmed:
@@ -69,7 +72,7 @@ class CameraPanel:
             switch(self._ring, "whole", on=percent == 100)
 
     def _choice(self, viewer: str, use_own: Callable[[], None]) -> None:
-        self._chosen = ""
+        self._chosen = ("", False)
         with box("foot choice"):
             self._browsers = button("Use this device's camera", f'data-camera="browser" data-viewer="{viewer}"')
             self._own = button("Use the robot's camera", 'data-camera="own"')
@@ -77,8 +80,8 @@ class CameraPanel:
         self._own.on("click", use_own)
         ui.on("webcam", lambda event: self._trouble.set_text(str(event.args.get("words", ""))))
 
-    def _show_choice(self, source: str) -> None:
-        if source != self._chosen:
-            self._chosen = source
-            switch(self._browsers, "hidden", on=source == "browser")
+    def _show_choice(self, source: str, *, is_given: bool) -> None:
+        if (source, is_given) != self._chosen:
+            self._chosen = (source, is_given)
+            switch(self._browsers, "hidden", on=source == "browser" and is_given)
             switch(self._own, "hidden", on=source == "own")

@@ -1,10 +1,11 @@
 """What a dataset must have before signs are learnt from it."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Final
 
 from handsteer.errors import TrainingError
-from handsteer.signs.figures import Confusion
+from handsteer.signs.figures import Confusion, Share
 from handsteer.signs.protocol import Classifier
 from handsteer.signs.teaching.dataset import Dataset, summarise
 from handsteer.signs.teaching.taught import SURE
@@ -46,8 +47,18 @@ def check_enough(dataset: Dataset, labels: Sequence[str]) -> None:
             )
 
 
-def check_not_known(dataset: Dataset, labels: Sequence[str], shipped: Classifier) -> None:
-    """Raise TrainingError when one of ``labels`` is often told as a sign of ``shipped`` already."""
+@dataclass(frozen=True)
+class Lookalike:
+    """Hands of a new sign that are told as a sign that is known already."""
+
+    label: str
+    sign: str
+    hands: Share
+
+
+def lookalikes(dataset: Dataset, labels: Sequence[str], shipped: Classifier) -> tuple[Lookalike, ...]:
+    """Return which of ``labels`` are told as a sign of ``shipped`` already, and how often."""
+    found = []
     for label in labels:
         told = [
             guess.sign if guess.confidence >= SURE else NONE
@@ -55,13 +66,19 @@ def check_not_known(dataset: Dataset, labels: Sequence[str], shipped: Classifier
             if not take.is_flat
             for guess in map(shipped.classify, take.hands)
         ]
-        for sign in shipped.signs:
-            share = told.count(sign) / len(told) if told else 0.0
-            if share > _KNOWN_SHARE:
-                raise TrainingError(
-                    f"{label} looks like {sign}: {share:.0%} of its hands are told as that already; "
-                    f"teach another shape, or give {sign} another action"
-                )
+        found += [Lookalike(label, sign, Share(told.count(sign), len(told))) for sign in shipped.signs if sign in told]
+    return tuple(found)
+
+
+def check_not_known(found: Sequence[Lookalike]) -> None:
+    """Raise TrainingError when a sign is often told as one that is known already."""
+    for each in found:
+        share = each.hands.rate or 0.0
+        if share > _KNOWN_SHARE:
+            raise TrainingError(
+                f"{each.label} looks like {each.sign}: {share:.0%} of its hands are told as that already; "
+                f"teach another shape, or give {each.sign} another action"
+            )
 
 
 def check_told_apart(likeliest: Confusion) -> None:

@@ -12,7 +12,14 @@ from handsteer.signs.figures import Confusion, Share
 from handsteer.signs.network import train
 from handsteer.signs.novelty import learn_novelty
 from handsteer.signs.protocol import Classifier
-from handsteer.signs.teaching.checks import check_enough, check_not_known, check_told_apart, taught_labels
+from handsteer.signs.teaching.checks import (
+    Lookalike,
+    check_enough,
+    check_not_known,
+    check_told_apart,
+    lookalikes,
+    taught_labels,
+)
 from handsteer.signs.teaching.dataset import Dataset, LabelSummary, Take, summarise
 from handsteer.signs.teaching.features import Array, Depth, taught_features
 from handsteer.signs.teaching.split import split
@@ -65,12 +72,14 @@ class TeachingReport:
         held_out: What was held out at a time to find out: ``person``, ``session`` or ``take``.
         confusion: Held-out rows, both hands, by the sign that they show and the one that was told.
         made: Of made hands of all shapes, how many are told as one of the signs; some of them truly show it.
+        known: Hands of the takes that are told as a shipped sign already, which goes before.
     """
 
     signs: tuple[TaughtSign, ...]
     held_out: str
     confusion: Confusion
     made: Share
+    known: tuple[Lookalike, ...] = ()
 
     def as_dict(self) -> dict[str, Any]:
         """Return the figures as plain values, for JSON."""
@@ -79,6 +88,7 @@ class TeachingReport:
             "held_out": self.held_out,
             "confusion": self.confusion.as_dict(),
             "made_hands": self.made.as_dict(),
+            "known": [{"sign": each.label, "told": each.sign, **each.hands.as_dict()} for each in self.known],
         }
 
 
@@ -117,7 +127,8 @@ def train_signs(
     """
     labels = taught_labels(dataset, sided)
     check_enough(dataset, labels)
-    check_not_known(dataset, labels, shipped)
+    known = lookalikes(dataset, labels, shipped)
+    check_not_known(known)
     depth: Depth = "flat" if any(take.is_flat for take in dataset.takes) else "full"
     teacher = _Teacher(frozenset(sided) | _pointing_sideways(dataset, labels), depth)
     held_out, folds = split(dataset, labels)
@@ -138,6 +149,7 @@ def train_signs(
         held_out=held_out,
         confusion=confusion,
         made=Share(int((model.confidences(made.pixels, made.world) >= SURE).any(axis=1).sum()), len(made.shapes)),
+        known=known,
     )
     return model, report
 

@@ -1,0 +1,92 @@
+"""What teaching on the page costs the recognition of a running graph, and how long the training takes.
+
+Run ``python benchmarks/teach.py``. A whole graph sees the virtual hand, 640x480 at 30 frames a second, and nobody looks
+at a page. The frames that are recognised in a second are compared with those of the graph alone, right before. The last
+row trains in the graph's own process instead, as the command line does.
+"""
+
+import os
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from handsteer.config import SignsConfig, load
+from handsteer.dashboard.teaching.teaching import Teaching
+from handsteer.graph import Graph, open_classifier
+from handsteer.signs.teaching.dataset import Dataset
+from handsteer.signs.teaching.train import train_signs
+
+ALONE_S = 5.0
+TRY_S = 8.0
+
+
+class Rate:
+    """Frames a second that are recognised, and how long each takes."""
+
+    def __init__(self, graph: Graph) -> None:
+        self._graph = graph
+        self._began_s, self._began = time.monotonic(), self._count()
+
+    def _count(self) -> int:
+        return sum(self._graph.recognition.counts.values())
+
+    def fps(self) -> float:
+        return (self._count() - self._began) / (time.monotonic() - self._began_s)
+
+
+def alone(graph: Graph) -> float:
+    rate = Rate(graph)
+    time.sleep(ALONE_S)
+    return rate.fps()
+
+
+def wait_until(condition: Callable[[], bool], teaching: Teaching) -> None:
+    while not condition():
+        if lesson := teaching.lesson("me"):
+            lesson.attend()
+        time.sleep(0.05)
+
+
+def row(what: str, before: float, during: float, took_s: float) -> None:
+    print(f"{what:<34} {before:6.1f} {during:6.1f} {during / before:8.0%} {took_s:8.1f}")
+
+
+def main() -> None:
+    print(f"{os.cpu_count()} processors, load before {os.getloadavg()[0]:.1f}, NumPy {np.__version__}\n")
+    print(f"{'frames recognised in a second':<34} {'alone':>6} {'then':>6} {'ratio':>8} {'took [s]':>8}")
+    with tempfile.TemporaryDirectory() as folder:
+        files = {"dataset": Path(folder) / "signs.npz", "model": Path(folder) / "mine.npz"}
+        base = {"camera": {"source": "virtual"}, "virtual_hand": {"script": "Peace:600"}}
+        with Graph(load(None, base, {"teach": {**files, "take_time": 1.5, "countdown": 0.0}})) as graph:
+            graph.start()
+            time.sleep(2.0)
+            teaching = Teaching.of(graph)
+            before = alone(graph)
+            teaching.begin("me", "Peace")
+            lesson = teaching.lesson("me")
+            assert lesson is not None
+            rate, began_s = Rate(graph), time.monotonic()
+            lesson.record()
+            wait_until(lambda: not lesson.view.recording, teaching)
+            row("takes are collected", before, rate.fps(), time.monotonic() - began_s)
+            takes = Dataset(tuple(each.take for each in lesson.view.takes))
+            rate, began_s = Rate(graph), time.monotonic()
+            lesson.train()
+            wait_until(lambda: lesson.view.step != "train", teaching)
+            row("trained in a process of its own", before, rate.fps(), time.monotonic() - began_s)
+            rate, began_s = Rate(graph), time.monotonic()
+            time.sleep(TRY_S)
+            row("what was learnt is tried", before, rate.fps(), time.monotonic() - began_s)
+            teaching.close()
+            time.sleep(1.0)
+            before = alone(graph)
+            rate, began_s = Rate(graph), time.monotonic()
+            train_signs(takes, open_classifier(SignsConfig()))
+            row("trained in the graph's process", before, rate.fps(), time.monotonic() - began_s)
+
+
+if __name__ == "__main__":
+    main()

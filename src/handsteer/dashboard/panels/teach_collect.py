@@ -1,0 +1,137 @@
+"""The second step of a lesson: takes of the sign."""
+
+import base64
+import math
+from collections.abc import Callable
+
+from nicegui import ui
+
+from handsteer.dashboard.panels.elements import box, button, switch, text
+from handsteer.dashboard.teaching.lesson import Collected, View, hands_in
+
+
+class Countdown:
+    """What is to be done now, in large letters on the camera's picture: who shows a sign stands back."""
+
+    def __init__(self, stage: ui.element) -> None:
+        self._stage = stage
+        with stage, box("countdown hidden") as self._box:
+            self._number = text("number", "")
+            self._words = text("words", "")
+
+    def update(self, view: View | None) -> None:
+        """Show ``view``."""
+        is_under_way = view is not None and view.recording
+        switch(self._box, "hidden", on=not is_under_way)
+        switch(self._stage, "recording", on=view is not None and view.status.phase == "recording")
+        if view is not None and is_under_way:
+            number, words = said_now(view)
+            self._number.set_text(number)
+            self._words.set_text(words)
+
+
+class CollectPanel:
+    """Record takes, look at them, delete some, and go on to the training.
+
+    Args:
+        record: Is called to begin the countdown.
+        pause: Is called to stop it.
+        train: Is called to go on.
+        discard: Is called to end the lesson.
+        delete: Is called with the number of a take to delete it.
+    """
+
+    def __init__(
+        self,
+        *,
+        record: Callable[[], None],
+        pause: Callable[[], None],
+        train: Callable[[], None],
+        discard: Callable[[], None],
+        delete: Callable[[int], None],
+    ) -> None:
+        self._delete = delete
+        self._shown: tuple[int, ...] = ()
+        with box("step collect hidden") as self.element:
+            self._count = text("count", "").props('role="status"')
+            self._hint = text("hint", "").props('role="status"')
+            with box("buttons"):
+                self._record = button("Record", "").classes("primary").on("click", record)
+                self._pause = button("Pause", "").on("click", pause)
+                self._train = button("Train", "").on("click", train)
+                button("Discard", 'aria-label="Discard: end the lesson and keep nothing"').on("click", discard)
+            self._takes = ui.element("ul").classes("takes").props('aria-label="Takes"')
+            text(
+                "faint",
+                "Show the sign as you will when you drive: nearer and farther, tilted, turned. Hands that are"
+                " of no use, as the camera saw something else, are deleted with their take.",
+            )
+
+    def update(self, view: View) -> None:
+        """Show ``view``."""
+        self._count.set_text(counted(view))
+        self._hint.set_text(view.hint)
+        switch(self._record, "hidden", on=view.recording)
+        switch(self._pause, "hidden", on=not view.recording)
+        self._train.props(remove="disabled") if view.can_train else self._train.props("disabled")
+        enough = len(view.takes) >= view.wanted
+        switch(self._record, "primary", on=not enough)
+        switch(self._train, "primary", on=enough)
+        numbers = tuple(each.number for each in view.takes)
+        if numbers != self._shown:
+            self._shown = numbers
+            self._takes.clear()
+            with self._takes:
+                for each in view.takes:
+                    self._tile(each)
+
+    def _tile(self, each: Collected) -> None:
+        picture = base64.b64encode(each.picture).decode()
+        with ui.element("li").classes("take"):
+            ui.element("img").props(f'src="data:image/jpeg;base64,{picture}" alt="A frame of take {each.number}"')
+            text("faint", f"{each.number}: {len(each.take.hands)} hands")
+            button("Delete", f'aria-label="Delete take {each.number}"').on("click", lambda: self._delete(each.number))
+
+
+class TrainPanel:
+    """How far the training is.
+
+    Args:
+        cancel: Is called to go back to the takes.
+    """
+
+    def __init__(self, cancel: Callable[[], None]) -> None:
+        self._percent = -1
+        with box("step train hidden") as self.element:
+            self._words = text("count", "Learning").props('role="status"')
+            with box("meter progress").props('role="progressbar" aria-label="Training"') as self._meter:
+                self._fill = box("")
+            with box("buttons"):
+                button("Cancel", 'aria-label="Cancel the training"').on("click", cancel)
+
+    def update(self, view: View) -> None:
+        """Show ``view``."""
+        percent = round(100 * view.progress)
+        if percent != self._percent:
+            self._percent = percent
+            self._words.set_text(
+                f"Learning what all takes have in common: {percent} %"
+                if percent
+                else "Making hands of every shape, to tell the sign from"
+            )
+            self._fill.style(f"width: {percent}%")
+            self._meter.props(f"aria-valuenow={percent}")
+
+
+def counted(view: View) -> str:
+    """Return how many takes of ``view`` there are, in words."""
+    takes = len(view.takes)
+    of = f" of {view.wanted}" if takes <= view.wanted else ""
+    return f"{takes}{of} takes, {hands_in(view.takes)} hands"
+
+
+def said_now(view: View) -> tuple[str, str]:
+    """Return what is to be done now while takes are recorded: a number, and words."""
+    if view.status.phase == "recording":
+        return str(view.status.hands), f"hands: show {view.label}"
+    return str(math.ceil(view.status.left_s)), f"then show {view.label}"

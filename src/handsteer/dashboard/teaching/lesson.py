@@ -1,0 +1,218 @@
+"""The lesson in which one sign is taught: what comes after what. No page, no clock, no camera and no threads."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final, Literal
+
+from handsteer.config import TeachConfig
+from handsteer.dashboard.teaching.hints import hint
+from handsteer.landmarks.protocol import Hand
+from handsteer.signs.protocol import SignGuess
+from handsteer.signs.recognizer import Recognition
+from handsteer.signs.teaching.collect import Collector, Facts, Status
+from handsteer.signs.teaching.dataset import Take
+from handsteer.signs.teaching.taught import TaughtModel
+from handsteer.signs.teaching.train import TeachingReport
+
+Step = Literal["collect", "train", "try"]
+
+MOST_TAKES: Final = 50
+"""More are not collected in one lesson."""
+
+_LEAST_TAKES: Final = 2
+_READY: Final = Status("ready", 0.0, 0)
+_TOO_FEW: Final = "Too few hands were seen: this take is done again."
+
+
+@dataclass(frozen=True)
+class Collected:
+    """A take of this lesson.
+
+    Attributes:
+        number: From 1, in the order in which they were collected.
+        take: The hands.
+        picture: A small JPEG file of a frame of it, mirrored, with the hand's skeleton; it stays in memory.
+    """
+
+    number: int
+    take: Take
+    picture: bytes
+
+
+@dataclass(frozen=True)
+class View:
+    """What there is to show of a lesson.
+
+    Attributes:
+        label: The sign.
+        step: Takes are collected, learnt from, or what was learnt is tried.
+        recording: Whether takes are under way.
+        status: How far the collecting is.
+        hint: What to do better; empty when all is well.
+        takes: Those that were collected and not deleted.
+        wanted: How many takes are asked for.
+        can_train: Whether there are enough of them.
+        progress: 0 to 1, how far the training is.
+        trouble: What went wrong; empty when nothing did.
+        report: How well the sign was learnt.
+        seen: What the sign that was learnt is told as, in the newest frame.
+    """
+
+    label: str
+    step: Step
+    recording: bool
+    status: Status
+    hint: str
+    takes: tuple[Collected, ...]
+    wanted: int
+    can_train: bool
+    progress: float
+    trouble: str
+    report: TeachingReport | None
+    seen: Recognition | None
+
+
+class Lesson:
+    """Collect takes, train, try what was learnt; whatever does not fit the step is left undone.
+
+    Args:
+        facts: About all takes, the sign among them.
+        plan: How many takes of which length are asked for.
+    """
+
+    def __init__(self, facts: Facts, plan: TeachConfig) -> None:
+        self.facts = facts
+        self.step: Step = "collect"
+        self.model: TaughtModel | None = None
+        self._plan = plan
+        self._collector: Collector | None = None
+        self._status = _READY
+        self._hint = ""
+        self._hands: list[Hand] = []
+        self._takes: list[Collected] = []
+        self._count = 0
+        self._progress = 0.0
+        self._trouble = ""
+        self._report: TeachingReport | None = None
+        self._seen: Recognition | None = None
+
+    @property
+    def takes(self) -> tuple[Take, ...]:
+        """Those that were collected and not deleted."""
+        return tuple(each.take for each in self._takes)
+
+    @property
+    def is_recording(self) -> bool:
+        """Whether a take, or the countdown before it, is under way."""
+        return self._collector is not None
+
+    @property
+    def view(self) -> View:
+        """What there is to show."""
+        return View(
+            label=self.facts.label,
+            step=self.step,
+            recording=self.is_recording,
+            status=self._status,
+            hint=self._hint,
+            takes=tuple(self._takes),
+            wanted=self._plan.takes,
+            can_train=len(self._takes) >= _LEAST_TAKES and not self.is_recording,
+            progress=self._progress,
+            trouble=self._trouble,
+            report=self._report,
+            seen=self._seen,
+        )
+
+    def record(self) -> None:
+        """Begin the countdown to the takes that are missing; to one more if none is."""
+        room = MOST_TAKES - len(self._takes)
+        if self.step != "collect" or self.is_recording or room <= 0:
+            return
+        missing = max(1, self._plan.takes - len(self._takes))
+        self._collector = Collector(
+            self.facts, takes=min(missing, room), take_s=self._plan.take_time, countdown_s=self._plan.countdown
+        )
+        self._trouble = ""
+        self._hands = []
+
+    def pause(self) -> None:
+        """Drop the take that is under way, and collect no more until :meth:`record`."""
+        self._collector = None
+        self._status = _READY
+        self._hands = []
+
+    def see(self, hand: Hand | None, guess: SignGuess, dt_s: float) -> Status:
+        """Take what the next frame shows while takes are collected, and return how far that is.
+
+        Args:
+            hand: The hand in it, if there is one.
+            guess: What that is told as by the signs that are known.
+            dt_s: Seconds since the last frame.
+        """
+        if self.step != "collect":
+            return _READY
+        self._status = _READY
+        if self._collector is not None:
+            self._status = self._collector.step(hand, dt_s)
+            self._note(hand)
+            if self._collector.done:
+                self._collector = None
+        self._hint = hint(hand, guess, self._hands)
+        return self._status
+
+    def keep(self, take: Take, picture: bytes) -> None:
+        """Keep a take that has ended."""
+        self._count += 1
+        self._takes.append(Collected(self._count, take, picture))
+
+    def delete(self, number: int) -> None:
+        """Delete a take; another one is collected for it if takes are under way."""
+        left = [each for each in self._takes if each.number != number]
+        if self.step == "collect" and len(left) < len(self._takes):
+            self._takes = left
+            if self._collector is not None:
+                self._collector.again()
+
+    def lose_frames(self) -> None:
+        """Say that no frames come."""
+        self._hint = "No picture comes from the camera."
+        self._seen = None
+
+    def begin_training(self) -> bool:
+        """Go on to the training, if there are enough takes; return whether that is so."""
+        if self.step != "collect" or not self.view.can_train:
+            return False
+        self.step, self._progress, self._trouble = "train", 0.0, ""
+        return True
+
+    def advance(self, done: int, of: int) -> None:
+        """Take how many steps of the training are done."""
+        self._progress = done / of
+
+    def learn(self, model: TaughtModel, report: TeachingReport) -> None:
+        """Take what was learnt, to be tried."""
+        if self.step == "train":
+            self.step, self.model, self._report, self._seen = "try", model, report, None
+
+    def try_out(self, seen: Recognition) -> None:
+        """Take what the next frame is told as by what was learnt."""
+        if self.step == "try":
+            self._seen, self._hint = seen, ""
+
+    def go_back(self, trouble: str = "") -> None:
+        """Go back to the collecting, with all takes, and say what went wrong."""
+        self.step, self.model, self._report, self._trouble = "collect", None, None, trouble
+        self.pause()
+
+    def _note(self, hand: Hand | None) -> None:
+        if self._status.finished is not None or self._status.failed:
+            self._hands = []
+            self._trouble = _TOO_FEW if self._status.failed else ""
+        elif self._status.phase == "recording" and hand is not None:
+            self._hands.append(hand)
+
+
+def hands_in(takes: Sequence[Collected]) -> int:
+    """Return how many hands there are in ``takes``."""
+    return sum(len(each.take.hands) for each in takes)

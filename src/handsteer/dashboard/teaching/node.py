@@ -1,0 +1,226 @@
+"""The node ``dashboard_lesson``: shows the camera's frames to a lesson, and has what it collects learnt."""
+
+import logging
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from handsteer.clock import Clock
+from handsteer.config import SignsConfig
+from handsteer.dashboard.teaching.lesson import Lesson, View
+from handsteer.errors import TrainingError
+from handsteer.images import bgr_image, encode_jpeg
+from handsteer.landmarks.protocol import Hand, Landmarker
+from handsteer.messages import IMAGE_RAW, Image
+from handsteer.nodes.node import Node
+from handsteer.signs.drawing import draw_hand
+from handsteer.signs.protocol import Classifier, SignGuess
+from handsteer.signs.recognizer import Recognizer
+from handsteer.signs.teaching.apart import TrainingApart
+from handsteer.signs.teaching.collect import largest
+from handsteer.signs.teaching.dataset import Dataset
+from handsteer.signs.teaching.taught import TaughtClassifier, TaughtModel
+from handsteer.signs.vocabulary import NONE
+from handsteer.transports.protocol import Received, Transport
+
+log = logging.getLogger(__name__)
+
+_WATCH_PERIOD_S: Final = 0.2
+_NO_FRAME_S: Final = 1.0
+_UNATTENDED_S: Final = 1.0
+_LONGEST_STEP_S: Final = 0.5
+_THUMBNAIL_HEIGHT: Final = 120
+_NOTHING: Final = SignGuess(NONE, 0.0)
+
+
+@dataclass(frozen=True)
+class Eyes:
+    """What a lesson sees with.
+
+    Attributes:
+        open_landmarker: Opens what finds the hands.
+        open_shipped: Opens the classifier of the signs that are shipped.
+        signs: Returns what decides when a sign counts, as it is now.
+    """
+
+    open_landmarker: Callable[[], Landmarker]
+    open_shipped: Callable[[], Classifier]
+    signs: Callable[[], SignsConfig]
+
+
+class LessonNode(Node):
+    """Gives one lesson; all may be called from any thread.
+
+    Hands are looked for a second time, beside the recognition, only while takes are collected or tried.
+
+    Args:
+        transport: Carries the messages.
+        clock: The graph's clock.
+        lesson: From here on only this node uses it.
+        known: The takes of earlier lessons, which are learnt from too.
+        eyes: What it sees with; the models are opened on this node's thread.
+    """
+
+    def __init__(self, transport: Transport, clock: Clock, lesson: Lesson, known: Dataset, eyes: Eyes) -> None:
+        super().__init__("dashboard_lesson", transport, clock)
+        self._lesson = lesson
+        self._known = known
+        self._eyes = eyes
+        self._lock = threading.RLock()
+        self._training: TrainingApart | None = None
+        self._seeing: tuple[Landmarker, Classifier] | None = None
+        self._trying: tuple[TaughtModel, Recognizer] | None = None
+        self._shown: tuple[NDArray[np.uint8], Hand, float] | None = None
+        self._last_s: float | None = None
+        self._last_frame_s = clock.now()
+        self._attended_s = clock.now()
+        self.subscribe(IMAGE_RAW, self._on_image)
+        self.every(_WATCH_PERIOD_S, self._watch)
+
+    @property
+    def view(self) -> View:
+        """What there is to show."""
+        with self._lock:
+            return self._lesson.view
+
+    @property
+    def learnt(self) -> TaughtModel | None:
+        """What was learnt, while it is tried."""
+        with self._lock:
+            return self._lesson.model
+
+    def attend(self) -> None:
+        """Say that the page of who teaches is there: without it for a second, no takes are collected."""
+        self._attended_s = self.clock.now()
+
+    def record(self) -> None:
+        """Begin the countdown to the takes that are missing."""
+        with self._lock:
+            self._lesson.record()
+
+    def pause(self) -> None:
+        """Drop the take that is under way, and collect no more."""
+        with self._lock:
+            self._lesson.pause()
+
+    def delete(self, number: int) -> None:
+        """Delete a take."""
+        with self._lock:
+            self._lesson.delete(number)
+
+    def train(self) -> None:
+        """Learn from the takes, of this lesson and of those before, on a thread and in a process of their own."""
+        with self._lock:
+            if not self._lesson.begin_training():
+                return
+            training = TrainingApart(self._known.with_takes(self._lesson.takes))
+            self._training = training
+        threading.Thread(target=self._learn, args=(training,), name="lesson_training", daemon=True).start()
+
+    def go_back(self) -> None:
+        """Collect further takes; a training that is under way is cancelled, and what was learnt is dropped."""
+        with self._lock:
+            self._cancel()
+            self._lesson.go_back()
+
+    def on_stop(self) -> None:
+        """End the training."""
+        with self._lock:
+            self._cancel()
+
+    def _cancel(self) -> None:
+        training, self._training = self._training, None
+        if training is not None:
+            training.cancel()
+
+    def _learn(self, training: TrainingApart) -> None:
+        def progress(done: int, of: int) -> None:
+            with self._lock:
+                if self._training is training:
+                    self._lesson.advance(done, of)
+
+        trouble, result = "", None
+        try:
+            result = training.run(progress)
+        except TrainingError as error:
+            trouble = str(error)
+        except Exception:
+            log.exception("the training of %s failed", self._lesson.facts.label)
+            trouble = "the training failed; the log says why"
+        with self._lock:
+            if self._training is not training:
+                return  # it was cancelled
+            self._training = None
+            if result is not None:
+                self._lesson.learn(*result)
+            else:
+                self._lesson.go_back(trouble)
+
+    def _on_image(self, received: Received[Image]) -> None:
+        now = self.clock.now()
+        self._last_frame_s = now
+        captured_s = received.captured_s if received.captured_s is not None else now
+        step_s = 0.0 if self._last_s is None else min(max(0.0, captured_s - self._last_s), _LONGEST_STEP_S)
+        self._last_s = captured_s
+        step = self._lesson.step
+        if step == "train":
+            return
+        if self._seeing is None:
+            self._seeing = self._eyes.open_landmarker(), self._eyes.open_shipped()
+        image = bgr_image(received.message)
+        if step == "collect":
+            self._collect(image, step_s, *self._seeing)
+        else:
+            self._try(image, step_s, *self._seeing)
+
+    def _collect(self, image: NDArray[np.uint8], step_s: float, landmarker: Landmarker, shipped: Classifier) -> None:
+        hand = largest(landmarker.detect(image))
+        guess = shipped.classify(hand) if hand is not None else _NOTHING
+        with self._lock:
+            status = self._lesson.see(hand, guess, step_s)
+            if status.finished is not None:
+                if self._shown is not None:
+                    self._lesson.keep(status.finished, thumbnail(*self._shown[:2]))
+                self._shown = None
+            elif status.phase == "recording" and hand is not None:
+                self._remember(image, hand, status.left_s)
+            elif status.phase != "recording":
+                self._shown = None
+
+    def _remember(self, image: NDArray[np.uint8], hand: Hand, left_s: float) -> None:
+        """Remember the frame in the middle of the take: at its begin the hand is still on its way."""
+        if self._shown is None or left_s >= self._shown[2] / 2:
+            whole_s = left_s if self._shown is None else self._shown[2]
+            self._shown = image, hand, whole_s
+
+    def _try(self, image: NDArray[np.uint8], step_s: float, landmarker: Landmarker, shipped: Classifier) -> None:
+        model = self.learnt
+        if model is None:
+            return
+        if self._trying is None or self._trying[0] is not model:
+            landmarker.reset()
+            self._trying = model, Recognizer(landmarker, TaughtClassifier(shipped, model), self._eyes.signs())
+        seen = self._trying[1].step(image, step_s)
+        with self._lock:
+            self._lesson.try_out(seen)
+
+    def _watch(self) -> None:
+        now = self.clock.now()
+        with self._lock:
+            if now - self._attended_s > _UNATTENDED_S and self._lesson.is_recording:
+                self._lesson.pause()
+            if now - self._last_frame_s > _NO_FRAME_S:
+                self._lesson.lose_frames()
+
+
+def thumbnail(image: NDArray[np.uint8], hand: Hand) -> bytes:
+    """Return a small, mirrored JPEG file of ``image``, (height, width, 3) uint8, BGR, with the skeleton of ``hand``."""
+    height, width = image.shape[:2]
+    size = (max(1, round(width * _THUMBNAIL_HEIGHT / height)), _THUMBNAIL_HEIGHT)
+    small = np.asarray(cv2.resize(draw_hand(image, hand), size, interpolation=cv2.INTER_AREA), np.uint8)
+    return encode_jpeg(small, 75).tobytes()

@@ -1,0 +1,259 @@
+"""Who teaches, where it is kept, and how the running graph takes it."""
+
+import datetime
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import yaml
+
+from handsteer.clock import Clock
+from handsteer.config import Config, ControlConfig, TeachConfig, validate
+from handsteer.control.actions import ACTIONS, Action, action_of
+from handsteer.dashboard.teaching.lesson import Lesson, View
+from handsteer.dashboard.teaching.node import Eyes, LessonNode
+from handsteer.errors import ConfigError, DatasetError
+from handsteer.graph import Graph, open_classifier, open_landmarker
+from handsteer.signs.teaching.collect import Facts
+from handsteer.signs.teaching.dataset import Dataset, label_for, load_dataset, save_dataset
+from handsteer.signs.teaching.taught import load_taught, save_taught
+from handsteer.signs.vocabulary import NONE, SIGNS, find_sign
+from handsteer.transports.protocol import Transport
+
+_LONGEST_PERSON: Final = 40
+
+
+@dataclass(frozen=True)
+class Kept:
+    """A sign that was taught and kept.
+
+    Attributes:
+        label: The sign.
+        action: What it does; None for what shall not count.
+        dataset: The file that has its takes.
+        model: The file that has what was learnt, which is in use now.
+        lines: YAML that makes it so at the next start too.
+    """
+
+    label: str
+    action: Action | None
+    dataset: Path
+    model: Path
+    lines: str
+
+
+@dataclass
+class _Given:
+    """The lesson that is given.
+
+    Attributes:
+        viewer: Who gives it.
+        node: Gives it.
+        lost: Signs of the model so far that cannot be learnt again, as there are no takes of them.
+        takes_are_saved: Whether its takes are in the file.
+    """
+
+    viewer: str
+    node: LessonNode
+    lost: tuple[str, ...]
+    takes_are_saved: bool = False
+
+
+class Teaching:
+    """One lesson at a time on a graph that runs in this process; may be used from any thread.
+
+    Files are read and written by :meth:`known`, :meth:`begin` and :meth:`keep`.
+
+    Args:
+        transport: Carries the graph's messages.
+        clock: The graph's clock.
+        plan: Which files, how many takes, how long.
+        eyes: What lessons see with.
+        config: Returns the configuration of the running graph.
+        reconfigure: Lets the running graph take another one; raises ConfigError if it cannot.
+    """
+
+    def __init__(
+        self,
+        transport: Transport,
+        clock: Clock,
+        plan: TeachConfig,
+        eyes: Eyes,
+        *,
+        config: Callable[[], Config],
+        reconfigure: Callable[[Config], None],
+    ) -> None:
+        self._wires = (transport, clock)
+        self._plan = plan
+        self._eyes = eyes
+        self._config = config
+        self._reconfigure = reconfigure
+        self._lock = threading.RLock()
+        self._given: _Given | None = None
+        self._closed = False
+
+    @classmethod
+    def of(cls, graph: Graph) -> "Teaching":
+        """Return the teaching on a graph whose nodes are all in this process."""
+        config = graph.config
+        eyes = Eyes(
+            open_landmarker=lambda: open_landmarker(config),
+            open_shipped=lambda: open_classifier(config.signs.model_copy(update={"model": None})),
+            signs=lambda: graph.config.signs,
+        )
+        wires = (graph.transport, graph.clock)
+        return cls(*wires, config.teach, eyes, config=lambda: graph.config, reconfigure=graph.reconfigure)
+
+    @property
+    def label(self) -> str | None:
+        """The sign that is being taught, whoever does; None when none is."""
+        given = self._given
+        return given.node.view.label if given else None
+
+    @property
+    def model_path(self) -> Path:
+        """The file that what is learnt is written to."""
+        return self._config().signs.model or self._plan.model
+
+    def known(self) -> Dataset:
+        """Return the takes of earlier lessons.
+
+        Raises:
+            DatasetError: Their file is damaged.
+        """
+        path = self._plan.dataset.expanduser()
+        return load_dataset(path) if path.exists() else Dataset()
+
+    def actions(self) -> tuple[Action, ...]:
+        """Return what a sign can be given to do."""
+        several = bool(self._config().control.robots)
+        return tuple(action for action in ACTIONS if several or action != "next_robot")
+
+    def action_of(self, label: str) -> Action:
+        """Return what the sign ``label`` does now, or would."""
+        return action_of(label, self._config().control.actions)
+
+    def begin(self, viewer: str, name: str, person: str = "") -> None:
+        """Begin a lesson; one that another viewer has left is over.
+
+        Args:
+            viewer: Who teaches.
+            name: The sign: one that was taught before, a new one, or ``NONE`` for what shall not count.
+            person: Who shows it; ``me`` by default.
+
+        Raises:
+            DatasetError: It is no name, the name of a shipped sign, or the file of takes is damaged.
+            ModelError: The file that would be written over is no model of taught signs.
+        """
+        known = self.known()
+        label = label_for(name, known.labels)
+        if label in SIGNS:
+            raise DatasetError(f"{label} is known already: give the new sign a name of its own")
+        path = self.model_path.expanduser()
+        old = load_taught(path).labels if path.exists() else ()
+        lost = tuple(sign for sign in old if sign not in (*known.labels, label))
+        when = f"{datetime.datetime.now():%Y-%m-%d %H:%M}"
+        lesson = Lesson(Facts(label, _person(person), when, "page"), self._plan)
+        node = LessonNode(*self._wires, lesson, known, self._eyes)
+        with self._lock:
+            self._end()
+            if not self._closed:
+                self._given = _Given(viewer, node, lost)
+                node.start()
+
+    def lesson(self, viewer: str) -> LessonNode | None:
+        """Return the lesson that ``viewer`` gives, if it does."""
+        given = self._given
+        return given.node if given is not None and given.viewer == viewer else None
+
+    def view(self, viewer: str) -> View | None:
+        """Return what there is to show of the lesson that ``viewer`` gives, if it does."""
+        node = self.lesson(viewer)
+        return node.view if node else None
+
+    def lost(self) -> tuple[str, ...]:
+        """Return the signs that are in the model so far, and would not be in the one of this lesson."""
+        given = self._given
+        return given.lost if given else ()
+
+    def keep(self, viewer: str, action: str) -> Kept | None:
+        """Keep what was learnt, and let the graph use it; the lesson is over.
+
+        The takes and the model are in their files, and the robot obeys the sign as soon as it may move again.
+
+        Args:
+            viewer: Who gives the lesson.
+            action: What the sign does.
+
+        Returns:
+            What was kept; None when ``viewer`` gives no lesson, or has nothing to keep yet.
+
+        Raises:
+            ConfigError: There is no such action, or the running nodes refuse the sign.
+            DatasetError: The file of takes is damaged, or cannot be written.
+            ModelError: The file of what was learnt cannot be written.
+        """
+        with self._lock:
+            given = self._given
+            model = given.node.learnt if given is not None and given.viewer == viewer else None
+            if given is None or model is None:
+                return None
+            view = given.node.view
+            does = next((each for each in self.actions() if each == action and view.label != NONE), None)
+            if does is None and view.label != NONE:
+                raise ConfigError(f"{action!r} is no action: choose one of {', '.join(self.actions())}")
+            path = self.model_path
+            save_taught(model, path.expanduser())
+            if not given.takes_are_saved:
+                takes = [each.take for each in view.takes]
+                save_dataset(self.known().with_takes(takes), self._plan.dataset.expanduser())
+                given.takes_are_saved = True
+            self._reconfigure(with_sign(self._config(), path, view.label, does))
+            self._end()
+            return Kept(view.label, does, self._plan.dataset, path, self._lines(path))
+
+    def end(self, viewer: str) -> None:
+        """End the lesson that ``viewer`` gives, if it does, and keep nothing of it."""
+        with self._lock:
+            if self._given is not None and self._given.viewer == viewer:
+                self._end()
+
+    def close(self) -> None:
+        """End whatever is under way, for good."""
+        with self._lock:
+            self._closed = True
+            self._end()
+
+    def _end(self) -> None:
+        given, self._given = self._given, None
+        if given is not None:
+            # Off this thread, which may be the server's: a frame may be under way.
+            threading.Thread(target=given.node.stop, name="lesson_end", daemon=True).start()
+
+    def _lines(self, model: Path) -> str:
+        actions = dict(self._config().control.actions)
+        content = {"signs": {"model": str(model)}, **({"control": {"actions": actions}} if actions else {})}
+        return yaml.safe_dump(content, sort_keys=False, allow_unicode=True)
+
+
+def with_sign(config: Config, model: Path, label: str, action: Action | None) -> Config:
+    """Return ``config`` with another model of taught signs, and what the sign ``label`` does, if it does anything.
+
+    Raises:
+        ConfigError: ``label`` cannot do that.
+    """
+    control = config.control
+    if action is not None:
+        actions = {**control.actions, find_sign(label, control.actions) or label: action}
+        control = validate(ControlConfig, {**control.model_dump(exclude_unset=True), "actions": actions})
+    signs = config.signs.model_copy(update={"model": model})
+    return config.model_copy(update={"signs": signs, "control": control})
+
+
+def _person(name: str) -> str:
+    name = " ".join(name.split())
+    if len(name) > _LONGEST_PERSON or not name.isprintable():
+        raise DatasetError(f"{name[:60]!r} is no name of a person: give up to {_LONGEST_PERSON} printable characters")
+    return name or "me"

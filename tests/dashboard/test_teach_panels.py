@@ -1,0 +1,69 @@
+"""What the page to teach on says, in words; and what it says where nothing can be taught."""
+
+import dataclasses
+
+import pytest
+
+from handsteer.config import TeachConfig
+from handsteer.control.actions import EFFECTS, Action
+from handsteer.dashboard.panels.teach_collect import counted, said_now
+from handsteer.dashboard.panels.teach_result import opinion
+from handsteer.dashboard.teaching.lesson import Collected, Lesson, View
+from handsteer.signs.recognizer import Recognition
+from handsteer.signs.teaching.collect import Facts, Status
+from handsteer.signs.vocabulary import NONE
+from tests.dashboard.served import Site
+from tests.signs.hands import show_sign
+from tests.signs.teaching.takes import take
+
+HAND = show_sign("Peace")
+
+
+def does(sign: str) -> Action:
+    return "turbo" if sign == "Peace" else "stop"
+
+
+@pytest.mark.parametrize(
+    ("seen", "expected"),
+    [
+        (None, ("No picture", "")),
+        (Recognition(NONE, NONE, 0.0, 0.0, None), ("No hand", "no hand is in view")),
+        (Recognition(NONE, NONE, 0.0, 0.0, HAND), ("No sign", "show Peace")),
+        (Recognition(NONE, "Peace", 0.934, 0.2, HAND), ("Peace, 93%", f"would mean: {EFFECTS['turbo']}")),
+        (Recognition("Stop", "Stop", 1.0, 0.0, HAND), ("Stop, 100%", "would mean: stops")),
+    ],
+)
+def test_what_a_hand_would_do(seen: Recognition | None, expected: tuple[str, str]) -> None:
+    assert opinion(seen, "Peace", does) == expected
+
+
+def view(takes: int, status: Status) -> View:
+    lesson = Lesson(Facts("Peace", "me", "today", "page"), TeachConfig(takes=2))
+    for number in range(takes):
+        lesson.keep(take("Peace", hands=7, seed=number), b"")
+    return dataclasses.replace(lesson.view, status=status)
+
+
+def test_takes_are_counted() -> None:
+    ready = Status("ready", 0.0, 0)
+    assert [counted(view(takes, ready)) for takes in (0, 2, 3)] == [
+        "0 of 2 takes, 0 hands",
+        "2 of 2 takes, 14 hands",
+        "3 takes, 21 hands",
+    ]
+    assert isinstance(view(1, ready).takes[0], Collected)
+
+
+def test_the_large_letters_say_what_to_do_now() -> None:
+    assert said_now(view(0, Status("countdown", 2.1, 0))) == ("3", "then show Peace")
+    assert said_now(view(0, Status("recording", 1.0, 34))) == ("34", "hands: show Peace")
+
+
+def test_where_the_graph_is_elsewhere_the_page_says_so() -> None:
+    site = Site()
+    try:
+        answer = site.get("/teach")
+        assert answer.status == 200
+        assert b"handsteer signs collect" in answer.read()
+    finally:
+        site.close()

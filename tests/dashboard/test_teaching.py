@@ -1,0 +1,221 @@
+"""Teaching on the nodes of a graph, without a page: real training, hands that are made."""
+
+import itertools
+import threading
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from handsteer.clock import RealClock
+from handsteer.config import Config, TeachConfig
+from handsteer.dashboard.teaching.node import Eyes, thumbnail
+from handsteer.dashboard.teaching.teaching import Teaching, with_sign
+from handsteer.errors import ConfigError, DatasetError, ModelCorrupt
+from handsteer.graph import open_classifier
+from handsteer.images import image_message
+from handsteer.landmarks.protocol import Hand
+from handsteer.landmarks.recorded import RecordedLandmarker
+from handsteer.messages import IMAGE_RAW, Header
+from handsteer.signs.teaching.dataset import Dataset, load_dataset, save_dataset
+from handsteer.signs.teaching.taught import load_taught, save_taught
+from handsteer.transports.in_process import InProcessTransport
+from tests.signs.hands import show_sign
+from tests.signs.teaching.models import model
+from tests.signs.teaching.takes import shaken, takes
+
+PATIENCE_S = 180.0
+IMAGE = np.full((48, 64, 3), 90, np.uint8)
+
+
+class School:
+    """Teaching, and frames that come ten times as fast as the lesson's clock says."""
+
+    def __init__(self, folder: Path, hands: list[Hand]) -> None:
+        self.folder = folder
+        self.clock = RealClock()
+        self.transport = InProcessTransport()
+        self.config = Config()
+        plan = TeachConfig(
+            dataset=folder / "signs.npz", model=folder / "mine.npz", takes=3, take_time=1.0, countdown=0.5
+        )
+        eyes = Eyes(
+            open_landmarker=lambda: RecordedLandmarker([[hand] for hand in hands] * 1000),
+            open_shipped=lambda: open_classifier(Config().signs),
+            signs=lambda: self.config.signs,
+        )
+        self.teaching = Teaching(
+            self.transport,
+            self.clock,
+            plan,
+            eyes,
+            config=lambda: self.config,
+            reconfigure=self._take,
+        )
+        self.refuses = False
+        self._ended = threading.Event()
+        self._camera = threading.Thread(target=self._publish)
+        self._camera.start()
+
+    def _take(self, config: Config) -> None:
+        if self.refuses:
+            raise ConfigError("signs.model: refused")
+        self.config = config
+
+    def _publish(self) -> None:
+        images = self.transport.advertise("my_camera", IMAGE_RAW)
+        for number in itertools.count():
+            if self._ended.wait(0.005):
+                return
+            header = Header(self.clock.stamp(self.clock.now()), "camera")
+            images.publish(image_message(IMAGE, header), number * 0.05)
+
+    @property
+    def files(self) -> set[str]:
+        return {path.name for path in self.folder.iterdir()}
+
+    def wait_until(self, condition: Callable[[], bool]) -> None:
+        for _ in range(round(PATIENCE_S / 0.02)):
+            lesson = self.teaching.lesson("ann")
+            if lesson is not None:
+                lesson.attend()
+            if condition():
+                return
+            self._ended.wait(0.02)
+        pytest.fail(f"waited in vain; the lesson is at {self.teaching.view('ann')}")
+
+    def close(self) -> None:
+        self.teaching.close()
+        self._ended.set()
+        self._camera.join()
+
+
+@pytest.fixture
+def school(tmp_path: Path) -> Iterator[School]:
+    random = np.random.default_rng(4)
+    school = School(tmp_path, [shaken("Peace", random) for _ in range(60)])
+    yield school
+    school.close()
+
+
+def collected(school: School) -> int:
+    view = school.teaching.view("ann")
+    return len(view.takes) if view else -1
+
+
+@pytest.mark.slow
+def test_a_sign_is_collected_learnt_kept_and_taken_by_the_graph(school: School) -> None:
+    save_dataset(Dataset(tuple(takes("Call", count=2))), school.folder / "signs.npz")
+    save_taught(model(), school.folder / "mine.npz")
+    teaching = school.teaching
+    teaching.begin("ann", " peace ", "Ann")
+    assert teaching.lost() == ("Hi", "Ho")
+    assert teaching.keep("ann", "turbo") is None, "nothing is learnt yet"
+    lesson = teaching.lesson("ann")
+    assert lesson is not None
+    assert teaching.lesson("ben") is None
+    lesson.record()
+    school.wait_until(lambda: collected(school) == 3)
+    lesson.delete(1)
+    assert school.files == {"signs.npz", "mine.npz"}
+    assert teaching.view("ann").takes[0].picture.startswith(b"\xff\xd8")
+
+    lesson.train()
+    school.wait_until(lambda: teaching.view("ann").progress > 0)
+    school.wait_until(lambda: teaching.view("ann").step == "try")
+    school.wait_until(lambda: (seen := teaching.view("ann").seen) is not None and seen.sign == "peace")
+    assert teaching.view("ann").report.confusion.labels == ("Call", "peace", "NONE")
+
+    with pytest.raises(ConfigError, match="'fly' is no action: choose one of forward"):
+        teaching.keep("ann", "fly")
+    assert teaching.keep("ben", "turbo") is None
+    school.refuses = True
+    with pytest.raises(ConfigError, match="refused"):
+        teaching.keep("ann", "turbo")
+    school.refuses = False
+    kept = teaching.keep("ann", "turbo")
+    assert kept is not None
+    assert school.config.control.actions == {"peace": "turbo"}
+    assert school.config.signs.model == school.folder / "mine.npz"
+    assert load_taught(school.folder / "mine.npz").labels == ("Call", "peace")
+    saved = load_dataset(school.folder / "signs.npz").takes
+    assert [(take.label, take.person) for take in saved] == [("Call", "me")] * 2 + [("peace", "Ann")] * 2
+    assert (teaching.label, teaching.view("ann")) == (None, None)
+    assert "actions:\n    peace: turbo" in kept.lines
+
+
+def test_what_is_discarded_leaves_nothing(school: School) -> None:
+    school.teaching.begin("ann", "Peace")
+    lesson = school.teaching.lesson("ann")
+    lesson.record()
+    school.wait_until(lambda: collected(school) == 2)
+    school.teaching.end("ben")
+    assert school.teaching.label == "Peace", "another one's lesson goes on"
+    school.teaching.end("ann")
+    assert (school.teaching.label, school.files, school.config) == (None, set(), Config())
+
+
+def test_a_training_is_cancelled_with_the_lesson_or_before(school: School) -> None:
+    school.teaching.begin("ann", "Peace")
+    lesson = school.teaching.lesson("ann")
+    lesson.record()
+    school.wait_until(lambda: collected(school) == 3)
+    lesson.train()
+    lesson.go_back()
+    assert (lesson.view.step, collected(school)) == ("collect", 3)
+    lesson.train()
+    school.teaching.end("ann")
+    school.wait_until(lambda: not any(thread.name == "lesson_training" for thread in threading.enumerate()))
+    assert school.files == set()
+
+
+def test_takes_are_collected_only_while_the_page_is_there(school: School) -> None:
+    school.teaching.begin("ann", "Peace")
+    lesson = school.teaching.lesson("ann")
+    lesson.record()
+    waiting = threading.Event()
+    for _ in range(200):
+        if not lesson.view.recording:
+            break
+        waiting.wait(0.05)
+    assert not lesson.view.recording
+    assert school.teaching.label == "Peace", "the page may come back"
+
+
+@pytest.mark.parametrize(
+    ("name", "person", "problem"),
+    [
+        ("", "", "'' is no name for a sign"),
+        ("turn left", "", "Turn Left is known already: give the new sign a name of its own"),
+        ("x" * 41, "", "is no name for a sign"),
+        ("Hi\x07", "", "is no name for a sign"),
+        ("Hi", "y" * 41, "is no name of a person"),
+    ],
+)
+def test_what_is_no_name_is_refused(school: School, name: str, person: str, problem: str) -> None:
+    with pytest.raises(DatasetError, match=problem):
+        school.teaching.begin("ann", name, person)
+    assert school.teaching.label is None
+
+
+def test_files_that_are_something_else_are_not_written_over(school: School) -> None:
+    (school.folder / "mine.npz").write_bytes(b"my thesis")
+    with pytest.raises(ModelCorrupt, match="not a model of taught signs"):
+        school.teaching.begin("ann", "Peace")
+    (school.folder / "signs.npz").write_bytes(b"my thesis")
+    with pytest.raises(DatasetError, match="not a dataset of signs"):
+        school.teaching.begin("ann", "Peace")
+
+
+def test_a_sign_that_has_an_action_by_another_spelling_gets_another() -> None:
+    config = Config.model_validate({"control": {"actions": {"thumb-up": "go"}, "max_linear": 0.5}})
+    changed = with_sign(config, Path("mine.npz"), "Thumb up", "turbo")
+    assert changed.control.actions == {"thumb-up": "turbo"}
+    assert changed.control.max_linear == 0.5
+    assert with_sign(config, Path("mine.npz"), "NONE", None).control == config.control
+
+
+def test_a_picture_of_a_take_is_small() -> None:
+    picture = thumbnail(np.zeros((480, 640, 3), np.uint8), show_sign("Stop"))
+    assert len(picture) < 10_000
