@@ -30,9 +30,9 @@ class DrivePage(Page):
             f'<link rel="stylesheet" href="{ASSETS_PATH}/world.css">'
             f'<script src="{ASSETS_PATH}/webcam.js" defer></script>'
         )
-        self._cameras = served.cameras
-        self._camera = CameraPanel(PICTURE_PATH, served.cameras, self.client.id, self._use_own_camera)
-        self._world = WorldPanel(served.robot, self.drives, self._watches)
+        self._cameras = served.local.cameras
+        self._camera = CameraPanel(PICTURE_PATH, served.local.cameras, self.client.id, self._use_own_camera)
+        self._world = WorldPanel(served.local.robot, self.drives, self._watches)
         with ui.element("div").classes("panels"):
             self._velocity = VelocityPanel()
             self._timing = TimingPanel()

@@ -34,24 +34,35 @@ _THEME_ICON = (
 
 
 @dataclass(frozen=True)
+class Local:
+    """What of the graph is in this process, where pages do more than topics let them; None is in another process.
+
+    Attributes:
+        cameras: The graph's camera, which a browser's may stand in for.
+        robot: The node of the robot, whose world people edit.
+        settings: The graph's parameters.
+        teaching: Gives lessons.
+    """
+
+    cameras: ChoiceOfCameras | None = None
+    robot: RobotNode | None = None
+    settings: Settings | None = None
+    teaching: Teaching | None = None
+
+
+@dataclass(frozen=True)
 class Served:
     """What the pages are made of.
 
     Attributes:
         node: Is joined for as long as a browser shows a page.
-        cameras: The graph's camera, which a browser's may stand in for; None where that cannot be.
+        local: What of the graph is in this process.
         topics: Whether steering by hand may go to other topics than the control's.
-        settings: The graph's parameters; None where they are in other processes.
-        robot: The node of the robot, whose world people edit; None where it is in another process.
-        teaching: Gives the lessons; None where the graph is in other processes.
     """
 
     node: WhileWatched[DashboardNode]
-    cameras: ChoiceOfCameras | None
-    topics: bool = False
-    settings: Settings | None = None
-    robot: RobotNode | None = None
-    teaching: Teaching | None = None
+    local: Local
+    topics: bool
 
 
 class Page:

@@ -17,14 +17,14 @@ from starlette.responses import Response
 from starlette.staticfiles import StaticFiles
 from starlette.websockets import WebSocket
 
-from handsteer.cameras.browser import LARGEST_BYTES, ChoiceOfCameras
+from handsteer.cameras.browser import LARGEST_BYTES
 from handsteer.clock import Clock
 from handsteer.config import DashboardConfig
 from handsteer.dashboard.access import Access, AccessMiddleware
 from handsteer.dashboard.drive import DrivePage
 from handsteer.dashboard.history import VelocityHistory
 from handsteer.dashboard.node import DashboardNode
-from handsteer.dashboard.page import ASSETS_PATH, ICON, PICTURE_PATH, WEBCAM_PATH, Served
+from handsteer.dashboard.page import ASSETS_PATH, ICON, PICTURE_PATH, WEBCAM_PATH, Local, Served
 from handsteer.dashboard.picture import PictureNode, PictureResponse
 from handsteer.dashboard.settings import SettingsPage
 from handsteer.dashboard.settings_file import DEFAULT_FILE, SettingsFile
@@ -36,7 +36,6 @@ from handsteer.dashboard.webcam import FrameSocket
 from handsteer.errors import DashboardError
 from handsteer.graph import Graph, cmd_vel_topic
 from handsteer.messages import CMD_VEL, Topic
-from handsteer.nodes.robot import RobotNode
 from handsteer.nodes.steering import SteeringNode
 from handsteer.transports.protocol import Transport
 
@@ -61,11 +60,8 @@ class Dashboard:
         steering: Drives when people steer on the page.
         config: Where the page is served, and how.
         cmd_vel: The topic of the commands that are shown.
-        cameras: The camera of this process, which a browser's may stand in for; None where it is in another.
+        local: What of the graph is in this process; nothing but the steering by default.
         topics: Whether steering by hand may go to other topics than the control's, where other robots may be.
-        settings: The parameters of the graph; None where its nodes are in other processes.
-        robot: The robot of this process, whose world people edit; None where it is in another.
-        teaching: Gives lessons on the graph; None where its nodes are in other processes.
 
     Attributes:
         node: Listens and steers for the browsers that show the page.
@@ -82,17 +78,15 @@ class Dashboard:
         config: DashboardConfig,
         *,
         cmd_vel: Topic[Any] = CMD_VEL,
-        cameras: ChoiceOfCameras | None = None,
+        local: Local | None = None,
         topics: bool = False,
-        settings: Settings | None = None,
-        robot: RobotNode | None = None,
-        teaching: Teaching | None = None,
     ) -> None:
+        local = local or Local()
         history = VelocityHistory()  # outlives the node, so that a page that is loaded anew shows it
         self.node = WhileWatched(lambda: DashboardNode(transport, clock, steering, cmd_vel, history))
         self.pictures = WhileWatched(lambda: PictureNode(transport, clock))
-        self.served = Served(self.node, cameras, topics, settings, robot, teaching)
-        self.webcam = FrameSocket(cameras, self._drives)
+        self.served = Served(self.node, local, topics)
+        self.webcam = FrameSocket(local.cameras, self._drives)
         self._config = config
         self._server: uvicorn.Server | None = None
         self._thread: threading.Thread | None = None
@@ -113,15 +107,8 @@ class Dashboard:
         settings = Settings(lambda: graph.config, graph.reconfigure, settings_file)
         topic = cmd_vel_topic(graph.config)
         wires = (graph.transport, graph.clock, graph.steering)
-        return cls(
-            *wires,
-            graph.config.dashboard,
-            cmd_vel=topic,
-            cameras=graph.cameras,
-            settings=settings,
-            robot=graph.robot,
-            teaching=Teaching.of(graph),
-        )
+        local = Local(graph.cameras, graph.robot, settings, Teaching.of(graph))
+        return cls(*wires, graph.config.dashboard, cmd_vel=topic, local=local)
 
     def start(self) -> str:
         """Serve the page and return its address once it answers; it holds the token where one is needed.
@@ -165,8 +152,8 @@ class Dashboard:
         """End the page, open connections too; may be called twice."""
         self.node.close()
         self.pictures.close()
-        if self.served.teaching is not None:
-            self.served.teaching.close()
+        if self.served.local.teaching is not None:
+            self.served.local.teaching.close()
         if self._server is not None and self._thread is not None:
             self._server.should_exit = True
             self._thread.join(_STOP_TIMEOUT_S)
@@ -272,5 +259,8 @@ def _application() -> FastAPI:
         binding_refresh_interval=None,
         gzip_middleware_factory=None,
         show_welcome_message=False,
+        # A browser that is busy drawing answers late; taken for gone, it would load the page anew and lose its seat.
+        # Who steers is missed much sooner, by what the page repeats.
+        reconnect_timeout=10.0,
     )
     return application

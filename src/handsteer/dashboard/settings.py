@@ -21,11 +21,11 @@ class SettingsPage(Page):
         super().__init__(served, "/settings")
         ui.add_head_html(f'<link rel="stylesheet" href="{ASSETS_PATH}/settings.css">')
         self._panel: SettingsPanel | None = None
-        if served.settings is None:
+        if served.local.settings is None:
             with ui.element("section").classes("card panel"):
                 text("elsewhere", _ELSEWHERE)
         else:
-            self._panel = SettingsPanel(served.settings, self.drives)
+            self._panel = SettingsPanel(served.local.settings, self.drives)
 
     def show(self, node: DashboardNode, state: PageState) -> None:
         """Show what is new."""

@@ -37,13 +37,13 @@ class TeachPage(Page):
             + f'<script src="{ASSETS_PATH}/webcam.js" defer></script>'
         )
         self._lesson: _LessonCard | None = None
-        if served.teaching is None:
+        if served.local.teaching is None:
             with card("Teach a sign", "lesson panel"):
                 ui.label(_ELSEWHERE)
             return
-        self._teaching = served.teaching
-        self._cameras = served.cameras
-        self._camera = CameraPanel(PICTURE_PATH, served.cameras, self.client.id, self._use_own_camera)
+        self._teaching = served.local.teaching
+        self._cameras = served.local.cameras
+        self._camera = CameraPanel(PICTURE_PATH, served.local.cameras, self.client.id, self._use_own_camera)
         self._lesson = _LessonCard(self, self._teaching)
         self._countdown = Countdown(self._camera.stage)
         self.client.on_disconnect(self._pause)
