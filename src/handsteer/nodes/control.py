@@ -156,8 +156,6 @@ class HandSignControlNode(Node):
             stopped=self._is_stopped,
             linear_mps=f"{velocity.linear_mps:.3f}",
             angular_radps=f"{velocity.angular_radps:.3f}",
-            max_linear=self._config.max_linear,
-            max_angular=self._config.max_angular,
             **({"robot": self._selection.fleet.selected} if self._selection else {}),
             **tell(self._config),
             **self._latencies(),
