@@ -1,8 +1,16 @@
-"""Makes the README's picture of the page: the virtual hand drives the robot, headless Chromium looks at it."""
+"""Makes the README's pictures of the page: the virtual hand drives the robot, headless Chromium looks at it."""
 
+import base64
 import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
+import cv2
+import numpy as np
 from chromium import launch
 from playwright.sync_api import Page, sync_playwright
 
@@ -11,22 +19,37 @@ from handsteer.dashboard.server import Dashboard
 from handsteer.errors import HandsteerError
 from handsteer.graph import Graph
 
-PATH = Path(__file__).resolve().parents[1] / "docs" / "images" / "page.png"
+IMAGES = Path(__file__).resolve().parents[1] / "docs" / "images"
+PICTURE, ANIMATION = IMAGES / "page.png", IMAGES / "drive.webp"
 WIDTH, HEIGHT = 1280, 800
-LARGEST_BYTES = 400_000
+LARGEST_BYTES = {PICTURE: 400_000, ANIMATION: 1_500_000}
 DRIVEN_M = 1.0
 PATIENCE_MS = 120_000
 
-CONFIG = {
-    "camera": {"source": "virtual"},
-    "virtual_hand": {"script": "Forward:6 Turn Left:1 Forward:3"},
-    "dashboard": {"port": 0},
-}
+SHOWN_S, FRAMES_PER_S = 15.0, 6.0
+SHOWN_WIDTH = 800
+QUALITY = 60
+
+COURSE = "Stop:2 Forward:3 Turn Left:1.5 Forward:3 Turn Right:1.5 Go:1 Backward:2 Stop:2"
 
 
 def main() -> None:
-    config = load(base=CONFIG)
-    with Graph(config) as graph, sync_playwright() as playwright:
+    with opened("Forward:6 Turn Left:1 Forward:3") as page:
+        take(page, PICTURE)
+    with opened(COURSE) as page:
+        record(page, ANIMATION)
+    for path, largest in LARGEST_BYTES.items():
+        size = path.stat().st_size
+        if size > largest:
+            sys.exit(f"{path} has {size} bytes, it should have at most {largest}")
+        print(f"{path}: {size} bytes")
+
+
+@contextmanager
+def opened(script: str) -> Iterator[Page]:
+    """Show the page of a graph whose virtual hand shows ``script``."""
+    hand = {"camera": {"source": "virtual"}, "virtual_hand": {"script": script}}
+    with Graph(load(base={**hand, "dashboard": {"port": 0}})) as graph, sync_playwright() as playwright:
         dashboard = Dashboard.of(graph)
         url = dashboard.start()
         try:
@@ -35,14 +58,10 @@ def main() -> None:
             page.goto(url)
             page.wait_for_selector(".world canvas")
             graph.start()
-            take(page, PATH)
+            yield page
             browser.close()
         finally:
             dashboard.stop()
-    size = PATH.stat().st_size
-    if size > LARGEST_BYTES:
-        sys.exit(f"{PATH} has {size} bytes, it should have at most {LARGEST_BYTES}")
-    print(f"{PATH}: {size} bytes")
 
 
 def take(page: Page, path: Path) -> None:
@@ -60,6 +79,50 @@ def take(page: Page, path: Path) -> None:
         timeout=PATIENCE_MS,
     )
     page.screenshot(path=path)
+
+
+def record(page: Page, path: Path) -> None:
+    """Save what ``page`` shows from the first sign on as an animation in real time."""
+    page.wait_for_function("document.querySelector('.camera .sign').textContent === 'Stop'", timeout=PATIENCE_MS)
+    frames: list[tuple[float, bytes]] = []
+    devtools = page.context.new_cdp_session(page)
+
+    def keep(frame: dict[str, Any]) -> None:
+        frames.append((frame["metadata"]["timestamp"], base64.b64decode(frame["data"])))
+        devtools.send("Page.screencastFrameAck", {"sessionId": frame["sessionId"]})
+
+    devtools.on("Page.screencastFrame", keep)
+    devtools.send("Page.startScreencast", {"format": "jpeg", "quality": 95, "maxWidth": WIDTH, "maxHeight": HEIGHT})
+    end_s = time.monotonic() + SHOWN_S
+    while time.monotonic() < end_s:
+        page.wait_for_timeout(50)
+    devtools.send("Page.stopScreencast")
+    animate(thinned(frames), path)
+
+
+def thinned(frames: list[tuple[float, bytes]]) -> list[tuple[float, bytes]]:
+    """Return those of ``frames``, each with its time in seconds, that are far enough from one another."""
+    kept = frames[:1]
+    for frame in frames:
+        if frame[0] - kept[-1][0] >= 1 / FRAMES_PER_S:
+            kept.append(frame)
+    return kept
+
+
+def animate(frames: list[tuple[float, bytes]], path: Path) -> None:
+    """Save JPEG files, each with its time in seconds, as an animated WebP."""
+    animation = cv2.Animation()
+    animation.frames = [small(jpeg) for _, jpeg in frames]
+    durations_ms = [round(1000 * (after - before)) for (before, _), (after, _) in pairwise(frames)]
+    animation.durations = [*durations_ms, 1000]
+    cv2.imwriteanimation(str(path), animation, [cv2.IMWRITE_WEBP_QUALITY, QUALITY])
+
+
+def small(jpeg: bytes) -> np.ndarray:
+    """Return a JPEG file's picture at the animation's size, with the alpha that the format wants."""
+    picture = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR)
+    height = round(picture.shape[0] * SHOWN_WIDTH / picture.shape[1])
+    return cv2.cvtColor(cv2.resize(picture, (SHOWN_WIDTH, height), interpolation=cv2.INTER_AREA), cv2.COLOR_BGR2BGRA)
 
 
 if __name__ == "__main__":
