@@ -38,6 +38,7 @@ class Network:
         reach: One of ROS 2's ranges, ``PEERS`` for this machine and static peers, or ``CYCLONEDDS_URI``.
         places: How many participants of the domain find ports of their own on this machine; None when it is not ours
             to say.
+        peers: Further machines that are looked at, as in ``ROS_STATIC_PEERS``.
     """
 
     domain: int
@@ -45,6 +46,7 @@ class Network:
     distribution: str = "jazzy"
     reach: str = "LOCALHOST"
     places: int | None = None
+    peers: tuple[str, ...] = ()
 
     @property
     def is_local(self) -> bool:
@@ -78,7 +80,7 @@ def network(environment: Mapping[str, str]) -> Network:
         peers = []
     places = PLACES_BY_MULTICAST if reach == "SUBNET" and not peers else PLACES
     found = "PEERS" if peers and reach == "LOCALHOST" else reach
-    return Network(domain, _config(reach, peers, places), distribution, found, places)
+    return Network(domain, _config(reach, peers, places), distribution, found, places, tuple(peers))
 
 
 def _range(environment: Mapping[str, str]) -> str:

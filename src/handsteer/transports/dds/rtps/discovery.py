@@ -1,4 +1,4 @@
-"""Who is in a domain and what they have, as RTPS participants tell one another (DDSI-RTPS 2.5, sections 8.5 and 9.6)."""
+"""Who is in a domain and what they have, as RTPS participants tell one another (DDSI-RTPS 2.5, 8.5 and 9.6)."""
 
 import socket
 import struct
@@ -30,7 +30,7 @@ _REQUESTS = 1000
 _LEASE, _TOPIC_NAME, _TYPE_NAME, _DOMAIN_ID, _VERSION, _VENDOR = 0x02, 0x05, 0x07, 0x0F, 0x15, 0x16
 _RELIABILITY, _DURABILITY, _USER_DATA, _UNICAST, _DEFAULT_UNICAST = 0x1A, 0x1D, 0x2C, 0x2F, 0x31
 _METATRAFFIC_UNICAST, _HISTORY, _PARTICIPANT_GUID, _ENDPOINT_SET, _ENDPOINT_GUID = 0x32, 0x40, 0x50, 0x58, 0x5A
-_KEY_HASH, _STATUS = 0x70, 0x71
+KEY_HASH, _STATUS = 0x70, 0x71
 _GONE = bytes.fromhex("00000003")  # disposed and unregistered; big-endian in any message
 
 
@@ -105,14 +105,14 @@ def endpoint_payload(data: EndpointData) -> bytes:
             _DURABILITY: [struct.pack("<I", _VOLATILE)],
             _HISTORY: [struct.pack("<II", 0, _REQUESTS)],
             _USER_DATA: [_octets(data.user_data)],
-            _KEY_HASH: [data.guid],
+            KEY_HASH: [data.guid],
         }
     )
 
 
 def farewell(guid: bytes, parameter: int = _PARTICIPANT_GUID) -> tuple[bytes, Parameters]:
     """Return the payload and what is said about it by which a participant takes its leave."""
-    return _ENCAPSULATION + _encoded({parameter: [guid]}), Parameters({_KEY_HASH: [guid], _STATUS: [_GONE]})
+    return _ENCAPSULATION + _encoded({parameter: [guid]}), Parameters({KEY_HASH: [guid], _STATUS: [_GONE]})
 
 
 def read_participant(data: Data) -> ParticipantData | None:
@@ -150,7 +150,7 @@ def is_gone(data: Data) -> bool:
 def key(data: Data) -> bytes | None:
     """Return the identifier of what the sample tells of, or of what is gone; None when it does not say."""
     found = _parameters(data) or Parameters()
-    for guid in (data.inline.first(_KEY_HASH), *(found.first(number) for number in (_ENDPOINT_GUID, _PARTICIPANT_GUID))):
+    for guid in (data.inline.first(KEY_HASH), *(found.first(number) for number in (_ENDPOINT_GUID, _PARTICIPANT_GUID))):
         if guid is not None and len(guid) == _GUID_BYTES:
             return guid
     return None

@@ -5,11 +5,11 @@ end has not confirmed it.
 """
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from handsteer.transports.dds.rtps.wire import WIDEST_SET, AckNack, Data, Gap, Heartbeat, Parameters, Submessage
 
-_AHEAD = 1024
+_AHEAD = WIDEST_SET
 """How far ahead of the next sample one is kept that has come too early."""
 
 
@@ -40,7 +40,7 @@ class Writer:
     """
 
     def __init__(self, entity: bytes, *, keeps: bool, depth: int) -> None:
-        self._entity = entity
+        self.entity = entity
         self._keeps = keeps
         self._depth = depth
         self._last = 0
@@ -76,7 +76,7 @@ class Writer:
     ) -> dict[bytes, list[Submessage]]:
         """Write a sample, for all readers or for one; return what each of them gets."""
         self._last += 1
-        data = Data(bytes(4), self._entity, self._last, payload, inline or Parameters())
+        data = Data(bytes(4), self.entity, self._last, payload, inline or Parameters())
         self._samples[self._last] = _Sample(data, reader)
         while len(self._samples) > self._depth:
             del self._samples[min(self._samples)]
@@ -97,7 +97,9 @@ class Writer:
 
     def pending(self) -> dict[bytes, list[Submessage]]:
         """Return what each reader gets that has not confirmed all that was for it."""
-        return {guid: [self._heartbeat(reader)] for guid, reader in self._readers.items() if reader.acked <= reader.told}
+        return {
+            guid: [self._heartbeat(reader)] for guid, reader in self._readers.items() if reader.acked <= reader.told
+        }
 
     def _news(self, guid: bytes, reader: _Reader) -> list[Submessage]:
         numbers = range(reader.told + 1, self._last + 1)
@@ -110,7 +112,7 @@ class Writer:
         for number in numbers:
             sample = self._samples.get(number)
             if sample is not None and number > reader.start and sample.reader in {None, guid}:
-                found.append(sample.data._replace(reader=reader.entity))
+                found.append(replace(sample.data, reader=reader.entity))
             else:
                 gone.append(number)
         return [*self._gaps(reader, gone), *found]
@@ -122,14 +124,14 @@ class Writer:
             end = at
             while end + 1 < len(numbers) and numbers[end + 1] == numbers[end] + 1:
                 end += 1
-            gaps.append(Gap(reader.entity, self._entity, numbers[at], numbers[end] + 1, ()))
+            gaps.append(Gap(reader.entity, self.entity, numbers[at], numbers[end] + 1, ()))
             at = end + 1
         return gaps
 
     def _heartbeat(self, reader: _Reader) -> Heartbeat:
         reader.heartbeats += 1
         first = reader.start + 1
-        return Heartbeat(reader.entity, self._entity, first, max(reader.told, first - 1), reader.heartbeats, final=False)
+        return Heartbeat(reader.entity, self.entity, first, max(reader.told, first - 1), reader.heartbeats, final=False)
 
     def _forget_acknowledged(self) -> None:
         if self._keeps:
@@ -146,6 +148,7 @@ class _Sender:
 
     next: int | None
     last: int = 0
+    is_heard: bool = False
     waiting: dict[int, Data | None] = field(default_factory=dict)
     acks: int = 0
 
@@ -159,7 +162,7 @@ class Reader:
     """
 
     def __init__(self, entity: bytes, *, wants_all: bool) -> None:
-        self._entity = entity
+        self.entity = entity
         self._wants_all = wants_all
         self._writers: dict[bytes, _Sender] = {}
 
@@ -209,6 +212,7 @@ class Reader:
             return [], []
         writer.next = max(writer.next or said.first, said.first)
         writer.last = said.last
+        writer.is_heard = True
         due = self._due(writer)
         answer = self._answer(guid, writer, final=True)
         return due, [answer] if answer.missing or not said.final else []
@@ -219,7 +223,7 @@ class Reader:
         return {guid: [self._answer(guid, writer, final=False)] for guid, writer in asked.items()}
 
     def _lacks(self, writer: _Sender) -> bool:
-        return writer.next is None or writer.acks == 1 or writer.next <= writer.last
+        return not writer.is_heard or writer.next is None or writer.next <= writer.last
 
     def _due(self, writer: _Sender) -> list[Data]:
         if writer.next is None:
@@ -239,4 +243,4 @@ class Reader:
         end = min(writer.last, base + WIDEST_SET - 1) if writer.next else 0
         missing = tuple(number for number in range(base, end + 1) if number not in writer.waiting)
         writer.acks += 1
-        return AckNack(self._entity, guid[-4:], base, missing, writer.acks, final and not missing)
+        return AckNack(self.entity, guid[-4:], base, missing, writer.acks, final and not missing)

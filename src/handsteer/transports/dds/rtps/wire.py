@@ -5,9 +5,8 @@ We write little-endian and read both. Whatever is malformed is left out; nothing
 
 import struct
 import time
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import NamedTuple
 
 PREFIX_BYTES = 12
 ENTITY_UNKNOWN = bytes(4)
@@ -48,7 +47,8 @@ class Parameters(dict[int, list[bytes]]):
         return found[0] if found else None
 
 
-class Data(NamedTuple):
+@dataclass(frozen=True)
+class Data:
     """A sample, or the end of one.
 
     Attributes:
@@ -63,10 +63,11 @@ class Data(NamedTuple):
     writer: bytes
     number: int
     payload: bytes | None
-    inline: Parameters = Parameters()
+    inline: Parameters = field(default_factory=Parameters)
 
 
-class Fragment(NamedTuple):
+@dataclass(frozen=True)
+class Fragment:
     """A part of a sample that was too large for one message, which we do not put together."""
 
     reader: bytes
@@ -74,7 +75,8 @@ class Fragment(NamedTuple):
     number: int
 
 
-class Heartbeat(NamedTuple):
+@dataclass(frozen=True)
+class Heartbeat:
     """What a writer has: the samples from ``first`` to ``last``; none when ``last`` is ``first - 1``."""
 
     reader: bytes
@@ -85,7 +87,8 @@ class Heartbeat(NamedTuple):
     final: bool
 
 
-class AckNack(NamedTuple):
+@dataclass(frozen=True)
+class AckNack:
     """What a reader has: all samples before ``base``; those in ``missing`` it asks for."""
 
     reader: bytes
@@ -96,7 +99,8 @@ class AckNack(NamedTuple):
     final: bool
 
 
-class Gap(NamedTuple):
+@dataclass(frozen=True)
+class Gap:
     """Which samples a reader need not wait for: from ``start`` to ``base - 1``, and ``numbers``."""
 
     reader: bytes
@@ -263,7 +267,7 @@ def _read_gap(body: bytes, flags: int, order: str) -> Gap:
     return Gap(reader, writer, _number(body, order, 8), base, numbers)
 
 
-_READ = {
+_READ: dict[int, Callable[[bytes, int, str], Submessage]] = {
     _DATA: _read_data,
     _DATA_FRAG: _read_fragment,
     _HEARTBEAT: _read_heartbeat,
