@@ -36,6 +36,10 @@ _SEEK_S, _SEEK_AT_LAST_S = 0.05, 5.0
 _OTHERS = 200
 _PACKED = 1400
 _ENDS = 1000
+_BUILTIN_READERS = {
+    told.PUBLICATIONS_WRITER: [told.PUBLICATIONS_READER],
+    told.SUBSCRIPTIONS_WRITER: [told.SUBSCRIPTIONS_READER],
+}
 _READER_KIND, _WRITER_KIND = b"\x04", b"\x03"  # of a topic without a key
 
 
@@ -140,7 +144,7 @@ class RtpsParticipant:
             if destination not in {self._prefix, ANYBODY}:
                 continue
             if isinstance(part, Data) and part.writer == told.SPDP_WRITER:
-                self._meet(part, message.vendor == VENDOR_FAST_DDS, now_s)
+                self._meet(message.prefix, part, message.vendor == VENDOR_FAST_DDS, now_s)
             elif message.prefix in self._others:
                 self._hear(message.prefix, part, now_s)
         self._answer(now_s)
@@ -207,17 +211,22 @@ class RtpsParticipant:
         self._repeat_pause_s = _REPEAT_S
         self._repeat_at_s = min(self._repeat_at_s, now_s + _REPEAT_S)
 
-    def _meet(self, data: Data, is_served: bool, now_s: float) -> None:
+    def _meet(self, prefix: bytes, data: Data, is_served: bool, now_s: float) -> None:
         if told.is_gone(data):
-            self._forget((told.key(data) or b"")[:PREFIX_BYTES])
+            self._forget(prefix)
             return
         said = told.read_participant(data)
-        if said is None or said.prefix == self._prefix or (said.prefix not in self._others and self._is_full):
+        if said is None or said.prefix != prefix:
             return
-        is_new = said.prefix not in self._others
-        self._others[said.prefix] = _Other(said, now_s + said.lease_s, is_served)
-        if not is_new or not is_served:
-            return
+        known = self._others.get(prefix)
+        if known is not None:
+            known.data, known.due_s = said, now_s + said.lease_s
+        elif len(self._others) < _OTHERS:
+            self._others[prefix] = _Other(said, now_s + said.lease_s, is_served)
+            if is_served:
+                self._introduce(said, now_s)
+
+    def _introduce(self, said: ParticipantData, now_s: float) -> None:
         ours = ((self._publications, told.PUBLICATIONS_READER), (self._subscriptions, told.SUBSCRIPTIONS_READER))
         theirs = (
             (self._their_publications, told.PUBLICATIONS_WRITER),
@@ -230,10 +239,6 @@ class RtpsParticipant:
             parts += reader.match(said.prefix + entity)
         self._say(said.prefix, said.metatraffic, parts)
         self._repeat_soon(now_s)
-
-    @property
-    def _is_full(self) -> bool:
-        return len(self._others) >= _OTHERS
 
     def _forget(self, prefix: bytes) -> None:
         if self._others.pop(prefix, None) is None:
@@ -266,7 +271,8 @@ class RtpsParticipant:
         if isinstance(part, AckNack) and not part.final:
             parts = [Heartbeat(part.reader, part.writer, 1, 0, 1, final=True)]
         elif isinstance(part, Heartbeat) and part.last >= part.first - 1 >= 0 and not part.final:
-            parts = [AckNack(part.reader, part.writer, part.last + 1, (), part.count, final=True)]
+            readers = [part.reader] if part.reader != ENTITY_UNKNOWN else _BUILTIN_READERS.get(part.writer, [])
+            parts = [AckNack(reader, part.writer, part.last + 1, (), part.count, final=True) for reader in readers]
         if parts:
             self._say(prefix, self._others[prefix].data.metatraffic, parts)
 
@@ -274,7 +280,8 @@ class RtpsParticipant:
         due: list[Data] = []
         match part:
             case Data():
-                due = reader.take(guid, part)
+                due, parts = reader.take(guid, part)
+                self._tell(guid, parts)
             case Gap():
                 due = reader.skip(guid, part)
             case Heartbeat():

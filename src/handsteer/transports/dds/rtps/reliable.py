@@ -90,7 +90,7 @@ class Writer:
             return []
         reader.acked = max(reader.acked, said.base)
         self._forget_acknowledged()
-        answer = self._again(guid, reader, [number for number in said.missing if number <= self._last])
+        answer = self._again(guid, reader, [number for number in said.missing if 0 < number <= self._last])
         if answer or not said.final:
             answer.append(self._heartbeat(reader))
         return answer
@@ -182,15 +182,17 @@ class Reader:
         """Forget the writer of this identifier."""
         self._writers.pop(guid, None)
 
-    def take(self, guid: bytes, data: Data) -> list[Data]:
-        """Take a sample; return those whose turn it is."""
+    def take(self, guid: bytes, data: Data) -> tuple[list[Data], list[Submessage]]:
+        """Take a sample; return those whose turn it is, and what asks for those that are missing."""
         writer = self._writers.get(guid)
         if writer is None or data.number < 1:
-            return []
+            return [], []
+        if writer.next is None and data.number == 1:
+            writer.next = 1  # nothing can have been before it
         base = writer.next if writer.next is not None else min([data.number, *writer.waiting])
         if base <= data.number < base + _AHEAD:
             writer.waiting.setdefault(data.number, data)
-        return self._due(writer)
+        return self._due(writer), [self._answer(guid, writer, final=False)] if writer.next is None else []
 
     def skip(self, guid: bytes, gap: Gap) -> list[Data]:
         """Wait no more for samples that will not come; return those whose turn it is."""
@@ -239,8 +241,9 @@ class Reader:
         return found
 
     def _answer(self, guid: bytes, writer: _Sender, *, final: bool) -> AckNack:
-        base = writer.next or 1
-        end = min(writer.last, base + WIDEST_SET - 1) if writer.next else 0
+        # Fast DDS begins with 0 itself, and takes it for the wish to hear at once of all that there is.
+        base = (writer.next or 0) if writer.is_heard else 0
+        end = min(writer.last, base + WIDEST_SET - 1) if writer.is_heard else -1
         missing = tuple(number for number in range(base, end + 1) if number not in writer.waiting)
         writer.acks += 1
         return AckNack(self.entity, guid[-4:], base, missing, writer.acks, final and not missing)

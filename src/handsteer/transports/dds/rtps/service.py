@@ -110,4 +110,4 @@ def _identity(client: bytes, request: Data) -> tuple[bytes, bytes]:
     """Return the reader that the reply is for, and what the reply says of its request."""
     said = request.inline.first(_RELATED) or request.inline.first(_RELATED_OF_FAST_DDS) or _NOBODY
     reader = said[:_GUID_BYTES] if len(said) == _IDENTITY_BYTES and said[:_GUID_BYTES] != _NOBODY else client
-    return reader, reader + struct.pack("<iI", request.number >> 32, request.number & 0xFFFFFFFF)
+    return reader, reader + struct.pack("<II", request.number >> 32, request.number & 0xFFFFFFFF)

@@ -309,7 +309,7 @@ def _written_data(part: Data) -> bytes:
 
 
 def _packed(number: int) -> bytes:
-    return struct.pack("<iI", number >> 32, number & 0xFFFFFFFF)
+    return struct.pack("<II", number >> 32 & 0xFFFFFFFF, number & 0xFFFFFFFF)
 
 
 def _packed_set(base: int, numbers: tuple[int, ...]) -> bytes:
