@@ -17,8 +17,6 @@ PLACES, PLACES_BY_MULTICAST = 33, 120
 # Four raw images: with the engine's own 1 MB, a process that is held up for a frame or two loses one. The system gives
 # what it allows (Linux: net.core.rmem_max), and nothing is said where that is less.
 _RECEIVE_BUFFER = "4MiB"
-# Cyclone DDS would warn of every request that is for a client on Fast DDS, which :mod:`fast_dds` answers.
-_SAYS = "<Tracing><Verbosity>severe</Verbosity></Tracing>"
 _PLACES = {
     "LOCALHOST": "this machine",
     "PEERS": "this machine and ROS_STATIC_PEERS",
@@ -118,6 +116,6 @@ def _config(reach: str, peers: list[str], places: int) -> str:
         "<CycloneDDS><Domain>"
         f"<General>{interface if alone else ''}<AllowMulticast>{multicast}</AllowMulticast></General>"
         f"<Discovery>{index}{'' if alone else announce}<Peers>{found}</Peers></Discovery>"
-        f'<Internal><SocketReceiveBufferSize min="default" max="{_RECEIVE_BUFFER}"/></Internal>{_SAYS}'
+        f'<Internal><SocketReceiveBufferSize min="default" max="{_RECEIVE_BUFFER}"/></Internal>'
         "</Domain></CycloneDDS>"
     )
