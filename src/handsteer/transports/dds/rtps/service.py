@@ -19,7 +19,8 @@ log = logging.getLogger(__name__)
 _RELATED, _RELATED_OF_FAST_DDS = 0x83, 0x800F
 _IDENTITY_BYTES, _GUID_BYTES = 24, 16
 _NOBODY = bytes(_GUID_BYTES)
-_WAIT_FOR_READER_S = 1.0
+# Fast DDS repeats after three seconds what was lost of a reader's announcement.
+_WAIT_FOR_READER_S = 10.0
 _WAITING, _KEPT, _CLIENTS = 100, 128, 1000
 _LARGEST = 60_000
 """What a datagram can carry, with room for what is said beside it."""
