@@ -3,11 +3,11 @@
 It reads orders as lines of JSON from its input and answers each by one line of JSON; they are those of
 ``tests/dds/peer.py`` as far as it has them. Beside them, ``endpoints`` (topic) returns what ``ros2 topic info -v``
 says, ``topics`` what ``ros2 topic list -t`` says, ``shift`` (from, to, type) publishes on one topic what comes on
-another, ``services`` (node) returns those of a node, ``service_names`` all, and ``names`` the full names of all
-nodes. ``parameters`` (node, call, arguments) calls one of the parameter services as rclpy's own client does, and
-returns the reply's fields, or None when nobody answers; ``fresh_clients`` (node, count) lists the parameters by as
-many clients, one after the other, each a participant of its own as ``ros2 param`` is one, and returns how many names
-each got, and after how many seconds.
+another, ``services`` (node) returns those of a node, ``servers`` (service) counts who offers it, and ``names`` the
+full names of all nodes. ``parameters`` (node, call, arguments) calls one of the parameter services as rclpy's own
+client does, and returns the reply's fields, or None when nobody answers; ``fresh_clients`` (node, count) lists the
+parameters by as many clients, one after the other, each a participant of its own as ``ros2 param`` is one, and
+returns how many names each got, and after how many seconds.
 """
 
 import json
@@ -133,8 +133,8 @@ def services(order: dict[str, Any]) -> dict[str, list[str]]:
     return dict(node.get_service_names_and_types_by_node(name, namespace or "/"))
 
 
-def service_names(_: dict[str, Any]) -> list[str]:
-    return [name for name, _ in node.get_service_names_and_types()]
+def servers(order: dict[str, Any]) -> int:
+    return int(node.count_services(order["service"]))
 
 
 def names(_: dict[str, Any]) -> list[str]:
@@ -219,7 +219,7 @@ ORDERS = {
         graph,
         topics,
         services,
-        service_names,
+        servers,
         names,
         parameters,
         fresh_clients,

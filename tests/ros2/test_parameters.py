@@ -80,17 +80,19 @@ def test_a_lower_limit_slows_a_driving_robot_at_once(ros2: Ros2Graph) -> None:
     driver.expect((0.3, 0.0), (0.6, 0.0), (0.2, 0.0))
 
 
-def test_ros2_sees_each_service_once_and_no_other_node(ros2: Ros2Graph) -> None:
+def test_ros2_sees_the_services_at_the_node_alone_and_their_end(ros2: Ros2Graph) -> None:
     node = f"/shown/{NODE}"
     control = ros2.node("control", name=node, ros=("-r", "__ns:=/shown"))
     ask(ros2, node, "list_parameters")
     assert ros2.peer.ask("services", node=node) == {f"{node}/{name}": [kind] for name, kind in SERVICES.items()}
+    assert ros2.peer.ask("servers", service=f"{node}/list_parameters") == 2  # one for each DDS
     names = ros2.peer.ask("names")
     assert names.count(node) == 1
     assert all(name == "/looker" or name.endswith(NODE) for name in names), names
     control.signal(signal.SIGTERM)
     assert control.code() == 0
-    eventually(lambda: not [name for name in ros2.peer.ask("service_names") if name.startswith(node)])
+    # Fast DDS does not understand how Cyclone DDS takes its leave, and waits ten seconds until it is overdue.
+    eventually(lambda: ros2.peer.ask("servers", service=f"{node}/list_parameters") <= 1, 5.0, what="ours to be gone")
     assert "Traceback" not in control.text
 
 

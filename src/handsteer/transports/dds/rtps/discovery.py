@@ -4,7 +4,7 @@ import socket
 import struct
 from dataclasses import dataclass
 
-from handsteer.transports.dds.rtps.wire import PREFIX_BYTES, VENDOR_UNKNOWN, Data, Parameters, decode_parameters
+from handsteer.transports.dds.rtps.wire import PREFIX_BYTES, STATUS, VENDOR_UNKNOWN, Data, Parameters, decode_parameters
 from handsteer.transports.dds.rtps.wire import encode_parameters as _encoded
 
 Address = tuple[str, int]
@@ -30,7 +30,7 @@ _REQUESTS = 1000
 _LEASE, _TOPIC_NAME, _TYPE_NAME, _DOMAIN_ID, _VERSION, _VENDOR = 0x02, 0x05, 0x07, 0x0F, 0x15, 0x16
 _RELIABILITY, _DURABILITY, _USER_DATA, _UNICAST, _DEFAULT_UNICAST = 0x1A, 0x1D, 0x2C, 0x2F, 0x31
 _METATRAFFIC_UNICAST, _HISTORY, _PARTICIPANT_GUID, _ENDPOINT_SET, _ENDPOINT_GUID = 0x32, 0x40, 0x50, 0x58, 0x5A
-KEY_HASH, _STATUS = 0x70, 0x71
+KEY_HASH = 0x70
 _GONE = bytes.fromhex("00000003")  # disposed and unregistered; big-endian in any message
 
 
@@ -112,7 +112,7 @@ def endpoint_payload(data: EndpointData) -> bytes:
 
 def farewell(guid: bytes, parameter: int = _PARTICIPANT_GUID) -> tuple[bytes, Parameters]:
     """Return the payload and what is said about it by which a participant takes its leave."""
-    return _ENCAPSULATION + _encoded({parameter: [guid]}), Parameters({KEY_HASH: [guid], _STATUS: [_GONE]})
+    return _ENCAPSULATION + _encoded({parameter: [guid]}), Parameters({KEY_HASH: [guid], STATUS: [_GONE]})
 
 
 def read_participant(data: Data) -> ParticipantData | None:
@@ -143,7 +143,7 @@ def read_endpoint(data: Data) -> EndpointData | None:
 
 def is_gone(data: Data) -> bool:
     """Return whether the sample says that what it tells of is gone."""
-    status = data.inline.first(_STATUS)
+    status = data.inline.first(STATUS)
     return status is not None and len(status) == 4 and bool(status[3] & 3)
 
 

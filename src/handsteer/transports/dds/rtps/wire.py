@@ -26,6 +26,8 @@ _DATA, _DATA_FRAG = 0x15, 0x16
 _WITHOUT_LENGTH = frozenset({0x01, _INFO_TS})
 _LITTLE = 0x01
 _SENTINEL, _PAD = 0x01, 0x00
+STATUS = 0x71
+"""Parameter that says of a sample that what it tells of is gone."""
 _MUST_UNDERSTAND = 0x4000
 # Before its flags for the set's extent, that of DATA says how far its quality of service is from here.
 _TO_INLINE_QOS = 16
@@ -301,7 +303,9 @@ def _written(part: Submessage) -> bytes:
 
 
 def _written_data(part: Data) -> bytes:
-    flags = (0x02 if part.inline else 0) | (0x04 if part.payload is not None else 0)
+    # Beside a status, the payload is no sample but the key of what the status is of.
+    kind = 0x08 if STATUS in part.inline else 0x04
+    flags = (0x02 if part.inline else 0) | (kind if part.payload is not None else 0)
     body = struct.pack("<HH", 0, _TO_INLINE_QOS) + part.reader + part.writer + _packed(part.number)
     body += encode_parameters(part.inline) if part.inline else b""
     body += part.payload or b""
