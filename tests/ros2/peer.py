@@ -5,8 +5,9 @@ It reads orders as lines of JSON from its input and answers each by one line of 
 says, ``topics`` what ``ros2 topic list -t`` says, ``shift`` (from, to, type) publishes on one topic what comes on
 another, ``services`` (node) returns those of a node, ``servers`` (service) counts who offers it, and ``names`` the
 full names of all nodes. ``parameters`` (node, call, arguments) calls one of the parameter services as rclpy's own
-client does, and returns the reply's fields, or None when nobody answers; ``fresh_clients`` (node, count) lists the
-parameters by as many clients, one after the other, each a participant of its own as ``ros2 param`` is one, and
+client does, and returns the reply's fields, or None when nobody answers; ``timed_calls`` (node, count) returns how
+many seconds each of some calls of ``list_parameters`` takes, after a first one; ``fresh_clients`` (node, count) lists
+the parameters by as many clients, one after the other, each a participant of its own as ``ros2 param`` is one, and
 returns how many names each got, and after how many seconds.
 """
 
@@ -155,6 +156,19 @@ def parameters(order: dict[str, Any]) -> Any:
     return fields(answer.result()) if answer.done() else None
 
 
+def timed_calls(order: dict[str, Any]) -> list[float]:
+    client = clients[order["node"]]
+    return [timed_call(client) for _ in range(order["count"])]
+
+
+def timed_call(client: AsyncParameterClient) -> float:
+    done = threading.Event()
+    began_s = time.monotonic()
+    client.list_parameters([]).add_done_callback(lambda _: done.set())
+    assert done.wait(10.0)
+    return time.monotonic() - began_s
+
+
 def fields(message: Any) -> Any:
     if hasattr(message, "get_fields_and_field_types"):
         return {name: fields(getattr(message, name)) for name in message.get_fields_and_field_types()}
@@ -222,6 +236,7 @@ ORDERS = {
         servers,
         names,
         parameters,
+        timed_calls,
         fresh_clients,
         endpoints,
     )
