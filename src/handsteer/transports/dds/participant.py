@@ -90,7 +90,8 @@ class Participant:
         # As ROS 2 makes them: the participant's part of an identifier, and a number.
         number = next(self._service_numbers).to_bytes(4, "big")
         identity = ".".join(f"{byte:x}" for byte in self._participant.guid.bytes[:12] + number)
-        requests = DdsTopic(self._participant, f"rq{name}Request", service_dds_type(service.request))
+        # Cyclone DDS checks what comes, and complains on the terminal of each request that a client on Fast DDS sends.
+        requests = DdsTopic(self._participant, f"rq{name}Request", opaque_type(dds_type_name(service.request)))
         replies = DdsTopic(self._participant, f"rr{name}Reply", service_dds_type(service.reply))
         reader: DataReader[Any] = DataReader(self._participant, requests, qos=service_qos(service.request, identity))
         writer: DataWriter[Any] = DataWriter(self._participant, replies, qos=service_qos(service.reply, identity))
