@@ -213,6 +213,18 @@ def test_nothing_is_said_before_a_client_is_there() -> None:
     assert world.sent == []
 
 
+def test_it_is_looked_for_at_all_places_until_it_answers() -> None:
+    places = [("10.0.0.2", 7410 + 2 * place) for place in range(33)]
+    seeking = RtpsParticipant(SERVER, 7, (SERVER_AT,), places, lambda addresses: addresses[:1])
+    seeking.seek([b"somebody....", b"another....."])
+    assert [address for _, address in seeking.tick(100.0)] == places
+    assert seeking.tick(100.01) == []
+    assert 0 < seeking.pause_s(100.01) < 0.1
+    assert [address for _, address in seeking.tick(100.1)] == places
+    asked = [bool(seeking.tick(101.0 + second / 10)) for second in range(600)]
+    assert 10 < sum(asked) < 25
+
+
 def test_a_client_that_was_seen_finds_the_service_and_is_answered() -> None:
     client = Client()
     world = met(client)

@@ -5,10 +5,10 @@ nobody sees a service twice who is answered by Cyclone DDS.
 """
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
 
 from handsteer.transports.dds.rtps import discovery as told
 from handsteer.transports.dds.rtps.discovery import Address, EndpointData, ParticipantData
+from handsteer.transports.dds.rtps.presence import LEASE_S, Presence
 from handsteer.transports.dds.rtps.reliable import Reader, Writer
 from handsteer.transports.dds.rtps.service import Service
 from handsteer.transports.dds.rtps.wire import (
@@ -30,10 +30,7 @@ from handsteer.transports.dds.rtps.wire import (
 Outgoing = list[tuple[bytes, Address]]
 """Datagrams, and where to send them."""
 
-_LEASE_S, _RENEW_S = 10.0, 3.0
 _REPEAT_S, _REPEAT_AT_LAST_S = 0.1, 2.0
-_SEEK_S, _SEEK_AT_LAST_S = 0.05, 5.0
-_OTHERS = 200
 _PACKED = 1400
 _ENDS = 1000
 _BUILTIN_READERS = {
@@ -41,15 +38,6 @@ _BUILTIN_READERS = {
     told.SUBSCRIPTIONS_WRITER: [told.SUBSCRIPTIONS_READER],
 }
 _READER_KIND, _WRITER_KIND = b"\x04", b"\x03"  # of a topic without a key
-
-
-@dataclass
-class _Other:
-    """Another participant; of one that is not on Fast DDS, only that it is there."""
-
-    data: ParticipantData
-    due_s: float
-    is_served: bool
 
 
 class RtpsParticipant:
@@ -73,14 +61,9 @@ class RtpsParticipant:
     ) -> None:
         self._prefix = prefix
         self._reach = reach
-        self._seeking = tuple(seeking)
         self._addresses = addresses
-        payload = told.participant_payload(
-            ParticipantData(prefix, addresses, addresses, _LEASE_S, b"enclave=/;"), domain
-        )
-        self._presence = Data(told.SPDP_READER, told.SPDP_WRITER, 1, payload)
-        self._others: dict[bytes, _Other] = {}
-        self._sought: frozenset[bytes] = frozenset()
+        data = ParticipantData(prefix, addresses, addresses, LEASE_S, b"enclave=/;")
+        self._presence = Presence(prefix, told.participant_payload(data, domain), seeking, self._say)
         self._ends: dict[bytes, tuple[Address, ...]] = {}
         self._services: list[Service] = []
         self._publications = Writer(told.PUBLICATIONS_WRITER, keeps=True, depth=_ENDS)
@@ -88,14 +71,12 @@ class RtpsParticipant:
         self._their_publications = Reader(told.PUBLICATIONS_READER, wants_all=True)
         self._their_subscriptions = Reader(told.SUBSCRIPTIONS_READER, wants_all=True)
         self._out: Outgoing = []
-        self._seek_at_s, self._seek_pause_s = 0.0, _SEEK_S
         self._repeat_at_s, self._repeat_pause_s = 0.0, _REPEAT_S
-        self._renew_at_s = 0.0
 
     @property
     def clients(self) -> int:
         """How many participants on Fast DDS are known."""
-        return sum(other.is_served for other in self._others.values())
+        return len(self._presence.served)
 
     def add(
         self,
@@ -127,69 +108,42 @@ class RtpsParticipant:
 
     def seek(self, prefixes: Iterable[bytes]) -> None:
         """Look for the participants of these prefixes, which are there, until they answer."""
-        sought = frozenset(prefixes)
-        if sought - self._sought:
-            self._seek_at_s, self._seek_pause_s = 0.0, _SEEK_S
-        self._sought = sought
+        self._presence.seek(prefixes)
 
     def receive(self, datagram: bytes, now_s: float) -> Outgoing:
         """Take a datagram; return what to send."""
         message = decode(datagram)
         if message is None or message.prefix == self._prefix:
             return []
-        other = self._others.get(message.prefix)
-        if other is not None:
-            other.due_s = now_s + other.data.lease_s
+        self._presence.heard(message.prefix, now_s)
         for destination, part in message.parts:
             if destination not in {self._prefix, ANYBODY}:
                 continue
             if isinstance(part, Data) and part.writer == told.SPDP_WRITER:
                 self._meet(message.prefix, part, message.vendor == VENDOR_FAST_DDS, now_s)
-            elif message.prefix in self._others:
+            elif message.prefix in self._presence.others:
                 self._hear(message.prefix, part, now_s)
         self._answer(now_s)
         return self._taken()
 
     def tick(self, now_s: float) -> Outgoing:
         """Return what is to be sent by now: presence, and what others have not confirmed."""
-        for prefix in [prefix for prefix, other in self._others.items() if other.due_s < now_s]:
+        for prefix in self._presence.overdue(now_s):
             self._forget(prefix)
         self._answer(now_s)
-        missing = self._missing
-        if missing and now_s >= self._seek_at_s:
-            self._seek_at_s, self._seek_pause_s = _later(now_s, self._seek_pause_s, _SEEK_AT_LAST_S)
-            datagram = encode(self._prefix, ANYBODY, [replace(self._presence, reader=ENTITY_UNKNOWN)])
-            self._out += [(datagram, address) for address in self._seeking]
-        if now_s >= self._renew_at_s:
-            self._renew_at_s = now_s + _RENEW_S
-            for prefix, other in self._others.items():
-                if other.is_served:
-                    self._say(prefix, other.data.metatraffic, [self._presence])
+        self._presence.tick(now_s)
         if now_s >= self._repeat_at_s:
             self._repeat(now_s)
         return self._taken()
 
     def pause_s(self, now_s: float) -> float:
         """Return after how many seconds :meth:`tick` has something to do, if nothing comes."""
-        times = [self._repeat_at_s]
-        if self.clients:
-            times.append(self._renew_at_s)
-        if self._missing:
-            times.append(self._seek_at_s)
-        return max(0.0, min(times) - now_s)
+        return max(0.0, min([self._repeat_at_s, *self._presence.next_s()]) - now_s)
 
     def leave(self) -> Outgoing:
         """Return what tells all others that it is gone."""
-        payload, inline = told.farewell(self._prefix + told.PARTICIPANT)
-        gone = Data(told.SPDP_READER, told.SPDP_WRITER, 2, payload, inline)
-        for prefix, other in self._others.items():
-            self._say(prefix, other.data.metatraffic, [gone])
-        self._others.clear()
+        self._presence.leave()
         return self._taken()
-
-    @property
-    def _missing(self) -> bool:
-        return any(prefix not in self._others for prefix in self._sought)
 
     @property
     def _writers(self) -> list[Writer]:
@@ -205,7 +159,8 @@ class RtpsParticipant:
         for guid, parts in pending:
             self._say(guid[:PREFIX_BYTES], self._addresses_of(guid), parts)
         pause_s = self._repeat_pause_s if pending else _REPEAT_AT_LAST_S
-        self._repeat_at_s, self._repeat_pause_s = _later(now_s, pause_s, _REPEAT_AT_LAST_S)
+        self._repeat_at_s = now_s + pause_s
+        self._repeat_pause_s = min(2 * pause_s, _REPEAT_AT_LAST_S)
 
     def _repeat_soon(self, now_s: float) -> None:
         self._repeat_pause_s = _REPEAT_S
@@ -215,16 +170,9 @@ class RtpsParticipant:
         if told.is_gone(data):
             self._forget(prefix)
             return
-        said = told.read_participant(data)
-        if said is None or said.prefix != prefix:
-            return
-        known = self._others.get(prefix)
-        if known is not None:
-            known.data, known.due_s = said, now_s + said.lease_s
-        elif len(self._others) < _OTHERS:
-            self._others[prefix] = _Other(said, now_s + said.lease_s, is_served)
-            if is_served:
-                self._introduce(said, now_s)
+        said = self._presence.meet(prefix, data, now_s, is_served=is_served)
+        if said is not None:
+            self._introduce(said, now_s)
 
     def _introduce(self, said: ParticipantData, now_s: float) -> None:
         ours = ((self._publications, told.PUBLICATIONS_READER), (self._subscriptions, told.SUBSCRIPTIONS_READER))
@@ -232,7 +180,7 @@ class RtpsParticipant:
             (self._their_publications, told.PUBLICATIONS_WRITER),
             (self._their_subscriptions, told.SUBSCRIPTIONS_WRITER),
         )
-        parts: list[Submessage] = [self._presence]
+        parts: list[Submessage] = [self._presence.told]
         for writer, entity in ours:
             parts += writer.match(said.prefix + entity)
         for reader, entity in theirs:
@@ -241,7 +189,7 @@ class RtpsParticipant:
         self._repeat_soon(now_s)
 
     def _forget(self, prefix: bytes) -> None:
-        if self._others.pop(prefix, None) is None:
+        if self._presence.others.pop(prefix, None) is None:
             return
         for writer in self._writers:
             for guid in writer.readers:
@@ -254,7 +202,7 @@ class RtpsParticipant:
         self._ends = {guid: addresses for guid, addresses in self._ends.items() if not guid.startswith(prefix)}
 
     def _hear(self, prefix: bytes, part: Submessage, now_s: float) -> None:
-        if not self._others[prefix].is_served:
+        if not self._presence.others[prefix].is_served:
             self._excuse(prefix, part)
         elif isinstance(part, AckNack):
             for writer in self._writers:
@@ -274,7 +222,7 @@ class RtpsParticipant:
             readers = [part.reader] if part.reader != ENTITY_UNKNOWN else _BUILTIN_READERS.get(part.writer, [])
             parts = [AckNack(reader, part.writer, part.last + 1, (), part.count, final=True) for reader in readers]
         if parts:
-            self._say(prefix, self._others[prefix].data.metatraffic, parts)
+            self._say(prefix, self._presence.others[prefix].data.metatraffic, parts)
 
     def _take(self, reader: Reader, guid: bytes, part: Submessage, now_s: float) -> None:
         due: list[Data] = []
@@ -315,7 +263,7 @@ class RtpsParticipant:
                 end.unmatch(guid)
                 self._ends.pop(guid, None)
             elif (said.topic, said.type) == (ours.topic, ours.type) and not service.is_full:
-                self._ends[guid] = said.addresses or self._others[prefix].data.default
+                self._ends[guid] = said.addresses or self._presence.others[prefix].data.default
                 self._tell(guid, end.match(guid))
                 self._repeat_soon(now_s)
 
@@ -334,21 +282,17 @@ class RtpsParticipant:
         self._say(guid[:PREFIX_BYTES], self._addresses_of(guid), parts)
 
     def _addresses_of(self, guid: bytes) -> tuple[Address, ...]:
-        other = self._others.get(guid[:PREFIX_BYTES])
+        other = self._presence.others.get(guid[:PREFIX_BYTES])
         return self._ends.get(guid) or (other.data.metatraffic if other else ())
 
     def _say(self, prefix: bytes, addresses: tuple[Address, ...], parts: list[Submessage]) -> None:
-        reached = self._reach(addresses)
+        reached = addresses if prefix == ANYBODY else self._reach(addresses)
         for datagram in _packed(self._prefix, prefix, parts):
             self._out += [(datagram, address) for address in reached]
 
     def _taken(self) -> Outgoing:
         out, self._out = self._out, []
         return out
-
-
-def _later(now_s: float, pause_s: float, longest_s: float) -> tuple[float, float]:
-    return now_s + pause_s, min(2 * pause_s, longest_s)
 
 
 def _packed(prefix: bytes, destination: bytes, parts: list[Submessage]) -> list[bytes]:
