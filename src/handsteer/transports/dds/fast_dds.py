@@ -77,15 +77,15 @@ class FastDdsServices:
 
 
 def _started(network: Network) -> Responder | None:
-    if network.reach == "OFF":
+    if network.asked == "OFF":
         return None
     try:
         return Responder(
             Surroundings(
                 network.domain,
-                # What CYCLONEDDS_URI says is not for us to read: no further than this machine, then.
-                is_local=network.is_local or network.reach == "CYCLONEDDS_URI",
-                uses_multicast=network.reach in {"SUBNET", "SYSTEM_DEFAULT"},
+                # What CYCLONEDDS_URI says is not for us to read: there, too, no further than ROS 2's variables say.
+                is_local=network.asked == "LOCALHOST" and not network.peers,
+                uses_multicast=network.asked in {"SUBNET", "SYSTEM_DEFAULT"},
                 peers=network.peers,
                 places=PLACES,
             )

@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 from handsteer.transports.dds.rtps.discovery import Address
+from handsteer.transports.dds.rtps.interfaces import multicast_addresses
 from handsteer.transports.dds.rtps.participant import Outgoing, RtpsParticipant
 from handsteer.transports.dds.rtps.wire import PREFIX_BYTES, VENDOR_UNKNOWN
 
@@ -21,6 +22,8 @@ _GROUP = "239.255.0.1"
 # RTPS 2.5, section 9.6.1.1: the ports of a domain, and of a participant in it.
 _BASE, _PER_DOMAIN, _PER_PARTICIPANT, _OWN = 7400, 250, 2, 10
 _LARGEST = 65536
+# The ports of this place and those above belong to the next domain.
+_LAST_PLACE = 120
 _AT_ONCE = 64
 _SENT_TO = 4
 _LEAVE_TIMEOUT_S = 1.0
@@ -57,20 +60,16 @@ class Responder:
     """
 
     def __init__(self, surroundings: Surroundings) -> None:
-        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        try:
-            self._socket.bind((_LOOPBACK if surroundings.is_local else "", 0))
-        except OSError:
-            self._socket.close()
-            raise
+        self._socket = _bound(surroundings)
         self._socket.setblocking(False)
         self._wake, self._woken = socket.socketpair()
         self._woken.setblocking(False)
         port = self._socket.getsockname()[1]
+        self._hosts = _hosts(surroundings)
         self._participant = RtpsParticipant(
             VENDOR_UNKNOWN + secrets.token_bytes(PREFIX_BYTES - len(VENDOR_UNKNOWN)),
             surroundings.domain,
-            tuple((host, port) for host in _hosts(surroundings)),
+            tuple((host, port) for host in self._hosts),
             _places(surroundings),
             _only_here if surroundings.is_local else _anywhere,
         )
@@ -139,8 +138,28 @@ class Responder:
 
     def _send(self, outgoing: Outgoing) -> None:
         for datagram, address in outgoing:
-            with contextlib.suppress(OSError):  # what is lost is repeated
-                self._socket.sendto(datagram, address)
+            for host in self._hosts if address[0] == _GROUP else (None,):
+                with contextlib.suppress(OSError):  # what is lost is repeated
+                    if host is not None:
+                        self._socket.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_IF, socket.inet_aton(host))
+                    self._socket.sendto(datagram, address)
+
+
+def _bound(surroundings: Surroundings) -> socket.socket:
+    """Return a socket at a port of the domain that no other participant wants, which firewalls know; else at any."""
+    first = _BASE + _PER_DOMAIN * surroundings.domain + _OWN + 1
+    wanted = (first + _PER_PARTICIPANT * place for place in reversed(range(surroundings.places, _LAST_PLACE)))
+    for port in (*(port for port in wanted if port < _LARGEST), 0):
+        found = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        try:
+            found.bind((_LOOPBACK if surroundings.is_local else "", port))
+        except OSError:
+            found.close()
+            if port == 0:
+                raise
+        else:
+            return found
+    raise AssertionError("the last port is 0")
 
 
 def _hosts(surroundings: Surroundings) -> tuple[str, ...]:
@@ -148,9 +167,9 @@ def _hosts(surroundings: Surroundings) -> tuple[str, ...]:
     if surroundings.is_local:
         return (_LOOPBACK,)
     asked = ([_GROUP] if surroundings.uses_multicast else []) + list(surroundings.peers)
-    found = dict.fromkeys(host for peer in asked if (host := _own_address(peer)) is not None)
-    beyond = tuple(host for host in found if host != _LOOPBACK)
-    return beyond or (_LOOPBACK,)
+    found = [*(multicast_addresses().values() if surroundings.uses_multicast else ()), *map(_own_address, asked)]
+    beyond = tuple(dict.fromkeys(host for host in found if host not in {None, _LOOPBACK}))
+    return tuple(host for host in beyond if host is not None) or (_LOOPBACK,)
 
 
 def _own_address(peer: str) -> str | None:
