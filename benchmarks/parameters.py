@@ -34,7 +34,8 @@ def cpu_s() -> float:
 
 def line(name: str, times_s: list[float]) -> str:
     took_ms = 1000 * np.array(times_s)
-    return f"  {name:46s} median {np.median(took_ms):7.2f} ms, p99 {np.percentile(took_ms, 99):7.2f} ms"
+    percentile = f"p99 {np.percentile(took_ms, 99):7.2f} ms, longest {took_ms.max():7.2f} ms"
+    return f"  {name:46s} median {np.median(took_ms):7.2f} ms, {percentile}"
 
 
 def main() -> None:
