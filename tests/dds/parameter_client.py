@@ -1,8 +1,9 @@
 """What a client of ROS 2's parameter services sends and reads over DDS, byte by byte as rmw_cyclonedds_cpp does.
 
-A part of ``peer.py``: types written by hand, encoded by cyclonedds. A request is its body with 16 bytes before it, the
-handle of the client's writer (uint64) and a number (int64); the reply begins with the same. Reader and writer have the
-same ``clientid=`` in their user data.
+A part of ``peer.py``: types written by hand, encoded by cyclonedds. No definition of a request's type is told to
+others, as rmw_cyclonedds_cpp tells none of any; cyclonedds has to tell one, which is that of any bytes. A request is
+its body with 16 bytes before it, the handle of the client's writer (uint64) and a number (int64); the reply begins
+with the same. Reader and writer have the same ``clientid=`` in their user data.
 """
 
 import itertools
@@ -12,7 +13,7 @@ from typing import Any
 
 from cyclonedds.core import Policy, Qos
 from cyclonedds.domain import DomainParticipant
-from cyclonedds.idl import IdlStruct
+from cyclonedds.idl import IdlStruct, make_idl_struct
 from cyclonedds.idl.types import byte, float64, int32, int64, sequence, uint8, uint32, uint64
 from cyclonedds.internal import InvalidSample
 from cyclonedds.pub import DataWriter
@@ -217,8 +218,9 @@ class Client:
             Policy.Userdata(f"clientid={identity};".encode() if identified else b""),
         )
         self.request_type = request
+        self.raw_type = raw_type(request)
         self.handle = 0x1122334455667700 + int.from_bytes(number, "big")
-        self.writer: Any = DataWriter(participant, Topic(participant, f"rq{service}Request", request), qos=qos)
+        self.writer: Any = DataWriter(participant, Topic(participant, f"rq{service}Request", self.raw_type), qos=qos)
         self.reader: Any = DataReader(participant, Topic(participant, f"rr{service}Reply", reply), qos=qos)
 
     def call(self, values: dict[str, Any], timeout_s: float) -> Any:
@@ -228,7 +230,8 @@ class Client:
             time.sleep(0.005)
         number = next(_numbers)
         filled = {name: _filled(name, value) for name, value in values.items()}
-        self.writer.write(self.request_type(client=self.handle, number=number, **filled))
+        request = self.request_type(client=self.handle, number=number, **filled)
+        self.writer.write(self.raw_type(request.serialize(use_version_2=False)))
         while time.monotonic() < deadline_s:
             for reply in self.reader.take(10):
                 # All clients of a service hear all replies.
@@ -236,6 +239,14 @@ class Client:
                     return asdict(reply)
             time.sleep(0.002)
         return None
+
+
+def raw_type(kind: Any) -> Any:
+    """Return a type of the same name, whose instances are made of the bytes that go over the wire."""
+    struct: Any = make_idl_struct("Opaque", kind.__idl_typename__, {"raw": uint8}, dataclassify=False)
+    struct.__init__ = lambda self, raw: setattr(self, "raw", raw)
+    struct.serialize = lambda self, *_, **__: self.raw
+    return struct
 
 
 def _filled(name: str, value: Any) -> Any:

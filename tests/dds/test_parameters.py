@@ -90,7 +90,6 @@ def test_a_client_that_says_in_no_way_who_it_is_gets_no_answer_and_harms_nobody(
     control = dds.node("control", name=node, ros=("-r", "__ns:=/other"))
     order = {"service": f"{node}/list_parameters", "type": "ListParameters", "fields": {"prefixes": [], "depth": 0}}
     assert dds.peer.ask("call", **order, identified=False, timeout_s=1.0) is None
-    eventually(lambda: "a node that does not run on Cyclone DDS has asked" in control.text)
     assert dds.peer.ask("call", **order)["result"]["names"]
     assert "Traceback" not in control.text
 

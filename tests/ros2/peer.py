@@ -3,11 +3,16 @@
 It reads orders as lines of JSON from its input and answers each by one line of JSON; they are those of
 ``tests/dds/peer.py`` as far as it has them. Beside them, ``endpoints`` (topic) returns what ``ros2 topic info -v``
 says, ``topics`` what ``ros2 topic list -t`` says, ``shift`` (from, to, type) publishes on one topic what comes on
-another, ``services`` (node) returns those of a node, and ``list_parameters`` (node) the names that ``ros2 param list``
-would show, or None when nobody answers within a second.
+another, ``services`` (node) returns those of a node, ``servers`` (service) counts who offers it, and ``names`` the
+full names of all nodes. ``parameters`` (node, call, arguments) calls one of the parameter services as rclpy's own
+client does, and returns the reply's fields, or None when nobody answers; ``timed_calls`` (node, count) returns how
+many seconds each of some calls of ``list_parameters`` takes, after a first one; ``fresh_clients`` (node, count) lists
+the parameters by as many clients, one after the other, each a participant of its own as ``ros2 param`` is one, and
+returns how many names each got, and after how many seconds.
 """
 
 import json
+import os
 import sys
 import threading
 import time
@@ -20,8 +25,9 @@ from builtin_interfaces.msg import Time
 from geometry_msgs.msg import Twist, TwistStamped
 from nav_msgs.msg import Odometry
 from rcl_interfaces.msg import Log
-from rcl_interfaces.srv import ListParameters
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.parameter import Parameter
+from rclpy.parameter_client import AsyncParameterClient
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import CompressedImage, Image
@@ -33,6 +39,7 @@ rclpy.init()
 node = rclpy.create_node("looker")
 noted: dict[str, list[Any]] = {}
 publishers: dict[str, Any] = {}
+clients: dict[str, Any] = {}
 
 
 def profile(order: dict[str, Any]) -> QoSProfile:
@@ -127,15 +134,71 @@ def services(order: dict[str, Any]) -> dict[str, list[str]]:
     return dict(node.get_service_names_and_types_by_node(name, namespace or "/"))
 
 
-def list_parameters(order: dict[str, Any]) -> list[str] | None:
-    client = node.create_client(ListParameters, f"{order['node']}/list_parameters")
-    if not client.wait_for_service(20.0):
+def servers(order: dict[str, Any]) -> int:
+    return int(node.count_services(order["service"]))
+
+
+def names(_: dict[str, Any]) -> list[str]:
+    return [f"{namespace.rstrip('/')}/{name}" for name, namespace in node.get_node_names_and_namespaces()]
+
+
+def parameters(order: dict[str, Any]) -> Any:
+    if order["node"] not in clients:
+        clients[order["node"]] = AsyncParameterClient(node, order["node"])
+    client = clients[order["node"]]
+    if not client.wait_for_services(20.0):
         return None
-    answer = client.call_async(ListParameters.Request())
-    deadline_s = time.monotonic() + 1.0
+    arguments = [Parameter(**one) if isinstance(one, dict) else one for one in order["arguments"]]
+    answer = getattr(client, order["call"])(arguments)
+    deadline_s = time.monotonic() + order.get("timeout_s", 10.0)
     while not answer.done() and time.monotonic() < deadline_s:
-        time.sleep(0.01)
-    return list(answer.result().result.names) if answer.done() else None
+        time.sleep(0.001)
+    return fields(answer.result()) if answer.done() else None
+
+
+def timed_calls(order: dict[str, Any]) -> list[float]:
+    client = clients[order["node"]]
+    return [timed_call(client) for _ in range(order["count"])]
+
+
+def timed_call(client: AsyncParameterClient) -> float:
+    done = threading.Event()
+    began_s = time.monotonic()
+    client.list_parameters([]).add_done_callback(lambda _: done.set())
+    assert done.wait(10.0)
+    return time.monotonic() - began_s
+
+
+def fields(message: Any) -> Any:
+    if hasattr(message, "get_fields_and_field_types"):
+        return {name: fields(getattr(message, name)) for name in message.get_fields_and_field_types()}
+    if isinstance(message, (bool, int, float, str)):
+        return message
+    return [fields(one) for one in message]
+
+
+def fresh_clients(order: dict[str, Any]) -> list[tuple[int, float]]:
+    return [fresh_client(order["node"]) for _ in range(order["count"])]
+
+
+def fresh_client(name: str) -> tuple[int, float]:
+    began_s = time.monotonic()
+    context = rclpy.Context()
+    context.init(domain_id=int(os.environ["ROS_DOMAIN_ID"]))
+    asker = rclpy.create_node("asker", context=context, start_parameter_services=False)
+    executor = SingleThreadedExecutor(context=context)
+    executor.add_node(asker)
+    client = AsyncParameterClient(asker, name)
+    found = 0
+    if client.wait_for_services(20.0):
+        answer = client.list_parameters([])
+        executor.spin_until_future_complete(answer, 5.0)
+        found = len(answer.result().result.names) if answer.done() else 0
+    took_s = time.monotonic() - began_s
+    executor.shutdown()
+    asker.destroy_node()
+    context.shutdown()
+    return found, took_s
 
 
 def endpoints(order: dict[str, Any]) -> list[dict[str, Any]]:
@@ -170,7 +233,11 @@ ORDERS = {
         graph,
         topics,
         services,
-        list_parameters,
+        servers,
+        names,
+        parameters,
+        timed_calls,
+        fresh_clients,
         endpoints,
     )
 }

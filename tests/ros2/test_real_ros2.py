@@ -155,17 +155,6 @@ def test_what_a_node_logs_is_on_rosout(ros2: Ros2Graph) -> None:
     assert logged[0][2].startswith("/told/image_raw: nothing passes")
 
 
-def test_parameter_services_are_seen_though_fast_dds_gets_no_answer(ros2: Ros2Graph) -> None:
-    """Fast DDS tells in RTPS headers who asks, which Cyclone DDS does not show: our node says so."""
-    node = f"/asked/{NODE}"
-    control = ros2.node("control", name=node, ros=("-r", "__ns:=/asked"))
-    eventually(lambda: len(ros2.peer.ask("services", node=node)) == 6)
-    assert ros2.peer.ask("services", node=node)[f"{node}/list_parameters"] == ["rcl_interfaces/srv/ListParameters"]
-    assert ros2.peer.ask("list_parameters", node=node) is None
-    eventually(lambda: "has asked, and cannot be answered: set RMW_IMPLEMENTATION=rmw_cyclonedds_cpp" in control.text)
-    assert "Traceback" not in control.text
-
-
 def test_the_time_of_ros2_is_followed(tmp_path: Path) -> None:
     with ros2_graph(tmp_path) as graph:
         peer = graph.peer

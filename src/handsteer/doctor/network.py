@@ -2,20 +2,14 @@
 
 import contextlib
 import socket
-import struct
 from pathlib import Path
 
-try:
-    import fcntl
-except ModuleNotFoundError:  # Windows
-    fcntl = None  # type: ignore[assignment]
+from handsteer.transports.dds.rtps.interfaces import multicast_addresses
 
 # RTPS 2.3, section 9.6.1.1: the ports of a domain, and of a participant in it.
 _BASE, _PER_DOMAIN, _PER_PARTICIPANT, _OWN, _LARGEST_DOMAIN = 7400, 250, 2, 10, 232
 _TABLES = ("/proc/net/udp", "/proc/net/udp6")
 _GROUP = "239.255.0.1"
-_UP, _LOOPBACK, _MULTICAST = 0x1, 0x8, 0x1000
-_GET_FLAGS, _GET_ADDRESS = 0x8913, 0x8915
 _ANSWER_S = 0.3
 
 
@@ -60,20 +54,7 @@ def multicast_interfaces() -> dict[str, bool]:
 
     The packet does not leave the machine. Loopback and interfaces that are down or without multicast are left out.
     """
-    return {name: _hears_itself(address) for name, address in _interfaces().items()}
-
-
-def _interfaces() -> dict[str, str]:
-    found = {}
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as asking:
-        for _, name in socket.if_nameindex() if fcntl else ():
-            request = struct.pack("256s", name.encode()[:15])
-            with contextlib.suppress(OSError):
-                (flags,) = struct.unpack_from("H", fcntl.ioctl(asking, _GET_FLAGS, request), 16)
-                address = socket.inet_ntoa(fcntl.ioctl(asking, _GET_ADDRESS, request)[20:24])
-                if flags & _UP and flags & _MULTICAST and not flags & _LOOPBACK:
-                    found[name] = address
-    return found
+    return {name: _hears_itself(address) for name, address in multicast_addresses().items()}
 
 
 def _hears_itself(address: str) -> bool:

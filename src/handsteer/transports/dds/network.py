@@ -38,6 +38,8 @@ class Network:
         reach: One of ROS 2's ranges, ``PEERS`` for this machine and static peers, or ``CYCLONEDDS_URI``.
         places: How many participants of the domain find ports of their own on this machine; None when it is not ours
             to say.
+        peers: Further machines that are looked at, as in ``ROS_STATIC_PEERS``.
+        asked: The range that ROS 2's variables ask for, where ``CYCLONEDDS_URI`` goes before it, too.
     """
 
     domain: int
@@ -45,6 +47,8 @@ class Network:
     distribution: str = "jazzy"
     reach: str = "LOCALHOST"
     places: int | None = None
+    peers: tuple[str, ...] = ()
+    asked: str = "LOCALHOST"
 
     @property
     def is_local(self) -> bool:
@@ -70,15 +74,15 @@ def network(environment: Mapping[str, str]) -> Network:
     distribution = "humble" if environment.get("ROS_DISTRO") == "humble" else "jazzy"
     reach = _range(environment)
     peers = _peers(environment.get("ROS_STATIC_PEERS", ""))
-    if environment.get("CYCLONEDDS_URI"):
-        return Network(domain, None, distribution, "CYCLONEDDS_URI")
-    if reach == "SYSTEM_DEFAULT":
-        return Network(domain, None, distribution, reach)
     if environment.get("ROS_LOCALHOST_ONLY") == "1" or reach == "OFF":
         peers = []
+    if environment.get("CYCLONEDDS_URI"):
+        return Network(domain, None, distribution, "CYCLONEDDS_URI", peers=tuple(peers), asked=reach)
+    if reach == "SYSTEM_DEFAULT":
+        return Network(domain, None, distribution, reach, peers=tuple(peers), asked=reach)
     places = PLACES_BY_MULTICAST if reach == "SUBNET" and not peers else PLACES
     found = "PEERS" if peers and reach == "LOCALHOST" else reach
-    return Network(domain, _config(reach, peers, places), distribution, found, places)
+    return Network(domain, _config(reach, peers, places), distribution, found, places, tuple(peers), reach)
 
 
 def _range(environment: Mapping[str, str]) -> str:

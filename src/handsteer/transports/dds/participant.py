@@ -2,9 +2,11 @@
 
 import itertools
 import threading
+import uuid
 from collections.abc import Callable
 from typing import Any
 
+from cyclonedds.builtin import BuiltinDataReader, BuiltinTopicDcpsParticipant
 from cyclonedds.core import DDSException, Policy, Qos
 from cyclonedds.domain import Domain, DomainParticipant
 from cyclonedds.dynamic import get_types_for_typeid
@@ -88,13 +90,22 @@ class Participant:
         # As ROS 2 makes them: the participant's part of an identifier, and a number.
         number = next(self._service_numbers).to_bytes(4, "big")
         identity = ".".join(f"{byte:x}" for byte in self._participant.guid.bytes[:12] + number)
-        requests = DdsTopic(self._participant, f"rq{name}Request", service_dds_type(service.request))
+        # Cyclone DDS checks what comes, and complains on the terminal of each request that a client on Fast DDS sends.
+        requests = DdsTopic(self._participant, f"rq{name}Request", opaque_type(dds_type_name(service.request)))
         replies = DdsTopic(self._participant, f"rr{name}Reply", service_dds_type(service.reply))
         reader: DataReader[Any] = DataReader(self._participant, requests, qos=service_qos(service.request, identity))
         writer: DataWriter[Any] = DataWriter(self._participant, replies, qos=service_qos(service.reply, identity))
         self._graph.add(reader)
         self._graph.add(writer)
         return reader, writer
+
+    def participants(self) -> Any:
+        """Return a new reader of who has come to the domain and who has left it; to be served, then left unserved."""
+        return BuiltinDataReader(self._participant, BuiltinTopicDcpsParticipant)
+
+    def tell_of(self, guid: bytes, *, writes: bool) -> None:
+        """Tell others that a reader or writer of this identifier, which is none of Cyclone DDS, is our node's."""
+        self._graph.add_other(uuid.UUID(bytes=guid), writes=writes)
 
     def tick(self, call: Callable[[], None]) -> None:
         """Call ``call`` on the DDS thread, four times a second and whenever something has come."""
@@ -116,6 +127,10 @@ class Participant:
         """
         topic = DdsTopic(self._participant, writer.topic, self._type_of(writer))
         return DataReader(self._participant, topic, qos=counter_qos(writer.qos))
+
+    def leave_unserved(self, reader: Any) -> None:
+        """Serve ``reader`` no more."""
+        self._dispatcher.remove(reader)
 
     def release(self, endpoint: DataWriter[Any] | DataReader[Any]) -> None:
         """Let go of a writer or reader; it is gone when the caller forgets it too."""

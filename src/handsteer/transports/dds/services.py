@@ -4,7 +4,8 @@ Before the body of both stand 16 bytes that tell which request a reply is for: e
 int64, that counts its requests. They are no part of ROS 2's type, and its own nodes send no definition in which they
 would be missed. A client's reader and writer have the same ``clientid=``
 in their user data, a server's the same ``serviceid=``. A client of Fast DDS says in the headers of RTPS instead who
-asks, which Cyclone DDS shows to nobody: its requests cannot be answered, and are left alone.
+asks, which Cyclone DDS shows to nobody: :mod:`~handsteer.transports.dds.fast_dds` answers it, and it is left alone
+here.
 """
 
 import logging
@@ -53,13 +54,10 @@ class ServiceServer:
         self._answer = answer
         # A client may be heard before its reader is known here, and would never get a reply that is sent at once.
         self._waiting: list[_Reply] = []
-        self._clients: set[int] = set()
-        self._said = False
         self._reader: Any
         self._writer: Any
         self._reader, self._writer = participant.service(name, service)
         participant.serve(self._reader, self._serve)
-        participant.tick(self._look_for_others)
         participant.tick(self._send_waiting)
 
     def close(self) -> None:
@@ -82,7 +80,6 @@ class ServiceServer:
             return  # it has gone already
         client = user_data(asker.qos).get("clientid")
         if client is None:
-            self._explain()
             return
         try:
             header, request = _open(sample.raw, self._service.request)
@@ -92,16 +89,6 @@ class ServiceServer:
             log.warning("%s: a request of %d bytes cannot be answered: %s", self._name, len(sample.raw), error)
             return
         self._waiting.append(_Reply(client, reply, time.monotonic() + _WAIT_FOR_READER_S))
-
-    def _look_for_others(self) -> None:
-        """Say it when a client comes that cannot be answered: Cyclone DDS drops its requests, which lack the header."""
-        reader = self._reader
-        handles = set(reader.get_matched_publications()) if reader is not None else set()
-        for handle in handles - self._clients:
-            client = reader.get_matched_publication_data(handle)
-            if client is not None and "clientid" not in user_data(client.qos):
-                self._explain()
-        self._clients = handles
 
     def _send_waiting(self) -> None:
         writer = self._writer
@@ -121,15 +108,6 @@ class ServiceServer:
             writer.write(writer.data_type(raw))
         except DDSException as error:
             log.warning("%s: a reply could not be sent: %s", self._name, error)
-
-    def _explain(self) -> None:
-        if not self._said:
-            log.warning(
-                "%s: a node that does not run on Cyclone DDS has asked, and cannot be answered: "
-                "set RMW_IMPLEMENTATION=rmw_cyclonedds_cpp there",
-                self._name,
-            )
-        self._said = True
 
 
 def _open(raw: bytes, kind: str) -> tuple[tuple[int, int], Any]:
