@@ -15,7 +15,14 @@ from handsteer.dashboard.access import Access, is_loopback
 from handsteer.errors import DashboardError
 from tests.dashboard.served import PATIENCE_S, Site
 
-PLACES = ("/", "/camera.mjpg", "/assets/page.js", "/_nicegui_ws/socket.io/?EIO=4&transport=polling")
+PLACES = (
+    "/",
+    "/teach",
+    "/settings",
+    "/camera.mjpg",
+    "/assets/page.js",
+    "/_nicegui_ws/socket.io/?EIO=4&transport=polling",
+)
 
 
 @pytest.fixture
