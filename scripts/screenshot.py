@@ -85,18 +85,20 @@ def record(page: Page, path: Path) -> None:
     """Save what ``page`` shows from the first sign on as an animation in real time."""
     page.wait_for_function("document.querySelector('.camera .sign').textContent === 'Stop'", timeout=PATIENCE_MS)
     frames: list[tuple[float, bytes]] = []
+    end_s = time.monotonic() + SHOWN_S
     devtools = page.context.new_cdp_session(page)
 
     def keep(frame: dict[str, Any]) -> None:
         frames.append((frame["metadata"]["timestamp"], base64.b64decode(frame["data"])))
-        devtools.send("Page.screencastFrameAck", {"sessionId": frame["sessionId"]})
+        if time.monotonic() < end_s:
+            devtools.send("Page.screencastFrameAck", {"sessionId": frame["sessionId"]})
 
     devtools.on("Page.screencastFrame", keep)
     devtools.send("Page.startScreencast", {"format": "jpeg", "quality": 95, "maxWidth": WIDTH, "maxHeight": HEIGHT})
-    end_s = time.monotonic() + SHOWN_S
     while time.monotonic() < end_s:
         page.wait_for_timeout(50)
     devtools.send("Page.stopScreencast")
+    devtools.detach()
     animate(thinned(frames), path)
 
 
