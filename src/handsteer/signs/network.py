@@ -42,12 +42,12 @@ class Network:
         return softmax(self.logits(features))
 
     def layers(self, features: Array) -> list[Array]:
-        """Return the outputs of all layers, the scaled features first."""
-        outputs = [(features - self.mean) * self.scale]
-        for weight, bias in zip(self.weights, self.biases, strict=True):
-            inputs = outputs[-1]
-            outputs.append((np.tanh(inputs) if len(outputs) > 1 else inputs) @ weight + bias)
-        return outputs
+        """Return what each layer gets, the scaled features first, and last the scores."""
+        passed = [(features - self.mean) * self.scale]
+        for layer, (weight, bias) in enumerate(zip(self.weights, self.biases, strict=True), 1):
+            scores = passed[-1] @ weight + bias
+            passed.append(np.tanh(scores) if layer < len(self.weights) else scores)
+        return passed
 
 
 def softmax(logits: Array) -> Array:
@@ -101,13 +101,13 @@ def train(
 
 def _gradients(network: Network, features: Array, targets: NDArray[np.int64], importance: Array) -> list[Array]:
     """Return the gradients of the mean cross entropy for all weights, then all biases."""
-    outputs = network.layers(features)
-    wanted = np.eye(outputs[-1].shape[1])[targets] * (1 - _SMOOTHING) + _SMOOTHING / outputs[-1].shape[1]
-    error = (softmax(outputs[-1]) - wanted) * importance[:, None] / len(targets)
+    *passed, scores = network.layers(features)
+    wanted = np.eye(scores.shape[1])[targets] * (1 - _SMOOTHING) + _SMOOTHING / scores.shape[1]
+    error = (softmax(scores) - wanted) * importance[:, None] / len(targets)
     weights: list[Array] = []
     biases: list[Array] = []
     for layer in reversed(range(len(network.weights))):
-        inputs = np.tanh(outputs[layer]) if layer else outputs[layer]
+        inputs = passed[layer]
         weights.insert(0, inputs.T @ error + _DECAY * network.weights[layer])
         biases.insert(0, error.sum(axis=0))
         error = (error @ network.weights[layer].T) * (1 - inputs**2)
