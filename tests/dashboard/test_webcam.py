@@ -38,7 +38,10 @@ def recording(slideshow: Path, sign: str, path: Path) -> Path:
 
 @pytest.fixture
 def graph() -> Iterator[Graph]:
-    hand = {"camera": {"source": "virtual"}, "virtual_hand": {"script": "NONE:60"}}
+    hand = {
+        "camera": {"source": "virtual", "width": 320, "height": 240, "fps": 15},
+        "virtual_hand": {"script": "NONE:60"},
+    }
     config = load(base={**hand, "dashboard": {"port": 0}})
     with Graph(config) as graph:
         graph.start()
