@@ -5,7 +5,6 @@ import functools
 import os
 import socket
 import ssl
-import sys
 import threading
 import time
 from pathlib import Path
@@ -44,9 +43,6 @@ _START_TIMEOUT_S = 20.0
 _STOP_TIMEOUT_S = 3.0
 # For browsers to say goodbye.
 _GRACE_S = 0.4
-# A frame waits for the interpreter each time that it comes back from resizing or a model. Pages would keep it for up to
-# 5 ms then, Python's default, and four of them would slow recognition by a tenth and more.
-_SWITCH_S = 0.0005
 # What the system may hold back for a viewer that reads slowly; more would only be older pictures.
 _SEND_BUFFER_BYTES = 256 * 1024
 
@@ -94,7 +90,6 @@ class Dashboard:
         self._config = config
         self._server: uvicorn.Server | None = None
         self._thread: threading.Thread | None = None
-        self._switched_s = sys.getswitchinterval()
 
     @classmethod
     def of(cls, graph: Graph, file: Path | None = None) -> "Dashboard":
@@ -145,8 +140,6 @@ class Dashboard:
             ssl_keyfile=config.private_key,
         )
         settings.timeout_graceful_shutdown = _GRACE_S  # type: ignore[assignment] # fractions work as well
-        self._switched_s = sys.getswitchinterval()
-        sys.setswitchinterval(_SWITCH_S)
         self._server = uvicorn.Server(settings)
         self._thread = threading.Thread(target=self._server.run, args=([listener],), name="dashboard", daemon=True)
         self._thread.start()
@@ -165,7 +158,6 @@ class Dashboard:
             self._server.should_exit = True
             self._thread.join(_STOP_TIMEOUT_S)
             self._server = None
-            sys.setswitchinterval(self._switched_s)
             _one_at_a_time.release()
 
     def _drives(self, viewer: str) -> bool:
