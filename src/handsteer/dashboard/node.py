@@ -153,11 +153,6 @@ class DashboardNode(Node):
             self._holder = None
             self._steering.release()
 
-    @property
-    def steering_topic(self) -> str:
-        """The topic that steering by hand goes to."""
-        return self._steering.topic
-
     def steer_on(self, viewer: str, topic: str) -> None:
         """Let steering by hand go to ``topic``, if ``viewer`` has the driver's seat or nobody has.
 

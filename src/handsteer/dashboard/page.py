@@ -1,7 +1,6 @@
 """What every page has: the head with the way to the others, the sentence with the Stop button, and who drives."""
 
 from dataclasses import dataclass
-from typing import ClassVar
 
 from nicegui import ui
 
@@ -19,6 +18,7 @@ PICTURE_PATH = "/camera.mjpg"
 WEBCAM_PATH = "/camera"
 ASSETS_PATH = "/assets"
 
+_LINKS = (("/", "Drive"), ("/teach", "Teach"), ("/settings", "Settings"))
 _WORDS_PERIOD_S = 0.1
 
 ICON = (
@@ -73,8 +73,6 @@ class Page:
         path: Where the page is, which its link in the head says.
     """
 
-    LINKS: ClassVar[tuple[tuple[str, str], ...]] = (("/", "Drive"), ("/teach", "Teach"), ("/settings", "Settings"))
-
     def __init__(self, served: Served, path: str) -> None:
         self.client = ui.context.client
         self._served = served
@@ -109,18 +107,14 @@ class Page:
             with ui.element("div"):
                 ui.html("<h1>handsteer</h1>", sanitize=False)
                 ui.label("drive a robot with your hand signs").classes("tagline")
-            if len(self.LINKS) > 1:
-                self._links(path)
+            with ui.element("nav").classes("links"):
+                for target, name in _LINKS:
+                    ui.link(name, target).props('aria-current="page"' if target == path else "")
             with ui.element("div").classes("right"):
                 self._driving = SeatPanel(self._ask, self._answer)
                 self._source = ui.label("").classes("source chip")
                 with ui.element("button").classes("icon-button theme").props('aria-label="Light or dark"'):
                     ui.html(_THEME_ICON, sanitize=False)
-
-    def _links(self, path: str) -> None:
-        with ui.element("nav").classes("links"):
-            for target, name in self.LINKS:
-                ui.link(name, target).props('aria-current="page"' if target == path else "")
 
     def _update(self) -> None:
         if node := self.joined:

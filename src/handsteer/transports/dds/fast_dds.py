@@ -33,7 +33,6 @@ class FastDdsServices:
     def __init__(self, participant: Participant, network: Network) -> None:
         self._participant = participant
         self._found: set[bytes] = set()
-        self._ends: list[tuple[bytes, bool]] = []
         self._responder = _started(network)
         self._reader: Any = None
         if self._responder is not None:

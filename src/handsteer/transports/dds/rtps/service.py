@@ -65,11 +65,6 @@ class Service:
         """Whether it has so many clients that no further one is taken."""
         return max(len(self.reader.writers), len(self.writer.readers)) >= _CLIENTS
 
-    @property
-    def is_waiting(self) -> bool:
-        """Whether a reply waits for its reader."""
-        return bool(self._waiting)
-
     def serve(self, client: bytes, request: Data, now_s: float) -> None:
         """Make the reply to a request of the writer ``client``; it waits for :meth:`send`."""
         if request.payload is None:

@@ -127,7 +127,7 @@ class Message:
 
     prefix: bytes
     vendor: bytes
-    parts: tuple[tuple[bytes, Submessage], ...] = field(default=())
+    parts: tuple[tuple[bytes, Submessage], ...]
 
 
 def decode(datagram: bytes) -> Message | None:
