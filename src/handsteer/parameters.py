@@ -88,6 +88,7 @@ class Description:
         minimum: The lowest value, or the bound that it must be above; None when there is none.
         maximum: The highest value; None when there is none.
         constraint: What else is asked of its values, in words; empty when nothing is.
+        choices: What there is to choose from; empty when that is not all that is allowed.
         why_fixed: Why it cannot be set while the node runs; None when it can.
     """
 
@@ -96,6 +97,7 @@ class Description:
     minimum: float | None = None
     maximum: float | None = None
     constraint: str = ""
+    choices: tuple[str, ...] = ()
     why_fixed: str | None = None
 
 
@@ -179,7 +181,7 @@ class NodeParameters:
             if isinstance(value, dict):
                 found += [(f"{prefix}{field}.{entry}", of) for entry, of in value.items()]
             else:
-                found.append((f"{prefix}{field}", "" if value is None else _plain(value)))
+                found.append((f"{prefix}{field}", "" if value is None else plain(value)))
         return found
 
     def _put(self, nested: dict[str, Any], name: str, value: Value | None) -> None:
@@ -214,7 +216,7 @@ class NodeParameters:
         if section not in self._sections:
             return None
         field, _, entry = rest.partition(".")
-        model = _model(section)
+        model = section_model(section)
         if field not in model.model_fields or _is_table(model, field) != bool(entry):
             return None
         return _Place(section, model, field, entry or None)
@@ -230,7 +232,8 @@ class _Place:
     entry: str | None
 
 
-def _model(section: str) -> type[Section]:
+def section_model(section: str) -> type[Section]:
+    """Return the model of a section of the configuration."""
     model = Config.model_fields[section].annotation
     assert isinstance(model, type)
     assert issubclass(model, Section)
@@ -238,14 +241,15 @@ def _model(section: str) -> type[Section]:
 
 
 def _fields(section: str) -> list[str]:
-    return list(_model(section).model_fields)
+    return list(section_model(section).model_fields)
 
 
 def _is_table(model: type[Section], field: str) -> bool:
     return get_origin(model.model_fields[field].annotation) is dict
 
 
-def _plain(value: Any) -> Value:
+def plain(value: Any) -> Any:
+    """Return ``value`` as YAML and parameter services have it: a path as its text, a tuple as a list."""
     return str(value) if isinstance(value, Path) else list(value) if isinstance(value, tuple) else value
 
 
@@ -259,7 +263,7 @@ def describe(model: type[Section], name: str) -> Description:
     lowest = above if above is not None else _bound(field, "ge")
     constraint = f"one of {', '.join(choices)}" if choices else f"above {above:g}" if above is not None else ""
     fixed = None if name in model.live else _AT_START
-    return Description(kind, field.description or "", lowest, _bound(field, "le"), constraint, fixed)
+    return Description(kind, field.description or "", lowest, _bound(field, "le"), constraint, choices, fixed)
 
 
 def _without_none(annotation: Any) -> Any:

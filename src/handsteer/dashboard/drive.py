@@ -1,4 +1,4 @@
-"""The page ``/``: what the camera sees, what was understood, what the robot does, and a pad to steer it."""
+"""The page ``/``: what the camera sees, what was understood, what the robot does, its world, and steering by hand."""
 
 import time
 
@@ -30,8 +30,7 @@ class DrivePage(Page):
             f'<link rel="stylesheet" href="{ASSETS_PATH}/world.css">'
             f'<script src="{ASSETS_PATH}/webcam.js" defer></script>'
         )
-        self._cameras = served.local.cameras
-        self._camera = CameraPanel(PICTURE_PATH, served.local.cameras, self.client.id, self._use_own_camera)
+        self._camera = CameraPanel(PICTURE_PATH, served.local.cameras, self.client.id, self.use_own_camera)
         self._world = WorldPanel(served.local.robot, self.drives, self._watches)
         with ui.element("div").classes("panels"):
             self._velocity = VelocityPanel()
@@ -47,7 +46,7 @@ class DrivePage(Page):
         super().show(node, state)
         for panel in (self._camera, self._world, self._velocity, self._timing, self._signs):
             panel.update(state)
-        self._steering.update(state, node.seat.place_of(self.client.id, node.clock.now()))
+        self._steering.update(state, self.place(node))
 
     def _update_world(self) -> None:
         if node := self.joined:
@@ -55,7 +54,7 @@ class DrivePage(Page):
 
     def _watches(self) -> bool:
         node = self.joined
-        return node is not None and node.seat.place_of(self.client.id, node.clock.now()).role == "watcher"
+        return node is not None and self.place(node).role == "watcher"
 
     def _update_plot(self) -> None:
         if node := self.joined:
@@ -73,7 +72,3 @@ class DrivePage(Page):
     def _release(self) -> None:
         if node := self.joined:
             node.release(self.client.id)
-
-    def _use_own_camera(self) -> None:
-        if self._cameras and self.drives():
-            self._cameras.choose("own")

@@ -8,6 +8,7 @@ from handsteer.cameras.browser import ChoiceOfCameras
 from handsteer.dashboard.node import DashboardNode
 from handsteer.dashboard.panels.banner import Banner
 from handsteer.dashboard.panels.seat import SeatPanel
+from handsteer.dashboard.seat import Place
 from handsteer.dashboard.settings_store import Settings
 from handsteer.dashboard.state import PageState
 from handsteer.dashboard.teaching.teaching import Teaching
@@ -87,7 +88,7 @@ class Page:
 
     def show(self, node: DashboardNode, state: PageState) -> None:
         """Show what is new, ten times a second; a page adds its own to it."""
-        self._driving.update(node.seat.place_of(self.client.id, node.clock.now()))
+        self._driving.update(self.place(node))
         self._source.set_text(state.camera)
         self._banner.update(state)
 
@@ -100,6 +101,15 @@ class Page:
         """Return whether this viewer has the driver's seat, which it is given if it is free."""
         node = self.joined
         return node is not None and node.seat.take(self.client.id, node.clock.now())
+
+    def place(self, node: DashboardNode) -> Place:
+        """Return what the driver's seat is for this viewer."""
+        return node.seat.place_of(self.client.id, node.clock.now())
+
+    def use_own_camera(self) -> None:
+        """Choose the camera of the machine that handsteer runs on, if this viewer drives."""
+        if self._served.local.cameras and self.drives():
+            self._served.local.cameras.choose("own")
 
     def _top(self, path: str) -> None:
         with ui.element("header").classes("top"):

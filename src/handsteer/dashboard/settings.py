@@ -31,5 +31,5 @@ class SettingsPage(Page):
         """Show what is new."""
         super().show(node, state)
         if self._panel is not None:
-            role = node.seat.place_of(self.client.id, node.clock.now()).role
+            role = self.place(node).role
             self._panel.update(to_driver=role == "driver", editable=role != "watcher")

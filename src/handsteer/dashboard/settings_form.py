@@ -2,14 +2,14 @@
 
 import re
 from dataclasses import dataclass
-from typing import Any, Literal, get_args
+from typing import Any, Literal, get_args, get_origin
 from urllib.parse import urlsplit
 
 import yaml
 
-from handsteer.config import Config, Section, validate
+from handsteer.config import Config, validate
 from handsteer.errors import ConfigError
-from handsteer.parameters import Description, describe
+from handsteer.parameters import Description, describe, section_model
 
 FieldKind = Literal["switch", "choice", "number", "text", "list", "table"]
 """How a field is edited; what a list and a table hold is separated by commas."""
@@ -140,19 +140,9 @@ def mask(address: str) -> str:
 
 def form() -> dict[str, tuple[FormField, ...]]:
     """Return the fields of every section of the configuration, in its order."""
-    return {name: tuple(_field(name, field) for field in section_model(name).model_fields) for name in _sections()}
-
-
-def section_model(name: str) -> type[Section]:
-    """Return the model of the section ``name``."""
-    model = Config.model_fields[name].annotation
-    assert isinstance(model, type)
-    assert issubclass(model, Section)
-    return model
-
-
-def _sections() -> list[str]:
-    return list(Config.model_fields)
+    return {
+        name: tuple(_field(name, field) for field in section_model(name).model_fields) for name in Config.model_fields
+    }
 
 
 def _field(section: str, name: str) -> FormField:
@@ -160,24 +150,23 @@ def _field(section: str, name: str) -> FormField:
     field = model.model_fields[name]
     known = describe(model, name)
     unit = _UNIT.search(known.text)
-    choices = tuple(known.constraint.removeprefix("one of ").split(", ")) if "one of " in known.constraint else ()
     return FormField(
         section=section,
         name=name,
         text=_UNIT.sub("", known.text),
         unit=unit.group(1) if unit else "",
         allowed=_allowed(known),
-        kind=_kind(field.annotation, known, choices),
-        choices=choices,
+        kind=_kind(field.annotation, known),
+        choices=known.choices,
         optional=type(None) in get_args(field.annotation),
         live=known.why_fixed is None,
     )
 
 
-def _kind(annotation: Any, known: Description, choices: tuple[str, ...]) -> FieldKind:
-    if getattr(annotation, "__origin__", None) is dict:
+def _kind(annotation: Any, known: Description) -> FieldKind:
+    if get_origin(annotation) is dict:
         return "table"
-    if choices:
+    if known.choices:
         return "choice"
     kinds: dict[str, FieldKind] = {"bool": "switch", "integer": "number", "double": "number", "strings": "list"}
     return kinds.get(known.kind, "text")

@@ -2,7 +2,6 @@
 
 import threading
 from collections.abc import Callable, Iterable, Mapping
-from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
@@ -11,6 +10,7 @@ from handsteer.dashboard.settings_file import SettingsFile
 from handsteer.dashboard.settings_form import FormField, form
 from handsteer.errors import ConfigError, HandsteerError
 from handsteer.hand.script import parse_script
+from handsteer.parameters import plain
 from handsteer.robots.world import load_world
 
 FORM: Mapping[str, tuple[FormField, ...]] = MappingProxyType(form())
@@ -206,8 +206,7 @@ _CHECKS: Mapping[str, Callable[[Config], object]] = MappingProxyType(
 def _with(values: Mapping[str, Mapping[str, Any]], fresh: Mapping[FormField, Any]) -> dict[str, dict[str, Any]]:
     merged = {section: dict(of) for section, of in values.items()}
     for field, value in fresh.items():
-        plain = list(value) if isinstance(value, tuple) else str(value) if isinstance(value, Path) else value
-        merged.setdefault(field.section, {})[field.name] = plain
+        merged.setdefault(field.section, {})[field.name] = plain(value)
     return merged
 
 

@@ -42,8 +42,7 @@ class TeachPage(Page):
                 ui.label(_ELSEWHERE)
             return
         self._teaching = served.local.teaching
-        self._cameras = served.local.cameras
-        self._camera = CameraPanel(PICTURE_PATH, served.local.cameras, self.client.id, self._use_own_camera)
+        self._camera = CameraPanel(PICTURE_PATH, served.local.cameras, self.client.id, self.use_own_camera)
         self._lesson = _LessonCard(self, self._teaching)
         self._countdown = Countdown(self._camera.stage)
         self.client.on_disconnect(self._pause)
@@ -66,10 +65,6 @@ class TeachPage(Page):
     def _pause(self) -> None:
         if lesson := self._teaching.lesson(self.client.id):
             lesson.pause()
-
-    def _use_own_camera(self) -> None:
-        if self._cameras and self.drives():
-            self._cameras.choose("own")
 
 
 class _LessonCard:

@@ -5,9 +5,10 @@ from collections.abc import Callable
 from nicegui import ui
 
 from handsteer.dashboard.panels.elements import box, button, card, switch, tag, text
-from handsteer.dashboard.settings_form import FormField, section_model
+from handsteer.dashboard.settings_form import FormField
 from handsteer.dashboard.settings_store import FORM, Settings
 from handsteer.errors import ConfigError, HandsteerError
+from handsteer.parameters import section_model
 
 _NONE = "none"
 _KEYBOARDS = {"number": 'inputmode="decimal"', "text": "", "list": "", "table": ""}
