@@ -2,9 +2,10 @@
 
 Run ``python benchmarks/page.py``; parts by name: ``bytes``, ``viewers``, ``deaf``, ``gone``. The whole graph runs in
 this process, at 640x480 and 30 frames a second. One real Chromium tells the bytes and the stopping times. What viewers
-cost is told with plain ones, in a process of their own, who read the pictures and the page's socket as a browser does
-but draw nothing: a browser that draws on the same processors would only tell what drawing costs. Rounds with none, one
-and four of them alternate, so that a busy machine slows all alike.
+cost is told with plain ones, in a process of their own, who take the pictures, the figures, the 3D view and the plots
+as a browser does but draw nothing: a browser that draws on the same processors would only tell what drawing costs. For
+the same reason the camera is a film of the virtual hand then, as a webcam does not draw either; ``--camera virtual``
+draws it. Rounds with none, one and four of them alternate, so that a busy machine slows all alike.
 """
 
 import argparse
@@ -13,6 +14,7 @@ import math
 import os
 import subprocess
 import sys
+import tempfile
 import threading
 import time
 import urllib.request
@@ -21,6 +23,7 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from urllib.parse import urlsplit
 
+import cv2
 import numpy as np
 import socketio
 from playwright.sync_api import Browser, Page, sync_playwright
@@ -28,8 +31,10 @@ from playwright.sync_api import Browser, Page, sync_playwright
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # for the relay and the browser that the tests use
 
 from scripts import chromium
-from tests.dashboard.network import Relay, client_of, deaf, deaf_page, join_query
+from tests.dashboard.network import Relay, client_of, deaf, deaf_page, drawn, join_query
 
+from handsteer.cameras.virtual import VirtualHandCamera
+from handsteer.clock import SteppedClock
 from handsteer.config import load
 from handsteer.dashboard.server import Dashboard
 from handsteer.graph import Graph
@@ -42,6 +47,8 @@ LIMIT_SLOWER = 0.10
 LIMIT_STOP_MS = 500
 PATIENCE_S = 60.0
 SETTLED_S = 1.0
+DRIVE = "Forward:3 Turn Left:3 Stop:2"
+FILM_S, FILM_FPS = 8, 30
 ACK_PERIOD_S = 3.0  # as NiceGUI's own script does it
 
 
@@ -50,11 +57,12 @@ class Served:
 
     Args:
         script: What the virtual hand shows.
+        camera: A film of it, or ``virtual``.
     """
 
-    def __init__(self, script: str) -> None:
+    def __init__(self, script: str, camera: str) -> None:
         settings = {
-            "camera": {"source": "virtual"},
+            "camera": {"source": camera},
             "virtual_hand": {"script": script, "background": "cluttered"},
             "dashboard": {"port": 0},
         }
@@ -90,12 +98,24 @@ class Served:
 
 
 @contextmanager
-def served(script: str) -> Iterator[Served]:
-    graph = Served(script)
+def served(script: str, camera: str = "virtual") -> Iterator[Served]:
+    graph = Served(script, camera)
     try:
         yield graph
     finally:
         graph.close()
+
+
+def film(path: Path, script: str) -> None:
+    """Film the virtual hand going through ``script``."""
+    clock = SteppedClock()
+    config = load(None, None, {"virtual_hand": {"script": script, "background": "cluttered"}}).virtual_hand
+    hand = VirtualHandCamera(config, width=640, height=480, fps=FILM_FPS, clock=clock)
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), FILM_FPS, (640, 480))
+    for _ in range(FILM_S * FILM_FPS):
+        writer.write(hand.read().image)
+        clock.advance(1 / FILM_FPS)
+    writer.release()
 
 
 @contextmanager
@@ -122,7 +142,7 @@ def load_now() -> str:
 
 def count_bytes(duration_s: float) -> None:
     """Print what one viewer is sent: a real browser, and a plain one who takes every picture however busy all is."""
-    with served("Forward:3 Turn Left:3 Stop:2") as page, Relay(page.port) as relay:
+    with served(DRIVE) as page, Relay(page.port) as relay:
         with browser() as chrome:
             visit(chrome, relay.port)
             print_bytes("a browser", page, relay, duration_s)
@@ -158,10 +178,10 @@ def plain_viewers(port: int, count: int) -> Iterator[None]:
             process.stdin.close()
 
 
-def count_viewers(rounds: int, duration_s: float) -> None:
+def count_viewers(rounds: int, duration_s: float, camera: str) -> None:
     """Print how much viewers slow the recognition."""
     figures: dict[int, list[tuple[float, float]]] = {0: [], 1: [], 4: []}
-    with served("Forward:3 Turn Left:3 Stop:2") as page:
+    with served(DRIVE, camera) as page:
         time.sleep(3.0)
         for number in range(rounds):
             for count in list(figures)[:: 1 if number % 2 else -1]:
@@ -183,10 +203,10 @@ def resident_mb() -> float:
     return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6
 
 
-def count_deaf(rounds: int, duration_s: float) -> None:
+def count_deaf(rounds: int, duration_s: float, camera: str) -> None:
     """Print what viewers cost who do not read, beside one who does."""
     figures: dict[bool, list[tuple[float, float]]] = {False: [], True: []}
-    with served("Forward:3 Turn Left:3 Stop:2") as page, plain_viewers(page.port, 1):
+    with served(DRIVE, camera) as page, plain_viewers(page.port, 1):
         time.sleep(5.0)
         before_mb = resident_mb()
         for _ in range(rounds):
@@ -279,7 +299,8 @@ async def read_page(port: int, joined: threading.Semaphore) -> None:
     """Join the page as its own script does, and take what it sends."""
     address = f"http://127.0.0.1:{port}"
     with urllib.request.urlopen(address) as answer:
-        client = client_of(answer.read().decode())
+        html = answer.read().decode()
+    client = client_of(html)
     page = socketio.AsyncClient()
     newest = 0
 
@@ -292,6 +313,8 @@ async def read_page(port: int, joined: threading.Semaphore) -> None:
     await page.connect(
         f"{address}?{join_query(client)}", transports=["websocket"], socketio_path="/_nicegui_ws/socket.io"
     )
+    for event in drawn(html):
+        await page.emit("event", event)
     joined.release()
     while True:
         await page.sleep(ACK_PERIOD_S)
@@ -305,17 +328,23 @@ def main() -> None:
     parser.add_argument("--duration", type=float, default=10.0, help="seconds of each measurement")
     parser.add_argument("--trials", type=int, default=20, help="of each way to be gone")
     parser.add_argument("--look", nargs=2, type=int, metavar=("PORT", "COUNT"), help=argparse.SUPPRESS)
+    parser.add_argument("--camera", choices=("film", "virtual"), default="film", help="what viewers and deaf ones see")
     options = parser.parse_args()
     if options.look:
         look(*options.look)
-    parts = {
-        "bytes": lambda: count_bytes(2 * options.duration),
-        "viewers": lambda: count_viewers(options.rounds, options.duration),
-        "deaf": lambda: count_deaf(options.rounds, options.duration),
-        "gone": lambda: count_gone(options.trials),
-    }
-    for part in options.parts or parts:
-        parts[part]()
+    with tempfile.TemporaryDirectory() as folder:
+        camera = options.camera
+        if camera == "film":
+            camera = str(Path(folder) / "film.avi")
+            film(Path(camera), DRIVE)
+        parts = {
+            "bytes": lambda: count_bytes(2 * options.duration),
+            "viewers": lambda: count_viewers(options.rounds, options.duration, camera),
+            "deaf": lambda: count_deaf(options.rounds, options.duration, camera),
+            "gone": lambda: count_gone(options.trials),
+        }
+        for part in options.parts or parts:
+            parts[part]()
 
 
 if __name__ == "__main__":

@@ -1,11 +1,14 @@
 """What is between a browser and the page: a relay that can go silent, and viewers who never read."""
 
 import base64
+import html as markup
+import json
 import os
 import re
 import socket
+import struct
 import threading
-from typing import Self
+from typing import Any, Self
 
 _CHUNK = 65536
 _LOOK_PERIOD_S = 0.05
@@ -102,12 +105,15 @@ def deaf_page(port: int, html: str) -> socket.socket:
     connection.settimeout(20.0)
     assert connection.recv(12) == b"HTTP/1.1 101"
     send_frame(connection, b"40")  # Socket.IO: connect
+    for event in drawn(html):
+        send_frame(connection, b"42" + json.dumps(["event", event]).encode())
     return connection
 
 
 def send_frame(connection: socket.socket, text: bytes) -> None:
-    """Send a short text by a websocket, masked by zeros."""
-    connection.sendall(bytes((0x81, 0x80 | len(text), 0, 0, 0, 0)) + text)
+    """Send a text of at most 65535 bytes by a websocket, masked by zeros."""
+    length = bytes((0x80 | len(text),)) if len(text) < 126 else struct.pack("!BH", 0x80 | 126, len(text))
+    connection.sendall(b"\x81" + length + bytes(4) + text)
 
 
 def client_of(html: str) -> str:
@@ -115,6 +121,19 @@ def client_of(html: str) -> str:
     found = re.search(r"client_id\W+([0-9a-f-]{36})", html)
     assert found, "the page names no client"
     return found.group(1)
+
+
+def drawn(html: str) -> list[dict[str, Any]]:
+    """Return what a browser says of the page ``html`` once its 3D view and its plots are there to be drawn in."""
+    found = re.search(r"parseElements\(String\.raw`(.*?)`", html, re.DOTALL)
+    assert found, "the page names no elements"
+    elements = json.loads(markup.unescape(found.group(1)))
+    return [
+        {"id": int(element), "client_id": client_of(html), "listener_id": event["listener_id"], "args": ["{}"]}
+        for element, facts in elements.items()
+        for event in facts.get("events", ())
+        if event["type"] in {"init", "begin"}
+    ]
 
 
 def join_query(client: str) -> str:
