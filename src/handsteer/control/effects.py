@@ -2,21 +2,13 @@
 
 import json
 from collections.abc import Mapping
+from functools import lru_cache
 
 from handsteer.config import ControlConfig, validate
 from handsteer.control.actions import EFFECTS, Action
 from handsteer.errors import ConfigError
 
-_TOLD = (
-    "ramp",
-    "linear_step",
-    "angular_step",
-    "linear_acceleration",
-    "angular_acceleration",
-    "max_linear",
-    "max_angular",
-    "actions",
-)
+_TOLD = tuple(sorted(ControlConfig.live))
 
 
 def effect_of(action: Action, rule: ControlConfig) -> str:
@@ -32,9 +24,15 @@ def tell(rule: ControlConfig) -> dict[str, str]:
 
 def told(values: Mapping[str, str]) -> ControlConfig | None:
     """Return what a report of :func:`tell` says, defaults for the rest; None when it says nothing that holds."""
+    return _rule_of(tuple(values.get(name, "") for name in _TOLD))
+
+
+# Reports come ten times a second and nearly always say the same.
+@lru_cache(maxsize=8)
+def _rule_of(texts: tuple[str, ...]) -> ControlConfig | None:
     try:
-        return validate(ControlConfig, {name: json.loads(values[name]) for name in _TOLD})
-    except (KeyError, ValueError, ConfigError):
+        return validate(ControlConfig, {name: json.loads(text) for name, text in zip(_TOLD, texts, strict=True)})
+    except (ValueError, ConfigError):
         return None
 
 
