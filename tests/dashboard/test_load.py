@@ -1,5 +1,7 @@
 """What viewers cost, and what becomes of a robot whose driver is gone."""
 
+import itertools
+import json
 import socket
 import threading
 import time
@@ -10,7 +12,7 @@ import pytest
 
 from handsteer.dashboard.picture import BYTES_PER_S
 from handsteer.messages import DiagnosticArray, DiagnosticStatus, Header, KeyValue
-from tests.dashboard.network import Relay, deaf, deaf_page, send_frame
+from tests.dashboard.network import Relay, client_of, deaf, deaf_page, send_frame
 from tests.dashboard.served import PATIENCE_S, Site
 from tests.dashboard.test_server import read_jpeg, viewer
 
@@ -63,6 +65,27 @@ def test_viewers_who_never_read_hold_up_nobody_and_are_let_go(site: Site) -> Non
     finally:
         for each in deaf_ones:
             each.close()
+
+
+@pytest.mark.slow
+def test_a_page_that_acknowledges_nothing_is_sent_nothing_more_until_it_does(site: Site) -> None:
+    html = site.get("/").read().decode()
+    with deaf_page(site.port, html) as page:
+        page.settimeout(1.5)
+        beats = itertools.count()
+
+        def hear() -> bytes:
+            report(site, str(next(beats)))  # there is always something new to say
+            try:
+                return page.recv(1 << 16)
+            except TimeoutError:
+                return b""
+
+        assert hear()
+        wait_until(lambda: not hear())
+        everything = {"client_id": client_of(html), "next_message_id": 1_000_000}
+        send_frame(page, b"42" + json.dumps(["ack", everything]).encode())
+        wait_until(lambda: b".0 m" in hear())
 
 
 def report(site: Site, value: str) -> None:

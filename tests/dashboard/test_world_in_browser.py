@@ -4,11 +4,17 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+import numpy as np
 import pytest
+from numpy.typing import NDArray
 from playwright.sync_api import Page, sync_playwright
 from scripts import chromium
 
+from handsteer.dashboard.geometry import about_axis, from_rpy
+from handsteer.messages import JOINT_STATES, JointState
+from handsteer.robots.description import joints, robot_description
 from handsteer.robots.world import load_world, read_world
+from handsteer.transports.protocol import Received
 from tests.dashboard.served import Site
 from tests.dashboard.visits import NEEDS_A_BROWSER, PATIENCE_MS, Visit, visiting
 
@@ -51,6 +57,18 @@ def trail_points(page: Page) -> int:
             return points;
         }}"""
     )
+
+
+def turned_links(page: Page) -> list[NDArray[np.float64]]:
+    """Return how the links of the drawn robot are turned, (3, 3) each."""
+    found = page.evaluate(
+        f"""() => {{ {SCENE}
+            const turned = [];
+            scene.traverse(shape => {{ if (shape.isGroup) turned.push(shape.matrix.elements) }});
+            return turned;
+        }}"""
+    )
+    return [np.reshape(columns, (4, 4)).T[:3, :3] for columns in found]
 
 
 def on_screen(page: Page, x: float, y: float, z: float = 0.2) -> tuple[float, float]:
@@ -98,6 +116,28 @@ def test_three_views_go_along_with_the_robot_and_its_way_is_drawn() -> None:
         press(page, "Back to start")
         visit.wait_until(lambda: abs(robot.state.truth.y) < 0.01)
         visit.wait_until(lambda: trail_points(page) <= 1)
+        assert visit.troubles == []
+
+
+def test_the_wheels_turn_as_the_joint_states_say() -> None:
+    with looking_at("empty") as visit:
+        robot, angles = visit.graph.robot, {}
+
+        def keep(received: Received[JointState]) -> None:
+            angles.update(zip(received.message.name, received.message.position.tolist(), strict=True))
+
+        visit.graph.transport.subscribe("test", JOINT_STATES, keep)
+        visit.graph.steering.steer(0.2, 0.5)
+        visit.wait_until(lambda: robot.state.truth.yaw > 1.0)
+        visit.graph.steering.release()
+        visit.wait_until(lambda: abs(robot.state.linear_mps) < 0.001)
+        wheels = [joint for joint in joints(robot_description()) if joint.type == "continuous"]
+        assert len({round(angles[wheel.name], 1) for wheel in wheels}) > 1  # each side its own
+        for wheel in wheels:
+            expected = from_rpy(wheel.rpy) @ about_axis(wheel.axis, angles[wheel.name])
+            visit.wait_until(
+                lambda to=expected: any(np.abs(to - link).max() < 0.03 for link in turned_links(visit.page))
+            )
         assert visit.troubles == []
 
 

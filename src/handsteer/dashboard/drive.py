@@ -14,8 +14,8 @@ from handsteer.dashboard.panels.velocity import VelocityPanel
 from handsteer.dashboard.panels.world import WorldPanel
 from handsteer.dashboard.state import PageState
 
-_WORLD_PERIOD_S = 0.05
-_PLOT_PERIOD_S = 0.2
+_SHOWN_TO_A_PLOT = 3
+"""A plot is drawn anew every third time, as its samples can wait."""
 
 
 class DrivePage(Page):
@@ -38,27 +38,22 @@ class DrivePage(Page):
             choose_topic = self._steer_on if served.topics else None
             self._steering = SteerPanel(self._steer, self._release, time.monotonic, choose_topic)
             self._signs = SignsPanel()
-        ui.timer(_WORLD_PERIOD_S, self._update_world)
-        ui.timer(_PLOT_PERIOD_S, self._update_plot)
+        self._shown = 0
 
     def show(self, node: DashboardNode, state: PageState) -> None:
         """Show what is new."""
         super().show(node, state)
-        for panel in (self._camera, self._world, self._velocity, self._timing, self._signs):
+        self._world.update(state, node.world)
+        for panel in (self._camera, self._velocity, self._timing, self._signs):
             panel.update(state)
         self._steering.update(state, self.place(node))
-
-    def _update_world(self) -> None:
-        if node := self.joined:
-            self._world.draw(node.world)
+        self._shown += 1
+        if self._shown % _SHOWN_TO_A_PLOT == 0:
+            self._velocity.draw(node.history, node.clock.now())
 
     def _watches(self) -> bool:
         node = self.joined
         return node is not None and self.place(node).role == "watcher"
-
-    def _update_plot(self) -> None:
-        if node := self.joined:
-            self._velocity.draw(node.history, node.clock.now())
 
     def _steer(self, linear_mps: float, angular_radps: float) -> None:
         if node := self.joined:

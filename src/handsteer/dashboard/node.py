@@ -253,7 +253,10 @@ class DashboardNode(Node):
 
     def _on_markers(self, received: Received[MarkerArray]) -> None:
         # rosbags types this list by the Marker of an older ROS.
-        self.world = replace(self.world, markers=tuple(cast("list[Marker]", received.message.markers)))
+        markers = tuple(cast("list[Marker]", received.message.markers))
+        # They are repeated for those who come late, with other stamps; who draws them need not look at each again.
+        if _drawn(markers) != _drawn(self.world.markers):
+            self.world = replace(self.world, markers=markers)
 
     def _on_description(self, received: Received[String]) -> None:
         self.world = replace(self.world, description=received.message.data)
@@ -261,6 +264,10 @@ class DashboardNode(Node):
 
 def _person(who: str | None, viewer: str) -> Person:
     return "" if not who else "you" if who == viewer else "another viewer"
+
+
+def _drawn(markers: tuple[Marker, ...]) -> list[tuple[object, ...]]:
+    return [(each.ns, each.id, each.type, each.action, each.pose, each.scale, each.color) for each in markers]
 
 
 def _reporter(message: DiagnosticArray) -> tuple[str, ...]:

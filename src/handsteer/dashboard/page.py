@@ -1,5 +1,6 @@
 """What every page has: the head with the way to the others, the sentence with the Stop button, and who drives."""
 
+import time
 from dataclasses import dataclass
 
 from nicegui import ui
@@ -20,7 +21,9 @@ WEBCAM_PATH = "/camera"
 ASSETS_PATH = "/assets"
 
 _LINKS = (("/", "Drive"), ("/teach", "Teach"), ("/settings", "Settings"))
-_WORDS_PERIOD_S = 0.1
+_PERIOD_S = 0.1
+_ACK_PATIENCE_S = 5.0
+"""A browser acknowledges every 3 s what it has got; one that has not for so long is sent no more until it does."""
 
 ICON = (
     '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 64 64"><rect width="64" height="64" rx="16" fill="#2457d6"/>'
@@ -84,7 +87,8 @@ class Page:
         )
         self._top(path)
         self._banner = Banner(self._halt, self._reset)
-        ui.timer(_WORDS_PERIOD_S, self._update)
+        self._unread: tuple[int | None, float] = (None, 0.0)
+        ui.timer(_PERIOD_S, self._update)
 
     def show(self, node: DashboardNode, state: PageState) -> None:
         """Show what is new, ten times a second; a page adds its own to it."""
@@ -127,8 +131,18 @@ class Page:
                     ui.html(_THEME_ICON, sanitize=False)
 
     def _update(self) -> None:
-        if node := self.joined:
+        node = self.joined
+        if node is not None and self._reads():
             self.show(node, node.state(self.client.id))
+
+    def _reads(self) -> bool:
+        """Return whether the browser takes what it is sent; what it does not take would only pile up."""
+        sent = self.client.outbox.message_history  # what was sent and not acknowledged yet, oldest first
+        oldest = sent[0][0] if sent else None
+        now_s = time.monotonic()
+        if oldest != self._unread[0]:
+            self._unread = (oldest, now_s)
+        return oldest is None or now_s - self._unread[1] < _ACK_PATIENCE_S
 
     def _halt(self) -> None:
         if node := self.joined:

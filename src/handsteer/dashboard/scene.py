@@ -14,7 +14,7 @@ from nicegui import ui
 from nicegui.elements.scene.scene_object3d import Object3D
 from nicegui.events import SceneDragEventArguments
 
-from handsteer.dashboard.geometry import Rotation, about_axis, css_colour, from_quaternion, from_rpy, parents_first
+from handsteer.dashboard.geometry import Rotation, css_colour, from_quaternion, from_rpy, parents_first
 from handsteer.dashboard.node import WorldState
 from handsteer.dashboard.scene_objects import RobotRig, TrailLine, View
 from handsteer.dashboard.trail import MOST_POINTS, Trail
@@ -70,7 +70,6 @@ class WorldView:
         self._scene = scene
         self._shown = WorldState()
         self._obstacles: dict[tuple[str, int], tuple[int, Object3D]] = {}
-        self._joints: dict[str, tuple[Joint, Object3D]] = {}
         self._view: View = "orbit"
         self._editable = False
         self._chosen: int | None = None
@@ -88,10 +87,8 @@ class WorldView:
         shown, self._shown = self._shown, world
         if world.description and world.description != shown.description:
             self._draw_robot(world.description)
-        if world.joints is not shown.joints:
-            self._turn_joints(dict(world.joints))
-        if world.robot != shown.robot:
-            self._robot.go(world.robot.x, world.robot.y, world.robot.yaw)
+        if world.robot != shown.robot or world.joints != shown.joints:
+            self._robot.go(world.robot.x, world.robot.y, world.robot.yaw, dict(world.joints))
             self._floor.move(round(world.robot.x), round(world.robot.y))
         if world.trail is not shown.trail:
             self._draw_trail(shown.trail, world.trail)
@@ -147,7 +144,6 @@ class WorldView:
     def _draw_robot(self, description: str) -> None:
         for link in self._robot.children:
             link.delete()
-        self._joints.clear()
         try:
             shapes, held = visuals(description), joints(description)
         except WorldError as error:
@@ -155,21 +151,18 @@ class WorldView:
             return
         # A link that no joint holds is the root, which is the robot itself.
         links: defaultdict[str, Object3D] = defaultdict(lambda: self._robot)
+        turning: list[tuple[Joint, Object3D]] = []
         with self._scene:
             for joint in parents_first(held):
                 with links[joint.parent]:
                     link = self._scene.group().move(*joint.xyz).rotate_R(from_rpy(joint.rpy).tolist())
                 links[joint.child] = link
-                self._joints[joint.name] = (joint, link)
+                if joint.type in _TURNING:
+                    turning.append((joint, link))
             for visual in shapes:
                 with links[visual.link]:
                     _draw(self._scene, visual)
-
-    def _turn_joints(self, angles: dict[str, float]) -> None:
-        for name in angles.keys() & self._joints.keys():
-            joint, link = self._joints[name]
-            if joint.type in _TURNING:
-                link.rotate_R((from_rpy(joint.rpy) @ about_axis(joint.axis, angles[name])).round(4).tolist())
+        self._robot.hold(turning)
 
     def _show_obstacles(self, markers: tuple[Marker, ...]) -> None:
         known = {

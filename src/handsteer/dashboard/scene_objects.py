@@ -1,11 +1,13 @@
 """What the 3D view has beyond NiceGUI's objects: the robot with its camera, and its way. Each has a small script."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Literal
 
 from nicegui import ui
 from nicegui.elements.scene.scene_object3d import Object3D
+
+from handsteer.robots.description import Joint
 
 View = Literal["orbit", "follow", "top"]
 """``orbit`` goes along with the robot; ``follow`` also turns with it; ``top`` looks down on it, north (+y) up."""
@@ -16,18 +18,29 @@ _STATIC = Path(__file__).parent / "static"
 class RobotRig(Object3D, component=_STATIC / "robot-rig.js"):
     """The robot, which takes the camera along with it.
 
+    All that moves goes to the browser in one message, as each costs the server more than what is in it.
+
     Args:
         scene: Is that of the camera.
     """
 
     def __init__(self, scene: ui.scene) -> None:
-        super().__init__(scene.id, "orbit", 0.0, 0.0, 0.0)
+        super().__init__(scene.id, "orbit", [], 0.0, 0.0, 0.0, [])
+        self._names: tuple[str, ...] = ()
 
-    def go(self, x: float, y: float, yaw: float) -> None:
-        """Stand at x and y in metres, turned by ``yaw`` in rad."""
-        pose = [round(x, 3), round(y, 3), round(yaw, 3)]
-        if pose != self.args[2:]:
-            self.args[2:] = pose
+    def hold(self, links: Sequence[tuple[Joint, Object3D]]) -> None:
+        """Turn these links from now on, each by the angle of its joint."""
+        self._names = tuple(joint.name for joint, _ in links)
+        self.args[2] = [[link.id, *joint.rpy, *joint.axis] for joint, link in links]
+        self.args[6] = [0.0] * len(links)
+        self.run_method("hold", self.args[2])
+
+    def go(self, x: float, y: float, yaw: float, angles: Mapping[str, float]) -> None:
+        """Stand at x and y in metres, turned by ``yaw`` in rad, with joints at ``angles`` in rad; 0 where none is."""
+        turned = [round(angles.get(name, 0.0), 2) for name in self._names]
+        pose = [round(x, 3), round(y, 3), round(yaw, 3), turned]
+        if pose != self.args[3:]:
+            self.args[3:] = pose
             self.run_method("go", *pose)
 
     def look(self, view: View) -> None:

@@ -51,17 +51,14 @@ class WorldPanel:
             self._restart.on("click", self._editor.restart)
         self.look("orbit")
 
-    def update(self, state: PageState) -> None:
-        """Show ``state``."""
+    def update(self, state: PageState, world: WorldState) -> None:
+        """Show ``state`` and ``world``."""
+        self._view.update(world)
         self._foot.update(state)
         self._course.update(state.course)
         self._flash(state.collisions)
         if self._editor.is_open and self._watches():
             self._close("Somebody else drives now, so the world is theirs to edit.")
-
-    def draw(self, world: WorldState) -> None:
-        """Show ``world``."""
-        self._view.update(world)
 
     def look(self, view: View) -> None:
         """Look at the robot from where ``view`` begins."""

@@ -2,6 +2,8 @@
 import { THREE } from "nicegui-scene";
 
 const UP = new THREE.Vector3(0, 0, 1);
+const GLIDE_MS = 120; // a little more than from one pose to the next, so that it never waits for one
+const LEAP_M = 0.5; // who is so far away was put there
 
 // Where the camera stands and what it looks at, from the robot; x is forward in "follow", east in the others.
 const PLACES = {
@@ -10,28 +12,65 @@ const PLACES = {
   top: { camera: [0, -0.01, 13], target: [0, 0, 0] }, // a little to the south, so that north is up
 };
 
+const shortest = (turn) => Math.atan2(Math.sin(turn), Math.cos(turn));
+
 export default class RobotRig {
-  create_mesh(scene, view, x, y, yaw) {
+  // joints: [id of the link, roll, pitch, yaw, axis x, y, z] each; angles: theirs, in rad, in the same order
+  create_mesh(scene, view, joints, x, y, yaw, angles) {
     this.scene = scene;
     this.view = view;
     this.mesh = new THREE.Group();
-    this.stand(x, y, yaw);
+    this.hold(joints);
+    this.stand({ x, y, yaw, angles });
     return this.mesh;
   }
 
-  stand(x, y, yaw) {
-    this.mesh.position.set(x, y, 0);
-    this.mesh.rotation.z = yaw;
+  hold(joints) {
+    this.joints = joints.map(([id, roll, pitch, yaw, ...axis]) => ({
+      id,
+      rest: new THREE.Quaternion().setFromEuler(new THREE.Euler(roll, pitch, yaw, "ZYX")), // about fixed axes
+      axis: new THREE.Vector3(...axis).normalize(),
+    }));
   }
 
-  go(x, y, yaw) {
+  stand(pose) {
     const from = this.mesh.position.clone();
-    const turn = this.view === "follow" ? yaw - this.mesh.rotation.z : 0;
-    this.stand(x, y, yaw);
-    const { camera, controls } = getElement(this.scene) ?? {};
+    const turn = this.view === "follow" ? pose.yaw - this.mesh.rotation.z : 0;
+    this.pose = pose;
+    this.mesh.position.set(pose.x, pose.y, 0);
+    this.mesh.rotation.z = pose.yaw;
+    const { camera, controls, objects } = getElement(this.scene) ?? {};
     for (const point of [camera?.position, controls?.target]) {
       point?.sub(from).applyAxisAngle(UP, turn).add(this.mesh.position);
     }
+    this.joints.forEach(({ id, rest, axis }, index) => {
+      const turned = new THREE.Quaternion().setFromAxisAngle(axis, pose.angles[index] ?? 0);
+      objects?.get(id)?.mesh?.quaternion.multiplyQuaternions(rest, turned);
+    });
+  }
+
+  // Poses come less often than pictures are drawn: the robot glides from one to the next.
+  go(x, y, yaw, angles) {
+    const isUnderWay = this.target !== undefined;
+    this.target = { x, y, yaw, angles };
+    this.from = this.pose;
+    this.began = performance.now();
+    if (Math.hypot(x - this.from.x, y - this.from.y) > LEAP_M) this.from = this.target;
+    if (!isUnderWay) this.glide();
+  }
+
+  glide() {
+    const { from, target } = this;
+    const part = Math.min((performance.now() - this.began) / GLIDE_MS, 1);
+    const angles = target.angles.map((angle, i) => angle - (1 - part) * shortest(angle - (from.angles[i] ?? angle)));
+    this.stand({
+      x: from.x + part * (target.x - from.x),
+      y: from.y + part * (target.y - from.y),
+      yaw: target.yaw - (1 - part) * shortest(target.yaw - from.yaw),
+      angles,
+    });
+    if (part < 1) requestAnimationFrame(() => this.glide());
+    else this.target = undefined;
   }
 
   look(view) {
