@@ -26,15 +26,6 @@ PLACES = (
 
 
 @pytest.fixture
-def site() -> Iterator[Site]:
-    site = Site()
-    try:
-        yield site
-    finally:
-        site.close()
-
-
-@pytest.fixture
 def open_site() -> Iterator[Site]:
     """One that other machines may reach."""
     site = Site(host="0.0.0.0")

@@ -5,7 +5,7 @@ import json
 import socket
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -15,15 +15,6 @@ from handsteer.messages import DiagnosticArray, DiagnosticStatus, Header, KeyVal
 from tests.dashboard.network import Relay, client_of, deaf, deaf_page, send_frame
 from tests.dashboard.served import PATIENCE_S, Site
 from tests.dashboard.test_server import read_jpeg, viewer
-
-
-@pytest.fixture
-def site() -> Iterator[Site]:
-    site = Site()
-    try:
-        yield site
-    finally:
-        site.close()
 
 
 def wait_until(condition: Callable[[], bool], patience_s: float = 3 * PATIENCE_S) -> None:

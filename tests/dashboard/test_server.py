@@ -15,15 +15,6 @@ from handsteer.errors import DashboardError
 from tests.dashboard.served import PATIENCE_S, Site
 
 
-@pytest.fixture
-def site() -> Iterator[Site]:
-    site = Site()
-    try:
-        yield site
-    finally:
-        site.close()
-
-
 @contextmanager
 def viewer(site: Site) -> Iterator[http.client.HTTPResponse]:
     response = site.get("/camera.mjpg")

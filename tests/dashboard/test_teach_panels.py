@@ -59,11 +59,7 @@ def test_the_large_letters_say_what_to_do_now() -> None:
     assert said_now(view(0, Status("recording", 1.0, 34))) == ("34", "hands: show Peace")
 
 
-def test_where_the_graph_is_elsewhere_the_page_says_so() -> None:
-    site = Site()
-    try:
-        answer = site.get("/teach")
-        assert answer.status == 200
-        assert b"handsteer signs collect" in answer.read()
-    finally:
-        site.close()
+def test_where_the_graph_is_elsewhere_the_page_says_so(site: Site) -> None:
+    answer = site.get("/teach")
+    assert answer.status == 200
+    assert b"handsteer signs collect" in answer.read()

@@ -254,6 +254,7 @@ def _application() -> FastAPI:
         application,
         title="handsteer",
         favicon=ICON,
+        language="en-US",
         dark=None,
         tailwind=False,
         binding_refresh_interval=None,

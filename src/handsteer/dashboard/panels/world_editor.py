@@ -47,20 +47,20 @@ class WorldEditor:
         self.is_open = False
         with box("editor off") as self._box:
             with box("row"):
-                tag("h3", "", "Add")
+                tag("h2", "", "Add")
                 for shape in get_args(Shape):
                     button(shape.capitalize(), f'aria-label="Add a {shape}"').on(
                         "click", lambda shape=shape: self._add(shape)
                     )
             with box("row"):
-                tag("h3", "", "Thing")
+                tag("h2", "", "Thing")
                 self._things = ui.select([], on_change=self._on_choice).props(
                     'outlined dense options-dense aria-label="Which thing to change"'
                 )
                 self._delete = button("Delete", 'aria-label="Delete the chosen thing"').on("click", self._remove)
             self._form = ThingForm(self._edit)
             with box("row"):
-                tag("h3", "", "World")
+                tag("h2", "", "World")
                 self._worlds = ui.select(shipped_worlds(), value=shipped_worlds()[0]).props(
                     'outlined dense options-dense aria-label="Which world to load"'
                 )

@@ -3,6 +3,7 @@ import { THREE } from "nicegui-scene";
 
 const UP = new THREE.Vector3(0, 0, 1);
 const GLIDE_MS = 120; // a little more than from one pose to the next, so that it never waits for one
+const STEP_MS = 40;
 const LEAP_M = 0.5; // who is so far away was put there
 
 // Where the camera stands and what it looks at, from the robot; x is forward in "follow", east in the others.
@@ -69,7 +70,8 @@ export default class RobotRig {
       yaw: target.yaw - (1 - part) * shortest(target.yaw - from.yaw),
       angles,
     });
-    if (part < 1) requestAnimationFrame(() => this.glide());
+    // Not at each frame of the screen: the view is drawn 20 times a second, and the rest of the page seldom.
+    if (part < 1) setTimeout(() => this.glide(), STEP_MS);
     else this.target = undefined;
   }
 
