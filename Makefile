@@ -37,19 +37,19 @@ lint: $(BIN)/.dev
 	@$(BIN)/python scripts/configuration_table.py --check
 
 unit: $(BIN)/.dev models
-	@$(BIN)/pytest -n auto --dist loadfile --no-loadscope-reorder $(ARGS)
+	@$(BIN)/pytest -n auto --dist loadfile $(ARGS)
 
 ros1: $(BIN)/.dev
 	@scripts/setup-ros1
 
 test-ros1: $(BIN)/.dev models
-	@$(BIN)/pytest -n auto --dist loadfile --no-loadscope-reorder -m ros1 $(ARGS)
+	@$(BIN)/pytest -n auto --dist loadfile -m ros1 $(ARGS)
 
 ros2: $(BIN)/.dev
 	@scripts/setup-ros2
 
 test-ros2: $(BIN)/.dev models
-	@$(BIN)/pytest -n auto --dist loadfile --no-loadscope-reorder -m ros2 $(ARGS)
+	@$(BIN)/pytest -n auto --dist loadfile -m ros2 $(ARGS)
 
 models: | $(BIN)/.run
 	@$(BIN)/handsteer models > /dev/null

@@ -2,7 +2,6 @@
 
 import importlib.util
 import shutil
-from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -33,17 +32,14 @@ def slideshow(data_dir: Path) -> Path:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Run a slow test that has failed once more, and files with many slow tests first.
+    """Run a slow test that has failed once more.
 
-    Slow ones drive real processes in real time, which a machine that is busy with other things may upset once. What is
-    wrong fails twice; the last line of the run counts what was run again. Files that take long, if they came last,
-    would keep one worker busy while the others have nothing to do any more.
+    Those drive real processes in real time, which a machine that is busy with other things may upset once. What is
+    wrong fails twice; the last line of the run counts what was run again.
     """
-    slow = [item for item in items if item.get_closest_marker("slow")]
-    for item in slow:
-        item.add_marker(pytest.mark.flaky(reruns=1, reruns_delay=3))
-    slow_in = Counter(item.path for item in slow)
-    items.sort(key=lambda item: -slow_in[item.path])
+    for item in items:
+        if item.get_closest_marker("slow"):
+            item.add_marker(pytest.mark.flaky(reruns=1, reruns_delay=3))
 
 
 def pytest_runtest_setup(item: pytest.Item) -> None:
