@@ -6,6 +6,7 @@ import socket
 import subprocess
 import sys
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
@@ -152,20 +153,36 @@ def test_doctor_finds_what_is_missing(
 def test_a_signal_ends_within_two_seconds_with_the_robot_stopped(number: signal.Signals, in_background: bool) -> None:
     """A shell lets its background jobs ignore SIGINT."""
     shell = ["env", f"--{'ignore' if in_background else 'default'}-signal=INT"]
-    command = [*shell, sys.executable, "-m", "handsteer", "run", "--headless", *VIRTUAL, "--json"]
+    code, out, err, took_s = interrupted_run(number, through=shell)
+    assert code == 0, err
+    assert "the robot is told to stand" in err
+    assert json.loads(out)["frames"] > 5
+    assert took_s < 2.0
+
+
+@pytest.mark.slow
+def test_signals_right_behind_one_another_end_it_as_one_does() -> None:
+    code, out, err, _ = interrupted_run(*[signal.SIGINT, signal.SIGTERM] * 5)
+    assert code == 0, err
+    assert "Traceback" not in err
+    assert json.loads(out)["frames"] > 5
+
+
+def interrupted_run(*numbers: signal.Signals, through: Sequence[str] = ()) -> tuple[int, str, str, float]:
+    """Send signals to a run that drives; return its exit code, its output and errors, and how long it took to end."""
+    command = [*through, sys.executable, "-m", "handsteer", "run", "--headless", *VIRTUAL, "--json"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stderr
+        process.stderr.readline()  # LiteRT says that there is a model: the graph is being made
         time.sleep(4.0)
         began_s = time.monotonic()
-        process.send_signal(number)
+        for number in numbers:
+            process.send_signal(number)
         try:
             out, err = process.communicate(timeout=20)
         finally:
             process.kill()
-        took_s = time.monotonic() - began_s
-    assert process.returncode == 0, err
-    assert "the robot is told to stand" in err
-    assert json.loads(out)["frames"] > 5
-    assert took_s < 2.0
+        return process.returncode, out, err, time.monotonic() - began_s
 
 
 def test_a_reader_that_leaves_is_no_error(data_dir: Path) -> None:

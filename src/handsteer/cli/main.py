@@ -1,9 +1,12 @@
 """The command line as a whole: its verbs, and what becomes of errors."""
 
 import logging
+import math
 import os
 import signal
 import sys
+import time
+from collections.abc import Callable
 from types import FrameType
 
 from cyclopts import App, CycloptsError, ValidationError
@@ -12,6 +15,9 @@ from pydantic import ValidationError as PydanticError
 from handsteer import __version__, config
 from handsteer.cli.options import say
 from handsteer.errors import HandsteerError
+
+# Another signal so soon after one is the same wish; it must not cut off what the first one has begun.
+_SAME_WISH_S = 1.0
 
 _EXAMPLES = """Examples:
   handsteer run                                  drive, and open the page
@@ -50,8 +56,9 @@ def main(arguments: list[str] | None = None) -> None:
     for noisy in ("uvicorn", "asyncio", "httpx", "watchfiles", "rospy"):
         logging.getLogger(noisy).setLevel(logging.WARNING)
     # SIGINT too: a shell lets its background jobs ignore it, and a robot must be stopped all the same.
+    interrupt = _interrupter()
     for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, _interrupt)
+        signal.signal(number, interrupt)
     words = _ros_words_last(sys.argv[1:] if arguments is None else arguments)
     _load_what_help_lists(app, words)
     try:
@@ -91,8 +98,17 @@ def _ros_words_last(arguments: list[str]) -> list[str]:
     return [*ours, *([] if "--" in ours else ["--"]), *ros] if ros else ours
 
 
-def _interrupt(_signal: int, _frame: FrameType | None) -> None:
-    raise KeyboardInterrupt
+def _interrupter() -> Callable[[int, FrameType | None], None]:
+    raised_s = -math.inf
+
+    def interrupt(_signal: int, _frame: FrameType | None) -> None:
+        nonlocal raised_s
+        now_s = time.monotonic()
+        if now_s - raised_s >= _SAME_WISH_S:
+            raised_s = now_s
+            raise KeyboardInterrupt
+
+    return interrupt
 
 
 def _problem(error: CycloptsError) -> str:
