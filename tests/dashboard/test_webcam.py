@@ -67,7 +67,8 @@ def browser(slideshow: Path, tmp_path: Path) -> Iterator[Browser]:
 
 
 def show(browser: Browser, url: str) -> Page:
-    page = browser.new_page()
+    # A small window: what is drawn without a graphics card takes the time in which pictures grow old.
+    page = browser.new_page(viewport={"width": 800, "height": 500})
     page.set_default_timeout(PATIENCE_MS)
     page.goto(url)
     return page
