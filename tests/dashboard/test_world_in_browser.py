@@ -37,9 +37,8 @@ gates:
 
 @contextmanager
 def looking_at(world: object) -> Iterator[Visit]:
-    """Show the page with ``world``, in a small window: without a graphics card, each pixel costs."""
+    """Show the page with ``world``."""
     with visiting("NONE:600", robot={"world": str(world)}) as visit:
-        visit.page.set_viewport_size({"width": 1000, "height": 600})
         visit.wait_until(lambda: visit.text(".banner .reason") == "no hand is in view")
         yield visit
 

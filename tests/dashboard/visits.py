@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from playwright.sync_api import ConsoleMessage, Page, Request, sync_playwright
+from playwright.sync_api import ConsoleMessage, Page, Request, ViewportSize, sync_playwright
 from scripts import chromium
 
 from handsteer.config import load
@@ -15,6 +15,8 @@ from handsteer.dashboard.server import Dashboard
 from handsteer.graph import Graph
 
 PATIENCE_MS = 60_000
+# Small: without a graphics card, each pixel costs.
+WINDOW: ViewportSize = {"width": 1000, "height": 600}
 
 NEEDS_A_BROWSER = [
     pytest.mark.browser,
@@ -73,7 +75,7 @@ def visiting(script: str, path: str = "/", webcam: Path | None = None, **section
         url = dashboard.start()
         browser = chromium.launch(playwright, webcam)
         try:
-            visit = Visit(browser.new_page(viewport={"width": 1280, "height": 800}), graph)
+            visit = Visit(browser.new_page(viewport=WINDOW), graph)
             visit.page.set_default_timeout(PATIENCE_MS)
             visit.page.on("console", visit.note_message)
             visit.page.on("pageerror", lambda error: visit.troubles.append(str(error)))
