@@ -13,14 +13,9 @@ from scripts import chromium
 from handsteer.config import load
 from handsteer.dashboard.server import Dashboard
 from handsteer.graph import Graph
+from tests.dashboard.visits import NEEDS_A_BROWSER, PATIENCE_MS, WINDOW
 
-PATIENCE_MS = 60_000
-
-pytestmark = [
-    pytest.mark.browser,
-    pytest.mark.slow,
-    pytest.mark.skipif(chromium.find() is None, reason=f"no browser found: none of {', '.join(chromium.NAMES)}"),
-]
+pytestmark = NEEDS_A_BROWSER
 
 
 def recording(slideshow: Path, sign: str, path: Path) -> Path:
@@ -67,8 +62,7 @@ def browser(slideshow: Path, tmp_path: Path) -> Iterator[Browser]:
 
 
 def show(browser: Browser, url: str) -> Page:
-    # A small window: what is drawn without a graphics card takes the time in which pictures grow old.
-    page = browser.new_page(viewport={"width": 800, "height": 500})
+    page = browser.new_page(viewport=WINDOW)  # what is drawn takes the time in which the webcam's pictures grow old
     page.set_default_timeout(PATIENCE_MS)
     page.goto(url)
     return page

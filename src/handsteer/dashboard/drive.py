@@ -14,8 +14,8 @@ from handsteer.dashboard.panels.velocity import VelocityPanel
 from handsteer.dashboard.panels.world import WorldPanel
 from handsteer.dashboard.state import PageState
 
-_SHOWN_TO_A_PLOT = 3
-"""A plot is drawn anew every third time, as its samples can wait."""
+_PLOT_EVERY = 3
+"""The plots are sent what is new every third time that the page is: a sample can wait."""
 
 
 class DrivePage(Page):
@@ -48,7 +48,7 @@ class DrivePage(Page):
             panel.update(state)
         self._steering.update(state, self.place(node))
         self._shown += 1
-        if self._shown % _SHOWN_TO_A_PLOT == 0:
+        if self._shown % _PLOT_EVERY == 0:
             self._velocity.draw(node.history, node.clock.now())
 
     def _watches(self) -> bool:
