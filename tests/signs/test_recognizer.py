@@ -8,7 +8,7 @@ from handsteer.landmarks.recorded import RecordedLandmarker
 from handsteer.signs.model import load_model
 from handsteer.signs.recognizer import Recognizer
 from handsteer.signs.trained import TrainedClassifier
-from handsteer.signs.vocabulary import FORWARD, NONE
+from handsteer.signs.vocabulary import FORWARD, NONE, SIGNS
 from tests.signs.hands import show_fingers, show_sign
 
 IMAGE = np.zeros((480, 640, 3), np.uint8)
@@ -50,3 +50,11 @@ def test_a_broken_frame_raises(image: np.ndarray) -> None:
     stream = Recognizer(MediaPipeLandmarker(LandmarksConfig()), CLASSIFIER, SignsConfig())
     with pytest.raises(FrameError):
         stream.step(image, 0.0)
+
+
+def test_the_likelihoods_are_there_whether_they_suffice_or_not() -> None:
+    step = Recognizer(RecordedLandmarker([[HAND]]), CLASSIFIER, SignsConfig(min_confidence=1.0)).step(IMAGE, 0.04)
+    assert step.seen == NONE
+    assert set(step.likelihoods) == set(SIGNS)
+    assert max(step.likelihoods, key=step.likelihoods.__getitem__) == FORWARD
+    assert recognizer(False).step(IMAGE, 0.04).likelihoods == {}

@@ -1,6 +1,7 @@
 """What every sign classifier offers."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Protocol
 
 from handsteer.landmarks.protocol import Hand
@@ -13,10 +14,12 @@ class SignGuess:
     Attributes:
         sign: The likeliest sign, or ``NONE``.
         confidence: 0 to 1, how sure that is.
+        likelihoods: How likely each sign is that the classifier knows, 0 to 1; empty when it does not say.
     """
 
     sign: str
     confidence: float
+    likelihoods: Mapping[str, float] = field(default_factory=dict, compare=False)
 
 
 class Classifier(Protocol):

@@ -1,6 +1,7 @@
 """From a frame to the sign that counts: landmarks, classifier and filter in a row."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +26,7 @@ class Recognition:
         confidence: 0 to 1, how sure ``seen`` is.
         progress: 0 to 1, how far ``seen`` is on its way to count.
         hand: The hand that was looked at; None when there is none.
+        likelihoods: How likely each known sign is for that hand, 0 to 1, sure enough or not; empty when there is none.
     """
 
     sign: str
@@ -32,6 +34,7 @@ class Recognition:
     confidence: float
     progress: float
     hand: Hand | None
+    likelihoods: Mapping[str, float] = field(default_factory=dict, compare=False)
 
     @property
     def reason(self) -> str:
@@ -71,14 +74,16 @@ class Recognizer:
             FrameError: The image has another shape or type.
         """
         hands = self._landmarker.detect(image, search=self._operator.wants_search(dt_s))
-        guesses = [self._seen(self._classifier.classify(hand)) for hand in hands]
+        told = [self._classifier.classify(hand) for hand in hands]
+        guesses = [self._seen(guess) for guess in told]
         chosen = self._operator.choose(hands, guesses, dt_s)
         hand, guess = (hands[chosen], guesses[chosen]) if chosen is not None else (None, _NOTHING)
+        likelihoods = told[chosen].likelihoods if chosen is not None else {}
         sign = self._filter.step(guess.sign, dt_s)
         if hand is not None and guess.sign == sign != NONE:
             self._operator.confirm()
             self._landmarker.follow_only(hand)
-        return Recognition(sign, guess.sign, guess.confidence, self._filter.progress, hand)
+        return Recognition(sign, guess.sign, guess.confidence, self._filter.progress, hand, likelihoods)
 
     def reconfigure(self, config: SignsConfig) -> None:
         """Go on with other confidences and times; what is followed and what counts stays."""

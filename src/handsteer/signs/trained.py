@@ -52,13 +52,14 @@ class TrainedClassifier:
         Nothing can be said of a hand whose landmarks are not all finite: it is ``NONE`` with a confidence of 0.
         """
         if not (np.isfinite(hand.points[:, :2]).all() and np.isfinite(hand.world).all()):
-            return SignGuess(NONE, 0.0)
+            return SignGuess(NONE, 0.0, dict.fromkeys(SIGNS, 0.0))
         pixels = hand.pixels[None, :, :2].astype(np.float64)
         shapes = self._model.probabilities(shape_features(pixels, hand.world[None])[0])
-        scores = _signs(shapes, pixels)
+        legible = legibility(hand)
+        scores = {sign: score * legible for sign, score in _signs(shapes, pixels).items()}
         best = max(scores, key=scores.__getitem__)
-        score = scores[best] * legibility(hand)
-        return SignGuess(best, score) if score >= 0.5 else SignGuess(NONE, 1.0 - score)
+        score = scores[best]
+        return SignGuess(best, score, scores) if score >= 0.5 else SignGuess(NONE, 1.0 - score, scores)
 
 
 def legibility(hand: Hand) -> float:

@@ -145,3 +145,12 @@ def test_a_flipped_byte_is_refused_or_makes_no_difference_to_loading(
     except (ModelCorrupt, ModelMissing):
         return
     assert len(loaded.labels) == 2
+
+
+def test_the_likelihoods_are_of_all_signs() -> None:
+    shipped = TrainedClassifier(load_model())
+    told = TaughtClassifier(shipped, model(hi=0.9)).classify(HAND)
+    assert set(told.likelihoods) == {*SIGNS, "Hi", "Ho"}
+    assert max(told.likelihoods, key=told.likelihoods.__getitem__) == told.sign == "Stop"
+    unsure = TaughtClassifier(Says(NONE, 1.0), model(hi=0.9)).classify(HAND)
+    assert (unsure.sign, unsure.confidence) == ("Hi", unsure.likelihoods["Hi"])

@@ -3,7 +3,7 @@
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -94,18 +94,27 @@ class TaughtClassifier:
         return (*self._other.signs, *self._model.labels)
 
     def classify(self, hand: Hand) -> SignGuess:
-        """Return the sign that ``hand`` shows; ``NONE`` when it is likelier that it shows none."""
+        """Return the sign that ``hand`` shows; ``NONE`` when it is likelier that it shows none.
+
+        The likelihoods of the taught signs are 0 when the other is sure, as nothing can come of them.
+        """
         known = self._other.classify(hand)
         if known.sign != NONE and known.confidence >= SURE:
-            return known
+            return replace(known, likelihoods={**known.likelihoods, **dict.fromkeys(self._model.labels, 0.0)})
         confidences = self._model.confidences(
             hand.pixels[None, :, :2].astype(np.float64), hand.world[None].astype(np.float64)
         )[0]
-        best = int(confidences.argmax())
-        confidence = float(confidences[best]) * legibility(hand)
-        if confidence < 0.5 or (known.sign != NONE and known.confidence >= confidence):
-            return known
-        return SignGuess(self._model.labels[best], confidence)
+        taught = dict(zip(self._model.labels, (confidences * legibility(hand)).tolist(), strict=True))
+        likelihoods = {**known.likelihoods, **taught}
+        best = max(taught, key=taught.__getitem__)
+        if taught[best] < 0.5 or (known.sign != NONE and known.confidence >= taught[best]):
+            return replace(known, likelihoods=likelihoods)
+        return SignGuess(best, taught[best], likelihoods)
+
+    @property
+    def signs_without_depth(self) -> tuple[str, ...]:
+        """The signs that it can tell from landmarks in the image alone, as those of imported rows are."""
+        return self._model.labels if self._model.depth == "flat" else ()
 
 
 def save_taught(model: TaughtModel, path: Path) -> None:
