@@ -33,3 +33,7 @@ class Classifier(Protocol):
     def classify(self, hand: Hand) -> SignGuess:
         """Return the sign that ``hand`` shows."""
         ...
+
+    def confidence(self, sign: str, likelihood: float) -> float:
+        """Return the confidence, 0 to 1, of one of its signs that is as likely as ``likelihood``, 0 to 1."""
+        ...

@@ -8,8 +8,9 @@ from numpy.typing import NDArray
 
 from handsteer.config import SignsConfig
 from handsteer.landmarks.protocol import Hand, Landmarker
+from handsteer.signs.evidence import Evidence
 from handsteer.signs.filter import SignFilter
-from handsteer.signs.operator import Operator
+from handsteer.signs.operator import Operator, Place
 from handsteer.signs.protocol import Classifier, SignGuess
 from handsteer.signs.vocabulary import NONE
 
@@ -56,6 +57,7 @@ class Recognizer:
         self._classifier = classifier
         self._filter = SignFilter(config)
         self._operator = Operator(config)
+        self._evidence = Evidence()
         self._config = config
 
     @property
@@ -79,7 +81,9 @@ class Recognizer:
         chosen = self._operator.choose(hands, guesses, dt_s)
         hand, guess = (hands[chosen], guesses[chosen]) if chosen is not None else (None, _NOTHING)
         likelihoods = told[chosen].likelihoods if chosen is not None else {}
-        sign = self._filter.step(guess.sign, dt_s)
+        self._evidence.add(Place.of(hand) if hand else None, likelihoods, dt_s)
+        guess = self._bridged(guess, dt_s)
+        sign = self._filter.step(guess.sign, dt_s, still=self._evidence.is_still(self._config.confirm_time))
         if hand is not None and guess.sign == sign != NONE:
             self._operator.confirm()
             self._landmarker.follow_only(hand)
@@ -101,6 +105,16 @@ class Recognizer:
         self._landmarker.reset()
         self._filter.reset()
         self._operator.reset()
+        self._evidence.reset()
+
+    def _bridged(self, guess: SignGuess, dt_s: float) -> SignGuess:
+        """Return the candidate in place of a ``guess`` of nothing, if the frames since it began are sure of it."""
+        candidate = self._filter.candidate
+        if guess.sign != NONE or candidate == NONE:
+            return guess
+        likelihood = self._evidence.likelihood(candidate, self._filter.candidate_s + dt_s)
+        confidence = self._classifier.confidence(candidate, likelihood)
+        return SignGuess(candidate, confidence) if confidence >= self._config.min_confidence else guess
 
     def _seen(self, guess: SignGuess) -> SignGuess:
         """Return ``guess`` if it is sure enough, else ``NONE``; the sign that counts need be less sure to be kept."""

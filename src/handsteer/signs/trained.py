@@ -13,26 +13,35 @@ from handsteer.signs.protocol import SignGuess
 from handsteer.signs.vocabulary import BACKWARD, FORWARD, GO, NONE, SIGNS, STOP, TURN_LEFT, TURN_RIGHT
 
 _DOUBT: Final = 1.5
-"""Width of the doubt about a limit, degrees or pixels."""
+"""Width of the doubt about a limit, degrees."""
 _POINTING: Final = 52.0
-"""How far off its axis an index finger or a thumb may point, degrees: people tilt their hands by up to 30, and their
-fingers in their hands."""
+"""How far off its axis an index finger may point, degrees: people tilt their hands by up to 30, and their fingers in
+their hands."""
+_SIDEWAYS: Final = 47.0
+"""How far off the horizontal a thumb may point, degrees: half of what is between a turn and a thumb up."""
 _UPRIGHT: Final = 55.0
 """How far from upwards an open hand may point: others hang, or rest."""
 _RAISED: Final = 120.0
 """How far from upwards a fist may point, likewise."""
 
+_SMALL_PX: Final = 17.0
+_SMALL_DOUBT_PX: Final = 4.0
+"""Longer side at which a hand is read half as surely, pixels, and the width of that: at 35 pixels a hundredth is
+missing, and a fist 3 m from a webcam of 640x480 has some 17."""
 
-_SMALLEST_PX: Final = 17.0
-"""Longer side of the smallest hand that can be read, pixels; a fist 3 m from a webcam of 640x480 has some more."""
+_THRESHOLDS: Final = {STOP: 0.5, GO: 0.5, FORWARD: 0.7, BACKWARD: 0.8, TURN_LEFT: 0.7, TURN_RIGHT: 0.7}
+"""Likelihood from which each sign is sure enough; docs/signs.md has the false rates that they were chosen for."""
+SURE: Final = 0.8
+"""The confidence of a sign whose likelihood is just at its threshold."""
 
 
 class TrainedClassifier:
     """A :class:`~handsteer.signs.protocol.Classifier` that knows the shapes of a model.
 
     The network says how likely it is that the hand is open, points with its index finger, stretches out its thumb or
-    is a fist; where it points in the image makes a sign of that. The confidence is the likelihood of the shape, times
-    that of the direction, times the landmark model's own that there is a hand; hands of too few pixels have none.
+    is a fist; where it points in the image makes a sign of that. A sign's likelihood is that of the shape, times that
+    of the direction, times how far the hand can be read (:func:`legibility`). Its confidence grows with it from 0 by
+    0.8 at the sign's own threshold to 1: a motion has to be likelier than ``Go`` and ``Stop`` to be as sure.
 
     Args:
         model: As :func:`~handsteer.signs.model.load_model` gives it.
@@ -56,15 +65,27 @@ class TrainedClassifier:
         pixels = hand.pixels[None, :, :2].astype(np.float64)
         shapes = self._model.probabilities(shape_features(pixels, hand.world[None])[0])
         legible = legibility(hand)
-        scores = {sign: score * legible for sign, score in _signs(shapes, pixels).items()}
-        best = max(scores, key=scores.__getitem__)
-        score = scores[best]
-        return SignGuess(best, score, scores) if score >= 0.5 else SignGuess(NONE, 1.0 - score, scores)
+        likelihoods = {sign: likelihood * legible for sign, likelihood in _signs(shapes, pixels).items()}
+        best = max(likelihoods, key=likelihoods.__getitem__)
+        none = max(0.0, 1.0 - sum(likelihoods.values()))
+        if none >= likelihoods[best]:
+            return SignGuess(NONE, none, likelihoods)
+        return SignGuess(best, self.confidence(best, likelihoods[best]), likelihoods)
+
+    def confidence(self, sign: str, likelihood: float) -> float:
+        """Return the confidence, 0 to 1, of ``sign`` when it is as likely as ``likelihood``."""
+        return float(likelihood ** (math.log(SURE) / math.log(_THRESHOLDS[sign])))
 
 
 def legibility(hand: Hand) -> float:
-    """Return how far ``hand`` can be read at all, 0 to 1: that it is there, times that it has enough pixels."""
-    return min(1.0, max(0.0, hand.presence)) * _within(-_SMALLEST_PX, -hand.longer_side_px)
+    """Return how far ``hand`` can be read at all, 0 to 1.
+
+    That is how sure the landmark model is that it is there, times that it has enough pixels, times the share of its
+    landmarks that are in the frame.
+    """
+    inside = ((hand.points[:, :2] >= 0.0) & (hand.points[:, :2] <= 1.0)).all(axis=1).mean()
+    large = _within(-_SMALL_PX, -hand.longer_side_px, _SMALL_DOUBT_PX)
+    return min(1.0, max(0.0, hand.presence)) * large * float(inside)
 
 
 def _signs(shapes: dict[str, float], pixels: NDArray[np.float64]) -> dict[str, float]:
@@ -76,8 +97,8 @@ def _signs(shapes: dict[str, float], pixels: NDArray[np.float64]) -> dict[str, f
         FORWARD: shapes.get("index", 0.0) * _within(_POINTING, _from_up(index)),
         BACKWARD: shapes.get("index", 0.0) * _within(_POINTING, 180.0 - _from_up(index)),
         # The frame is not mirrored: the user's own right is the left of the image.
-        TURN_LEFT: shapes.get("thumb", 0.0) * _within(_POINTING, _from_right(thumb)),
-        TURN_RIGHT: shapes.get("thumb", 0.0) * _within(_POINTING, 180.0 - _from_right(thumb)),
+        TURN_LEFT: shapes.get("thumb", 0.0) * _within(_SIDEWAYS, _from_right(thumb)),
+        TURN_RIGHT: shapes.get("thumb", 0.0) * _within(_SIDEWAYS, 180.0 - _from_right(thumb)),
     }
 
 
@@ -91,6 +112,6 @@ def _from_right(vector: NDArray[np.float64]) -> float:
     return math.degrees(math.atan2(abs(float(vector[1])), float(vector[0])))
 
 
-def _within(limit: float, value: float) -> float:
+def _within(limit: float, value: float, doubt: float = _DOUBT) -> float:
     """Return how sure it is, 0 to 1, that ``value`` is below ``limit``."""
-    return 1.0 / (1.0 + math.exp(min(50.0, (value - limit) / _DOUBT)))
+    return 1.0 / (1.0 + math.exp(min(50.0, (value - limit) / doubt)))

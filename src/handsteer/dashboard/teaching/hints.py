@@ -8,7 +8,7 @@ import numpy as np
 from handsteer.landmarks.protocol import Hand
 from handsteer.signs.features import KNUCKLES, WRIST
 from handsteer.signs.protocol import SignGuess
-from handsteer.signs.teaching.taught import SURE
+from handsteer.signs.trained import SURE
 from handsteer.signs.vocabulary import NONE
 
 _SMALL_PX: Final = 60.0

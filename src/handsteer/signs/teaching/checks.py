@@ -8,7 +8,7 @@ from handsteer.errors import TrainingError
 from handsteer.signs.figures import Confusion, Share
 from handsteer.signs.protocol import Classifier
 from handsteer.signs.teaching.dataset import Dataset, summarise
-from handsteer.signs.teaching.taught import SURE
+from handsteer.signs.trained import SURE
 from handsteer.signs.vocabulary import NONE, SIGNS, find_sign
 
 _LEAST_TAKES: Final = 2

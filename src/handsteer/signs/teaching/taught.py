@@ -18,14 +18,11 @@ from handsteer.signs.npz import Arrays, NpzFormat
 from handsteer.signs.protocol import Classifier, SignGuess
 from handsteer.signs.teaching.dataset import label_for
 from handsteer.signs.teaching.features import FEATURE_COUNTS, Array, Depth, taught_features
-from handsteer.signs.trained import legibility
+from handsteer.signs.trained import SURE, legibility
 from handsteer.signs.vocabulary import NONE, SIGNS
 
 FORMAT: Final = 1
 """Version of the file and of the features."""
-
-SURE: Final = 0.8
-"""The confidence that a sign gets whose likelihood is just at its threshold."""
 
 _FILE: Final = NpzFormat(
     "model of taught signs",
@@ -110,6 +107,10 @@ class TaughtClassifier:
         if taught[best] < 0.5 or (known.sign != NONE and known.confidence >= taught[best]):
             return replace(known, likelihoods=likelihoods)
         return SignGuess(best, taught[best], likelihoods)
+
+    def confidence(self, sign: str, likelihood: float) -> float:
+        """Return the confidence, 0 to 1, of ``sign``; the likelihood of a taught sign is its confidence."""
+        return likelihood if sign in self._model.labels else self._other.confidence(sign, likelihood)
 
     @property
     def signs_without_depth(self) -> tuple[str, ...]:

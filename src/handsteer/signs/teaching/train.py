@@ -23,8 +23,9 @@ from handsteer.signs.teaching.checks import (
 from handsteer.signs.teaching.dataset import Dataset, LabelSummary, Take, summarise
 from handsteer.signs.teaching.features import Array, Depth, taught_features
 from handsteer.signs.teaching.split import split
-from handsteer.signs.teaching.taught import FORMAT, SURE, TaughtModel
+from handsteer.signs.teaching.taught import FORMAT, TaughtModel
 from handsteer.signs.teaching.variation import mirrored, points_sideways, vary
+from handsteer.signs.trained import SURE
 from handsteer.signs.training.hands import Hands, make_hands
 from handsteer.signs.vocabulary import NONE
 

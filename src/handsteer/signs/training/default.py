@@ -14,10 +14,11 @@ from handsteer.signs.model import FORMAT, SignModel
 from handsteer.signs.network import train
 from handsteer.signs.novelty import learn_novelty
 from handsteer.signs.training.hands import make_hands
+from handsteer.signs.training.people import draw_people, load_people
 from handsteer.signs.training.truth import SHAPES
 
 SEED: Final = 7
-_CHUNKS, _CHUNK = 12, 50_000
+_CHUNKS, _CHUNK, _PEOPLE = 10, 50_000, 20_000
 HIDDEN: Final = (64, 32)
 EPOCHS: Final = 30
 
@@ -29,12 +30,14 @@ def made_hands(chunks: int, seed: int) -> tuple[NDArray[np.float64], NDArray[np.
         chunks: How much to make: each is about 39 000 hands.
         seed: The same seed gives the same hands.
     """
+    people = load_people()
     features, shapes = [], []
     for random in np.random.default_rng(seed).spawn(chunks):
         hands = make_hands(_CHUNK, random)
+        image, space, theirs = draw_people(_PEOPLE, random, people)
         # Rounded, so that the last digits in which processors differ are gone.
-        features.append(np.round(shape_features(hands.pixels, hands.world), 4))
-        shapes.append(hands.shapes)
+        features += [np.round(shape_features(hands.pixels, hands.world), 4), np.round(shape_features(image, space), 4)]
+        shapes += [hands.shapes, theirs]
     return np.concatenate(features), np.concatenate(shapes)
 
 

@@ -70,7 +70,7 @@ def _views(count: int, random: Random) -> Array:
     back = random.random(count) < 0.5
     yaw = np.where(back, np.pi, 0.0) + np.radians(random.normal(0, 32, count))
     pitch = np.radians(random.normal(0, 28, count))
-    anyhow = random.random(count) < 0.25
+    anyhow = random.random(count) < 0.33
     yaw = np.where(anyhow, random.uniform(-np.pi, np.pi, count), yaw)
     pitch = np.where(anyhow, np.arcsin(random.uniform(-1, 1, count)), pitch)
     roll = random.uniform(-np.pi, np.pi, count)

@@ -32,7 +32,7 @@ STRAIGHT, CURLED, HALF, HOOKED, LOOSE, ROUND = range(6)
 # Degrees of spread, opposition, mcp, ip and rotation for a thumb that is ...
 _THUMB_STATES: Final = np.array(
     [
-        ((54, 11), (12, 12), (-2, 12), (-4, 14), (0, 8)),  # stretched out
+        ((54, 11), (12, 12), (-2, 13), (-4, 19), (0, 8)),  # stretched out, some bent back as a hitch-hiker's
         ((22, 10), (14, 11), (6, 12), (8, 14), (0, 8)),  # beside the index finger
         ((14, 9), (40, 11), (28, 14), (55, 20), (-1, 8)),  # folded over bent fingers
         ((10, 8), (55, 12), (35, 16), (45, 22), (0, 8)),  # across the palm
@@ -71,9 +71,9 @@ def thumb_out(count: int, random: Random) -> Array:
 
 
 def fist(count: int, random: Random) -> Array:
-    """Return (count, 23) angles of a fist, the thumb over the fingers or beside them."""
+    """Return (count, 23) angles of a fist, the thumb over the fingers, beside them or inside."""
     states = np.repeat(_choice([CURLED, LOOSE], [0.8, 0.2], count, random)[:, None], 4, axis=1)
-    angles = _posed(states, _choice([FOLDED, ACROSS, BESIDE], [0.65, 0.2, 0.15], count, random), random)
+    angles = _posed(states, _choice([FOLDED, ACROSS, BESIDE], [0.45, 0.2, 0.35], count, random), random)
     _bend_together(angles, random, mcp=10, pip=8)
     return angles
 

@@ -29,20 +29,20 @@ def name_shapes(angles: Array, joints: Array, elevations: Array, facing: Array) 
     reach = thumb_reach(joints)
     straight, open_enough = _straight(angles)
     closed, closed_enough = _closed(angles)
-    apart = thumb_gap(joints)
+    apart, aslant = thumb_gap(joints), np.degrees(thumb_angle(joints))
     curled, curled_enough = _closed(angles, ease=10.0)
     elevation = np.degrees(elevations)
     sure = {
         OPEN: straight.all(axis=1) & (reach >= 0.92) & (facing >= 0.4),
         INDEX: straight[:, 0] & curled[:, 1:].all(axis=1) & (reach <= 1.0) & (elevation[:, 0] <= 55),
-        THUMB: closed.all(axis=1) & (reach >= 0.98) & (apart >= 0.5) & (elevation[:, 1] <= 55),
-        FIST: closed.all(axis=1) & (reach <= 0.82),
+        THUMB: closed.all(axis=1) & (reach >= 1.05) & (apart >= 0.5) & (aslant >= 38) & (elevation[:, 1] <= 55),
+        FIST: closed.all(axis=1) & ((reach <= 0.82) | (aslant <= 28) & (reach <= 1.1)),
     }
     possible = {
         OPEN: open_enough.all(axis=1) & (reach >= 0.82),
         INDEX: open_enough[:, 0] & curled_enough[:, 1:].all(axis=1) & (reach <= 1.2) & (elevation[:, 0] <= 68),
-        THUMB: closed_enough.all(axis=1) & (reach >= 0.84) & (apart >= 0.35) & (elevation[:, 1] <= 68),
-        FIST: closed_enough.all(axis=1) & (reach <= 0.98),
+        THUMB: closed_enough.all(axis=1) & (reach >= 0.9) & (apart >= 0.35) & (aslant >= 28) & (elevation[:, 1] <= 68),
+        FIST: closed_enough.all(axis=1) & ((reach <= 0.98) | (aslant <= 36) & (reach <= 1.25)),
     }
     named = np.full(len(angles), _UNSURE)
     for shape, holds in sure.items():
@@ -63,6 +63,18 @@ def thumb_gap(joints: Array) -> Array:
     palm = np.linalg.norm(joints[:, [5, 9, 13, 17]] - joints[:, :1], axis=2).mean(axis=1)
     gaps: Array = np.linalg.norm(joints[:, [8, 12]] - joints[:, 4:5], axis=2).min(axis=1) / palm
     return gaps
+
+
+def thumb_angle(joints: Array) -> Array:
+    """Return (n,) angles between the thumb, from its knuckle to its tip, and the palm, radians.
+
+    A thumb that lies along the index finger belongs to a fist; so the landmark model sees most plain fists.
+    """
+    thumb = joints[:, 4] - joints[:, 2]
+    palm = joints[:, [5, 9, 13, 17]].mean(axis=1) - joints[:, 0]
+    cosines = (thumb * palm).sum(axis=1) / np.linalg.norm(thumb, axis=1) / np.linalg.norm(palm, axis=1)
+    angles: Array = np.arccos(np.clip(cosines, -1.0, 1.0))
+    return angles
 
 
 def _straight(angles: Array) -> tuple[Flags, Flags]:
