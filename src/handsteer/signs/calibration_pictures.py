@@ -2,12 +2,15 @@
 
 from collections.abc import Mapping
 
+import numpy as np
+
 from handsteer.signs.calibration import Calibration
 from handsteer.signs.figures import Tally
-from handsteer.signs.plot import BLUE, COLOURS, GRID, Picture, Plot
+from handsteer.signs.plot import BLUE, COLOURS, GRID, INK, Picture, Plot
 from handsteer.signs.vocabulary import NONE
 
-_MARKED = (0.3, 0.5, 0.8, 0.95)
+_TOPS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)
+"""Where an axis may end, so that its ticks are round."""
 
 
 def draw_reliability(figures: Calibration, title: str) -> Picture:
@@ -38,34 +41,33 @@ def draw_reliability(figures: Calibration, title: str) -> Picture:
 def draw_sweep(rows: Mapping[float, Tally], title: str) -> Picture:
     """Return a picture of what thresholds do: (height, width, 3) uint8, BGR.
 
-    A line for each sign that is shown, a dot on it for each threshold: what it costs in false alarms to the right, and
-    recall upwards.
+    At the left recall, at the right what it costs: a line for each sign, a dot for each threshold; in black how many of
+    all photos would move the robot as they should not.
 
     Args:
-        rows: What is counted with each threshold.
+        rows: What is counted with each threshold, 0.25 to 1.
         title: A line above it.
     """
-    first = next(iter(rows.values()))
-    signs = [sign for sign in first.recall if sign != NONE]
-    lines = {
-        sign: [(row.false_alarms[sign].rate or 0.0, row.recall[sign].rate or 0.0) for row in rows.values()]
-        for sign in signs
-    }
-    points = [point for line in lines.values() for point in line]
-    widest = max((x for x, _ in points), default=0.0)
-    lowest = min((y for _, y in points), default=0.0)
-    plot = Plot(
-        title,
-        "of the photos that don't show the sign, how many gave it",
-        "recall, for thresholds from right to left",
-        x_range=(0.0, max(0.01, 1.05 * widest)),
-        y_range=(max(0.0, lowest - 0.05), 1.0),
+    tallies = list(rows.values())
+    shown = [sign for sign in tallies[0].recall if sign != NONE]
+    signs = list(tallies[0].false_alarms)
+    colours = {sign: COLOURS[number % len(COLOURS)] for number, sign in enumerate(signs)}
+    recall = {sign: [tally.recall[sign].rate or 0.0 for tally in tallies] for sign in shown}
+    alarms = {sign: [tally.false_alarms[sign].rate or 0.0 for tally in tallies] for sign in signs}
+    motion = [tally.false_motion.rate or 0.0 for tally in tallies]
+    most = max(motion + [share for line in alarms.values() for share in line])
+    left = Plot(title, "threshold", "recall", x_range=(0.25, 1.0))
+    right = Plot(
+        "",
+        "threshold",
+        "of those that don't show the sign, how many gave it",
+        x_range=(0.25, 1.0),
+        y_range=(0.0, next(top for top in _TOPS if top >= most)),
     )
-    for number, (sign, line) in enumerate(lines.items()):
-        colour = COLOURS[number % len(COLOURS)]
-        plot.line(line, colour)
-        plot.legend(sign, colour)
-        for threshold, point in zip(rows, line, strict=True):
-            if threshold in _MARKED:
-                plot.note(f"{threshold:g}", *point, colour)
-    return plot.picture
+    for plot, lines in ((left, recall), (right, alarms)):
+        for sign, line in lines.items():
+            plot.line(list(zip(rows, line, strict=True)), colours[sign])
+            plot.legend(sign, colours[sign])
+    right.line(list(zip(rows, motion, strict=True)), INK)
+    right.legend("moves wrongly", INK)
+    return np.hstack([left.picture, right.picture])

@@ -112,6 +112,11 @@ class Tally:
     false_alarms: dict[str, Share]
 
     @property
+    def false_motion(self) -> Share:
+        """Of all photos, how many gave a sign that moves the robot and that they don't show."""
+        return Share(sum(share.count for share in self.wrong_motion.values()), self.photos)
+
+    @property
     def wrong_motion_of_signs(self) -> Share:
         """Of all photos that show a sign, how many gave another one that moves the robot."""
         shares = [share for sign, share in self.wrong_motion.items() if sign != NONE]
@@ -126,6 +131,7 @@ class Tally:
             "wrong_motion": _plain(self.wrong_motion),
             "wrong_motion_of_signs": self.wrong_motion_of_signs.as_dict(),
             "false_commands": self.false_commands.as_dict(),
+            "false_motion": self.false_motion.as_dict(),
             "false_alarms": _plain(self.false_alarms),
         }
 

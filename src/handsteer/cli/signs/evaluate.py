@@ -83,7 +83,8 @@ def evaluate(
     opened = _open(sources, classifier)
     _check_figures(opened, {**pictures, "--sweep": sweep})
     evaluation = _evaluate(opened, views, config, classifier, grace)
-    names = ", ".join(dict.fromkeys(path.resolve().name for path in sources))
+    runs = evaluation.stills or evaluation.videos
+    names = ", ".join(dict.fromkeys(Path(run.source).resolve().name for run in runs))
     for option, path in pictures.items():
         if path is not None:
             _write_picture(option, path, _picture(option, evaluation, names))

@@ -179,7 +179,7 @@ def _video_tables(name: str, report: VideoReport) -> list[str]:
         f"{name}: {report.frames} frames, {report.duration_s:.1f} s",
         table(["sign that counted", "seconds"], [[sign, f"{time_s:.1f}"] for sign, time_s in report.counted_s.items()]),
         f"Times at which a sign began to count that moves the robot: {len(report.motion_events)}, "
-        f"{_per_minute(report.motion_rate)} a minute",
+        f"{_per_minute(report.motion_rate, ' a minute')}",
     ]
     if report.labels is None:
         return [*parts, *_events(report.motion_events), "There are no labels to compare with."]
@@ -192,7 +192,7 @@ def _labelled(labels: LabelledFigures) -> list[str]:
         "By the labels: in how many frames the sign was seen and for how many it counted, and how soon it counted",
         table(["sign", "frames", "seen", "counted", "shown", "missed", "median s", "slowest s"], rows),
         f"False commands: {len(labels.false_commands)} in {labels.scored_s:.1f} s, "
-        f"{_per_minute(labels.false_rate)} a minute",
+        f"{_per_minute(labels.false_rate, ' a minute')}",
         *_events(labels.false_commands),
         *confusion_table("frames", labels.confusion),
     ]
@@ -210,11 +210,11 @@ def _events(events: Sequence[Event]) -> list[str]:
     return [table(["sign", "from s", "to s"], rows)] if rows else []
 
 
-def _per_minute(events: Rate) -> str:
+def _per_minute(events: Rate, unit: str = "") -> str:
     if events.interval is None:
         return "-"
     low, high = events.interval
-    return f"{events.per_minute:.1f} ({low:.1f}-{high:.1f})"
+    return f"{events.per_minute:.1f}{unit} ({low:.1f}-{high:.1f})"
 
 
 def _seconds(time_s: float | None) -> str:
