@@ -1,5 +1,6 @@
 """How good signs are told in photos: recall, false commands, confusion matrix."""
 
+from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -171,8 +172,11 @@ class PhotoReport(Tally):
 
 def tally(results: Collection[PhotoResult], signs: Sequence[str], motion: Collection[str]) -> Tally:
     """Return what is counted of ``results``; the arguments are those of :func:`photo_report`."""
-    shown = [sign for sign in (*signs, NONE) if any(photo.truth == sign for photo in results)]
-    of_sign = {sign: [photo for photo in results if photo.truth == sign] for sign in shown}
+    every: dict[str, list[PhotoResult]] = {sign: [] for sign in (*signs, NONE)}
+    for photo in results:
+        every[photo.truth].append(photo)
+    of_sign = {sign: photos for sign, photos in every.items() if photos}
+    wrongly = Counter(photo.seen for photo in results if not _is_right(photo))
     wrong_motion = {
         sign: _share(photos, lambda photo: photo.seen in motion and not _is_right(photo))
         for sign, photos in of_sign.items()
@@ -186,7 +190,7 @@ def tally(results: Collection[PhotoResult], signs: Sequence[str], motion: Collec
         },
         wrong_motion=wrong_motion,
         false_commands=wrong_motion.get(NONE, Share(0, 0)),
-        false_alarms={sign: _false_alarms(results, sign) for sign in signs},
+        false_alarms={sign: Share(wrongly[sign], len(results) - len(every[sign])) for sign in signs},
     )
 
 
@@ -235,10 +239,6 @@ def _is_right(photo: PhotoResult) -> bool:
 def _share(photos: Iterable[PhotoResult], counts: Callable[[PhotoResult], bool]) -> Share:
     verdicts = [counts(photo) for photo in photos]
     return Share(sum(verdicts), len(verdicts))
-
-
-def _false_alarms(photos: Iterable[PhotoResult], sign: str) -> Share:
-    return _share((photo for photo in photos if photo.truth != sign), lambda photo: photo.seen == sign)
 
 
 def _plain(shares: dict[str, Share]) -> dict[str, Any]:
