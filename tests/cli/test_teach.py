@@ -81,7 +81,8 @@ def test_a_dataset_is_evaluated(capsys: pytest.CaptureFixture[str]) -> None:
     save_dataset(Dataset((*takes("Forward", count=2), *takes("NONE", "Call", count=1))), Path("some.npz"))
     plain = json.loads(prints(capsys, "signs", "evaluate", "some.npz", "--json"))
     assert plain["recall"]["Forward"]["rate"] > 0.95
-    assert plain["false_commands"]["kinds"]["me"] == {"count": 0, "of": 90, "rate": 0.0}
+    mine = plain["false_commands"]["kinds"]["me"]
+    assert (mine["count"], mine["of"], mine["rate"]) == (0, 90, 0.0)
     assert (
         json.loads(prints(capsys, "signs", "evaluate", "some.npz", "--json", "--flip"))["recall"]["Forward"]["rate"]
         > 0.95

@@ -1,6 +1,7 @@
 """What a lesson comes to, without its training."""
 
-from handsteer.signs.figures import Confusion, Share
+from handsteer.signs.figures import Confusion
+from handsteer.signs.intervals import Share
 from handsteer.signs.teaching.dataset import LabelSummary
 from handsteer.signs.teaching.train import TaughtSign, TeachingReport
 

@@ -1,4 +1,5 @@
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -13,8 +14,9 @@ from handsteer.clock import SteppedClock
 from handsteer.config import Config, VirtualHandConfig
 from handsteer.errors import CameraUnreadable, LabelError
 from handsteer.graph import open_recognizer
+from handsteer.signs.calibration import sweep
 from handsteer.signs.evaluate import evaluate_frames, evaluate_photos
-from handsteer.signs.figures import PhotoResult
+from handsteer.signs.figures import PhotoResult, tally
 from handsteer.signs.labelled import LabelledPhoto, read_video_labels
 from handsteer.signs.recognizer import Recognizer
 from handsteer.signs.video_figures import video_report
@@ -84,6 +86,24 @@ def test_nothing_is_kept_from_one_photo_to_the_next(recognizer: Recognizer, phot
     assert {result.hand_px is None for result in by_name(photos[3:]).values()} == {True}
 
 
+def test_each_photo_has_its_likelihoods_and_what_it_was_told_by(
+    recognizer: Recognizer, photos: list[LabelledPhoto]
+) -> None:
+    stop, *_, nothing = evaluate_photos([replace(photo, person_set="made") for photo in photos], recognizer, View())
+    assert stop.person_set == "made"
+    assert set(stop.likelihoods) == set(SIGNS)
+    assert stop.likeliest == (STOP, stop.confidence)
+    assert stop.presence is not None
+    assert 0.5 < stop.presence <= 1.0
+    assert (dict(nothing.likelihoods), nothing.presence) == ({}, None)
+
+
+def test_the_sweep_agrees_with_what_is_seen(recognizer: Recognizer, photos: list[LabelledPhoto]) -> None:
+    results = list(evaluate_photos(photos, recognizer, View()))
+    threshold = Config().signs.min_confidence
+    assert sweep(results, SIGNS, MOTION_SIGNS, [threshold])[threshold] == tally(results, SIGNS, MOTION_SIGNS)
+
+
 def test_a_photo_that_cannot_be_decoded_is_named(recognizer: Recognizer, tmp_path: Path) -> None:
     broken = tmp_path / "broken.jpg"
     broken.write_bytes(b"no picture")
@@ -104,7 +124,7 @@ def test_a_video_is_seen_as_a_camera_gives_it(recognizer: Recognizer, photos: li
     assert verdicts[0].counts == STOP
     assert verdicts[3].counts == STOP, "Forward has still to be confirmed"
     assert verdicts[-1].counts == FORWARD
-    labels = video_report(verdicts, SIGNS, MOTION_SIGNS).labels
+    labels = video_report({"": verdicts}, SIGNS, MOTION_SIGNS).labels
     assert labels is not None
     assert 0.05 <= (labels.reactions[FORWARD].median_s or 0.0) <= 0.25
     assert labels.false_commands == ()
@@ -119,9 +139,8 @@ def test_labels_that_belong_to_another_video_are_refused(recognizer: Recognizer,
 @pytest.mark.slow
 def test_the_slide_show_gives_no_false_command(recognizer: Recognizer, slideshow: Path) -> None:
     truths = read_video_labels(slideshow, SIGNS)
-    report = video_report(
-        list(evaluate_frames(video_frames(slideshow), truths, recognizer, View())), SIGNS, MOTION_SIGNS
-    )
+    verdicts = list(evaluate_frames(video_frames(slideshow), truths, recognizer, View()))
+    report = video_report({"": verdicts}, SIGNS, MOTION_SIGNS)
     assert report.frames == 270
     assert report.duration_s == pytest.approx(22.5)
     assert report.labels is not None

@@ -1,10 +1,13 @@
 import json
+from dataclasses import replace
 
 import cv2
 import numpy as np
+import pytest
 
 from handsteer.signs.confusion_picture import draw_confusion
-from handsteer.signs.figures import Confusion, PhotoResult, Share, photo_report
+from handsteer.signs.figures import Confusion, PhotoResult, photo_report
+from handsteer.signs.intervals import Share
 from handsteer.signs.vocabulary import FORWARD, GO, MOTION_SIGNS, NONE, SIGNS, STOP, TURN_LEFT
 
 
@@ -34,8 +37,22 @@ def test_figures_of_photos() -> None:
     assert report.wrong_motion[GO] == Share(1, 3)
     assert report.false_commands == Share(1, 4), "Stop and Go are no motion"
     assert report.false_commands_by_kind == {"call": Share(1, 2), "ok": Share(0, 2)}
-    assert len(report.wrong) == 6
+    assert report.recall_of_found[STOP] == Share(1, 1)
+    assert report.false_motion == Share(2, 9)
+    assert report.wrong_motion_of_signs == Share(1, 5), "a sign that is taken for another, and drives"
+    assert report.false_alarms[STOP] == Share(2, 7)
     assert report.unscored == 3
+    assert report.by_person_set == {}, "nobody has said whose hands they are"
+
+
+def test_persons_are_counted_apart() -> None:
+    ann, bob = ([replace(result, person_set=name) for result in RESULTS] for name in ("Ann", "Bob"))
+    report = photo_report([*ann, *bob[:1]], SIGNS, MOTION_SIGNS)
+    assert {name: tally.recall[STOP] for name, tally in report.by_person_set.items()} == {
+        "Ann": Share(1, 2),
+        "Bob": Share(1, 1),
+    }
+    assert report.by_person_set["Bob"].false_commands == Share(0, 0)
 
 
 def test_a_sign_that_the_table_of_actions_lets_move_counts_as_motion() -> None:
@@ -53,10 +70,13 @@ def test_confusion_counts_rows_by_truth() -> None:
 
 def test_the_report_is_json_and_nothing_of_nothing_is_null() -> None:
     plain = json.loads(json.dumps(photo_report(RESULTS, SIGNS, MOTION_SIGNS).as_dict(), allow_nan=False))
-    assert plain["recall"]["Stop"] == {"count": 1, "of": 2, "rate": 0.5}
+    low, high = (pytest.approx(end, abs=1e-4) for end in (0.0945, 0.9055))
+    assert plain["recall"]["Stop"] == {"count": 1, "of": 2, "rate": 0.5, "low": low, "high": high}
+    assert plain["recall_by_size"]["Stop"]["> 80 px"]["low"] is None
     assert plain["recall_by_size"]["Stop"]["> 80 px"]["rate"] is None
     assert plain["false_commands"]["kinds"]["call"]["rate"] == 0.5
-    assert plain["wrong"][1]["seen"] == "Forward"
+    verdict = json.loads(json.dumps(RESULTS[1].as_dict(), allow_nan=False))
+    assert (verdict["sign"], verdict["hand_found"], verdict["hand_px"]) == (NONE, False, None)
 
 
 def test_the_picture_shows_right_blue_and_wrong_red() -> None:

@@ -16,13 +16,14 @@ def put(folder: Path, *names: str) -> None:
 
 def test_an_index_gives_sign_and_kind(tmp_path: Path) -> None:
     put(tmp_path, "a.jpg", "b.jpg", "negatives/ok/c.jpg", "d.jpg", "e.jpg")
-    text = "path,sign,kind,more\na.jpg, Stop,,1\nb.jpg,turn_right,left hand,2\nnegatives/ok/c.jpg,none,,3\nd.jpg,,L,4\n"
-    (tmp_path / "index.csv").write_text("\ufeff" + text, encoding="utf-8")
+    rows = ["a.jpg, Stop,,", "b.jpg,turn_right,left hand, Ann", "negatives/ok/c.jpg,none,", "d.jpg,,L,B,x", ""]
+    text = "\n".join(["\ufeffpath,sign,kind,person_set", *rows])
+    (tmp_path / "index.csv").write_text(text, encoding="utf-8")
     assert read_photo_labels(tmp_path, SIGNS) == [
         LabelledPhoto(tmp_path / "a.jpg", STOP),
-        LabelledPhoto(tmp_path / "b.jpg", TURN_RIGHT, "left hand"),
+        LabelledPhoto(tmp_path / "b.jpg", TURN_RIGHT, "left hand", "Ann"),
         LabelledPhoto(tmp_path / "negatives/ok/c.jpg", NONE, "ok"),
-        LabelledPhoto(tmp_path / "d.jpg", None, "L"),
+        LabelledPhoto(tmp_path / "d.jpg", None, "L", "B"),
     ]
 
 

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from handsteer.signs.figures import Share
+from handsteer.signs.intervals import Share
 from handsteer.signs.video_figures import Event, FrameVerdict, VideoReport, video_report
 from handsteer.signs.vocabulary import FORWARD, GO, MOTION_SIGNS, NONE, SIGNS, STOP
 
@@ -12,13 +12,18 @@ LETTERS = {"F": FORWARD, "S": STOP, "G": GO, ".": NONE, "?": None}
 FPS = 10
 
 
-def report(truth: str, counts: str, grace_s: float = 0.25) -> VideoReport:
-    """Return the figures of a video of 10 frames a second, one letter a frame."""
-    frames = [
-        FrameVerdict(at / FPS, LETTERS[true], LETTERS[counted] or NONE, LETTERS[counted] or NONE)
+def frames_of(truth: str, counts: str, fps: float = FPS) -> list[FrameVerdict]:
+    """Return the frames of a video, one letter a frame."""
+    return [
+        FrameVerdict(at / fps, LETTERS[true], LETTERS[counted] or NONE, LETTERS[counted] or NONE)
         for at, (true, counted) in enumerate(zip(truth, counts, strict=True))
     ]
-    return video_report(frames, SIGNS, MOTION_SIGNS, grace_s)
+
+
+def report(truth: str, counts: str, grace_s: float = 0.25) -> VideoReport:
+    """Return the figures of a video of 10 frames a second."""
+    frames = frames_of(truth, counts)
+    return video_report({"v": frames}, SIGNS, MOTION_SIGNS, grace_s)
 
 
 @pytest.mark.parametrize(
@@ -37,14 +42,14 @@ def report(truth: str, counts: str, grace_s: float = 0.25) -> VideoReport:
 def test_false_commands(truth: str, counts: str, false: list[tuple[float, float]]) -> None:
     labels = report(truth, counts).labels
     assert labels is not None
-    assert labels.false_commands == tuple(Event(FORWARD, *times) for times in false)
-    assert labels.false_commands_per_minute == pytest.approx(len(false) * 60 / labels.scored_s)
+    assert labels.false_commands == tuple(Event(FORWARD, *times, "v") for times in false)
+    assert labels.false_rate.per_minute == pytest.approx(len(false) * 60 / labels.scored_s)
 
 
 def test_without_grace_each_frame_beyond_is_false() -> None:
     labels = report("FF..", "FFF.", grace_s=0.0).labels
     assert labels is not None
-    assert labels.false_commands == (Event(FORWARD, 0.2, 0.2),)
+    assert labels.false_commands == (Event(FORWARD, 0.2, 0.2, "v"),)
 
 
 def test_reaction_times() -> None:
@@ -65,14 +70,14 @@ def test_without_labels_signs_and_motion_are_counted() -> None:
     figures = report("?" * 10, "..FF.FF.SS")
     assert figures.labels is None
     assert figures.counted_s == {STOP: 0.2, FORWARD: 0.4, NONE: 0.4}
-    assert figures.motion_events == (Event(FORWARD, 0.2, 0.3), Event(FORWARD, 0.5, 0.6))
-    assert figures.motion_events_per_minute == pytest.approx(120)
+    assert figures.motion_events == (Event(FORWARD, 0.2, 0.3, "v"), Event(FORWARD, 0.5, 0.6, "v"))
+    assert figures.motion_rate.per_minute == pytest.approx(120)
     assert json.loads(json.dumps(figures.as_dict()))["labels"] is None
 
 
 @pytest.mark.parametrize("frames", ["", "F"])
 def test_next_to_nothing(frames: str) -> None:
-    assert report(frames, frames).motion_events_per_minute == 0.0
+    assert report(frames, frames).motion_rate.per_minute == 0.0
 
 
 @given(text=st.text(alphabet="FSG.", max_size=40))
@@ -83,3 +88,26 @@ def test_a_recogniser_that_is_always_right_makes_no_false_command(text: str) -> 
         assert labels.false_commands == ()
         assert all(reaction.slowest_s == 0.0 for reaction in labels.reactions.values())
         assert all(share.rate == 1.0 for share in labels.counted_right.values())
+
+
+def test_several_videos_are_summed() -> None:
+    videos = {
+        "a": frames_of("FFFF......", "..FF...F.."),
+        "b": frames_of("??????????????????????????????", ".........................FFFF.", fps=2 * FPS),
+        "c": frames_of("FF........", "F........."),
+    }
+    figures = video_report(videos, SIGNS, MOTION_SIGNS, grace_s=0.2)
+    assert (figures.videos, figures.frames) == (3, 50)
+    assert figures.duration_s == pytest.approx(1.0 + 1.5 + 1.0)
+    assert figures.counted_s[FORWARD] == pytest.approx(0.3 + 0.2 + 0.1)
+    assert [event.video for event in figures.motion_events] == ["a", "a", "b", "c"]
+    assert figures.motion_rate.per_minute == pytest.approx(60 * 4 / 3.5)
+    labels = figures.labels
+    assert labels is not None
+    assert labels.scored_s == pytest.approx(2.0)
+    assert labels.false_commands == (Event(FORWARD, 0.7, 0.7, "a"),)
+    assert (labels.reactions[FORWARD].shown, labels.reactions[FORWARD].slowest_s) == (2, 0.2)
+    assert labels.counted_right[FORWARD] == Share(3, 6)
+    plain = json.loads(json.dumps(figures.as_dict(), allow_nan=False))
+    assert plain["motion_events_per_minute_low"] < plain["motion_events_per_minute"]
+    assert plain["labels"]["false_commands_per_minute_high"] > 30

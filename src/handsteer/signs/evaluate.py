@@ -2,14 +2,18 @@
 
 from collections.abc import Iterable, Iterator, Mapping
 
+import numpy as np
+
 from handsteer.cameras.files import read_photo
 from handsteer.cameras.protocol import Frame
-from handsteer.errors import EvaluationError, LabelError
+from handsteer.errors import LabelError
+from handsteer.landmarks.protocol import Hand
 from handsteer.signs.figures import PhotoResult
 from handsteer.signs.labelled import LabelledPhoto
 from handsteer.signs.protocol import Classifier
 from handsteer.signs.recognizer import Recognizer
 from handsteer.signs.teaching.dataset import Dataset
+from handsteer.signs.teaching.taught import TaughtClassifier
 from handsteer.signs.video_figures import FrameVerdict
 from handsteer.signs.views import View
 from handsteer.signs.vocabulary import NONE
@@ -29,8 +33,18 @@ def evaluate_photos(photos: Iterable[LabelledPhoto], recognizer: Recognizer, vie
             continue
         recognizer.reset()
         recognition = recognizer.step(view.picture(read_photo(photo.path)), 0.0)
-        size = round(recognition.hand.longer_side_px, 1) if recognition.hand else None
-        yield PhotoResult(str(photo.path), kind, truth, recognition.seen, round(recognition.confidence, 4), size)
+        hand = recognition.hand
+        yield PhotoResult(
+            path=str(photo.path),
+            kind=kind,
+            truth=truth,
+            seen=recognition.seen,
+            confidence=recognition.confidence,
+            hand_px=hand.longer_side_px if hand else None,
+            presence=hand.presence if hand else None,
+            person_set=photo.person_set,
+            likelihoods=recognition.likelihoods,
+        )
 
 
 def evaluate_frames(
@@ -64,26 +78,43 @@ def evaluate_frames(
 def evaluate_takes(
     dataset: Dataset, classifier: Classifier, min_confidence: float, view: View
 ) -> Iterator[PhotoResult]:
-    """Yield what is seen in each hand of a dataset, with nothing kept from one to the next; its kind is the person.
+    """Yield what is seen in each hand of a dataset, with nothing kept from one to the next.
 
-    Hands that cannot be scored when they are seen as ``view`` does are left out.
+    Its kind and its set of persons are the person. Hands that cannot be scored when they are seen as ``view`` does are
+    left out, and so are those without the depth that it takes to tell them (:func:`lacks_depth`).
 
-    Raises:
-        EvaluationError: The dataset has a sign that the classifier doesn't know.
+    Args:
+        dataset: Whose signs are all known to the classifier, or ``NONE``.
+        classifier: What is tested.
+        min_confidence: 0 to 1, from which a sign is seen.
+        view: How the hands are looked at.
     """
-    unknown = [label for label in dataset.labels if label not in (*classifier.signs, NONE)]
-    if unknown:
-        known = ", ".join((*classifier.signs, NONE))
-        raise EvaluationError(
-            f"the sign {unknown[0]!r} is not known; the signs are {known}: name a model that knows it by --signs.model"
-        )
     for number, take in enumerate(dataset.takes, start=1):
         truth, _ = view.truth(take.label)
         if truth is None:
             continue
-        for row, hand in enumerate(take.hands):
+        for row, hand in enumerate(take.hands, start=1):
+            if lacks_depth(hand, take.label, classifier):
+                continue
             guess = classifier.classify(view.hand(hand))
-            seen = guess.sign if guess.confidence >= min_confidence else NONE
-            confidence = round(guess.confidence, 4)
-            name = f"take {number}, hand {row + 1}"
-            yield PhotoResult(name, take.person, truth, seen, confidence, round(hand.longer_side_px, 1))
+            yield PhotoResult(
+                path=f"take {number}, hand {row}",
+                kind=take.person,
+                truth=truth,
+                seen=guess.sign if guess.confidence >= min_confidence else NONE,
+                confidence=guess.confidence,
+                hand_px=hand.longer_side_px,
+                presence=hand.presence,
+                person_set=take.person,
+                likelihoods=guess.likelihoods,
+            )
+
+
+def lacks_depth(hand: Hand, label: str, classifier: Classifier) -> bool:
+    """Return whether ``hand`` has no depth and ``label`` cannot be told without it, so that it cannot be scored.
+
+    Only signs that were taught from such landmarks can. For ``NONE`` the shipped signs would have to be told too.
+    """
+    if np.isfinite(hand.world).all():
+        return False
+    return not (isinstance(classifier, TaughtClassifier) and label in classifier.signs_without_depth)

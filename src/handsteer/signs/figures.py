@@ -1,9 +1,11 @@
 """How good signs are told in photos: recall, false commands, confusion matrix."""
 
-from collections.abc import Callable, Collection, Iterable, Sequence
-from dataclasses import dataclass
+from collections import Counter
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
+from handsteer.signs.intervals import Share
 from handsteer.signs.vocabulary import NONE
 
 SIZES = ("< 45 px", "45-80 px", "> 80 px", "no hand")
@@ -21,6 +23,9 @@ class PhotoResult:
         seen: The sign that was seen.
         confidence: 0 to 1, how sure that was.
         hand_px: The longer side of the box about the landmarks, in pixels; None when no hand was found.
+        presence: 0 to 1, how sure the landmark model was that there is a hand; None when none was found.
+        person_set: Whose hand it is, or from which set of photos; may be empty.
+        likelihoods: How likely each sign is, 0 to 1; empty when no hand was found.
     """
 
     path: str
@@ -29,6 +34,9 @@ class PhotoResult:
     seen: str
     confidence: float
     hand_px: float | None
+    presence: float | None = None
+    person_set: str = ""
+    likelihoods: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def size(self) -> str:
@@ -37,22 +45,25 @@ class PhotoResult:
             return SIZES[3]
         return SIZES[0] if self.hand_px < 45 else SIZES[1] if self.hand_px <= 80 else SIZES[2]
 
-
-@dataclass(frozen=True)
-class Share:
-    """So many of so many."""
-
-    count: int
-    of: int
-
     @property
-    def rate(self) -> float | None:
-        """0 to 1; None of nothing."""
-        return self.count / self.of if self.of else None
+    def likeliest(self) -> tuple[str, float]:
+        """The likeliest sign, sure enough or not, and how likely it is; ``NONE`` and 0 without a hand."""
+        return max(self.likelihoods.items(), key=lambda item: item[1], default=(NONE, 0.0))
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the share as plain values, for JSON."""
-        return {"count": self.count, "of": self.of, "rate": self.rate}
+        """Return the verdict as plain values, for JSON."""
+        return {
+            "path": self.path,
+            "kind": self.kind,
+            "person_set": self.person_set,
+            "truth": self.truth,
+            "sign": self.seen,
+            "confidence": round(self.confidence, 4),
+            "likelihoods": {sign: round(value, 6) for sign, value in self.likelihoods.items()},
+            "hand_found": self.hand_px is not None,
+            "hand_px": None if self.hand_px is None else round(self.hand_px, 1),
+            "presence": None if self.presence is None else round(self.presence, 4),
+        }
 
 
 @dataclass(frozen=True)
@@ -82,50 +93,113 @@ class Confusion:
 
 
 @dataclass(frozen=True)
-class PhotoReport:
-    """The figures of a set of labelled photos.
+class Tally:
+    """What is counted of any set of labelled photos; signs that none of them shows are left out.
 
     Attributes:
-        results: All scored photos.
-        unscored: How many photos were left out, as nobody could say what they show.
+        photos: How many there are.
         recall: Of the photos of each sign, how many were right; a hand that is not found is wrong.
-        recall_by_size: Likewise, for each of :data:`SIZES`.
+        recall_of_found: Likewise, of the photos in which a hand was found.
         wrong_motion: Of the photos of each sign, how many gave another sign that moves the robot.
         false_commands: Of all photos that show no sign, how many gave one that moves the robot.
-        false_commands_by_kind: Likewise, for each kind.
-        confusion: Which sign was taken for which.
+        false_alarms: For each sign that can be told, of the photos that don't show it, how many gave it.
     """
 
-    results: tuple[PhotoResult, ...]
-    unscored: int
+    photos: int
     recall: dict[str, Share]
-    recall_by_size: dict[str, dict[str, Share]]
+    recall_of_found: dict[str, Share]
     wrong_motion: dict[str, Share]
     false_commands: Share
-    false_commands_by_kind: dict[str, Share]
-    confusion: Confusion
+    false_alarms: dict[str, Share]
 
     @property
-    def wrong(self) -> list[PhotoResult]:
-        """The photos in which another sign was seen than they show."""
-        return [result for result in self.results if result.seen != result.truth]
+    def false_motion(self) -> Share:
+        """Of all photos, how many gave a sign that moves the robot and that they don't show."""
+        return Share(sum(share.count for share in self.wrong_motion.values()), self.photos)
+
+    @property
+    def wrong_motion_of_signs(self) -> Share:
+        """Of all photos that show a sign, how many gave another one that moves the robot."""
+        shares = [share for sign, share in self.wrong_motion.items() if sign != NONE]
+        return Share(sum(share.count for share in shares), sum(share.of for share in shares))
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the figures as plain values, for JSON; of the single photos those that were wrong."""
+        """Return the figures as plain values, for JSON."""
         return {
-            "photos": len(self.results),
-            "unscored": self.unscored,
+            "photos": self.photos,
             "recall": _plain(self.recall),
-            "recall_by_size": {sign: _plain(sizes) for sign, sizes in self.recall_by_size.items()},
+            "recall_of_found": _plain(self.recall_of_found),
             "wrong_motion": _plain(self.wrong_motion),
-            "false_commands": {**self.false_commands.as_dict(), "kinds": _plain(self.false_commands_by_kind)},
-            "confusion": self.confusion.as_dict(),
-            "wrong": [{**vars(result)} for result in self.wrong],
+            "wrong_motion_of_signs": self.wrong_motion_of_signs.as_dict(),
+            "false_commands": self.false_commands.as_dict(),
+            "false_motion": self.false_motion.as_dict(),
+            "false_alarms": _plain(self.false_alarms),
         }
 
 
+@dataclass(frozen=True)
+class PhotoReport(Tally):
+    """The figures of a set of labelled photos.
+
+    Attributes:
+        unscored: How many photos were left out, as nobody could say what they show.
+        without_depth: How many hands were left out, as their landmarks have no depth.
+        recall_by_size: As ``recall``, for each of :data:`SIZES`.
+        false_commands_by_kind: As ``false_commands``, for each kind.
+        by_person_set: What is counted of each set of persons; empty when all are of the same.
+        confusion: Which sign was taken for which.
+    """
+
+    unscored: int
+    without_depth: int
+    recall_by_size: dict[str, dict[str, Share]]
+    false_commands_by_kind: dict[str, Share]
+    by_person_set: dict[str, Tally]
+    confusion: Confusion
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the figures as plain values, for JSON."""
+        return {
+            **super().as_dict(),
+            "unscored": self.unscored,
+            "without_depth": self.without_depth,
+            "recall_by_size": {sign: _plain(sizes) for sign, sizes in self.recall_by_size.items()},
+            "false_commands": {**self.false_commands.as_dict(), "kinds": _plain(self.false_commands_by_kind)},
+            "by_person_set": {name: tally.as_dict() for name, tally in self.by_person_set.items()},
+            "confusion": self.confusion.as_dict(),
+        }
+
+
+def tally(results: Collection[PhotoResult], signs: Sequence[str], motion: Collection[str]) -> Tally:
+    """Return what is counted of ``results``; the arguments are those of :func:`photo_report`."""
+    every: dict[str, list[PhotoResult]] = {sign: [] for sign in (*signs, NONE)}
+    for photo in results:
+        every[photo.truth].append(photo)
+    of_sign = {sign: photos for sign, photos in every.items() if photos}
+    wrongly = Counter(photo.seen for photo in results if not _is_right(photo))
+    wrong_motion = {
+        sign: _share(photos, lambda photo: photo.seen in motion and not _is_right(photo))
+        for sign, photos in of_sign.items()
+    }
+    return Tally(
+        photos=len(results),
+        recall={sign: _share(photos, _is_right) for sign, photos in of_sign.items()},
+        recall_of_found={
+            sign: _share((photo for photo in photos if photo.hand_px is not None), _is_right)
+            for sign, photos in of_sign.items()
+        },
+        wrong_motion=wrong_motion,
+        false_commands=wrong_motion.get(NONE, Share(0, 0)),
+        false_alarms={sign: Share(wrongly[sign], len(results) - len(every[sign])) for sign in signs},
+    )
+
+
 def photo_report(
-    results: Sequence[PhotoResult], signs: Sequence[str], motion: Collection[str], unscored: int = 0
+    results: Sequence[PhotoResult],
+    signs: Sequence[str],
+    motion: Collection[str],
+    unscored: int = 0,
+    without_depth: int = 0,
 ) -> PhotoReport:
     """Return the figures of ``results``.
 
@@ -134,37 +208,37 @@ def photo_report(
         signs: The signs that can occur, without ``NONE``, in the order of the tables.
         motion: Those that can move the robot.
         unscored: How many photos were left out.
+        without_depth: How many hands were left out for want of depth.
     """
+    whole = tally(results, signs, motion)
+    sets = sorted({photo.person_set for photo in results})
+    kinds = sorted({photo.kind for photo in results if photo.truth == NONE})
 
-    def share(photos: Iterable[PhotoResult], counts: Callable[[PhotoResult], bool]) -> Share:
-        verdicts = [counts(photo) for photo in photos]
-        return Share(sum(verdicts), len(verdicts))
+    def of(**wanted: str) -> list[PhotoResult]:
+        return [photo for photo in results if all(getattr(photo, name) == value for name, value in wanted.items())]
 
-    def right(photo: PhotoResult) -> bool:
-        return photo.seen == photo.truth
-
-    def moves_wrongly(photo: PhotoResult) -> bool:
-        return photo.seen in motion and not right(photo)
-
-    of_sign = {sign: [photo for photo in results if photo.truth == sign] for sign in (*signs, NONE)}
-    shown = {sign: photos for sign, photos in of_sign.items() if photos}
-    negatives = of_sign[NONE]
-    kinds = sorted({photo.kind for photo in negatives})
     return PhotoReport(
-        results=tuple(results),
+        **vars(whole),
         unscored=unscored,
-        recall={sign: share(photos, right) for sign, photos in shown.items()},
+        without_depth=without_depth,
         recall_by_size={
-            sign: {size: share((photo for photo in photos if photo.size == size), right) for size in SIZES}
-            for sign, photos in shown.items()
+            sign: {size: _share(of(truth=sign, size=size), _is_right) for size in SIZES} for sign in whole.recall
         },
-        wrong_motion={sign: share(photos, moves_wrongly) for sign, photos in shown.items()},
-        false_commands=share(negatives, moves_wrongly),
         false_commands_by_kind={
-            kind: share((photo for photo in negatives if photo.kind == kind), moves_wrongly) for kind in kinds
+            kind: _share(of(truth=NONE, kind=kind), lambda photo: photo.seen in motion) for kind in kinds
         },
+        by_person_set={name: tally(of(person_set=name), signs, motion) for name in sets} if len(sets) > 1 else {},
         confusion=Confusion.of(((photo.truth, photo.seen) for photo in results), signs),
     )
+
+
+def _is_right(photo: PhotoResult) -> bool:
+    return photo.seen == photo.truth
+
+
+def _share(photos: Iterable[PhotoResult], counts: Callable[[PhotoResult], bool]) -> Share:
+    verdicts = [counts(photo) for photo in photos]
+    return Share(sum(verdicts), len(verdicts))
 
 
 def _plain(shares: dict[str, Share]) -> dict[str, Any]:

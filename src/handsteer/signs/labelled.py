@@ -22,20 +22,22 @@ class LabelledPhoto:
         path: The file.
         truth: The sign that must come out, ``NONE`` among them; None when it is not to be scored.
         kind: What it shows in other words, such as ``thumb_up`` for a hand that is no sign; may be empty.
+        person_set: Whose hand it is, or from which set of photos; may be empty.
     """
 
     path: Path
     truth: str | None
     kind: str = ""
+    person_set: str = ""
 
 
 def read_photo_labels(folder: Path, signs: Sequence[str]) -> list[LabelledPhoto]:
     """Return the photos of ``folder`` with their labels.
 
     The folder has an ``index.csv`` with the columns ``path`` (from the folder) and ``sign`` (empty: not scored), and
-    ``kind`` if wanted; or a subfolder for each sign. Everything under ``negatives`` shows no sign, and the folder
-    below it is its kind; what is under ``ambiguous`` is not scored. Names may be written in any case, with spaces,
-    ``_``, ``-`` or nothing between words.
+    ``kind`` and ``person_set`` if wanted; or a subfolder for each sign. Everything under ``negatives`` shows no sign,
+    and the folder below it is its kind; what is under ``ambiguous`` is not scored. Names may be written in any case,
+    with spaces, ``_``, ``-`` or nothing between words.
 
     Args:
         folder: Where the photos are.
@@ -90,7 +92,8 @@ def _from_index(index: Path, signs: Sequence[str]) -> list[LabelledPhoto]:
         truth = _truth(row["sign"], signs, where)
         if truth is not None and not path.is_file():
             raise LabelError(f"{where}: there is no photo {path}")
-        photos.append(LabelledPhoto(path, truth, row.get("kind") or _kind_of(Path(row["path"]))))
+        kind = row.get("kind") or _kind_of(Path(row["path"]))
+        photos.append(LabelledPhoto(path, truth, kind, row.get("person_set", "")))
     return photos
 
 

@@ -1,12 +1,13 @@
 """How well signs are told over time: false commands a minute, and how soon each sign counts."""
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from itertools import groupby
+from itertools import chain, groupby
 from statistics import median
 from typing import Any
 
-from handsteer.signs.figures import Confusion, Share
+from handsteer.signs.figures import Confusion
+from handsteer.signs.intervals import Rate, Share
 from handsteer.signs.vocabulary import NONE
 
 
@@ -29,11 +30,12 @@ class FrameVerdict:
 
 @dataclass(frozen=True)
 class Event:
-    """A time in which a sign counted without a break, in seconds from the first frame."""
+    """A time in which a sign counted without a break, in seconds from the first frame of the video."""
 
     sign: str
     start_s: float
     end_s: float
+    video: str = ""
 
 
 @dataclass(frozen=True)
@@ -55,9 +57,10 @@ class Reaction:
 
 @dataclass(frozen=True)
 class VideoReport:
-    """The figures of a video.
+    """The figures of a video, or of several together.
 
     Attributes:
+        videos: How many there are.
         frames: How many there are.
         duration_s: How long it is.
         counted_s: For how long each sign counted, ``NONE`` among them.
@@ -65,6 +68,7 @@ class VideoReport:
         labels: What the labels say about it; None when there are none.
     """
 
+    videos: int
     frames: int
     duration_s: float
     counted_s: dict[str, float]
@@ -72,18 +76,19 @@ class VideoReport:
     labels: "LabelledFigures | None"
 
     @property
-    def motion_events_per_minute(self) -> float:
-        """Times a minute at which a sign began to count that moves the robot."""
-        return _per_minute(len(self.motion_events), self.duration_s)
+    def motion_rate(self) -> Rate:
+        """How often a sign began to count that moves the robot."""
+        return Rate(len(self.motion_events), self.duration_s)
 
     def as_dict(self) -> dict[str, Any]:
         """Return the figures as plain values, for JSON."""
         return {
+            "videos": self.videos,
             "frames": self.frames,
             "duration_s": self.duration_s,
             "counted_s": self.counted_s,
             "motion_events": [asdict(event) for event in self.motion_events],
-            "motion_events_per_minute": self.motion_events_per_minute,
+            **self.motion_rate.as_dict("motion_events"),
             "labels": self.labels and self.labels.as_dict(),
         }
 
@@ -109,9 +114,9 @@ class LabelledFigures:
     confusion: Confusion
 
     @property
-    def false_commands_per_minute(self) -> float:
-        """False commands a minute of the time in which the sign is known."""
-        return _per_minute(len(self.false_commands), self.scored_s)
+    def false_rate(self) -> Rate:
+        """How many false commands there are in the time in which the sign is known."""
+        return Rate(len(self.false_commands), self.scored_s)
 
     def as_dict(self) -> dict[str, Any]:
         """Return the figures as plain values, for JSON."""
@@ -121,53 +126,71 @@ class LabelledFigures:
             "counted_right": {sign: share.as_dict() for sign, share in self.counted_right.items()},
             "reactions": {sign: asdict(reaction) for sign, reaction in self.reactions.items()},
             "false_commands": [asdict(event) for event in self.false_commands],
-            "false_commands_per_minute": self.false_commands_per_minute,
+            **self.false_rate.as_dict("false_commands"),
             "confusion": self.confusion.as_dict(),
         }
 
 
 def video_report(
-    frames: Sequence[FrameVerdict], signs: Sequence[str], motion: Collection[str], grace_s: float = 0.3
+    videos: Mapping[str, Sequence[FrameVerdict]],
+    signs: Sequence[str],
+    motion: Collection[str],
+    grace_s: float = 0.3,
 ) -> VideoReport:
-    """Return the figures of the frames of a video.
+    """Return the figures of one video, or of several together.
 
     A false command is a time in which one sign counts that moves the robot, but was not shown at any moment of the
     last ``grace_s`` seconds: those who change their sign are given that long to be understood. It is one event however
     long it lasts. Where the truth is not known within that time, nothing is held against the recogniser.
 
     Args:
-        frames: All of them, in their order.
+        videos: The name of each, and all its frames in their order.
         signs: The signs that can occur, without ``NONE``.
         motion: Those that can move the robot.
         grace_s: How long a sign that is no longer shown may go on to count, in seconds.
     """
-    period_s = (frames[-1].time_s - frames[0].time_s) / (len(frames) - 1) if len(frames) > 1 else 0.0
-    counted = {sign: sum(frame.counts == sign for frame in frames) * period_s for sign in (*signs, NONE)}
-    known = any(frame.truth is not None for frame in frames)
+    periods_s = {name: _period_s(frames) for name, frames in videos.items()}
+    counted = {
+        sign: sum(periods_s[name] * sum(frame.counts == sign for frame in frames) for name, frames in videos.items())
+        for sign in (*signs, NONE)
+    }
+    moving = {
+        name: [frame.counts if frame.counts in motion else None for frame in frames] for name, frames in videos.items()
+    }
+    known = any(frame.truth is not None for frames in videos.values() for frame in frames)
     return VideoReport(
-        frames=len(frames),
-        duration_s=len(frames) * period_s,
+        videos=len(videos),
+        frames=sum(map(len, videos.values())),
+        duration_s=sum(len(frames) * periods_s[name] for name, frames in videos.items()),
         counted_s={sign: round(time_s, 3) for sign, time_s in counted.items() if time_s},
-        motion_events=tuple(_events([frame.counts if frame.counts in motion else None for frame in frames], frames)),
-        labels=_labelled(frames, signs, motion, grace_s, period_s) if known else None,
+        motion_events=tuple(_events(moving, videos)),
+        labels=_labelled(videos, signs, motion, grace_s) if known else None,
     )
 
 
 def _labelled(
-    frames: Sequence[FrameVerdict], signs: Sequence[str], motion: Collection[str], grace_s: float, period_s: float
+    videos: Mapping[str, Sequence[FrameVerdict]], signs: Sequence[str], motion: Collection[str], grace_s: float
 ) -> LabelledFigures:
-    scored = [frame for frame in frames if frame.truth is not None]
-    shown = [sign for sign in (*signs, NONE) if any(frame.truth == sign for frame in scored)]
-    of_sign = {sign: [frame for frame in scored if frame.truth == sign] for sign in shown}
-    false = [frame.counts if _is_false(frames, at, motion, grace_s) else None for at, frame in enumerate(frames)]
+    scored = {name: [frame for frame in frames if frame.truth is not None] for name, frames in videos.items()}
+    frames_known = list(chain.from_iterable(scored.values()))
+    of_sign = {sign: [frame for frame in frames_known if frame.truth == sign] for sign in (*signs, NONE)}
+    shown = {sign: frames for sign, frames in of_sign.items() if frames}
+    false = {
+        name: [frame.counts if _is_false(frames, at, motion, grace_s) else None for at, frame in enumerate(frames)]
+        for name, frames in videos.items()
+    }
     return LabelledFigures(
-        scored_s=len(scored) * period_s,
-        seen_right={sign: Share(sum(f.seen == sign for f in of), len(of)) for sign, of in of_sign.items()},
-        counted_right={sign: Share(sum(f.counts == sign for f in of), len(of)) for sign, of in of_sign.items()},
-        reactions={sign: _reaction(sign, frames) for sign in shown},
-        false_commands=tuple(_events(false, frames)),
-        confusion=Confusion.of(((frame.truth or NONE, frame.counts) for frame in scored), signs),
+        scored_s=sum(len(scored[name]) * _period_s(frames) for name, frames in videos.items()),
+        seen_right={sign: Share(sum(f.seen == sign for f in of), len(of)) for sign, of in shown.items()},
+        counted_right={sign: Share(sum(f.counts == sign for f in of), len(of)) for sign, of in shown.items()},
+        reactions={sign: _reaction(sign, videos.values()) for sign in shown},
+        false_commands=tuple(_events(false, videos)),
+        confusion=Confusion.of(((frame.truth or NONE, frame.counts) for frame in frames_known), signs),
     )
+
+
+def _period_s(frames: Sequence[FrameVerdict]) -> float:
+    return (frames[-1].time_s - frames[0].time_s) / (len(frames) - 1) if len(frames) > 1 else 0.0
 
 
 def _is_false(frames: Sequence[FrameVerdict], at: int, motion: Collection[str], grace_s: float) -> bool:
@@ -181,11 +204,10 @@ def _is_false(frames: Sequence[FrameVerdict], at: int, motion: Collection[str], 
     return all(frame.truth not in (None, now.counts) for frame in frames[begin : at + 1])
 
 
-def _reaction(sign: str, frames: Sequence[FrameVerdict]) -> Reaction:
+def _reaction(sign: str, videos: Iterable[Sequence[FrameVerdict]]) -> Reaction:
     times_s: list[float | None] = []
-    for truth, group in groupby(frames, key=lambda frame: frame.truth):
-        if truth == sign:
-            showing = list(group)
+    for frames in videos:
+        for showing in (list(group) for truth, group in groupby(frames, lambda frame: frame.truth) if truth == sign):
             counted_s = next((frame.time_s for frame in showing if frame.counts == sign), None)
             times_s.append(None if counted_s is None else round(counted_s - showing[0].time_s, 6))
     known_s = [time_s for time_s in times_s if time_s is not None]
@@ -197,13 +219,10 @@ def _reaction(sign: str, frames: Sequence[FrameVerdict]) -> Reaction:
     )
 
 
-def _events(marks: Sequence[str | None], frames: Sequence[FrameVerdict]) -> Iterator[Event]:
+def _events(marks: Mapping[str, Sequence[str | None]], videos: Mapping[str, Sequence[FrameVerdict]]) -> Iterator[Event]:
     """Yield an event for each run of the same mark; None marks nothing. It ends with its last frame."""
-    for mark, group in groupby(zip(marks, frames, strict=True), key=lambda pair: pair[0]):
-        if mark is not None:
-            times_s = [frame.time_s for _, frame in group]
-            yield Event(mark, round(times_s[0], 6), round(times_s[-1], 6))
-
-
-def _per_minute(events: int, duration_s: float) -> float:
-    return 60 * events / duration_s if duration_s else 0.0
+    for video, frames in videos.items():
+        for mark, group in groupby(zip(marks[video], frames, strict=True), key=lambda pair: pair[0]):
+            if mark is not None:
+                times_s = [frame.time_s for _, frame in group]
+                yield Event(mark, round(times_s[0], 6), round(times_s[-1], 6), video)

@@ -44,6 +44,12 @@ class View:
     rotate_deg: float = 0.0
     enlarge: bool = True
 
+    @property
+    def name(self) -> str:
+        """How tables call it: ``raw`` or ``flipped``, and by how many degrees it is turned."""
+        turned = f" {self.rotate_deg:+g}" if self.rotate_deg else ""
+        return ("flipped" if self.flip else "raw") + turned
+
     def picture(self, image: NDArray[np.uint8]) -> NDArray[np.uint8]:
         """Return ``image``, (height, width, 3) uint8, seen so; its size may change."""
         if self.enlarge and max(image.shape[:2]) < _SMALL_PX:

@@ -2,6 +2,7 @@
 
 import json as json_format
 import sys
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -9,54 +10,64 @@ import cv2
 from cyclopts import Parameter
 from tqdm import tqdm
 
-from handsteer.cameras.files import PHOTO_SUFFIXES, video_frames
 from handsteer.cli.options import ConfigFile, Flag, Parameters, settings
-from handsteer.cli.signs.tables import photo_tables, video_tables
+from handsteer.cli.signs.evaluation_tables import evaluation_tables
 from handsteer.config import Config
 from handsteer.control.actions import motion_signs
 from handsteer.errors import EvaluationError
 from handsteer.graph import open_classifier, open_recognizer
+from handsteer.signs.calibration_pictures import draw_reliability, draw_sweep
 from handsteer.signs.confusion_picture import draw_confusion
-from handsteer.signs.evaluate import evaluate_frames, evaluate_photos, evaluate_takes
-from handsteer.signs.figures import Confusion, PhotoReport, photo_report
-from handsteer.signs.labelled import labels_of, read_photo_labels, read_video_labels
-from handsteer.signs.teaching.dataset import load_dataset
-from handsteer.signs.video_figures import VideoReport, video_report
+from handsteer.signs.evaluation import Evaluation
+from handsteer.signs.labelled import labels_of
+from handsteer.signs.plot import Picture
+from handsteer.signs.protocol import Classifier
+from handsteer.signs.sources import LabelledFolder, LabelledHands, LabelledVideo, PhotoRun, Source, open_source
 from handsteer.signs.views import View
 
 
 def evaluate(
-    source: Path,
-    /,
-    *,
+    *sources: Path,
     json: Flag = False,
     png: Path | None = None,
+    reliability: Path | None = None,
+    sweep: Flag = False,
+    sweep_png: Path | None = None,
     flip: Flag = False,
-    rotate: Annotated[float, Parameter(allow_leading_hyphen=True)] = 0.0,
+    rotate: Annotated[str, Parameter(allow_leading_hyphen=True)] = "0",
     as_is: Flag = False,
     grace: float = 0.3,
     config_file: ConfigFile = None,
     parameters: Parameters = None,
 ) -> int:
-    """Print how well the signs are told in labelled photos, in a video, or in a dataset of landmarks.
+    """Print how well the signs are told in labelled photos, in videos, or in datasets of landmarks.
 
-    Example: handsteer signs evaluate photos/ --flip --png confusion.png
+    Example: handsteer signs evaluate photos/ more/ a.mp4 --flip --rotate -15,0,15
 
-    A folder has an index.csv (columns path, sign, and kind if wanted), or a subfolder for each sign and one called
-    negatives. A video may have a file VIDEO.labels.csv beside it (columns frame, sign), VIDEO without its ending.
+    A folder has an index.csv (columns path and sign, and kind and person_set if wanted), or a subfolder for each sign
+    and one called negatives. A video may have a file VIDEO.labels.csv beside it (columns frame, sign), VIDEO without
+    its ending.
 
     Parameters
     ----------
-    source
-        A folder of labelled photos, a video file, or a dataset (.npz) of `signs collect`.
+    sources
+        Folders of labelled photos, video files, and datasets (.npz) of `signs collect`.
     json
-        Print one JSON object.
+        Print one JSON object, with what was seen in each photo and how likely each sign was.
     png
         Write the confusion matrix as a picture to this file.
+    reliability
+        Print how far likelihoods can be trusted, and write it as a picture to this file.
+    sweep
+        Print what other thresholds of the confidence would give.
+    sweep_png
+        Write that as a picture to this file.
     flip
-        Look at everything flipped left to right: the other hand, and left for right.
+        Look at everything flipped left to right: the other hand, and left for right. With several angles, both raw
+        and flipped at each of them.
     rotate
-        Turn everything clockwise by so many degrees; by 180, Forward is Backward.
+        Turn everything clockwise by so many degrees; by 180, Forward is Backward. Or several angles, as -15,0,15:
+        each is looked at, and compared.
     as_is
         Don't pad and enlarge photos below 400 px.
     grace
@@ -65,78 +76,120 @@ def evaluate(
         YAML file with parameters; those given here go before it.
     """
     config = settings(config_file, parameters)
-    _check(rotate, grace, png)
-    view = View(flip=flip, rotate_deg=rotate, enlarge=not as_is)
-    report: PhotoReport | VideoReport
-    confusion: Confusion | None
-    if source.suffix.lower() == ".npz":
-        report = _dataset(source, config, view)
-        text, confusion = photo_tables(report, "hands"), report.confusion
-    elif source.is_file():
-        report = _video(source, config, view, grace, wants_confusion=png is not None)
-        text, confusion = video_tables(report), report.labels.confusion if report.labels else None
+    pictures = {"--png": png, "--reliability": reliability, "--sweep-png": sweep_png}
+    _check(grace, pictures)
+    views = _views(rotate, flip=flip, enlarge=not as_is)
+    classifier = open_classifier(config.signs)
+    opened = _open(sources, classifier)
+    _check_figures(opened, {**pictures, "--sweep": sweep})
+    evaluation = _evaluate(opened, views, config, classifier, grace)
+    runs = evaluation.stills or evaluation.videos
+    names = ", ".join(dict.fromkeys(Path(run.source).resolve().name for run in runs))
+    for option, path in pictures.items():
+        if path is not None:
+            _write_picture(option, path, _picture(option, evaluation, names))
+    with_sweep = sweep or sweep_png is not None
+    if json:
+        print(json_format.dumps(evaluation.as_dict(with_sweep=with_sweep)))
     else:
-        report = _photos(source, config, view)
-        text, confusion = photo_tables(report), report.confusion
-    if png is not None and confusion is not None:
-        _write_picture(png, confusion, f"{source.resolve().name}: signs shown and seen")
-    asked = {"source": str(source), "flip": flip, "rotate": rotate}
-    print(json_format.dumps({**asked, **report.as_dict()}) if json else text)
+        print(evaluation_tables(evaluation, with_reliability=reliability is not None, with_sweep=with_sweep))
     return 0
 
 
-def _photos(folder: Path, config: Config, view: View) -> PhotoReport:
-    signs = open_classifier(config.signs).signs
-    photos = read_photo_labels(folder, signs)
-    results = list(evaluate_photos(_with_progress(photos, "photos"), open_recognizer(config), view))
-    if not results:
-        raise EvaluationError(f"{folder}: no photo shows a sign or NONE when it is turned so; try another --rotate")
-    return photo_report(
-        results, signs, motion_signs(config.control.actions, signs), unscored=len(photos) - len(results)
+def _views(rotate: str, *, flip: bool, enlarge: bool) -> list[View]:
+    """Return how to look: one angle gives one view; with several, each is looked at, and with ``flip`` also flipped."""
+    try:
+        angles = [float(angle) for angle in rotate.split(",") if angle.strip()]
+    except ValueError:
+        angles = []
+    if not angles:
+        raise EvaluationError(f"--rotate: {rotate!r} should be degrees, or several with commas, as -15,0,15")
+    for angle in angles:
+        if not -360 <= angle <= 360:
+            raise EvaluationError(f"--rotate: {angle:g} should be from -360 to 360 degrees")
+    flips = [flip] if "," not in rotate else [False, True] if flip else [False]
+    return list(dict.fromkeys(View(flipped, angle, enlarge) for flipped in flips for angle in angles))
+
+
+def _open(paths: Iterable[Path], classifier: Classifier) -> list[Source]:
+    """Return all sources, checked as far as that goes before the work, which takes a while."""
+    unique = list(dict.fromkeys(paths))
+    if not unique:
+        raise EvaluationError("there is nothing to evaluate: give folders of labelled photos, videos, or datasets")
+    return [open_source(path, classifier) for path in unique]
+
+
+def _evaluate(
+    sources: Sequence[Source], views: Sequence[View], config: Config, classifier: Classifier, grace_s: float
+) -> Evaluation:
+    folders = [source for source in sources if isinstance(source, LabelledFolder)]
+    datasets = [source for source in sources if isinstance(source, LabelledHands)]
+    videos = [source for source in sources if isinstance(source, LabelledVideo)]
+    least = config.signs.min_confidence
+    hands = [data.run(classifier, least, view, _with_progress) for data in datasets for view in views]
+    _check_scored(hands)
+    # Hands are found already: no landmark models are needed for those.
+    recognizer = open_recognizer(config) if folders or videos else None
+    photos = [folder.run(recognizer, view, _with_progress) for folder in folders for view in views if recognizer]
+    _check_scored(photos)
+    return Evaluation(
+        signs=classifier.signs,
+        motion=motion_signs(config.control.actions, classifier.signs),
+        photos=tuple(photos),
+        hands=tuple(hands),
+        videos=tuple(video.run(recognizer, view, _with_progress) for video in videos for view in views if recognizer),
+        grace_s=grace_s,
     )
 
 
-def _dataset(path: Path, config: Config, view: View) -> PhotoReport:
-    dataset = load_dataset(path)
-    classifier = open_classifier(config.signs)
-    results = list(evaluate_takes(dataset, classifier, config.signs.min_confidence, view))
-    if not results:
-        raise EvaluationError(f"{path}: no hand shows a sign or NONE when it is turned so; try another --rotate")
-    unscored = sum(len(take.hands) for take in dataset.takes) - len(results)
-    return photo_report(results, classifier.signs, motion_signs(config.control.actions, classifier.signs), unscored)
+def _check_scored(runs: Sequence[PhotoRun]) -> None:
+    for source in dict.fromkeys(run.source for run in runs):
+        if not any(run.results for run in runs if run.source == source):
+            raise EvaluationError(
+                f"{source}: nothing in it shows a sign or NONE when it is turned so; try another --rotate"
+            )
 
 
-def _video(path: Path, config: Config, view: View, grace_s: float, *, wants_confusion: bool) -> VideoReport:
-    if path.suffix.lower() in PHOTO_SUFFIXES:
-        raise EvaluationError(f"{path} is a photo: give the folder of labelled photos that it is in, or a video")
-    signs = open_classifier(config.signs).signs
-    truths = read_video_labels(path, signs)
-    if wants_confusion and truths is None:
-        raise EvaluationError(
-            f"--png: there are no labels for {path}, so no confusion matrix: expected {labels_of(path)}"
-        )
-    frames = _with_progress(video_frames(path), "frames")
-    verdicts = list(evaluate_frames(frames, truths, open_recognizer(config), view))
-    return video_report(verdicts, signs, motion_signs(config.control.actions, signs), grace_s)
-
-
-def _with_progress(things: Any, unit: str) -> Any:
+def _with_progress(things: Iterable[Any], unit: str) -> Iterable[Any]:
     return tqdm(things, unit=f" {unit}", file=sys.stderr, disable=not sys.stderr.isatty())
 
 
-def _check(rotate: float, grace_s: float, png: Path | None) -> None:
-    if not -360 <= rotate <= 360:
-        raise EvaluationError(f"--rotate: {rotate:g} should be from -360 to 360 degrees")
+def _check(grace_s: float, pictures: Mapping[str, Path | None]) -> None:
     if not 0 <= grace_s <= 10:
         raise EvaluationError(f"--grace: {grace_s:g} should be from 0 to 10 seconds")
     # Before the work, which takes a while, not after it.
-    if png is not None and (png.suffix.lower() != ".png" or not png.parent.is_dir()):
-        raise EvaluationError(f"--png: {png} should be a file name that ends in .png, in a folder that is there")
+    for option, png in pictures.items():
+        if png is not None and (png.suffix.lower() != ".png" or not png.parent.is_dir()):
+            raise EvaluationError(f"{option}: {png} should be a file name that ends in .png, in a folder that is there")
 
 
-def _write_picture(path: Path, confusion: Confusion, title: str) -> None:
-    _, data = cv2.imencode(".png", draw_confusion(confusion, title))
+def _check_figures(sources: Sequence[Source], wanted: Mapping[str, object]) -> None:
+    """Refuse what cannot be had from videos alone."""
+    videos = [source for source in sources if isinstance(source, LabelledVideo)]
+    if len(videos) < len(sources):
+        return
+    if wanted["--png"] and all(video.truths is None for video in videos):
+        path = videos[0].path
+        raise EvaluationError(
+            f"--png: there are no labels for {path}, so no confusion matrix: expected {labels_of(path)}"
+        )
+    for option in ("--reliability", "--sweep", "--sweep-png"):
+        if wanted[option]:
+            raise EvaluationError(f"{option}: it takes photos or a dataset; here are only videos")
+
+
+def _picture(option: str, evaluation: Evaluation, names: str) -> Picture:
+    if option == "--reliability":
+        return draw_reliability(evaluation.calibration, f"{names}: how far likelihoods can be trusted")
+    if option == "--sweep-png":
+        return draw_sweep(evaluation.sweep, f"{names}: thresholds")
+    assert evaluation.confusion is not None
+    return draw_confusion(evaluation.confusion, f"{names}: signs shown and seen")
+
+
+def _write_picture(option: str, path: Path, picture: Picture) -> None:
+    _, data = cv2.imencode(".png", picture)
     try:
         path.write_bytes(data.tobytes())
     except OSError as error:
-        raise EvaluationError(f"--png: cannot write {path}: {error.strerror}") from None
+        raise EvaluationError(f"{option}: cannot write {path}: {error.strerror}") from None

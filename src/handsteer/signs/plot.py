@@ -1,0 +1,117 @@
+"""Small plots, drawn by OpenCV: what a report needs, without another library to install."""
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+Colour = tuple[int, int, int]
+"""Blue, green and red, each 0 to 255."""
+Picture = NDArray[np.uint8]
+
+INK: Colour = (40, 40, 40)
+GRID: Colour = (210, 210, 210)
+BLUE: Colour = (142, 96, 24)
+RED: Colour = (48, 56, 200)
+COLOURS: tuple[Colour, ...] = (BLUE, RED, (60, 140, 40), (30, 150, 230), (150, 60, 150), (120, 120, 120), (160, 160, 0))
+"""Told apart also by most who see colours otherwise; the first for the first line, and so on."""
+
+_FONT = cv2.FONT_HERSHEY_SIMPLEX
+_LEFT, _RIGHT, _TOP, _BOTTOM = 76, 150, 60, 64
+_SIDE = 480
+_TICKS = 5
+
+
+def write(picture: Picture, text: str, origin: tuple[int, int], scale: float, ink: Colour = INK) -> None:
+    """Write ``text`` with its lower left corner at ``origin``."""
+    cv2.putText(picture, text, origin, _FONT, scale, ink, 1, cv2.LINE_AA)
+
+
+def centre(
+    picture: Picture, text: str, middle: tuple[int, int], scale: float, *, ink: Colour = INK, widest: int = 10_000
+) -> None:
+    """Write ``text`` about ``middle``, smaller where it would be wider than ``widest`` pixels."""
+    scale *= min(1.0, widest / text_width(text, scale))
+    (width, height), _ = cv2.getTextSize(text, _FONT, scale, 1)
+    write(picture, text, (middle[0] - width // 2, middle[1] + height // 2), scale, ink)
+
+
+def text_width(text: str, scale: float) -> int:
+    """Return how wide ``text`` is, in pixels."""
+    return max(1, int(cv2.getTextSize(text, _FONT, scale, 1)[0][0]))
+
+
+class Plot:
+    """Axes in percent, with room for a legend at their right.
+
+    Args:
+        title: A line above them.
+        x: What goes to the right.
+        y: What goes upwards.
+        x_range: The shares at the ends of the x axis, 0 to 1.
+        y_range: Likewise, of the y axis.
+
+    Attributes:
+        picture: (height, width, 3) uint8, BGR.
+    """
+
+    def __init__(
+        self,
+        title: str,
+        x: str,
+        y: str,
+        x_range: tuple[float, float] = (0.0, 1.0),
+        y_range: tuple[float, float] = (0.0, 1.0),
+    ) -> None:
+        width = max(_LEFT + _SIDE + _RIGHT, text_width(title, 0.55) + 32)
+        self.picture: Picture = np.full((_TOP + _SIDE + _BOTTOM, width, 3), 255, np.uint8)
+        self._x, self._y = x_range, y_range
+        self._entries = 0
+        write(self.picture, title, (16, 26), 0.55)
+        write(self.picture, y, (16, _TOP - 12), 0.45)
+        centre(self.picture, x, (_LEFT + _SIDE // 2, _TOP + _SIDE + 48), 0.45)
+        for step in range(_TICKS + 1):
+            self._tick(step / _TICKS)
+
+    def at(self, x: float, y: float) -> tuple[int, int]:
+        """Return the pixel of a point."""
+        right = (x - self._x[0]) / (self._x[1] - self._x[0])
+        up = (y - self._y[0]) / (self._y[1] - self._y[0])
+        return _LEFT + round(_SIDE * right), _TOP + round(_SIDE * (1 - up))
+
+    def line(self, points: Sequence[tuple[float, float]], colour: Colour, *, dots: bool = True) -> None:
+        """Draw a line through ``points``, with a dot at each."""
+        pixels = [self.at(*point) for point in points]
+        for begin, end in pairwise(pixels):
+            cv2.line(self.picture, begin, end, colour, 1, cv2.LINE_AA)
+        for pixel in pixels if dots else []:
+            cv2.circle(self.picture, pixel, 3, colour, -1, cv2.LINE_AA)
+
+    def range(self, x: float, low: float, high: float, colour: Colour) -> None:
+        """Draw an error bar from ``low`` to ``high``."""
+        begin, end = self.at(x, low), self.at(x, high)
+        cv2.line(self.picture, begin, end, colour, 1, cv2.LINE_AA)
+        for px, py in (begin, end):
+            cv2.line(self.picture, (px - 4, py), (px + 4, py), colour, 1, cv2.LINE_AA)
+
+    def note(self, text: str, x: float, y: float, colour: Colour = INK) -> None:
+        """Write ``text`` above a point."""
+        px, py = self.at(x, y)
+        centre(self.picture, text, (px, py - 12), 0.36, ink=colour)
+
+    def legend(self, text: str, colour: Colour) -> None:
+        """Add a line to the legend."""
+        y = _TOP + 14 + 22 * self._entries
+        cv2.circle(self.picture, (_LEFT + _SIDE + 18, y), 5, colour, -1, cv2.LINE_AA)
+        write(self.picture, text, (_LEFT + _SIDE + 30, y + 5), 0.42)
+        self._entries += 1
+
+    def _tick(self, part: float) -> None:
+        x, y = (low + part * (high - low) for low, high in (self._x, self._y))
+        (across, bottom), (left, up) = self.at(x, self._y[0]), self.at(self._x[0], y)
+        cv2.line(self.picture, (across, bottom), (across, _TOP), GRID, 1)
+        cv2.line(self.picture, (left, up), (left + _SIDE, up), GRID, 1)
+        centre(self.picture, f"{100 * x:.3g}%", (across, bottom + 18), 0.42)
+        centre(self.picture, f"{100 * y:.3g}%", (left - 32, up), 0.42)

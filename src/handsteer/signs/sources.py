@@ -1,0 +1,143 @@
+"""What signs are evaluated on: folders of labelled photos, datasets of landmarks, videos."""
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from handsteer.cameras.files import PHOTO_SUFFIXES, video_frames
+from handsteer.errors import EvaluationError
+from handsteer.signs.evaluate import evaluate_frames, evaluate_photos, evaluate_takes, lacks_depth
+from handsteer.signs.figures import PhotoResult
+from handsteer.signs.labelled import LabelledPhoto, read_photo_labels, read_video_labels
+from handsteer.signs.protocol import Classifier
+from handsteer.signs.recognizer import Recognizer
+from handsteer.signs.teaching.dataset import Dataset, load_dataset
+from handsteer.signs.video_figures import FrameVerdict
+from handsteer.signs.views import View
+from handsteer.signs.vocabulary import NONE
+
+Watch = Callable[[Iterable[Any], str], Iterable[Any]]
+"""Passes on what it is given, a unit of what; and may show how far it is."""
+
+
+@dataclass(frozen=True)
+class PhotoRun:
+    """What was seen in the photos of a folder, or in the hands of a dataset.
+
+    Attributes:
+        source: The folder or file.
+        view: How it was looked at.
+        results: What was seen in each that is scored.
+        unscored: How many were left out.
+        without_depth: How many hands were left out for want of depth.
+    """
+
+    source: str
+    view: View
+    results: tuple[PhotoResult, ...]
+    unscored: int
+    without_depth: int = 0
+
+
+@dataclass(frozen=True)
+class VideoRun:
+    """What was seen in the frames of a video."""
+
+    source: str
+    view: View
+    frames: tuple[FrameVerdict, ...]
+
+
+@dataclass(frozen=True)
+class LabelledFolder:
+    """A folder of photos whose signs are known."""
+
+    path: Path
+    photos: tuple[LabelledPhoto, ...]
+
+    def run(self, recognizer: Recognizer, view: View, watch: Watch) -> PhotoRun:
+        """Return what ``recognizer`` sees in the photos when they are looked at as ``view`` does.
+
+        Raises:
+            CameraUnreadable: A photo cannot be decoded.
+        """
+        results = tuple(evaluate_photos(watch(self.photos, "photos"), recognizer, view))
+        return PhotoRun(str(self.path), view, results, len(self.photos) - len(results))
+
+
+@dataclass(frozen=True)
+class LabelledHands:
+    """A dataset of landmarks whose signs are all known."""
+
+    path: Path
+    dataset: Dataset
+
+    def run(self, classifier: Classifier, min_confidence: float, view: View, watch: Watch) -> PhotoRun:
+        """Return what ``classifier`` tells of the hands when they are looked at as ``view`` does."""
+        hands = [(take.label, hand) for take in self.dataset.takes for hand in take.hands]
+        without_depth = sum(lacks_depth(hand, label, classifier) for label, hand in hands)
+        results = tuple(watch(evaluate_takes(self.dataset, classifier, min_confidence, view), "hands"))
+        unscored = len(hands) - len(results) - without_depth
+        return PhotoRun(str(self.path), view, results, unscored, without_depth)
+
+
+@dataclass(frozen=True)
+class LabelledVideo:
+    """A video, and the sign of each frame where it is known; None where nothing is."""
+
+    path: Path
+    truths: dict[int, str] | None
+
+    def run(self, recognizer: Recognizer, view: View, watch: Watch) -> VideoRun:
+        """Return what ``recognizer`` sees in the frames when they are looked at as ``view`` does.
+
+        Raises:
+            CameraUnreadable: It is not a video that can be decoded.
+            LabelError: There are labels for more frames than there are.
+        """
+        frames = watch(video_frames(self.path), "frames")
+        return VideoRun(str(self.path), view, tuple(evaluate_frames(frames, self.truths, recognizer, view)))
+
+
+Source = LabelledFolder | LabelledHands | LabelledVideo
+
+
+def open_source(path: Path, classifier: Classifier) -> Source:
+    """Return what is at ``path``, with its labels: a folder, a dataset (``.npz``), or else a video.
+
+    Raises:
+        EvaluationError: There is nothing, its labels are wrong or name signs that ``classifier`` doesn't know, or
+            nothing in it can be scored.
+        CameraUnreadable: It is not a video that can be decoded.
+        DatasetError: It is not a dataset that can be read.
+    """
+    if path.suffix.lower() == ".npz":
+        return _open_dataset(path, classifier)
+    if not path.is_file():
+        return LabelledFolder(path, tuple(read_photo_labels(path, classifier.signs)))
+    if path.suffix.lower() in PHOTO_SUFFIXES:
+        raise EvaluationError(f"{path} is a photo: give the folder of labelled photos that it is in, or a video")
+    next(video_frames(path))  # now rather than when others have been looked at for an hour
+    return LabelledVideo(path, read_video_labels(path, classifier.signs))
+
+
+def _open_dataset(path: Path, classifier: Classifier) -> LabelledHands:
+    dataset = load_dataset(path)
+    known = (*classifier.signs, NONE)
+    unknown = [label for label in dataset.labels if label not in known]
+    if unknown:
+        raise EvaluationError(
+            f"{path}: the sign {unknown[0]!r} is not known; the signs are {', '.join(known)}: "
+            "name a model that knows it by --signs.model"
+        )
+    hands = [(take.label, hand) for take in dataset.takes for hand in take.hands]
+    if not hands:
+        raise EvaluationError(f"{path}: there is no hand in it")
+    if all(lacks_depth(hand, label, classifier) for label, hand in hands):
+        raise EvaluationError(
+            f"{path}: none of its {len(hands)} hands has depth, and without it {', '.join(dataset.labels)} cannot be "
+            "told: give hands of `handsteer signs collect`, or photos; only signs that were taught from rows without "
+            "depth are told from such rows (--signs.model)"
+        )
+    return LabelledHands(path, dataset)
