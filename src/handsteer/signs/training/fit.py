@@ -5,6 +5,7 @@ Each folder has an ``index.csv`` (docs/signs-evaluate.md). Only photos of the pa
 """
 
 import csv
+import itertools
 import sys
 from collections import defaultdict
 from collections.abc import Iterator
@@ -17,11 +18,23 @@ from tqdm import tqdm
 
 from handsteer.cameras.files import read_photo
 from handsteer.config import LandmarksConfig
-from handsteer.hand.kinematics import Array
+from handsteer.hand import poses
+from handsteer.hand.backgrounds import make_background
+from handsteer.hand.kinematics import ANGLES, Array, angles_of, clamp, pose_skeleton
+from handsteer.hand.placement import Pinhole, Placement, orientation
+from handsteer.hand.renderer import SKINS, Look, render
 from handsteer.landmarks.mediapipe import MediaPipeLandmarker
 from handsteer.landmarks.protocol import Hand
 from handsteer.signs.labelled import INDEX
-from handsteer.signs.training.people import COORDINATES, FILE, LEAST_HANDS, Distribution, save_people, to_canonical
+from handsteer.signs.training.people import (
+    COORDINATES,
+    FILE,
+    LEAST_HANDS,
+    REST,
+    Distribution,
+    save_people,
+    to_canonical,
+)
 from handsteer.signs.training.split import part_of
 from handsteer.signs.training.truth import FIST, OPEN, OTHER, SHAPES, THUMB
 from handsteer.signs.training.truth import INDEX as POINTING
@@ -31,12 +44,25 @@ from handsteer.signs.vocabulary import NONE
 _SHAPES: Final = {"Stop": OPEN, "Forward": POINTING, "Go": FIST, "Turn Right": THUMB, "Turn Left": THUMB}
 _KINDS: Final = {
     **dict.fromkeys(("like", "dislike", "thumb_up", "thumb_down"), THUMB),
-    **dict.fromkeys(("none", "hand_no_sign", "person_no_hand_sign"), "rest"),
+    **dict.fromkeys(("none", "hand_no_sign", "person_no_hand_sign"), REST),
     **dict.fromkeys(("rock", "horns"), "horns"),
     **dict.fromkeys(("three", "four", "other_digits"), "digits"),
 }
 """Kinds of photos without a sign that are one kind of hand; others are kinds of their own."""
-_CLUSTERS: Final = {"rest": 8, THUMB: 6, "digits": 4}
+_SIZE: Final = (640, 480)
+_SIDES: Final = 8
+_DRAWN: Final = 45
+_END_ON: Final = 0.85
+_ALONG: Final = angles_of(thumb_spread=20.0, thumb_opposition=14.0, thumb_mcp=6.0, thumb_ip=10.0)
+_POSES: Final = (
+    (OPEN, poses.OPEN),
+    (POINTING, poses.INDEX),
+    (THUMB, poses.THUMB),
+    (FIST, poses.FIST),
+    (FIST, np.where(np.isin(np.arange(len(ANGLES)), range(2, 7)), _ALONG, poses.FIST)),
+)
+"""Shapes of the virtual hand: a fist with its thumb over the fingers, and one with it along them."""
+_CLUSTERS: Final = {REST: 8, THUMB: 6, "digits": 4}
 _DIRECTIONS: Final = 12
 _RAISED: Final = 0.6
 """Of several hands the highest is the one that shows something, if it is not smaller than this share of the largest."""
@@ -49,6 +75,8 @@ def main() -> None:
         for kind, coordinates in seen_hands(folder):
             hands[kind].append(coordinates)
     fitted = [each for kind in sorted(hands) for each in fit(kind, np.array(hands[kind]))]
+    for shape, drawn in drawn_hands():
+        fitted += [_normal("drawn", SHAPES.index(shape), drawn)]
     save_people(tuple(fitted), FILE)
 
 
@@ -63,12 +91,46 @@ def seen_hands(folder: Path) -> Iterator[tuple[str, Array]]:
         landmarker.reset()
         hands = landmarker.detect(View().picture(read_photo(folder / row["path"])))
         if hands:
-            hand = _raised(hands)
             kind = _KINDS.get(row["kind"], row["kind"]) if row["sign"] == NONE else _SHAPES[row["sign"]]
-            yield (
-                kind,
-                to_canonical(hand.pixels[None, :, :2].astype(np.float64), hand.world[None].astype(np.float64))[0],
-            )
+            yield kind, _coordinates(_raised(hands))
+
+
+def drawn_hands() -> Iterator[tuple[str, Array]]:
+    """Yield shape and (n, 105) canonical coordinates of virtual hands, seen from one side after another.
+
+    Nobody shows a camera all sides of a fist; what the landmark model makes of them is seen on drawn ones.
+    """
+    random = np.random.default_rng(0)
+    landmarker = MediaPipeLandmarker(LandmarksConfig())
+    camera = Pinhole.webcam(*_SIZE)
+    backgrounds = [make_background(kind, *_SIZE, seed) for seed, kind in enumerate(("plain", "cluttered"))]
+    for (shape, angles), side in tqdm(list(itertools.product(_POSES, range(_SIDES))), desc="drawn", disable=None):
+        seen = []
+        for number in range(_DRAWN):
+            yaw = (side + random.uniform(-0.5, 0.5)) * 2 * np.pi / _SIDES
+            turn = orientation(yaw=yaw, pitch=random.normal(0, 0.45), roll=random.normal(0, 0.3))
+            joints = clamp(angles + random.normal(0, 0.07) + random.normal(0, 0.09, len(angles)))
+            skeleton, placement = pose_skeleton(joints), Placement(turn, np.array([0.0, 0.0, random.uniform(0.4, 0.9)]))
+            look = Look(skin=list(SKINS)[number % len(SKINS)], sleeve=number % 2 == 0)
+            landmarker.reset()
+            hands = landmarker.detect(render(skeleton, placement, camera, look, backgrounds[number % 4 // 2]))
+            pointing = placement.apply(skeleton.joints[0])
+            if hands and (shape == FIST or _is_aslant(pointing, shape)):
+                seen.append(_coordinates(_raised(hands)))
+        if len(seen) >= LEAST_HANDS:
+            yield shape, np.array(seen)
+
+
+def _is_aslant(joints: Array, shape: str) -> bool:
+    """Return whether what (21, 3) joints of a shape point with is seen from the side, rather than end on."""
+    start, end = {THUMB: (2, 4), POINTING: (5, 8), OPEN: (9, 12)}[shape]
+    pointing = joints[end] - joints[start]
+    return bool(abs(pointing[2]) <= _END_ON * np.linalg.norm(pointing))
+
+
+def _coordinates(hand: Hand) -> Array:
+    row: Array = to_canonical(hand.pixels[None, :, :2].astype(np.float64), hand.world[None].astype(np.float64))[0]
+    return row
 
 
 def _raised(hands: list[Hand]) -> Hand:

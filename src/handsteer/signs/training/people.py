@@ -19,17 +19,22 @@ from handsteer.errors import ModelCorrupt, ModelMissing
 from handsteer.hand.kinematics import Array, turn_x, turn_y
 from handsteer.signs.features import INDEX_BASE, KNUCKLES, LITTLE_BASE, WRIST
 from handsteer.signs.npz import Arrays, NpzFormat
-from handsteer.signs.training.truth import SHAPES
+from handsteer.signs.training.truth import FIST, SHAPES, THUMB
 
 Random = np.random.Generator
 
 LEAST_HANDS: Final = 30
+REST: Final = "rest"
+"""The kind of hands that show nothing: they hang, rest or hold something."""
 COORDINATES: Final = 21 * 2 + 21 * 3
 FILE: Final = Path(__file__).parent / "people.npz"
 """The statistics that are shipped; :mod:`handsteer.signs.training.fit` makes them."""
 
 _WIDER: Final = 1.2
 """Times the measured spread: strangers differ more from these people than these do among themselves."""
+_CHOICES: Final = 24
+_THUMB: Final = slice(1, 5)
+_PALM: Final = [5, 9, 13, 17]
 _TURNED_RAD: Final = np.radians(18.0)
 """Standard deviation by which half of the hands are seen from further aside, above or below, radians."""
 
@@ -78,14 +83,36 @@ def draw_people(count: int, random: Random, people: tuple[Distribution, ...]) ->
     """
     kinds = sorted({each.kind for each in people})
     totals = {kind: sum(each.hands for each in people if each.kind == kind) for kind in kinds}
-    drawn, shapes = [], []
+    hands: dict[str, list[Array]] = {kind: [] for kind in kinds}
+    shapes: dict[str, list[NDArray[np.int64]]] = {kind: [] for kind in kinds}
     for each in people:
         part = each.draw(round(count / len(kinds) * each.hands / totals[each.kind]), random)
-        drawn.append(part)
-        shapes.append(np.full(len(part), each.shape))
-    image, space = from_canonical(np.concatenate(drawn))
-    image, space = _seen_from_elsewhere(image, space, random)
-    return image, space, np.concatenate(shapes)
+        hands[each.kind].append(part)
+        shapes[each.kind].append(np.full(len(part), each.shape))
+    drawn = [np.concatenate(hands[kind]) for kind in kinds]
+    named = [np.concatenate(shapes[kind]) for kind in kinds]
+    by_kind = dict(zip(kinds, drawn, strict=True))
+    drawn.append(_closed_like(by_kind[THUMB][::2], np.concatenate([by_kind[FIST], by_kind[REST]]), random))
+    named.append(np.full(len(drawn[-1]), SHAPES.index(FIST)))
+    image, space = _seen_from_elsewhere(*from_canonical(np.concatenate(drawn)), random)
+    return image, space, np.concatenate(named)
+
+
+def _closed_like(hands: Array, others: Array, random: Random) -> Array:
+    """Return (n, 105) hands with their thumb out as fists: each with the thumb of that of ``others`` held most like it.
+
+    People show a camera their fists from the front; the backs and sides of closed fingers are seen on hands with the
+    thumb out, and thumbs along the fingers on the backs of hands at rest.
+    """
+    image, space = (points.copy() for points in from_canonical(hands))
+    choices = random.integers(0, len(others), (len(hands), _CHOICES))
+    other_image, other_space = from_canonical(others)
+    palm, other_palm = space[:, _PALM] - space[:, [WRIST]], other_space[:, _PALM] - other_space[:, [WRIST]]
+    unlike = ((other_palm[choices] - palm[:, None]) ** 2).sum(axis=(2, 3))
+    chosen = choices[np.arange(len(hands)), unlike.argmin(axis=1)]
+    for points, theirs in ((image, other_image[chosen]), (space, other_space[chosen])):
+        points[:, _THUMB] = points[:, [WRIST]] + theirs[:, _THUMB] - theirs[:, [WRIST]]
+    return np.concatenate([image.reshape(len(hands), -1), space.reshape(len(hands), -1)], axis=1)
 
 
 def to_canonical(pixels: Array, world: Array) -> Array:
