@@ -8,8 +8,8 @@ from handsteer.landmarks.recorded import RecordedLandmarker
 from handsteer.signs.model import load_model
 from handsteer.signs.recognizer import Recognizer
 from handsteer.signs.trained import TrainedClassifier
-from handsteer.signs.vocabulary import FORWARD, NONE, SIGNS
-from tests.signs.hands import show_fingers, show_sign
+from handsteer.signs.vocabulary import FORWARD, NONE, SIGNS, STOP
+from tests.signs.hands import moved, show_fingers, show_sign
 
 IMAGE = np.zeros((480, 640, 3), np.uint8)
 HAND = show_sign(FORWARD)
@@ -50,6 +50,29 @@ def test_a_broken_frame_raises(image: np.ndarray) -> None:
     stream = Recognizer(MediaPipeLandmarker(LandmarksConfig()), CLASSIFIER, SignsConfig())
     with pytest.raises(FrameError):
         stream.step(image, 0.0)
+
+
+def test_a_sign_that_passes_by_does_not_count_until_the_hand_is_held_still() -> None:
+    passing = [moved(HAND, x_px=-150.0 + 25.0 * frame) for frame in range(12)]
+    stream = Recognizer(
+        RecordedLandmarker([[hand] for hand in [*passing, *[passing[-1]] * 8]]), CLASSIFIER, SignsConfig()
+    )
+    steps = [stream.step(IMAGE, 1 / 30) for _ in range(20)]
+    assert all(step.seen == FORWARD for step in steps)
+    assert [step.sign for step in steps[:12]] == [NONE] * 12
+    assert steps[-1].sign == FORWARD
+
+
+def test_stop_counts_at_its_first_frame_however_the_hand_moves() -> None:
+    hands = [moved(show_sign(STOP), x_px=-150.0 + 40.0 * frame) for frame in range(3)]
+    stream = Recognizer(RecordedLandmarker([[hand] for hand in hands]), CLASSIFIER, SignsConfig())
+    assert stream.step(IMAGE, 1 / 30).sign == STOP
+
+
+def test_a_sign_that_counts_goes_on_while_the_hand_moves() -> None:
+    hands = [HAND] * 6 + [moved(HAND, x_px=25.0 * frame) for frame in range(8)]
+    stream = Recognizer(RecordedLandmarker([[hand] for hand in hands]), CLASSIFIER, SignsConfig())
+    assert [stream.step(IMAGE, 1 / 30).sign for _ in range(14)][4:] == [FORWARD] * 10
 
 
 def test_the_likelihoods_are_there_whether_they_suffice_or_not() -> None:

@@ -6,11 +6,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from handsteer.hand.kinematics import angles_of
+from handsteer.hand.poses import FIST, HandPose, View
 from handsteer.landmarks.protocol import Hand, Handedness
 from handsteer.signs.model import load_model
 from handsteer.signs.trained import TrainedClassifier
-from handsteer.signs.vocabulary import FORWARD, GO, NONE, SIGNS, STOP, TURN_LEFT, TURN_RIGHT
-from tests.signs.hands import SIZE, hand_of, show_fingers, show_sign
+from handsteer.signs.vocabulary import FORWARD, GO, MOTION_SIGNS, NONE, SIGNS, STOP, TURN_LEFT, TURN_RIGHT
+from tests.signs.hands import SIZE, hand_of, moved, show_fingers, show_pose, show_sign
 
 CLASSIFIER = TrainedClassifier(load_model())
 THUMB_OUT = {"spread": 56.0, "opposition": 12.0}
@@ -64,6 +66,39 @@ OTHERS = {
 @pytest.mark.parametrize("name", OTHERS)
 def test_other_hands_are_none(name: str) -> None:
     assert sure_sign(OTHERS[name]) == NONE
+
+
+@pytest.mark.parametrize("view", ["front", "back", "side", "other side", "from below"])
+@pytest.mark.parametrize("thumb", ["over the fingers", "along them"])
+def test_fists_from_all_sides_never_turn_the_robot(view: str, thumb: str) -> None:
+    yaw = {"back": math.pi, "side": math.pi / 2, "other side": -math.pi / 2}.get(view, 0.2)
+    pitch = -0.7 if view == "from below" else 0.0
+    along = {"spread": 18.0, "opposition": 14.0, "mcp": 6.0, "ip": 10.0}
+    angles = angles_of(**{f"thumb_{joint}": angle for joint, angle in along.items()})
+    angles[7:] = FIST[7:]
+    pose = HandPose(FIST if thumb == "over the fingers" else angles, View(yaw=yaw, pitch=pitch))
+    assert sure_sign(show_pose(pose)) in (GO, NONE)
+
+
+@pytest.mark.parametrize("tilt", [-15, 0, 15])
+@pytest.mark.parametrize("up", [True, False])
+def test_a_thumb_up_or_down_is_no_turn_when_it_is_tilted(tilt: float, up: bool) -> None:
+    # A thumb stretched out like this one points up when the hand is rolled by -65 degrees.
+    roll = math.radians((-65 if up else 115) + tilt)
+    assert sure_sign(show_fingers(thumb=THUMB_OUT, roll=roll)) == NONE
+
+
+def test_a_hand_at_the_edge_of_the_frame_is_less_sure() -> None:
+    hand = show_sign(STOP)
+    cut = moved(hand, x_px=SIZE[0] / 2)
+    assert CLASSIFIER.classify(cut).likelihoods[STOP] < 0.7 * CLASSIFIER.classify(hand).likelihoods[STOP]
+
+
+def test_a_motion_must_be_likelier_than_go_and_stop_to_be_as_sure() -> None:
+    assert CLASSIFIER.confidence(GO, 0.6) > 0.8
+    assert CLASSIFIER.confidence(STOP, 0.6) > 0.8
+    assert all(CLASSIFIER.confidence(sign, 0.6) < 0.8 for sign in MOTION_SIGNS)
+    assert all(CLASSIFIER.confidence(sign, 1.0) == 1.0 for sign in SIGNS)
 
 
 @pytest.mark.parametrize("sign", SIGNS)

@@ -17,19 +17,23 @@ _DOUBT: Final = 1.5
 _POINTING: Final = 52.0
 """How far off its axis an index finger may point, degrees: people tilt their hands by up to 30, and their fingers in
 their hands."""
-_SIDEWAYS: Final = 47.0
+_SIDEWAYS: Final = 49.0
 """How far off the horizontal a thumb may point, degrees: half of what is between a turn and a thumb up."""
 _UPRIGHT: Final = 55.0
 """How far from upwards an open hand may point: others hang, or rest."""
 _RAISED: Final = 120.0
 """How far from upwards a fist may point, likewise."""
+_HANGING: Final = 145.0
+"""How far from upwards the palms of hands point that hang down: of people who do nothing, 156 to 178 degrees."""
+_HANGING_TRUST: Final = 0.82
+"""What a thumb of a hand that hangs is worth: it may lie beside the fingers, and look as if it pointed to a side."""
 
 _SMALL_PX: Final = 17.0
 _SMALL_DOUBT_PX: Final = 4.0
 """Longer side at which a hand is read half as surely, pixels, and the width of that: at 35 pixels a hundredth is
 missing, and a fist 3 m from a webcam of 640x480 has some 17."""
 
-_THRESHOLDS: Final = {STOP: 0.5, GO: 0.5, FORWARD: 0.7, BACKWARD: 0.8, TURN_LEFT: 0.7, TURN_RIGHT: 0.7}
+_THRESHOLDS: Final = {STOP: 0.5, GO: 0.5, FORWARD: 0.8, BACKWARD: 0.85, TURN_LEFT: 0.7, TURN_RIGHT: 0.7}
 """Likelihood from which each sign is sure enough; docs/signs.md has the false rates that they were chosen for."""
 SURE: Final = 0.8
 """The confidence of a sign whose likelihood is just at its threshold."""
@@ -91,14 +95,16 @@ def legibility(hand: Hand) -> float:
 def _signs(shapes: dict[str, float], pixels: NDArray[np.float64]) -> dict[str, float]:
     """Return how likely each sign is, given the shapes' likelihoods and (1, 21, 2) landmarks."""
     index, thumb, palm = (vectors[0] for vectors in directions(pixels))
+    hangs = 1.0 - _within(_HANGING, _from_up(palm))
+    sideways = shapes.get("thumb", 0.0) * (1.0 - (1.0 - _HANGING_TRUST) * hangs)
     return {
         STOP: shapes.get("open", 0.0) * _within(_UPRIGHT, _from_up(palm)),
         GO: shapes.get("fist", 0.0) * _within(_RAISED, _from_up(palm)),
         FORWARD: shapes.get("index", 0.0) * _within(_POINTING, _from_up(index)),
         BACKWARD: shapes.get("index", 0.0) * _within(_POINTING, 180.0 - _from_up(index)),
         # The frame is not mirrored: the user's own right is the left of the image.
-        TURN_LEFT: shapes.get("thumb", 0.0) * _within(_SIDEWAYS, _from_right(thumb)),
-        TURN_RIGHT: shapes.get("thumb", 0.0) * _within(_SIDEWAYS, 180.0 - _from_right(thumb)),
+        TURN_LEFT: sideways * _within(_SIDEWAYS, _from_right(thumb)),
+        TURN_RIGHT: sideways * _within(_SIDEWAYS, 180.0 - _from_right(thumb)),
     }
 
 

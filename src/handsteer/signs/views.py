@@ -24,7 +24,9 @@ _DIRECTIONS: dict[tuple[str, str], tuple[str, float]] = {
     (TURN_LEFT, ""): ("thumb", 90.0),
     (TURN_RIGHT, ""): ("thumb", 270.0),
     (NONE, "thumb_up"): ("thumb", 0.0),
+    (NONE, "like"): ("thumb", 0.0),
     (NONE, "thumb_down"): ("thumb", 180.0),
+    (NONE, "dislike"): ("thumb", 180.0),
     (NONE, "index_to_image_right"): ("index", 90.0),
     (NONE, "index_to_image_left"): ("index", 270.0),
 }

@@ -35,7 +35,7 @@ from handsteer.signs.training.people import (
     save_people,
     to_canonical,
 )
-from handsteer.signs.training.split import part_of
+from handsteer.signs.training.split import Part, part_of
 from handsteer.signs.training.truth import FIST, OPEN, OTHER, SHAPES, THUMB
 from handsteer.signs.training.truth import INDEX as POINTING
 from handsteer.signs.views import View
@@ -80,13 +80,13 @@ def main() -> None:
     save_people(tuple(fitted), FILE)
 
 
-def seen_hands(folder: Path) -> Iterator[tuple[str, Array]]:
-    """Yield the kind and the (105,) canonical coordinates of the hand in each photo of ``folder`` to tune on."""
+def seen_hands(folder: Path, part: Part = "tune") -> Iterator[tuple[str, Array]]:
+    """Yield the kind and the (105,) canonical coordinates of the hand in each photo of a part of ``folder``."""
     landmarker = MediaPipeLandmarker(LandmarksConfig())
     with (folder / INDEX).open(encoding="utf-8") as file:
         rows = [row for row in csv.DictReader(file) if row["sign"]]
     for row in tqdm(rows, desc=folder.name, disable=None):
-        if part_of(row["path"], row["person_set"]) != "tune":
+        if part_of(row["path"], row["person_set"]) != part:
             continue
         landmarker.reset()
         hands = landmarker.detect(View().picture(read_photo(folder / row["path"])))
