@@ -15,11 +15,11 @@ from handsteer.cli.signs.tables import photo_tables, video_tables
 from handsteer.config import Config
 from handsteer.control.actions import motion_signs
 from handsteer.errors import EvaluationError
-from handsteer.graph import open_classifier, open_recognizer
 from handsteer.signs.confusion_picture import draw_confusion
 from handsteer.signs.evaluate import evaluate_frames, evaluate_photos, evaluate_takes
 from handsteer.signs.figures import Confusion, PhotoReport, photo_report
 from handsteer.signs.labelled import labels_of, read_photo_labels, read_video_labels
+from handsteer.signs.opening import open_classifier, open_recognizer
 from handsteer.signs.teaching.dataset import load_dataset
 from handsteer.signs.video_figures import VideoReport, video_report
 from handsteer.signs.views import View
