@@ -57,6 +57,4 @@ def _draw_label(picture: NDArray[np.uint8], recognition: Recognition) -> None:
     origin = (round(16 * scale), round(40 * scale))
     # To smooth the outline would take as long as all the rest of the drawing, and hardly shows.
     for ink, thickness, line in (((0, 0, 0), 5, cv2.LINE_8), (colour, 2, cv2.LINE_AA)):
-        cv2.putText(
-            picture, text, origin, cv2.FONT_HERSHEY_SIMPLEX, scale, ink, max(1, round(thickness * scale)), line
-        )
+        cv2.putText(picture, text, origin, cv2.FONT_HERSHEY_SIMPLEX, scale, ink, max(1, round(thickness * scale)), line)
