@@ -35,6 +35,8 @@ def test_photos_and_videos_are_recognised_without_messages_or_robots() -> None:
     assert not packages & {"mujoco", "nicegui", "rosbags", "xacro"}
 
 
-def test_the_graph_loads_no_libraries_of_robots_that_other_processes_have() -> None:
-    packages = {name.partition(".")[0] for name in loaded_by("import handsteer.cli.nodes\n")}
+def test_a_node_loads_nothing_of_cameras_and_robots_that_other_processes_have() -> None:
+    modules = loaded_by("import handsteer.cli.nodes\n")
+    packages = {name.partition(".")[0] for name in modules}
     assert not packages & {"mujoco", "nicegui", "rospy", "xacro"}
+    assert "handsteer.hand" not in modules
