@@ -91,6 +91,7 @@ lock:
 	@PATH="$(BIN):$$PATH" $(COMPILE) pyproject.toml --group setup --output-file requirements.txt
 	@PATH="$(BIN):$$PATH" $(COMPILE) pyproject.toml --group setup --group dev --output-file requirements-dev.txt
 	@PATH="$(BIN):$$PATH" $(COMPILE) --group pyproject.toml:ros2 --output-file requirements-ros2.txt
+	@echo "mediapipe==0.10.21" | PATH="$(BIN):$$PATH" $(COMPILE) - --output-file benchmarks/tutorial-requirements.txt
 
 clean:
 	@rm -rf $(VENV) .mypy_cache .pytest_cache .ruff_cache .hypothesis

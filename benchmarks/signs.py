@@ -16,11 +16,11 @@ from pathlib import Path
 import cv2
 
 from handsteer.config import Config
-from handsteer.graph import open_recognizer
 from handsteer.signs.evaluate import evaluate_photos
 from handsteer.signs.figures import PhotoResult
 from handsteer.signs.intervals import Share
 from handsteer.signs.labelled import LabelledPhoto, read_photo_labels
+from handsteer.signs.opening import open_recognizer
 from handsteer.signs.training.split import part_of
 from handsteer.signs.views import View
 from handsteer.signs.vocabulary import FORWARD, MOTION_SIGNS, NONE, SIGNS, TURN_LEFT, TURN_RIGHT

@@ -15,7 +15,8 @@ import numpy as np
 
 from handsteer.config import SignsConfig, load
 from handsteer.dashboard.teaching.teaching import Teaching
-from handsteer.graph import Graph, open_classifier
+from handsteer.graph import Graph
+from handsteer.signs.opening import open_classifier
 from handsteer.signs.teaching.dataset import Dataset
 from handsteer.signs.teaching.train import train_signs
 

@@ -10,7 +10,7 @@ from handsteer.cameras.files import read_photo
 from handsteer.cameras.virtual import VirtualHandCamera
 from handsteer.clock import SteppedClock
 from handsteer.config import Config, VirtualHandConfig
-from handsteer.graph import open_recognizer
+from handsteer.signs.opening import open_recognizer
 
 
 def main() -> None:

@@ -6,12 +6,12 @@ import cv2
 import numpy as np
 
 from handsteer.config import Config
-from handsteer.graph import open_recognizer
 from handsteer.hand.backgrounds import make_background
 from handsteer.hand.kinematics import angles_of, pose_skeleton
 from handsteer.hand.placement import Pinhole
 from handsteer.hand.poses import HandPose, View, sign_pose
 from handsteer.hand.renderer import Look, render
+from handsteer.signs.opening import open_recognizer
 from handsteer.signs.vocabulary import NONE, SIGNS
 
 FOLDER = Path(__file__).resolve().parents[1] / "docs" / "pictures"

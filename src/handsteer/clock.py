@@ -8,9 +8,10 @@ import math
 import threading
 import time
 from collections.abc import Callable
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
-from handsteer.messages import Time
+if TYPE_CHECKING:
+    from handsteer.messages import Time
 
 _NS_PER_S = 1_000_000_000
 _LOOK_AGAIN_S = 0.005
@@ -25,11 +26,11 @@ class Clock(Protocol):
         """Return the time in seconds since an arbitrary, fixed moment; it never goes back."""
         ...
 
-    def stamp(self, time_s: float) -> Time:
+    def stamp(self, time_s: float) -> "Time":
         """Return the header stamp for ``time_s``, a time that :meth:`now` returned."""
         ...
 
-    def time_of(self, stamp: Time) -> float:
+    def time_of(self, stamp: "Time") -> float:
         """Return the time in seconds, as :meth:`now` tells it, that a header stamp stands for."""
         ...
 
@@ -54,11 +55,11 @@ class RealClock:
         """Return ``time.monotonic()`` in seconds."""
         return time.monotonic()
 
-    def stamp(self, time_s: float) -> Time:
+    def stamp(self, time_s: float) -> "Time":
         """Return Unix time for the monotonic ``time_s``."""
         return to_stamp(time_s + self._offset_s())
 
-    def time_of(self, stamp: Time) -> float:
+    def time_of(self, stamp: "Time") -> float:
         """Return the monotonic time for the Unix time ``stamp``."""
         return to_seconds(stamp) - self._offset_s()
 
@@ -90,11 +91,11 @@ class SteppedClock:
         """Return the time in seconds that the clock was last set to."""
         return self._now_s
 
-    def stamp(self, time_s: float) -> Time:
+    def stamp(self, time_s: float) -> "Time":
         """Return ``time_s`` as a stamp."""
         return to_stamp(time_s)
 
-    def time_of(self, stamp: Time) -> float:
+    def time_of(self, stamp: "Time") -> float:
         """Return ``stamp`` in seconds."""
         return to_seconds(stamp)
 
@@ -153,12 +154,12 @@ class SimulatedClock:
         with self._lock:
             return self._now()
 
-    def stamp(self, time_s: float) -> Time:
+    def stamp(self, time_s: float) -> "Time":
         """Return the simulator's time for ``time_s``; never one that the simulator has not reached yet."""
         with self._lock:
             return to_stamp(max(0.0, min(time_s - self._offset_s, self._told_s)))
 
-    def time_of(self, stamp: Time) -> float:
+    def time_of(self, stamp: "Time") -> float:
         """Return the time in seconds that the simulator's time ``stamp`` stands for."""
         seconds = to_seconds(stamp)
         with self._lock:
@@ -175,12 +176,15 @@ class SimulatedClock:
         return self._newest_s
 
 
-def to_stamp(seconds: float) -> Time:
+def to_stamp(seconds: float) -> "Time":
     """Return ``seconds`` (>= 0) as a ROS time, rounded to a nanosecond."""
+    # Whoever reads a video needs a clock and no messages, which take longer to load than all of OpenCV.
+    from handsteer.messages import Time  # noqa: PLC0415
+
     nanoseconds = round(seconds * _NS_PER_S)
     return Time(sec=nanoseconds // _NS_PER_S, nanosec=nanoseconds % _NS_PER_S)
 
 
-def to_seconds(stamp: Time) -> float:
+def to_seconds(stamp: "Time") -> float:
     """Return a ROS time in seconds."""
     return stamp.sec + stamp.nanosec / _NS_PER_S

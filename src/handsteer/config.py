@@ -9,13 +9,11 @@ import re
 from pathlib import Path
 from typing import Any, ClassVar, Literal, TypeVar
 
-import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
 
 from handsteer.control.actions import ALWAYS_STOP, BUILT_IN, Action
 from handsteer.errors import ConfigError
-from handsteer.messages import CmdVelType
-from handsteer.presets import Preset, preset
+from handsteer.presets import CmdVelType, Preset, preset
 from handsteer.signs.vocabulary import find_sign
 
 S = TypeVar("S", bound="Section")
@@ -342,6 +340,9 @@ def _preset(values: dict[str, Any]) -> dict[str, Any]:
 
 
 def _read_yaml(path: Path) -> dict[str, Any]:
+    # Whoever has no file, such as a program that only recognises signs, need not load it.
+    import yaml  # noqa: PLC0415
+
     try:
         values = yaml.safe_load(path.read_text(encoding="utf-8"))
     except OSError as error:

@@ -20,10 +20,8 @@ from handsteer.cameras.browser import BrowserCamera, ChoiceOfCameras, NoCamera
 from handsteer.cameras.choose import open_camera
 from handsteer.cameras.protocol import Camera
 from handsteer.clock import Clock, RealClock, SimulatedClock, SteppedClock, WallClock
-from handsteer.config import Config, SignsConfig, cmd_vel_type
+from handsteer.config import Config, cmd_vel_type
 from handsteer.errors import ConfigError
-from handsteer.landmarks.mediapipe import MediaPipeLandmarker
-from handsteer.landmarks.protocol import Landmarker
 from handsteer.messages import Topic, cmd_vel
 from handsteer.nodes.camera import CameraNode
 from handsteer.nodes.control import HandSignControlNode
@@ -35,11 +33,7 @@ from handsteer.robots import open_robot
 from handsteer.robots.course import CourseState
 from handsteer.robots.protocol import Pose2D
 from handsteer.signs.drawing import annotate
-from handsteer.signs.model import load_model
-from handsteer.signs.protocol import Classifier
-from handsteer.signs.recognizer import Recognizer
-from handsteer.signs.teaching.taught import TaughtClassifier, load_taught
-from handsteer.signs.trained import TrainedClassifier
+from handsteer.signs.opening import open_classifier, open_recognizer
 from handsteer.signs.vocabulary import NONE, find_sign
 from handsteer.transports.in_process import InProcessTransport
 from handsteer.transports.protocol import Session, Transport
@@ -313,31 +307,3 @@ def _warn_of_unknown_signs(config: Config, signs: tuple[str, ...]) -> None:
     for name in config.control.actions:
         if find_sign(name, (*signs, NONE)) is None:
             log.warning("control.actions: the sign %s is not known; the signs are %s", name, ", ".join(signs))
-
-
-def open_recognizer(config: Config) -> Recognizer:
-    """Return the recogniser that ``config`` describes.
-
-    Raises:
-        ModelError: A landmark model or the sign model is missing or broken.
-    """
-    return Recognizer(open_landmarker(config), open_classifier(config.signs), config.signs)
-
-
-def open_landmarker(config: Config) -> Landmarker:
-    """Return what finds the hands in frames.
-
-    Raises:
-        ModelError: A landmark model is missing or broken.
-    """
-    return MediaPipeLandmarker(config.landmarks)
-
-
-def open_classifier(config: SignsConfig) -> Classifier:
-    """Return the classifier that ``config`` describes: the signs that are shipped, and those that were taught.
-
-    Raises:
-        ModelError: A sign model is missing or broken.
-    """
-    shipped = TrainedClassifier(load_model())
-    return TaughtClassifier(shipped, load_taught(config.model.expanduser())) if config.model else shipped

@@ -6,7 +6,7 @@ They are used as values: once published, a message is not changed any more.
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Generic, Literal, TypeVar
+from typing import Any, ClassVar, Generic, TypeVar
 
 from rosbags.typesys.stores.ros2_jazzy import builtin_interfaces__msg__Duration as Duration
 from rosbags.typesys.stores.ros2_jazzy import builtin_interfaces__msg__Time as Time
@@ -39,10 +39,11 @@ from rosbags.typesys.stores.ros2_jazzy import visualization_msgs__msg__Marker as
 from rosbags.typesys.stores.ros2_jazzy import visualization_msgs__msg__MarkerArray as MarkerArray
 from rosbags.typesys.stores.ros2_jazzy import visualization_msgs__msg__MeshFile as MeshFile
 
+from handsteer.presets import CmdVelType
+
 __all__ = [
     "Bool",
     "ClockMessage",
-    "CmdVelType",
     "ColorRGBA",
     "CompressedImage",
     "DiagnosticArray",
@@ -82,9 +83,6 @@ __all__ = [
 ]
 
 M = TypeVar("M")
-
-CmdVelType = Literal["twist", "twist_stamped"]
-"""How a velocity command is sent: geometry_msgs/Twist, or geometry_msgs/TwistStamped."""
 
 
 @dataclass

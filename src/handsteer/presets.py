@@ -13,6 +13,9 @@ Sources, by robot:
 
 from typing import Any, Literal, get_args
 
+CmdVelType = Literal["twist", "twist_stamped"]
+"""How a velocity command is sent: geometry_msgs/Twist, or geometry_msgs/TwistStamped."""
+
 Preset = Literal["generic", "turtlebot3_burger", "turtlebot3_waffle", "turtlebot4", "turtlesim"]
 PRESETS: tuple[Preset, ...] = get_args(Preset)
 

@@ -13,11 +13,11 @@ from handsteer.config import Config, TeachConfig
 from handsteer.dashboard.teaching.node import Eyes, thumbnail
 from handsteer.dashboard.teaching.teaching import Teaching, with_sign
 from handsteer.errors import ConfigError, DatasetError, ModelCorrupt
-from handsteer.graph import open_classifier
 from handsteer.images import image_message
 from handsteer.landmarks.protocol import Hand
 from handsteer.landmarks.recorded import RecordedLandmarker
 from handsteer.messages import IMAGE_RAW, Header
+from handsteer.signs.opening import open_classifier
 from handsteer.signs.teaching.dataset import Dataset, load_dataset, save_dataset
 from handsteer.signs.teaching.taught import load_taught, save_taught
 from handsteer.transports.in_process import InProcessTransport

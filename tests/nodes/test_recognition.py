@@ -5,7 +5,6 @@ import pytest
 
 from handsteer.config import Config, SignsConfig
 from handsteer.errors import ConfigError
-from handsteer.graph import open_classifier
 from handsteer.images import image_message, jpeg_message
 from handsteer.landmarks.protocol import Hand
 from handsteer.landmarks.recorded import RecordedLandmarker
@@ -14,6 +13,7 @@ from handsteer.nodes.recognition import HandSignRecognitionNode
 from handsteer.parameters import NodeParameters
 from handsteer.signs.drawing import annotate
 from handsteer.signs.model import load_model
+from handsteer.signs.opening import open_classifier
 from handsteer.signs.recognizer import Recognizer
 from handsteer.signs.teaching.taught import save_taught
 from handsteer.signs.trained import TrainedClassifier

@@ -13,11 +13,11 @@ from handsteer.cameras.virtual import VirtualHandCamera
 from handsteer.clock import SteppedClock
 from handsteer.config import Config, VirtualHandConfig
 from handsteer.errors import CameraUnreadable, LabelError
-from handsteer.graph import open_recognizer
 from handsteer.signs.calibration import sweep
 from handsteer.signs.evaluate import evaluate_frames, evaluate_photos
 from handsteer.signs.figures import PhotoResult, tally
 from handsteer.signs.labelled import LabelledPhoto, read_video_labels
+from handsteer.signs.opening import open_recognizer
 from handsteer.signs.recognizer import Recognizer
 from handsteer.signs.video_figures import video_report
 from handsteer.signs.views import View

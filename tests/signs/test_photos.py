@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from handsteer.config import Config
-from handsteer.graph import open_recognizer
+from handsteer.signs.opening import open_recognizer
 from handsteer.signs.recognizer import Recognizer
 from handsteer.signs.vocabulary import MOTION_SIGNS, NONE
 

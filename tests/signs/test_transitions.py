@@ -7,7 +7,7 @@ import pytest
 from handsteer.cameras.virtual import VirtualHandCamera
 from handsteer.clock import SteppedClock
 from handsteer.config import Config, VirtualHandConfig
-from handsteer.graph import open_recognizer
+from handsteer.signs.opening import open_recognizer
 from handsteer.signs.vocabulary import MOTION_SIGNS, NONE, SIGNS
 
 FPS = 30

@@ -5,7 +5,6 @@ from pathlib import Path
 
 from handsteer.cameras.files import PHOTO_SUFFIXES, PhotoFolder, VideoFile
 from handsteer.cameras.protocol import Camera
-from handsteer.cameras.virtual import VirtualHandCamera
 from handsteer.cameras.webcam import Webcam, is_address, is_device, webcams
 from handsteer.clock import Clock
 from handsteer.config import CameraConfig, VirtualHandConfig
@@ -52,6 +51,9 @@ def _webcam(source: str, config: CameraConfig, clock: Clock) -> Camera:
 
 
 def _virtual(config: CameraConfig, virtual_hand: VirtualHandConfig, clock: Clock) -> Camera:
+    # What draws the hand is loaded only by the process that shows it: all nodes come through here.
+    from handsteer.cameras.virtual import VirtualHandCamera  # noqa: PLC0415
+
     return VirtualHandCamera(virtual_hand, width=config.width, height=config.height, fps=config.fps, clock=clock)
 
 

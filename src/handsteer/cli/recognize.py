@@ -4,9 +4,9 @@ import json as json_format
 from pathlib import Path
 
 from handsteer.cli.options import ConfigFile, Flag, Parameters, settings
-from handsteer.graph import open_recognizer
 from handsteer.recognize import FrameResult
 from handsteer.recognize import recognize as results
+from handsteer.signs.opening import open_recognizer
 
 
 def recognize(

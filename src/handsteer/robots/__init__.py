@@ -6,7 +6,6 @@ from handsteer.config import RobotConfig
 from handsteer.errors import ConfigError
 from handsteer.messages import CMD_VEL, Topic
 from handsteer.robots.protocol import Robot
-from handsteer.robots.remote import RemoteRobot
 from handsteer.transports.protocol import Session
 
 
@@ -25,11 +24,13 @@ def open_robot(
         ConfigError: It is a real robot, and there is no link to it.
         WorldError: The world of a simulated robot cannot be used.
     """
+    # Each robot's libraries (xacro, MuJoCo) are loaded only by the process that has it: all nodes come through here.
     if config.kind != "sim":
         if link is None:
             raise ConfigError(f"robot.kind is {config.kind}: only `handsteer run` drives a real robot; here it is sim")
+        from handsteer.robots.remote import RemoteRobot  # noqa: PLC0415
+
         return RemoteRobot(config, cmd_vel, frame_id, link)
-    # MuJoCo is loaded only when it is used.
     from handsteer.robots.simulated import SimulatedRobot  # noqa: PLC0415
 
     return SimulatedRobot(config)

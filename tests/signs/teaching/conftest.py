@@ -4,9 +4,9 @@ import pytest
 
 from handsteer.cameras.files import read_photo
 from handsteer.config import Config
-from handsteer.graph import open_landmarker
 from handsteer.landmarks.protocol import Hand
 from handsteer.signs.labelled import read_photo_labels
+from handsteer.signs.opening import open_landmarker
 from handsteer.signs.teaching.collect import largest
 from handsteer.signs.views import View
 from handsteer.signs.vocabulary import SIGNS

@@ -12,7 +12,7 @@ from handsteer.cameras.virtual import VirtualHandCamera
 from handsteer.clock import RealClock
 from handsteer.config import Config, VirtualHandConfig
 from handsteer.errors import CameraNotFound, DatasetError
-from handsteer.graph import open_landmarker
+from handsteer.signs.opening import open_landmarker
 from handsteer.signs.teaching.collect import Collector, Facts, Status, collect_live, collect_recorded, largest
 from tests.signs.hands import moved, show_sign
 

@@ -15,11 +15,11 @@ from handsteer.cli.signs.evaluation_tables import evaluation_tables
 from handsteer.config import Config
 from handsteer.control.actions import motion_signs
 from handsteer.errors import EvaluationError
-from handsteer.graph import open_classifier, open_recognizer
 from handsteer.signs.calibration_pictures import draw_reliability, draw_sweep
 from handsteer.signs.confusion_picture import draw_confusion
 from handsteer.signs.evaluation import Evaluation
 from handsteer.signs.labelled import labels_of
+from handsteer.signs.opening import open_classifier, open_recognizer
 from handsteer.signs.plot import Picture
 from handsteer.signs.protocol import Classifier
 from handsteer.signs.sources import LabelledFolder, LabelledHands, LabelledVideo, PhotoRun, Source, open_source

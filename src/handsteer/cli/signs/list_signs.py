@@ -6,7 +6,7 @@ from handsteer.cli.options import ConfigFile, Flag, Parameters, settings
 from handsteer.cli.signs.tables import table
 from handsteer.control.actions import action_of
 from handsteer.control.effects import effect_of
-from handsteer.graph import open_classifier
+from handsteer.signs.opening import open_classifier
 from handsteer.signs.vocabulary import NONE, find_sign
 
 

@@ -12,7 +12,7 @@ from handsteer.cli.options import Flag, say
 from handsteer.cli.signs.tables import teaching_tables
 from handsteer.config import SignsConfig, TeachConfig
 from handsteer.errors import TrainingError
-from handsteer.graph import open_classifier
+from handsteer.signs.opening import open_classifier
 from handsteer.signs.teaching.dataset import Dataset, load_dataset
 from handsteer.signs.teaching.taught import save_taught
 from handsteer.signs.teaching.train import train_signs

@@ -15,7 +15,8 @@ from handsteer.control.actions import ACTIONS, Action, action_of
 from handsteer.dashboard.teaching.lesson import Lesson, View
 from handsteer.dashboard.teaching.node import Eyes, LessonNode
 from handsteer.errors import ConfigError, DatasetError
-from handsteer.graph import Graph, open_classifier, open_landmarker
+from handsteer.graph import Graph
+from handsteer.signs.opening import open_classifier, open_landmarker
 from handsteer.signs.teaching.collect import Facts
 from handsteer.signs.teaching.dataset import Dataset, label_for, load_dataset, save_dataset
 from handsteer.signs.teaching.taught import load_taught, save_taught

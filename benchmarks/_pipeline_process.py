@@ -1,0 +1,103 @@
+"""One of the pipelines that ``tutorial.py`` compares, as a process of its own.
+
+``python _pipeline_process.py NAME`` reads jobs from its standard input, one JSON object a line, and answers each by one
+or two lines of JSON. A job names a file of raw frames (``frames``; uint8, BGR, of ``shape`` [n, height, width, 3]), the
+seconds from one to the next (``dt_s``), and its ``kind``:
+
+* ``start``: the first answer has the process's CPU seconds from its own start to the end of the first frame
+  (``cpu_s``); the second, after all frames, its peak memory in MB (``peak_mb``). One frame is in memory at a time.
+* ``run``: the CPU milliseconds of each frame, all threads of the process together (``cpu_ms``), and in how many frames
+  a hand was seen (``hands``).
+
+Nothing is loaded here that a pipeline does not need itself.
+"""
+
+import itertools
+import json
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+Step = Callable[[Any, float], bool]
+
+
+def main() -> None:
+    step = OPENERS[sys.argv[1]]()
+    for line in sys.stdin:
+        job = json.loads(line)
+        (_start if job["kind"] == "start" else _run)(step, job)
+
+
+def _start(step: Step, job: dict[str, Any]) -> None:
+    import numpy as np  # noqa: PLC0415
+
+    count, *shape = job["shape"]
+    size = shape[0] * shape[1] * shape[2]
+    for number in range(count):
+        step(np.fromfile(job["frames"], np.uint8, size, offset=number * size).reshape(shape), job["dt_s"])
+        if number == 0:
+            _answer(cpu_s=time.process_time())
+    _answer(peak_mb=_peak_mb())
+
+
+def _run(step: Step, job: dict[str, Any]) -> None:
+    import numpy as np  # noqa: PLC0415
+
+    frames = np.fromfile(job["frames"], np.uint8).reshape(job["shape"])
+    hands, marks = 0, [time.process_time()]
+    for frame in frames:
+        hands += step(frame, job["dt_s"])
+        # What threads of a pipeline do between two frames counts too.
+        marks.append(time.process_time())
+    _answer(cpu_ms=[(after - before) * 1000 for before, after in itertools.pairwise(marks)], hands=hands)
+
+
+def _answer(**values: Any) -> None:
+    print(json.dumps(values), flush=True)
+
+
+def _peak_mb() -> float:
+    """Return the most resident memory that this process has had, in MB, libraries included."""
+    # Not by resource.getrusage: that begins with the memory of the process that started this one.
+    status = Path("/proc/self/status").read_text(encoding="ascii")
+    (line,) = (line for line in status.splitlines() if line.startswith("VmHWM:"))
+    return int(line.split()[1]) * 1024 / 1e6
+
+
+def _tutorial() -> Step:
+    import cv2  # noqa: PLC0415
+    from _tutorial_pipeline import TutorialPipeline  # noqa: PLC0415
+
+    cv2.setNumThreads(1)
+    return TutorialPipeline().step
+
+
+def _handsteer(*, drawing: bool) -> Step:
+    import cv2  # noqa: PLC0415
+
+    from handsteer.config import Config  # noqa: PLC0415
+    from handsteer.signs.drawing import annotate  # noqa: PLC0415
+    from handsteer.signs.opening import open_recognizer  # noqa: PLC0415
+
+    cv2.setNumThreads(1)
+    recognizer = open_recognizer(Config())
+
+    def step(image: Any, dt_s: float) -> bool:
+        recognition = recognizer.step(image, dt_s)
+        if drawing:
+            annotate(image, recognition)
+        return recognition.hand is not None
+
+    return step
+
+
+OPENERS: dict[str, Callable[[], Step]] = {
+    "tutorial": _tutorial,
+    "handsteer": lambda: _handsteer(drawing=True),
+    "handsteer, nothing drawn": lambda: _handsteer(drawing=False),
+}
+
+if __name__ == "__main__":
+    main()
