@@ -15,7 +15,7 @@ from handsteer.config import Config, VirtualHandConfig
 from handsteer.errors import CameraUnreadable, LabelError
 from handsteer.signs.calibration import sweep
 from handsteer.signs.evaluate import evaluate_frames, evaluate_photos
-from handsteer.signs.figures import PhotoResult, tally
+from handsteer.signs.figures import PhotoResult
 from handsteer.signs.labelled import LabelledPhoto, read_video_labels
 from handsteer.signs.opening import open_recognizer
 from handsteer.signs.recognizer import Recognizer
@@ -92,16 +92,20 @@ def test_each_photo_has_its_likelihoods_and_what_it_was_told_by(
     stop, *_, nothing = evaluate_photos([replace(photo, person_set="made") for photo in photos], recognizer, View())
     assert stop.person_set == "made"
     assert set(stop.likelihoods) == set(SIGNS)
-    assert stop.likeliest == (STOP, stop.confidence)
+    assert stop.likeliest == (STOP, stop.likelihoods[STOP])
+    assert stop.likelihoods[STOP] <= stop.confidence <= 1.0
     assert stop.presence is not None
     assert 0.5 < stop.presence <= 1.0
     assert (dict(nothing.likelihoods), nothing.presence) == ({}, None)
 
 
-def test_the_sweep_agrees_with_what_is_seen(recognizer: Recognizer, photos: list[LabelledPhoto]) -> None:
+def test_the_sweep_sees_the_likeliest_sign_from_each_threshold_on(
+    recognizer: Recognizer, photos: list[LabelledPhoto]
+) -> None:
     results = list(evaluate_photos(photos, recognizer, View()))
-    threshold = Config().signs.min_confidence
-    assert sweep(results, SIGNS, MOTION_SIGNS, [threshold])[threshold] == tally(results, SIGNS, MOTION_SIGNS)
+    likelihood = results[0].likelihoods[STOP]
+    swept = sweep(results, SIGNS, MOTION_SIGNS, [likelihood, likelihood + 1e-6])
+    assert [tally.recall[STOP].count for tally in swept.values()] == [1, 0]
 
 
 def test_a_photo_that_cannot_be_decoded_is_named(recognizer: Recognizer, tmp_path: Path) -> None:
