@@ -8,7 +8,7 @@ from typing import Final
 from handsteer.signs.operator import Place
 
 _FRAMES: Final = 12
-_STILL: Final = 0.35
+_STILL: Final = 0.25
 """How far a hand that is held still strays during the confirmation, in its own sizes: the strokes of a sign language go
 three times as far, a tremor a tenth."""
 
@@ -40,7 +40,7 @@ class Evidence:
             self._seen.append(_Seen(dt_s, place, likelihoods))
 
     def is_still(self, seconds: float) -> bool:
-        """Return whether the hand strayed by less than a third of its size in the last ``seconds``.
+        """Return whether the hand strayed by less than a quarter of its size in the last ``seconds``.
 
         A hand that has been in view for less than that is judged by the frames there are.
         """
