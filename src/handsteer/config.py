@@ -76,7 +76,11 @@ class VirtualHandConfig(Section):
 class LandmarksConfig(Section):
     """How the hand is found in a frame."""
 
-    model: Literal["full", "lite"] = Field("full", description="full is more accurate; lite takes about 40 % less time")
+    model: Literal["fast", "full", "lite"] = Field(
+        "fast",
+        description="full is MediaPipe's own; fast is full with 8-bit integers, half the time and the same to a "
+        "quarter of a pixel; lite is as fast, and less accurate",
+    )
     max_hands: int = Field(
         2, ge=1, le=2, description="How many hands are looked for in a frame, to choose the one that shows a sign"
     )

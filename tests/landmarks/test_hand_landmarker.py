@@ -39,7 +39,7 @@ def distance(hand: Hand, points: np.ndarray) -> float:
     return float(np.median(np.linalg.norm(hand.pixels[:, :2] - points, axis=1)))
 
 
-@pytest.mark.parametrize("model", ["full", "lite"])
+@pytest.mark.parametrize("model", ["fast", "full", "lite"])
 @pytest.mark.parametrize(("place", "handedness"), [(open_right_hand, "Right"), (open_left_hand, "Left")])
 def test_finds_either_hand_where_it_is(model, place, handedness):
     points = place(300, 250)

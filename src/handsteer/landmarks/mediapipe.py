@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from handsteer.config import LandmarksConfig
 from handsteer.errors import FrameError
 from handsteer.landmarks.hand_landmark import Estimate, HandLandmarkModel
-from handsteer.landmarks.models import find_model
+from handsteer.landmarks.models import find_pair
 from handsteer.landmarks.palm import Palm, PalmDetector
 from handsteer.landmarks.protocol import Hand
 from handsteer.landmarks.roi import Roi, from_landmarks
@@ -39,7 +39,7 @@ class MediaPipeLandmarker:
 
     Args:
         config: Model, number of hands, thresholds, threads.
-        models: Folder of the model files; by default :func:`handsteer.landmarks.models.models_dir`.
+        models: Folder of the model files that are fetched; by default :func:`handsteer.landmarks.models.models_dir`.
 
     Raises:
         ModelMissing: A model file is not there.
@@ -48,8 +48,7 @@ class MediaPipeLandmarker:
 
     def __init__(self, config: LandmarksConfig, models: Path | None = None) -> None:
         self._config = config
-        palm = find_model(f"palm_detection_{config.model}.tflite", models)
-        landmark = find_model(f"hand_landmark_{config.model}.tflite", models)
+        palm, landmark = find_pair(config.model, models)
         self._palms = PalmDetector(palm, config.threads, config.min_detection_confidence)
         self._landmarks = HandLandmarkModel(landmark, config.threads)
         self._followed: list[Roi] = []
