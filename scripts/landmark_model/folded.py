@@ -1,6 +1,7 @@
-"""The hand landmark model with its weights as plain float32, which is what a quantiser takes.
+"""The hand landmark model with plain float32 weights, which is what a quantiser takes, and without idle channels.
 
 MediaPipe ships the weights as float16, each behind an operation that makes float32 of it when the model is loaded.
+Nearly half of the inner channels of its late layers have no weights at all: they give the same number for any picture.
 """
 
 from typing import Any, Final
@@ -14,7 +15,7 @@ _KINDS: Final = {number: kind for kind, number in vars(schema.BuiltinOperator).i
 
 
 def folded(content: bytes) -> bytes:
-    """Return the model ``content`` without its float16; it computes the very same numbers.
+    """Return the model ``content`` without float16 and idle channels; it computes the same numbers but for rounding.
 
     Operations are numbered from 0 in the order in which they run, and what one gives is called as :func:`operations`
     says, but for the model's own outputs.
@@ -25,6 +26,7 @@ def folded(content: bytes) -> bytes:
     model = schema.ModelT.InitFromObj(schema.Model.GetRootAsModel(content, 0))
     (graph,) = model.subgraphs
     _make_weights_float32(model)
+    _drop_idle_channels(model)
     _drop_unused_tensors(graph)
     _drop_unused_buffers(model)
     for number, operation in enumerate(graph.operators):
@@ -66,6 +68,56 @@ def _make_weights_float32(model: Any) -> None:
         single.buffer = len(model.buffers)
         model.buffers.append(buffer)
     graph.operators = kept
+
+
+def _drop_idle_channels(model: Any) -> None:
+    """Leave out the channels that a depthwise convolution without weights makes constant.
+
+    What they add to the layer behind it becomes part of that one's bias.
+    """
+    (graph,) = model.subgraphs
+    for middle in graph.operators:
+        if _kind(model, middle) != "DEPTHWISE_CONV_2D":
+            continue
+        weights, bias = (_Array(model, index) for index in middle.inputs[1:])
+        used = weights.values.any(axis=(0, 1, 2))
+        constant = np.clip(bias.values[~used], 0, 6)  # The activation is ReLU6.
+        (before,) = (each for each in graph.operators if each.outputs[0] == middle.inputs[0])
+        narrowed, behind = [before.outputs[0], middle.outputs[0]], _readers(graph, middle)
+        if _kind(model, behind[0]) == "MEAN":
+            narrowed, behind = [*narrowed, behind[0].outputs[0]], _readers(graph, behind[0])
+        for after in behind:
+            last_weights, last_bias = (_Array(model, index) for index in after.inputs[1:])
+            added = last_weights.values[..., ~used] @ constant
+            last_bias.set(last_bias.values + added.reshape(-1))
+            last_weights.set(last_weights.values[..., used])
+        for array in (weights, bias):
+            array.set(array.values[..., used])
+        for index in before.inputs[1:]:
+            array = _Array(model, index)
+            array.set(array.values[used])
+        for index in narrowed:
+            graph.tensors[index].shape = np.array([*graph.tensors[index].shape[:-1], used.sum()], np.int32)
+
+
+def _readers(graph: Any, operation: Any) -> list[Any]:
+    return [each for each in graph.operators if each.inputs[0] == operation.outputs[0]]
+
+
+class _Array:
+    """The numbers of a constant tensor, which nothing else may share."""
+
+    def __init__(self, model: Any, index: int) -> None:
+        self._tensor = model.subgraphs[0].tensors[index]
+        self._buffer = model.buffers[self._tensor.buffer]
+
+    @property
+    def values(self) -> np.ndarray:
+        return self._buffer.data.view("<f4").reshape(self._tensor.shape)
+
+    def set(self, values: np.ndarray) -> None:
+        self._tensor.shape = np.array(values.shape, np.int32)
+        self._buffer.data = np.ascontiguousarray(values, "<f4").reshape(-1).view(np.uint8)
 
 
 def _drop_unused_tensors(graph: Any) -> None:
