@@ -87,7 +87,8 @@ class LandmarksConfig(Section):
     min_detection_confidence: float = Field(0.3, ge=0, le=1, description="Score from which a palm counts as found")
     second_look: bool = Field(True, description="Look twice at a hand that is new, which reads it better")
     wide_search: bool = Field(
-        True, description="Look for hands also as if they were smaller, which finds more near ones"
+        True,
+        description="Look for hands also as if they were smaller, and in the middle of the frame; finds more near ones",
     )
     min_presence: float = Field(0.5, ge=0, le=1, description="Score below which a followed hand counts as lost")
     threads: int = Field(1, ge=1, le=64, description="CPU threads of the landmark model")
