@@ -6,7 +6,7 @@ ARGS ?=
 # NumPy's threads would wait for one another: the matrices are small, and tests run side by side.
 export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: help run test ros1 test-ros1 ros2 test-ros2 lint unit format lock bench bench-signs signs-model models docs screenshots \
+.PHONY: help run test ros1 test-ros1 ros2 test-ros2 lint unit format lock bench bench-signs signs-model landmark-model models docs screenshots \
 	screenshots-ros1 clean
 
 help:
@@ -19,6 +19,7 @@ help:
 	@echo "make bench        print the speed and accuracy tables"
 	@echo "make bench-signs  print how well signs are told on photos of people"
 	@echo "make signs-model  train the sign model again, from hands that it makes itself; gives the same file"
+	@echo "make landmark-model  make the 8-bit hand landmark model again, of MediaPipe's; gives the same file"
 	@echo "make docs         write docs/configuration.md again from the configuration"
 	@echo "make screenshots  make the README's pictures again (needs Chromium)"
 	@echo "make screenshots-ros1  make the picture of RViz again (needs ROS 1, rviz, xvfb and imagemagick)"
@@ -67,6 +68,11 @@ bench-signs: $(BIN)/.dev models
 signs-model: | $(BIN)/.run
 	@$(BIN)/python -m handsteer.signs.training
 
+QUANTIZER := $(VENV)/quantizer
+landmark-model: models $(QUANTIZER)/.made
+	@$(QUANTIZER)/bin/python scripts/landmark_model/build.py "$$($(BIN)/python -c \
+		'from handsteer.landmarks.models import find_model; print(find_model("hand_landmark_full.tflite"))')"
+
 docs: $(BIN)/.dev
 	@$(BIN)/python scripts/configuration_table.py
 
@@ -83,6 +89,11 @@ $(BIN)/.run: scripts/setup requirements.txt pyproject.toml
 $(BIN)/.dev: scripts/setup requirements-dev.txt pyproject.toml | $(BIN)/.run
 	@scripts/setup requirements-dev.txt && touch $@
 
+$(QUANTIZER)/.made: requirements-quantizer.txt | $(BIN)/.run
+	@$(BIN)/python -m venv --without-pip $(QUANTIZER)
+	@PATH="$(BIN):$$PATH" VIRTUAL_ENV="$(CURDIR)/$(QUANTIZER)" uv pip install --quiet --require-hashes \
+		--requirement requirements-quantizer.txt && touch $@
+
 # For every system and Python that is supported; without the address of any index.
 COMPILE = uv pip compile --quiet --universal --python-version 3.11 --generate-hashes \
 	--no-emit-index-url --no-annotate --no-header --upgrade
@@ -92,6 +103,7 @@ lock:
 	@PATH="$(BIN):$$PATH" $(COMPILE) pyproject.toml --group setup --group dev --output-file requirements-dev.txt
 	@PATH="$(BIN):$$PATH" $(COMPILE) --group pyproject.toml:ros2 --output-file requirements-ros2.txt
 	@echo "mediapipe==0.10.21" | PATH="$(BIN):$$PATH" $(COMPILE) - --output-file benchmarks/tutorial-requirements.txt
+	@PATH="$(BIN):$$PATH" $(COMPILE) --group pyproject.toml:quantizer --output-file requirements-quantizer.txt
 
 clean:
 	@rm -rf $(VENV) .mypy_cache .pytest_cache .ruff_cache .hypothesis

@@ -14,7 +14,7 @@ from ai_edge_litert.interpreter import Interpreter
 
 from handsteer.config import LandmarksConfig
 from handsteer.landmarks.mediapipe import MediaPipeLandmarker
-from handsteer.landmarks.models import find_model
+from handsteer.landmarks.models import find_pair
 
 CLIP = Path(__file__).parents[2] / "shared" / "data" / "videos" / "dex-retargeting_human_hand_video_1280x720.mp4"
 PARTS = ("JPEG decode", "landmark model", "palm model", "JPEG to landmarks, hand followed")
@@ -24,7 +24,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="Time the way from a 640x480 JPEG to the landmarks of a hand.")
     parser.add_argument("--clip", type=Path, default=CLIP, help="a video of one hand that stays in view")
     parser.add_argument("--frames", type=int, default=300)
-    parser.add_argument("--model", choices=["full", "lite"], default="full")
+    parser.add_argument("--model", choices=["fast", "full", "lite"], default="fast")
     options = parser.parse_args()
     cv2.setNumThreads(1)
     report(measure(read_jpegs(options.clip, options.frames), options.model))
@@ -44,7 +44,7 @@ def read_jpegs(clip: Path, count: int) -> list[np.ndarray]:
 def measure(files: list[np.ndarray], model: str) -> np.ndarray:
     """Return the (n, 4) seconds of each part, for the n frames that found the hand followed."""
     landmarker = MediaPipeLandmarker(LandmarksConfig(model=model))
-    landmark, palm = (load(f"{name}_{model}.tflite") for name in ("hand_landmark", "palm_detection"))
+    palm, landmark = (load(path) for path in find_pair(model))
     following = False
     rows = []
     for file in files:
@@ -68,8 +68,8 @@ def decode(file: np.ndarray) -> np.ndarray:
     return cv2.imdecode(file, cv2.IMREAD_COLOR)
 
 
-def load(name: str) -> Interpreter:
-    interpreter = Interpreter(str(find_model(name)), num_threads=1)
+def load(path: Path) -> Interpreter:
+    interpreter = Interpreter(str(path), num_threads=1)
     interpreter.allocate_tensors()
     return interpreter
 

@@ -31,7 +31,7 @@ def test_a_number_may_name_a_webcam() -> None:
             r"ROS parameter /r1/hand_sign_recognition/min_confidense: there is no such",
         ),
         ({"min_confidence": 2}, r"ROS parameter /r1/hand_sign_recognition/min_confidence: 2 should be less than or eq"),
-        ({"landmarks": {"model": "big"}}, r"/r1/hand_sign_recognition/landmarks/model: 'big' should be 'full' or 'li"),
+        ({"landmarks": {"model": "big"}}, r"/r1/hand_sign_recognition/landmarks/model: 'big' should be 'fast', 'f"),
         ({"landmarks": {"modl": "full"}}, r"/r1/hand_sign_recognition/landmarks/modl: there is no such parameter"),
         ({"landmarks": "full"}, r"/r1/hand_sign_recognition/landmarks: there is no such parameter"),
     ],
@@ -64,7 +64,7 @@ def test_what_is_set_is_what_the_node_gets() -> None:
 
 def test_what_is_read_at_the_start_can_only_be_set_to_what_it_is() -> None:
     parameters = NodeParameters(Config(), "signs", lambda _: None)
-    parameters.set({"landmarks.model": "full", "image_transport": "auto"})
+    parameters.set({"landmarks.model": "fast", "image_transport": "auto"})
     with pytest.raises(ConfigError, match=r"^landmarks.model cannot be set: it is read when the node starts"):
         parameters.set({"landmarks.model": "lite"})
 

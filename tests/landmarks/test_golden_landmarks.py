@@ -25,7 +25,9 @@ class Golden:
         return np.flatnonzero(self.found)
 
 
-AS_MEDIAPIPE = LandmarksConfig(max_hands=1, min_detection_confidence=0.5, second_look=False, wide_search=False)
+AS_MEDIAPIPE = LandmarksConfig(
+    model="full", max_hands=1, min_detection_confidence=0.5, second_look=False, wide_search=False
+)
 
 
 def load(group: str) -> Golden:

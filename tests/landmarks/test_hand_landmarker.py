@@ -39,7 +39,7 @@ def distance(hand: Hand, points: np.ndarray) -> float:
     return float(np.median(np.linalg.norm(hand.pixels[:, :2] - points, axis=1)))
 
 
-@pytest.mark.parametrize("model", ["full", "lite"])
+@pytest.mark.parametrize("model", ["fast", "full", "lite"])
 @pytest.mark.parametrize(("place", "handedness"), [(open_right_hand, "Right"), (open_left_hand, "Left")])
 def test_finds_either_hand_where_it_is(model, place, handedness):
     points = place(300, 250)
@@ -160,7 +160,7 @@ def test_any_palm_counts_at_confidence_zero_and_none_at_one(landmarker):
     (hand,) = landmarker.detect(frame)
     (same,) = MediaPipeLandmarker(LandmarksConfig(min_detection_confidence=0)).detect(frame)
     assert distance(same, hand.pixels[:, :2]) < 5
-    assert MediaPipeLandmarker(LandmarksConfig(min_detection_confidence=1)).detect(frame) == []
+    assert MediaPipeLandmarker(LandmarksConfig(min_detection_confidence=1, wide_search=False)).detect(frame) == []
 
 
 @pytest.mark.parametrize(

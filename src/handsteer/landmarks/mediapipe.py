@@ -4,12 +4,9 @@ The way from frame to landmarks is that of MediaPipe 0.10.21's graph ``hand_land
 ``mp.solutions.hands``: while enough hands are followed, only the landmark model runs, on the region that the last
 landmarks give; otherwise palms are looked for in the whole frame first. Beyond that, a hand that is new is looked at
 twice, unless the configuration says otherwise: the second time in the region that its own landmarks give, as a palm
-says less well where a hand is. And palms are looked for in a widened frame too, where hands look smaller: the
-palm model misses some that nearly fill the frame.
+says less well where a hand is. And hands are looked for in more ways than by palms in the frame, see ``search``.
 """
 
-import itertools
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
 
@@ -19,13 +16,13 @@ from numpy.typing import NDArray
 from handsteer.config import LandmarksConfig
 from handsteer.errors import FrameError
 from handsteer.landmarks.hand_landmark import Estimate, HandLandmarkModel
-from handsteer.landmarks.models import find_model
-from handsteer.landmarks.palm import Palm, PalmDetector
+from handsteer.landmarks.models import find_pair
+from handsteer.landmarks.palm import PalmDetector
 from handsteer.landmarks.protocol import Hand
 from handsteer.landmarks.roi import Roi, from_landmarks
+from handsteer.landmarks.search import Search
 
 _SAME_HAND_OVERLAP: Final = 0.5
-_WIDENED: Final = 1.25
 _PART: Final = 0.7
 _MAX_SIDE: Final = 32766
 """OpenCV samples no picture that is larger."""
@@ -39,7 +36,7 @@ class MediaPipeLandmarker:
 
     Args:
         config: Model, number of hands, thresholds, threads.
-        models: Folder of the model files; by default :func:`handsteer.landmarks.models.models_dir`.
+        models: Folder of the model files that are fetched; by default :func:`handsteer.landmarks.models.models_dir`.
 
     Raises:
         ModelMissing: A model file is not there.
@@ -48,13 +45,12 @@ class MediaPipeLandmarker:
 
     def __init__(self, config: LandmarksConfig, models: Path | None = None) -> None:
         self._config = config
-        palm = find_model(f"palm_detection_{config.model}.tflite", models)
-        landmark = find_model(f"hand_landmark_{config.model}.tflite", models)
-        self._palms = PalmDetector(palm, config.threads, config.min_detection_confidence)
+        palm, landmark = find_pair(config.model, models)
+        palms = PalmDetector(palm, config.threads, config.min_detection_confidence)
+        self._search = Search(palms, config.max_hands, wide=config.wide_search)
         self._landmarks = HandLandmarkModel(landmark, config.threads)
         self._followed: list[Roi] = []
         self._hands: list[Hand] = []
-        self._searches = self._all_searches()
         self._image_size = (0, 0)
 
     def detect(self, image: NDArray[np.uint8], *, search: bool = True) -> list[Hand]:
@@ -76,8 +72,7 @@ class MediaPipeLandmarker:
         if (width, height) != self._image_size:
             self.reset()
             self._image_size = (width, height)
-        estimates = [self._estimate(image, region) for region in self._regions(image, search)]
-        present, self._followed = _of_different_hands([each for each in estimates if self._is_present(each)])
+        present, self._followed = _of_different_hands(self._estimates(image, search))
         self._hands = [_hand(estimate, width, height) for estimate in present]
         return list(self._hands)
 
@@ -91,38 +86,33 @@ class MediaPipeLandmarker:
         """Forget the hands of the last frame."""
         self._followed = []
         self._hands = []
-        self._searches = self._all_searches()
+        self._search.reset()
 
-    def _all_searches(self) -> Iterator[tuple[float, ...]]:
-        if not self._config.wide_search:
-            return itertools.repeat((1.0,))
-        return itertools.chain([(1.0, _WIDENED)], itertools.cycle([(1.0,), (_WIDENED,)]))
+    def _estimates(self, image: NDArray[np.uint8], search: bool) -> list[Estimate]:
+        """Return the hands that are seen where they were, and new ones if not all that are wanted are followed."""
+        followed, wanted = self._followed, self._config.max_hands
+        if followed and (not search or len(followed) >= wanted):
+            return self._present(image, followed)
+        for places in self._search.places(image, beside_a_hand=bool(followed)):
+            regions = _distinct([*followed, *places.regions])[:wanted]
+            if present := self._present(image, regions, places.min_presence):
+                return present
+        return []
 
-    def _estimate(self, image: NDArray[np.uint8], region: Roi) -> Estimate:
-        """Return what is seen in a region; of a hand that is new, at the second look."""
-        estimate = self._landmarks.estimate(image, region)
-        is_new = all(region is not followed for followed in self._followed)
-        if not (is_new and self._config.second_look and self._is_present(estimate)):
-            return estimate
-        return self._landmarks.estimate(image, from_landmarks(estimate.pixels[:, :2]))
+    def _present(self, image: NDArray[np.uint8], regions: list[Roi], min_presence: float = 0.0) -> list[Estimate]:
+        """Return what is seen in the regions that show a hand; of one that is new, at the second look."""
+        present = []
+        for region in regions:
+            estimate = self._landmarks.estimate(image, region)
+            is_new = all(region is not followed for followed in self._followed)
+            if is_new and self._config.second_look and self._is_present(estimate):
+                estimate = self._landmarks.estimate(image, from_landmarks(estimate.pixels[:, :2]))
+            if self._is_present(estimate) and estimate.presence >= min_presence:
+                present.append(estimate)
+        return present
 
     def _is_present(self, estimate: Estimate) -> bool:
         return estimate.presence > self._config.min_presence
-
-    def _regions(self, image: NDArray[np.uint8], search: bool) -> list[Roi]:
-        """Return where to look for hands: where they were, and at new palms if not all hands are followed."""
-        wanted = self._config.max_hands
-        regions = list(self._followed)
-        if not regions or (search and len(regions) < wanted):
-            regions += [palm.roi for palm in self._search(image, wanted)]
-        return _distinct(regions)[:wanted]
-
-    def _search(self, image: NDArray[np.uint8], wanted: int) -> list[Palm]:
-        """Return palms, the surest first: at the first search in the plain and the widened frame, then in turns."""
-        palms = [
-            palm for widened in next(self._searches) for palm in self._palms.detect(image, wanted, widened=widened)
-        ]
-        return sorted(palms, key=lambda palm: -palm.score)
 
 
 def _distinct(regions: list[Roi]) -> list[Roi]:

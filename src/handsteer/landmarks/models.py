@@ -2,7 +2,7 @@
 
 They are MediaPipe's (Apache-2.0) and are in no package of their own, so they are taken, with their licence, out of
 the ``mediapipe`` wheel on PyPI; MediaPipe itself is not installed. ``pip`` downloads the wheel, because it knows the
-user's package index, proxies and certificates.
+user's package index, proxies and certificates. What was made of one of them is small, and part of handsteer.
 """
 
 import hashlib
@@ -28,7 +28,12 @@ MODELS: Final = {
     "hand_landmark_full.tflite": "11c272b891e1a99ab034208e23937a8008388cf11ed2a9d776ed3d01d0ba00e3",
     "hand_landmark_lite.tflite": "048edd3645c9bf7397d19a9f6e3a42957d6e414c9bea6598030a2e9b624156e6",
 }
-"""SHA-256 of each model file."""
+"""SHA-256 of each model file that is fetched."""
+
+SHIPPED: Final = {
+    "hand_landmark_fast.tflite": "383471f879c29961bb5c2b53a3cb4fc5cf84abe41751c612700b288ed815e1bd",
+}
+"""SHA-256 of each model file that is part of handsteer; ``make landmark-model`` makes it."""
 
 Progress = Callable[[int, int], None]
 """Called now and then with the bytes downloaded so far and the bytes to download in all."""
@@ -58,20 +63,41 @@ def find_model(name: str, directory: Path | None = None) -> Path:
     """Return the path of the model file ``name``, after checking its content.
 
     Args:
-        name: A key of :data:`MODELS`.
-        directory: Where to look; by default :func:`models_dir`.
+        name: A key of :data:`MODELS` or :data:`SHIPPED`.
+        directory: Where to look; by default :func:`models_dir`, and handsteer itself for what is part of it.
 
     Raises:
         ModelMissing: It is not there, or cannot be read.
         ModelCorrupt: Its content is not what it should be.
     """
-    path = (directory or models_dir()) / name
+    is_shipped = name in SHIPPED
+    path = (directory or (Path(__file__).parent if is_shipped else models_dir())) / name
+    remedy = "install handsteer again" if is_shipped else _REMEDY
     try:
         content = path.read_bytes()
     except OSError as error:
-        raise ModelMissing(f"cannot read the landmark model {path} ({error.strerror}): {_REMEDY}") from None
-    _check(name, content, f"the landmark model {path} is damaged: {_REMEDY}")
+        raise ModelMissing(f"cannot read the landmark model {path} ({error.strerror}): {remedy}") from None
+    _check(name, content, f"the landmark model {path} is damaged: {remedy}")
     return path
+
+
+def find_pair(model: str, directory: Path | None = None) -> tuple[Path, Path]:
+    """Return the paths of the palm and the hand landmark model that go together.
+
+    Args:
+        model: ``fast``, ``full`` or ``lite``, as ``landmarks.model`` of the configuration.
+        directory: Where to look for those that are fetched; by default :func:`models_dir`.
+
+    Raises:
+        ModelMissing: One is not there, or cannot be read.
+        ModelCorrupt: The content of one is not what it should be.
+    """
+    palm = "full" if model == "fast" else model  # The palm model gains little by integers.
+    landmark = f"hand_landmark_{model}.tflite"
+    return (
+        find_model(f"palm_detection_{palm}.tflite", directory),
+        find_model(landmark, None if landmark in SHIPPED else directory),
+    )
 
 
 def fetch_models(progress: Progress) -> list[Path]:
@@ -172,7 +198,7 @@ def _extract(wheel: Path, names: list[str], folder: Path) -> None:
 
 
 def _check(name: str, content: bytes, message: str) -> None:
-    if hashlib.sha256(content).hexdigest() != MODELS[name]:
+    if hashlib.sha256(content).hexdigest() != (MODELS | SHIPPED)[name]:
         raise ModelCorrupt(message)
 
 

@@ -1,0 +1,64 @@
+"""Makes the shipped ``hand_landmark_fast.tflite`` of MediaPipe's full model: ``make landmark-model``.
+
+Most of it then computes with 8-bit integers. It is made of the model and of ``ranges.json`` (see ``ranges.py``) alone,
+and the same versions of the packages give the same bytes. Needs ai-edge-quantizer, which handsteer itself does not.
+"""
+
+import argparse
+import hashlib
+import json
+import logging
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from ai_edge_quantizer import quantizer
+from ai_edge_quantizer.qtyping import TFLOperationName
+from folded import folded, operations
+
+HERE: Final = Path(__file__).parent
+RANGES: Final = HERE / "ranges.json"
+TARGET: Final = HERE.parents[1] / "src" / "handsteer" / "landmarks" / "hand_landmark_fast.tflite"
+
+# Which operations were left in float, and why, stands in docs/performance.md.
+WHOLLY_INTEGER: Final = range(5, 42)
+"""Operations on 8-bit integers, scaled by the measured ranges, from the first layer of 56x56 to the last of 14x14."""
+INTEGER_INSIDE: Final = range(42, 56)
+"""Here only the convolutions are, which scale each picture by itself: what goes from one to the next stays float."""
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description="Make the 8-bit hand landmark model.")
+    parser.add_argument("source", type=Path, help="MediaPipe's hand_landmark_full.tflite")
+    parser.add_argument("--target", type=Path, default=TARGET)
+    options = parser.parse_args()
+    logging.getLogger().setLevel(logging.ERROR)
+    model = quantized(folded(options.source.read_bytes()), json.loads(RANGES.read_text(encoding="utf-8")))
+    options.target.write_bytes(model)
+    print(f"{options.target}: {len(model)} bytes, SHA-256 {hashlib.sha256(model).hexdigest()}")
+
+
+def quantized(model: bytes, ranges: dict[str, list[float]]) -> bytes:
+    """Return the folded ``model`` with most of its operations on integers.
+
+    Args:
+        model: As :func:`folded.folded` returns it.
+        ranges: The least and the largest number that each operation gives, by its name.
+    """
+    maker = quantizer.Quantizer(bytearray(model))
+    for number, (kind, name, _) in enumerate(operations(model)):
+        # The quantiser knows an operation by the name of what it gives, with a semicolon after it.
+        if number in WHOLLY_INTEGER:
+            maker.add_static_config(f"^{name};", TFLOperationName(kind), activation_num_bits=8, weight_num_bits=8)
+        elif number in INTEGER_INSIDE and kind == "CONV_2D":
+            maker.add_dynamic_config(f"^{name};", TFLOperationName(kind), num_bits=8)
+    bounds = {name: _bounds(low, high) for name, (low, high) in ranges.items()}
+    return bytes(maker.quantize(bounds, enable_progress_bar=False, enable_progress_report=False).quantized_model)
+
+
+def _bounds(low: float, high: float) -> dict[str, np.ndarray]:
+    return {"min": np.full((1, 1, 1, 1), low, np.float32), "max": np.full((1, 1, 1, 1), high, np.float32)}
+
+
+if __name__ == "__main__":
+    main()

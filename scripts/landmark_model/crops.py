@@ -1,0 +1,48 @@
+"""The hands in folders of photos as the landmark model is given them, in two halves: to choose by, and to judge by."""
+
+import csv
+import hashlib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Literal
+
+import cv2
+import numpy as np
+
+from handsteer.config import LandmarksConfig
+from handsteer.landmarks.mediapipe import MediaPipeLandmarker
+from handsteer.landmarks.roi import from_landmarks
+from handsteer.signs.views import View
+
+SIDE = 224
+Half = Literal["choose", "judge"]
+
+
+def photos(folders: list[Path], half: Half) -> Iterator[tuple[str, np.ndarray]]:
+    """Yield the name and the picture, BGR, of each photo of one half.
+
+    Nobody is in both: the few people of the set ``emre`` judge, the students of ``sld`` choose, and where each photo
+    is of somebody else, a hash of its name decides.
+
+    Args:
+        folders: Each has an ``index.csv`` with the columns ``path`` and ``person_set``.
+        half: Which half.
+    """
+    for folder in folders:
+        with (folder / "index.csv").open(encoding="utf-8") as file:
+            rows = list(csv.DictReader(file))
+        for row in rows:
+            odd = hashlib.sha256(row["path"].encode()).digest()[0] % 2
+            by_hash: Half = "choose" if odd else "judge"
+            if {"emre": "judge", "sld": "choose"}.get(row["person_set"], by_hash) == half:
+                yield row["path"], View().picture(cv2.imread(str(folder / row["path"])))
+
+
+def crops(folders: list[Path], half: Half) -> Iterator[np.ndarray]:
+    """Yield a (224, 224, 3) uint8 RGB picture of each hand in the photos of one half, as a followed hand is seen."""
+    landmarker = MediaPipeLandmarker(LandmarksConfig(model="full"))
+    for _, photo in photos(folders, half):
+        landmarker.reset()
+        for hand in landmarker.detect(photo):
+            crop = from_landmarks(hand.pixels[:, :2]).crop(photo, SIDE, cv2.BORDER_REPLICATE)
+            yield cv2.cvtColor(crop, cv2.COLOR_BGR2RGB)

@@ -1,0 +1,65 @@
+"""Measures the numbers that the hand landmark model's operations give on pictures of hands, into ``ranges.json``.
+
+Run ``python scripts/landmark_model/ranges.py FOLDER...`` in the environment of handsteer, with folders of photos as
+``crops.photos`` takes them. Only the ranges are kept; nobody can be told by them.
+"""
+
+import argparse
+import json
+from pathlib import Path
+
+import numpy as np
+from ai_edge_litert.interpreter import Interpreter
+from crops import crops
+from folded import folded, operations
+
+from handsteer.landmarks.models import find_model
+
+TARGET = Path(__file__).with_name("ranges.json")
+OPERATIONS = range(4, 42)
+"""Those that ``build.py`` makes integer, and the one that gives them their input."""
+KEPT_PERCENT = 99.9
+"""Numbers beyond are cut off: a few large ones would cost all others their resolution."""
+SAMPLES = 2000
+"""Numbers looked at of each operation and picture."""
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description="Measure the ranges that the 8-bit hand landmark model is made with.")
+    parser.add_argument("folders", type=Path, nargs="+", help="photos of people, with an index.csv")
+    parser.add_argument("--crops", type=int, default=600, help="how many pictures of hands are looked at")
+    options = parser.parse_args()
+    pictures = list(crops(options.folders, "choose"))
+    if not pictures:
+        raise SystemExit("no hand is found in these photos")
+    chosen = np.random.default_rng(0).permutation(len(pictures))[: options.crops]
+    ranges = measured([pictures[i] for i in sorted(chosen)])
+    lines = ",\n".join(f'"{name}": [{low:.4f}, {high:.4f}]' for name, (low, high) in ranges.items())
+    TARGET.write_text(f"{{\n{lines}\n}}\n", encoding="utf-8")
+    json.loads(TARGET.read_text(encoding="utf-8"))
+    print(f"{TARGET}: {len(ranges)} ranges from {len(chosen)} of {len(pictures)} hands")
+
+
+def measured(pictures: list[np.ndarray]) -> dict[str, tuple[float, float]]:
+    """Return what all but a few of each operation's numbers lie between, by the operation's name.
+
+    Args:
+        pictures: (224, 224, 3) uint8 RGB each.
+    """
+    model = folded(find_model("hand_landmark_full.tflite").read_bytes())
+    interpreter = Interpreter(model_content=model, experimental_preserve_all_tensors=True)
+    interpreter.allocate_tensors()
+    outputs = {name: index for _, name, index in operations(model)[OPERATIONS.start : OPERATIONS.stop]}
+    numbers: dict[str, list[np.ndarray]] = {name: [] for name in outputs}
+    random = np.random.default_rng(0)
+    for picture in pictures:
+        interpreter.set_tensor(interpreter.get_input_details()[0]["index"], np.float32(picture[None] / 255))
+        interpreter.invoke()
+        for name, index in outputs.items():
+            numbers[name].append(random.choice(interpreter.get_tensor(index).ravel(), SAMPLES))
+    cut = (100 - KEPT_PERCENT) / 2
+    return {name: tuple(np.percentile(each, [cut, 100 - cut])) for name, each in numbers.items()}
+
+
+if __name__ == "__main__":
+    main()
