@@ -62,6 +62,10 @@ class Roi:
         flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
         return cv2.warpAffine(image, crop_to_frame, (pixels, pixels), flags=flags, borderMode=border)  # type: ignore[return-value]
 
+    def grown(self, factor: float) -> "Roi":
+        """Return the square about the same centre, ``factor`` times as large."""
+        return Roi(self.center_x, self.center_y, self.side * factor, self.rotation)
+
     def overlap(self, other: "Roi") -> float:
         """Return the intersection over union of the two squares as if neither were rotated, 0 to 1."""
         reach = (self.side + other.side) / 2
