@@ -102,7 +102,8 @@ class MediaPipeLandmarker:
         for places in self._search.places(image, beside_a_hand=bool(followed)):
             regions = _distinct([*followed, *places.regions])[:wanted]
             if present := self._present(image, regions, places.min_presence):
-                return present
+                rivals = [each for roi in places.rivals for each in self._present(image, [roi], places.min_presence)]
+                return [max(present + rivals, key=lambda each: each.presence)] if rivals else present
         return []
 
     def _present(self, image: NDArray[np.uint8], regions: list[Roi], min_presence: float = 0.0) -> list[Estimate]:

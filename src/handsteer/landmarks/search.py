@@ -35,10 +35,12 @@ class Places:
     Attributes:
         regions: The surest first.
         min_presence: 0 to 1, how sure the landmark model has to be for it to be a hand, at least.
+        rivals: Other ways to see the one region: if a hand is seen in it, the way counts in which it is seen most surely.
     """
 
     regions: list[Roi]
     min_presence: float = 0.0
+    rivals: tuple[Roi, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -70,10 +72,16 @@ class Middle:
     turned_deg: float = 0.0
 
     def places(self, image: NDArray[np.uint8], palms: PalmDetector, limit: int) -> Places:
-        """Return the one place."""
+        """Return the one place, and how it is seen with the fingers pointing elsewhere.
+
+        A thumb up looks like an index finger to a model that expects the fingers there.
+        """
         height, width = image.shape[:2]
-        roi = Roi(width / 2, height / 2, _MIDDLE * min(width, height), radians(self.turned_deg))
-        return Places([roi], _TURNED_PRESENCE if self.turned_deg else _NEAR_PRESENCE)
+        region, *rivals = (
+            Roi(width / 2, height / 2, _MIDDLE * min(width, height), radians(self.turned_deg + turned))
+            for turned in (0.0, 90.0, 180.0, 270.0)
+        )
+        return Places([region], _TURNED_PRESENCE if self.turned_deg else _NEAR_PRESENCE, tuple(rivals))
 
 
 Turn = tuple[Palms | Middle, ...]
