@@ -118,7 +118,9 @@ def test_a_thumb_up_in_the_middle_is_not_read_as_an_index_finger():
     """Upright, the landmark model expects the fingers where the thumb is; turned, it is surer."""
     view = View(yaw=np.radians(20), pitch=np.radians(-20), roll=np.radians(10 - 90), position=(0.0, 0.0, 0.35))
     placement = view.placement("Right")
-    frame = render(pose_skeleton(THUMB), placement, Pinhole.webcam(640, 480), Look(), make_background("plain", 640, 480))
+    frame = render(
+        pose_skeleton(THUMB), placement, Pinhole.webcam(640, 480), Look(), make_background("plain", 640, 480)
+    )
     no_palms = MediaPipeLandmarker(LandmarksConfig(min_detection_confidence=1))
     (hand,) = no_palms.detect(frame)
     (as_with_a_palm,) = MediaPipeLandmarker(LandmarksConfig()).detect(frame)

@@ -35,7 +35,7 @@ class Places:
     Attributes:
         regions: The surest first.
         min_presence: 0 to 1, how sure the landmark model has to be for it to be a hand, at least.
-        rivals: Other ways to see the one region: if a hand is seen in it, the way counts in which it is seen most surely.
+        rivals: Other ways to see the one region: of those in which a hand is seen, the surest counts.
     """
 
     regions: list[Roi]

@@ -30,14 +30,14 @@ _HANGING_TRUST: Final = 0.82
 
 _PRESENT: Final = 0.7
 _PRESENT_DOUBT: Final = 0.05
-"""The landmark model's certainty at which it is as likely that there is no hand, and the width of that: of people's hands
-99 of 100 are above 0.85, of faces that it takes for a hand half are below."""
+"""The landmark model's certainty at which it is as likely that there is no hand, and the width of that: of people's
+hands 99 of 100 are above 0.85, of faces that it takes for a hand half are below."""
 _SMALL_PX: Final = 17.0
 _SMALL_DOUBT_PX: Final = 4.0
 """Longer side at which a hand is read half as surely, pixels, and the width of that: at 35 pixels a hundredth is
 missing, and a fist 3 m from a webcam of 640x480 has some 17."""
 
-_THRESHOLDS: Final = {STOP: 0.5, GO: 0.75, FORWARD: 0.8, BACKWARD: 0.85, TURN_LEFT: 0.7, TURN_RIGHT: 0.7}
+_THRESHOLDS: Final = {STOP: 0.5, GO: 0.65, FORWARD: 0.8, BACKWARD: 0.85, TURN_LEFT: 0.75, TURN_RIGHT: 0.75}
 """Likelihood from which each sign is sure enough; docs/signs.md has the false rates that they were chosen for."""
 SURE: Final = 0.8
 """The confidence of a sign whose likelihood is just at its threshold."""
