@@ -37,7 +37,7 @@ _SMALL_DOUBT_PX: Final = 4.0
 """Longer side at which a hand is read half as surely, pixels, and the width of that: at 35 pixels a hundredth is
 missing, and a fist 3 m from a webcam of 640x480 has some 17."""
 
-_THRESHOLDS: Final = {STOP: 0.5, GO: 0.65, FORWARD: 0.8, BACKWARD: 0.85, TURN_LEFT: 0.75, TURN_RIGHT: 0.75}
+_THRESHOLDS: Final = {STOP: 0.5, GO: 0.6, FORWARD: 0.7, BACKWARD: 0.9, TURN_LEFT: 0.65, TURN_RIGHT: 0.65}
 """Likelihood from which each sign is sure enough; docs/signs.md has the false rates that they were chosen for."""
 SURE: Final = 0.8
 """The confidence of a sign whose likelihood is just at its threshold."""
