@@ -95,9 +95,9 @@ def test_a_hand_at_the_edge_of_the_frame_is_less_sure() -> None:
 
 
 def test_a_motion_must_be_likelier_than_go_and_stop_to_be_as_sure() -> None:
-    assert CLASSIFIER.confidence(GO, 0.7) > 0.8
-    assert CLASSIFIER.confidence(STOP, 0.7) > 0.8
-    assert all(CLASSIFIER.confidence(sign, 0.7) < 0.8 for sign in MOTION_SIGNS)
+    assert CLASSIFIER.confidence(GO, 0.62) > 0.8
+    assert CLASSIFIER.confidence(STOP, 0.62) > 0.8
+    assert all(CLASSIFIER.confidence(sign, 0.62) < 0.8 for sign in MOTION_SIGNS)
     assert all(CLASSIFIER.confidence(sign, 1.0) == 1.0 for sign in SIGNS)
 
 

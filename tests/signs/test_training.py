@@ -42,11 +42,20 @@ def test_features_know_no_place_size_turn_or_side() -> None:
 
 def test_directions_are_those_in_the_image() -> None:
     pixels = np.zeros((1, 21, 2))
-    pixels[0, [5, 9, 13, 17]] = (0.0, -100.0)
-    pixels[0, 8] = (0.0, -200.0)
+    pixels[0, [5, 9, 13, 17]] = [(30.0, -100.0), (10.0, -100.0), (-10.0, -100.0), (-30.0, -100.0)]
+    pixels[0, 8] = (30.0, -200.0)
     pixels[0, 4] = (50.0, -100.0)
     index, thumb, palm = directions(pixels)
-    assert (index[0].tolist(), thumb[0].tolist(), palm[0].tolist()) == ([0, -100], [50, 0], [0, -100])
+    assert (index[0].tolist(), palm[0].tolist()) == ([0, -100], [0, -100])
+    assert thumb[0] / np.linalg.norm(thumb[0]) == pytest.approx([1.0, 0.0])
+
+
+def test_a_thumb_points_between_its_tip_and_the_row_of_the_knuckles() -> None:
+    pixels = np.zeros((1, 21, 2))
+    pixels[0, [5, 9, 13, 17]] = [(30.0, -100.0), (10.0, -100.0), (-10.0, -100.0), (-30.0, -100.0)]
+    pixels[0, 4] = (50.0, -150.0)
+    thumb = directions(pixels)[1][0]
+    assert np.degrees(np.arctan2(-thumb[1], thumb[0])) == pytest.approx(22.5)
 
 
 def test_a_network_learns_classes_that_no_line_separates() -> None:

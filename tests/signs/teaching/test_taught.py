@@ -10,7 +10,7 @@ from handsteer.landmarks.protocol import Hand
 from handsteer.signs.model import DEFAULT_MODEL, load_model
 from handsteer.signs.protocol import SignGuess
 from handsteer.signs.teaching.taught import TaughtClassifier, load_taught, save_taught
-from handsteer.signs.trained import TrainedClassifier
+from handsteer.signs.trained import TrainedClassifier, legibility
 from handsteer.signs.vocabulary import NONE, SIGNS
 from tests.signs.hands import show_sign
 from tests.signs.teaching.models import COUNT, model
@@ -51,7 +51,7 @@ def test_the_surer_one_counts_when_neither_is_sure() -> None:
 
 def test_the_threshold_is_where_a_sign_is_sure() -> None:
     at = TaughtClassifier(Says(NONE, 1.0), model(hi=0.95, threshold=0.95)).classify(HAND)
-    assert at.confidence == pytest.approx(0.8 * HAND.presence, abs=0.001)
+    assert at.confidence == pytest.approx(0.8 * legibility(HAND), abs=0.001)
 
 
 def test_a_shape_that_is_far_from_what_was_taught_is_none_of_it() -> None:
