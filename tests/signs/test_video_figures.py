@@ -75,6 +75,13 @@ def test_without_labels_signs_and_motion_are_counted() -> None:
     assert json.loads(json.dumps(figures.as_dict()))["labels"] is None
 
 
+def test_motion_behind_a_sign_and_behind_none_are_told_apart() -> None:
+    figures = report("?" * 12, "..FF.GFF....")
+    assert [event.engaged for event in figures.motion_events] == [False, True]
+    assert figures.engaged_rate.per_minute == pytest.approx(60 / 0.5)
+    assert figures.idle_rate.per_minute == pytest.approx(60 / 0.7)
+
+
 @pytest.mark.parametrize("frames", ["", "F"])
 def test_next_to_nothing(frames: str) -> None:
     assert report(frames, frames).motion_rate.per_minute == 0.0

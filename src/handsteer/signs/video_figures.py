@@ -1,7 +1,7 @@
 """How well signs are told over time: false commands a minute, and how soon each sign counts."""
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from itertools import chain, groupby
 from statistics import median
 from typing import Any
@@ -30,12 +30,21 @@ class FrameVerdict:
 
 @dataclass(frozen=True)
 class Event:
-    """A time in which a sign counted without a break, in seconds from the first frame of the video."""
+    """A time in which a sign counted without a break.
+
+    Attributes:
+        sign: The sign.
+        start_s: When it began, in seconds from the first frame of the video.
+        end_s: When its last frame was.
+        video: The video.
+        engaged: Whether another sign counted right before, so that somebody was driving.
+    """
 
     sign: str
     start_s: float
     end_s: float
     video: str = ""
+    engaged: bool = field(default=False, compare=False)
 
 
 @dataclass(frozen=True)
@@ -80,6 +89,17 @@ class VideoReport:
         """How often a sign began to count that moves the robot."""
         return Rate(len(self.motion_events), self.duration_s)
 
+    @property
+    def engaged_rate(self) -> Rate:
+        """How often one began behind another sign, in the time in which signs counted."""
+        engaged_s = sum(time_s for sign, time_s in self.counted_s.items() if sign != NONE)
+        return Rate(sum(event.engaged for event in self.motion_events), engaged_s)
+
+    @property
+    def idle_rate(self) -> Rate:
+        """How often one began when none had counted, in the time in which none did."""
+        return Rate(sum(not event.engaged for event in self.motion_events), self.counted_s.get(NONE, 0.0))
+
     def as_dict(self) -> dict[str, Any]:
         """Return the figures as plain values, for JSON."""
         return {
@@ -89,6 +109,8 @@ class VideoReport:
             "counted_s": self.counted_s,
             "motion_events": [asdict(event) for event in self.motion_events],
             **self.motion_rate.as_dict("motion_events"),
+            **self.engaged_rate.as_dict("motion_events_engaged"),
+            **self.idle_rate.as_dict("motion_events_idle"),
             "labels": self.labels and self.labels.as_dict(),
         }
 
@@ -222,7 +244,9 @@ def _reaction(sign: str, videos: Iterable[Sequence[FrameVerdict]]) -> Reaction:
 def _events(marks: Mapping[str, Sequence[str | None]], videos: Mapping[str, Sequence[FrameVerdict]]) -> Iterator[Event]:
     """Yield an event for each run of the same mark; None marks nothing. It ends with its last frame."""
     for video, frames in videos.items():
-        for mark, group in groupby(zip(marks[video], frames, strict=True), key=lambda pair: pair[0]):
+        for mark, group in groupby(enumerate(marks[video]), key=lambda pair: pair[1]):
             if mark is not None:
-                times_s = [frame.time_s for _, frame in group]
-                yield Event(mark, round(times_s[0], 6), round(times_s[-1], 6), video)
+                numbers = [number for number, _ in group]
+                first, last = numbers[0], numbers[-1]
+                engaged = first > 0 and frames[first - 1].counts != NONE
+                yield Event(mark, round(frames[first].time_s, 6), round(frames[last].time_s, 6), video, engaged)

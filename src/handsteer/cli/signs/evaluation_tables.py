@@ -180,6 +180,8 @@ def _video_tables(name: str, report: VideoReport) -> list[str]:
         table(["sign that counted", "seconds"], [[sign, f"{time_s:.1f}"] for sign, time_s in report.counted_s.items()]),
         f"Times at which a sign began to count that moves the robot: {len(report.motion_events)}, "
         f"{_per_minute(report.motion_rate, ' a minute')}",
+        f"Behind another sign {_per_minute(report.engaged_rate, ' a minute')} of the time with a sign, "
+        f"behind none {_per_minute(report.idle_rate, ' a minute')} of the time without one",
     ]
     if report.labels is None:
         return [*parts, *_events(report.motion_events), "There are no labels to compare with."]
