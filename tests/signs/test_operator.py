@@ -62,9 +62,16 @@ def test_a_much_smaller_hand_does_not_take_over_while_the_followed_one_is_in_vie
 def test_for_a_short_loss_nobody_takes_over() -> None:
     operator = Operator(CONFIG)
     look(operator, (LEFT, FORWARD), frames=10)
-    assert look(operator, (RIGHT, STOP), frames=2) is None
+    assert look(operator, (RIGHT, GO), frames=2) is None
+    assert look(operator, (LEFT, FORWARD), (RIGHT, GO)) is LEFT
+    assert look(operator, (RIGHT, GO), frames=5) is RIGHT
+
+
+def test_stop_counts_from_any_hand_while_the_followed_one_is_lost() -> None:
+    operator = Operator(CONFIG)
+    look(operator, (LEFT, FORWARD), frames=10)
     assert look(operator, (LEFT, FORWARD), (RIGHT, STOP)) is LEFT
-    assert look(operator, (RIGHT, STOP), frames=5) is RIGHT
+    assert look(operator, (RIGHT, STOP)) is RIGHT
 
 
 def test_a_moving_hand_is_followed() -> None:

@@ -8,7 +8,7 @@ from handsteer.landmarks.recorded import RecordedLandmarker
 from handsteer.signs.model import load_model
 from handsteer.signs.recognizer import Recognizer
 from handsteer.signs.trained import TrainedClassifier
-from handsteer.signs.vocabulary import FORWARD, NONE, SIGNS, STOP
+from handsteer.signs.vocabulary import FORWARD, GO, NONE, SIGNS, STOP
 from tests.signs.hands import moved, show_fingers, show_sign
 
 IMAGE = np.zeros((480, 640, 3), np.uint8)
@@ -67,6 +67,21 @@ def test_stop_counts_at_its_first_frame_however_the_hand_moves() -> None:
     hands = [moved(show_sign(STOP), x_px=-150.0 + 40.0 * frame) for frame in range(3)]
     stream = Recognizer(RecordedLandmarker([[hand] for hand in hands]), CLASSIFIER, SignsConfig())
     assert stream.step(IMAGE, 1 / 30).sign == STOP
+
+
+@pytest.mark.parametrize("x_px", [0.0, 30.0, 200.0])
+def test_another_sign_counts_as_soon_wherever_the_hand_is_by_then(x_px: float) -> None:
+    hands = [show_sign(GO)] * 10 + [moved(HAND, x_px=x_px)] * 10
+    stream = Recognizer(RecordedLandmarker([[hand] for hand in hands]), CLASSIFIER, SignsConfig(bridge_time=0.0))
+    signs = [stream.step(IMAGE, 1 / 30).sign for _ in range(20)]
+    # A hand that jumps by more than its size is another hand, which is seen from the next frame on.
+    assert signs.index(FORWARD) <= (14 if x_px > 100 else 13)
+
+
+def test_stop_counts_at_its_first_frame_where_the_hand_has_jumped_to() -> None:
+    hands = [HAND] * 6 + [moved(show_sign(STOP), x_px=250.0)]
+    stream = Recognizer(RecordedLandmarker([[hand] for hand in hands]), CLASSIFIER, SignsConfig())
+    assert [stream.step(IMAGE, 1 / 30).sign for _ in range(7)][-2:] == [FORWARD, STOP]
 
 
 def test_a_sign_that_counts_goes_on_while_the_hand_moves() -> None:

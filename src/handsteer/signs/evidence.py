@@ -30,7 +30,7 @@ class Evidence:
         """Take the next frame.
 
         Args:
-            place: Where the hand is; None when it is not in view, which forgets all before.
+            place: Where its palm is; None when it is not in view, which forgets all before.
             likelihoods: How likely each sign is, 0 to 1.
             dt_s: Seconds since the last frame, >= 0.
         """

@@ -10,9 +10,10 @@ import numpy as np
 from handsteer.config import SignsConfig
 from handsteer.landmarks.protocol import Hand
 from handsteer.signs.protocol import SignGuess
-from handsteer.signs.vocabulary import NONE
+from handsteer.signs.vocabulary import NONE, STOP
 
 _SEARCH_PERIOD_S: Final = 0.2
+_PALM: Final = [0, 5, 9, 13, 17]
 _JUMP: Final = 1.0
 """How far a hand can move from one frame to the next, in its own sizes."""
 _MUCH_SMALLER: Final = 0.6
@@ -34,6 +35,12 @@ class Place:
         x, y = ((low + high) / 2).tolist()
         return cls(x, y, max(1.0, float(np.max(high - low))))
 
+    @classmethod
+    def of_palm(cls, hand: Hand) -> "Place":
+        """Return where the palm of ``hand`` is, which stays when fingers move, and how large the whole hand is."""
+        x, y = hand.pixels[_PALM, :2].mean(axis=0).tolist()
+        return cls(x, y, max(1.0, hand.longer_side_px))
+
     def distance(self, other: "Place") -> float:
         """Return how far ``other`` is from here, in sizes of this one."""
         return float(np.hypot(self.x - other.x, self.y - other.y)) / self.size
@@ -45,7 +52,7 @@ class Operator:
     - While none is followed, it is the hand that shows a sign: the surest and largest of them.
     - Once a sign of it counts, it stays the one while it is in view, until none has counted for ``switch_time`` and
       another hand, which is not much smaller, shows one: a resting hand or a bystander doesn't take over.
-    - A hand that is out of view for ``bridge_time`` is followed no more.
+    - A hand that is out of view for ``bridge_time`` is followed no more; while it is, any hand may show ``Stop``.
     """
 
     def __init__(self, config: SignsConfig) -> None:
@@ -87,7 +94,10 @@ class Operator:
         self._idle_s += dt_s
         followed = self._find(places, dt_s)
         if self._followed is not None and followed is None:
-            return None
+            # Anybody may stop the robot, and so may the hand that was followed where it has jumped to.
+            showing = [index for index in showing if guesses[index].sign == STOP]
+            if not showing:
+                return None
         if followed is not None and followed not in showing and self._idle_s >= self._config.switch_time:
             showing = [index for index in showing if places[index].size >= _MUCH_SMALLER * places[followed].size]
         elif followed is not None:

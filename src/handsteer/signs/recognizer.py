@@ -81,9 +81,11 @@ class Recognizer:
         chosen = self._operator.choose(hands, guesses, dt_s)
         hand, guess = (hands[chosen], guesses[chosen]) if chosen is not None else (None, _NOTHING)
         likelihoods = told[chosen].likelihoods if chosen is not None else {}
-        self._evidence.add(Place.of(hand) if hand else None, likelihoods, dt_s)
-        guess = self._bridged(guess, dt_s)
-        sign = self._filter.step(guess.sign, dt_s, still=self._evidence.is_still(self._config.confirm_time))
+        self._evidence.add(Place.of_palm(hand) if hand else None, likelihoods, dt_s)
+        since_s = self._filter.candidate_s + dt_s
+        guess = self._bridged(guess, since_s)
+        still = self._evidence.is_still(min(since_s, self._config.confirm_time))
+        sign = self._filter.step(guess.sign, dt_s, still=still)
         if hand is not None and guess.sign == sign != NONE:
             self._operator.confirm()
             self._landmarker.follow_only(hand)
@@ -107,12 +109,12 @@ class Recognizer:
         self._operator.reset()
         self._evidence.reset()
 
-    def _bridged(self, guess: SignGuess, dt_s: float) -> SignGuess:
+    def _bridged(self, guess: SignGuess, since_s: float) -> SignGuess:
         """Return the candidate in place of a ``guess`` of nothing, if the frames since it began are sure of it."""
         candidate = self._filter.candidate
         if guess.sign != NONE or candidate == NONE:
             return guess
-        likelihood = self._evidence.likelihood(candidate, self._filter.candidate_s + dt_s)
+        likelihood = self._evidence.likelihood(candidate, since_s)
         confidence = self._classifier.confidence(candidate, likelihood)
         return SignGuess(candidate, confidence) if confidence >= self._config.min_confidence else guess
 
