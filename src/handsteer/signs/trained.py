@@ -1,4 +1,4 @@
-"""Signs told by a trained network from the shape of the hand, and by where it points."""
+"""Signs recognised by a trained network from the shape of the hand, and by where it points."""
 
 import math
 from typing import Final

@@ -27,7 +27,7 @@ def made_hands(chunks: int, seed: int) -> tuple[NDArray[np.float64], NDArray[np.
     """Return (n, features) of n made hands, and their (n,) shapes as indices into ``SHAPES``.
 
     Args:
-        chunks: How much to make: each is about 39 000 hands.
+        chunks: How much to make: each is about 58 000 hands.
         seed: The same seed gives the same hands.
     """
     people = load_people()
@@ -53,5 +53,10 @@ def train_default(progress: Callable[[int], object], chunks: int = _CHUNKS, epoc
     network = train(features, shapes, hidden=HIDDEN, epochs=epochs, seed=SEED, progress=progress)
     novelty = learn_novelty(features, shapes, network.mean, network.scale)
     counts = {shape: int(count) for shape, count in zip(SHAPES, np.bincount(shapes), strict=True)}
-    trained_on = {"source": "hands made by handsteer.signs.training", "seed": SEED, "hands": counts, "format": FORMAT}
+    trained_on = {
+        "source": "hands made by handsteer.signs.training, and drawn from its statistics of people",
+        "seed": SEED,
+        "hands": counts,
+        "format": FORMAT,
+    }
     return SignModel(SHAPES, network, novelty, trained_on)

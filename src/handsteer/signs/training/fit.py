@@ -4,7 +4,6 @@ Each folder has an ``index.csv`` (docs/signs-evaluate.md). Only photos of the pa
 (:mod:`handsteer.signs.training.split`). What is written holds means and spreads, no picture and no row of a person.
 """
 
-import csv
 import itertools
 import sys
 from collections import defaultdict
@@ -25,7 +24,7 @@ from handsteer.hand.placement import Pinhole, Placement, orientation
 from handsteer.hand.renderer import SKINS, Look, render
 from handsteer.landmarks.mediapipe import MediaPipeLandmarker
 from handsteer.landmarks.protocol import Hand
-from handsteer.signs.labelled import INDEX
+from handsteer.signs.labelled import read_photo_labels
 from handsteer.signs.training.people import (
     COORDINATES,
     FILE,
@@ -39,7 +38,7 @@ from handsteer.signs.training.split import Part, part_of
 from handsteer.signs.training.truth import FIST, OPEN, OTHER, SHAPES, THUMB
 from handsteer.signs.training.truth import INDEX as POINTING
 from handsteer.signs.views import View
-from handsteer.signs.vocabulary import NONE
+from handsteer.signs.vocabulary import NONE, SIGNS
 
 _SHAPES: Final = {"Stop": OPEN, "Forward": POINTING, "Go": FIST, "Turn Right": THUMB, "Turn Left": THUMB}
 _KINDS: Final = {
@@ -70,6 +69,10 @@ _RAISED: Final = 0.6
 
 def main() -> None:
     """Write the statistics of the photos in the folders named on the command line."""
+    if len(sys.argv) < 2:
+        raise SystemExit(
+            "name the folders of labelled photos to fit to: without any, the statistics would be of no people"
+        )
     hands = defaultdict(list)
     for folder in map(Path, sys.argv[1:]):
         for kind, coordinates in seen_hands(folder):
@@ -81,17 +84,19 @@ def main() -> None:
 
 
 def seen_hands(folder: Path, part: Part = "tune") -> Iterator[tuple[str, Array]]:
-    """Yield the kind and the (105,) canonical coordinates of the hand in each photo of a part of ``folder``."""
+    """Yield the kind and the (105,) canonical coordinates of the hand in each photo of a part of ``folder``.
+
+    Raises:
+        LabelError: The folder has no labels that can be used.
+    """
     landmarker = MediaPipeLandmarker(LandmarksConfig())
-    with (folder / INDEX).open(encoding="utf-8") as file:
-        rows = [row for row in csv.DictReader(file) if row["sign"]]
-    for row in tqdm(rows, desc=folder.name, disable=None):
-        if part_of(row["path"], row["person_set"]) != part:
+    for photo in tqdm(read_photo_labels(folder, SIGNS), desc=folder.name, disable=None):
+        if photo.truth is None or part_of(photo.path, photo.person_set) != part:
             continue
         landmarker.reset()
-        hands = landmarker.detect(View().picture(read_photo(folder / row["path"])))
+        hands = landmarker.detect(View().picture(read_photo(photo.path)))
         if hands:
-            kind = _KINDS.get(row["kind"], row["kind"]) if row["sign"] == NONE else _SHAPES[row["sign"]]
+            kind = _KINDS.get(photo.kind, photo.kind) if photo.truth == NONE else _SHAPES[photo.truth]
             yield kind, _coordinates(_raised(hands))
 
 
