@@ -9,8 +9,7 @@ from handsteer.signs.operator import Place
 
 _FRAMES: Final = 12
 _STILL: Final = 0.25
-"""How far a hand that is held still strays during the confirmation, in its own sizes: the strokes of a sign language go
-three times as far, a tremor a tenth."""
+"""How far a hand that is held still may stray during the confirmation, in its own sizes; chosen, not measured."""
 
 
 @dataclass(frozen=True)

@@ -9,11 +9,12 @@ import numpy as np
 
 from handsteer.config import SignsConfig
 from handsteer.landmarks.protocol import Hand
+from handsteer.signs.features import KNUCKLES, WRIST
 from handsteer.signs.protocol import SignGuess
 from handsteer.signs.vocabulary import NONE, STOP
 
 _SEARCH_PERIOD_S: Final = 0.2
-_PALM: Final = [0, 5, 9, 13, 17]
+_PALM: Final = [WRIST, *KNUCKLES]
 _JUMP: Final = 1.0
 """How far a hand can move from one frame to the next, in its own sizes."""
 _MUCH_SMALLER: Final = 0.6

@@ -18,7 +18,7 @@ _POINTING: Final = 52.0
 """How far off its axis an index finger may point, degrees: people tilt their hands by up to 30, and their fingers in
 their hands."""
 _SIDEWAYS: Final = 49.0
-"""How far off the horizontal a thumb may point, degrees: half of what is between a turn and a thumb up."""
+"""How far off the horizontal a thumb may point, degrees: about half-way to a thumb up or down."""
 _UPRIGHT: Final = 55.0
 """How far from upwards an open hand may point: others hang, or rest."""
 _RAISED: Final = 120.0

@@ -40,7 +40,7 @@ def evaluate(
     config_file: ConfigFile = None,
     parameters: Parameters = None,
 ) -> int:
-    """Print how well the signs are told in labelled photos, in videos, or in datasets of landmarks.
+    """Print how well the signs are recognised in labelled photos, in videos, or in datasets of landmarks.
 
     Example: handsteer signs evaluate photos/ more/ a.mp4 --flip --rotate -15,0,15
 

@@ -1,4 +1,4 @@
-"""Trains the sign model that handsteer ships, from hands that it makes itself: ``make signs-model``.
+"""Trains the sign model that handsteer ships, from hands that are made and drawn: ``make signs-model``.
 
 The same code gives the same bytes, so the file in the repository can be checked against it.
 """

@@ -34,7 +34,6 @@ _WIDER: Final = 1.2
 """Times the measured spread: strangers differ more from these people than these do among themselves."""
 _CHOICES: Final = 24
 _THUMB: Final = slice(1, 5)
-_PALM: Final = [5, 9, 13, 17]
 _TURNED_RAD: Final = np.radians(18.0)
 """Standard deviation by which half of the hands are seen from further aside, above or below, radians."""
 
@@ -107,7 +106,7 @@ def _closed_like(hands: Array, others: Array, random: Random) -> Array:
     image, space = (points.copy() for points in from_canonical(hands))
     choices = random.integers(0, len(others), (len(hands), _CHOICES))
     other_image, other_space = from_canonical(others)
-    palm, other_palm = space[:, _PALM] - space[:, [WRIST]], other_space[:, _PALM] - other_space[:, [WRIST]]
+    palm, other_palm = space[:, KNUCKLES] - space[:, [WRIST]], other_space[:, KNUCKLES] - other_space[:, [WRIST]]
     unlike = ((other_palm[choices] - palm[:, None]) ** 2).sum(axis=(2, 3))
     chosen = choices[np.arange(len(hands)), unlike.argmin(axis=1)]
     for points, theirs in ((image, other_image[chosen]), (space, other_space[chosen])):
