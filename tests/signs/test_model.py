@@ -30,7 +30,7 @@ def test_the_shipped_model_is_small_and_says_what_it_was_trained_on() -> None:
     model = load_model()
     assert len(CONTENT) < 300_000
     assert model.shapes == ("open", "index", "thumb", "fist", "other")
-    assert model.trained_on["source"] == "hands made by handsteer.signs.training"
+    assert "handsteer.signs.training" in model.trained_on["source"]
     assert sum(model.trained_on["hands"].values()) > 100_000
 
 
