@@ -91,3 +91,9 @@ class Peer(Process):
         line = str(self.popen.stdout.readline())
         assert line, f"the peer has ended: {self.text}"
         return line.strip()
+
+
+def as_tests_drive(verb: str, options: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the options of one of handsteer's nodes; a control follows the first sign, unless they say otherwise."""
+    is_told = verb != "control" or any("arming" in option for option in options)
+    return options if is_told else ("--control.arming", "off", *options)

@@ -10,6 +10,8 @@ import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Protocol
 
+from handsteer.timeouts import RESYNC_S, STALE_S
+
 if TYPE_CHECKING:
     from handsteer.messages import Time
 
@@ -17,6 +19,8 @@ _NS_PER_S = 1_000_000_000
 _LOOK_AGAIN_S = 0.005
 # Simulators tell their time 10 to 1000 times a second.
 _STANDS_AFTER_S = 0.15
+# What a clock was set by, at least; less may be a delay.
+_LEAST_SET_S = 1.0
 
 
 class Clock(Protocol):
@@ -174,6 +178,52 @@ class SimulatedClock:
         # The greatest of all, because sums of the same seconds in another order differ in their last digit.
         self._newest_s = max(self._newest_s, self._told_s + self._offset_s + stood_s)
         return self._newest_s
+
+
+class ClockWatch:
+    """Notices that the clock which stamps messages, or ours, was set while they came.
+
+    By their stamps, messages that come in order cannot get older faster than time passes; where the clocks are in step,
+    none is from the future. Where they do, or one is, by a second or more, a clock was set. Messages are then watched
+    for :data:`~handsteer.timeouts.RESYNC_S`; if all of them agree, their ages are corrected by as much.
+
+    Args:
+        in_step: Whether the two clocks are meant to tell the same time.
+
+    Attributes:
+        set_by_s: By how much the clock was set, in seconds, back if positive.
+    """
+
+    def __init__(self, *, in_step: bool) -> None:
+        self._in_step = in_step
+        self.set_by_s = 0.0
+        self._correction_s = 0.0
+        self._last: tuple[float, float] | None = None
+        self._watched: tuple[float, float] | None = None
+
+    def corrected(self, age_s: float, now_s: float) -> float | None:
+        """Return the age of a message without what a clock was set by; None while that is being found out.
+
+        Args:
+            age_s: Time of arrival less that of the stamp, in seconds, of whatever two clocks.
+            now_s: Time of arrival, in seconds of a monotonic clock.
+        """
+        last, self._last = self._last, (age_s, now_s)
+        if last is not None and self._watched is None and self._was_set(*last, age_s, now_s):
+            self._watched, self.set_by_s = (age_s, now_s), age_s - last[0]
+        if self._watched is not None:
+            first_age_s, since_s = self._watched
+            if abs(age_s - first_age_s) > STALE_S:  # one message that was late, no clock
+                self._watched = None
+            elif now_s - since_s >= RESYNC_S:
+                self._correction_s += self.set_by_s
+                self._watched = None
+        return None if self._watched is not None else age_s - self._correction_s
+
+    def _was_set(self, last_age_s: float, last_s: float, age_s: float, now_s: float) -> bool:
+        set_back_s = age_s - last_age_s - (now_s - last_s)
+        is_ahead, was_ahead = (age - self._correction_s < -_LEAST_SET_S for age in (age_s, last_age_s))
+        return set_back_s > _LEAST_SET_S or (self._in_step and is_ahead and not was_ahead)
 
 
 def to_stamp(seconds: float) -> "Time":

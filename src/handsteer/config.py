@@ -15,6 +15,7 @@ from handsteer.control.actions import ALWAYS_STOP, BUILT_IN, Action
 from handsteer.errors import ConfigError
 from handsteer.presets import CmdVelType, Preset, preset
 from handsteer.signs.vocabulary import find_sign
+from handsteer.timeouts import ODOMETRY_S, ROBOT_S, STALE_S
 
 S = TypeVar("S", bound="Section")
 
@@ -111,7 +112,7 @@ class SignsConfig(Section):
     switch_time: float = Field(
         0.5, ge=0, le=10, description="How long the followed hand shows no sign before another that shows one is [s]"
     )
-    max_frame_age: float = Field(0.35, gt=0, le=10, description="An older frame counts as no frame [s]")
+    max_frame_age: float = Field(STALE_S, gt=0, le=10, description="An older frame counts as no frame [s]")
     image_transport: Literal["auto", "raw", "compressed"] = Field(
         "auto",
         description="Which images are recognised: raw is /image_raw, compressed is /image_raw/compressed; "
@@ -140,9 +141,19 @@ class ControlConfig(Section):
             "sign_timeout",
             "steering_timeout",
             "actions",
+            "max_sign_rate",
+            "max_linear_acceleration",
+            "max_angular_acceleration",
+            "max_linear_jerk",
+            "max_angular_jerk",
         }
     )
 
+    arming: Literal["auto", "on", "off"] = Field(
+        "auto",
+        description="Whether nothing moves before neutral was seen (Stop, or no hand), after the start and after every "
+        "fault; auto is on unless the robot is simulated in the same process",
+    )
     ramp: Literal["per_message", "per_second"] = Field(
         "per_message",
         description="per_message grows by a step a message, as the tutorial does; per_second whatever the frame rate",
@@ -151,11 +162,34 @@ class ControlConfig(Section):
     angular_step: float = Field(0.1, gt=0, le=5, description="Growth of turning speed a message [rad/s]")
     linear_acceleration: float = Field(0.3, gt=0, le=10, description="Growth of forward speed if per_second [m/s²]")
     angular_acceleration: float = Field(3.0, gt=0, le=50, description="Growth of turning speed if per_second [rad/s²]")
+    max_sign_rate: float = Field(
+        60.0, gt=0, le=1000, description="More signs than this a second make the robot no faster, if per_message [1/s]"
+    )
     max_linear: float = Field(1.0, gt=0, le=10, description="Highest forward and backward speed [m/s]")
     max_angular: float = Field(2.0, gt=0, le=20, description="Highest turning speed [rad/s]")
-    sign_timeout: float = Field(0.35, gt=0, le=5, description="Without a sign for this long, the robot is stopped [s]")
+    max_linear_acceleration: float = Field(
+        0.0, ge=0, le=1000, description="Limit of what is commanded when speeding up, whoever drives; 0 is none [m/s²]"
+    )
+    max_angular_acceleration: float = Field(
+        0.0,
+        ge=0,
+        le=1000,
+        description="Limit of what is commanded when speeding up, whoever drives; 0 is none [rad/s²]",
+    )
+    max_linear_jerk: float = Field(
+        0.0, ge=0, le=1000, description="Limit of what is commanded when speeding up, whoever drives; 0 is none [m/s³]"
+    )
+    max_angular_jerk: float = Field(
+        0.0,
+        ge=0,
+        le=1000,
+        description="Limit of what is commanded when speeding up, whoever drives; 0 is none [rad/s³]",
+    )
+    sign_timeout: float = Field(
+        STALE_S, gt=0, le=5, description="Without a sign for this long, the robot is stopped [s]"
+    )
     steering_timeout: float = Field(
-        0.35, gt=0, le=5, description="Steering by hand keeps the signs out for this long after its last command [s]"
+        STALE_S, gt=0, le=5, description="Steering by hand keeps the signs out for this long after its last command [s]"
     )
     actions: dict[str, Action] = Field(
         {}, description="What further signs do, as {Hi: stop, Peace: turbo}; Stop and NONE always stop"
@@ -170,6 +204,12 @@ class ControlConfig(Section):
         max_length=32,
         description="Namespaces of robots that one hand drives in turn, as [r1, r2]; none has one robot, without one",
     )
+
+    @field_validator("arming", mode="before")
+    @classmethod
+    def _as_yaml_reads_it(cls, arming: object) -> object:
+        # To YAML, and so to ROS, on and off are other words for true and false.
+        return {True: "on", False: "off"}[arming] if isinstance(arming, bool) else arming
 
     @field_validator("robots")
     @classmethod
@@ -211,7 +251,7 @@ class RobotConfig(Section):
         "odometry", description="What it carries: nav_msgs/Odometry or turtlesim/Pose"
     )
     odom_timeout: float = Field(
-        0.5, gt=0, le=10, description="Odometry of a real robot that stops for this long stops the robot [s]"
+        ODOMETRY_S, gt=0, le=10, description="Odometry of a real robot that stops for this long stops the robot [s]"
     )
     command_rate: float = Field(
         20.0, ge=5, le=50, description="How often a real robot is told again what it is told [1/s]"
@@ -224,7 +264,10 @@ class RobotConfig(Section):
     max_angular: float = Field(8.0, gt=0, le=50, description="Limit of the controller [rad/s]")
     max_angular_acceleration: float = Field(2.0, gt=0, le=50, description="Limit of the controller [rad/s²]")
     cmd_vel_timeout: float = Field(
-        0.4, gt=0, le=10, description="Without a command for this long, or when a stamped one is older, it brakes [s]"
+        ROBOT_S,
+        gt=0,
+        le=10,
+        description="Without a command for this long, or when a stamped one is older, it brakes [s]",
     )
     odom_frame_id: str = Field("odom", description="Coordinate frame of the odometry")
     base_frame_id: str = Field("base_link", description="Coordinate frame of the robot")

@@ -74,7 +74,7 @@ class Graph:
         self.recognition = make_recognition(config, *wires)
         self.cameras = open_cameras(config, self.clock)
         self.camera = make_camera(config, *wires, self.cameras)
-        self.control = make_control(config, *wires)
+        self.control = make_control(config, *wires, simulated=config.robot.kind == "sim")
         self.steering = make_steering(config, *wires)
         self._added: tuple[Node, ...] = ()
         self._link = link
@@ -265,13 +265,20 @@ def cmd_vel_topic(config: Config) -> Topic[Any]:
     return cmd_vel(cmd_vel_type(config))
 
 
-def make_control(config: Config, transport: Transport, clock: Clock) -> HandSignControlNode:
+def make_control(config: Config, transport: Transport, clock: Clock, *, simulated: bool = False) -> HandSignControlNode:
     """Return the node ``hand_sign_control``.
+
+    Args:
+        config: Everything that can be set.
+        transport: Carries the messages.
+        clock: The graph's clock.
+        simulated: Whether it is known that the robot is simulated; ``control.arming`` is then off if it is ``auto``.
 
     Raises:
         ConfigError: Control and robot were told different types of commands.
     """
-    return HandSignControlNode(transport, clock, config.control, cmd_vel_topic(config))
+    arming = config.control.arming == "on" or (config.control.arming == "auto" and not simulated)
+    return HandSignControlNode(transport, clock, config.control, cmd_vel_topic(config), arming=arming)
 
 
 def make_robot(config: Config, transport: Transport, clock: Clock, link: Session | None = None) -> RobotNode:

@@ -40,6 +40,7 @@ from rosbags.typesys.stores.ros2_jazzy import visualization_msgs__msg__MarkerArr
 from rosbags.typesys.stores.ros2_jazzy import visualization_msgs__msg__MeshFile as MeshFile
 
 from handsteer.presets import CmdVelType
+from handsteer.timeouts import STALE_S
 
 __all__ = [
     "Bool",
@@ -135,20 +136,19 @@ class Topic(Generic[M]):
         return self.name if self.is_global else self.name.removeprefix("/")
 
 
-# Shorter than the robot's own patience: what is older has been answered by a stop already.
-_COMMAND_LIFESPAN_S = 0.35
-
 IMAGE_RAW = Topic("/image_raw", Image)
 IMAGE_COMPRESSED = Topic("/image_raw/compressed", CompressedImage, beneath=IMAGE_RAW)
 # Each sign makes the robot a step faster, so none may be lost when several come at once.
-HAND_SIGN = Topic("/gesture/hand_sign", String, depth=10, lifespan_s=_COMMAND_LIFESPAN_S)
+HAND_SIGN = Topic("/gesture/hand_sign", String, depth=10, lifespan_s=STALE_S)
 IMAGE_ANNOTATED = Topic("/gesture/image_annotated", Image)
-CMD_VEL = Topic("/robot_diff_drive_controller/cmd_vel", Twist, depth=10, lifespan_s=_COMMAND_LIFESPAN_S)
+CMD_VEL = Topic("/robot_diff_drive_controller/cmd_vel", Twist, depth=10, lifespan_s=STALE_S)
 SELECT_ROBOT = Topic("/select_robot", String, depth=10)
 SELECTED_ROBOT = Topic("/selected_robot", String, latched=True)
 # True stops the robot, whoever drives; false lets it drive again. No stop may get lost.
 STOP = Topic("/stop", Bool, depth=10)
-STEERING_CMD_VEL = Topic("/steering/cmd_vel", Twist, lifespan_s=_COMMAND_LIFESPAN_S)
+# What the nodes remember of it, for one that starts anew: each that runs says so.
+STOPPED = Topic("/stopped", Bool, latched=True, depth=10)
+STEERING_CMD_VEL = Topic("/steering/cmd_vel", Twist, lifespan_s=STALE_S)
 ODOM = Topic("/robot_diff_drive_controller/odom", Odometry)
 TF = Topic("/tf", TFMessage, is_global=True, depth=10)
 JOINT_STATES = Topic("/joint_states", JointState)

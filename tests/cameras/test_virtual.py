@@ -53,8 +53,8 @@ def test_two_cameras_of_one_configuration_show_the_same() -> None:
     for clock in clocks:
         clock.advance(1.2)
     first, second = (hand.read().image.astype(int) for hand in hands)
-    # 8.2 - 7.0 is not quite 1.2, so the odd pixel may differ by a rounding.
-    assert np.abs(first - second).max() <= 1
+    # 8.2 - 7.0 is not quite 1.2, so the odd pixel may differ by a rounding; each has its noise, of 0 to 2.
+    assert np.abs(first - second).max() <= 3
 
 
 def test_the_script_is_shown_over_and_over() -> None:

@@ -107,12 +107,12 @@ class ControlContract:
         time.sleep(0.6)
         assert len(driver.twists) == 3
 
-    @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-    def test_one_zero_at_exit(self, drive: MakeDriver, number: signal.Signals) -> None:
+    @pytest.mark.parametrize("name", ["INT", "TERM", "HUP", "QUIT", "ABRT", "TSTP", "USR1", "ALRM"])
+    def test_one_zero_at_exit(self, drive: MakeDriver, name: str) -> None:
         driver = drive("--control.sign-timeout", "5")
         driver.show("Forward", count=2)
         driver.expect((0.01, 0.0), (0.02, 0.0))
-        driver.process.signal(number)
+        driver.process.signal(signal.Signals[f"SIG{name}"])
         assert driver.process.code() == 0, driver.process.text
         driver.expect((0.01, 0.0), (0.02, 0.0), (0.0, 0.0))
 
@@ -126,6 +126,23 @@ class ControlContract:
         driver.expect((0.01, 0.0), (0.02, 0.0), (0.03, 0.0), (0.0, 0.0))
         time.sleep(0.5)
         assert set(driver.twists[3:]) == {(0.0, 0.0)}
+
+    def test_a_hand_that_is_up_at_the_start_moves_nothing_before_neutral_was_seen(self, drive: MakeDriver) -> None:
+        driver = drive("--control.arming", "auto")
+        driver.show("Forward", count=60)
+        eventually(lambda: len(driver.twists) >= 60, what="a twist for each sign")
+        assert set(driver.twists) == {(0.0, 0.0)}
+        driver.show("NONE", count=40)
+        driver.show("Forward", count=5)
+        eventually(lambda: driver.twists[-1] == (0.05, 0.0), what="the robot to be driven")
+        driver.show("Stop")
+        time.sleep(0.6)  # as a camera that hangs
+        driver.show("Forward", count=5)
+        eventually(lambda: len(driver.twists) >= 112, what="a twist for each sign, and a zero")
+        assert driver.twists[-1] == (0.0, 0.0)
+        driver.show("Stop")
+        driver.show("Forward")
+        eventually(lambda: driver.twists[-1] == (0.01, 0.0), what="the robot to be driven")
 
 
 @dataclass(frozen=True)
@@ -210,7 +227,7 @@ class ChainContract:
         assert stood_s - resumed_s < 0.6  # 0.3 m/s at 1 m/s², and no more
 
 
-RUN = ("--headless", "--json", *FORWARD, "--virtual-hand.script", "Forward:600", "--control.max-linear", "0.1")
+RUN = ("--headless", "--json", *FORWARD, "--virtual-hand.script", "Stop:2 Forward:600", "--control.max-linear", "0.1")
 """A run that drives a robot of another process, at 0.1 m/s in the end."""
 
 

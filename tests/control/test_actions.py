@@ -5,7 +5,8 @@ from hypothesis import strategies as st
 from handsteer.config import ControlConfig
 from handsteer.control.actions import ACTIONS, EFFECTS, action_of, motion_signs
 from handsteer.control.driver import Driver
-from handsteer.control.sign_control import ZERO, SignControl, Velocity
+from handsteer.control.sign_control import SignControl
+from handsteer.control.velocity import ZERO, Velocity
 from handsteer.signs.vocabulary import FORWARD, GO, MOTION_SIGNS, NONE, SIGNS, STOP, TURN_LEFT
 
 DT = 1 / 30

@@ -5,7 +5,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from handsteer.config import ControlConfig
-from handsteer.control.sign_control import ZERO, SignControl, Velocity
+from handsteer.control.sign_control import SignControl
+from handsteer.control.velocity import ZERO, Velocity
 from handsteer.signs.vocabulary import BACKWARD, FORWARD, GO, NONE, SIGNS, STOP, TURN_LEFT, TURN_RIGHT
 
 DT = 1 / 30

@@ -1,4 +1,4 @@
-from handsteer.control.sign_control import Velocity
+from handsteer.control.velocity import Velocity
 from handsteer.dashboard.history import PERIOD_S, SPAN_S, Sample, VelocityHistory
 from handsteer.dashboard.panels.plot import rows_of
 

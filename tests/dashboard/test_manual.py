@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from handsteer.control.sign_control import ZERO, Velocity
+from handsteer.control.velocity import ZERO, Velocity
 from handsteer.dashboard.manual import SLIDERS_TIMEOUT_S, Manual
 
 SLOW, FAST = Velocity(0.2, 0.1), Velocity(-0.4, 1.0)

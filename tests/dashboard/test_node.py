@@ -5,7 +5,7 @@ import pytest
 
 from handsteer.clock import SteppedClock
 from handsteer.config import ControlConfig
-from handsteer.control.sign_control import Velocity
+from handsteer.control.velocity import Velocity
 from handsteer.dashboard.node import HOLD_TIMEOUT_S, DashboardNode
 from handsteer.dashboard.watch import WhileWatched
 from handsteer.errors import TransportError

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from handsteer.control.sign_control import ZERO, Velocity
+from handsteer.control.velocity import ZERO, Velocity
 from handsteer.dashboard.panels.banner import spoken
 from handsteer.dashboard.panels.mux import entries
 from handsteer.dashboard.panels.sliders import read_limit

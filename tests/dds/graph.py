@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from tests.processes import Peer, Process, eventually
+from tests.processes import Peer, Process, as_tests_drive, eventually
 
 PEER = Path(__file__).with_name("peer.py")
 # Domains above have their ports among those that the system gives to others.
@@ -95,7 +95,9 @@ class DdsGraph:
 
     def node(self, verb: str, *arguments: str, name: str, ros: tuple[str, ...] = ()) -> Process:
         """Start one of handsteer's nodes and wait until it is in the graph under ``name``."""
-        process = self.handsteer(verb, "--transport", "dds", *arguments, *(("--ros-args", *ros) if ros else ()))
+        process = self.handsteer(
+            verb, "--transport", "dds", *as_tests_drive(verb, arguments), *(("--ros-args", *ros) if ros else ())
+        )
         eventually(lambda: name in self.nodes() or not process.running, what=f"{name} to start")
         assert process.running, process.text
         return process

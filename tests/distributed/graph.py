@@ -10,7 +10,7 @@ from typing import Any
 
 from tests.dds.graph import PEER, ROS_VARIABLES
 from tests.distributed.network import DEVICE, ROBOT, WORKSTATION, Link, Machine
-from tests.processes import Peer, Process, eventually
+from tests.processes import Peer, Process, as_tests_drive, eventually
 
 CMD_VEL = "/robot_diff_drive_controller/cmd_vel"
 ODOM = "/robot_diff_drive_controller/odom"
@@ -83,7 +83,14 @@ class TwoMachines:
     ) -> Process:
         """Start one of handsteer's nodes; ``ahead_s`` is how far that machine's clock is ahead of the others'."""
         module = (str(WITH_CLOCK), str(ahead_s)) if ahead_s else ("-m", "handsteer")
-        words = (*module, verb, "--transport", "dds", *options, *(("--ros-args", *ros) if ros else ()))
+        words = (
+            *module,
+            verb,
+            "--transport",
+            "dds",
+            *as_tests_drive(verb, options),
+            *(("--ros-args", *ros) if ros else ()),
+        )
         process = Process(machine.command(sys.executable, *words), self._environment(**variables), self._log())
         self._processes.append(process)
         return process

@@ -9,8 +9,8 @@ from handsteer.nodes.camera import CameraNode
 from handsteer.testing.faulty_camera import Event, FaultyCamera
 from tests.nodes.stepping import Bench
 
-IMAGE = np.full((48, 64, 3), 7, np.uint8)
 LOST = CameraLost("webcam 0 gives no more frames")
+ONE, TWO, THREE = (np.full((48, 64, 3), level, np.uint8) for level in (7, 8, 9))
 
 
 def start(*events: Event, age_s: float = 0.0) -> tuple[Bench, CameraNode, FaultyCamera]:
@@ -22,18 +22,18 @@ def start(*events: Event, age_s: float = 0.0) -> tuple[Bench, CameraNode, Faulty
 
 
 def test_frames_go_out_with_their_capture_time() -> None:
-    bench, node, _ = start(IMAGE, IMAGE, age_s=0.04)
+    bench, node, _ = start(ONE, TWO, age_s=0.04)
     bench.clock.advance(1.0)
     images = bench.record(IMAGE_RAW)
     bench.run(0.15)
     assert [round(to_seconds(image.header.stamp), 3) for image in images] == [0.96, 1.06]
     assert images[0].header.frame_id == "camera"
-    np.testing.assert_array_equal(bgr_image(images[0]), IMAGE)
+    np.testing.assert_array_equal(bgr_image(images[0]), ONE)
     assert node.frames == 2
 
 
 def test_jpeg_is_made_on_demand() -> None:
-    bench, _, _ = start(IMAGE, IMAGE, IMAGE)
+    bench, _, _ = start(ONE, TWO, THREE)
     bench.run(0.05)
     compressed = bench.record(IMAGE_COMPRESSED)
     bench.run(0.1)
@@ -41,7 +41,7 @@ def test_jpeg_is_made_on_demand() -> None:
 
 
 def test_a_lost_camera_is_tried_again_with_growing_pauses(caplog: pytest.LogCaptureFixture) -> None:
-    bench, node, _ = start(IMAGE, LOST, LOST, LOST, IMAGE, IMAGE)
+    bench, node, _ = start(ONE, LOST, LOST, LOST, TWO, THREE)
     images, diagnostics = bench.record(IMAGE_RAW), bench.record(DIAGNOSTICS)
     bench.run(1.0)
     assert (len(images), diagnostics[-1].status[0].message) == (1, "webcam 0 gives no more frames")
@@ -56,7 +56,7 @@ def test_a_lost_camera_is_tried_again_with_growing_pauses(caplog: pytest.LogCapt
 
 
 def test_a_file_that_ends_says_so_and_the_camera_is_released_at_the_end() -> None:
-    bench, node, camera = start(IMAGE)
+    bench, node, camera = start(ONE)
     bench.run(0.05)
     assert not node.ended.is_set()
     bench.run(0.1)
@@ -66,7 +66,23 @@ def test_a_file_that_ends_says_so_and_the_camera_is_released_at_the_end() -> Non
 
 
 def test_no_frame_now_is_no_message() -> None:
-    bench, _, _ = start(IMAGE, None, None, IMAGE)
+    bench, _, _ = start(ONE, None, None, TWO)
     images = bench.record(IMAGE_RAW)
     bench.run(0.35)
     assert len(images) == 2
+
+
+def test_a_picture_that_is_the_same_as_the_last_is_no_frame_and_the_camera_is_said_to_be_frozen(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    bench, node, _ = start(ONE, *[TWO] * 20, THREE, ONE)
+    images, diagnostics = bench.record(IMAGE_RAW), bench.record(DIAGNOSTICS)
+    bench.run(1.95)
+    assert [image.data[0] for image in images] == [7, 8]
+    status = diagnostics[-1].status[0]
+    assert (status.level, status.message) == (2, "faulty camera: frozen, the same picture for 1.3 s")
+    assert caplog.text.count("faulty camera is frozen") == 1
+    bench.run(0.3)
+    assert [image.data[0] for image in images] == [7, 8, 9, 7]
+    assert "faulty camera is back" in caplog.text
+    assert node.frames == 4

@@ -220,8 +220,24 @@ def test_a_reset_alone_moves_nothing(bench: ControlBench) -> None:
     stop(bench, False)
     bench.show(*["Forward"] * 5)
     assert set(bench.commands[3:]) == {(0, 0)}
-    bench.show("NONE", "Forward")
+    bench.show(*["NONE"] * 8, *["Forward"] * 5)
+    assert set(bench.commands[3:]) == {(0, 0)}, "a hand that is missed for a few frames was not let go"
+    bench.show(*["NONE"] * 16, "Forward")
     assert bench.commands[-1] == (0.01, 0)
+
+
+def test_a_none_that_a_fault_made_is_not_a_hand_let_go(bench: ControlBench) -> None:
+    stop(bench, True)
+    stop(bench, False)
+    for _ in range(10):  # as recognition has it when frames come by fits and starts
+        bench.show(*["Forward"] * 5)
+        bench.run(0.35)
+        bench.show("NONE")
+    for _ in range(5):  # and while none come
+        bench.run(0.5)
+        bench.show("NONE")
+    bench.show(*["Forward"] * 5)
+    assert set(bench.commands) == {(0, 0)}
 
 
 def test_steering_that_was_held_through_a_reset_has_to_let_go(bench: ControlBench) -> None:

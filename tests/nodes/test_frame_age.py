@@ -1,3 +1,5 @@
+from itertools import accumulate
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -5,10 +7,17 @@ from hypothesis import strategies as st
 from handsteer.nodes.frame_age import FrameAge
 
 LIMIT_S = 0.35
-DELAYS_S = st.lists(st.floats(0.0, 2.0), min_size=1, max_size=60)
 TINY_S = 1e-6
 PERIOD_S = 1 / 30
 LEAK_S = 60 * PERIOD_S * 0.001
+
+
+def in_order(delays_s: list[float]) -> list[float]:
+    """Return delays of frames that come every 33 ms in the order in which they were sent."""
+    return list(accumulate(delays_s, lambda last, delay_s: min(delay_s, last + PERIOD_S)))
+
+
+DELAYS_S = st.lists(st.floats(0.0, 2.0), min_size=1, max_size=60).map(in_order)
 
 
 def ages(delays_s: list[float], ahead_s: float) -> list[tuple[float, str | None]]:
@@ -68,3 +77,25 @@ def test_a_clock_that_is_set_right_is_trusted_again() -> None:
         why = age.why_refused(now_s, now_s - 0.05)
     assert why is None
     assert age.ahead_s < 0.25
+
+
+@pytest.mark.parametrize("set_by_s", [5.0, -5.0, 3600.0])
+def test_a_clock_that_is_set_while_frames_come_is_followed_after_a_second(set_by_s: float) -> None:
+    age = FrameAge(LIMIT_S)
+    told = []
+    for number in range(300):
+        now_s = 1000.0 + number * PERIOD_S
+        captured_s = now_s - 0.03 - 0.01 * (number % 3)
+        told.append(age.why_refused(now_s, captured_s - (set_by_s if number >= 90 else 0.0)))
+    assert set(told[:90]) == {None}
+    way = "back" if set_by_s > 0 else "ahead"
+    assert told[91] is not None
+    assert told[91].startswith(f"a clock was set {way} by {abs(set_by_s):.1f} s: frames are timed anew")
+    assert set(told[121:]) == {None}
+
+
+def test_a_queue_that_stood_still_is_no_clock_that_was_set() -> None:
+    age = FrameAge(LIMIT_S)
+    assert all(age.why_refused(number * PERIOD_S, number * PERIOD_S) is None for number in range(30))
+    late = [age.why_refused(6.0 + number * PERIOD_S, 1.0 + number * PERIOD_S) for number in range(300)]
+    assert all(why is not None and why.startswith("frames come 5.0 s after their stamp") for why in late)

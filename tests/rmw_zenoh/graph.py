@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from tests.processes import Peer, Process, eventually, free_port
+from tests.processes import Peer, Process, as_tests_drive, eventually, free_port
 
 PEER = Path(__file__).with_name("peer.py")
 DOMAIN = 7
@@ -62,7 +62,9 @@ class ZenohGraph:
 
     def node(self, verb: str, *arguments: str, name: str, ros: tuple[str, ...] = ()) -> Process:
         """Start one of handsteer's nodes and wait until it is in the graph under ``name``."""
-        process = self.handsteer(verb, "--transport", "zenoh", *arguments, *(("--ros-args", *ros) if ros else ()))
+        process = self.handsteer(
+            verb, "--transport", "zenoh", *as_tests_drive(verb, arguments), *(("--ros-args", *ros) if ros else ())
+        )
         eventually(lambda: name in self.nodes() or not process.running, what=f"{name} to start")
         assert process.running, process.text
         return process

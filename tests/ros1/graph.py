@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from tests.processes import Peer, Process, eventually, free_port
+from tests.processes import Peer, Process, as_tests_drive, eventually, free_port
 
 PEER = Path(__file__).with_name("peer.py")
 
@@ -106,7 +106,7 @@ class Ros1Graph:
 
     def node(self, verb: str, *arguments: str, name: str = "") -> Process:
         """Start one of handsteer's nodes and wait until it is in the graph under ``name``."""
-        process = self.handsteer(verb, "--transport", "ros1", *arguments)
+        process = self.handsteer(verb, "--transport", "ros1", *as_tests_drive(verb, arguments))
         if name:
             eventually(lambda: name in self.nodes() or not process.running, what=f"{name} to start")
             assert process.running, process.text

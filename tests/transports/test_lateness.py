@@ -39,6 +39,24 @@ def test_a_clock_that_is_set_back_is_trusted_again_after_a_while() -> None:
     assert not any(late[90:])
 
 
+def test_a_clock_that_is_set_back_by_seconds_while_messages_come_is_followed_after_a_second() -> None:
+    lateness = Lateness(0.35)
+    late = []
+    for number in range(300):
+        now = number / 30
+        late.append(lateness.is_late(b"a", now - (5.0 if number >= 90 else 0.0), now + 0.02 * (number % 3)))
+    assert not any(late[:90])
+    assert all(late[90:119])
+    assert not any(late[122:])
+
+
+def test_a_queue_that_stands_is_no_clock_that_was_set() -> None:
+    lateness = Lateness(0.35)
+    assert not any(lateness.is_late(b"a", number / 30, number / 30) for number in range(30))
+    held = [lateness.is_late(b"a", 1.0 + number / 30, 6.0 + number / 300) for number in range(100)]
+    assert all(held), "what waited for five seconds, and comes ten times as fast as it was sent"
+
+
 def test_it_does_not_grow() -> None:
     lateness = Lateness(0.35)
     for number in range(1000):

@@ -6,4 +6,8 @@ import sys
 from pathlib import Path
 
 NODE = Path(__file__).resolve().parents[2] / "handsteer_node"
-os.execv(NODE, [str(NODE), "control", *sys.argv[1:]])
+# In the course each word gives its twist from the first on. The parameter ~arming goes before this file.
+COURSE = Path(__file__).resolve().with_name("course.yaml")
+given = sys.argv[1:]
+file = [] if any(word.startswith("--config") for word in given) else ["--config", str(COURSE)]
+os.execv(NODE, [str(NODE), "control", *file, *given])

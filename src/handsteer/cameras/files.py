@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from handsteer.cameras.noise import SensorNoise
 from handsteer.cameras.protocol import EndOfStream, Frame
 from handsteer.clock import Clock, SteppedClock
 from handsteer.errors import CameraNotFound, CameraUnreadable
@@ -26,6 +27,7 @@ class VideoFile:
         path: The file.
         clock: Stamps the frames.
         at_end: What happens after the last frame.
+        noise: Whether frames get a sensor's noise, as files may repeat a picture and no camera does.
 
     Attributes:
         period_s: Time between two frames, as the file says; 1/30 s when it does not.
@@ -35,8 +37,9 @@ class VideoFile:
         CameraUnreadable: It is not a video that can be decoded.
     """
 
-    def __init__(self, path: Path, clock: Clock, at_end: AtEnd = "loop") -> None:
+    def __init__(self, path: Path, clock: Clock, at_end: AtEnd = "loop", *, noise: bool = True) -> None:
         self.name = str(path)
+        self._noise = SensorNoise() if noise else None
         self._path = path
         self._clock = clock
         self._at_end = at_end
@@ -63,7 +66,10 @@ class VideoFile:
             self._capture.set(cv2.CAP_PROP_POS_FRAMES, 0)
             self._next = self._decode()
         image, self._next = self._next, self._decode()
-        return None if image is None else Frame(image, self._clock.now())
+        if image is None:
+            return None
+        captured_s = self._clock.now()
+        return Frame(self._noise.on(image, captured_s) if self._noise else image, captured_s)
 
     def close(self) -> None:
         """Release the file; may be called twice."""
@@ -81,7 +87,7 @@ class PhotoFolder:
         path: The folder, or a photo.
         clock: Stamps the frames.
         photo_duration_s: How long each photo is shown, in seconds.
-        fps: Frames a second: a photo is repeated, as a camera would see it.
+        fps: Frames a second: a photo is repeated, as a camera would see it, with a sensor's noise.
         at_end: What happens after the last photo.
 
     Raises:
@@ -96,6 +102,7 @@ class PhotoFolder:
         self.period_s = 1.0 / fps
         self._clock = clock
         self._at_end = at_end
+        self._noise = SensorNoise()
         self._photos = find_photos(path)
         self._repeats = max(1, round(photo_duration_s * fps))
         self._shown = 0
@@ -118,7 +125,8 @@ class PhotoFolder:
         if repeat == 0:
             self._load(index)
         self._shown += 1
-        return Frame(self._image, self._clock.now())
+        captured_s = self._clock.now()
+        return Frame(self._noise.on(self._image, captured_s), captured_s)
 
     def close(self) -> None:
         """Nothing is held."""
@@ -139,7 +147,7 @@ def video_frames(path: Path) -> Iterator[Frame]:
         CameraUnreadable: It is not a video that can be decoded.
     """
     clock = SteppedClock()
-    video = VideoFile(path, clock, at_end="end")
+    video = VideoFile(path, clock, at_end="end", noise=False)
     try:
         while frame := video.read():
             yield frame

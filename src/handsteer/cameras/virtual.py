@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from handsteer.cameras.noise import SensorNoise
 from handsteer.cameras.protocol import Frame
 from handsteer.clock import Clock
 from handsteer.config import VirtualHandConfig
@@ -50,6 +51,7 @@ class VirtualHandCamera:
         self._look = Look(skin=config.skin, sleeve=config.sleeve)
         self._camera = Pinhole.webcam(width, height)
         self._background = make_background(config.background, width, height, config.seed)
+        self._noise = SensorNoise(config.seed)
         self._clock = clock
         self._start_s = clock.now()
 
@@ -58,7 +60,8 @@ class VirtualHandCamera:
         pose = self._motion.at(self._clock.now() - self._start_s).pose
         skeleton, placement = pose_skeleton(pose.angles), pose.view.placement(self._handedness)
         image = render(skeleton, placement, self._camera, self._look, self._background)
-        return Frame(image, self._clock.now())
+        captured_s = self._clock.now()
+        return Frame(self._noise.on(image, captured_s), captured_s)
 
     def truth(self, time_s: float) -> Truth:
         """Return what the hand does at ``time_s`` of the clock."""

@@ -19,6 +19,12 @@ from handsteer.errors import HandsteerError
 # Another signal so soon after one is the same wish; it must not cut off what the first one has begun.
 _SAME_WISH_S = 1.0
 
+_ENDING = (
+    *("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT", "SIGABRT", "SIGTSTP", "SIGTTIN", "SIGTTOU", "SIGUSR1", "SIGUSR2"),
+    *("SIGALRM", "SIGVTALRM", "SIGPROF", "SIGXCPU", "SIGIO", "SIGPWR", "SIGSTKFLT", "SIGSYS", "SIGBREAK"),
+)
+"""Signals whose default is to end a program, or to hold it, as Ctrl-Z does; the robot would hear nothing of it."""
+
 _EXAMPLES = """Examples:
   handsteer run                                  drive, and open the page
   handsteer run --headless --duration 30 --json  no page, one summary at the end
@@ -55,10 +61,7 @@ def main(arguments: list[str] | None = None) -> None:
     logging.basicConfig(level=logging.INFO, format="handsteer: %(message)s", stream=sys.stderr)
     for noisy in ("uvicorn", "asyncio", "httpx", "watchfiles", "rospy"):
         logging.getLogger(noisy).setLevel(logging.WARNING)
-    # SIGINT too: a shell lets its background jobs ignore it, and a robot must be stopped all the same.
-    interrupt = _interrupter()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, interrupt)
+    _end_on_signals()
     words = _ros_words_last(sys.argv[1:] if arguments is None else arguments)
     _load_what_help_lists(app, words)
     try:
@@ -96,6 +99,23 @@ def _ros_words_last(arguments: list[str]) -> list[str]:
         (ros if inside else ours).append(argument)
         inside = inside and argument != "--"
     return [*ours, *([] if "--" in ours else ["--"]), *ros] if ros else ours
+
+
+def _end_on_signals() -> None:
+    """End the program in order, which leaves the robot standing, on each signal that would end or hold it otherwise.
+
+    SIGKILL and SIGSTOP cannot be caught, and after a crash (SIGSEGV and its like) nothing can be said any more.
+    """
+    interrupt = _interrupter()
+    for name in _ENDING:
+        number = getattr(signal, name, None)
+        if number is None:
+            continue  # not on this system
+        # Whoever starts a program by nohup wants it to outlive the terminal. SIGINT is taken even so: a shell lets its
+        # background jobs ignore it, and a robot must be stopped all the same.
+        if name == "SIGHUP" and signal.getsignal(number) == signal.SIG_IGN:
+            continue
+        signal.signal(number, interrupt)
 
 
 def _interrupter() -> Callable[[int, FrameType | None], None]:

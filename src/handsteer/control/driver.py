@@ -5,7 +5,8 @@ from typing import Literal
 
 from handsteer.config import ControlConfig
 from handsteer.control.actions import action_of
-from handsteer.control.sign_control import ZERO, SignControl, Velocity
+from handsteer.control.sign_control import SignControl
+from handsteer.control.velocity import ZERO, Velocity
 from handsteer.signs.vocabulary import NONE
 
 Source = Literal["nobody", "signs", "steering"]

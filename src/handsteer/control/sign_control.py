@@ -1,41 +1,14 @@
 """From signs to velocities: the tutorial's rule, with limits and a watchdog."""
 
 import math
-from dataclasses import dataclass
 
 from handsteer.config import ControlConfig
 from handsteer.control.actions import Action, action_of
+from handsteer.control.safety import Allowance
+from handsteer.control.velocity import ZERO, Velocity
 
 _DIGITS = 9
 _TURBO = 2.0
-
-
-@dataclass(frozen=True)
-class Velocity:
-    """Forward velocity in m/s and turning velocity in rad/s, left positive (REP 103)."""
-
-    linear_mps: float = 0.0
-    angular_radps: float = 0.0
-
-    @property
-    def is_zero(self) -> bool:
-        """Whether the robot is to stand still."""
-        return self.linear_mps == 0.0 and self.angular_radps == 0.0
-
-    @property
-    def is_finite(self) -> bool:
-        """Whether both parts are numbers that a robot can follow."""
-        return math.isfinite(self.linear_mps) and math.isfinite(self.angular_radps)
-
-    def clamped(self, max_linear_mps: float, max_angular_radps: float) -> "Velocity":
-        """Return the nearest velocity within the limits."""
-        return Velocity(
-            max(-max_linear_mps, min(self.linear_mps, max_linear_mps)),
-            max(-max_angular_radps, min(self.angular_radps, max_angular_radps)),
-        )
-
-
-ZERO = Velocity()
 
 
 class SignControl:
@@ -58,6 +31,7 @@ class SignControl:
     def __init__(self, config: ControlConfig) -> None:
         self._config = config
         self._since_sign_s = 0.0
+        self._allowance = Allowance(config.max_sign_rate)
         self.velocity = ZERO
         self.silent = True
 
@@ -75,6 +49,7 @@ class SignControl:
         if not (math.isfinite(dt_s) and dt_s >= 0):
             return self.halt()
         self._since_sign_s += dt_s
+        self._allowance.step(dt_s)
         if sign is None:
             timed_out = not self.silent and self._since_sign_s >= self._config.sign_timeout
             return self.halt() if timed_out else None
@@ -90,6 +65,7 @@ class SignControl:
     def reconfigure(self, config: ControlConfig) -> None:
         """Go on with another configuration; :attr:`velocity` is clamped to its limits."""
         self._config = config
+        self._allowance.rate = config.max_sign_rate
         self.velocity = self.velocity.clamped(config.max_linear, config.max_angular)
 
     def halt(self) -> Velocity | None:
@@ -112,7 +88,10 @@ class SignControl:
         }.get(action, now)
         # So that a sum of steps is what people make of it: 0.22, not 0.22000000000000006.
         summed = Velocity(round(after.linear_mps, _DIGITS), round(after.angular_radps, _DIGITS))
-        return summed.clamped(self._config.max_linear, self._config.max_angular)
+        limited = summed.clamped(self._config.max_linear, self._config.max_angular)
+        if not _is_faster(limited, now) or self._config.ramp == "per_second" or self._allowance.take():
+            return limited
+        return Velocity(now.linear_mps, limited.angular_radps if limited.angular_radps == 0.0 else now.angular_radps)
 
     def _boosted(self) -> Velocity:
         doubled = Velocity(_TURBO * self.velocity.linear_mps, self.velocity.angular_radps)
@@ -123,3 +102,8 @@ class SignControl:
         if config.ramp == "per_message":
             return config.linear_step, config.angular_step
         return config.linear_acceleration * interval_s, config.angular_acceleration * interval_s
+
+
+def _is_faster(after: Velocity, before: Velocity) -> bool:
+    grows = abs(after.linear_mps) > abs(before.linear_mps)
+    return grows or abs(after.angular_radps) > abs(before.angular_radps)

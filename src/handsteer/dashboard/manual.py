@@ -2,7 +2,7 @@
 
 import math
 
-from handsteer.control.sign_control import ZERO, Velocity
+from handsteer.control.velocity import ZERO, Velocity
 from handsteer.transports.lateness import Lateness
 
 HOLD_TIMEOUT_S = 0.3

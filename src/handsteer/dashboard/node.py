@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Any, cast
 
 from handsteer.clock import Clock, to_seconds
-from handsteer.control.sign_control import Velocity
+from handsteer.control.velocity import Velocity
 from handsteer.dashboard.history import PERIOD_S, Sample, VelocityHistory
 from handsteer.dashboard.manual import HOLD_TIMEOUT_S
 from handsteer.dashboard.seat import Seat

@@ -8,18 +8,19 @@ from typing import Literal
 
 from handsteer.config import ControlConfig
 from handsteer.control.effects import told
-from handsteer.control.sign_control import ZERO, Velocity
+from handsteer.control.velocity import ZERO, Velocity
 from handsteer.nodes.node import ERROR, OK
 from handsteer.robots.course import CourseState, read_course
 from handsteer.robots.protocol import Pose2D
 from handsteer.signs.vocabulary import NONE, SIGNS
+from handsteer.timeouts import ROBOT_S
 
 Mood = Literal["driving", "standing", "trouble", "waiting"]
 
 STALE_S = 2.0
 """A node that has not reported for this long counts as silent; the slowest reports twice a second."""
 
-COMMAND_HOLDS_S = 0.4
+COMMAND_HOLDS_S = ROBOT_S
 """A command counts for this long, as in the robot's controller; then nothing is commanded."""
 
 

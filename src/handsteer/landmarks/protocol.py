@@ -51,6 +51,12 @@ class Hand:
         """The longer side of the box about the landmarks, in pixels."""
         return float(np.ptp(self.pixels[:, :2], axis=0).max())
 
+    @property
+    def box_px(self) -> tuple[int, int, int, int]:
+        """The box about the landmarks: left, top, right and bottom in pixels; it may reach beyond the frame."""
+        (left, top), (right, bottom) = self.pixels[:, :2].min(axis=0), self.pixels[:, :2].max(axis=0)
+        return int(left), int(top), int(right) + 1, int(bottom) + 1
+
 
 class Landmarker(Protocol):
     """Finds hands in frames; follows them from one frame to the next."""

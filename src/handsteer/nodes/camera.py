@@ -2,12 +2,15 @@
 
 import logging
 
+from handsteer.cameras.freshness import Freshness
 from handsteer.cameras.protocol import Camera, EndOfStream, Frame
 from handsteer.clock import Clock
 from handsteer.errors import CameraError
 from handsteer.images import image_message, jpeg_message
 from handsteer.messages import IMAGE_COMPRESSED, IMAGE_RAW, Header
 from handsteer.nodes.node import ERROR, OK, Node
+from handsteer.nodes.stop_keeper import StopKeeper
+from handsteer.timeouts import STALE_S
 from handsteer.transports.protocol import Transport
 
 _DIAGNOSE_PERIOD_S = 0.5
@@ -20,6 +23,8 @@ log = logging.getLogger(__name__)
 
 class CameraNode(Node):
     """Publishes each frame of a camera with its capture time; a camera that is lost is tried again and again.
+
+    A picture that is the same as the last is no frame.
 
     Args:
         transport: Carries the messages.
@@ -40,6 +45,10 @@ class CameraNode(Node):
         self._retry_s = _FIRST_RETRY_S
         self._state = (OK, f"{camera.name}: waiting for the first frame")
         self._last_frame_s = clock.now()
+        self._freshness = Freshness(STALE_S)
+        self._last_read_s = clock.now()
+        self._is_frozen = False
+        StopKeeper(self)
         self._image = self.publisher(IMAGE_RAW)
         self._compressed = self.publisher(IMAGE_COMPRESSED)
         self._reading = self.every(camera.period_s or 0.0, self._read)
@@ -66,13 +75,14 @@ class CameraNode(Node):
         except CameraError as error:
             self._lose(error)
         else:
-            if frame is not None:
+            if frame is not None and self._is_new(frame):
                 self._publish(frame)
 
     def _publish(self, frame: Frame) -> None:
-        if self._retry_s > _FIRST_RETRY_S:
+        if self._retry_s > _FIRST_RETRY_S or self._is_frozen:
             log.warning("%s is back", self._camera.name)
         self._retry_s = _FIRST_RETRY_S
+        self._is_frozen = False
         self.frames += 1
         self._last_frame_s = self.clock.now()
         self._state = (OK, f"{self._camera.name}: delivers frames")
@@ -80,6 +90,17 @@ class CameraNode(Node):
         self._image.publish(image_message(frame.image, header), frame.captured_s)
         if self._compressed.wanted:
             self._compressed.publish(jpeg_message(frame.image, header), frame.captured_s)
+
+    def _is_new(self, frame: Frame) -> bool:
+        elapsed_s, self._last_read_s = frame.captured_s - self._last_read_s, frame.captured_s
+        self._freshness.why_refused(frame.image, max(0.0, elapsed_s))
+        frozen_s = self._freshness.frozen_s
+        if frozen_s > STALE_S:
+            self._state = (ERROR, f"{self._camera.name}: frozen, the same picture for {frozen_s:.1f} s")
+            if not self._is_frozen:
+                log.warning("%s is frozen: it delivers the same picture again and again", self._camera.name)
+                self._is_frozen = True
+        return frozen_s == 0.0
 
     def _lose(self, error: CameraError) -> None:
         log.warning("%s; trying again in %g s", error, self._retry_s)

@@ -1,6 +1,5 @@
 """The node ``hand_sign_control``: signs in, one velocity command out for each."""
 
-import math
 from typing import Any
 
 from handsteer.clock import Clock
@@ -9,13 +8,14 @@ from handsteer.control.actions import action_of
 from handsteer.control.driver import Driver
 from handsteer.control.effects import tell
 from handsteer.control.fleet import NEXT
-from handsteer.control.hold import Hold
-from handsteer.control.sign_control import ZERO, Velocity
-from handsteer.messages import CMD_VEL, HAND_SIGN, STEERING_CMD_VEL, STOP, Bool, String, Topic, Twist, command
+from handsteer.control.safety import Following, Ramp, Safety
+from handsteer.control.velocity import ZERO, Velocity
+from handsteer.messages import CMD_VEL, HAND_SIGN, ODOM, STEERING_CMD_VEL, Odometry, String, Topic, Twist, command
 from handsteer.nodes.interruption import Interruption
 from handsteer.nodes.latency import LatencyLog
 from handsteer.nodes.node import OK, Node
 from handsteer.nodes.selection import Selection
+from handsteer.nodes.stop_keeper import StopKeeper
 from handsteer.signs.vocabulary import NONE
 from handsteer.transports.protocol import Publisher, Received, Transport
 
@@ -34,32 +34,43 @@ class HandSignControlNode(Node):
         clock: The graph's clock.
         config: Limits, steps and timeouts.
         cmd_vel: The topic of the commands, of Twist or TwistStamped.
+        arming: Whether nothing moves before neutral was seen, and while no robot listens
+            (:mod:`handsteer.control.safety`).
 
     Attributes:
         latency: From the capture of a frame to the Twist that it led to.
     """
 
     def __init__(
-        self, transport: Transport, clock: Clock, config: ControlConfig, cmd_vel: Topic[Any] = CMD_VEL
+        self,
+        transport: Transport,
+        clock: Clock,
+        config: ControlConfig,
+        cmd_vel: Topic[Any] = CMD_VEL,
+        *,
+        arming: bool = False,
     ) -> None:
         super().__init__("hand_sign_control", transport, clock)
         self.latency = LatencyLog()
         self._config = config
         self._driver = Driver(config)
-        self._hold = Hold()
-        self._is_stopped = False
-        self._last_step_s = clock.now()
+        self._safety = Safety(config, arming=arming)
+        self._following = Following() if arming and not config.robots else None
+        self._arming = arming
+        self._ramp = Ramp(config)
+        self._ramped_s = self._last_step_s = clock.now()
         self._interruption = Interruption(config.sign_timeout, clock.now())
         self._topic = cmd_vel
         self._last_sign = NONE
-        self._last_steering_s = -math.inf
         self._selection = (
             Selection(self, config.robots, cmd_vel, self._send, self._on_change) if config.robots else None
         )
         self._cmd_vel = self._selection.publisher if self._selection else self.publisher(cmd_vel)
-        self.subscribe(STOP, self._on_stop_or_reset)
+        StopKeeper(self, self._on_stop_or_reset)
         self.subscribe(STEERING_CMD_VEL, self._on_steering)
         self.subscribe(HAND_SIGN, self._on_sign)
+        if self._following:
+            self.subscribe(ODOM, self._on_odometry)
         self.every(_WATCHDOG_PERIOD_S, self._watch)
         self.every(_DIAGNOSE_PERIOD_S, self._report)
 
@@ -67,6 +78,8 @@ class HandSignControlNode(Node):
         """Take all of ``control``; a robot that is faster than new limits allow is told so at once."""
         self._config = config.control
         self._interruption.limit_s = config.control.sign_timeout
+        self._safety.reconfigure(config.control)
+        self._ramp.reconfigure(config.control)
         self._publish(self._driver.reconfigure(config.control))
 
     def on_stop(self) -> None:
@@ -76,13 +89,13 @@ class HandSignControlNode(Node):
         if self._selection:
             self._selection.beat()
 
-    def _on_stop_or_reset(self, received: Received[Bool]) -> None:
-        was_stopped, self._is_stopped = self._is_stopped, bool(received.message.data)
-        if self._is_stopped:
+    def _on_stop_or_reset(self, is_stopped: bool) -> None:
+        if is_stopped:
+            self._safety.stop()
             self._driver.halt()
             self._publish(ZERO)
-        elif was_stopped:
-            self._hold.begin()
+        else:
+            self._safety.reset()
 
     def _on_sign(self, received: Received[String]) -> None:
         captured_s = received.captured_s
@@ -98,41 +111,55 @@ class HandSignControlNode(Node):
         steering = None if self._interruption.distrusts(self.clock.now()) else self._steered(wanted)
         self._publish(self._driver.step(elapsed_s, steering=steering))
 
+    def _on_odometry(self, received: Received[Odometry]) -> None:
+        assert self._following is not None
+        measured = received.message.twist.twist
+        self._following.note(Velocity(measured.linear.x, measured.angular.z))
+
     def _watch(self) -> None:
-        self._publish(self._driver.step(self._elapsed()))
+        elapsed_s = self._elapsed()
+        self._look_after_the_robot(elapsed_s)
+        self._publish(self._driver.step(elapsed_s))
         if self._selection:
             self._selection.beat()
 
+    def _look_after_the_robot(self, elapsed_s: float) -> None:
+        if not self._arming:
+            return
+        away = None if self._cmd_vel.wanted else "no robot listens"
+        if away is None and self._following is not None:
+            away = self._following.step(elapsed_s, self._driver.velocity)
+        if away is not None:
+            self._safety.robot_is_away(away)
+            self._publish(self._driver.halt())
+
     def _admitted(self, sign: str | None) -> str | None:
-        """Return the sign to follow: ``NONE`` while the robot is stopped, or waits for a sign that stops."""
+        """Return the sign to follow: ``NONE`` while the robot is stopped, or waits for neutral."""
         if sign is None:
             return None
         action = action_of(sign, self._config.actions)
         if self._selection and action == "next_robot" and sign != self._last_sign:
             self._selection.select(NEXT)
         self._last_sign = sign
-        passes = self._hold.let_sign_pass(stops=action == "stop")
-        return sign if passes and not self._is_stopped else NONE
+        return sign if self._safety.admits_sign(sign, stops=action == "stop") else NONE
 
     def _steered(self, wanted: Velocity) -> Velocity:
         """Return the steering to follow: zero while the robot is stopped, or waits for the steering to let go."""
-        now = self.clock.now()
-        after_pause = now - self._last_steering_s >= self._config.steering_timeout
-        self._last_steering_s = now
-        passes = self._hold.let_steering_pass(is_zero=wanted.is_zero, after_pause=after_pause)
-        return wanted if passes and not self._is_stopped else ZERO
+        return wanted if self._safety.admits_steering(is_zero=wanted.is_zero) else ZERO
 
     def _on_change(self) -> None:
         """Start from standing with another robot."""
         assert self._selection is not None
         self._driver.halt()
-        self._hold.begin()
+        self._safety.disarm()
         self._cmd_vel = self._selection.publisher
 
     def _publish(self, velocity: Velocity | None, captured_s: float | None = None) -> None:
         if velocity is None:
             return
-        self._send(self._cmd_vel, velocity, captured_s)
+        now = self.clock.now()
+        since_s, self._ramped_s = now - self._ramped_s, now
+        self._send(self._cmd_vel, self._ramp.step(velocity, min(since_s, self._config.sign_timeout)), captured_s)
         if captured_s is not None:
             self.latency.add(self.clock.now() - captured_s)
 
@@ -144,7 +171,9 @@ class HandSignControlNode(Node):
     def _elapsed(self) -> float:
         now = self.clock.now()
         elapsed_s, self._last_step_s = now - self._last_step_s, now
-        self._interruption.note(now)
+        if self._interruption.note(now):
+            self._safety.fault("the control was held up")
+        self._safety.step(elapsed_s)
         return elapsed_s
 
     def _report(self) -> None:
@@ -153,7 +182,7 @@ class HandSignControlNode(Node):
             OK,
             self._reason,
             source=self._driver.source,
-            stopped=self._is_stopped,
+            stopped=self._safety.is_stopped,
             linear_mps=f"{velocity.linear_mps:.3f}",
             angular_radps=f"{velocity.angular_radps:.3f}",
             **({"robot": self._selection.fleet.selected} if self._selection else {}),
@@ -163,14 +192,21 @@ class HandSignControlNode(Node):
 
     @property
     def _reason(self) -> str:
-        if self._is_stopped:
+        safety = self._safety
+        if safety.is_stopped:
             return "standing: stopped, until it is reset"
         source = self._driver.source
-        if self._hold.signs and source == "signs":
-            return f"standing: {self._disarmed}, moves once Stop is shown, or no hand"
-        if self._hold.steering and source == "steering":
-            return f"standing: {self._disarmed}, steers once the steering has been let go"
-        return self._driver.reason
+        if source == "steering":
+            waits = safety.steering_waits
+            return (
+                f"standing: {self._disarmed}, steers once the steering has been let go"
+                if waits
+                else self._driver.reason
+            )
+        why = safety.signs_wait
+        if why is None or (source == "nobody" and not why):
+            return self._driver.reason
+        return f"standing: {self._disarmed}{f' ({why})' if why else ''}, moves once Stop is shown, or no hand"
 
     @property
     def _disarmed(self) -> str:

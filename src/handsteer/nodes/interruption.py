@@ -1,7 +1,6 @@
 """What a node that was itself held up does with messages that waited meanwhile: nothing, for they may be old."""
 
-_DISTRUST_S = 0.1
-"""How long after an interruption messages may still come out of sockets and queues."""
+from handsteer.timeouts import HELD_UP_S
 
 
 class Interruption:
@@ -24,7 +23,7 @@ class Interruption:
         interrupted = now_s - self._noted_s > self.limit_s
         self._noted_s = now_s
         if interrupted:
-            self._distrust_until_s = now_s + _DISTRUST_S
+            self._distrust_until_s = now_s + HELD_UP_S
         return interrupted
 
     def distrusts(self, now_s: float) -> bool:

@@ -9,6 +9,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from handsteer.cameras.freshness import Freshness
 from handsteer.clock import Clock
 from handsteer.config import Config, SignsConfig
 from handsteer.errors import ConfigError, ModelError
@@ -17,13 +18,15 @@ from handsteer.messages import HAND_SIGN, IMAGE_ANNOTATED, IMAGE_COMPRESSED, IMA
 from handsteer.nodes.frame_age import FrameAge
 from handsteer.nodes.latency import LatencyLog
 from handsteer.nodes.node import OK, WARN, Node
+from handsteer.nodes.stop_keeper import StopKeeper
 from handsteer.signs.protocol import Classifier
 from handsteer.signs.recognizer import Recognition, Recognizer
 from handsteer.signs.vocabulary import NONE
 from handsteer.transports.protocol import Received, Transport
 
 _WATCH_PERIOD_S = 0.02
-_SILENCE_PERIOD_S = 0.1
+# Further apart than FAULT_GAP_S, so that the control takes them for what they are: frames that were not looked at.
+_SILENCE_PERIOD_S = 0.5
 _DIAGNOSE_PERIOD_S = 0.1
 _SHORTLY_S = 3.0
 
@@ -68,12 +71,14 @@ class HandSignRecognitionNode(Node):
         self._model = _version_of(config.model)
         self._last_captured_s: float | None = None
         self._last_frame_s = clock.now()
-        self._last_none_s = -math.inf
+        self._last_sign_s = clock.now()
         self._last_hand_s: float | None = None
         self._age = FrameAge(config.max_frame_age)
+        self._freshness = Freshness(config.max_frame_age)
         self._refused: str | None = None
         self._refused_s = -math.inf
         self._recognition: Recognition | None = None
+        StopKeeper(self)
         self._sign = self.publisher(HAND_SIGN)
         self._annotated = self.publisher(IMAGE_ANNOTATED)
         wanted = config.image_transport
@@ -99,7 +104,7 @@ class HandSignRecognitionNode(Node):
             self._recognizer.use(self._open_classifier(config.signs))
             self._model = version
         self._config = config.signs
-        self._age.limit_s = config.signs.max_frame_age
+        self._age.limit_s = self._freshness.limit_s = config.signs.max_frame_age
         self._recognizer.reconfigure(config.signs)
 
     def _has_other_model(self, config: SignsConfig) -> bool:
@@ -112,19 +117,24 @@ class HandSignRecognitionNode(Node):
         began_s = self.clock.now()
         captured_s = received.captured_s if received.captured_s is not None else began_s
         self._refused = self._age.why_refused(began_s, captured_s)
+        if self._refused is None:
+            self._look_at(picture_of(received.message), received, began_s, captured_s)
         if self._refused is not None:
-            self._refused_s = began_s
-            return  # a stale frame is no frame: the watch publishes NONE
-        try:
-            image = picture_of(received.message)
-            recognition = self._recognizer.step(image, self._since_last_frame(captured_s))
-        except Exception:
-            self._lose()
-            raise
-        self._last_frame_s = began_s
-        self._recognition = recognition
+            self._refused_s = began_s  # a stale frame, or one that is not new, is no frame: the watch publishes NONE
+
+    def _look_at(self, image: NDArray[np.uint8], received: Received[M], began_s: float, captured_s: float) -> None:
+        dt_s = self._since_last_frame(captured_s)
+        self._refused = self._freshness.why_refused(image, dt_s)
+        if self._refused is not None:
+            return
+        recognition = self._recognizer.step(image, dt_s)
         if recognition.hand is not None:
             self._last_hand_s = began_s
+            self._refused = self._freshness.why_hand_refused(recognition.hand.box_px, dt_s)
+            if self._refused is not None:
+                return
+        self._last_frame_s = self._last_sign_s = began_s
+        self._recognition = recognition
         self.counts[recognition.sign] = self.counts.get(recognition.sign, 0) + 1
         self._sign.publish(String(data=recognition.sign), received.captured_s)
         self.processing.add(self.clock.now() - began_s)
@@ -139,15 +149,14 @@ class HandSignRecognitionNode(Node):
 
     def _watch(self) -> None:
         now = self.clock.now()
-        silent = now - self._last_frame_s > self._config.max_frame_age
-        if silent and (self._recognition is not None or now - self._last_none_s >= _SILENCE_PERIOD_S):
-            self._last_none_s = now
-            self._lose()
-
-    def _lose(self) -> None:
-        self._recognizer.reset()
-        self._recognition = None
-        self._sign.publish(String(data=NONE))
+        if now - self._last_frame_s <= self._config.max_frame_age:
+            return
+        period_s = _SILENCE_PERIOD_S if self._recognition is None else self._config.max_frame_age
+        if now - self._last_sign_s > period_s:
+            self._last_sign_s = now
+            self._recognizer.reset()
+            self._recognition = None
+            self._sign.publish(String(data=NONE))
 
     def _report(self) -> None:
         seen = self._recognition

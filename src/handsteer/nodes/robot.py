@@ -42,6 +42,7 @@ from handsteer.messages import (
 )
 from handsteer.nodes.interruption import Interruption
 from handsteer.nodes.node import ERROR, OK, WARN, Node
+from handsteer.nodes.stop_keeper import StopKeeper
 from handsteer.nodes.world_changes import WorldChanges
 from handsteer.nodes.world_markers import Touches, gate_strips, world_markers
 from handsteer.robots.course import CourseState, Referee
@@ -95,6 +96,7 @@ class RobotNode(Node):
         self.state = robot.step(0.0)
         self.path_length_m = 0.0
         self.was_located = self.state.located
+        StopKeeper(self)
         self._odom = self.publisher(ODOM)
         self._tf = self.publisher(TF)
         self._joint_states = self.publisher(JOINT_STATES)

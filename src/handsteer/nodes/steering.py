@@ -1,6 +1,5 @@
 """The node ``steering``: drives by hand, as ``rqt_robot_steering`` does, and stops the robot whoever drives."""
 
-import math
 import re
 import threading
 from dataclasses import dataclass
@@ -8,11 +7,12 @@ from typing import Any
 
 from handsteer.clock import Clock
 from handsteer.config import Config, ControlConfig
-from handsteer.control.hold import Hold
-from handsteer.control.sign_control import ZERO, Velocity
+from handsteer.control.safety import Ramp, Safety
+from handsteer.control.velocity import ZERO, Velocity
 from handsteer.errors import TransportError
 from handsteer.messages import CMD_VEL, STEERING_CMD_VEL, STOP, Bool, Topic, command
 from handsteer.nodes.node import Node
+from handsteer.nodes.stop_keeper import StopKeeper
 from handsteer.transports.protocol import Publisher, Received, Transport
 
 _PERIOD_S = 0.1
@@ -58,11 +58,13 @@ class SteeringNode(Node):
         self._wanted: Velocity | None = None
         self._halted = False
         self._heard_stop: bool | None = None
-        self._hold = Hold()
-        self._last_steered_s = -math.inf
+        self._safety = Safety(self._config, arming=False)
+        self._ramp = Ramp(self._config)
+        self._last_step_s = self._last_sent_s = clock.now()
         self._target = _Target(STEERING_CMD_VEL.name, STEERING_CMD_VEL, self.publisher(STEERING_CMD_VEL))
         self._targets = {self._target.name: self._target}
         self._stop = self.publisher(STOP)
+        StopKeeper(self)
         self.every(_PERIOD_S, self._repeat)
 
     @property
@@ -96,12 +98,14 @@ class SteeringNode(Node):
         with self._lock:
             target = self._targets.get(name) or self._find(name)
             self.release()
-            self._hold.begin()
+            self._safety.disarm()
             self._target = target
 
     def on_reconfigure(self, config: Config) -> None:
         """Take the limits of ``control``."""
         self._config = config.control
+        self._safety.reconfigure(config.control)
+        self._ramp.reconfigure(config.control)
 
     def steer(self, linear_mps: float, angular_radps: float) -> None:
         """Drive at this velocity from now on: m/s forward, rad/s to the left."""
@@ -151,10 +155,9 @@ class SteeringNode(Node):
     def _admitted(self, wanted: Velocity) -> Velocity:
         """Return what may be sent; the limits are ``hand_sign_control``'s affair where it is not passed by."""
         now = self.clock.now()
-        after_pause = now - self._last_steered_s >= self._config.steering_timeout
-        self._last_steered_s = now
-        passes = self._hold.let_steering_pass(is_zero=wanted.is_zero, after_pause=after_pause)
-        if not passes or self.is_stopped:
+        elapsed_s, self._last_step_s = now - self._last_step_s, now
+        self._safety.step(elapsed_s)
+        if not self._safety.admits_steering(is_zero=wanted.is_zero) or self.is_stopped:
             return ZERO
         if not self.is_direct:
             return wanted
@@ -171,7 +174,7 @@ class SteeringNode(Node):
     def _stand(self) -> None:
         """Ask for nothing any more; a robot that is steered past the control is told to stand here."""
         self._wanted = None
-        self._hold.begin()
+        self._safety.disarm()
         if self.is_direct:
             self._publish(ZERO)
 
@@ -185,6 +188,10 @@ class SteeringNode(Node):
                 self._publish(ZERO)
 
     def _publish(self, velocity: Velocity) -> None:
-        stamp, frame_id = self.clock.stamp(self.clock.now()), self._config.cmd_vel_frame_id
+        now = self.clock.now()
+        if self.is_direct:  # hand_sign_control sees to it elsewhere
+            velocity = self._ramp.step(velocity, min(now - self._last_sent_s, _PERIOD_S))
+            self._last_sent_s = now
+        stamp, frame_id = self.clock.stamp(now), self._config.cmd_vel_frame_id
         message = command(self._target.topic, velocity.linear_mps, velocity.angular_radps, stamp, frame_id)
         self._target.publisher.publish(message)

@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 
 from nicegui import ui
 
-from handsteer.control.sign_control import Velocity
+from handsteer.control.velocity import Velocity
 from handsteer.dashboard.history import SPAN_S, Sample
 
 Row = tuple[float, float | None, float | None]

@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 from nicegui import ui
 
-from handsteer.control.sign_control import Velocity
+from handsteer.control.velocity import Velocity
 from handsteer.dashboard.panels.elements import box, button, switch, text
 
 _LINEAR_MPS = 0.5

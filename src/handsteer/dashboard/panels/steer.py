@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 from nicegui import ui
 
-from handsteer.control.sign_control import Velocity
+from handsteer.control.velocity import Velocity
 from handsteer.dashboard.manual import Manual
 from handsteer.dashboard.panels.elements import box, button, card, switch, text
 from handsteer.dashboard.panels.mux import MuxPanel

@@ -1,0 +1,73 @@
+"""Whether a picture is new: a camera that hangs goes on delivering, with new stamps, what it saw last."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+_SAMPLES_A_SIDE = 60
+_BLACK = 6.0
+
+Box = tuple[int, int, int, int]
+
+
+class Freshness:
+    """Compares each picture with the one before.
+
+    No two pictures of a real camera are the same: its sensor has noise. Where a whole picture is the same as the last,
+    at some thousand pixels, it is not new. Compressed video repeats parts that hardly change, so a part is no proof,
+    unless it is where the hand is, every pixel of it, and for longer than a moment.
+
+    Args:
+        limit_s: How long the hand may look exactly the same, in seconds; may be set later, too.
+
+    Attributes:
+        frozen_s: How long the same picture has come, in seconds; 0 after a new one.
+    """
+
+    def __init__(self, limit_s: float) -> None:
+        self.limit_s = limit_s
+        self.frozen_s = 0.0
+        self._image: NDArray[np.uint8] | None = None
+        self._before: NDArray[np.uint8] | None = None
+        self._sample: NDArray[np.uint8] | None = None
+        self._hand_frozen_s = 0.0
+
+    def why_refused(self, image: NDArray[np.uint8], dt_s: float) -> str | None:
+        """Return why ``image`` is no new picture, in words; None when it is one.
+
+        Args:
+            image: (height, width, 3) uint8.
+            dt_s: Seconds since the picture before, >= 0.
+        """
+        step = max(1, min(image.shape[:2]) // _SAMPLES_A_SIDE)
+        sample = image[step // 2 :: step, step // 2 :: step].copy()
+        is_same = self._sample is not None and np.array_equal(sample, self._sample)
+        self._sample = sample
+        if is_same:
+            self.frozen_s += dt_s
+            return f"the camera is frozen: the same picture for {self.frozen_s:.1f} s"
+        self.frozen_s = 0.0
+        self._before, self._image = self._image, image
+        if sample.mean() < _BLACK:
+            return "the picture is black: is the lens covered?"
+        return None
+
+    def why_hand_refused(self, box: Box, dt_s: float) -> str | None:
+        """Return why the hand in ``box`` of the last picture is not seen now, in words; None when it is.
+
+        Args:
+            box: Left, top, right and bottom in pixels; the last two are not within.
+            dt_s: Seconds since the picture before, >= 0.
+        """
+        self._hand_frozen_s = self._hand_frozen_s + dt_s if self._is_same(box) else 0.0
+        if self._hand_frozen_s <= self.limit_s:
+            return None
+        return f"the picture is torn: the hand's part of it is the same for {self._hand_frozen_s:.1f} s"
+
+    def _is_same(self, box: Box) -> bool:
+        image, before = self._image, self._before
+        # A camera that draws into the same memory again has overwritten the picture before.
+        if image is None or before is None or image.shape != before.shape or np.may_share_memory(image, before):
+            return False
+        left, top, right, bottom = box
+        there = np.s_[max(0, top) : max(0, bottom), max(0, left) : max(0, right)]
+        return bool(image[there].size) and np.array_equal(image[there], before[there])
