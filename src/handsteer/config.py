@@ -149,11 +149,6 @@ class ControlConfig(Section):
         }
     )
 
-    arming: Literal["auto", "on", "off"] = Field(
-        "auto",
-        description="Whether nothing moves before neutral was seen (Stop, or no hand), after the start and after every "
-        "fault; auto is on unless the robot is simulated in the same process",
-    )
     ramp: Literal["per_message", "per_second"] = Field(
         "per_message",
         description="per_message grows by a step a message, as the tutorial does; per_second whatever the frame rate",
@@ -193,6 +188,11 @@ class ControlConfig(Section):
     )
     actions: dict[str, Action] = Field(
         {}, description="What further signs do, as {Hi: stop, Peace: turbo}; Stop and NONE always stop"
+    )
+    arming: Literal["auto", "on", "off"] = Field(
+        "auto",
+        description="Whether nothing moves before neutral was seen (Stop, or no hand), after the start and after every "
+        "fault; auto is on unless the robot is simulated in the same process",
     )
     cmd_vel_type: CmdVelType = Field(
         "twist",

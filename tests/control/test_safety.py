@@ -1,0 +1,224 @@
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from handsteer.config import ControlConfig
+from handsteer.control.safety import Allowance, Following, Ramp, Safety
+from handsteer.control.velocity import ZERO, Velocity
+from handsteer.timeouts import ARMING_S, FAULT_GAP_S, NEUTRAL_S, STEERING_AT_START_S
+
+FRAME_S = 1 / 30
+CONFIG = ControlConfig()
+
+
+def show(safety: Safety, sign: str, seconds: float = FRAME_S, period_s: float = FRAME_S) -> bool:
+    """Show a sign; return whether it may be followed in the end."""
+    admitted = False
+    for _ in range(max(1, round(seconds / period_s))):
+        safety.step(period_s)
+        admitted = safety.admits_sign(sign, stops=sign in {"Stop", "NONE"})
+    return admitted
+
+
+def armed() -> Safety:
+    safety = Safety(CONFIG, arming=True)
+    show(safety, "NONE", 2.0)
+    assert show(safety, "Forward")
+    return safety
+
+
+def test_without_arming_the_first_sign_counts() -> None:
+    assert show(Safety(CONFIG, arming=False), "Forward")
+
+
+def test_a_hand_that_is_up_at_the_start_moves_nothing_however_long() -> None:
+    safety = Safety(CONFIG, arming=True)
+    assert not show(safety, "Forward", 60.0)
+    assert safety.signs_wait == "has just started"
+
+
+@pytest.mark.parametrize(("sign", "seconds"), [("Stop", FRAME_S), ("NONE", NEUTRAL_S + 2 * FRAME_S)])
+def test_neutral_is_a_stop_or_an_empty_picture_for_a_while(sign: str, seconds: float) -> None:
+    safety = Safety(CONFIG, arming=True)
+    show(safety, "Forward", ARMING_S)
+    show(safety, sign, seconds)
+    assert show(safety, "Forward")
+
+
+def test_a_hand_that_is_missed_for_some_frames_was_not_let_go() -> None:
+    safety = Safety(CONFIG, arming=True)
+    show(safety, "Forward", ARMING_S)
+    for _ in range(10):
+        show(safety, "NONE", NEUTRAL_S / 2)
+        assert not show(safety, "Forward", 0.2)
+
+
+def test_it_arms_no_earlier_than_others_can_have_said_that_the_robot_was_stopped() -> None:
+    safety = Safety(CONFIG, arming=True)
+    assert not show(safety, "Stop", ARMING_S - 2 * FRAME_S)
+    show(safety, "Stop", 4 * FRAME_S)
+    assert show(safety, "Forward")
+
+
+@pytest.mark.parametrize("gap_s", [FAULT_GAP_S, CONFIG.sign_timeout, 3.0])
+def test_a_none_after_a_gap_is_a_fault_and_none_that_were_seen_let_it_arm(gap_s: float) -> None:
+    safety = armed()
+    safety.step(gap_s)
+    assert not safety.admits_sign("NONE", stops=True)
+    assert not show(safety, "Forward", 5.0)
+    assert not show(safety, "NONE", 20.0, period_s=0.5), "as recognition says while no frame comes"
+    assert not show(safety, "Forward")
+    show(safety, "NONE", NEUTRAL_S + FRAME_S)
+    assert show(safety, "Forward")
+
+
+def test_a_pause_of_the_signs_is_a_fault() -> None:
+    safety = armed()
+    safety.step(CONFIG.sign_timeout)
+    assert not show(safety, "Forward", 5.0)
+    assert safety.signs_wait == "no sign came"
+
+
+def test_without_arming_a_fault_alone_changes_nothing() -> None:
+    safety = Safety(CONFIG, arming=False)
+    show(safety, "Forward")
+    safety.step(5.0)
+    assert show(safety, "Forward")
+
+
+@pytest.mark.parametrize("arming", [False, True])
+def test_a_stop_holds_until_it_is_reset_and_neutral_was_seen(arming: bool) -> None:
+    safety = Safety(CONFIG, arming=arming)
+    show(safety, "Stop", 2.0)
+    safety.stop()
+    show(safety, "Stop", 2.0)
+    assert not show(safety, "Forward")
+    assert not safety.admits_steering(is_zero=False)
+    safety.reset()
+    assert not show(safety, "Forward", 5.0)
+    show(safety, "Stop")
+    assert show(safety, "Forward")
+
+
+def test_a_robot_that_was_away_is_driven_after_neutral_only() -> None:
+    safety = armed()
+    safety.robot_is_away("no robot listens")
+    assert not show(safety, "Forward", 5.0)
+    show(safety, "Stop")
+    assert show(safety, "Forward")
+
+
+def test_steering_that_was_held_since_before_the_start_has_to_let_go() -> None:
+    safety = Safety(CONFIG, arming=True)
+    for _ in range(100):
+        safety.step(0.1)
+        assert not safety.admits_steering(is_zero=False)
+    safety.step(CONFIG.steering_timeout)
+    assert safety.admits_steering(is_zero=False)
+
+
+def test_a_key_that_is_pressed_some_time_after_the_start_steers_at_once() -> None:
+    safety = Safety(CONFIG, arming=True)
+    safety.step(STEERING_AT_START_S)
+    assert safety.admits_steering(is_zero=False)
+
+
+EVENTS = st.lists(
+    st.tuples(
+        st.sampled_from(["Forward", "Turn Left", "NONE", "Stop", "stop", "reset", "away", "steer", "zero"]),
+        st.floats(0.0, 1.0),
+    ),
+    max_size=60,
+)
+
+
+@given(EVENTS, st.booleans())
+def test_whatever_happens_a_stopped_robot_follows_nobody(events: list[tuple[str, float]], arming: bool) -> None:
+    safety, stopped = Safety(CONFIG, arming=arming), False
+    for event, seconds in events:
+        safety.step(seconds)
+        if event in {"stop", "reset"}:
+            stopped = event == "stop"
+            (safety.stop if stopped else safety.reset)()
+        elif event == "away":
+            safety.robot_is_away("away")
+        elif event in {"steer", "zero"}:
+            assert not (safety.admits_steering(is_zero=event == "zero") and stopped)
+        else:
+            assert not (safety.admits_sign(event, stops=event in {"NONE", "Stop"}) and stopped)
+
+
+def test_a_robot_whose_odometry_stops_is_not_there() -> None:
+    following = Following()
+    assert following.step(10.0, Velocity(0.5, 0.0)) is None, "it never gave any"
+    following.note(Velocity(0.5, 0.0))
+    assert following.step(0.4, Velocity(0.5, 0.0)) is None
+    assert following.step(0.2, Velocity(0.5, 0.0)) == "the robot's odometry has stopped"
+    following.note(Velocity(0.5, 0.0))
+    assert following.step(0.02, Velocity(0.5, 0.0)) is None
+
+
+@pytest.mark.parametrize("commanded", [Velocity(0.5, 0.0), Velocity(-0.5, 0.0), Velocity(0.0, 1.0)])
+def test_a_robot_that_stands_though_it_is_told_to_move_does_not_follow(commanded: Velocity) -> None:
+    following, said = Following(), []
+    for _ in range(60):
+        following.note(ZERO)
+        said.append(following.step(0.02, commanded))
+    assert "the robot stood though it was told to move" in said[49:]
+    assert set(said[:49]) == {None}
+
+
+def test_a_robot_that_moves_or_is_told_little_follows() -> None:
+    for commanded, measured in ((Velocity(0.5, 0.0), Velocity(0.3, 0.0)), (Velocity(0.02, 0.0), ZERO), (ZERO, ZERO)):
+        following = Following()
+        for _ in range(200):
+            following.note(measured)
+            assert following.step(0.02, commanded) is None
+
+
+@given(st.floats(30.0, 2000.0), st.floats(1.0, 3.0))
+def test_no_more_signs_count_than_allowed_however_many_come(rate: float, seconds: float) -> None:
+    allowance, taken = Allowance(60.0), 0
+    allowance.step(100.0)
+    for _ in range(int(rate * seconds)):
+        allowance.step(1 / rate)
+        taken += allowance.take()
+    assert taken <= 60.0 * (seconds + Allowance.BURST_S) + 1
+    if rate <= 60.0:
+        assert taken == int(rate * seconds)
+
+
+SPEEDS = st.lists(st.floats(-2.0, 2.0), min_size=1, max_size=60)
+
+
+@given(SPEEDS, st.floats(0.1, 5.0), st.floats(0.5, 20.0))
+def test_what_is_commanded_grows_no_faster_than_the_limits_and_falls_at_once(
+    wanted: list[float], acceleration: float, jerk: float
+) -> None:
+    ramp = Ramp(ControlConfig(max_linear_acceleration=acceleration, max_linear_jerk=jerk))
+    speed, growth = 0.0, 0.0
+    for linear in wanted:
+        after = ramp.step(Velocity(linear, linear), 0.1)
+        assert after.angular_radps == linear, "turning has no limit here"
+        assert abs(after.linear_mps) <= abs(linear)
+        if abs(linear) <= abs(speed) and linear * speed >= 0:
+            assert after.linear_mps == linear
+        grown = abs(after.linear_mps) - (abs(speed) if after.linear_mps * speed > 0 else 0.0)
+        assert grown <= acceleration * 0.1 + 1e-9
+        assert grown <= max(0.0, growth) + jerk * 0.1 * 0.1 + 1e-9
+        speed, growth = after.linear_mps, grown
+
+
+def test_without_limits_what_is_wanted_is_commanded() -> None:
+    ramp = Ramp(ControlConfig())
+    for wanted in (Velocity(1.0, 2.0), Velocity(-1.0, 0.5), ZERO):
+        assert ramp.step(wanted, 0.0) == wanted
+
+
+def test_a_limit_of_jerk_alone_lets_it_get_there() -> None:
+    ramp = Ramp(ControlConfig(max_linear_jerk=2.0))
+    for _ in range(30):
+        now = ramp.step(Velocity(1.0, 0.0), 0.1)
+    assert math.isclose(now.linear_mps, 1.0)
