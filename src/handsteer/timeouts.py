@@ -12,7 +12,7 @@ that follow."""
 ROBOT_S: Final = 0.4
 """A robot that hears no command for so long brakes by itself; longer than :data:`STALE_S`, so that it is told first."""
 
-ODOMETRY_S: Final = 0.5
+ODOMETRY_S: Final = 0.45
 """Odometry that comes no more for so long tells that the robot is not there."""
 
 FAULT_GAP_S: Final = 0.3
@@ -36,4 +36,7 @@ RESYNC_S: Final = 1.0
 """How long frames are watched after their clock was set, before they are timed by it anew."""
 
 NOT_FOLLOWING_S: Final = 1.0
-"""A robot that was told to move for so long and does not is not following."""
+"""A robot that stands for so long after it was told to move does not follow."""
+
+STOOD_BY_ITSELF_S: Final = 0.1
+"""A robot that has followed, and then stands for so long though it is told to move, does not hear what it is told."""

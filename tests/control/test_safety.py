@@ -116,6 +116,21 @@ def test_steering_that_was_held_since_before_the_start_has_to_let_go() -> None:
         safety.step(0.1)
         assert not safety.admits_steering(is_zero=False)
     safety.step(CONFIG.steering_timeout)
+    assert not safety.admits_steering(is_zero=False), "its link may have been cut"
+    safety.step(0.1)
+    assert safety.admits_steering(is_zero=True)
+    safety.step(5.0)
+    assert safety.admits_steering(is_zero=False)
+
+
+def test_without_arming_a_pause_of_the_steering_is_letting_go() -> None:
+    safety = Safety(CONFIG, arming=False)
+    safety.disarm()
+    assert safety.admits_steering(is_zero=False)
+    safety.disarm()
+    safety.step(0.1)
+    assert not safety.admits_steering(is_zero=False)
+    safety.step(CONFIG.steering_timeout)
     assert safety.admits_steering(is_zero=False)
 
 
@@ -168,6 +183,26 @@ def test_a_robot_that_stands_though_it_is_told_to_move_does_not_follow(commanded
         said.append(following.step(0.02, commanded))
     assert "the robot stood though it was told to move" in said[49:]
     assert set(said[:49]) == {None}
+
+
+def test_a_robot_that_has_followed_and_stands_does_not_hear() -> None:
+    following, forward = Following(), Velocity(0.5, 0.0)
+    following.note(Velocity(0.4, 0.0))
+    assert following.step(0.02, forward) is None
+    said = []
+    for _ in range(6):
+        following.note(ZERO)
+        said.append(following.step(0.02, forward))
+    assert said[-2] == "the robot stood though it was told to move"
+
+
+def test_a_robot_that_turns_round_stands_for_a_moment() -> None:
+    following = Following()
+    following.note(Velocity(0.5, 0.0))
+    assert following.step(0.02, Velocity(0.5, 0.0)) is None
+    for number in range(50):
+        following.note(Velocity(0.5 - 0.02 * number, 0.0))
+        assert following.step(0.02, Velocity(-0.5, 0.0)) is None
 
 
 def test_a_robot_that_moves_or_is_told_little_follows() -> None:

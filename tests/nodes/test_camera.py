@@ -10,7 +10,7 @@ from handsteer.testing.faulty_camera import Event, FaultyCamera
 from tests.nodes.stepping import Bench
 
 LOST = CameraLost("webcam 0 gives no more frames")
-ONE, TWO, THREE = (np.full((48, 64, 3), level, np.uint8) for level in (7, 8, 9))
+ONE, TWO, THREE, FOUR = (np.full((48, 64, 3), level, np.uint8) for level in (7, 8, 9, 10))
 
 
 def start(*events: Event, age_s: float = 0.0) -> tuple[Bench, CameraNode, FaultyCamera]:
@@ -75,7 +75,7 @@ def test_no_frame_now_is_no_message() -> None:
 def test_a_picture_that_is_the_same_as_the_last_is_no_frame_and_the_camera_is_said_to_be_frozen(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
-    bench, node, _ = start(ONE, *[TWO] * 20, THREE, ONE)
+    bench, node, _ = start(ONE, *[TWO] * 20, THREE, FOUR)
     images, diagnostics = bench.record(IMAGE_RAW), bench.record(DIAGNOSTICS)
     bench.run(1.95)
     assert [image.data[0] for image in images] == [7, 8]
@@ -83,6 +83,6 @@ def test_a_picture_that_is_the_same_as_the_last_is_no_frame_and_the_camera_is_sa
     assert (status.level, status.message) == (2, "faulty camera: frozen, the same picture for 1.3 s")
     assert caplog.text.count("faulty camera is frozen") == 1
     bench.run(0.3)
-    assert [image.data[0] for image in images] == [7, 8, 9, 7]
+    assert [image.data[0] for image in images] == [7, 8, 9, 10]
     assert "faulty camera is back" in caplog.text
     assert node.frames == 4

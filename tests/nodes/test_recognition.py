@@ -98,16 +98,25 @@ def test_a_broken_frame_is_no_frame(bench: RecognitionBench) -> None:
 
 def test_the_same_picture_again_is_no_frame_whoever_publishes_it(bench: RecognitionBench) -> None:
     statuses = bench.record(DIAGNOSTICS)
-    frozen = image_message(bench.picture(), HEADER)
     bench.show(frames=6)
     bench.signs.clear()
-    bench.show(frozen, frames=60)
+    bench.show(image_message(bench.picture(), HEADER), frames=60)
     assert bench.names[0] == "Forward", "it was new once"
     assert set(bench.names[1:]) == {"NONE"}
     assert len(bench.names) <= 5
     assert statuses[-1].status[0].message.startswith("the camera is frozen: the same picture for ")
     bench.show(frames=6)
     assert bench.names[-1] == "Forward"
+
+
+def test_a_second_camera_that_is_frozen_adds_nothing_to_one_that_is_not(bench: RecognitionBench) -> None:
+    frozen = image_message(NOISE.on(GREY, 99.0), HEADER)
+    bench.show(frozen)
+    bench.signs.clear()
+    for _ in range(10):
+        bench.show()
+        bench.show(frozen)
+    assert len(bench.names) == 10
 
 
 def test_a_hand_in_the_part_of_a_picture_that_stands_still_is_not_seen(bench: RecognitionBench) -> None:

@@ -1,19 +1,23 @@
 """Whether a picture is new: a camera that hangs goes on delivering, with new stamps, what it saw last."""
 
+from collections import deque
+
 import numpy as np
 from numpy.typing import NDArray
 
 _SAMPLES_A_SIDE = 60
 _BLACK = 6.0
+# A frozen camera may share its topic with others that are not.
+_REMEMBERED = 8
 
 Box = tuple[int, int, int, int]
 
 
 class Freshness:
-    """Compares each picture with the one before.
+    """Compares each picture with those before.
 
-    No two pictures of a real camera are the same: its sensor has noise. Where a whole picture is the same as the last,
-    at some thousand pixels, it is not new. Compressed video repeats parts that hardly change, so a part is no proof,
+    No two pictures of a real camera are the same: its sensor has noise. A picture that is the same as one of the last
+    few, at some thousand pixels, is not new. Compressed video repeats parts that hardly change, so a part is no proof,
     unless it is where the hand is, every pixel of it, and for longer than a moment.
 
     Args:
@@ -28,7 +32,7 @@ class Freshness:
         self.frozen_s = 0.0
         self._image: NDArray[np.uint8] | None = None
         self._before: NDArray[np.uint8] | None = None
-        self._sample: NDArray[np.uint8] | None = None
+        self._samples: deque[NDArray[np.uint8]] = deque(maxlen=_REMEMBERED)
         self._hand_frozen_s = 0.0
 
     def why_refused(self, image: NDArray[np.uint8], dt_s: float) -> str | None:
@@ -40,12 +44,11 @@ class Freshness:
         """
         step = max(1, min(image.shape[:2]) // _SAMPLES_A_SIDE)
         sample = image[step // 2 :: step, step // 2 :: step].copy()
-        is_same = self._sample is not None and np.array_equal(sample, self._sample)
-        self._sample = sample
-        if is_same:
+        if any(np.array_equal(sample, known) for known in self._samples):
             self.frozen_s += dt_s
             return f"the camera is frozen: the same picture for {self.frozen_s:.1f} s"
         self.frozen_s = 0.0
+        self._samples.append(sample)
         self._before, self._image = self._image, image
         if sample.mean() < _BLACK:
             return "the picture is black: is the lens covered?"

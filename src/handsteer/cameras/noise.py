@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-_SHIFTS = 64
+_SHIFTS = 256
 _TICKS_PER_S = 10_000
 
 

@@ -8,9 +8,17 @@ how fast what is commanded may grow. How long each waits stands in :mod:`handste
 import math
 
 from handsteer.config import ControlConfig
-from handsteer.control.velocity import ZERO, Velocity
+from handsteer.control.velocity import Velocity
 from handsteer.signs.vocabulary import NONE
-from handsteer.timeouts import ARMING_S, FAULT_GAP_S, NEUTRAL_S, NOT_FOLLOWING_S, ODOMETRY_S, STEERING_AT_START_S
+from handsteer.timeouts import (
+    ARMING_S,
+    FAULT_GAP_S,
+    NEUTRAL_S,
+    NOT_FOLLOWING_S,
+    ODOMETRY_S,
+    STEERING_AT_START_S,
+    STOOD_BY_ITSELF_S,
+)
 
 _SLACK_S = 1e-9
 
@@ -20,8 +28,9 @@ class Safety:
 
     Neutral, for signs, is a sign that stops, or an empty picture for :data:`~handsteer.timeouts.NEUTRAL_S`; a ``NONE``
     that a fault has made is neither. For steering it is a zero, or a pause. After a Stop was reset, or another robot
-    was chosen, each has to show it once. With ``arming`` each has to do so after the start too, and signs after every
-    fault: so a hand that is up already, or a pad that is held, moves nothing.
+    was chosen, each has to show it once. With ``arming`` each has to do so after the start too, and after every fault;
+    a pause of steering that was not at zero is then a fault as well. So a hand that is up already, or a stick that
+    is held, moves nothing.
 
     Args:
         config: How long signs and steering may pause.
@@ -37,6 +46,7 @@ class Safety:
         self._age_s = 0.0
         self._sign_age_s = math.inf
         self._steering_age_s = math.inf
+        self._last_steering_was_zero = True
         self._neutral_s = 0.0
         self._signs_wait: str | None = "has just started" if arming else None
         self._steering_waits = arming
@@ -105,7 +115,11 @@ class Safety:
         # What is heard for the first time soon after the start may have been held since before it.
         is_first_at_start = math.isinf(age_s) and self._arming and self._age_s < STEERING_AT_START_S
         after_pause = age_s >= self._config.steering_timeout and not is_first_at_start
-        if is_zero or after_pause:
+        is_lost = after_pause and self._arming and not self._last_steering_was_zero
+        self._last_steering_was_zero = is_zero
+        if is_lost:
+            self._steering_waits = True
+        if is_zero or (after_pause and not is_lost):
             self._steering_waits = False
         return not (self._steering_waits or self.is_stopped)
 
@@ -127,11 +141,13 @@ class Following:
         self._measured: Velocity | None = None
         self._age_s = 0.0
         self._refuses_s = 0.0
+        self._follows: Velocity | None = None
 
     def note(self, measured: Velocity) -> None:
-        """Take what odometry says that the robot does."""
-        self._measured = measured
-        self._age_s = 0.0
+        """Take what odometry says that the robot does; what is not finite says nothing."""
+        if measured.is_finite:
+            self._measured = measured
+            self._age_s = 0.0
 
     def step(self, dt_s: float, commanded: Velocity) -> str | None:
         """Let ``dt_s`` seconds pass in which ``commanded`` held; return what is wrong with the robot, or None."""
@@ -140,10 +156,18 @@ class Following:
         self._age_s += dt_s
         if self._age_s >= ODOMETRY_S:
             return "the robot's odometry has stopped"
-        self._refuses_s = self._refuses_s + dt_s if _stands_instead(commanded, self._measured) else 0.0
-        if self._refuses_s < NOT_FOLLOWING_S:
+        done = _done(commanded, self._measured)
+        turns_round = self._follows is not None and not _same_way(commanded, self._follows)
+        if not done or turns_round:
+            self._follows = None
+        elif max(done) >= 0.5:
+            self._follows = commanded
+        stands = bool(done) and max(map(abs, done)) <= 0.1
+        self._refuses_s = self._refuses_s + dt_s if stands else 0.0
+        if self._refuses_s < (STOOD_BY_ITSELF_S if self._follows else NOT_FOLLOWING_S):
             return None
         self._refuses_s = 0.0
+        self._follows = None
         return "the robot stood though it was told to move"
 
 
@@ -215,9 +239,11 @@ class _Axis:
         return self._now
 
 
-def _stands_instead(commanded: Velocity, measured: Velocity) -> bool:
-    """Return whether a robot that is told to move does less than a tenth of it; slow commands tell nothing."""
-    wanted = (abs(commanded.linear_mps), abs(commanded.angular_radps))
-    done = (abs(measured.linear_mps), abs(measured.angular_radps))
-    tells = commanded != ZERO and (wanted[0] >= 0.1 or wanted[1] >= 0.2)
-    return tells and done[0] <= 0.1 * wanted[0] and done[1] <= 0.1 * wanted[1]
+def _done(commanded: Velocity, measured: Velocity) -> list[float]:
+    """Return how much of what it is told the robot does, 1 for all, a part for each way that it is told enough of."""
+    parts = ((commanded.linear_mps, measured.linear_mps, 0.1), (commanded.angular_radps, measured.angular_radps, 0.2))
+    return [does / wanted for wanted, does, least in parts if abs(wanted) >= least]
+
+
+def _same_way(one: Velocity, other: Velocity) -> bool:
+    return one.linear_mps * other.linear_mps >= 0 and one.angular_radps * other.angular_radps >= 0
