@@ -44,11 +44,14 @@ class Freshness:
         """
         step = max(1, min(image.shape[:2]) // _SAMPLES_A_SIDE)
         sample = image[step // 2 :: step, step // 2 :: step].copy()
-        if any(np.array_equal(sample, known) for known in self._samples):
+        same = next((index for index, known in enumerate(self._samples) if np.array_equal(sample, known)), None)
+        if same is not None:
+            del self._samples[same]
+        self._samples.append(sample)
+        if same is not None:
             self.frozen_s += dt_s
             return f"the camera is frozen: the same picture for {self.frozen_s:.1f} s"
         self.frozen_s = 0.0
-        self._samples.append(sample)
         self._before, self._image = self._image, image
         if sample.mean() < _BLACK:
             return "the picture is black: is the lens covered?"
