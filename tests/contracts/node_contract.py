@@ -166,6 +166,18 @@ class Running:
                 self.nodes[name] = start()
         return self
 
+    def kill(self, name: str) -> None:
+        """Kill a node, and wait until it has gone."""
+        self.nodes[name].popen.kill()
+        self.nodes[name].popen.wait()
+
+    def say_stop(self, stopped: bool) -> None:
+        """Publish ``stopped`` on ``/stop``, as anybody may."""
+        self.peer.ask("advertise", topic="/stop", package="std_msgs", type="Bool")
+        # All but the one that publishes hear it: robot, control, recognition and camera.
+        eventually(lambda: self.peer.ask("listeners", topic="/stop") >= len(self.nodes), what="the nodes to listen")
+        self.peer.ask("publish", topic="/stop", values={"data": stopped}, count=1, period_s=0.1)
+
     @property
     def speeds(self) -> list[tuple[float, float]]:
         """When, and the robot's speed in m/s."""
@@ -214,6 +226,23 @@ class ChainContract:
             time.sleep(0.3)
             assert {twist for at_s, twist in twists(running.peer) if at_s > stopped_s} <= {(0.0, 0.0)}
         assert stopped_s - killed_s <= LIMIT_S + _SEEN_S
+
+    def test_a_stop_outlives_the_control(self, running: Running) -> None:
+        """The hand shows Forward all the time, and the control does not wait for neutral."""
+        running.say_stop(True)
+        running.expect_rest()
+        running.kill("control")
+        running.revive()
+        stood_s = time.monotonic()
+        eventually(lambda: any(at_s > stood_s for at_s, _ in twists(running.peer)), what="the new control to speak")
+        time.sleep(1.5)
+        speeds = [speed for at_s, speed in running.speeds if at_s > stood_s]
+        assert max(map(abs, speeds)) < 0.05, "it may not have heard so for a moment"
+        assert abs(speeds[-1]) < 0.01
+        running.say_stop(False)
+        time.sleep(0.2)
+        running.kill("control")
+        running.revive().expect_full_speed()
 
     def test_a_robot_that_was_frozen_does_not_drive_on(self, running: Running) -> None:
         robot = running.nodes["robot"]

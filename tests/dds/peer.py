@@ -48,6 +48,11 @@ class String(IdlStruct, typename="std_msgs::msg::dds_::String_"):
 
 
 @dataclass
+class Bool(IdlStruct, typename="std_msgs::msg::dds_::Bool_"):
+    data: bool = False
+
+
+@dataclass
 class Time(IdlStruct, typename="builtin_interfaces::msg::dds_::Time_"):
     sec: int32 = 0
     nanosec: uint32 = 0
@@ -186,7 +191,19 @@ class ParticipantEntitiesInfo(IdlStruct, typename="rmw_dds_common::msg::dds_::Pa
 
 TYPES = {
     kind.__name__: kind
-    for kind in (String, Image, CompressedImage, Twist, Odometry, DiagnosticArray, Clock, Log, ParameterEvent, Battery)
+    for kind in (
+        Bool,
+        String,
+        Image,
+        CompressedImage,
+        Twist,
+        Odometry,
+        DiagnosticArray,
+        Clock,
+        Log,
+        ParameterEvent,
+        Battery,
+    )
 }
 RELIABLE, BEST_EFFORT = Policy.Reliability.Reliable(1_000_000_000), Policy.Reliability.BestEffort
 CDR = Policy.DataRepresentation(use_cdrv0_representation=True)

@@ -75,12 +75,16 @@ def test_ros2_sees_the_node_by_its_names_types_and_hashes(dds: DdsGraph) -> None
         "typehash=RIHS01_df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18;",
     ]
     eventually(lambda: "rt/base/cmd_vel" in dds.nodes()["/far/driver"]["writers"])
-    eventually(lambda: len(topics(dds.nodes()["/far/driver"]["readers"])) == 3)
+    eventually(lambda: len(topics(dds.nodes()["/far/driver"]["readers"])) == 4)
     node = dds.nodes()["/far/driver"]
     assert node["participant"] == "enclave=/;"
     assert node["writers"]["rt/base/cmd_vel"] == twist
-    assert topics(node["writers"]) == {"rt/base/cmd_vel", "rt/diagnostics", "rt/parameter_events", "rt/rosout"}
-    assert topics(node["readers"]) == {"rt/far/gesture/hand_sign", "rt/far/steering/cmd_vel", "rt/far/stop"}
+    assert topics(node["writers"]) == {
+        *("rt/base/cmd_vel", "rt/diagnostics", "rt/far/stopped", "rt/parameter_events", "rt/rosout")
+    }
+    assert topics(node["readers"]) == {
+        *("rt/far/gesture/hand_sign", "rt/far/steering/cmd_vel", "rt/far/stop", "rt/far/stopped")
+    }
     assert node["readers"]["rt/far/gesture/hand_sign"] == string
     assert node["readers"]["rt/far/steering/cmd_vel"] == twist
     control.signal(signal.SIGTERM)

@@ -23,6 +23,7 @@ import zenoh.ext
 
 # As `ros2 topic info -v` prints them.
 HASHES = {
+    "std_msgs::msg::dds_::Bool_": "RIHS01_feb91e995ff9ebd09c0cb3d2aed18b11077585839fb5db80193b62d74528f6c9",
     "std_msgs::msg::dds_::String_": "RIHS01_df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18",
     "geometry_msgs::msg::dds_::Twist_": "RIHS01_9c45bf16fe0983d80e3cfe750d6835843d265a9a6c46bd2e609fcddde6fb8d2a",
     "sensor_msgs::msg::dds_::Image_": "RIHS01_d31d41a9a4c4bc8eae9be757b0beed306564f7526c88ea6a4588fb9582527d47",
@@ -108,6 +109,8 @@ def cdr(kind: str, values: dict[str, Any]) -> bytes:
     if kind == "String":
         text = values["data"].encode() + b"\0"
         return HEADER + struct.pack("<I", len(text)) + text
+    if kind == "Bool":
+        return HEADER + struct.pack("<?", values["data"])
     if kind == "Clock":
         return HEADER + struct.pack("<iI", int(values["s"]), int(values["s"] % 1 * 1e9))
     assert kind == "Twist"
