@@ -7,6 +7,7 @@ twice, unless the configuration says otherwise: the second time in the region th
 says less well where a hand is. And hands are looked for in more ways than by palms in the frame, see ``search``.
 """
 
+from math import inf
 from pathlib import Path
 from typing import Final
 
@@ -21,11 +22,17 @@ from handsteer.landmarks.palm import PalmDetector
 from handsteer.landmarks.protocol import Hand
 from handsteer.landmarks.roi import Roi, from_landmarks
 from handsteer.landmarks.search import Search
+from handsteer.landmarks.stillness import Pace, Stillness, cells_of_frame, cells_of_hands
 
 _SAME_HAND_OVERLAP: Final = 0.5
 _PART: Final = 0.7
 _SECOND_LOOK: Final = 1.15
 """How much larger the region of the second look is than MediaPipe's: of 57 misread hands of people it reads 12 more."""
+_SEARCH: Final = Pace(change=6, settle_s=0.12, period_s=0.2)
+"""How often to search without a hand: by the end of the settling, each of the four main ways had its frame at 30 Hz."""
+_SEARCH_BESIDE_A_HAND: Final = Pace(change=6, settle_s=0.4, period_s=1.0, least_s=0.2)
+_FOLLOW: Final = Pace(change=3, settle_s=0.08, period_s=0.1)
+"""How often to look at hands that are followed: below three levels, landmarks stray by 0.03 of the hand at most."""
 _MAX_SIDE: Final = 32766
 """OpenCV samples no picture that is larger."""
 
@@ -50,12 +57,15 @@ class MediaPipeLandmarker:
         palm, landmark = find_pair(config.model, models)
         palms = PalmDetector(palm, config.threads, config.min_detection_confidence)
         self._search = Search(palms, config.max_hands, wide=config.wide_search)
+        self._searched = Stillness()
+        self._still = Stillness()
         self._landmarks = HandLandmarkModel(landmark, config.threads)
         self._followed: list[Roi] = []
+        self._looked_at: list[Roi] = []
         self._hands: list[Hand] = []
         self._image_size = (0, 0)
 
-    def detect(self, image: NDArray[np.uint8], *, search: bool = True) -> list[Hand]:
+    def detect(self, image: NDArray[np.uint8], *, search: bool = True, dt_s: float = inf) -> list[Hand]:
         """Return the hands in ``image``; an empty list when there is none.
 
         A frame of another size than the one before is taken as the start of another stream: nothing is followed
@@ -65,6 +75,8 @@ class MediaPipeLandmarker:
             image: (height, width, 3) uint8, BGR, not mirrored; 1 to 32766 pixels a side, of any memory layout. Grey
                 and BGRA pictures are refused rather than guessed at.
             search: Whether to look for further hands while one is followed already.
+            dt_s: Seconds since the last frame, >= 0. By it less is looked at while the picture does not change; without
+                it, each frame is looked at.
 
         Raises:
             FrameError: The image has another shape or type.
@@ -74,7 +86,21 @@ class MediaPipeLandmarker:
         if (width, height) != self._image_size:
             self.reset()
             self._image_size = (width, height)
-        present, self._followed = _of_different_hands(self._estimates(image, search))
+        self._searched.wait(dt_s)
+        self._still.wait(dt_s)
+        if self._wants_search(image, search):
+            self._still.reset()
+            estimates = self._new_and_followed(image, self._followed)
+        elif self._followed and self._still.wants_look(cells_of_hands(image, self._looked_at), _FOLLOW):
+            estimates = self._followed_on(image)
+        else:
+            return list(self._hands)
+        if self._followed and not estimates:
+            self._searched.reset()
+        present, self._followed = _of_different_hands(estimates)
+        if self._followed:
+            self._looked_at = self._followed
+            self._still.look(cells_of_hands(image, self._looked_at))
         self._hands = [_hand(estimate, width, height) for estimate in present]
         return list(self._hands)
 
@@ -89,18 +115,34 @@ class MediaPipeLandmarker:
         self._followed = []
         self._hands = []
         self._search.reset()
+        self._searched.reset()
+        self._still.reset()
 
-    def _estimates(self, image: NDArray[np.uint8], search: bool) -> list[Estimate]:
-        """Return the hands that are seen where they were, and new ones if not all that are wanted are followed."""
-        followed, wanted = self._followed, self._config.max_hands
-        if followed and (not search or len(followed) >= wanted):
-            present = self._present(image, followed)
-            if present or not self._config.wide_search:
-                return present
-            # A hand that has jumped is looked for at once: it may show Stop.
-            followed = []
+    def _wants_search(self, image: NDArray[np.uint8], further: bool) -> bool:
+        """Return whether to look for hands, with one that is followed only if ``further`` ones are asked for."""
+        pace = _SEARCH_BESIDE_A_HAND if self._followed else _SEARCH
+        if self._followed and (not further or len(self._followed) >= self._config.max_hands):
+            return False
+        if self._searched.is_too_early(pace) or not self._searched.wants_look(cells := cells_of_frame(image), pace):
+            return False
+        self._searched.look(cells)
+        return True
+
+    def _followed_on(self, image: NDArray[np.uint8]) -> list[Estimate]:
+        """Return the hands that are seen where they were; if none is, those that are found."""
+        present = self._present(image, self._followed)
+        if present or not self._config.wide_search:
+            return present
+        # A hand that has jumped is looked for at once: it may show Stop.
+        self._search.begin_again()
+        self._searched.reset()
+        self._searched.look(cells_of_frame(image))
+        return self._new_and_followed(image, [])
+
+    def _new_and_followed(self, image: NDArray[np.uint8], followed: list[Roi]) -> list[Estimate]:
+        """Return the hands that are seen where they were, and those that are found."""
         for places in self._search.places(image, beside_a_hand=bool(followed)):
-            regions = _distinct([*followed, *places.regions])[:wanted]
+            regions = _distinct([*followed, *places.regions])[: self._config.max_hands]
             if present := self._present(image, regions, places.min_presence):
                 rivals = [each for roi in places.rivals for each in self._present(image, [roi], places.min_presence)]
                 return [max(present + rivals, key=lambda each: each.presence)] if rivals else present

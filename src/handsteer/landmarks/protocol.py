@@ -1,6 +1,7 @@
 """What every landmarker offers."""
 
 from dataclasses import dataclass
+from math import inf
 from typing import Literal, Protocol
 
 import numpy as np
@@ -61,7 +62,7 @@ class Hand:
 class Landmarker(Protocol):
     """Finds hands in frames; follows them from one frame to the next."""
 
-    def detect(self, image: NDArray[np.uint8], *, search: bool = True) -> list[Hand]:
+    def detect(self, image: NDArray[np.uint8], *, search: bool = True, dt_s: float = inf) -> list[Hand]:
         """Return the hands in ``image``; an empty list when there is none.
 
         Hands that are already followed come first and keep their order; new ones after them, the surest first.
@@ -69,6 +70,7 @@ class Landmarker(Protocol):
         Args:
             image: (height, width, 3) uint8, BGR, not mirrored.
             search: Whether to look for further hands while one is followed already, which takes time.
+            dt_s: Seconds since the last frame, >= 0, by which less can be looked at where nothing changes.
 
         Raises:
             FrameError: The image has another shape or type.

@@ -1,6 +1,7 @@
 """Replays hands that are already known, without looking at the frames."""
 
 from collections.abc import Iterable
+from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,12 +20,13 @@ class RecordedLandmarker:
         self._frames = [list(hands) for hands in frames]
         self._next = 0
 
-    def detect(self, image: NDArray[np.uint8], *, search: bool = True) -> list[Hand]:
+    def detect(self, image: NDArray[np.uint8], *, search: bool = True, dt_s: float = inf) -> list[Hand]:
         """Return the hands of the next frame; an empty list after the last one.
 
         Args:
             image: Not looked at.
             search: Makes no difference.
+            dt_s: Makes no difference.
         """
         hands = self._frames[self._next] if self._next < len(self._frames) else []
         self._next += 1

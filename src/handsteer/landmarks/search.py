@@ -124,6 +124,11 @@ class Search:
             self._without_hands = itertools.chain([_FIRST], itertools.cycle(_WITHOUT_HANDS))
             self._beside_a_hand = itertools.cycle(_BESIDE_A_HAND)
 
+    def begin_again(self) -> None:
+        """Look for a hand that has just been in view: of the ways to look, those come first that find most."""
+        if self._wide:
+            self._without_hands = itertools.cycle(_WITHOUT_HANDS)
+
     def places(self, image: NDArray[np.uint8], *, beside_a_hand: bool) -> Iterator[Places]:
         """Yield where hands may be in the next frame; further places are for when those before are no hands.
 

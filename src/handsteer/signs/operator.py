@@ -13,7 +13,6 @@ from handsteer.signs.features import KNUCKLES, WRIST
 from handsteer.signs.protocol import SignGuess
 from handsteer.signs.vocabulary import NONE, STOP
 
-_SEARCH_PERIOD_S: Final = 0.2
 _PALM: Final = [WRIST, *KNUCKLES]
 _JUMP: Final = 1.0
 """How far a hand can move from one frame to the next, in its own sizes."""
@@ -69,18 +68,10 @@ class Operator:
         self._followed: Place | None = None
         self._unseen_s = 0.0
         self._idle_s = math.inf
-        self._since_search_s = 0.0
 
-    def wants_search(self, dt_s: float) -> bool:
-        """Return whether to look for further hands, ``dt_s`` seconds after the last frame: it takes time.
-
-        It is wanted now and then while the followed hand gives no sign.
-        """
-        self._since_search_s += dt_s
-        if self._idle_s == 0.0 or self._since_search_s < _SEARCH_PERIOD_S:
-            return False
-        self._since_search_s = 0.0
-        return True
+    def wants_search(self) -> bool:
+        """Return whether to look for further hands, which takes time: while the followed one gives no sign."""
+        return self._idle_s > 0.0
 
     def choose(self, hands: Sequence[Hand], guesses: Sequence[SignGuess], dt_s: float) -> int | None:
         """Return the index of the hand that gives the signs; None when it is not in view.

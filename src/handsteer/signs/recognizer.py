@@ -75,7 +75,7 @@ class Recognizer:
         Raises:
             FrameError: The image has another shape or type.
         """
-        hands = self._landmarker.detect(image, search=self._operator.wants_search(dt_s))
+        hands = self._landmarker.detect(image, search=self._operator.wants_search(), dt_s=dt_s)
         told = [self._classifier.classify(hand) for hand in hands]
         guesses = [self._seen(guess) for guess in told]
         chosen = self._operator.choose(hands, guesses, dt_s)
