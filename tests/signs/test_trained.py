@@ -11,7 +11,7 @@ from handsteer.hand.poses import FIST, HandPose, View
 from handsteer.landmarks.protocol import Hand, Handedness
 from handsteer.signs.model import load_model
 from handsteer.signs.trained import TrainedClassifier
-from handsteer.signs.vocabulary import FORWARD, GO, MOTION_SIGNS, NONE, SIGNS, STOP, TURN_LEFT, TURN_RIGHT
+from handsteer.signs.vocabulary import BACKWARD, FORWARD, GO, MOTION_SIGNS, NONE, SIGNS, STOP, TURN_LEFT, TURN_RIGHT
 from tests.signs.hands import SIZE, hand_of, moved, show_fingers, show_pose, show_sign
 
 CLASSIFIER = TrainedClassifier(load_model())
@@ -110,6 +110,20 @@ def test_the_mirror_image_is_as_sure_and_turns_the_other_way(sign: str) -> None:
     one, other = CLASSIFIER.classify(hand), CLASSIFIER.classify(flipped)
     assert other.sign == {TURN_LEFT: TURN_RIGHT, TURN_RIGHT: TURN_LEFT}.get(one.sign, one.sign)
     assert other.confidence == pytest.approx(one.confidence, abs=1e-4)
+
+
+def pointing_down(closed: float, pitch_deg: float) -> Hand:
+    """Return a hand whose index finger points down, the others ``closed`` from 0 to 1, tipped away from the camera."""
+    degrees = {"thumb_spread": 9.0, "thumb_opposition": 50.0, "thumb_mcp": 35.0, "thumb_ip": 60.0}
+    degrees |= {"index_mcp": 3.0, "index_pip": 5.0, "index_dip": 3.0}
+    for finger in ("middle", "ring", "little"):
+        degrees |= {f"{finger}_mcp": 70.0 * closed, f"{finger}_pip": 92.0 * closed, f"{finger}_dip": 50.0 * closed}
+    return show_pose(HandPose(angles_of(**degrees), View(yaw=0.15, pitch=math.radians(pitch_deg), roll=math.pi)))
+
+
+@pytest.mark.parametrize(("closed", "pitch_deg", "sign"), [(1.0, -20, BACKWARD), (1.0, 20, BACKWARD), (0.7, 20, NONE)])
+def test_a_half_open_hand_that_points_down_and_away_is_at_rest(closed: float, pitch_deg: float, sign: str) -> None:
+    assert sure_sign(pointing_down(closed, pitch_deg)) == sign
 
 
 def test_a_hand_that_is_hardly_there_is_no_sign() -> None:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.floating]
 
-WRIST, THUMB_TIP, INDEX_BASE, INDEX_TIP, LITTLE_BASE = 0, 4, 5, 8, 17
+WRIST, THUMB_TIP, INDEX_BASE, INDEX_TIP, MIDDLE_BASE, MIDDLE_TIP, LITTLE_BASE = 0, 4, 5, 8, 9, 12, 17
 KNUCKLES: Final = (5, 9, 13, 17)
 
 _DIGITS: Final = np.array(
