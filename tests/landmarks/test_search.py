@@ -82,6 +82,15 @@ def test_a_reset_makes_the_next_frame_the_first():
     assert first == again != second
 
 
+def test_a_hand_that_has_just_been_lost_is_looked_for_in_the_plain_frame_first():
+    palms = Palms()
+    search = Search(palms, 2, wide=True)
+    for frames in (1, 2, 3):
+        list(frame_by_frame(search, palms, frames))
+        search.begin_again()
+        assert [widened for widened, _ in frame_by_frame(search, palms, 2)] == [[1.0], [1.25]]
+
+
 def test_enough_sure_palms_in_the_plain_frame_end_the_search():
     for sure, widened in ((palm(100, 0.9), [1.0]), (palm(100, 0.6), [1.0, 1.25])):
         palms = Palms(sure)
