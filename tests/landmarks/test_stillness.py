@@ -55,6 +55,20 @@ def test_what_comes_slowly_is_a_change_too():
     assert looks(slowly, seldom) == list(range(0, 40, 6))
 
 
+def test_a_change_wakes_only_where_frames_were_left_out_before():
+    bright = np.full_like(EMPTY, 255)
+    for frames, woken in ((2, False), (20, True)):
+        stillness = Stillness()
+        for picture in [*[EMPTY] * frames, bright]:
+            stillness.wait(DT)
+            if stillness.wants_look(cells := cells_of_frame(picture), PACE):
+                stillness.look(cells)
+        assert stillness.woken is woken
+        stillness.wait(DT)
+        assert stillness.wants_look(cells_of_frame(EMPTY), PACE)
+        assert not stillness.woken
+
+
 def test_no_look_follows_another_too_early():
     pace = Pace(change=6, settle_s=0.4, period_s=1.0, least_s=0.19)
     flicker = [np.full((48, 64, 3), 200 * (number % 2), np.uint8) for number in range(30)]

@@ -125,6 +125,8 @@ class MediaPipeLandmarker:
             return False
         if self._searched.is_too_early(pace) or not self._searched.wants_look(cells := cells_of_frame(image), pace):
             return False
+        if self._searched.woken:
+            self._search.begin_again()
         self._searched.look(cells)
         return True
 

@@ -125,7 +125,7 @@ class Search:
             self._beside_a_hand = itertools.cycle(_BESIDE_A_HAND)
 
     def begin_again(self) -> None:
-        """Look for a hand that has just been in view: of the ways to look, those come first that find most."""
+        """Of the ways to look in frames without hands, begin with those that find most: there may be one just now."""
         if self._wide:
             self._without_hands = itertools.cycle(_WITHOUT_HANDS)
 

@@ -43,6 +43,9 @@ class Stillness:
 
     The picture is compared with the one that was looked at, not with the last frame, so what comes slowly is a change
     too.
+
+    Attributes:
+        woken: Whether the frame that was asked about last has changed after others were not worth a look.
     """
 
     def __init__(self) -> None:
@@ -53,6 +56,8 @@ class Stillness:
         self._seen: Cells | None = None
         self._since_change_s = 0.0
         self._since_look_s = inf
+        self._rests = False
+        self.woken = False
 
     def wait(self, dt_s: float) -> None:
         """Let ``dt_s`` seconds pass, >= 0."""
@@ -70,10 +75,15 @@ class Stillness:
             cells: Those of the frame, as many as were given to :meth:`look`.
             pace: How often to.
         """
-        if self._seen is None or cv2.norm(cells, self._seen, cv2.NORM_INF) >= pace.change:
+        changed = self._seen is None or cv2.norm(cells, self._seen, cv2.NORM_INF) >= pace.change
+        self.woken = changed and self._rests
+        if changed:
+            self._rests = False
             self._since_change_s = 0.0
             return True
-        return self._since_look_s >= pace.period_s or self._since_change_s < pace.settle_s
+        wanted = self._since_look_s >= pace.period_s or self._since_change_s < pace.settle_s
+        self._rests = self._rests or not wanted
+        return wanted
 
     def look(self, cells: Cells) -> None:
         """Note that the frame with these ``cells`` is looked at."""
