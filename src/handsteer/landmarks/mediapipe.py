@@ -30,7 +30,7 @@ _SECOND_LOOK: Final = 1.15
 """How much larger the region of the second look is than MediaPipe's: of 57 misread hands of people it reads 12 more."""
 _SEARCH: Final = Pace(change=6, settle_s=0.12, period_s=0.2)
 """How often to search without a hand: by the end of the settling, each of the four main ways had its frame at 30 Hz."""
-_SEARCH_BESIDE_A_HAND: Final = Pace(change=6, settle_s=0.4, period_s=1.0, least_s=0.2)
+_SEARCH_BESIDE_A_HAND: Final = Pace(change=6, settle_s=0.2, period_s=1.0, least_s=0.2)
 _FOLLOW: Final = Pace(change=3, settle_s=0.08, period_s=0.1)
 """How often to look at hands that are followed: below three levels, landmarks stray by 0.03 of the hand at most."""
 _MAX_SIDE: Final = 32766
@@ -58,6 +58,7 @@ class MediaPipeLandmarker:
         palms = PalmDetector(palm, config.threads, config.min_detection_confidence)
         self._search = Search(palms, config.max_hands, wide=config.wide_search)
         self._searched = Stillness()
+        self._searched_beside = Stillness()
         self._still = Stillness()
         self._landmarks = HandLandmarkModel(landmark, config.threads)
         self._followed: list[Roi] = []
@@ -86,8 +87,8 @@ class MediaPipeLandmarker:
         if (width, height) != self._image_size:
             self.reset()
             self._image_size = (width, height)
-        self._searched.wait(dt_s)
-        self._still.wait(dt_s)
+        for stillness in (self._searched, self._searched_beside, self._still):
+            stillness.wait(dt_s)
         if self._wants_search(image, search):
             self._still.reset()
             estimates = self._new_and_followed(image, self._followed)
@@ -115,19 +116,21 @@ class MediaPipeLandmarker:
         self._followed = []
         self._hands = []
         self._search.reset()
-        self._searched.reset()
-        self._still.reset()
+        for stillness in (self._searched, self._searched_beside, self._still):
+            stillness.reset()
 
     def _wants_search(self, image: NDArray[np.uint8], further: bool) -> bool:
         """Return whether to look for hands, with one that is followed only if ``further`` ones are asked for."""
-        pace = _SEARCH_BESIDE_A_HAND if self._followed else _SEARCH
-        if self._followed and (not further or len(self._followed) >= self._config.max_hands):
+        searched, pace = self._searched, _SEARCH
+        if self._followed:
+            if not further or len(self._followed) >= self._config.max_hands:
+                return False
+            searched, pace = self._searched_beside, _SEARCH_BESIDE_A_HAND
+        if searched.is_too_early(pace) or not searched.wants_look(cells := cells_of_frame(image), pace):
             return False
-        if self._searched.is_too_early(pace) or not self._searched.wants_look(cells := cells_of_frame(image), pace):
-            return False
-        if self._searched.woken:
+        if searched.woken and not self._followed:
             self._search.begin_again()
-        self._searched.look(cells)
+        searched.look(cells)
         return True
 
     def _followed_on(self, image: NDArray[np.uint8]) -> list[Estimate]:
@@ -137,12 +140,13 @@ class MediaPipeLandmarker:
             return present
         # A hand that has jumped is looked for at once: it may show Stop.
         self._search.begin_again()
-        self._searched.reset()
-        self._searched.look(cells_of_frame(image))
         return self._new_and_followed(image, [])
 
     def _new_and_followed(self, image: NDArray[np.uint8], followed: list[Roi]) -> list[Estimate]:
         """Return the hands that are seen where they were, and those that are found."""
+        if not followed:
+            # One of two hands may be found only in the next frame, in which it is looked for in another way.
+            self._searched_beside.reset()
         for places in self._search.places(image, beside_a_hand=bool(followed)):
             regions = _distinct([*followed, *places.regions])[: self._config.max_hands]
             if present := self._present(image, regions, places.min_presence):

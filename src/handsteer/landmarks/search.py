@@ -98,7 +98,8 @@ _FIRST: Final[Turn] = (Palms((1.0, 1.25)), _VERY_WIDE, _MIDDLE_UP, *_MIDDLES_TUR
 _WITHOUT_HANDS: Final[tuple[Turn, ...]] = tuple(
     turn for turned in _MIDDLES_TURNED for turn in ((_PLAIN,), (_WIDE, _MIDDLE_UP), (_PLAIN,), (_VERY_WIDE, turned))
 )
-_BESIDE_A_HAND: Final[tuple[Turn, ...]] = ((_PLAIN,), (_WIDE,))
+# A hand that is followed was mostly found in the plain frame, in which a second one would have been seen too.
+_BESIDE_A_HAND: Final[tuple[Turn, ...]] = ((_WIDE,), (_PLAIN,))
 
 
 class Search:
@@ -136,6 +137,8 @@ class Search:
             image: (height, width, 3) uint8, BGR.
             beside_a_hand: Whether one is followed already.
         """
+        if self._wide and not beside_a_hand:
+            self._beside_a_hand = itertools.cycle(_BESIDE_A_HAND)
         turn = next(self._beside_a_hand if beside_a_hand else self._without_hands)
         for way in turn:
             yield way.places(image, self._palms, self._limit)

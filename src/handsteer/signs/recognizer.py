@@ -75,7 +75,9 @@ class Recognizer:
         Raises:
             FrameError: The image has another shape or type.
         """
-        hands = self._landmarker.detect(image, search=self._operator.wants_search(), dt_s=dt_s)
+        # A hand whose sign is about to count is as good as chosen.
+        search = self._operator.wants_search() and self._filter.candidate == NONE
+        hands = self._landmarker.detect(image, search=search, dt_s=dt_s)
         told = [self._classifier.classify(hand) for hand in hands]
         guesses = [self._seen(guess) for guess in told]
         chosen = self._operator.choose(hands, guesses, dt_s)
