@@ -4,6 +4,7 @@ import pytest
 from handsteer.config import LandmarksConfig, SignsConfig
 from handsteer.errors import FrameError
 from handsteer.landmarks.mediapipe import MediaPipeLandmarker
+from handsteer.landmarks.protocol import Hand
 from handsteer.landmarks.recorded import RecordedLandmarker
 from handsteer.signs.model import load_model
 from handsteer.signs.recognizer import Recognizer
@@ -82,6 +83,24 @@ def test_stop_counts_at_its_first_frame_where_the_hand_has_jumped_to() -> None:
     hands = [HAND] * 6 + [moved(show_sign(STOP), x_px=250.0)]
     stream = Recognizer(RecordedLandmarker([[hand] for hand in hands]), CLASSIFIER, SignsConfig())
     assert [stream.step(IMAGE, 1 / 30).sign for _ in range(7)][-2:] == [FORWARD, STOP]
+
+
+class Searching(RecordedLandmarker):
+    """Notes in which frames further hands were asked for."""
+
+    searched: tuple[bool, ...] = ()
+
+    def detect(self, image: np.ndarray, *, search: bool = True, dt_s: float = 0.0) -> list[Hand]:
+        self.searched = (*self.searched, search)
+        return super().detect(image, search=search, dt_s=dt_s)
+
+
+def test_further_hands_are_looked_for_only_while_no_sign_counts_or_is_about_to() -> None:
+    peace = show_fingers("index", "middle")
+    landmarker = Searching([[peace], [peace], *[[HAND]] * 6])
+    stream = Recognizer(landmarker, CLASSIFIER, SignsConfig())
+    assert [stream.step(IMAGE, 0.04).sign for _ in range(8)] == [NONE] * 5 + [FORWARD] * 3
+    assert landmarker.searched == (True, True, True, *[False] * 5)
 
 
 def test_a_sign_that_counts_goes_on_while_the_hand_moves() -> None:
