@@ -147,7 +147,7 @@ SELECTED_ROBOT = Topic("/selected_robot", String, latched=True)
 # True stops the robot, whoever drives; false lets it drive again. No stop may get lost.
 STOP = Topic("/stop", Bool, depth=10)
 # What the nodes remember of it, for one that starts anew: each that runs says so.
-STOPPED = Topic("/stopped", Bool, latched=True, depth=10)
+STOPPED = Topic("/stopped", Bool, latched=True)
 STEERING_CMD_VEL = Topic("/steering/cmd_vel", Twist, lifespan_s=STALE_S)
 ODOM = Topic("/robot_diff_drive_controller/odom", Odometry)
 TF = Topic("/tf", TFMessage, is_global=True, depth=10)

@@ -174,9 +174,8 @@ class Running:
     def say_stop(self, stopped: bool) -> None:
         """Publish ``stopped`` on ``/stop``, as anybody may."""
         self.peer.ask("advertise", topic="/stop", package="std_msgs", type="Bool")
-        # All but the one that publishes hear it: robot, control, recognition and camera.
-        eventually(lambda: self.peer.ask("listeners", topic="/stop") >= len(self.nodes), what="the nodes to listen")
-        self.peer.ask("publish", topic="/stop", values={"data": stopped}, count=1, period_s=0.1)
+        eventually(lambda: self.peer.ask("listeners", topic="/stop") > 0, what="the nodes to listen")
+        self.peer.ask("publish", topic="/stop", values={"data": stopped}, count=20, period_s=0.1)
 
     @property
     def speeds(self) -> list[tuple[float, float]]:

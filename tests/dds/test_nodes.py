@@ -76,6 +76,7 @@ def test_ros2_sees_the_node_by_its_names_types_and_hashes(dds: DdsGraph) -> None
     ]
     eventually(lambda: "rt/base/cmd_vel" in dds.nodes()["/far/driver"]["writers"])
     eventually(lambda: len(topics(dds.nodes()["/far/driver"]["readers"])) == 4)
+    eventually(lambda: len(topics(dds.nodes()["/far/driver"]["writers"])) == 5)
     node = dds.nodes()["/far/driver"]
     assert node["participant"] == "enclave=/;"
     assert node["writers"]["rt/base/cmd_vel"] == twist

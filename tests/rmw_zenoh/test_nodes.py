@@ -90,7 +90,7 @@ def test_signs_that_were_held_up_on_their_way_are_not_obeyed(network: ZenohGraph
 def test_ros2_sees_the_node_by_its_names_types_hashes_and_profiles(network: ZenohGraph) -> None:
     words = ("-r", "__ns:=/far", "-r", "__node:=driver", "-r", f"{CMD_VEL[1:]}:=/base/cmd_vel")
     control = network.node("control", name="/far/driver", ros=words)
-    eventually(lambda: len(network.nodes()["/far/driver"]["MS"]) == 3)
+    eventually(lambda: len(network.nodes()["/far/driver"]["MS"]) == 4)
     eventually(lambda: len(network.nodes()["/far/driver"]["MP"]) >= 2)
     node = network.nodes()["/far/driver"]
     assert node["alive"]

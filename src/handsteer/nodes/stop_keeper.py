@@ -21,7 +21,8 @@ class StopKeeper:
         self._on_stop = on_stop
         self._is_stopped: bool | None = None
         self._stopped = node.publisher(STOPPED)
-        node.subscribe(STOPPED, self._on_word_of_others)
+        # Several say so at once: that one of them was stopped must not be lost behind another's that was not.
+        node.subscribe(STOPPED, self._on_word_of_others, key=lambda message: bool(message.data))
         node.subscribe(STOP, self._on_stop_or_reset)
 
     def _on_stop_or_reset(self, received: Received[Bool]) -> None:
