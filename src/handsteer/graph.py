@@ -271,7 +271,7 @@ def make_control(config: Config, transport: Transport, clock: Clock) -> HandSign
     Raises:
         ConfigError: Control and robot were told different types of commands.
     """
-    return HandSignControlNode(transport, clock, config.control, cmd_vel_topic(config))
+    return HandSignControlNode(transport, clock, config.control, cmd_vel_topic(config), config.collision_monitor)
 
 
 def make_robot(config: Config, transport: Transport, clock: Clock, link: Session | None = None) -> RobotNode:

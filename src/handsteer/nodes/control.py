@@ -4,7 +4,7 @@ import math
 from typing import Any
 
 from handsteer.clock import Clock
-from handsteer.config import Config, ControlConfig
+from handsteer.config import CollisionMonitorConfig, Config, ControlConfig
 from handsteer.control.actions import action_of
 from handsteer.control.driver import Driver
 from handsteer.control.effects import tell
@@ -12,6 +12,7 @@ from handsteer.control.fleet import NEXT
 from handsteer.control.hold import Hold
 from handsteer.control.sign_control import ZERO, Velocity
 from handsteer.messages import CMD_VEL, HAND_SIGN, STEERING_CMD_VEL, STOP, Bool, String, Topic, Twist, command
+from handsteer.nodes.collision_monitor import CollisionMonitor
 from handsteer.nodes.interruption import Interruption
 from handsteer.nodes.latency import LatencyLog
 from handsteer.nodes.node import OK, Node
@@ -34,19 +35,26 @@ class HandSignControlNode(Node):
         clock: The graph's clock.
         config: Limits, steps and timeouts.
         cmd_vel: The topic of the commands, of Twist or TwistStamped.
+        collision_monitor: Whether and how commands are slowed before obstacles; not at all by default.
 
     Attributes:
         latency: From the capture of a frame to the Twist that it led to.
     """
 
     def __init__(
-        self, transport: Transport, clock: Clock, config: ControlConfig, cmd_vel: Topic[Any] = CMD_VEL
+        self,
+        transport: Transport,
+        clock: Clock,
+        config: ControlConfig,
+        cmd_vel: Topic[Any] = CMD_VEL,
+        collision_monitor: CollisionMonitorConfig | None = None,
     ) -> None:
         super().__init__("hand_sign_control", transport, clock)
         self.latency = LatencyLog()
         self._config = config
         self._driver = Driver(config)
         self._hold = Hold()
+        self._monitor = CollisionMonitor(self, collision_monitor or CollisionMonitorConfig(), self._driver.hold_back)
         self._is_stopped = False
         self._last_step_s = clock.now()
         self._interruption = Interruption(config.sign_timeout, clock.now())
@@ -67,6 +75,7 @@ class HandSignControlNode(Node):
         """Take all of ``control``; a robot that is faster than new limits allow is told so at once."""
         self._config = config.control
         self._interruption.limit_s = config.control.sign_timeout
+        self._monitor.reconfigure(config.collision_monitor)
         self._publish(self._driver.reconfigure(config.control))
 
     def on_stop(self) -> None:
@@ -132,7 +141,7 @@ class HandSignControlNode(Node):
     def _publish(self, velocity: Velocity | None, captured_s: float | None = None) -> None:
         if velocity is None:
             return
-        self._send(self._cmd_vel, velocity, captured_s)
+        self._send(self._cmd_vel, self._monitor.admit(velocity), captured_s)
         if captured_s is not None:
             self.latency.add(self.clock.now() - captured_s)
 
@@ -158,6 +167,7 @@ class HandSignControlNode(Node):
             angular_radps=f"{velocity.angular_radps:.3f}",
             **({"robot": self._selection.fleet.selected} if self._selection else {}),
             **tell(self._config),
+            **self._monitor.values(),
             **self._latencies(),
         )
 
@@ -170,7 +180,7 @@ class HandSignControlNode(Node):
             return f"standing: {self._disarmed}, moves once Stop is shown, or no hand"
         if self._hold.steering and source == "steering":
             return f"standing: {self._disarmed}, steers once the steering has been let go"
-        return self._driver.reason
+        return self._monitor.explain(self._driver.reason)
 
     @property
     def _disarmed(self) -> str:
