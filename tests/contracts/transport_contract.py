@@ -46,6 +46,10 @@ class TransportContract:
 
     settle_s = 0.0
 
+    def name_of(self, node: str) -> str:
+        """Return what the graph calls the node of this process that is named ``node``."""
+        return node
+
     @pytest.fixture
     def transport(self) -> Iterator[Transport]:
         raise NotImplementedError
@@ -232,6 +236,19 @@ class TransportContract:
         publisher.publish(String(data="Go"))
         time.sleep(self.settle_s)
         assert got == []
+
+    def test_it_tells_who_publishes_a_topic(self, transport: Transport) -> None:
+        assert transport.publishers_of(CMD_VEL) == []
+        publishers = [transport.advertise("talker", topic) for topic in (CMD_VEL, HAND_SIGN)]
+        assert eventually(lambda: len(transport.publishers_of(CMD_VEL)) == 1)
+        (name,) = transport.publishers_of(CMD_VEL)
+        assert name == self.name_of("talker")
+        transport.subscribe("listener", CMD_VEL, lambda _: None)
+        assert transport.publishers_of(CMD_VEL) == [name]
+        assert transport.publishers_of(WORDS) == []
+        transport.close()
+        assert transport.publishers_of(HAND_SIGN) == []
+        assert len(publishers) == 2
 
     def test_a_node_is_known_by_its_own_name(self, transport: Transport) -> None:
         assert split_reporter(transport.full_name("my_camera"))[1] == "my_camera"

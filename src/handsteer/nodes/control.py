@@ -1,5 +1,6 @@
 """The node ``hand_sign_control``: signs in, one velocity command out for each."""
 
+import logging
 import math
 from typing import Any
 
@@ -15,10 +16,13 @@ from handsteer.messages import CMD_VEL, HAND_SIGN, STEERING_CMD_VEL, STOP, Bool,
 from handsteer.nodes.collision_monitor import CollisionMonitor
 from handsteer.nodes.interruption import Interruption
 from handsteer.nodes.latency import LatencyLog
-from handsteer.nodes.node import OK, Node
+from handsteer.nodes.node import OK, WARN, Node
+from handsteer.nodes.rivals import Rivals
 from handsteer.nodes.selection import Selection
 from handsteer.signs.vocabulary import NONE
 from handsteer.transports.protocol import Publisher, Received, Transport
+
+log = logging.getLogger(__name__)
 
 _WATCHDOG_PERIOD_S = 0.02
 _DIAGNOSE_PERIOD_S = 0.1
@@ -65,6 +69,7 @@ class HandSignControlNode(Node):
             Selection(self, config.robots, cmd_vel, self._send, self._on_change) if config.robots else None
         )
         self._cmd_vel = self._selection.publisher if self._selection else self.publisher(cmd_vel)
+        self._rivals = Rivals(self, [HAND_SIGN, *(self._selection.topics if self._selection else [cmd_vel])])
         self.subscribe(STOP, self._on_stop_or_reset)
         self.subscribe(STEERING_CMD_VEL, self._on_steering)
         self.subscribe(HAND_SIGN, self._on_sign)
@@ -91,7 +96,11 @@ class HandSignControlNode(Node):
             self._driver.halt()
             self._publish(ZERO)
         elif was_stopped:
+            log.info("stop is reset by false on %s, which is published by %s", STOP.name, self._voices(STOP))
             self._hold.begin()
+
+    def _voices(self, topic: Topic[Any]) -> str:
+        return ", ".join(self.transport.publishers_of(topic)) or "nobody that is known"
 
     def _on_sign(self, received: Received[String]) -> None:
         captured_s = received.captured_s
@@ -159,7 +168,7 @@ class HandSignControlNode(Node):
     def _report(self) -> None:
         velocity = self._driver.velocity
         self.diagnose(
-            OK,
+            WARN if self._rivals.warning or self._monitor.why_blind() else OK,
             self._reason,
             source=self._driver.source,
             stopped=self._is_stopped,
@@ -168,6 +177,7 @@ class HandSignControlNode(Node):
             **({"robot": self._selection.fleet.selected} if self._selection else {}),
             **tell(self._config),
             **self._monitor.values(),
+            **({"warning": self._rivals.warning} if self._rivals.warning else {}),
             **self._latencies(),
         )
 

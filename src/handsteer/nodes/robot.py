@@ -43,6 +43,7 @@ from handsteer.messages import (
 )
 from handsteer.nodes.interruption import Interruption
 from handsteer.nodes.node import ERROR, OK, WARN, Node
+from handsteer.nodes.rivals import Rivals
 from handsteer.nodes.scans import scan_message
 from handsteer.nodes.world_changes import WorldChanges
 from handsteer.nodes.world_markers import Touches, gate_strips, world_markers
@@ -112,6 +113,7 @@ class RobotNode(Node):
         self.publisher(ROBOT_DESCRIPTION).publish(String(data=robot.description))
         self._hears_old = False
         self.subscribe(cmd_vel, self._on_command)
+        self._rivals = Rivals(self, [cmd_vel], {config.cmd_vel_topic: robot.commanders})
         self.every(_PERIOD_S, self._step)
         self.every(_SCAN_PERIOD_S, self._publish_scan)
         self.every(_MARKERS_PERIOD_S, self._publish_markers)
@@ -247,6 +249,7 @@ class RobotNode(Node):
             path_length_m=f"{self.path_length_m:.2f}",
             truth=f"{state.truth.x:.3f} {state.truth.y:.3f} {state.truth.yaw:.3f}",
             **({} if self.course is None else self.course.as_values()),
+            **({"warning": self._rivals.warning} if self._rivals.warning else {}),
         )
 
     def _condition(self) -> tuple[int, str]:
@@ -257,6 +260,8 @@ class RobotNode(Node):
             return WARN, f"touches {', '.join(self.state.contacts)}"
         if silence_s > self._config.cmd_vel_timeout and self._command != Velocity():
             return WARN, f"standing: no command for {silence_s:.1f} s, and the last one was to drive"
+        if self._rivals.warning:
+            return WARN, "is commanded by more than one node"
         return OK, "moves freely"
 
 

@@ -118,6 +118,10 @@ class Robot(Protocol):
         """Return what its laser scanner sees; None when nothing new has come, or there is no scanner."""
         ...
 
+    def commanders(self) -> list[str]:
+        """Return the nodes that command it in a graph of its own, this one among them; none where it has none."""
+        ...
+
     def reset(self) -> None:
         """Stand still at the start again, obstacles too."""
         ...

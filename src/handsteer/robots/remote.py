@@ -127,6 +127,10 @@ class RemoteRobot:
             max(0.0, self._session.clock.now() - measured_s),
         )
 
+    def commanders(self) -> list[str]:
+        """Return the nodes that publish on the topic of its commands."""
+        return self._session.transport.publishers_of(self._topic)
+
     def reset(self) -> None:
         """Let it stand where it is; a real robot cannot be put back."""
         self.command(0.0, 0.0)

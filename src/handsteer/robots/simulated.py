@@ -80,6 +80,10 @@ class SimulatedRobot:
         """Return what its laser scanner sees now."""
         return self._lidar.scan(self.data)
 
+    def commanders(self) -> list[str]:
+        """Return an empty list: it has no graph of its own."""
+        return []
+
     def enter(self, world: World) -> None:
         """Stand at the start of another world; as :meth:`reset`.
 
