@@ -157,7 +157,7 @@ def test_several_robots_are_refused() -> None:
 
 
 class LateRobot(SimulatedRobot):
-    """Says what it saw one scan ago."""
+    """Says what it saw one scan ago, as if it were new."""
 
     _before: RangeScan | None = None
 

@@ -36,22 +36,41 @@ def fastest_mps(velocity: Velocity, rule: CollisionMonitorConfig) -> float:
     return max(math.hypot(abs(v) + abs(w) * rule.side, w * x) for x in (rule.front, rule.back))
 
 
-def seen_later(x: Array, y: Array, velocity: Velocity, times_s: Array) -> tuple[Array, Array]:
-    """Return where a robot that moves at a steady ``velocity`` has points that do not move.
+def on_a_circle(velocity: Velocity, times_s: Array) -> Array:
+    """Return where a robot that goes on at a steady ``velocity`` is at ``times_s``, (K,): (K, 3) x, y and yaw."""
+    turned = velocity.angular_radps * times_s
+    # sin(a) / a holds for a straight line, too.
+    chord = velocity.linear_mps * times_s * np.sinc(turned / math.tau)
+    return np.stack([chord * np.cos(turned / 2), chord * np.sin(turned / 2), turned], axis=1)
+
+
+def braking(moving: Velocity, told: Velocity, rule: CollisionMonitorConfig, delay_s: float, times_s: Array) -> Array:
+    """Return where a robot is that is told ``told``, and to stand after ``delay_s`` seconds: (K, 3) x, y and yaw.
 
     Args:
-        x: (N,), forward of the base frame now, in metres.
-        y: (N,), to the left of it now.
-        velocity: Along a circle, whose middle is beside the robot.
-        times_s: (K,), in seconds from now.
-
-    Returns:
-        x and y in the base frame of each time, (K, N) each.
+        moving: How it moves now; it changes that as fast as it brakes.
+        told: What it is told now.
+        rule: Its brakes.
+        delay_s: When it is told to stand.
+        times_s: (K,), at equal intervals from 0.
     """
-    v, w = velocity.linear_mps, velocity.angular_radps
-    turned = (w * times_s)[:, None]
-    # sin(a) / a and (1 - cos(a)) / a hold for a straight line, too.
-    half = turned / 2
-    chord = v * times_s[:, None] * np.sinc(half / np.pi)
-    dx, dy = x - chord * np.cos(half), y - chord * np.sin(half)
-    return dx * np.cos(turned) + dy * np.sin(turned), dy * np.cos(turned) - dx * np.sin(turned)
+    v = _speeds(moving.linear_mps, told.linear_mps, rule.deceleration, delay_s, times_s)
+    w = _speeds(moving.angular_radps, told.angular_radps, rule.angular_deceleration, delay_s, times_s)
+    step_s = times_s[1]
+    yaw = np.concatenate([[0.0], np.cumsum((w[1:] + w[:-1]) / 2 * step_s)])
+    way, middle = (v[1:] + v[:-1]) / 2 * step_s, (yaw[1:] + yaw[:-1]) / 2
+    x, y = np.cumsum(way * np.cos(middle)), np.cumsum(way * np.sin(middle))
+    return np.stack([np.concatenate([[0.0], x]), np.concatenate([[0.0], y]), yaw], axis=1)
+
+
+def seen_from(poses: Array, points: Array) -> tuple[Array, Array]:
+    """Return x and y, (K, N) each, of ``points`` (N, 2) as a robot sees them from ``poses`` (K, 3) x, y and yaw."""
+    x, y, yaw = (poses[:, number, None] for number in range(3))
+    dx, dy = points[:, 0] - x, points[:, 1] - y
+    return dx * np.cos(yaw) + dy * np.sin(yaw), dy * np.cos(yaw) - dx * np.sin(yaw)
+
+
+def _speeds(moving: float, told: float, most: float, delay_s: float, times_s: Array) -> Array:
+    before, after = most * np.minimum(times_s, delay_s), most * np.maximum(times_s - delay_s, 0.0)
+    speeds: Array = moving + np.clip(told - moving, -before, before)
+    return speeds - np.clip(speeds, -after, after)

@@ -12,12 +12,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from handsteer.config import CollisionMonitorConfig
-from handsteer.control.footprint import fastest_mps, gaps, reach_m, seen_later
+from handsteer.control.footprint import braking, fastest_mps, gaps, on_a_circle, reach_m, seen_from
 from handsteer.control.scan_points import Points
 from handsteer.control.sign_control import ZERO, Velocity
 
 _PAD_M = 0.02
 """Nothing is to come nearer to the robot, be it beside it."""
+
+# The faster a robot changes how it moves, the less is sure where that leads.
+_PAD_S = 0.03
 
 # Who is nearer already may come no nearer than by this, which is the noise of a scan.
 _NOISE_M = 0.01
@@ -28,8 +31,9 @@ _STEP_M = 0.03
 _FEWEST_STEPS, _MOST_STEPS = 8, 400
 _SLOWEST = 0.005
 _NOTHING_MPS = 1e-6
-# How much of the speed a robot keeps that turns as it was told, the more the better.
-_LESS = (1.0, 0.75, 0.5, 0.25)
+# Which shares of a velocity that is too fast are tried, of driving and of turning: those first that turn as they were
+# told, as turning leads away from most things.
+_LESS = ((1.0, 1.0), (0.75, 1.0), (0.5, 1.0), (0.25, 1.0), (0.0, 1.0), (1.0, 0.5), (1.0, 0.0), (0.5, 0.5), (0.0, 0.5))
 
 
 @dataclass(frozen=True)
@@ -60,61 +64,51 @@ def limit(
     points: Points,
     rule: CollisionMonitorConfig,
     moving: Velocity = ZERO,
-    age_s: float = 0.0,
 ) -> tuple[Velocity, Hit | None]:
     """Return the velocity to command instead of ``wanted``, and what it is slowed for; None where it is not.
 
     It is never faster, and never turns or drives the other way. A robot that is slowed may turn as fast as it could in
-    place; its way becomes tighter.
+    place; its way becomes tighter. A robot that has to change how it moves does not go the way of its command at once:
+    what it would meet meanwhile, and while it brakes then, counts too. Where that cannot be avoided, as late as can be.
 
     Args:
         wanted: What signs or steering ask for; finite.
-        points: The obstacles.
+        points: The obstacles, now.
         rule: Footprint, margin and brakes.
-        moving: How the robot moves now: what it turns by it goes on with for a while, whatever it is told.
-        age_s: How old the points are, in seconds.
+        moving: How the robot moves now.
     """
     if wanted.is_zero or not len(points):
         return wanted, None
-    delay_s = rule.reaction_time + age_s
-    share, hit = _share(wanted, points, rule, delay_s)
-    change_s = abs(moving.angular_radps - wanted.angular_radps) / rule.angular_deceleration
-    if wanted.linear_mps and change_s:
-        onward = Velocity(wanted.linear_mps, moving.angular_radps)
-        onward_share, onward_hit = _share(onward, points, rule, delay_s, change_s + delay_s)
-        if onward_share < share:
-            share, hit = onward_share, onward_hit
-    if hit is None:
-        return wanted, None
-    if not wanted.linear_mps or not wanted.angular_radps:
-        return _scaled(wanted, share, share), hit
-    turn, _ = _share(Velocity(0.0, wanted.angular_radps), points, rule, delay_s)
-    for less in _LESS:
-        slower = _scaled(wanted, share * less, turn)
-        if _share(slower, points, rule, delay_s)[1] is None:
-            return slower, hit
-    return _scaled(wanted, 0.0, turn), hit
+    share, hit = turn, _ = _share(wanted, points, rule)
+    if hit and wanted.linear_mps and wanted.angular_radps:
+        turn, _ = _share(Velocity(0.0, wanted.angular_radps), points, rule)
+    best, latest_s = ZERO, 0.0
+    for linear, angular in _LESS:
+        slower = _scaled(wanted, share * linear, turn * angular)
+        if hit and _share(slower, points, rule)[1]:
+            continue
+        met = _met_while_braking(moving, slower, points, rule)
+        if met is None:
+            return slower, None if slower == wanted else hit
+        hit = hit or met
+        if met.time_s > latest_s:
+            best, latest_s = slower, met.time_s
+    return best, None if best == wanted else hit
 
 
 def _scaled(velocity: Velocity, linear: float, angular: float) -> Velocity:
+    if linear == angular == 1.0:
+        return velocity
     v, w = velocity.linear_mps * linear, velocity.angular_radps * angular
     return Velocity(v if abs(v) >= _SLOWEST else 0.0, w if abs(w) >= _SLOWEST else 0.0)
 
 
-def _share(
-    velocity: Velocity, points: Points, rule: CollisionMonitorConfig, delay_s: float, within_s: float = math.inf
-) -> tuple[float, Hit | None]:
+def _share(velocity: Velocity, points: Points, rule: CollisionMonitorConfig) -> tuple[float, Hit | None]:
     """Return which share of ``velocity`` lets the robot stop in time, 0 to 1, and what it has to stop for.
 
     Times are those at the full velocity: a share s takes s * delay + s² * braking / 2 of it.
-
-    Args:
-        velocity: The command.
-        points: The obstacles.
-        rule: Footprint, margin and brakes.
-        delay_s: How long the robot goes on before it brakes.
-        within_s: What it would meet later does not count.
     """
+    delay_s = rule.reaction_time
     fastest = fastest_mps(velocity, rule)
     if fastest < _NOTHING_MPS:
         return 1.0, None
@@ -124,7 +118,7 @@ def _share(
     # The margin is for driving; a turn in place may end at the pad, so that a robot before a wall can turn away.
     margin_s = rule.margin * abs(velocity.linear_mps) / fastest**2
     needed_s = delay_s + braking_s / 2
-    hit = first_hit(velocity, points, rule, min(needed_s + margin_s, within_s))
+    hit = first_hit(velocity, points, rule, needed_s + margin_s)
     free_s = math.inf if hit is None else hit.time_s - margin_s
     if free_s >= needed_s * (1 - 1e-6):
         return 1.0, None
@@ -141,19 +135,52 @@ def first_hit(velocity: Velocity, points: Points, rule: CollisionMonitorConfig, 
         return None
     # A creeping robot, too, is to see that it comes nearer to what is near already.
     seen_s = max(horizon_s, _CREEP_M / fastest)
-    way_m = fastest * seen_s
-    near = points[np.hypot(points[:, 0], points[:, 1]) <= way_m + reach_m(rule) + _PAD_M]
+    times_s = _times(fastest, seen_s)
+    poses = on_a_circle(velocity, times_s)
+    hit = _met(poses, times_s, points, rule, pad_m=_PAD_M, fastest_mps=fastest)
+    return hit if hit and hit.time_s <= horizon_s else None
+
+
+def _met_while_braking(moving: Velocity, told: Velocity, points: Points, rule: CollisionMonitorConfig) -> Hit | None:
+    """Return what a robot meets first that is told ``told``, and to stand one reaction time later; None for nothing."""
+    fastest = fastest_mps(
+        Velocity(
+            max(abs(moving.linear_mps), abs(told.linear_mps)), max(abs(moving.angular_radps), abs(told.angular_radps))
+        ),
+        rule,
+    )
+    if fastest < _NOTHING_MPS:
+        return None
+    # Who turns round stops on the way, and has to stop again.
+    stop_s = max(
+        max(abs(moving.linear_mps), abs(told.linear_mps)) / rule.deceleration,
+        max(abs(moving.angular_radps), abs(told.angular_radps)) / rule.angular_deceleration,
+    )
+    times_s = _times(fastest, rule.reaction_time + stop_s)
+    poses = braking(moving, told, rule, rule.reaction_time, times_s)
+    return _met(poses, times_s, points, rule, pad_m=_PAD_M + _PAD_S * fastest, fastest_mps=fastest)
+
+
+def _times(fastest_mps: float, seconds: float) -> Points:
+    steps = min(max(math.ceil(fastest_mps * seconds / _STEP_M), _FEWEST_STEPS), _MOST_STEPS)
+    return np.linspace(0.0, seconds, steps + 1)
+
+
+def _met(
+    poses: Points, times_s: Points, points: Points, rule: CollisionMonitorConfig, *, pad_m: float, fastest_mps: float
+) -> Hit | None:
+    """Return what the footprint meets first on its way by ``poses`` (K, 3) at ``times_s`` (K,); None for nothing."""
+    way_m = float(np.hypot(poses[:, 0], poses[:, 1]).max())
+    near = points[np.hypot(points[:, 0], points[:, 1]) <= way_m + reach_m(rule) + pad_m]
     if not len(near):
         return None
-    steps = min(max(math.ceil(way_m / _STEP_M), _FEWEST_STEPS), _MOST_STEPS)
-    times_s = np.linspace(0.0, seen_s, steps + 1)
-    gap = gaps(*seen_later(near[:, 0], near[:, 1], velocity, times_s), rule)
+    gap = gaps(*seen_from(poses, near), rule)
     # Where something is within the pad already, the robot may still pass by what gets no nearer.
-    met_s = _met_s(gap, times_s, min(_PAD_M, float(gap[0].min()) - _NOISE_M))
-    comes_nearer = gap[1] - gap[0] < -_GLANCING * fastest * times_s[1]
-    met_s[(gap[0] < _PAD_M) & comes_nearer & np.isfinite(met_s)] = 0.0
+    met_s = _met_s(gap, times_s, min(pad_m, float(gap[0].min()) - _NOISE_M))
+    comes_nearer = gap[1] - gap[0] < -_GLANCING * fastest_mps * times_s[1]
+    met_s[(gap[0] < pad_m) & comes_nearer & np.isfinite(met_s)] = 0.0
     first = int(met_s.argmin())
-    if met_s[first] > horizon_s:
+    if not math.isfinite(met_s[first]):
         return None
     return Hit(float(near[first, 0]), float(near[first, 1]), float(gap[0, first]), float(met_s[first]))
 
@@ -203,11 +230,16 @@ class ObstacleLimiter:
         return self._points is None or self.silence_s(now_s) > self.rule.source_timeout
 
     def limit(self, wanted: Velocity, now_s: float) -> Velocity:
-        """Return what to command at ``now_s`` instead of ``wanted``: zero without a scan; else as :func:`limit`."""
+        """Return what to command at ``now_s`` instead of ``wanted``: zero without a scan; else as :func:`limit`.
+
+        The robot has gone on since the scan was measured, and so the points are taken to be elsewhere.
+        """
         self._moving = self._followed(now_s)
         self.hit, said = None, ZERO
         if self._points is not None and not self.is_blind(now_s):
-            said, self.hit = limit(wanted, self._points, self.rule, self._moving, self.silence_s(now_s))
+            moved = on_a_circle(self._moving, np.array([self.silence_s(now_s)]))
+            points = np.stack(seen_from(moved, self._points), axis=-1)[0]
+            said, self.hit = limit(wanted, points, self.rule, self._moving)
         self._told, self._told_s = said, now_s
         return said
 
