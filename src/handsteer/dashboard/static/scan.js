@@ -4,9 +4,7 @@ import { THREE } from "nicegui-scene";
 export default class ScanDots {
   create_mesh(points, size, height) {
     this.height = height;
-    // Its bounds would have to be computed again with each scan.
     this.mesh = new THREE.Points(new THREE.BufferGeometry(), new THREE.PointsMaterial({ size, transparent: true }));
-    this.mesh.frustumCulled = false;
     this.show(points);
     return this.mesh;
   }
