@@ -9,7 +9,7 @@ import re
 from pathlib import Path
 from typing import Any, ClassVar, Literal, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
 from handsteer.control.actions import ALWAYS_STOP, BUILT_IN, Action
 from handsteer.errors import ConfigError
@@ -233,6 +233,44 @@ class ControlConfig(Section):
         return named
 
 
+class CollisionMonitorConfig(Section):
+    """Slows the robot before what a laser scanner sees in its way, and stops it in front."""
+
+    live = frozenset(
+        {
+            "enabled",
+            "source_timeout",
+            "margin",
+            "deceleration",
+            "angular_deceleration",
+            "reaction_time",
+            "front",
+            "back",
+            "side",
+            "scan_x",
+            "scan_y",
+            "scan_yaw",
+        }
+    )
+
+    enabled: bool = Field(False, description="Whether commands are slowed before obstacles; this needs a topic `scan`")
+    source_timeout: float = Field(
+        0.5, gt=0, le=5, description="Without a scan for this long, or when it is older, the robot is stopped [s]"
+    )
+    margin: float = Field(0.15, ge=0, le=5, description="How far before an obstacle in its way the robot stops [m]")
+    deceleration: float = Field(0.7, gt=0, le=20, description="How hard the robot surely brakes [m/s²]")
+    angular_deceleration: float = Field(1.5, gt=0, le=50, description="How hard it surely brakes a turn [rad/s²]")
+    reaction_time: float = Field(
+        0.25, ge=0, le=5, description="How long a command takes to act, the wait for the next scan included [s]"
+    )
+    front: float = Field(0.26, gt=0, le=10, description="How far the robot reaches ahead of its base frame [m]")
+    back: float = Field(0.26, gt=0, le=10, description="How far it reaches behind it [m]")
+    side: float = Field(0.245, gt=0, le=10, description="How far it reaches to either side [m]")
+    scan_x: float = Field(0.0, ge=-10, le=10, description="How far ahead of the base frame the scanner is [m]")
+    scan_y: float = Field(0.0, ge=-10, le=10, description="How far to the left of it the scanner is [m]")
+    scan_yaw: float = Field(0.0, ge=-7, le=7, description="By how much the scanner is turned to the left [rad]")
+
+
 class RobotConfig(Section):
     """The robot, and the world it is simulated in or the topics it listens to."""
 
@@ -253,6 +291,7 @@ class RobotConfig(Section):
     odom_timeout: float = Field(
         ODOMETRY_S, gt=0, le=10, description="Odometry of a real robot that stops for this long stops the robot [s]"
     )
+    scan_topic: str = Field("scan", description="Topic of a real robot's laser scanner; none when empty")
     command_rate: float = Field(
         20.0, ge=5, le=50, description="How often a real robot is told again what it is told [1/s]"
     )
@@ -271,6 +310,7 @@ class RobotConfig(Section):
     )
     odom_frame_id: str = Field("odom", description="Coordinate frame of the odometry")
     base_frame_id: str = Field("base_link", description="Coordinate frame of the robot")
+    scan_frame_id: str = Field("base_scan", description="Coordinate frame of the laser scanner")
     publish_clock: bool = Field(False, description="Whether it publishes /clock; it then runs on real time itself")
 
 
@@ -314,9 +354,16 @@ class Config(Section):
     landmarks: LandmarksConfig = LandmarksConfig()
     signs: SignsConfig = SignsConfig()
     control: ControlConfig = ControlConfig()
+    collision_monitor: CollisionMonitorConfig = CollisionMonitorConfig()
     robot: RobotConfig = RobotConfig()
     teach: TeachConfig = TeachConfig()
     dashboard: DashboardConfig = DashboardConfig()
+
+    @model_validator(mode="after")
+    def _monitors_one_robot(self) -> "Config":
+        if self.collision_monitor.enabled and self.control.robots:
+            raise ValueError("collision_monitor.enabled should be false with control.robots: it is for one robot")
+        return self
 
 
 def load(path: Path | None = None, base: dict[str, Any] | None = None, *overrides: dict[str, Any]) -> Config:

@@ -278,7 +278,9 @@ def make_control(config: Config, transport: Transport, clock: Clock, *, simulate
         ConfigError: Control and robot were told different types of commands.
     """
     arming = config.control.arming == "on" or (config.control.arming == "auto" and not simulated)
-    return HandSignControlNode(transport, clock, config.control, cmd_vel_topic(config), arming=arming)
+    return HandSignControlNode(
+        transport, clock, config.control, cmd_vel_topic(config), config.collision_monitor, arming=arming
+    )
 
 
 def make_robot(config: Config, transport: Transport, clock: Clock, link: Session | None = None) -> RobotNode:

@@ -30,6 +30,7 @@ from rosbags.typesys.stores.ros2_jazzy import rosgraph_msgs__msg__Clock as Clock
 from rosbags.typesys.stores.ros2_jazzy import sensor_msgs__msg__CompressedImage as CompressedImage
 from rosbags.typesys.stores.ros2_jazzy import sensor_msgs__msg__Image as Image
 from rosbags.typesys.stores.ros2_jazzy import sensor_msgs__msg__JointState as JointState
+from rosbags.typesys.stores.ros2_jazzy import sensor_msgs__msg__LaserScan as LaserScan
 from rosbags.typesys.stores.ros2_jazzy import std_msgs__msg__Bool as Bool
 from rosbags.typesys.stores.ros2_jazzy import std_msgs__msg__ColorRGBA as ColorRGBA
 from rosbags.typesys.stores.ros2_jazzy import std_msgs__msg__Header as Header
@@ -54,6 +55,7 @@ __all__ = [
     "Image",
     "JointState",
     "KeyValue",
+    "LaserScan",
     "Log",
     "Marker",
     "MarkerArray",
@@ -152,6 +154,7 @@ STEERING_CMD_VEL = Topic("/steering/cmd_vel", Twist, lifespan_s=STALE_S)
 ODOM = Topic("/robot_diff_drive_controller/odom", Odometry)
 TF = Topic("/tf", TFMessage, is_global=True, depth=10)
 JOINT_STATES = Topic("/joint_states", JointState)
+SCAN = Topic("/scan", LaserScan)
 CLOCK = Topic("/clock", ClockMessage, is_global=True)
 ROBOT_DESCRIPTION = Topic("/robot_description", String, latched=True)
 WORLD_MARKERS = Topic("/world/markers", MarkerArray)

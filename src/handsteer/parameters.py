@@ -41,7 +41,7 @@ _WORDS: dict[Kind, str] = {
     "string": "a text",
     "strings": "a list of texts",
 }
-_USED_TOGETHER = {"camera": ("virtual_hand",), "signs": ("landmarks",)}
+_USED_TOGETHER = {"camera": ("virtual_hand",), "signs": ("landmarks",), "control": ("collision_monitor",)}
 _AT_START = "it is read when the node starts: give it then"
 
 

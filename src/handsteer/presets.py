@@ -22,14 +22,20 @@ PRESETS: tuple[Preset, ...] = get_args(Preset)
 # The distributions before TwistStamped became what these robots listen to.
 _BARE_TWIST = ("noetic", "foxy", "galactic", "humble", "iron")
 
+_BRAKES = 0.7
+
 
 def _preset(
     linear_mps: float, angular_radps: float, linear_mps2: float, angular_radps2: float, **robot: Any
 ) -> dict[str, Any]:
-    """Return a preset: the highest speeds of control and robot, and the robot's highest accelerations."""
+    """Return a preset: the highest speeds of control and robot, the robot's highest accelerations, and its brakes.
+
+    Nobody says how hard these robots surely brake; a part of their acceleration is taken for it.
+    """
     speeds = {"max_linear": linear_mps, "max_angular": angular_radps}
     accelerations = {"max_linear_acceleration": linear_mps2, "max_angular_acceleration": angular_radps2}
-    return {"control": speeds, "robot": {**speeds, **accelerations, **robot}}
+    brakes = {"deceleration": _BRAKES * linear_mps2, "angular_deceleration": _BRAKES * angular_radps2}
+    return {"control": speeds, "robot": {**speeds, **accelerations, **robot}, "collision_monitor": brakes}
 
 
 _TURTLESIM = {"cmd_vel_topic": "turtle1/cmd_vel", "odom_topic": "turtle1/pose", "odom_type": "turtlesim_pose"}

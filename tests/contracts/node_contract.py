@@ -42,6 +42,10 @@ class Driver(ABC):
     def show(self, sign: str, count: int = 1, period_s: float = 0.02) -> None:
         """Publish ``sign`` so many times."""
 
+    @abstractmethod
+    def interfere(self) -> None:
+        """Become a second publisher of velocity commands."""
+
     @property
     @abstractmethod
     def commands(self) -> Twists:
@@ -143,6 +147,15 @@ class ControlContract:
         driver.show("Stop")
         driver.show("Forward")
         eventually(lambda: driver.twists[-1] == (0.01, 0.0), what="the robot to be driven")
+
+    def test_a_second_publisher_of_commands_is_said(self, drive: MakeDriver) -> None:
+        driver = drive()
+        driver.show("Forward")
+        driver.expect((0.01, 0.0))
+        assert "publishers" not in driver.process.text
+        driver.interfere()
+        eventually(lambda: "cmd_vel has 2 publishers (" in driver.process.text, 15.0, what="the warning")
+        assert "hand_sign_control" in driver.process.text.partition("has 2 publishers (")[2].partition(")")[0]
 
 
 @dataclass(frozen=True)

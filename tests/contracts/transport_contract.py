@@ -11,7 +11,19 @@ import pytest
 from handsteer.clock import Clock, RealClock
 from handsteer.errors import TransportError
 from handsteer.images import bgr_image, image_message
-from handsteer.messages import CMD_VEL, HAND_SIGN, IMAGE_RAW, ROBOT_DESCRIPTION, Header, Image, String, Topic, twist
+from handsteer.messages import (
+    CMD_VEL,
+    HAND_SIGN,
+    IMAGE_RAW,
+    ROBOT_DESCRIPTION,
+    SCAN,
+    Header,
+    Image,
+    LaserScan,
+    String,
+    Topic,
+    twist,
+)
 from handsteer.nodes.node import Node
 from handsteer.nodes.reporters import split_reporter
 from handsteer.transports.protocol import Publisher, Received, Transport
@@ -45,6 +57,10 @@ class TransportContract:
     """
 
     settle_s = 0.0
+
+    def name_of(self, node: str) -> str:
+        """Return what the graph calls the node of this process that is named ``node``."""
+        return node
 
     @pytest.fixture
     def transport(self) -> Iterator[Transport]:
@@ -98,6 +114,20 @@ class TransportContract:
         assert eventually(lambda: got)
         assert got[0].message == String(data="Go")
         assert got[0].captured_s in {12.5, None}
+
+    def test_a_laser_scan_arrives_whole(self, make_node: Callable[[str], Node]) -> None:
+        talker, listener = make_node("talker"), make_node("listener")
+        got: list[Received[LaserScan]] = []
+        listener.subscribe(SCAN, got.append)
+        listener.start()
+        header = Header(stamp=talker.clock.stamp(talker.clock.now()), frame_id="base_scan")
+        ranges = np.array([1.5, np.inf, -np.inf, np.nan], np.float32)
+        sent = LaserScan(header, -3.0, 3.0, 2.0, 0.0, 0.1, 0.05, 8.0, ranges, np.zeros(0, np.float32))
+        heard(talker.publisher(SCAN)).publish(sent)
+        assert eventually(lambda: got)
+        assert got[0].message.header == header
+        assert got[0].message.angle_increment == 2.0
+        np.testing.assert_array_equal(got[0].message.ranges, ranges)
 
     def test_several_messages_wait_for_a_busy_subscriber_where_the_topic_has_depth(
         self, make_node: Callable[[str], Node]
@@ -232,6 +262,19 @@ class TransportContract:
         publisher.publish(String(data="Go"))
         time.sleep(self.settle_s)
         assert got == []
+
+    def test_it_tells_who_publishes_a_topic(self, transport: Transport) -> None:
+        assert transport.publishers_of(CMD_VEL) == []
+        publishers = [transport.advertise("talker", topic) for topic in (CMD_VEL, HAND_SIGN)]
+        assert eventually(lambda: len(transport.publishers_of(CMD_VEL)) == 1)
+        (name,) = transport.publishers_of(CMD_VEL)
+        assert name == self.name_of("talker")
+        transport.subscribe("listener", CMD_VEL, lambda _: None)
+        assert transport.publishers_of(CMD_VEL) == [name]
+        assert transport.publishers_of(WORDS) == []
+        transport.close()
+        assert transport.publishers_of(HAND_SIGN) == []
+        assert len(publishers) == 2
 
     def test_a_node_is_known_by_its_own_name(self, transport: Transport) -> None:
         assert split_reporter(transport.full_name("my_camera"))[1] == "my_camera"

@@ -15,12 +15,14 @@ from handsteer.messages import (
     JOINT_STATES,
     ODOM,
     ROBOT_DESCRIPTION,
+    SCAN,
     STEERING_CMD_VEL,
     DiagnosticArray,
     DiagnosticStatus,
     Header,
     JointState,
     KeyValue,
+    LaserScan,
     Odometry,
     Point,
     Pose,
@@ -286,3 +288,33 @@ def test_only_who_drives_chooses_the_topic_and_not_while_stopped(bench: Bench) -
     bench.node.steer_on("me", "/cmd_vel")
     assert bench.steered[-1] == (0.0, 0.0)
     assert bench.node.state("me").viewers.topic == "/cmd_vel"
+
+
+def scan_of(bench: Bench, *ranges: float) -> LaserScan:
+    header = Header(bench.clock.stamp(bench.clock.now()), "base_scan")
+    figures = (0.0, 3.0, 1.0, 0.0, 0.1, 0.05, 8.0)
+    return LaserScan(header, *figures, np.array(ranges, np.float32), np.zeros(0, np.float32))
+
+
+def test_a_scan_is_drawn_where_the_robot_was_when_it_was_measured(bench: Bench) -> None:
+    bench.odometry(1.0)
+    scan = scan_of(bench, 2.0)
+    bench.step(0.05)
+    bench.odometry(1.5)
+    bench.publish(SCAN, scan)
+    assert bench.node.world.scan == ((3.0, 0.0),)
+
+
+def test_a_scanner_that_falls_silent_is_drawn_no_more(bench: Bench) -> None:
+    bench.odometry(0.0)
+    bench.publish(SCAN, scan_of(bench, 2.0))
+    bench.step(0.5)
+    assert bench.node.world.scan
+    bench.step(0.6)
+    assert bench.node.world.scan == ()
+
+
+def test_what_nodes_warn_of_is_told_once(bench: Bench) -> None:
+    for name in ("hand_sign_control", "robot"):
+        bench.report(name, "driving: Forward", warning="two nodes command the robot")
+    assert bench.node.state().warnings == ("two nodes command the robot",)

@@ -266,3 +266,16 @@ def test_a_page_without_the_robot_says_where_its_world_is_edited() -> None:
             browser.close()
     finally:
         site.close()
+
+
+def test_what_the_scanner_sees_is_drawn() -> None:
+    with looking_at("obstacles") as visit:
+        dots = f"""() => {{ {SCENE}
+            const found = [];
+            scene.traverse(shape => shape.isPoints && found.push(...shape.geometry.attributes.position.array));
+            return found;
+        }}"""
+        visit.wait_until(lambda: visit.page.evaluate(dots))
+        seen = np.array(visit.page.evaluate(dots)).reshape(-1, 3)
+        # The island ahead, whose near side is 3.25 m away.
+        assert np.abs(seen[:, :2] - (3.25, 0.0)).sum(axis=1).min() < 0.05

@@ -43,6 +43,9 @@ class DdsDriver(Driver):
     def show_raw(self, raw: bytes) -> None:
         self._peer.ask("publish_raw", topic=self.signs, hex=raw.hex())
 
+    def interfere(self) -> None:
+        self._peer.ask("advertise", topic=self.cmd_vel, type="Twist")
+
     @property
     def commands(self) -> Twists:
         return twists(self._peer, self.cmd_vel)[self._before :]

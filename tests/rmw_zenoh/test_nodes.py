@@ -45,10 +45,15 @@ def network(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ZenohGraph]:
         yield graph
 
 
+class ZenohDriver(DdsDriver):
+    def interfere(self) -> None:
+        self._peer.ask("introduce", name="intruder", topic=self.cmd_vel, type="Twist", kind="MP")
+
+
 class TestControl(ControlContract):
     @pytest.fixture
     def drive(self, network: ZenohGraph) -> MakeDriver:
-        return partial(DdsDriver, network)
+        return partial(ZenohDriver, network)
 
 
 class TestChain(ChainContract):

@@ -51,6 +51,9 @@ class Ros1Driver(Driver):
         values = {"data": sign}
         self._peer.ask("publish", topic="gesture/hand_sign", values=values, count=count, period_s=period_s)
 
+    def interfere(self) -> None:
+        self._peer.ask("advertise", topic=f"{self.namespace}{CMD_VEL}", package="geometry_msgs", type="Twist")
+
     @property
     def commands(self) -> Twists:
         return twists(self._peer, f"{self.namespace}{CMD_VEL}")

@@ -35,6 +35,9 @@ def session(graph: Ros1Graph) -> Session:
 class TestRos1(TransportContract):
     settle_s = 0.3
 
+    def name_of(self, node: str) -> str:
+        return "/tests"
+
     @pytest.fixture
     def transport(self, session: Session) -> Iterator[Transport]:
         from handsteer.transports.ros1.transport import Ros1Transport  # noqa: PLC0415 - only where ROS 1 is

@@ -23,6 +23,7 @@ SENT = [
     "sensor_msgs/msg/Image",
     "sensor_msgs/msg/CompressedImage",
     "sensor_msgs/msg/JointState",
+    "sensor_msgs/msg/LaserScan",
     "geometry_msgs/msg/Twist",
     "nav_msgs/msg/Odometry",
     "tf2_msgs/msg/TFMessage",

@@ -70,6 +70,11 @@ class Driver:
         within = self._velocity.clamped(config.max_linear, config.max_angular)
         return self._say(within if self.source != "nobody" and within != self._velocity else None)
 
+    def hold_back(self, velocity: Velocity) -> None:
+        """Go on from ``velocity``, a slower one that was commanded instead of the last."""
+        self._velocity = velocity
+        self._signs.hold_back(velocity)
+
     def halt(self) -> Velocity | None:
         """Stop whoever drives; return one zero, or None when nobody does."""
         was_driving = self.source != "nobody"

@@ -68,6 +68,10 @@ class SignControl:
         self._allowance.rate = config.max_sign_rate
         self.velocity = self.velocity.clamped(config.max_linear, config.max_angular)
 
+    def hold_back(self, velocity: Velocity) -> None:
+        """Go on from no faster than ``velocity``, so that nothing has added up when the robot may be faster again."""
+        self.velocity = self.velocity.clamped(abs(velocity.linear_mps), abs(velocity.angular_radps))
+
     def halt(self) -> Velocity | None:
         """Forget the velocity; return one zero, or None when that has been said already."""
         was_silent = self.silent

@@ -9,6 +9,7 @@ from handsteer.clock import Clock, to_seconds
 from handsteer.control.velocity import Velocity
 from handsteer.dashboard.history import PERIOD_S, Sample, VelocityHistory
 from handsteer.dashboard.manual import HOLD_TIMEOUT_S
+from handsteer.dashboard.scan import scan_points
 from handsteer.dashboard.seat import Seat
 from handsteer.dashboard.state import (
     COMMAND_HOLDS_S,
@@ -28,10 +29,12 @@ from handsteer.messages import (
     JOINT_STATES,
     ODOM,
     ROBOT_DESCRIPTION,
+    SCAN,
     WORLD_MARKERS,
     DiagnosticArray,
     DiagnosticStatus,
     JointState,
+    LaserScan,
     Marker,
     MarkerArray,
     Odometry,
@@ -52,6 +55,7 @@ _WATCH_PERIOD_S = 0.05
 _FRAME_COUNTS_KEPT = 6
 _ODOMETRY_KEPT = 16
 _ODOMETRY_HOLDS_S = 0.5
+_SCAN_HOLDS_S = 1.0
 
 
 _START = Pose2D(0.0, 0.0, 0.0)
@@ -68,6 +72,7 @@ class WorldState:
         markers: The obstacles by namespace and id.
         description: The robot's URDF; empty as long as it is not known.
         trail: Where the robot has gone while the page was looked at.
+        scan: What its laser scanner sees: x and y in the world, in metres.
     """
 
     robot: Pose2D = _START
@@ -75,6 +80,7 @@ class WorldState:
     markers: tuple[Marker, ...] = ()
     description: str = ""
     trail: Trail = _NO_TRAIL
+    scan: tuple[tuple[float, float], ...] = ()
 
 
 class DashboardNode(Node):
@@ -114,12 +120,13 @@ class DashboardNode(Node):
         self._steering = steering
         self._holder: tuple[str, float] | None = None
         self._stopper: str | None = None
-        self._odometry_came_s = -math.inf
+        self._odometry_came_s = self._scan_came_s = -math.inf
         self.subscribe(DIAGNOSTICS, self._on_diagnostics, key=_reporter)
         self.subscribe(cmd_vel, self._on_command)
         self.subscribe(ODOM, self._on_odometry)
         self.subscribe(JOINT_STATES, self._on_joints)
         self.subscribe(WORLD_MARKERS, self._on_markers)
+        self.subscribe(SCAN, self._on_scan)
         self.subscribe(ROBOT_DESCRIPTION, self._on_description)
         self.every(_WATCH_PERIOD_S, self._watch)
         self.every(PERIOD_S, self._sample)
@@ -190,6 +197,8 @@ class DashboardNode(Node):
 
     def _watch(self) -> None:
         self.seat.tick(self.clock.now())
+        if self.world.scan and self.clock.now() - self._scan_came_s > _SCAN_HOLDS_S:
+            self.world = replace(self.world, scan=())
         holder = self._holder
         if holder is not None and (self.clock.now() - holder[1] > HOLD_TIMEOUT_S or not self.seat.drives(holder[0])):
             self.release(holder[0])
@@ -223,9 +232,13 @@ class DashboardNode(Node):
 
     def _take_truth(self, report: Report, stamp_s: float) -> None:
         truth = _pose(report.values.get("truth", ""))
+        then = self._odometry_at(stamp_s)
+        if truth is not None and then is not None:
+            self._truth = (truth, then)
+
+    def _odometry_at(self, stamp_s: float) -> Pose2D | None:
         then = [pose for at_s, pose in self._odometry if at_s <= stamp_s]
-        if truth is not None and then:
-            self._truth = (truth, then[-1])
+        return then[-1] if then else None
 
     def _notice_restart(self, report: Report) -> None:
         before_m, self._path_length_m = self._path_length_m, report.number("path_length_m") or 0.0
@@ -257,6 +270,13 @@ class DashboardNode(Node):
         # They are repeated for those who come late, with other stamps; who draws them need not look at each again.
         if _drawn(markers) != _drawn(self.world.markers):
             self.world = replace(self.world, markers=markers)
+
+    def _on_scan(self, received: Received[LaserScan]) -> None:
+        then = self._odometry_at(to_seconds(received.message.header.stamp))
+        self._scan_came_s = self.clock.now()
+        if then is not None:
+            place = place_in_world(*self._truth, then) if self._truth else then
+            self.world = replace(self.world, scan=scan_points(received.message, place))
 
     def _on_description(self, received: Received[String]) -> None:
         self.world = replace(self.world, description=received.message.data)

@@ -16,7 +16,7 @@ from nicegui.events import SceneDragEventArguments
 
 from handsteer.dashboard.geometry import Rotation, css_colour, from_quaternion, from_rpy, parents_first
 from handsteer.dashboard.node import WorldState
-from handsteer.dashboard.scene_objects import RobotRig, TrailLine, View
+from handsteer.dashboard.scene_objects import RobotRig, ScanDots, TrailLine, View
 from handsteer.dashboard.trail import MOST_POINTS, Trail
 from handsteer.errors import WorldError
 from handsteer.messages import Marker
@@ -34,6 +34,9 @@ _FRAMES_PER_S = 20
 _TRAIL = "#7aa7ff"
 _TRAIL_WIDTH_M = 0.05
 _TRAIL_HEIGHT_M = 0.004
+_SCAN = "#ff6a5e"
+_SCAN_DOT_M = 0.05
+_SCAN_HEIGHT_M = 0.16
 _RING = "#ffd24a"
 _RING_INNER = 0.44
 _RING_SPARE = 1.35
@@ -77,6 +80,7 @@ class WorldView:
             with scene.group() as self._floor:
                 _draw_floor(scene)
             self._trail = TrailLine(MOST_POINTS, _TRAIL_WIDTH_M).material(_TRAIL, 0.75, "both").move(z=_TRAIL_HEIGHT_M)
+            self._scan = ScanDots(_SCAN_DOT_M, _SCAN_HEIGHT_M).material(_SCAN)
             self._ring = scene.ring(_RING_INNER, 0.5, 48).material(_RING, 1.0, "both").visible(False)
             self._robot = RobotRig(scene)
         # After the scene's own, which puts the camera elsewhere.
@@ -92,6 +96,8 @@ class WorldView:
             self._floor.move(round(world.robot.x), round(world.robot.y))
         if world.trail is not shown.trail:
             self._draw_trail(shown.trail, world.trail)
+        if world.scan != shown.scan:
+            self._scan.show(world.scan)
         if world.markers is not shown.markers:
             self._show_obstacles(world.markers)
             self._show_ring()

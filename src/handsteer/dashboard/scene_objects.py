@@ -49,6 +49,23 @@ class RobotRig(Object3D, component=_STATIC / "robot-rig.js"):
         self.run_method("look", view)
 
 
+class ScanDots(Object3D, component=_STATIC / "scan.js"):
+    """What a laser scanner sees: a dot for each ray that meets something.
+
+    Args:
+        size_m: How large a dot is, in metres.
+        height_m: How high above the floor they are.
+    """
+
+    def __init__(self, size_m: float, height_m: float) -> None:
+        super().__init__([], size_m, height_m)
+
+    def show(self, points: Sequence[tuple[float, float]]) -> None:
+        """Draw these points, x and y in metres, instead of those before."""
+        self.args[0] = [list(point) for point in points]
+        self.run_method("show", self.args[0])
+
+
 class TrailLine(Object3D, component=_STATIC / "trail.js"):
     """The robot's way.
 

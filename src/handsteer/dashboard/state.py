@@ -124,6 +124,7 @@ class PageState:
         max_linear_mps: The highest speed that control lets through, either way; None when it does not say.
         max_angular_radps: Likewise, for turning.
         course: How far it is on the course of its world; None where there is none.
+        warnings: What is amiss though everything goes on, a sentence each, as two nodes that command one robot.
     """
 
     mood: Mood
@@ -151,6 +152,7 @@ class PageState:
     max_linear_mps: float | None
     max_angular_radps: float | None
     course: CourseState | None = None
+    warnings: tuple[str, ...] = ()
 
 
 def compose(observed: Observed, now_s: float, viewers: Viewers = NOBODY) -> PageState:
@@ -188,7 +190,14 @@ def compose(observed: Observed, now_s: float, viewers: Viewers = NOBODY) -> Page
         max_linear_mps=control.number("max_linear") or None,
         max_angular_radps=control.number("max_angular") or None,
         course=read_course(robot.values),
+        warnings=warnings_in(reports),
     )
+
+
+def warnings_in(reports: Mapping[str, Report]) -> tuple[str, ...]:
+    """Return what nodes report as a warning of its own, each sentence once."""
+    said = (report.values.get("warning", "") for report in reports.values())
+    return tuple(dict.fromkeys(warning for warning in said if warning))
 
 
 def is_stopped(control: Report | None, viewers: Viewers) -> bool:

@@ -1,23 +1,28 @@
 """The node ``hand_sign_control``: signs in, one velocity command out for each."""
 
+import logging
 from typing import Any
 
 from handsteer.clock import Clock
-from handsteer.config import Config, ControlConfig
+from handsteer.config import CollisionMonitorConfig, Config, ControlConfig
 from handsteer.control.actions import action_of
 from handsteer.control.driver import Driver
 from handsteer.control.effects import tell
 from handsteer.control.fleet import NEXT
 from handsteer.control.safety import Following, Ramp, Safety
 from handsteer.control.velocity import ZERO, Velocity
-from handsteer.messages import CMD_VEL, HAND_SIGN, ODOM, STEERING_CMD_VEL, Odometry, String, Topic, Twist, command
+from handsteer.messages import CMD_VEL, HAND_SIGN, ODOM, STEERING_CMD_VEL, STOP, Odometry, String, Topic, Twist, command
+from handsteer.nodes.collision_monitor import CollisionMonitor
 from handsteer.nodes.interruption import Interruption
 from handsteer.nodes.latency import LatencyLog
-from handsteer.nodes.node import OK, Node
+from handsteer.nodes.node import OK, WARN, Node
+from handsteer.nodes.rivals import Rivals
 from handsteer.nodes.selection import Selection
 from handsteer.nodes.stop_keeper import StopKeeper
 from handsteer.signs.vocabulary import NONE
 from handsteer.transports.protocol import Publisher, Received, Transport
+
+log = logging.getLogger(__name__)
 
 _WATCHDOG_PERIOD_S = 0.02
 _DIAGNOSE_PERIOD_S = 0.1
@@ -34,6 +39,7 @@ class HandSignControlNode(Node):
         clock: The graph's clock.
         config: Limits, steps and timeouts.
         cmd_vel: The topic of the commands, of Twist or TwistStamped.
+        collision_monitor: Whether and how commands are slowed before obstacles; not at all by default.
         arming: Whether nothing moves before neutral was seen, and while no robot listens
             (:mod:`handsteer.control.safety`).
 
@@ -47,6 +53,7 @@ class HandSignControlNode(Node):
         clock: Clock,
         config: ControlConfig,
         cmd_vel: Topic[Any] = CMD_VEL,
+        collision_monitor: CollisionMonitorConfig | None = None,
         *,
         arming: bool = False,
     ) -> None:
@@ -59,6 +66,7 @@ class HandSignControlNode(Node):
         self._arming = arming
         self._ramp = Ramp(config)
         self._ramped_s = self._last_step_s = clock.now()
+        self._monitor = CollisionMonitor(self, collision_monitor or CollisionMonitorConfig(), self._driver.hold_back)
         self._interruption = Interruption(config.sign_timeout, clock.now())
         self._topic = cmd_vel
         self._last_sign = NONE
@@ -66,6 +74,7 @@ class HandSignControlNode(Node):
             Selection(self, config.robots, cmd_vel, self._send, self._on_change) if config.robots else None
         )
         self._cmd_vel = self._selection.publisher if self._selection else self.publisher(cmd_vel)
+        self._rivals = Rivals(self, [HAND_SIGN, *(self._selection.topics if self._selection else [cmd_vel])])
         StopKeeper(self, self._on_stop_or_reset)
         self.subscribe(STEERING_CMD_VEL, self._on_steering)
         self.subscribe(HAND_SIGN, self._on_sign)
@@ -80,6 +89,7 @@ class HandSignControlNode(Node):
         self._interruption.limit_s = config.control.sign_timeout
         self._safety.reconfigure(config.control)
         self._ramp.reconfigure(config.control)
+        self._monitor.reconfigure(config.collision_monitor)
         self._publish(self._driver.reconfigure(config.control))
 
     def on_stop(self) -> None:
@@ -95,7 +105,12 @@ class HandSignControlNode(Node):
             self._driver.halt()
             self._publish(ZERO)
         else:
+            if self._safety.is_stopped:
+                log.info("stop is reset by false on %s, which is published by %s", STOP.name, self._voices(STOP))
             self._safety.reset()
+
+    def _voices(self, topic: Topic[Any]) -> str:
+        return ", ".join(self.transport.publishers_of(topic)) or "nobody that is known"
 
     def _on_sign(self, received: Received[String]) -> None:
         captured_s = received.captured_s
@@ -159,7 +174,8 @@ class HandSignControlNode(Node):
             return
         now = self.clock.now()
         since_s, self._ramped_s = now - self._ramped_s, now
-        self._send(self._cmd_vel, self._ramp.step(velocity, min(since_s, self._config.sign_timeout)), captured_s)
+        ramped = self._ramp.step(velocity, min(since_s, self._config.sign_timeout))
+        self._send(self._cmd_vel, self._monitor.admit(ramped), captured_s)
         if captured_s is not None:
             self.latency.add(self.clock.now() - captured_s)
 
@@ -179,7 +195,7 @@ class HandSignControlNode(Node):
     def _report(self) -> None:
         velocity = self._driver.velocity
         self.diagnose(
-            OK,
+            WARN if self._rivals.warning or self._monitor.why_blind() else OK,
             self._reason,
             source=self._driver.source,
             stopped=self._safety.is_stopped,
@@ -187,6 +203,8 @@ class HandSignControlNode(Node):
             angular_radps=f"{velocity.angular_radps:.3f}",
             **({"robot": self._selection.fleet.selected} if self._selection else {}),
             **tell(self._config),
+            **self._monitor.values(),
+            **({"warning": self._rivals.warning} if self._rivals.warning else {}),
             **self._latencies(),
         )
 
@@ -201,11 +219,11 @@ class HandSignControlNode(Node):
             return (
                 f"standing: {self._disarmed}, steers once the steering has been let go"
                 if waits
-                else self._driver.reason
+                else self._monitor.explain(self._driver.reason)
             )
         why = safety.signs_wait
         if why is None or (source == "nobody" and not why):
-            return self._driver.reason
+            return self._monitor.explain(self._driver.reason)
         return f"standing: {self._disarmed}{f' ({why})' if why else ''}, moves once Stop is shown, or no hand"
 
     @property

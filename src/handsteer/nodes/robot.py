@@ -17,6 +17,7 @@ from handsteer.messages import (
     JOINT_STATES,
     ODOM,
     ROBOT_DESCRIPTION,
+    SCAN,
     TF,
     WORLD_MARKERS,
     ClockMessage,
@@ -42,6 +43,8 @@ from handsteer.messages import (
 )
 from handsteer.nodes.interruption import Interruption
 from handsteer.nodes.node import ERROR, OK, WARN, Node
+from handsteer.nodes.rivals import Rivals
+from handsteer.nodes.scans import scan_message
 from handsteer.nodes.stop_keeper import StopKeeper
 from handsteer.nodes.world_changes import WorldChanges
 from handsteer.nodes.world_markers import Touches, gate_strips, world_markers
@@ -56,6 +59,7 @@ log = logging.getLogger(__name__)
 
 _PERIOD_S = 0.02
 _MARKERS_PERIOD_S = 0.05
+_SCAN_PERIOD_S = 0.1
 _DIAGNOSE_PERIOD_S = 0.1
 # A machine that was busy for longer than this lets the simulated robot wait rather than leap.
 _LONGEST_STEP_S = 0.1
@@ -101,6 +105,7 @@ class RobotNode(Node):
         self._tf = self.publisher(TF)
         self._joint_states = self.publisher(JOINT_STATES)
         self._clock_out = self.publisher(CLOCK) if config.publish_clock else None
+        self._scan = self.publisher(SCAN)
         self._markers = self.publisher(WORLD_MARKERS)
         self._most_markers = 0
         self._touches = Touches()
@@ -110,7 +115,9 @@ class RobotNode(Node):
         self.publisher(ROBOT_DESCRIPTION).publish(String(data=robot.description))
         self._hears_old = False
         self.subscribe(cmd_vel, self._on_command)
+        self._rivals = Rivals(self, [cmd_vel], {config.cmd_vel_topic: robot.commanders})
         self.every(_PERIOD_S, self._step)
+        self.every(_SCAN_PERIOD_S, self._publish_scan)
         self.every(_MARKERS_PERIOD_S, self._publish_markers)
         self.every(_DIAGNOSE_PERIOD_S, self._report)
 
@@ -215,6 +222,13 @@ class RobotNode(Node):
             self._tf.publish(TFMessage(transforms=[_transform(header, base, self.state.odometry)]))
         self._joint_states.publish(_joint_state(Header(stamp=stamp, frame_id=""), self.state))
 
+    def _publish_scan(self) -> None:
+        scan = self._robot.scan() if self._scan.wanted else None
+        if scan is not None:
+            measured_s = self.clock.now() - scan.age_s
+            header = Header(stamp=self.clock.stamp(measured_s), frame_id=self._config.scan_frame_id)
+            self._scan.publish(scan_message(header, scan), measured_s)
+
     def _publish_markers(self) -> None:
         now = self.clock.now()
         self._touches.note(self.state.contacts, now)
@@ -237,6 +251,7 @@ class RobotNode(Node):
             path_length_m=f"{self.path_length_m:.2f}",
             truth=f"{state.truth.x:.3f} {state.truth.y:.3f} {state.truth.yaw:.3f}",
             **({} if self.course is None else self.course.as_values()),
+            **({"warning": self._rivals.warning} if self._rivals.warning else {}),
         )
 
     def _condition(self) -> tuple[int, str]:
@@ -247,6 +262,8 @@ class RobotNode(Node):
             return WARN, f"touches {', '.join(self.state.contacts)}"
         if silence_s > self._config.cmd_vel_timeout and self._command != Velocity():
             return WARN, f"standing: no command for {silence_s:.1f} s, and the last one was to drive"
+        if self._rivals.warning:
+            return WARN, "is commanded by more than one node"
         return OK, "moves freely"
 
 

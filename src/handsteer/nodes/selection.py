@@ -29,15 +29,19 @@ class Selection:
         cmd_vel: The topic of commands within each.
         send: Publishes a velocity.
         on_change: Is called when another robot was selected, before anything is sent to it.
+
+    Attributes:
+        fleet: Which robots there are, and which is driven.
+        topics: Where each is commanded.
     """
 
     def __init__(
         self, node: Node, names: tuple[str, ...], cmd_vel: Topic[Any], send: Send, on_change: Callable[[], None]
     ) -> None:
         self.fleet = Fleet(names)
-        self._publishers: dict[str, Publisher[Any]] = {
-            name: node.publisher(replace(cmd_vel, name=f"/{name}{cmd_vel.name}")) for name in names
-        }
+        topics = {name: replace(cmd_vel, name=f"/{name}{cmd_vel.name}") for name in names}
+        self.topics = tuple(topics.values())
+        self._publishers: dict[str, Publisher[Any]] = {name: node.publisher(topic) for name, topic in topics.items()}
         self._send = send
         self._on_change = on_change
         self._left: dict[str, int] = {}

@@ -42,6 +42,9 @@ straight drive by 0.1 ‰ and a turn by 1 %."""
 
 _GRAVITY_MPS2 = 9.81
 
+THINGS_GROUP = 1
+"""The group of the geoms of obstacles; all others are in group 0."""
+
 # Narrow: at two points further apart, MuJoCo would let each tread resist the turn.
 _TREAD_HALF_WIDTH_M = 0.002
 _GRIP_ALONG = 1.0
@@ -178,6 +181,7 @@ def _add_thing(spec: mujoco.MjSpec, name: str, thing: Thing) -> None:
         "size": [x / 2, z / 2, 0] if thing.shape == "cylinder" else [x / 2, y / 2, z / 2],
         "contype": _ALL,
         "conaffinity": _ALL,
+        "group": THINGS_GROUP,
     }
     if not thing.movable:
         spec.worldbody.add_geom(name=name, **shape, **pose)

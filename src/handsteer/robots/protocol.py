@@ -3,6 +3,9 @@
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
+import numpy as np
+from numpy.typing import NDArray
+
 Shape = Literal["box", "cylinder", "sphere"]
 
 
@@ -67,6 +70,28 @@ class Obstacle:
     orientation: tuple[float, float, float, float]
 
 
+@dataclass(frozen=True, eq=False)
+class RangeScan:
+    """What a laser scanner has measured: one turn, or a part of one.
+
+    Attributes:
+        angle_min: Direction of the first ray in the scanner's frame, in rad, left positive.
+        angle_increment: From one ray to the next, in rad.
+        range_min: The shortest distance that it measures, in metres.
+        range_max: The longest, in metres.
+        ranges: (N,), in metres by ray; REP 117: +inf where nothing is, -inf where something is too near, NaN where
+            nothing is known.
+        age_s: How long ago it was measured, in seconds.
+    """
+
+    angle_min: float
+    angle_increment: float
+    range_min: float
+    range_max: float
+    ranges: NDArray[np.float32]
+    age_s: float = 0.0
+
+
 class Robot(Protocol):
     """A robot that takes velocity commands.
 
@@ -87,6 +112,14 @@ class Robot(Protocol):
 
     def obstacles(self) -> list[Obstacle]:
         """Return the things around it, where they are now; an empty list if it knows of none."""
+        ...
+
+    def scan(self) -> RangeScan | None:
+        """Return what its laser scanner sees; None when nothing new has come, or there is no scanner."""
+        ...
+
+    def commanders(self) -> list[str]:
+        """Return the nodes that command it in a graph of its own, this one among them; none where it has none."""
         ...
 
     def reset(self) -> None:

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from handsteer.config import RobotConfig
-from handsteer.messages import CMD_VEL, Odometry, Topic, TurtlePose, command, type_name, yaw_of
+from handsteer.messages import CMD_VEL, LaserScan, Odometry, Topic, TurtlePose, command, type_name, yaw_of
 from handsteer.robots.description import robot_description
 from handsteer.robots.diff_drive import Velocity
-from handsteer.robots.protocol import Obstacle, Pose2D, RobotState
+from handsteer.robots.protocol import Obstacle, Pose2D, RangeScan, RobotState
 from handsteer.robots.relay import ZERO, Relay
 from handsteer.transports.protocol import Received, Session
 
@@ -64,6 +64,8 @@ class RemoteRobot:
         self._topic: Topic[Any] = _topic(config.cmd_vel_topic, cmd_vel.type, CMD_VEL.depth)
         self._odom_topic = _full_name(session, config.odom_topic)
         self._seen: _Seen | None = None
+        self._scanned: tuple[LaserScan, float] | None = None
+        self._listens_to_scans = False
         self._senseless = False
         self._linked_s = 0.0
         self._time_s = 0.0
@@ -106,6 +108,29 @@ class RemoteRobot:
         """Return an empty list: nothing is known of them."""
         return []
 
+    def scan(self) -> RangeScan | None:
+        """Return what its laser scanner has seen since the last call; the first one begins to listen."""
+        if self._config.scan_topic and not self._listens_to_scans:
+            self._listens_to_scans = True
+            topic = _topic(self._config.scan_topic, LaserScan, 1)
+            self._session.transport.subscribe(_NODE, topic, self._on_scan)
+        scanned, self._scanned = self._scanned, None
+        if scanned is None:
+            return None
+        message, measured_s = scanned
+        return RangeScan(
+            message.angle_min,
+            message.angle_increment,
+            message.range_min,
+            message.range_max,
+            message.ranges,
+            max(0.0, self._session.clock.now() - measured_s),
+        )
+
+    def commanders(self) -> list[str]:
+        """Return the nodes that publish on the topic of its commands."""
+        return self._session.transport.publishers_of(self._topic)
+
     def reset(self) -> None:
         """Let it stand where it is; a real robot cannot be put back."""
         self.command(0.0, 0.0)
@@ -139,6 +164,10 @@ class RemoteRobot:
         self._senseless = not all(map(math.isfinite, (pose.x, pose.y, pose.yaw, *_numbers(seen.velocity))))
         if not self._senseless:
             self._seen = seen
+
+    def _on_scan(self, received: Received[LaserScan]) -> None:
+        now = self._session.clock.now()
+        self._scanned = received.message, now if received.captured_s is None else received.captured_s
 
     def _trouble(self, *, listens: bool, is_silent: bool) -> str:
         if not listens:

@@ -12,8 +12,9 @@ from handsteer.robots import diff_drive
 from handsteer.robots.contacts import Contacts
 from handsteer.robots.description import robot_description
 from handsteer.robots.diff_drive import DriveState, Velocity
+from handsteer.robots.lidar import Lidar
 from handsteer.robots.physics import ROBOT_JOINT, TIMESTEP_S, WHEEL_JOINTS, compile_model, thing_name
-from handsteer.robots.protocol import Obstacle, Pose2D, RobotState
+from handsteer.robots.protocol import Obstacle, Pose2D, RangeScan, RobotState
 from handsteer.robots.world import World, load_world
 
 _log = logging.getLogger(__name__)
@@ -74,6 +75,14 @@ class SimulatedRobot:
             Obstacle(thing.name, thing.shape, thing.extent, thing.rgba, *self._thing_pose(index))
             for index, thing in enumerate(self.world.obstacles)
         ]
+
+    def scan(self) -> RangeScan:
+        """Return what its laser scanner sees now."""
+        return self._lidar.scan(self.data)
+
+    def commanders(self) -> list[str]:
+        """Return an empty list: it has no graph of its own."""
+        return []
 
     def enter(self, world: World) -> None:
         """Stand at the start of another world; as :meth:`reset`.
@@ -138,6 +147,7 @@ class SimulatedRobot:
         self._wheel_angles = np.array([joint.qposadr[0] for joint in joints])
         self._wheel_speeds = np.array([joint.dofadr[0] for joint in joints])
         self._contacts = Contacts(model, world)
+        self._lidar = Lidar(model, self.description)
         self._pose_at = int(model.joint(ROBOT_JOINT).qposadr[0])
 
     def _carried_over(self, model: mujoco.MjModel, same: dict[int, int]) -> mujoco.MjData:

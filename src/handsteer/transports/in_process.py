@@ -1,6 +1,7 @@
 """Messages within one process: handed over by reference, no copy, no thread of its own."""
 
 import threading
+import weakref
 from typing import Any, Generic, TypeVar
 
 from handsteer.messages import Topic
@@ -19,14 +20,23 @@ class InProcessTransport:
         self._types = TopicTypes()
         self._lock = threading.Lock()
         self._fanouts: dict[str, Fanout[Any]] = {}
+        self._publishers: weakref.WeakSet[InProcessPublisher[Any]] = weakref.WeakSet()
 
     def advertise(self, node: str, topic: Topic[M]) -> "InProcessPublisher[M]":
         """Return the sending end of ``topic`` for the node named ``node``."""
-        return InProcessPublisher(topic, self._fanout(topic))
+        publisher = InProcessPublisher(topic, self._fanout(topic), node)
+        with self._lock:
+            self._publishers.add(publisher)
+        return publisher
 
     def subscribe(self, node: str, topic: Topic[M], deliver: Deliver[M]) -> FanoutSubscription[M]:
         """Call ``deliver`` for each message on ``topic`` from now on, on the publisher's thread."""
         return self._fanout(topic).add(deliver)
+
+    def publishers_of(self, topic: Topic[Any]) -> list[str]:
+        """Return the names of the nodes that hold a sending end of ``topic``."""
+        with self._lock:
+            return sorted(publisher.node for publisher in self._publishers if publisher.topic == topic.name)
 
     def full_name(self, node: str) -> str:
         """Return ``node``."""
@@ -36,6 +46,7 @@ class InProcessTransport:
         """End all publishing and receiving; may be called twice."""
         with self._lock:
             fanouts, self._fanouts = self._fanouts, {}
+            self._publishers.clear()
         for fanout in fanouts.values():
             fanout.close()
 
@@ -46,9 +57,16 @@ class InProcessTransport:
 
 
 class InProcessPublisher(Generic[M]):
-    """The sending end of a topic."""
+    """The sending end of a topic.
 
-    def __init__(self, topic: Topic[M], fanout: Fanout[M]) -> None:
+    Attributes:
+        node: Name of the node that has it.
+        topic: Name of the topic.
+    """
+
+    def __init__(self, topic: Topic[M], fanout: Fanout[M], node: str) -> None:
+        self.node = node
+        self.topic = topic.name
         self._topic = topic
         self._fanout = fanout
 

@@ -1,7 +1,7 @@
 """A graph of several processes as somebody sees who looks on: its nodes, its topics, and what is amiss."""
 
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -61,8 +61,13 @@ def amiss(nodes: Iterable[str], topics: Iterable[ObservedTopic]) -> list[str]:
         if len(topic.types) > 1:
             said.append(f"{topic.name} has the types {' and '.join(topic.types)}: only those of one type are connected")
         if len(topic.publishers) > 1 and _VELOCITIES & set(topic.types):
-            said.append(
-                f"{topic.name} has {len(topic.publishers)} publishers ({', '.join(topic.publishers)}), and a robot "
-                "obeys all of them in turn: end all but one, or give each a topic of its own by remapping"
-            )
+            said.append(many_voices(topic.name, topic.publishers))
     return said
+
+
+def many_voices(topic: str, publishers: Sequence[str]) -> str:
+    """Return what is to be said of a topic that a robot obeys and that has several ``publishers``."""
+    return (
+        f"{topic} has {len(publishers)} publishers ({', '.join(publishers)}), and a robot "
+        "obeys all of them in turn: end all but one, or give each a topic of its own by remapping"
+    )

@@ -79,6 +79,14 @@ class Transport(Protocol):
         """
         ...
 
+    def publishers_of(self, topic: Topic[Any]) -> list[str]:
+        """Return the names of the nodes that publish ``topic`` now, as far as they are known; returns at once.
+
+        Each publisher counts: a node that has two is there twice, and so are two nodes of one name. Those of other
+        processes may be known late, and are missed for some seconds when they were killed.
+        """
+        ...
+
     def full_name(self, node: str) -> str:
         """Return what others know the node named ``node`` by: ``process: node`` where it has a process of its own."""
         ...

@@ -16,6 +16,9 @@ pytest.importorskip("cyclonedds")
 class TestDds(TransportContract):
     settle_s = 0.3
 
+    def name_of(self, node: str) -> str:
+        return "/r1/tests"
+
     @pytest.fixture
     def session(self, monkeypatch: pytest.MonkeyPatch) -> Iterator[Session]:
         monkeypatch.setenv("ROS_DOMAIN_ID", str(free_domain()))

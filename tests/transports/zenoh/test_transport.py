@@ -16,6 +16,9 @@ pytest.importorskip("zenoh")
 class TestZenoh(TransportContract):
     settle_s = 0.3
 
+    def name_of(self, node: str) -> str:
+        return "/r1/tests"
+
     @pytest.fixture
     def session(self, monkeypatch: pytest.MonkeyPatch) -> Iterator[Session]:
         # No router, and nobody else: this process talks to itself.

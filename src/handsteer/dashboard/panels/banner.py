@@ -13,7 +13,7 @@ _TIME = re.compile(r" for \d+(\.\d+)? s\b")
 
 def spoken(state: PageState) -> str:
     """Return the sentence for a screen reader, which would read out each tenth of a second of a time that passes."""
-    return f"{state.headline}: {_TIME.sub('', state.reason)}"
+    return ". ".join([f"{state.headline}: {_TIME.sub('', state.reason)}", *state.warnings])
 
 
 class Banner:
@@ -30,6 +30,7 @@ class Banner:
             box("lamp")
             self._headline = text("headline", "Starting")
             self._reason = text("reason", "waiting for the first report")
+            self._warning = text("warning hidden", "")
             with box("buttons"):
                 self._reset = button("Reset", 'aria-label="Reset: let the robot be driven again"').on("click", reset)
                 self._stop = button("Stop", 'aria-label="Stop the robot (space key)" aria-keyshortcuts="Space"')
@@ -42,6 +43,8 @@ class Banner:
         self._headline.set_text(state.headline)
         self._reason.set_text(state.reason)
         self._spoken.set_text(spoken(state))
+        self._warning.set_text("; ".join(state.warnings))
+        switch(self._warning, "hidden", on=not state.warnings)
         switch(self._reset, "hidden", on=not state.stopped)
         if state.mood != self._mood:
             self._banner.classes(remove=self._mood, add=state.mood)

@@ -22,6 +22,7 @@ from handsteer.transports.dds.matching import Endpoint, Matching
 from handsteer.transports.dds.network import Network
 from handsteer.transports.dds.qos import counter_qos, reader_qos, service_qos, writer_qos
 from handsteer.transports.dds.types import dds_type, opaque_type, service_dds_type
+from handsteer.transports.observed import UNNAMED
 from handsteer.transports.ros2.encoding import dds_type_name, ros_type_name, types
 from handsteer.transports.ros2.names import NodeName
 from handsteer.transports.ros2.service_types import Service
@@ -118,6 +119,15 @@ class Participant:
     def others(self) -> tuple[list[str], list[tuple[Endpoint, str | None]]]:
         """Return the nodes of other processes, and their publishers and subscribers with the node of each, if told."""
         return self._graph.nodes(), [(end, self._graph.node_of(key)) for key, end in self._matching.others().items()]
+
+    def publishers_of(self, topic: Topic[Any]) -> list[str]:
+        """Return the node of each publisher of ``topic`` in other processes, as far as it has told its name."""
+        name = self._dds_name(topic)
+        return [
+            self._graph.node_of(key) or UNNAMED
+            for key, end in self._matching.others().items()
+            if end.publishes and end.topic == name
+        ]
 
     def counter(self, writer: Endpoint) -> DataReader[Any]:
         """Return a reader that gets what ``writer`` sends, of whatever type, and that is told to nobody as our node's.

@@ -50,8 +50,7 @@ class DdsTransport:
 
     def advertise(self, node: str, topic: Topic[M]) -> "DdsPublisher[M]":
         """Return the sending end of ``topic`` for the node named ``node``."""
-        self._claim(topic)
-        publisher = DdsPublisher(self._participant, topic)
+        publisher = DdsPublisher(self._participant, topic, self._claim(topic))
         with self._lock:
             self._publishers.append(publisher)
         return publisher
@@ -64,6 +63,13 @@ class DdsTransport:
                 self._incoming[name] = Fanout(latched=topic.latched, receive=partial(self._receive, topic))
             fanout: Fanout[M] = self._incoming[name]
         return fanout.add(deliver)
+
+    def publishers_of(self, topic: Topic[Any]) -> list[str]:
+        """Return the full names of the ROS 2 nodes that publish ``topic``; names come up to three seconds late."""
+        name = self._participant.name.topic(topic)
+        with self._lock:
+            ours = [self._participant.name.full for publisher in self._publishers if publisher.name == name]
+        return sorted([*ours, *self._participant.publishers_of(topic)])
 
     def full_name(self, node: str) -> str:
         """Return the ROS 2 node's name and ``node``, as ROS's own diagnostics do: ``r1/my_camera: my_camera``."""
@@ -98,9 +104,14 @@ class DdsTransport:
 
 
 class DdsPublisher(Generic[M]):
-    """The sending end of a topic."""
+    """The sending end of a topic.
 
-    def __init__(self, participant: Participant, topic: Topic[M]) -> None:
+    Attributes:
+        name: Full name of the topic.
+    """
+
+    def __init__(self, participant: Participant, topic: Topic[M], name: str) -> None:
+        self.name = name
         self._participant = participant
         self._topic = topic
         self._writer: Any = participant.writer(topic)

@@ -3,7 +3,6 @@
 import logging
 import sys
 import threading
-import xmlrpc.client
 from collections.abc import Sequence
 from typing import Any
 
@@ -20,10 +19,10 @@ except ImportError as problem:
         f"ROS 1 is not installed for this Python ({problem}): on Debian and Ubuntu, `make ros1` installs it"
     ) from None
 
+from handsteer.transports.ros1.master import Master
 from handsteer.transports.ros1.transport import Ros1Transport
 
 _PING_PERIOD_S = 0.5
-_PING_TIMEOUT_S = 2.0
 _PINGS_UNTIL_LOST = 3
 _CLOCK_SILENCE_S = 2.0
 # rospy sends on threads of its own and does not tell when they are done.
@@ -47,7 +46,7 @@ class Ros1Session:
 
     def __init__(self, node: str, arguments: Sequence[str]) -> None:
         _refuse_what_rospy_would_ignore(arguments)
-        self._master = _Master(rosgraph.get_master_uri())
+        self._master = Master(rosgraph.get_master_uri())
         self._master.ping()
         self._asked_to_end = threading.Event()
         self._lost: str | None = None
@@ -111,34 +110,6 @@ class Ros1Session:
         """Hold rospy's shutdown up until the nodes have said their last: `rosnode kill`, or another of this name."""
         self._asked_to_end.set()
         self._left.wait(_LEAVE_TIMEOUT_S)
-
-
-class _Master:
-    """The ROS master at an address; knows whether it answers."""
-
-    def __init__(self, uri: str) -> None:
-        self._uri = uri
-        try:
-            self._proxy = xmlrpc.client.ServerProxy(uri, transport=_ImpatientTransport())
-        except OSError:
-            raise TransportError(f"ROS_MASTER_URI is {uri!r}: it should be as http://localhost:11311") from None
-
-    def ping(self) -> None:
-        """Raise TransportError unless it answers."""
-        try:
-            self._proxy.getPid("/handsteer")
-        except (OSError, xmlrpc.client.Error) as error:
-            reason = getattr(error, "strerror", None) or error
-            raise TransportError(
-                f"no ROS master answers at {self._uri} ({reason}): start roscore, or set ROS_MASTER_URI"
-            ) from None
-
-
-class _ImpatientTransport(xmlrpc.client.Transport):
-    def make_connection(self, host: Any) -> Any:
-        connection = super().make_connection(host)
-        connection.timeout = _PING_TIMEOUT_S
-        return connection
 
 
 def _refuse_what_rospy_would_ignore(arguments: Sequence[str]) -> None:

@@ -13,6 +13,7 @@ from handsteer.messages import Topic, type_name
 from handsteer.transports.channels import Deliver, Fanout, FanoutSubscription, TopicTypes, check_type
 from handsteer.transports.protocol import Received
 from handsteer.transports.ros1.conversion import from_ros1, ros1_type, to_ros1
+from handsteer.transports.ros1.system_state import SystemState
 from handsteer.transports.stamps import capture_time
 
 M = TypeVar("M")
@@ -39,6 +40,7 @@ class Ros1Transport:
         self._lock = threading.Lock()
         self._outgoing: dict[str, Ros1Publisher[Any]] = {}
         self._incoming: dict[str, Fanout[Any]] = {}
+        self._state = SystemState()
 
     def advertise(self, node: str, topic: Topic[M]) -> "Ros1Publisher[M]":
         """Return the sending end of ``topic`` for the node named ``node``."""
@@ -57,12 +59,20 @@ class Ros1Transport:
             fanout: Fanout[M] = self._incoming[name]
         return fanout.add(deliver)
 
+    def publishers_of(self, topic: Topic[Any]) -> list[str]:
+        """Return the full names of the ROS nodes that publish ``topic``, as the master said a moment ago.
+
+        A node that was killed stays known to the master for good (``rosnode cleanup``).
+        """
+        return self._state.publishers_of(_full_name(topic))
+
     def full_name(self, node: str) -> str:
         """Return the ROS node's name and ``node``, as ROS's own diagnostics do: ``r1/my_camera: my_camera``."""
         return f"{rospy.get_name().removeprefix('/')}: {node}"
 
     def close(self) -> None:
         """End all publishing and receiving; may be called twice."""
+        self._state.close()
         with self._lock:
             publishers, incoming = list(self._outgoing.values()), list(self._incoming.values())
             self._outgoing = {}

@@ -1,17 +1,17 @@
 """Quality of service: what we offer and request for each kind of topic, whatever carries it.
 
 Commands, signs and what follows from them are reliable. Images and ``/clock`` are best effort, as ROS 2's
-``sensor_data`` has it: a late one is of no use. Of a robot's state we offer reliable and request best effort, which
-fits with any robot.
+``sensor_data`` has it: a late one is of no use. Of a robot's state and its scans we offer reliable and request best
+effort, which fits with any robot.
 """
 
 from dataclasses import dataclass
 from typing import Any
 
-from handsteer.messages import ClockMessage, CompressedImage, Image, JointState, Odometry, Topic
+from handsteer.messages import ClockMessage, CompressedImage, Image, JointState, LaserScan, Odometry, Topic
 
 _SENSOR_DATA = (Image, CompressedImage, ClockMessage)
-_STATE = (Odometry, JointState)
+_STATE = (Odometry, JointState, LaserScan)
 
 
 @dataclass(frozen=True)

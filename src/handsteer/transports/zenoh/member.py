@@ -88,6 +88,10 @@ class Member:
             self._neighbours.add(endpoint)
         return token, text
 
+    def publishers_of(self, topic: str) -> list[str]:
+        """Return the node of each publisher of the topic of this full name in other processes."""
+        return [] if self._neighbours is None else self._neighbours.publishers_of(topic)
+
     def watch_router(self) -> None:
         """Say it when the router has gone, or is there again; does nothing where none is looked for."""
         if self._network.attempts is None:

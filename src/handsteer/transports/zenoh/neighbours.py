@@ -35,6 +35,12 @@ class Neighbours:
         for entity in theirs:
             self._compare(entity)
 
+    def publishers_of(self, topic: str) -> list[str]:
+        """Return the node of each publisher of the topic of this full name in other processes."""
+        with self._lock:
+            theirs = [(entity.node, entity.endpoint) for entity in self._theirs.values()]
+        return [node for node, end in theirs if end and (end.kind, end.topic) == ("publisher", topic)]
+
     def close(self) -> None:
         """Look no more."""
         self._watch.undeclare()

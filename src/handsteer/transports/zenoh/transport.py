@@ -71,6 +71,13 @@ class ZenohTransport:
             fanout: Fanout[M] = self._incoming[name]
         return fanout.add(deliver)
 
+    def publishers_of(self, topic: Topic[Any]) -> list[str]:
+        """Return the full names of the ROS 2 nodes that publish ``topic``, as their liveliness tokens tell."""
+        name = self._member.name.topic(topic)
+        with self._lock:
+            ours = [self._member.name.full for publisher in self._publishers if publisher.name == name]
+        return sorted([*ours, *self._member.publishers_of(name)])
+
     def full_name(self, node: str) -> str:
         """Return the ROS 2 node's name and ``node``, as ROS's own diagnostics do: ``r1/my_camera: my_camera``."""
         return f"{self._member.name.full.removeprefix('/')}: {node}"
@@ -100,12 +107,17 @@ class ZenohTransport:
 
 
 class ZenohPublisher(Generic[M]):
-    """The sending end of a topic."""
+    """The sending end of a topic.
+
+    Attributes:
+        name: Full name of the topic.
+    """
 
     def __init__(self, member: Member, topic: Topic[M]) -> None:
         self._topic = topic
         profile = offered(topic)
         name, kind = _named(member, topic)
+        self.name = name
         key = member.key(name, kind)
         self._publisher = member.session.declare_publisher(key, **_options(profile))
         # It keeps messages for late subscribers, but does not know of any: the plain one beside it does.

@@ -1,0 +1,72 @@
+"""From a laser scan to the obstacles around the robot: points in its own frame."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from handsteer.config import CollisionMonitorConfig
+from handsteer.control.footprint import gaps
+from handsteer.messages import LaserScan
+
+Points = NDArray[np.float64]
+"""(N, 2): x forward and y left of the robot's base frame, in metres."""
+
+MOST_POINTS = 1440
+"""Of a longer scan, the nearest of each few neighbouring rays is kept."""
+
+# What seems to be deeper within the robot is a part of it, as a post that the scanner sees.
+_SKIN_M = 0.05
+
+
+def points_of(scan: LaserScan, rule: CollisionMonitorConfig) -> Points | None:
+    """Return where the scanner sees something; None when the scan is broken or says nothing.
+
+    Distances mean what REP 117 and ``sensor_msgs/LaserScan`` say: beyond ``range_max`` and +inf is free, -inf is too
+    near to be measured, so the robot touches it; NaN and what is below ``range_min`` is no reading.
+
+    Args:
+        scan: The message, of any size.
+        rule: Where the scanner is on the robot, and how far the robot reaches.
+    """
+    ranges = np.asarray(scan.ranges, dtype=np.float64).reshape(-1)
+    figures = (scan.angle_min, scan.angle_increment, scan.range_min, scan.range_max)
+    if not all(map(math.isfinite, figures)) or not scan.angle_increment or scan.range_max <= 0:
+        return None
+    touches = np.isneginf(ranges)
+    found = (ranges >= max(0.0, scan.range_min)) & (ranges <= scan.range_max) & (ranges > 0)
+    if not (touches | found | (ranges > scan.range_max)).any():
+        return None
+    kept, distances = _thinned(np.where(touches, 0.0, np.where(found, ranges, np.inf)))
+    angles = rule.scan_yaw + scan.angle_min + kept * scan.angle_increment
+    points = _along(angles, distances) + np.array([rule.scan_x, rule.scan_y])
+    gap = gaps(points[:, 0], points[:, 1], rule)
+    is_touch = distances == 0.0
+    seen = points[~is_touch & (gap > -_SKIN_M)]
+    return np.concatenate([seen, _on_the_edge(angles[is_touch], rule)])
+
+
+def _thinned(ranges: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the numbers of the rays that meet something, at most :data:`MOST_POINTS`, and how far it is."""
+    if len(ranges) > MOST_POINTS:
+        each = math.ceil(len(ranges) / MOST_POINTS)
+        groups = np.pad(ranges, (0, -len(ranges) % each), constant_values=np.inf).reshape(-1, each)
+        nearest = groups.argmin(axis=1)
+        numbers, ranges = np.arange(len(groups)) * each + nearest, groups[np.arange(len(groups)), nearest]
+    else:
+        numbers = np.arange(len(ranges))
+    meets = np.isfinite(ranges)
+    return numbers[meets].astype(np.float64), ranges[meets]
+
+
+def _along(angles: NDArray[np.float64], distances: NDArray[np.float64]) -> Points:
+    return np.stack([distances * np.cos(angles), distances * np.sin(angles)], axis=1)
+
+
+def _on_the_edge(angles: NDArray[np.float64], rule: CollisionMonitorConfig) -> Points:
+    """Return where rays from the base frame leave the robot, a hair inside."""
+    cos, sin = np.cos(angles), np.sin(angles)
+    with np.errstate(divide="ignore"):
+        ahead = np.where(cos >= 0, rule.front, rule.back) / np.abs(cos)
+        aside = rule.side / np.abs(sin)
+    return _along(angles, np.minimum(ahead, aside) * (1 - 1e-6))

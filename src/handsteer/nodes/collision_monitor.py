@@ -1,0 +1,98 @@
+"""Slows a control's commands before obstacles on ``/scan``, and says so."""
+
+import logging
+import math
+from collections.abc import Callable
+
+from handsteer.config import CollisionMonitorConfig
+from handsteer.control.obstacles import ObstacleLimiter
+from handsteer.control.scan_points import points_of
+from handsteer.control.velocity import Velocity
+from handsteer.messages import SCAN, LaserScan
+from handsteer.nodes.node import Node
+from handsteer.transports.protocol import Received
+
+log = logging.getLogger(__name__)
+
+
+class CollisionMonitor:
+    """Listens to the laser scanner once it is enabled, and from then on.
+
+    Args:
+        node: The control.
+        rule: Whether it is enabled, and how.
+        on_slowed: Gets each velocity that is commanded instead of a faster one.
+    """
+
+    def __init__(self, node: Node, rule: CollisionMonitorConfig, on_slowed: Callable[[Velocity], None]) -> None:
+        self._node = node
+        self._on_slowed = on_slowed
+        self._limiter = ObstacleLimiter(rule)
+        self._listens = False
+        self._came_s = -math.inf
+        self._is_broken = False
+        self._stands = False
+        self.reconfigure(rule)
+
+    def reconfigure(self, rule: CollisionMonitorConfig) -> None:
+        """Go on by another rule."""
+        self._limiter.rule = rule
+        self._limiter.hit = None
+        if rule.enabled and not self._listens:
+            self._listens = True
+            self._node.subscribe(SCAN, self._on_scan)
+
+    def admit(self, wanted: Velocity) -> Velocity:
+        """Return what may be commanded instead of ``wanted``."""
+        self._stands = False
+        if not self._limiter.rule.enabled:
+            return wanted
+        now = self._node.clock.now()
+        allowed = self._limiter.limit(wanted, now) if wanted.is_finite else wanted
+        if allowed != wanted:
+            self._stands = allowed.is_zero
+            self._on_slowed(allowed)
+        return allowed
+
+    def explain(self, reason: str) -> str:
+        """Return the control's ``reason`` with what slows the robot, as ``driving: Forward, slowed: obstacle …``."""
+        if not self._limiter.rule.enabled:
+            return reason
+        if why := self.why_blind():
+            return f"standing: {why}"
+        hit = self._limiter.hit
+        if hit is None:
+            return reason
+        said = hit.describe(self._limiter.rule)
+        return f"standing: stopped before an {said}" if self._stands else f"{reason}, slowed: {said}"
+
+    def why_blind(self) -> str:
+        """Return why nothing may move for want of scans; empty when they come, or are not asked for."""
+        now = self._node.clock.now()
+        rule = self._limiter.rule
+        if not rule.enabled or not self._limiter.is_blind(now):
+            return ""
+        if now - self._came_s > rule.source_timeout:
+            since = f" for {now - self._came_s:.1f} s" if math.isfinite(self._came_s) else ""
+            return f"no laser scan has come{since}, so what is in the way is not known"
+        if self._is_broken:
+            return "the laser scans that come say nothing, so what is in the way is not known"
+        return f"laser scans come {self._limiter.silence_s(now):.1f} s after their stamp: are the clocks in step?"
+
+    def values(self) -> dict[str, str]:
+        """Return what there is to report."""
+        hit = self._limiter.hit
+        return {} if hit is None else {"obstacle_m": f"{max(0.0, hit.gap_m):.2f}"}
+
+    def _on_scan(self, received: Received[LaserScan]) -> None:
+        now = self._node.clock.now()
+        self._came_s = now
+        points = points_of(received.message, self._limiter.rule)
+        if (points is None) != self._is_broken:
+            self._is_broken = points is None
+            (log.warning if self._is_broken else log.info)(
+                "laser scans %s", "say nothing" if self._is_broken else "come again"
+            )
+        if points is not None:
+            captured_s = now if received.captured_s is None else received.captured_s
+            self._limiter.see(points, min(captured_s, now))

@@ -1,0 +1,58 @@
+"""Notices when more than one node publishes what a robot obeys, and says so."""
+
+import logging
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from handsteer.messages import Topic
+from handsteer.nodes.node import Node
+from handsteer.transports.observed import UNNAMED, many_voices
+
+log = logging.getLogger(__name__)
+
+_PERIOD_S = 1.0
+# A node that starts anew is there twice for a moment, and names come up to three seconds late.
+_LOOKS, _LOOKS_FOR_NAMES = 2, 4
+
+Look = Callable[[], Sequence[str]]
+
+
+class Rivals:
+    """Looks once a second at who publishes to topics that are to have one voice.
+
+    Args:
+        node: On whose thread to look, and whose transport knows.
+        topics: The topics.
+        elsewhere: Further ones by name, of another graph: returns the nodes that publish there.
+
+    Attributes:
+        warning: What is amiss, in one sentence; empty when nothing is.
+    """
+
+    def __init__(self, node: Node, topics: Sequence[Topic[Any]], elsewhere: dict[str, Look] | None = None) -> None:
+        self.warning = ""
+        self._node = node
+        self._looks: dict[str, Look] = {topic.name: self._look_at(topic) for topic in topics}
+        self._looks |= elsewhere or {}
+        self._seen: dict[str, int] = {}
+        self._said: set[str] = set()
+        node.every(_PERIOD_S, self._look)
+
+    def _look_at(self, topic: Topic[Any]) -> Look:
+        return lambda: self._node.transport.publishers_of(topic)
+
+    def _look(self) -> None:
+        warnings = [warning for name, look in self._looks.items() if (warning := self._amiss(name, look()))]
+        for warning in warnings:
+            if warning not in self._said:
+                log.warning("%s: %s", self._node.name, warning)
+        self._said = set(warnings)
+        self.warning = "; ".join(warnings)
+
+    def _amiss(self, topic: str, publishers: Sequence[str]) -> str:
+        if len(publishers) < 2:
+            self._seen.pop(topic, None)
+            return ""
+        self._seen[topic] = self._seen.get(topic, 0) + 1
+        is_sure = self._seen[topic] >= (_LOOKS_FOR_NAMES if UNNAMED in publishers else _LOOKS)
+        return many_voices(topic, publishers) if is_sure else ""

@@ -1,0 +1,237 @@
+"""The control with a scanner: by itself, and driving the simulated robot."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from handsteer.config import CollisionMonitorConfig, Config, ControlConfig, RobotConfig
+from handsteer.messages import CMD_VEL, DIAGNOSTICS, HAND_SIGN, SCAN, Header, LaserScan, String
+from handsteer.nodes.control import HandSignControlNode
+from handsteer.nodes.robot import RobotNode
+from handsteer.nodes.scans import scan_message
+from handsteer.nodes.steering import SteeringNode
+from handsteer.robots.protocol import RangeScan
+from handsteer.robots.simulated import SimulatedRobot
+from handsteer.robots.world import World
+from tests.nodes.stepping import Bench
+
+RULE = CollisionMonitorConfig(enabled=True)
+WALL = {"name": "wall", "shape": "box", "size": [0.2, 8, 0.5], "position": [4, 0]}
+
+
+def ahead(metres: float) -> RangeScan:
+    """Return a scan of something this far ahead of the scanner, and nothing else."""
+    ranges = np.full(360, np.inf, np.float32)
+    ranges[180] = metres
+    return RangeScan(-math.pi, math.tau / 360, 0.05, 8.0, ranges)
+
+
+class MonitorBench(Bench):
+    def __init__(self, rule: CollisionMonitorConfig = RULE, control: ControlConfig | None = None) -> None:
+        super().__init__()
+        self.control = HandSignControlNode(
+            self.transport, self.clock, control or ControlConfig(), collision_monitor=rule
+        )
+        self.nodes = [self.control]
+        self.signs = self.transport.advertise("recognition", HAND_SIGN)
+        self.scans = self.transport.advertise("scanner", SCAN)
+        self.twists = self.record(CMD_VEL)
+        self.reports = self.record(DIAGNOSTICS)
+
+    def show(self, sign: str, times: int = 1, scan: RangeScan | None = None, age_s: float = 0.0) -> None:
+        for _ in range(times):
+            if scan is not None:
+                self.scan(scan, age_s)
+            self.signs.publish(String(data=sign), self.clock.now())
+            self.run(1 / 30)
+
+    def scan(self, scan: RangeScan, age_s: float = 0.0) -> None:
+        stamped_s = self.clock.now() - age_s
+        self.scans.publish(scan_message(Header(self.clock.stamp(stamped_s), "base_scan"), scan), stamped_s)
+
+    @property
+    def command(self) -> tuple[float, float]:
+        return self.twists[-1].linear.x, self.twists[-1].angular.z
+
+    def report(self) -> tuple[str, dict[str, str]]:
+        self.run(0.1)
+        status = self.reports[-1].status[0]
+        return status.message, {pair.key: pair.value for pair in status.values}
+
+
+def test_it_is_off_by_default_and_wants_no_scans() -> None:
+    bench = MonitorBench(CollisionMonitorConfig())
+    assert not bench.scans.wanted
+    bench.show("Forward", 3)
+    assert bench.command == (0.03, 0.0)
+
+
+def test_without_scans_the_robot_stands_and_says_why() -> None:
+    bench = MonitorBench()
+    assert bench.scans.wanted
+    bench.show("Forward", 10)
+    assert {(twist.linear.x, twist.angular.z) for twist in bench.twists} == {(0.0, 0.0)}
+    assert bench.report()[0] == "standing: no laser scan has come, so what is in the way is not known"
+
+
+def test_free_of_obstacles_it_changes_nothing() -> None:
+    bench, plain = MonitorBench(), MonitorBench(CollisionMonitorConfig())
+    for each in (bench, plain):
+        each.show("Forward", 20, ahead(7.0))
+        each.show("Turn Left", 20, ahead(7.0))
+    assert bench.twists == plain.twists
+
+
+def test_it_slows_and_says_what_for() -> None:
+    bench = MonitorBench()
+    bench.show("Forward", 60, ahead(0.7))
+    message, values = bench.report()
+    assert 0.1 < bench.command[0] < 0.5
+    assert message == "driving: Forward, slowed: obstacle 0.44 m ahead"
+    assert values["obstacle_m"] == "0.44"
+    bench.show("Forward", 5, ahead(0.4))
+    assert bench.command == (0.0, 0.0)
+    assert bench.report()[0] == "standing: stopped before an obstacle 0.14 m ahead"
+    bench.show("Backward", 5, ahead(0.4))
+    assert bench.command == (pytest.approx(-0.05), 0.0)
+    assert bench.report()[0] == "driving: Backward"
+
+
+def test_speed_does_not_add_up_before_an_obstacle() -> None:
+    bench = MonitorBench()
+    bench.show("Forward", 100, ahead(0.4))
+    bench.show("Forward", 1, ahead(7.0))
+    assert bench.command == (pytest.approx(0.01), 0.0)
+
+
+def test_a_slowed_robot_goes_on_as_slowly_until_it_is_told_to_be_faster() -> None:
+    bench = MonitorBench()
+    bench.show("Forward", 60, ahead(0.7))
+    slow, _ = bench.command
+    bench.show("Go", 5, ahead(7.0))
+    assert bench.command == (pytest.approx(slow, abs=0.01), 0.0)
+
+
+def test_a_scan_that_stops_coming_stops_the_robot() -> None:
+    bench = MonitorBench()
+    bench.show("Forward", 10, ahead(7.0))
+    assert bench.command[0] > 0.0
+    bench.show("Forward", 14)
+    assert bench.command[0] > 0.0
+    bench.show("Forward", 3)
+    assert bench.command == (0.0, 0.0)
+    assert bench.report()[0].startswith("standing: no laser scan has come for 0.")
+
+
+def test_scans_that_come_late_stop_the_robot_and_it_says_so() -> None:
+    bench = MonitorBench()
+    bench.show("Forward", 10, ahead(7.0), age_s=2.0)
+    assert bench.command == (0.0, 0.0)
+    assert bench.report()[0] == "standing: laser scans come 2.1 s after their stamp: are the clocks in step?"
+
+
+def test_scans_that_say_nothing_stop_the_robot(caplog: pytest.LogCaptureFixture) -> None:
+    bench = MonitorBench()
+    nothing = RangeScan(-math.pi, math.tau / 360, 0.05, 8.0, np.full(360, np.nan, np.float32))
+    bench.show("Forward", 10, nothing)
+    assert bench.command == (0.0, 0.0)
+    assert "the laser scans that come say nothing" in bench.report()[0]
+    assert caplog.text.count("laser scans say nothing") == 1
+
+
+def test_it_can_be_turned_on_and_off_while_it_runs() -> None:
+    bench = MonitorBench(CollisionMonitorConfig())
+    bench.control.reconfigure(Config(collision_monitor=RULE))
+    bench.show("Forward", 5)
+    assert bench.command == (0.0, 0.0)
+    bench.control.reconfigure(Config())
+    bench.show("Forward", 5)
+    assert bench.command[0] > 0.0
+
+
+def test_several_robots_are_refused() -> None:
+    with pytest.raises(ValueError, match="it is for one robot"):
+        Config(collision_monitor=RULE, control=ControlConfig(robots=("r1", "r2")))
+
+
+class LateRobot(SimulatedRobot):
+    """Says what it saw one scan ago, as if it were new."""
+
+    _before: RangeScan | None = None
+
+    def scan(self) -> RangeScan:
+        before, self._before = self._before, super().scan()
+        return before or self._before
+
+
+class Drive(MonitorBench):
+    """The control drives a simulated robot in a world, as told by signs or by hand."""
+
+    def __init__(self, *obstacles: dict[str, Any], late: bool = False, **control: Any) -> None:
+        super().__init__(control=ControlConfig.model_validate(control))
+        kind = LateRobot if late else SimulatedRobot
+        robot = kind(RobotConfig(), World.model_validate({"obstacles": obstacles}))
+        self.robot = RobotNode(self.transport, self.clock, robot, RobotConfig())
+        self.steering = SteeringNode(self.transport, self.clock)
+        self.nodes = [self.steering, self.robot, self.control]
+
+    def steer(self, linear_mps: float, angular_radps: float, seconds: float) -> None:
+        self.steering.steer(linear_mps, angular_radps)
+        self.run(seconds)
+
+    @property
+    def gap_m(self) -> float:
+        """How far the robot's front is from the wall."""
+        return 3.9 - self.robot.state.truth.x - 0.26
+
+
+@pytest.mark.parametrize("late", [False, True], ids=["fresh", "a scan late"])
+@pytest.mark.parametrize("linear_mps", [0.1, 0.3, 0.6, 1.0, 1.5, 2.0])
+def test_a_drive_towards_a_wall_ends_before_it_and_can_back_out(linear_mps: float, *, late: bool) -> None:
+    drive = Drive(WALL, late=late, max_linear=2.0)
+    drive.run(0.2)
+    drive.steer(linear_mps, 0.0, 3.0 / linear_mps + 12.0)
+    assert drive.robot.state.collisions == 0
+    assert 0.1 < drive.gap_m < 0.3
+    assert abs(drive.robot.state.linear_mps) < 0.01
+    drive.steer(-0.5, 0.0, 3.0)
+    assert drive.gap_m > 1.2
+
+
+@pytest.mark.parametrize("turn", [1.0, -1.0])
+def test_before_a_wall_it_can_turn_away_and_drive_on(turn: float) -> None:
+    drive = Drive(WALL)
+    drive.steer(1.0, 0.0, 10.0)
+    drive.steer(0.5, turn, 1.6)
+    drive.steer(0.5, 0.0, 3.0)
+    assert drive.robot.state.collisions == 0
+    assert abs(drive.robot.state.truth.y) > 0.8
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_whoever_steers_wildly_touches_nothing(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    posts = [
+        {"name": f"post {n}", "shape": "cylinder", "radius": 0.1, "height": 0.5, "position": [x, y]}
+        for n, (x, y) in enumerate([(1.5, 0.5), (1.5, -0.9), (-1.2, 0.4), (0.2, 1.6), (-0.6, -1.5)])
+    ]
+    drive = Drive(WALL, *posts)
+    drive.run(0.2)
+    for linear_mps, angular_radps, seconds in rng.uniform([-1, -2, 0.2], [1, 2, 2.0], (40, 3)):
+        drive.steer(linear_mps, angular_radps, seconds)
+    assert drive.robot.state.collisions == 0
+    assert drive.robot.path_length_m > 2.0
+
+
+def test_the_message_is_a_whole_laser_scan() -> None:
+    drive = Drive(WALL)
+    scans = drive.record(SCAN)
+    drive.run(1.0)
+    scan = scans[-1]
+    assert isinstance(scan, LaserScan)
+    assert scan.header.frame_id == "base_scan"
+    assert 9 <= len(scans) <= 11
+    assert scan.angle_min + 359 * scan.angle_increment == pytest.approx(scan.angle_max)
+    assert scan.ranges[180] == pytest.approx(3.9, abs=0.01)

@@ -1,0 +1,107 @@
+import logging
+
+import pytest
+
+from handsteer.config import ControlConfig, RobotConfig
+from handsteer.messages import CMD_VEL, DIAGNOSTICS, HAND_SIGN, STOP, Bool, DiagnosticStatus
+from handsteer.nodes.control import HandSignControlNode
+from handsteer.nodes.robot import RobotNode
+from handsteer.robots import open_robot
+from handsteer.robots.simulated import SimulatedRobot
+from tests.nodes.stepping import Bench
+
+SIGNS = "/gesture/hand_sign has 2 publishers (hand_sign_recognition, intruder)"
+COMMANDS = "/robot_diff_drive_controller/cmd_vel has 2 publishers (hand_sign_control, intruder)"
+
+
+class Chain(Bench):
+    """A control and a robot, with one recognition."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.reports = self.record(DIAGNOSTICS)
+        config = RobotConfig(world="empty")
+        self.control = HandSignControlNode(self.transport, self.clock, ControlConfig())
+        self.nodes = [RobotNode(self.transport, self.clock, open_robot(config), config), self.control]
+        self.recognition = self.transport.advertise("hand_sign_recognition", HAND_SIGN)
+
+    def said(self, name: str) -> tuple[DiagnosticStatus, str]:
+        status = [one for report in self.reports for one in report.status if one.name == name][-1]
+        return status, {pair.key: pair.value for pair in status.values}.get("warning", "")
+
+
+@pytest.fixture
+def chain(caplog: pytest.LogCaptureFixture) -> Chain:
+    caplog.set_level(logging.INFO)
+    return Chain()
+
+
+def test_one_voice_a_topic_is_as_it_should_be(chain: Chain, caplog: pytest.LogCaptureFixture) -> None:
+    chain.run(5.0)
+    for name in ("hand_sign_control", "robot"):
+        status, warning = chain.said(name)
+        assert (status.level, warning) == (0, "")
+    assert "publishers" not in caplog.text
+
+
+def test_a_second_publisher_of_signs_is_said_once_and_no_more_when_it_has_gone(
+    chain: Chain, caplog: pytest.LogCaptureFixture
+) -> None:
+    intruder = chain.transport.advertise("intruder", HAND_SIGN)
+    chain.run(5.0)
+    status, warning = chain.said("hand_sign_control")
+    assert status.level == 1
+    assert warning.startswith(SIGNS)
+    assert caplog.text.count(SIGNS) == 1
+    del intruder
+    chain.run(2.0)
+    status, warning = chain.said("hand_sign_control")
+    assert (status.level, warning) == (0, "")
+
+
+def test_a_second_publisher_of_commands_is_said_by_control_and_robot(chain: Chain) -> None:
+    intruder = chain.transport.advertise("intruder", CMD_VEL)
+    chain.run(5.0)
+    for name in ("hand_sign_control", "robot"):
+        status, warning = chain.said(name)
+        assert status.level == 1
+        assert warning.startswith(COMMANDS)
+    assert chain.said("robot")[0].message == "is commanded by more than one node"
+    assert intruder.wanted
+
+
+def test_a_second_control_is_two_voices(chain: Chain) -> None:
+    chain.nodes.append(HandSignControlNode(chain.transport, chain.clock, ControlConfig()))
+    chain.run(5.0)
+    assert "has 2 publishers (hand_sign_control, hand_sign_control)" in chain.said("robot")[1]
+
+
+def test_a_node_that_only_passes_by_is_not_said(chain: Chain, caplog: pytest.LogCaptureFixture) -> None:
+    chain.run(0.5)
+    passing = chain.transport.advertise("passing", HAND_SIGN)
+    chain.run(1.0)
+    del passing
+    chain.run(3.0)
+    assert "publishers" not in caplog.text
+
+
+def test_who_commands_a_real_robot_in_its_own_graph_is_asked_too() -> None:
+    class Real(SimulatedRobot):
+        def commanders(self) -> list[str]:
+            return ["/handsteer", "/teleop"]
+
+    chain = Chain()
+    config = RobotConfig(world="empty")
+    chain.nodes[0] = RobotNode(chain.transport, chain.clock, Real(config), config)
+    chain.run(5.0)
+    assert chain.said("robot")[1].startswith("cmd_vel has 2 publishers (/handsteer, /teleop)")
+
+
+def test_many_may_stop_and_who_could_have_reset_is_logged(chain: Chain, caplog: pytest.LogCaptureFixture) -> None:
+    stops = [chain.transport.advertise(name, STOP) for name in ("page", "phone")]
+    stops[0].publish(Bool(data=True))
+    chain.run(5.0)
+    assert chain.said("hand_sign_control")[1] == ""
+    stops[1].publish(Bool(data=False))
+    chain.run(0.1)
+    assert "stop is reset by false on /stop, which is published by page, phone" in caplog.text

@@ -1,0 +1,72 @@
+"""A robot behind a topic, in a graph of its own that is within this process."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from handsteer.clock import SteppedClock
+from handsteer.config import RobotConfig
+from handsteer.messages import CMD_VEL, Header, LaserScan, Topic, Twist
+from handsteer.robots.remote import RemoteRobot
+from handsteer.transports.in_process import InProcessTransport
+from handsteer.transports.protocol import Publisher
+
+
+class Link:
+    """A session of a graph that has a listener of commands and a scanner."""
+
+    name = "/handsteer"
+    parameters: dict[str, Any] = {}  # noqa: RUF012 - never changed
+
+    def __init__(self) -> None:
+        self.clock = SteppedClock()
+        self.transport = InProcessTransport()
+        self.transport.subscribe("base", Topic("/cmd_vel", Twist, depth=CMD_VEL.depth), lambda _: None)
+        self.scanner: Publisher[LaserScan] = self.transport.advertise("scanner", Topic("/front/scan", LaserScan))
+
+    def scan(self, metres: float) -> None:
+        now = self.clock.now()
+        header = Header(self.clock.stamp(now), "laser")
+        figures = (0.0, 0.0, 0.1, 0.0, 0.1, 0.1, 8.0)
+        message = LaserScan(header, *figures, np.array([metres], np.float32), np.zeros(0, np.float32))
+        self.scanner.publish(message, now)
+
+
+def join(**config: Any) -> tuple[Link, RemoteRobot]:
+    link = Link()
+    settings = RobotConfig.model_validate({"kind": "dds", "scan_topic": "front/scan", **config})
+    return link, RemoteRobot(settings, CMD_VEL, "base_link", link)  # type: ignore[arg-type]
+
+
+def test_its_scanner_is_listened_to_once_somebody_asks() -> None:
+    link, robot = join()
+    assert not link.scanner.wanted
+    assert robot.scan() is None
+    assert link.scanner.wanted
+
+
+def test_each_scan_is_given_once_and_with_its_age() -> None:
+    link, robot = join()
+    robot.scan()
+    link.scan(1.5)
+    link.clock.advance(0.2)
+    scan = robot.scan()
+    assert scan is not None
+    assert scan.ranges.tolist() == [1.5]
+    assert scan.age_s == pytest.approx(0.2)
+    assert robot.scan() is None
+
+
+def test_a_robot_without_a_scanner_has_no_scan() -> None:
+    link, robot = join(scan_topic="")
+    assert robot.scan() is None
+    assert not link.scanner.wanted
+
+
+def test_it_knows_who_else_commands_it() -> None:
+    link, robot = join()
+    assert robot.commanders() == ["robot"]
+    teleop = link.transport.advertise("teleop", Topic("/cmd_vel", Twist, depth=CMD_VEL.depth))
+    assert robot.commanders() == ["robot", "teleop"]
+    assert teleop.wanted
