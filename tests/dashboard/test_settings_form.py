@@ -132,6 +132,8 @@ def test_a_search_finds_names_and_meanings() -> None:
     assert len(found("")) == len(FIELDS)
     assert found("MAX linear") == [
         "control.max_linear",
+        "control.max_linear_acceleration",
+        "control.max_linear_jerk",
         "robot.max_linear",
         "robot.max_linear_acceleration",
     ]
