@@ -26,5 +26,5 @@ class SensorNoise:
             shape = (height + _SHIFTS, width + _SHIFTS, 3)
             self._grain = np.random.default_rng(self._seed).integers(0, 3, shape, dtype=np.uint8)
         top, left = np.random.default_rng(round(time_s * _TICKS_PER_S)).integers(0, _SHIFTS, 2)
-        noise = np.ascontiguousarray(self._grain[top : top + height, left : left + width])
-        return np.asarray(cv2.add(image, noise), np.uint8)
+        grain = self._grain[top : top + height, left : left + width]
+        return np.asarray(cv2.add(image, grain), np.uint8)

@@ -60,8 +60,8 @@ class VirtualHandCamera:
         pose = self._motion.at(self._clock.now() - self._start_s).pose
         skeleton, placement = pose_skeleton(pose.angles), pose.view.placement(self._handedness)
         image = render(skeleton, placement, self._camera, self._look, self._background)
-        captured_s = self._clock.now()
-        return Frame(self._noise.on(image, captured_s), captured_s)
+        noisy = self._noise.on(image, self._clock.now())
+        return Frame(noisy, self._clock.now())
 
     def truth(self, time_s: float) -> Truth:
         """Return what the hand does at ``time_s`` of the clock."""
