@@ -19,6 +19,7 @@ from handsteer.signs.vocabulary import find_sign
 S = TypeVar("S", bound="Section")
 
 RobotKind = Literal["sim", "dds", "zenoh", "ros1"]
+_LONGEST_SHOWN = 200
 _NAMESPACE = re.compile(r"[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)
 
 
@@ -329,7 +330,8 @@ def describe(error: ValidationError) -> str:
     if problem["type"] == "extra_forbidden":
         return f"{field}: there is no such parameter"
     reason = problem["msg"].removeprefix("Input ").removeprefix("Value error, ")
-    return f"{field}: {problem['input']!r} {reason}"
+    given = repr(problem["input"])
+    return f"{field}: {given if len(given) <= _LONGEST_SHOWN else given[:_LONGEST_SHOWN] + '...'} {reason}"
 
 
 def _preset(values: dict[str, Any]) -> dict[str, Any]:
@@ -346,16 +348,9 @@ def _preset(values: dict[str, Any]) -> dict[str, Any]:
 
 def _read_yaml(path: Path) -> dict[str, Any]:
     # Whoever has no file, such as a program that only recognises signs, need not load it.
-    import yaml  # noqa: PLC0415
+    from handsteer import plain_yaml  # noqa: PLC0415
 
-    try:
-        values = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise ConfigError(f"cannot read the configuration {path}: {error.strerror}") from None
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        line = getattr(getattr(error, "problem_mark", None), "line", None)
-        at = f", line {line + 1}" if line is not None else ""
-        raise ConfigError(f"{path}{at}: not valid YAML") from None
+    values = plain_yaml.read(path, str(path), ConfigError, f"cannot read the configuration {path}")
     if values is None:
         return {}
     if not isinstance(values, dict):

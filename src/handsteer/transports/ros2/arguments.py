@@ -10,8 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import yaml
-
+from handsteer import plain_yaml
 from handsteer.errors import TransportError
 from handsteer.transports.ros2.names import Remap
 
@@ -153,22 +152,15 @@ def _parameter(text: str) -> ParameterRule:
     rule = _PARAMETER.fullmatch(source)
     if not (assigned and rule):
         raise TransportError(f"-p {text}: it should be {_VALUES['-p']}")
-    try:
-        parsed = yaml.safe_load(value)
-    except yaml.YAMLError:
-        raise TransportError(f"-p {text}: {value!r} is no YAML value") from None
+    parsed = plain_yaml.parse(value, f"-p {text[:60]}", TransportError)
     node = rule["node"]
     pattern = "/**" if node is None else node if node.startswith("/") else f"/**/{node}"
     return ParameterRule(pattern, dict(_flat("", {rule["name"]: parsed})))
 
 
 def _parameter_file(path: Path) -> list[ParameterRule]:
-    try:
-        content = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise TransportError(f"--params-file {path}: {error.strerror}") from None
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise TransportError(f"--params-file {path}: it is no YAML ({error})") from None
+    source = f"--params-file {path}"
+    content = plain_yaml.read(path, source, TransportError, source)
     rules = list(_file_rules(path, "", content))
     if not rules:
         raise TransportError(f"--params-file {path}: it has no ros__parameters; it should be as {_FILE_EXAMPLE}")
