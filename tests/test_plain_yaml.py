@@ -7,19 +7,11 @@ import pytest
 
 from handsteer import plain_yaml
 from handsteer.errors import ConfigError, WorldError
-
-BOMB = "\n".join(
-    ["a0: &a0 [x, x, x, x, x, x, x, x, x]"]
-    + [f"a{n}: &a{n} [{', '.join([f'*a{n - 1}'] * 9)}]" for n in range(1, 9)]
-    + ["obstacles: *a8"]
-)
-"""517 bytes that stand for 9^9 texts."""
-
-MERGES = "a0: &a0 {x: 1}\n" + "\n".join(f"a{n}: &a{n} {{<<: [{', '.join([f'*a{n - 1}'] * 9)}]}}" for n in range(1, 12))
+from tests.fuzz import corpus
 
 REFUSED = (
-    (BOMB, r"^w\.yaml, line 1: anchors \(&\) and aliases \(\*\) are not read here: write the value out$"),
-    (MERGES, r"line 1: anchors"),
+    (corpus.ALIASES, r"^w\.yaml, line 1: anchors \(&\) and aliases \(\*\) are not read here: write the value out$"),
+    (corpus.MERGES, r"line 1: anchors"),
     ("a: 1\nb: *a", r"line 2: anchors"),
     ("a: 1\n<<: {b: 1}", r"line 2: merge keys \(<<\) are not read here"),
     ("[" * 100_000, "line 1: lists and tables are nested more than 32 deep"),

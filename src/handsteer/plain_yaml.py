@@ -63,7 +63,7 @@ def parse(text: str | bytes, source: str, error: type[HandsteerError]) -> Any:
         if len(text) > LARGEST_BYTES:
             raise _Problem(f"is larger than {LARGEST_BYTES // 1000} kB, which no such file should be")
         _look_through(text)
-        return yaml.load(text, _Loader)  # noqa: S506 - a safe loader
+        return yaml.load(text, _Loader)
     except _Problem as problem:
         reason, line = str(problem), problem.line
     except yaml.YAMLError as problem:
