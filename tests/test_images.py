@@ -124,7 +124,7 @@ def test_jpeg() -> None:
 
 @given(st.binary(max_size=64))
 def test_what_is_no_picture_is_refused(data: bytes) -> None:
-.*picture"):
+    with pytest.raises(FrameError, match=r"a compressed image, format 'jpeg': .* picture"):
         jpeg_picture(CompressedImage(HEADER, "jpeg", np.frombuffer(data, np.uint8)))
 
 
