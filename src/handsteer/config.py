@@ -261,7 +261,19 @@ class DashboardConfig(Section):
         None, description="PEM file with the certificate for https, which browsers want before they give a camera away"
     )
     private_key: Path | None = Field(None, description="PEM file with its key, unless the certificate's file has it")
-    open_browser: bool = Field(True, description="Whether run opens the page in a browser")
+    token: Literal["auto", "always"] = Field(
+        "auto",
+        description="Whether the page needs the token: only where other machines can reach it, or always, as where "
+        "several people are logged in on this machine",
+    )
+    open_browser: bool = Field(
+        True, description="Whether run opens the page in a browser; never with token: always, as commands are public"
+    )
+
+    @property
+    def opens_browser(self) -> bool:
+        """Whether the page is opened in a browser: its command line, with the token, is to be read by everybody."""
+        return self.open_browser and self.token == "auto"
 
 
 class Config(Section):

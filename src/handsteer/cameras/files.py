@@ -51,7 +51,9 @@ class VideoFile:
         width, height = (int(self._capture.get(side)) for side in (cv2.CAP_PROP_FRAME_WIDTH, cv2.CAP_PROP_FRAME_HEIGHT))
         if width * height > MOST_PIXELS:
             self._capture.release()
-            raise CameraUnreadable(f"{path} is a video of {width}x{height}: it should have at most {MOST_PIXELS} pixels")
+            raise CameraUnreadable(
+                f"{path} is a video of {width}x{height}: it should have at most {MOST_PIXELS} pixels"
+            )
         fps = self._capture.get(cv2.CAP_PROP_FPS)
         self.period_s = 1.0 / (fps if 0 < fps <= _HIGHEST_FPS else _DEFAULT_FPS)
         self._next = self._decode()
