@@ -41,7 +41,7 @@ _Loader.yaml_implicit_resolvers = {
 }
 
 
-class _Problem(Exception):
+class _ProblemError(Exception):
     def __init__(self, reason: str, mark: Any = None) -> None:
         super().__init__(reason)
         self.line = getattr(mark, "line", None)
@@ -61,10 +61,10 @@ def parse(text: str | bytes, source: str, error: type[HandsteerError]) -> Any:
     """
     try:
         if len(text) > LARGEST_BYTES:
-            raise _Problem(f"is larger than {LARGEST_BYTES // 1000} kB, which no such file should be")
+            raise _ProblemError(f"is larger than {LARGEST_BYTES // 1000} kB, which no such file should be")
         _look_through(text)
         return yaml.load(text, _Loader)
-    except _Problem as problem:
+    except _ProblemError as problem:
         reason, line = str(problem), problem.line
     except yaml.YAMLError as problem:
         reason, line = "not valid YAML", getattr(getattr(problem, "problem_mark", None), "line", None)
@@ -108,11 +108,11 @@ def _look_through(text: str | bytes) -> None:
     depth = 0
     for count, event in enumerate(_events(text)):
         if count > MOST_VALUES:
-            raise _Problem(f"more than {MOST_VALUES} values", event.start_mark)
+            raise _ProblemError(f"more than {MOST_VALUES} values", event.start_mark)
         if isinstance(event, yaml.CollectionStartEvent):
             depth += 1
             if depth > DEEPEST:
-                raise _Problem(f"lists and tables are nested more than {DEEPEST} deep", event.start_mark)
+                raise _ProblemError(f"lists and tables are nested more than {DEEPEST} deep", event.start_mark)
             if event.tag not in (None, "!", *_COLLECTIONS):
                 raise _unknown_tag(event)
         elif isinstance(event, yaml.ScalarEvent):
@@ -125,7 +125,7 @@ def _events(text: str | bytes) -> Iterator[Any]:
     """Yield what begins and ends in ``text``, and its scalars."""
     for event in yaml.parse(text, _Loader):
         if isinstance(event, yaml.AliasEvent) or getattr(event, "anchor", None) is not None:
-            raise _Problem("anchors (&) and aliases (*) are not read here: write the value out", event.start_mark)
+            raise _ProblemError("anchors (&) and aliases (*) are not read here: write the value out", event.start_mark)
         if isinstance(event, yaml.ScalarEvent | yaml.CollectionStartEvent | yaml.CollectionEndEvent):
             yield event
 
@@ -133,22 +133,22 @@ def _events(text: str | bytes) -> Iterator[Any]:
 def _check_scalar(event: Any) -> None:
     is_plain = event.tag is None and not event.style
     if is_plain and event.value == "<<":
-        raise _Problem("merge keys (<<) are not read here: write the values out", event.start_mark)
-    found = _RESOLVER.resolve(yaml.ScalarNode, event.value, (True, False))
+        raise _ProblemError("merge keys (<<) are not read here: write the values out", event.start_mark)
+    found = _RESOLVER.resolve(yaml.ScalarNode, event.value, (True, False))  # type: ignore[no-untyped-call]
     tag = found if is_plain else event.tag
     if tag in (None, "!"):
         return
     if tag not in _SCALARS:
         raise _unknown_tag(event)
     if tag in _NUMBERS and len(event.value) > LONGEST_NUMBER:
-        raise _Problem(f"a number of {len(event.value)} characters: {LONGEST_NUMBER} are enough", event.start_mark)
+        raise _ProblemError(f"a number of {len(event.value)} characters: {LONGEST_NUMBER} are enough", event.start_mark)
     if tag not in (f"{_TAG}str", found) and not (tag == f"{_TAG}float" and found == f"{_TAG}int"):
         name = tag.removeprefix(_TAG)
-        raise _Problem(f"{_short(event.value)} cannot be read as !!{name}", event.start_mark)
+        raise _ProblemError(f"{_short(event.value)} cannot be read as !!{name}", event.start_mark)
 
 
-def _unknown_tag(event: Any) -> _Problem:
-    return _Problem(f"the tag {_short(event.tag)} is not read here: leave it out", event.start_mark)
+def _unknown_tag(event: Any) -> _ProblemError:
+    return _ProblemError(f"the tag {_short(event.tag)} is not read here: leave it out", event.start_mark)
 
 
 def _short(text: str) -> str:

@@ -5,7 +5,7 @@ served to the same browser, and only in the shape that its script has.
 """
 
 import logging
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Mapping
 from inspect import isawaitable
 from typing import Any, Final
 from urllib.parse import parse_qs
@@ -25,6 +25,7 @@ _REFUSED: Final = "Implicit handshake failed"
 _LONGEST_NAME: Final = 100
 _LONGEST_LOG: Final = 300
 _MOST_ARGUMENTS: Final = 20
+_LEVELS: Final = ("debug", "info", "warning", "error")
 
 
 def _is_name(value: Any) -> bool:
@@ -59,7 +60,6 @@ _SHAPES: Final[dict[str, dict[str, Check]]] = {
     "ack": {"client_id": _is_name, "next_message_id": _is_count},
     "log": {"client_id": _is_name, "level": lambda level: level in _LEVELS, "message": lambda _: True},
 }
-_LEVELS: Final = ("debug", "info", "warning", "error")
 
 
 class SocketEvents:
@@ -88,7 +88,7 @@ class SocketEvents:
         return await self._shake_hands(socket, said, self._server.get_environ(socket) or {})
 
     async def _shake_hands(self, socket: str, said: Any, environ: dict[str, Any]) -> bool:
-        if not _fits(said, _HANDSHAKE) or not _is_of(said["client_id"], environ):
+        if not _fits(said, _HANDSHAKE) or not is_page_of(said["client_id"], environ.get("asgi.scope", {})):
             _note("handshake")
             return False
         if not await self._handlers["handshake"](socket, {name: said[name] for name in (*_HANDSHAKE,)} | _old(said)):
@@ -119,11 +119,11 @@ class SocketEvents:
         return take
 
 
-def _is_of(page: str, environ: dict[str, Any]) -> bool:
-    """Return whether the websocket is of the browser to which ``page`` was served."""
+def is_page_of(page: str, scope: Mapping[str, Any]) -> bool:
+    """Return whether the request of ``scope`` is of the browser to which ``page`` was served."""
     client = Client.instances.get(page)
-    session = environ.get("asgi.scope", {}).get("state", {}).get(SESSION)
-    return bool(client and session) and client.request.scope["state"][SESSION] == session  # type: ignore[union-attr]
+    session = scope.get("state", {}).get(SESSION)
+    return bool(client and session) and client.request.scope["state"].get(SESSION) == session  # type: ignore[union-attr]
 
 
 def _fits(said: Any, shape: dict[str, Check]) -> bool:

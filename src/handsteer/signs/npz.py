@@ -21,6 +21,8 @@ LARGEST_BYTES: Final = 256_000_000
 MOST_ARRAYS: Final = 100
 
 _LONGEST_REASON: Final = 160
+_LAST_CHARACTER: Final = 0x10FFFF
+_SURROGATES: Final = 0xD800 >> 11
 _KINDS: Final = frozenset("biufU")
 
 
@@ -57,15 +59,14 @@ class NpzFormat:
         except OSError as error:
             reason = error.strerror or error
             raise self._missing(f"cannot read the {self.what} {path} ({reason}): {self.remedy}") from None
-        except _Refused as problem:
+        except _RefusedError as problem:
             raise self._corrupt(f"{path}: not a {self.what}: {problem}; {self.remedy}") from None
         except Exception:  # the readers of headers and of packed data raise whatever they stumble on
             raise self._corrupt(f"{path}: not a {self.what}, or damaged; {self.remedy}") from None
         version = arrays.pop("format", None)
         if version is None or version.shape != () or version != self.version:
-            raise self._corrupt(
-                f"{path}: a {self.what} of format {str(version)[:_LONGEST_REASON]} is not known, expected {self.version}; {self.remedy}"
-            )
+            known = f"is not known, expected {self.version}"
+            raise self._corrupt(f"{path}: a {self.what} of format {_in_words(version)} {known}; {self.remedy}")
         return arrays
 
     def damaged(self, path: Path, reason: object) -> HandsteerError:
@@ -89,7 +90,7 @@ class NpzFormat:
             raise
 
 
-class _Refused(Exception):
+class _RefusedError(Exception):
     pass
 
 
@@ -97,10 +98,10 @@ def _check_sizes(file: zipfile.ZipFile) -> None:
     """Look at what the directory of ``file`` says; no more than that is unpacked of any entry."""
     entries = file.infolist()
     if len(entries) > MOST_ARRAYS:
-        raise _Refused(f"it has {len(entries)} arrays")
+        raise _RefusedError(f"it has {len(entries)} arrays")
     size = sum(entry.file_size for entry in entries)
     if size > LARGEST_BYTES:
-        raise _Refused(f"its arrays have {size / 1e6:.0f} MB, and should have at most {LARGEST_BYTES / 1e6:.0f}")
+        raise _RefusedError(f"its arrays have {size / 1e6:.0f} MB, and should have at most {LARGEST_BYTES / 1e6:.0f}")
 
 
 def _array(file: zipfile.ZipFile, entry: zipfile.ZipInfo) -> NDArray[Any]:
@@ -111,9 +112,21 @@ def _array(file: zipfile.ZipFile, entry: zipfile.ZipInfo) -> NDArray[Any]:
         shape, _, kind = read_header(stream)
     # In numbers of Python: a shape may be of more elements than a machine's integer holds.
     if kind.kind not in _KINDS:
-        raise _Refused(f"its array {entry.filename[:60]!r} is neither of numbers nor of text")
+        raise _RefusedError(f"its array {entry.filename[:60]!r} is neither of numbers nor of text")
     if math.prod(shape) * kind.itemsize > entry.file_size:
-        raise _Refused(f"its array {entry.filename[:60]!r} says that it is larger than it is")
+        raise _RefusedError(f"its array {entry.filename[:60]!r} says that it is larger than it is")
     with file.open(entry) as stream:
         array: NDArray[Any] = np.lib.format.read_array(stream, allow_pickle=False)
+    if kind.kind == "U" and not _is_text(array):
+        raise _RefusedError(f"its array {entry.filename[:60]!r} has characters that there are not")
     return array
+
+
+def _is_text(array: NDArray[Any]) -> bool:
+    """Return whether ``array``, of kind U, has characters of Unicode alone; others break Python."""
+    codes = np.frombuffer(array.tobytes(), np.dtype("u4").newbyteorder(array.dtype.byteorder))
+    return not ((codes > _LAST_CHARACTER) | ((codes >> 11) == _SURROGATES)).any()
+
+
+def _in_words(version: NDArray[Any] | None) -> str:
+    return " ".join(str(version).split())[:_LONGEST_REASON]
