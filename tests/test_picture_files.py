@@ -42,13 +42,27 @@ def test_a_torn_picture_is_refused(data: bytes, part: float) -> None:
         (corpus.resized_jpeg(0, 10), "0x10"),
         (PROGRESSIVE.replace(b"\xff\xda", b"\xff\xda" * 40, 1), "of more than 32 scans"),
         (FILES[".png"].replace(b"IDAT", b"acTL", 1), "animated"),
+        (corpus.png(20, 20).replace(b"\x00\x00\x00\x00IEND", b"{{{{{{{{\x00\x00\x00\x00IEND"), "a torn PNG picture"),
         (FILES[".jpg"][:2] + b"\xff\xe0\x00\x02" * 3000 + FILES[".jpg"][2:], "no JPEG picture"),
         (b"GIF89a" + bytes(50), "56 bytes that are no JPEG or PNG picture"),
         (cv2.imencode(".bmp", PHOTO)[1].tobytes(), "no JPEG or PNG"),
         (cv2.imencode(".webp", PHOTO)[1].tobytes(), "no JPEG or PNG"),
         (b"", "0 bytes"),
     ],
-    ids=["png", "jpeg", "two faces", "no width", "scans", "animated", "segments", "gif", "bmp", "webp", "empty"],
+    ids=[
+        "png",
+        "jpeg",
+        "two faces",
+        "no width",
+        "scans",
+        "animated",
+        "long chunk",
+        "segments",
+        "gif",
+        "bmp",
+        "webp",
+        "empty",
+    ],
 )
 def test_what_would_cost_much_is_refused_before_it_is_decoded(
     data: bytes, words: str, monkeypatch: pytest.MonkeyPatch

@@ -22,7 +22,10 @@ _SEGMENTS = frozenset({*_START_OF_FRAME, 0xC4, 0xCC, *range(0xDA, 0xE0), *range(
 # Each makes the decoder go through the whole picture; the finest of progressive files have a dozen.
 _MOST_SCANS = 32
 _MOST_SEGMENTS = 2000
-_IMAGE_HEADER, _PNG_END = b"\x00\x00\x00\rIHDR", b"IEND\xaeB`\x82"
+_IMAGE_HEADER = b"\x00\x00\x00\rIHDR"
+_ANIMATION = frozenset({b"acTL", b"fcTL", b"fdAT"})
+_AROUND_A_CHUNK = 12  # bytes: its length, its name, its checksum
+_MOST_CHUNKS = 50_000
 
 
 class FileSize(NamedTuple):
@@ -101,9 +104,23 @@ def _check_scans(data: bytes, begin: int) -> None:
 def _png_size(data: bytes) -> FileSize:
     """Return what the first chunk says (PNG, third edition, 11.2.1)."""
     begin = len(_PNG) + len(_IMAGE_HEADER)
-    if data[len(_PNG) : begin] != _IMAGE_HEADER or data.find(_PNG_END, begin) < 0:
-        raise FrameError(f"a torn PNG picture: {len(data)} bytes without its header or its end")
-    if data.find(b"acTL", begin, data.find(b"IDAT", begin)) >= 0:
-        raise FrameError("an animated PNG picture, of which there is no size to know")
+    if data[len(_PNG) : begin] != _IMAGE_HEADER:
+        raise FrameError(f"a torn PNG picture: {len(data)} bytes without its header")
+    _check_chunks(data)
     width, height = (int.from_bytes(data[begin + 4 * n : begin + 4 * n + 4], "big") for n in (0, 1))
     return FileSize("PNG", width, height)
+
+
+def _check_chunks(data: bytes) -> None:
+    """Look at each chunk's length: a decoder makes room for what it says, were it gigabytes."""
+    at = len(_PNG)
+    for _ in range(_MOST_CHUNKS):
+        length, name = int.from_bytes(data[at : at + 4], "big"), data[at + 4 : at + 8]
+        if name in _ANIMATION:
+            raise FrameError("an animated PNG picture, of which there is no size to know")
+        at += length + _AROUND_A_CHUNK
+        if at > len(data):
+            break
+        if name == b"IEND":
+            return
+    raise FrameError(f"a torn PNG picture: {len(data)} bytes without its end")

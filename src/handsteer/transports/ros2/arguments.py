@@ -145,7 +145,7 @@ def _remap(text: str) -> Iterator[Remap]:
         return  # the nodes have no services
     name = {"__name": "__node"}.get(name, name.removeprefix("rostopic://"))
     if name.startswith("__") and name not in {"__node", "__ns"}:
-        raise TransportError(f"-r {_shown(text)}: there is no {name}; there are __node and __ns")
+        raise TransportError(f"-r {_shown(text)}: there is no {_shown(name)}; there are __node and __ns")
     if "*" in source or "\\" in target:
         raise TransportError(f"-r {_shown(text)}: ROS 2 has no wildcards in remapping rules")
     yield Remap(name, target.removeprefix("rostopic://"), rule["node"])
