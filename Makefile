@@ -3,15 +3,18 @@
 VENV := .venv
 BIN := $(VENV)/bin
 ARGS ?=
+# Of each fuzzer; `make test` tries 1,000.
+CASES ?= 100000
 # NumPy's threads would wait for one another: the matrices are small, and tests run side by side.
 export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: help run test ros1 test-ros1 ros2 test-ros2 lint unit format lock bench bench-signs signs-model landmark-model models docs screenshots \
+.PHONY: help run test ros1 test-ros1 ros2 test-ros2 lint unit fuzz format lock bench bench-signs signs-model landmark-model models docs screenshots \
 	screenshots-ros1 clean
 
 help:
 	@echo "make run          drive the robot: your webcam, or the virtual hand (options: make run ARGS='--camera 0')"
 	@echo "make test         everything that CI checks: format, lint, types, tests"
+	@echo "make fuzz         try 100,000 damaged or hostile inputs on each reader (fewer: make fuzz CASES=5000)"
 	@echo "make ros1         install ROS 1 from Debian's or Ubuntu's packages, for handsteer ... --transport ros1"
 	@echo "make test-ros1    check what runs on ROS 1"
 	@echo "make ros2         install a ROS 2 for the tests to talk to, beside handsteer (not needed to use it)"
@@ -39,6 +42,9 @@ lint: $(BIN)/.dev
 
 unit: $(BIN)/.dev models
 	@$(BIN)/pytest -n auto --dist loadfile $(ARGS)
+
+fuzz: $(BIN)/.dev models
+	@HANDSTEER_FUZZ_CASES=$(CASES) $(BIN)/pytest -n auto tests/fuzz $(ARGS)
 
 ros1: $(BIN)/.dev
 	@scripts/setup-ros1

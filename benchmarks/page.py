@@ -31,7 +31,7 @@ from playwright.sync_api import Browser, Page, sync_playwright
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # for the relay and the browser that the tests use
 
 from scripts import chromium
-from tests.dashboard.network import Relay, client_of, deaf, deaf_page, drawn, join_query
+from tests.dashboard.network import Relay, client_of, cookies_of, deaf, deaf_page, drawn, join_query
 
 from handsteer.cameras.virtual import VirtualHandCamera
 from handsteer.clock import SteppedClock
@@ -215,7 +215,7 @@ def count_deaf(rounds: int, duration_s: float, camera: str) -> None:
                     for _ in range(4 if with_deaf else 0):
                         stack.enter_context(deaf(page.port, "/camera.mjpg"))
                         with urllib.request.urlopen(page.url) as answer:
-                            stack.enter_context(deaf_page(page.port, answer.read().decode()))
+                            stack.enter_context(deaf_page(page.port, answer.read().decode(), cookies_of(answer)))
                     time.sleep(1.0)
                     measured.append(page.recognise(duration_s))
         grown_mb = resident_mb() - before_mb
@@ -299,7 +299,7 @@ async def read_page(port: int, joined: threading.Semaphore) -> None:
     """Join the page as its own script does, and take what it sends."""
     address = f"http://127.0.0.1:{port}"
     with urllib.request.urlopen(address) as answer:
-        html = answer.read().decode()
+        html, cookies = answer.read().decode(), cookies_of(answer)
     client = client_of(html)
     page = socketio.AsyncClient()
     newest = 0
@@ -311,7 +311,10 @@ async def read_page(port: int, joined: threading.Semaphore) -> None:
 
     page.on("*", take)
     await page.connect(
-        f"{address}?{join_query(client)}", transports=["websocket"], socketio_path="/_nicegui_ws/socket.io"
+        f"{address}?{join_query(client)}",
+        headers={"Cookie": cookies},
+        transports=["websocket"],
+        socketio_path="/_nicegui_ws/socket.io",
     )
     for event in drawn(html):
         await page.emit("event", event)

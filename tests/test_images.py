@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 from handsteer.errors import FrameError
 from handsteer.images import bgr_image, image_message, jpeg_message, jpeg_picture
 from handsteer.messages import CompressedImage, Header, Image, Time
+from tests.fuzz import corpus
 
 HEADER = Header(stamp=Time(1, 2), frame_id="camera")
 BGR = np.random.default_rng(0).integers(0, 255, (48, 64, 3), np.uint8)
@@ -104,7 +105,7 @@ def test_half_a_pair_of_pixels_is_refused() -> None:
 @given(st.integers(0, 300), st.integers(0, 40), st.integers(0, 40), st.integers(0, 200))
 def test_sizes_that_do_not_fit_are_refused(size: int, height: int, width: int, step: int) -> None:
     wrong = Image(HEADER, height, width, "bgr8", 0, step, np.zeros(size, np.uint8))
-    if height and width and step >= 3 * width and size >= step * (height - 1) + 3 * width:
+    if height and width and step >= 3 * width and step * (height - 1) + 3 * width <= size <= step * height:
         assert bgr_image(wrong).shape == (height, width, 3)
     else:
         with pytest.raises(FrameError, match=r"needs a step of at least|has no pixels"):
@@ -123,5 +124,21 @@ def test_jpeg() -> None:
 
 @given(st.binary(max_size=64))
 def test_what_is_no_picture_is_refused(data: bytes) -> None:
-    with pytest.raises(FrameError, match="is no picture"):
+    with pytest.raises(FrameError, match=r"a compressed image, format 'jpeg': .* picture"):
         jpeg_picture(CompressedImage(HEADER, "jpeg", np.frombuffer(data, np.uint8)))
+
+
+def test_a_small_file_of_a_large_picture_is_refused() -> None:
+    data = np.frombuffer(corpus.png(10000, 10000), np.uint8)
+    with pytest.raises(FrameError, match="a PNG picture of 10000x10000"):
+        jpeg_picture(CompressedImage(HEADER, "png", data))
+    with pytest.raises(FrameError, match="a torn JPEG picture"):
+        jpeg_picture(CompressedImage(HEADER, "jpeg", np.frombuffer(corpus.jpeg()[:-9], np.uint8)))
+
+
+def test_a_raw_image_beyond_all_cameras_is_refused() -> None:
+    with pytest.raises(FrameError, match="an image of 8192x4096: it should have at most"):
+        bgr_image(Image(HEADER, 4096, 8192, "mono8", 0, 8192, np.zeros(4096 * 8192, np.uint8)))
+    for height, width in ((-1, 4), (4, -1)):
+        with pytest.raises(FrameError, match="has no pixels"):
+            bgr_image(Image(HEADER, height, width, "mono8", 0, 4, np.zeros(16, np.uint8)))

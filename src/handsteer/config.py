@@ -20,6 +20,7 @@ from handsteer.timeouts import ODOMETRY_S, ROBOT_S, STALE_S
 S = TypeVar("S", bound="Section")
 
 RobotKind = Literal["sim", "dds", "zenoh", "ros1"]
+_LONGEST_SHOWN = 200
 _NAMESPACE = re.compile(r"[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)
 
 
@@ -343,7 +344,19 @@ class DashboardConfig(Section):
         None, description="PEM file with the certificate for https, which browsers want before they give a camera away"
     )
     private_key: Path | None = Field(None, description="PEM file with its key, unless the certificate's file has it")
-    open_browser: bool = Field(True, description="Whether run opens the page in a browser")
+    token: Literal["auto", "always"] = Field(
+        "auto",
+        description="Whether the page needs the token: only where other machines can reach it, or always, as where "
+        "several people are logged in on this machine",
+    )
+    open_browser: bool = Field(
+        True, description="Whether run opens the page in a browser; never with token: always, as commands are public"
+    )
+
+    @property
+    def opens_browser(self) -> bool:
+        """Whether the page is opened in a browser: its command line, with the token, is to be read by everybody."""
+        return self.open_browser and self.token == "auto"
 
 
 class Config(Section):
@@ -419,7 +432,8 @@ def describe(error: ValidationError) -> str:
     if problem["type"] == "extra_forbidden":
         return f"{field}: there is no such parameter"
     reason = problem["msg"].removeprefix("Input ").removeprefix("Value error, ")
-    return f"{field}: {problem['input']!r} {reason}"
+    given = repr(problem["input"])
+    return f"{field}: {given if len(given) <= _LONGEST_SHOWN else given[:_LONGEST_SHOWN] + '...'} {reason}"
 
 
 def _preset(values: dict[str, Any]) -> dict[str, Any]:
@@ -436,16 +450,9 @@ def _preset(values: dict[str, Any]) -> dict[str, Any]:
 
 def _read_yaml(path: Path) -> dict[str, Any]:
     # Whoever has no file, such as a program that only recognises signs, need not load it.
-    import yaml  # noqa: PLC0415
+    from handsteer import plain_yaml  # noqa: PLC0415
 
-    try:
-        values = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise ConfigError(f"cannot read the configuration {path}: {error.strerror}") from None
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        line = getattr(getattr(error, "problem_mark", None), "line", None)
-        at = f", line {line + 1}" if line is not None else ""
-        raise ConfigError(f"{path}{at}: not valid YAML") from None
+    values = plain_yaml.read(path, str(path), ConfigError, f"cannot read the configuration {path}")
     if values is None:
         return {}
     if not isinstance(values, dict):

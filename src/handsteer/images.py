@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from handsteer.errors import FrameError
 from handsteer.messages import CompressedImage, Header, Image
+from handsteer.picture_files import MOST_PIXELS, decode
 
 # Encodings of ROS's sensor_msgs/image_encodings.h: bytes a pixel, and what makes them BGR. ROS 1 names the byte order
 # of yuv422 after OpenCV (UYVY), or yuv422_yuy2; ROS 2 has the names of the byte orders besides.
@@ -43,7 +44,7 @@ def bgr_image(message: Image) -> NDArray[np.uint8]:
     if message.encoding not in _ENCODINGS:
         deep = "16" in message.encoding or "32" in message.encoding or "64" in message.encoding
         why = "has more than 8 bits a channel" if deep else "is not known"
-        raise FrameError(f"image encoding {message.encoding!r} {why}: use one of {', '.join(_ENCODINGS)}")
+        raise FrameError(f"image encoding {message.encoding[:60]!r} {why}: use one of {', '.join(_ENCODINGS)}")
     pixel_bytes, to_bgr = _ENCODINGS[message.encoding]
     picture = _pixels(message, pixel_bytes)
     if to_bgr is None:
@@ -57,10 +58,12 @@ def _pixels(message: Image, pixel_bytes: int) -> NDArray[np.uint8]:
     """Return a view of ``message`` as (height, width, pixel_bytes), the padding at the end of each row left out."""
     height, width, step = message.height, message.width, message.step
     row = width * pixel_bytes
-    if not (height and width):
+    if not (height > 0 and width > 0):
         raise FrameError(f"an image of {width}x{height} has no pixels")
+    if height * width > MOST_PIXELS:
+        raise FrameError(f"an image of {width}x{height}: it should have at most {MOST_PIXELS} pixels")
     # The last row needs no padding after it.
-    if step < row or message.data.size < step * (height - 1) + row:
+    if step < row or not step * (height - 1) + row <= message.data.size <= step * height:
         raise FrameError(
             f"a {width}x{height} {message.encoding} image needs a step of at least {row} and step x {height} bytes, "
             f"got a step of {step} and {message.data.size} bytes"
@@ -75,15 +78,15 @@ def jpeg_message(bgr: NDArray[np.uint8], header: Header, quality: int = 80) -> C
 
 
 def jpeg_picture(message: CompressedImage) -> NDArray[np.uint8]:
-    """Return the picture of ``message`` as (height, width, 3) uint8, BGR; any format that OpenCV reads.
+    """Return the picture of ``message``, a JPEG or PNG file, as (height, width, 3) uint8, BGR.
 
     Raises:
-        FrameError: The data is not a picture.
+        FrameError: The data is no such picture, is torn, or has more than :data:`MOST_PIXELS`.
     """
-    picture = cv2.imdecode(message.data, cv2.IMREAD_COLOR) if message.data.size else None
-    if picture is None:
-        raise FrameError(f"a compressed image of {message.data.size} bytes, format {message.format!r}, is no picture")
-    return np.asarray(picture, np.uint8)
+    try:
+        return decode(message.data.tobytes())
+    except FrameError as error:
+        raise FrameError(f"a compressed image, format {message.format[:60]!r}: {error}") from None
 
 
 def encode_jpeg(bgr: NDArray[np.uint8], quality: int = 80) -> NDArray[np.uint8]:

@@ -1,27 +1,22 @@
 import struct
 
-import cv2
-import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from handsteer.cameras.browser import LARGEST_BYTES, BrowserCamera, ChoiceOfCameras, NoCamera, jpeg_size
+from handsteer.cameras.browser import LARGEST_BYTES, BrowserCamera, ChoiceOfCameras, NoCamera
 from handsteer.cameras.protocol import Camera, Frame
 from handsteer.cameras.virtual import VirtualHandCamera
 from handsteer.clock import SteppedClock
 from handsteer.config import VirtualHandConfig
 from handsteer.errors import FrameError
 from tests.contracts.camera_contract import CameraContract
-
-
-def jpeg(width: int = 32, height: int = 24, value: int = 90) -> bytes:
-    return cv2.imencode(".jpg", np.full((height, width, 3), value, np.uint8))[1].tobytes()
+from tests.fuzz import corpus
 
 
 def sent(at_s: float, **picture: int) -> bytes:
     """Return a frame as a browser sends it, whose clock says ``at_s``."""
-    return struct.pack("<d", 1000 * at_s) + jpeg(**picture)
+    return struct.pack("<d", 1000 * at_s) + corpus.jpeg(**picture)
 
 
 class Sending:
@@ -127,20 +122,17 @@ def test_a_device_is_closed_while_the_browser_is_chosen_so_that_it_keeps_no_old_
     [
         (b"", "a frame of 0 bytes"),
         (bytes(LARGEST_BYTES + 1), "at most 1000000"),
-        (struct.pack("<d", float("nan")) + jpeg(), "without the time"),
+        (struct.pack("<d", float("nan")) + corpus.jpeg(), "without the time"),
         (struct.pack("<d", 1.0) + b"GIF89a", "no JPEG"),
+        (struct.pack("<d", 1.0) + corpus.png(64, 48), "no JPEG"),
+        (sent(0.0)[:-20], "a torn JPEG picture"),
         (sent(0.0, width=4000, height=3000), "4000x3000: it should have at most 1920x1080"),
     ],
-    ids=["empty", "large", "timeless", "gif", "huge"],
+    ids=["empty", "large", "timeless", "gif", "png", "torn", "huge"],
 )
 def test_what_is_no_frame_is_refused(data: bytes, message: str) -> None:
     with pytest.raises(FrameError, match=message):
         BrowserCamera(SteppedClock(0.0)).offer(data)
-
-
-@given(width=st.integers(1, 300), height=st.integers(1, 300))
-def test_the_size_of_a_jpeg_file_is_read_from_its_head(width: int, height: int) -> None:
-    assert jpeg_size(jpeg(width, height)) == (width, height)
 
 
 @given(st.binary(max_size=200).map(lambda rest: b"\xff\xd8\xff" + rest))

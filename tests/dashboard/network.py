@@ -95,12 +95,24 @@ def deaf(port: int, path: str, headers: str = "") -> socket.socket:
     return connection
 
 
-def deaf_page(port: int, html: str) -> socket.socket:
-    """Return the websocket of the page ``html`` that was served on ``port``: it joins the page, and reads nothing."""
+def cookies_of(answer: Any) -> str:
+    """Return the cookies that ``answer``, of the server, gives to a browser, as it sends them back."""
+    return "; ".join(cookie.partition(";")[0] for cookie in answer.headers.get_all("Set-Cookie", []))
+
+
+def deaf_page(port: int, html: str, cookies: str) -> socket.socket:
+    """Return the websocket of a page that was served on ``port``: it joins the page, and reads nothing.
+
+    Args:
+        port: Where it was served.
+        html: What was served.
+        cookies: Those that came with it.
+    """
     client = client_of(html)
     query = f"EIO=4&transport=websocket&{join_query(client)}"
     key = base64.b64encode(os.urandom(16)).decode()
     upgrade = f"Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Key: {key}\r\nSec-WebSocket-Version: 13\r\n"
+    upgrade += f"Cookie: {cookies}\r\n"
     connection = deaf(port, f"/_nicegui_ws/socket.io/?{query}", upgrade)
     connection.settimeout(20.0)
     assert connection.recv(12) == b"HTTP/1.1 101"

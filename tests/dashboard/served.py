@@ -15,6 +15,7 @@ from handsteer.images import image_message
 from handsteer.messages import DIAGNOSTICS, IMAGE_ANNOTATED, Header
 from handsteer.nodes.steering import SteeringNode
 from handsteer.transports.in_process import InProcessTransport
+from tests.dashboard.network import cookies_of
 
 PATIENCE_S = 20.0
 
@@ -45,6 +46,11 @@ class Site:
         connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=PATIENCE_S)
         connection.request("GET", path, headers=headers)
         return connection.getresponse()
+
+    def page(self, path: str = "/") -> tuple[str, str]:
+        """Return a page, and the cookies that came with it."""
+        answer = self.get(path)
+        return answer.read().decode(), cookies_of(answer)
 
     def close(self) -> None:
         self.dashboard.stop()

@@ -1,5 +1,6 @@
 import asyncio
 import http.client
+import socket
 import ssl
 import subprocess
 from collections.abc import Iterator
@@ -11,8 +12,10 @@ import websockets
 from hypothesis import given
 from hypothesis import strategies as st
 
+from handsteer.config import DashboardConfig
 from handsteer.dashboard.access import Access, is_loopback
 from handsteer.errors import DashboardError
+from tests.dashboard.network import cookies_of
 from tests.dashboard.served import PATIENCE_S, Site
 
 PLACES = (
@@ -69,7 +72,14 @@ def test_pages_of_other_sites_are_kept_out(site: Site) -> None:
         assert site.get(path, Origin="https://evil.example").status == 403
         assert site.get(path, Origin="null").status == 403
         assert site.get(path, **{"Sec-Fetch-Site": "cross-site", "Sec-Fetch-Mode": "no-cors"}).status == 403
-    assert site.get("/", **{"Sec-Fetch-Site": "cross-site", "Sec-Fetch-Mode": "navigate"}).status == 200
+        # Another port of this machine is of the same site, and another's.
+        assert site.get(path, **{"Sec-Fetch-Site": "same-site", "Sec-Fetch-Mode": "no-cors"}).status == 403
+        for frame in ("iframe", "frame", "embed", "object"):
+            for place in ("cross-site", "same-site", "same-origin"):
+                framed = {"Sec-Fetch-Site": place, "Sec-Fetch-Mode": "navigate", "Sec-Fetch-Dest": frame}
+                assert site.get(path, **framed).status == 403
+    link = {"Sec-Fetch-Site": "cross-site", "Sec-Fetch-Mode": "navigate", "Sec-Fetch-Dest": "document"}
+    assert site.get("/", **link).status == 200
     assert site.get("/", Host=host, Origin=f"http://{host}").status == 200
     assert status_of_websocket(site, Origin="https://evil.example") == 403
     assert status_of_websocket(site, Origin=f"http://{host}") == 101
@@ -100,6 +110,82 @@ def test_the_printed_address_lets_a_browser_in_and_hides_its_token(open_site: Si
     assert open_site.get("/", Cookie=pair).status == 200
     assert status_of_websocket(open_site, Cookie=pair) == 101
     assert status_of_websocket(open_site, Cookie=pair, Origin="https://evil.example") == 403
+
+
+def test_what_follows_the_token_is_a_place_of_this_server(open_site: Site) -> None:
+    for path in ("//evil.example/", "///evil.example/", "/%2Fevil.example/", "/\\evil.example"):
+        response = open_site.get(f"{path}?token={token_of(open_site)}&a=b")
+        assert response.status == 303
+        place = response.headers["Location"]
+        assert place.startswith("/")
+        assert not place.startswith(("//", "/\\"))
+        assert place.endswith("?a=b")
+
+
+def test_the_token_is_in_no_log(open_site: Site, caplog: pytest.LogCaptureFixture) -> None:
+    token = token_of(open_site)
+    bearer = {"Authorization": f"Bearer {token}"}
+    for path in (f"/no/such/page?token={token}", f"/no/such/page?a=b&token={token}", f"/?x[]=1&%74oken={token}"):
+        open_site.get(path, **bearer).read()
+    assert token not in caplog.text
+    assert "/no/such/page" in caplog.text
+
+
+@pytest.mark.parametrize("host", ["127.0.0.1", "0.0.0.0"])
+def test_every_answer_keeps_itself_out_of_frames_and_says_nothing_of_the_server(host: str) -> None:
+    site = Site(host=host)
+    try:
+        for path in (*PLACES, "/no/such/page", "/assets/none.js", "/_nicegui_ws/socket.io/?EIO=9"):
+            for headers in ({}, {"Origin": "https://evil.example"}, {"Host": "evil.example"}):
+                response = site.get(path, **headers)
+                check_headers(response)
+                response.close()
+        with socket.create_connection(("127.0.0.1", site.port), timeout=PATIENCE_S) as connection:
+            connection.sendall(b"NONSENSE\r\n\r\n")
+            response = http.client.HTTPResponse(connection)
+            response.begin()
+            assert response.status == 400
+            check_headers(response)
+    finally:
+        site.close()
+
+
+def check_headers(response: http.client.HTTPResponse) -> None:
+    policy = response.headers["Content-Security-Policy"]
+    assert "frame-ancestors 'none'" in policy
+    assert "default-src 'none'" in policy
+    assert response.headers["X-Frame-Options"] == "DENY"
+    assert response.headers["X-Content-Type-Options"] == "nosniff"
+    assert response.headers["Referrer-Policy"] == "no-referrer"
+    assert "Server" not in response.headers
+
+
+def test_each_browser_has_a_session_that_nobody_else_can_make(site: Site) -> None:
+    first, second = (cookies_of(site.get("/")) for _ in range(2))
+    assert first != second
+    assert cookies_of(site.get("/", Cookie=first)) == ""
+    tampered = first[:-1] + ("0" if first[-1] != "0" else "1")
+    for cookie in (
+        tampered,
+        f"handsteer_{site.port}_session=\xe9.x",
+        f"handsteer_{site.port}_session={'a' * 5000}",
+        ";=;",
+    ):
+        assert cookies_of(site.get("/", Cookie=cookie)) not in ("", first)
+
+
+def test_the_token_is_wanted_on_this_machine_too_where_that_is_set() -> None:
+    site = Site(token="always")
+    try:
+        assert site.url.startswith("http://127.0.0.1:")
+        assert site.get("/").status == 401
+        assert site.get("/", Host="evil.example").status == 400
+        assert site.get(f"/?token={token_of(site)}").status == 303
+        assert site.get("/", Authorization=f"Bearer {token_of(site)}").status == 200
+        assert not DashboardConfig(token="always").opens_browser
+        assert DashboardConfig().opens_browser
+    finally:
+        site.close()
 
 
 def test_https_with_a_certificate_of_ones_own(tmp_path: Path) -> None:

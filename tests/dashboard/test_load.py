@@ -42,7 +42,7 @@ def test_no_viewer_is_sent_more_than_it_should_be(site: Site) -> None:
 @pytest.mark.slow
 def test_viewers_who_never_read_hold_up_nobody_and_are_let_go(site: Site) -> None:
     deaf_ones = [deaf(site.port, "/camera.mjpg") for _ in range(3)]
-    deaf_ones += [page := deaf_page(site.port, site.get("/").read().decode())]
+    deaf_ones += [page := deaf_page(site.port, *site.page())]
     try:
         wait_until(lambda: site.reports.wanted)  # the page has been joined
         with viewer(site) as response:
@@ -60,8 +60,8 @@ def test_viewers_who_never_read_hold_up_nobody_and_are_let_go(site: Site) -> Non
 
 @pytest.mark.slow
 def test_a_page_that_acknowledges_nothing_is_sent_nothing_more_until_it_does(site: Site) -> None:
-    html = site.get("/").read().decode()
-    with deaf_page(site.port, html) as page:
+    html, cookies = site.page()
+    with deaf_page(site.port, html, cookies) as page:
         page.settimeout(1.5)
         beats = itertools.count()
 

@@ -127,3 +127,45 @@ def test_a_browser_without_a_webcam_says_so(url: str) -> None:
         page.get_by_text("Use this device's camera").click()
         wait_for_words(page, ".camera .trouble", "this device has no camera")
         browser.close()
+
+
+STILL_CAMERA = """
+  delete HTMLVideoElement.prototype.requestVideoFrameCallback;
+  const canvas = Object.assign(document.createElement("canvas"), { width: 64, height: 48 });
+  canvas.getContext("2d").fillRect(0, 0, 64, 48);
+  const stream = canvas.captureStream(0);
+  navigator.mediaDevices.getUserMedia = async () => stream;
+  window.takePicture = (colour) => {
+    const paint = canvas.getContext("2d");
+    paint.fillStyle = colour;
+    paint.fillRect(0, 0, 64, 48);
+    stream.getTracks()[0].requestFrame();
+  };
+  window.sent = 0;
+  const post = Worker.prototype.postMessage;
+  Worker.prototype.postMessage = function (message, ...rest) {
+    if (message.picture) window.sent++;
+    return post.call(this, message, ...rest);
+  };
+"""
+
+
+def test_a_browser_that_does_not_tell_of_new_pictures_sends_each_once_too(url: str) -> None:
+    with sync_playwright() as playwright:
+        browser = chromium.launch(playwright)
+        page = browser.new_page(viewport=WINDOW)
+        page.set_default_timeout(PATIENCE_MS)
+        page.add_init_script(STILL_CAMERA)
+        page.goto(url)
+        page.get_by_text("Use this device's camera").wait_for()
+        page.evaluate("setInterval(() => window.sent || takePicture('red'), 100)")  # until it is listened to
+        page.get_by_text("Use this device's camera").click()
+        page.wait_for_function("window.sent > 0")
+        page.wait_for_timeout(500)  # what was painted meanwhile has come
+        for colour in ("green", "blue"):
+            before = page.evaluate("window.sent")
+            page.wait_for_timeout(1000)  # thirty times as long as a picture takes
+            assert page.evaluate("window.sent") == before
+            page.evaluate("takePicture", colour)
+            page.wait_for_function("before => window.sent === before + 1", arg=before)
+        browser.close()

@@ -1,4 +1,7 @@
+import re
 import threading
+
+import pytest
 
 from handsteer.clock import RealClock, SteppedClock
 from handsteer.config import Config
@@ -134,3 +137,39 @@ def test_a_configuration_that_fails_is_counted_and_the_node_goes_on() -> None:
     assert node.spin_once()
     assert node.callback_errors == 1
     assert not node.spin_once()
+
+
+def test_what_fails_again_and_again_is_said_once_with_its_traceback_and_then_counted(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    clock, transport, topic = SteppedClock(), InProcessTransport(), Topic("/number", int)
+    node = Node("node", transport, clock)
+    publisher = transport.advertise("other", topic)
+
+    def fail(received: Received[int]) -> None:
+        raise ValueError("odd" * 1000)
+
+    node.subscribe(topic, fail)
+    for number in range(900):
+        publisher.publish(number)
+        node.spin_once()
+        clock.advance(1 / 30)
+    assert node.callback_errors == 900
+    assert [record.exc_info is not None for record in caplog.records] == [True, False, False]
+    assert re.match(r"node: callback of /number has failed 60\d times: odd", caplog.records[-1].getMessage())
+    assert len(caplog.records[-1].getMessage()) < 300
+
+
+def test_another_failure_is_said_at_once(caplog: pytest.LogCaptureFixture) -> None:
+    transport, topic = InProcessTransport(), Topic("/number", int)
+    node = Node("node", transport, SteppedClock())
+    publisher = transport.advertise("other", topic)
+
+    def fail(received: Received[int]) -> None:
+        raise (ValueError if received.message else KeyError)(received.message)
+
+    node.subscribe(topic, fail)
+    for number in (0, 1, 1, 0):
+        publisher.publish(number)
+        node.spin_once()
+    assert [record.exc_info and record.exc_info[0] for record in caplog.records] == [KeyError, ValueError]

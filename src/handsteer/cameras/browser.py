@@ -6,12 +6,10 @@ import threading
 import time
 from typing import Literal
 
-import cv2
-import numpy as np
-
 from handsteer.cameras.protocol import Camera, Frame
 from handsteer.clock import Clock
 from handsteer.errors import FrameError
+from handsteer.picture_files import decode, size_of
 
 Source = Literal["own", "browser"]
 
@@ -23,7 +21,6 @@ _HEADER = struct.Struct("<d")
 _WAIT_S = 0.2
 # How much later the quickest frame is taken to have been, in seconds a second: clocks of two machines drift apart.
 _LEAK = 0.001
-_START_OF_FRAME = frozenset({*range(0xC0, 0xC4), *range(0xC5, 0xC8), *range(0xC9, 0xCC), *range(0xCD, 0xD0)})
 
 
 class BrowserCamera:
@@ -78,8 +75,10 @@ class BrowserCamera:
             newest, self._newest = self._newest, None
         if newest is None:
             return None
-        image = cv2.imdecode(np.frombuffer(newest[0], np.uint8), cv2.IMREAD_COLOR)
-        return None if image is None else Frame(np.asarray(image, np.uint8), newest[1])
+        try:
+            return Frame(decode(newest[0], _MOST_PIXELS), newest[1])
+        except FrameError:  # damaged within
+            return None
 
 
 class NoCamera:
@@ -167,23 +166,9 @@ def _check(data: bytes) -> float:
     (sent_ms,) = _HEADER.unpack_from(data)
     if not math.isfinite(sent_ms):
         raise FrameError("a frame without the time of its capture")
-    width, height = jpeg_size(data[HEADER_BYTES:])
+    kind, width, height = size_of(data[HEADER_BYTES:])
+    if kind != "JPEG":
+        raise FrameError("a frame that is no JPEG picture")
     if not 0 < width * height <= _MOST_PIXELS:
         raise FrameError(f"a frame of {width}x{height}: it should have at most 1920x1080 pixels")
     return float(sent_ms) / 1000
-
-
-def jpeg_size(data: bytes) -> tuple[int, int]:
-    """Return width and height of a JPEG file in pixels, without decoding it (ITU-T T.81, annex B).
-
-    Raises:
-        FrameError: It is none.
-    """
-    at = 2
-    while data[:2] == b"\xff\xd8" and at + 9 <= len(data) and data[at] == 0xFF:
-        marker, length = data[at + 1], int.from_bytes(data[at + 2 : at + 4], "big")
-        if marker in _START_OF_FRAME:
-            height, width = (int.from_bytes(data[at + 5 + 2 * n : at + 7 + 2 * n], "big") for n in (0, 1))
-            return width, height
-        at += 2 + length
-    raise FrameError("a frame that is no JPEG picture")

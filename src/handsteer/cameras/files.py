@@ -11,10 +11,15 @@ from numpy.typing import NDArray
 from handsteer.cameras.noise import SensorNoise
 from handsteer.cameras.protocol import EndOfStream, Frame
 from handsteer.clock import Clock, SteppedClock
-from handsteer.errors import CameraNotFound, CameraUnreadable
+from handsteer.errors import CameraNotFound, CameraUnreadable, FrameError
+from handsteer.picture_files import MOST_PIXELS, decode
 
 AtEnd = Literal["loop", "hold", "end"]
-PHOTO_SUFFIXES = frozenset({".jpg", ".jpeg", ".png", ".bmp", ".webp", ".tif", ".tiff"})
+PHOTO_SUFFIXES = frozenset({".jpg", ".jpeg", ".png"})
+
+LARGEST_PHOTO_BYTES = 100_000_000
+MOST_PHOTO_PIXELS = 8192 * 8192
+"""A photo of a phone with 50 megapixels may be larger than any camera's frame."""
 
 _DEFAULT_FPS = 30.0
 _HIGHEST_FPS = 240.0
@@ -46,6 +51,12 @@ class VideoFile:
         if not path.is_file():
             raise CameraNotFound(f"there is no video file {path}")
         self._capture = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG)
+        width, height = (int(self._capture.get(side)) for side in (cv2.CAP_PROP_FRAME_WIDTH, cv2.CAP_PROP_FRAME_HEIGHT))
+        if width * height > MOST_PIXELS:
+            self._capture.release()
+            raise CameraUnreadable(
+                f"{path} is a video of {width}x{height}: it should have at most {MOST_PIXELS} pixels"
+            )
         fps = self._capture.get(cv2.CAP_PROP_FPS)
         self.period_s = 1.0 / (fps if 0 < fps <= _HIGHEST_FPS else _DEFAULT_FPS)
         self._next = self._decode()
@@ -178,12 +189,18 @@ def read_photo(path: Path) -> NDArray[np.uint8]:
     """Return a photo as (height, width, 3) uint8, BGR.
 
     Raises:
-        CameraUnreadable: The file cannot be decoded.
+        CameraUnreadable: The file cannot be read or decoded, is torn, or has more than :data:`MOST_PHOTO_PIXELS`.
     """
     try:
-        image = cv2.imread(str(path), cv2.IMREAD_COLOR)
-    except cv2.error:  # a picture beyond OpenCV's limit of pixels
-        image = None
-    if image is None:
-        raise CameraUnreadable(f"{path} is not a photo that can be decoded: try a jpg or png file")
-    return np.asarray(image, np.uint8)
+        with path.open("rb") as file:
+            data = file.read(LARGEST_PHOTO_BYTES + 1)
+    except OSError as error:
+        raise CameraUnreadable(f"cannot read the photo {path}: {error.strerror}") from None
+    if len(data) > LARGEST_PHOTO_BYTES:
+        raise CameraUnreadable(f"{path}: a photo should have at most {LARGEST_PHOTO_BYTES // 1_000_000} MB")
+    try:
+        return decode(data, MOST_PHOTO_PIXELS)
+    except FrameError as error:
+        raise CameraUnreadable(
+            f"{path} is not a photo that can be decoded ({error}): try another jpg or png file"
+        ) from None

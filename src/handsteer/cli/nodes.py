@@ -157,7 +157,7 @@ def _served(node: SteeringNode, config: Config) -> Iterator[None]:
     url = dashboard.start()
     try:
         say(f"the page is at {url}")
-        if config.dashboard.open_browser:
+        if config.dashboard.opens_browser:
             webbrowser.open(url)
         yield
     finally:

@@ -147,7 +147,7 @@ def _run_until_end(graph: Graph, duration: float | None, file: Path | None, *, h
     try:
         graph.start()
         say(f"the page is at {url}; Ctrl-C ends")
-        if graph.config.dashboard.open_browser:
+        if graph.config.dashboard.opens_browser:
             webbrowser.open(url)
         graph.wait(duration)
     finally:

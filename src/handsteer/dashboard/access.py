@@ -1,23 +1,33 @@
-"""Who may use the page: everybody on this machine, and elsewhere whoever has the token.
+"""Who may use the page: everybody on this machine, and elsewhere, or if so wished here too, whoever has the token.
 
 A page of another site that a browser on this machine shows is kept out, whatever it asks for: by the ``Origin`` and
-``Sec-Fetch-Site`` headers, which it cannot forge, and by the name that it has for this machine (DNS rebinding).
+``Sec-Fetch-`` headers, which it cannot forge, and by the name that it has for this machine (DNS rebinding). It cannot
+show this one in a frame either.
 """
 
 import hmac
 import ipaddress
 import secrets
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from http.cookies import CookieError, SimpleCookie
+from typing import Literal
 from urllib.parse import parse_qsl, urlencode, urlsplit
 
-from starlette.datastructures import Headers, State
+from starlette.datastructures import Headers, MutableHeaders, State
 from starlette.responses import PlainTextResponse, RedirectResponse, Response
-from starlette.types import ASGIApp, Receive, Scope, Send
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from handsteer.dashboard.doors import Doors
+from handsteer.dashboard.sessions import Sessions
 
 _TOKEN_BYTES = 24
 _LOOPBACK_NAMES = frozenset({"127.0.0.1", "localhost", "::1"})
 _KINDS = frozenset({"http", "websocket"})
+_FRAMES = frozenset({"iframe", "frame", "fencedframe", "embed", "object"})
+_LONGEST_COOKIES = 8192
+
+SESSION = "handsteer_session"
+"""Where the session of a request is in the ``state`` of its scope."""
 
 
 @dataclass(frozen=True)
@@ -26,15 +36,26 @@ class Access:
 
     Attributes:
         token: Has to be in the address, in the cookie that follows from it, or in an ``Authorization`` header; None
-            when the page is served to this machine only, which needs none.
+            when the page is served to this machine only, and needs none.
+        is_local: Whether the page is served to this machine only.
+        sessions: Tells browsers apart.
     """
 
     token: str | None = None
+    is_local: bool = True
+    sessions: Sessions = field(default_factory=Sessions)
 
     @classmethod
-    def to(cls, host: str) -> "Access":
-        """Return what is needed where the page is served on ``host``: a fresh token, unless only we can reach it."""
-        return cls(None if is_loopback(host) else secrets.token_urlsafe(_TOKEN_BYTES))
+    def to(cls, host: str, token: Literal["auto", "always"] = "auto") -> "Access":
+        """Return what is needed where the page is served on ``host``.
+
+        Args:
+            host: A name or an address.
+            token: Whether there is a fresh token unless only this machine can reach the page, or always.
+        """
+        is_local = is_loopback(host)
+        is_free = is_local and token == "auto"
+        return cls(None if is_free else secrets.token_urlsafe(_TOKEN_BYTES), is_local)
 
     def admits(self, given: str | None) -> bool:
         """Return whether ``given`` is the token; takes as long for a wrong one as for the right one."""
@@ -44,9 +65,11 @@ class Access:
 class AccessMiddleware:
     """Answers those who may not come in: 400 and 403 to pages of other sites, 401 to those without the token.
 
+    Gives a session to who comes in without one.
+
     Args:
         app: What the others get.
-        state: Has the :class:`Access` that holds now, as ``access``.
+        state: Has the :class:`Access` that holds now, as ``access``, and the :class:`Doors`, as ``doors``.
     """
 
     def __init__(self, app: ASGIApp, state: State) -> None:
@@ -55,13 +78,24 @@ class AccessMiddleware:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Pass the request on, or answer it."""
-        answer = _answer(self._state.access, scope) if scope["type"] in _KINDS else None
-        if answer is None:
+        if scope["type"] not in _KINDS:
             await self._app(scope, receive, send)
-        elif scope["type"] == "http" or "websocket.http.response" in scope.get("extensions", {}):
-            await answer(scope, receive, send)
-        else:
-            await send({"type": "websocket.close", "code": 1008})
+            return
+        access: Access = self._state.access
+        doors: Doors = self._state.doors
+        answer = _answer(access, scope)
+        session = _cookie(Headers(scope=scope), session_cookie_name(scope))
+        is_known = answer is None and access.sessions.knows(session)
+        with doors.serving(scope.get("client"), is_known=is_known):
+            if answer is not None:
+                await _refuse(answer, scope, receive, send)
+                return
+            _drop_token(scope)
+            if not is_known and scope["type"] == "http":
+                session = access.sessions.new()
+                send = _with_session(send, scope, session)
+            scope.setdefault("state", {})[SESSION] = session if session and access.sessions.knows(session) else ""
+            await self._app(scope, receive, send)
 
 
 def is_loopback(host: str) -> bool:
@@ -72,11 +106,18 @@ def is_loopback(host: str) -> bool:
         return host == "localhost"
 
 
+async def _refuse(answer: Response, scope: Scope, receive: Receive, send: Send) -> None:
+    if scope["type"] == "http" or "websocket.http.response" in scope.get("extensions", {}):
+        await answer(scope, receive, send)
+    else:
+        await send({"type": "websocket.close", "code": 1008})
+
+
 def _answer(access: Access, scope: Scope) -> Response | None:
     headers = Headers(scope=scope)
-    if access.token is None and _name(headers.get("host", "")) not in _LOOPBACK_NAMES:
+    if access.is_local and _name(headers.get("host", "")) not in _LOOPBACK_NAMES:
         return PlainTextResponse("this page is served to this machine only", 400)
-    if _is_of_another_site(headers, scope):
+    if _is_of_another_site(headers):
         return PlainTextResponse("pages of other sites may not use this one", 403)
     return None if access.token is None else _ask_for_token(access, scope, headers)
 
@@ -96,10 +137,33 @@ def _ask_for_token(access: Access, scope: Scope, headers: Headers) -> Response |
         return None
     # The token leaves the address, which stands in the browser's history and over its user's shoulder.
     rest = f"?{urlencode(query)}" if query else ""
-    answer = RedirectResponse(f"{scope['path']}{rest}", 303)
+    # One slash: behind two, a browser takes what follows for another site.
+    answer = RedirectResponse(f"/{scope['path'].lstrip('/')}{rest}", 303)
     is_secure = scope.get("scheme") == "https"
     answer.set_cookie(cookie, access.token or "", httponly=True, samesite="lax", secure=is_secure)
     return answer
+
+
+def _drop_token(scope: Scope) -> None:
+    """Take the token out of the address of a request, which others may log."""
+    query: bytes = scope.get("query_string", b"")
+    if b"token" in query:
+        rest = [(name, value) for name, value in parse_qsl(query.decode("latin-1")) if name != "token"]
+        scope["query_string"] = urlencode(rest).encode()
+
+
+def _with_session(send: Send, scope: Scope, session: str) -> Send:
+    """Return ``send`` that gives ``session`` to the browser as a cookie."""
+    cookie = Response()
+    is_secure = scope.get("scheme") == "https"
+    cookie.set_cookie(session_cookie_name(scope), session, httponly=True, samesite="lax", secure=is_secure)
+
+    async def send_with_cookie(message: Message) -> None:
+        if message["type"] == "http.response.start":
+            MutableHeaders(scope=message).append("Set-Cookie", cookie.headers["set-cookie"])
+        await send(message)
+
+    return send_with_cookie
 
 
 def cookie_name(scope: Scope) -> str:
@@ -108,12 +172,28 @@ def cookie_name(scope: Scope) -> str:
     return f"handsteer_{port}"
 
 
-def _is_of_another_site(headers: Headers, scope: Scope) -> bool:
+def session_cookie_name(scope: Scope) -> str:
+    """Return the name of the cookie with the session, as :func:`cookie_name`."""
+    return f"{cookie_name(scope)}_session"
+
+
+def _is_of_another_site(headers: Headers) -> bool:
     origin = headers.get("origin")
-    if origin is not None and urlsplit(origin).netloc != headers.get("host"):
+    if origin is not None and _place(origin) != headers.get("host"):
         return True
-    # Without an Origin: pictures and the like. To follow a link from elsewhere is all right.
-    return headers.get("sec-fetch-site") == "cross-site" and headers.get("sec-fetch-mode") != "navigate"
+    if headers.get("sec-fetch-dest") in _FRAMES:  # none of our pages has frames
+        return True
+    # Without an Origin: pictures and the like; another port of this machine counts as the same site, and is another's.
+    # To follow a link from elsewhere is all right.
+    is_ours = headers.get("sec-fetch-site", "none") in {"same-origin", "none"}
+    return not is_ours and headers.get("sec-fetch-mode") != "navigate"
+
+
+def _place(origin: str) -> str | None:
+    try:
+        return urlsplit(origin).netloc
+    except ValueError:
+        return None
 
 
 def _name(host: str) -> str:
@@ -126,7 +206,7 @@ def _name(host: str) -> str:
 
 def _cookie(headers: Headers, name: str) -> str | None:
     try:
-        found = SimpleCookie(headers.get("cookie", "")).get(name)
+        found = SimpleCookie(headers.get("cookie", "")[:_LONGEST_COOKIES]).get(name)
     except CookieError:
         return None
     return found.value if found else None

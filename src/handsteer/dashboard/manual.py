@@ -12,6 +12,7 @@ SLIDERS_TIMEOUT_S = 0.5
 """Sliders go to zero when the page has not been heard of for this long."""
 
 _LATE_S = 0.2
+_LATEST_MS = 1e15  # far in the future; an integer may be too large for any float
 _LATE_IN_A_ROW = 5
 _PAGE = b"page"
 
@@ -77,7 +78,7 @@ class Manual:
         self.sliders = ZERO
 
     def _is_timely(self, sent: object, now_s: float) -> bool:
-        if isinstance(sent, bool) or not isinstance(sent, int | float) or not math.isfinite(sent):
+        if isinstance(sent, bool) or not isinstance(sent, int | float) or not abs(sent) < _LATEST_MS:
             return False
         is_late = self._lateness.is_late(_PAGE, sent / 1000, now_s)
         self._late = self._late + 1 if is_late else 0

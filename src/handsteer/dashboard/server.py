@@ -12,7 +12,7 @@ from typing import Any
 
 import uvicorn
 from fastapi import FastAPI
-from nicegui import ui
+from nicegui import core, ui
 from starlette.responses import Response
 from starlette.staticfiles import StaticFiles
 from starlette.websockets import WebSocket
@@ -21,14 +21,18 @@ from handsteer.cameras.browser import LARGEST_BYTES
 from handsteer.clock import Clock
 from handsteer.config import DashboardConfig
 from handsteer.dashboard.access import Access, AccessMiddleware
+from handsteer.dashboard.doors import Doors
 from handsteer.dashboard.drive import DrivePage
+from handsteer.dashboard.headers import HEADERS
 from handsteer.dashboard.history import VelocityHistory
 from handsteer.dashboard.node import DashboardNode
 from handsteer.dashboard.page import ASSETS_PATH, ICON, PICTURE_PATH, WEBCAM_PATH, Local, Served
+from handsteer.dashboard.page_log import keep_short
 from handsteer.dashboard.picture import PictureNode, PictureResponse
 from handsteer.dashboard.settings import SettingsPage
 from handsteer.dashboard.settings_file import DEFAULT_FILE, SettingsFile
 from handsteer.dashboard.settings_store import Settings
+from handsteer.dashboard.socket_events import SocketEvents
 from handsteer.dashboard.teach import TeachPage
 from handsteer.dashboard.teaching.teaching import Teaching
 from handsteer.dashboard.watch import WhileWatched
@@ -121,30 +125,21 @@ class Dashboard:
             raise DashboardError("this process serves a page already: stop that one first")
         config = self._config
         try:
-            _check_certificate(config)
+            certificate = _certificate(config)
             listener = _listen(config.host, config.port)
         except DashboardError:
             _one_at_a_time.release()
             raise
-        access = Access.to(config.host)
+        access = Access.to(config.host, config.token)
         application = _application()
         application.state.dashboard = self
         application.state.access = access
-        settings = uvicorn.Config(
-            application,
-            log_config=None,
-            access_log=False,
-            lifespan="on",
-            ws_max_size=2 * LARGEST_BYTES,
-            ssl_certfile=config.certificate,
-            ssl_keyfile=config.private_key,
-        )
-        settings.timeout_graceful_shutdown = _GRACE_S  # type: ignore[assignment] # fractions work as well
-        self._server = uvicorn.Server(settings)
+        application.state.doors = Doors(certificate)
+        self._server = uvicorn.Server(_settings(application))
         self._thread = threading.Thread(target=self._server.run, args=([listener],), name="dashboard", daemon=True)
         self._thread.start()
         self._wait_until_served()
-        scheme = "https" if config.certificate else "http"
+        scheme = "https" if certificate else "http"
         address = f"{scheme}://{_shown(config.host)}:{listener.getsockname()[1]}"
         return f"{address}/?token={access.token}" if access.token else address
 
@@ -211,23 +206,43 @@ def _shown(host: str) -> str:
     return f"[{host}]" if ":" in host else host
 
 
-def _check_certificate(config: DashboardConfig) -> None:
+def _settings(application: FastAPI) -> uvicorn.Config:
+    settings = uvicorn.Config(
+        # Around all of it, so that nothing, errors included, goes past.
+        AccessMiddleware(application, application.state),
+        http=application.state.doors.protocol,
+        headers=list(HEADERS),
+        server_header=False,
+        proxy_headers=False,  # whoever is on this machine could say that he is another
+        # uvloop reads on behind a protocol that has paused it before TLS begins.
+        loop="asyncio" if application.state.doors.is_secure else "auto",
+        log_config=None,
+        access_log=False,
+        lifespan="on",
+        ws_max_size=2 * LARGEST_BYTES,
+    )
+    settings.timeout_graceful_shutdown = _GRACE_S  # type: ignore[assignment] # fractions work as well
+    return settings
+
+
+def _certificate(config: DashboardConfig) -> ssl.SSLContext | None:
     if config.certificate is None:
         if config.private_key is not None:
             raise DashboardError("dashboard.private_key is of no use without dashboard.certificate: give both")
-        return
+        return None
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
     try:
-        ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER).load_cert_chain(config.certificate, config.private_key)
+        context.load_cert_chain(config.certificate, config.private_key)
     except OSError as error:  # ssl's own errors are of this kind, too
         reason = error.strerror or error
         raise DashboardError(f"the certificate {config.certificate} cannot be used for https: {reason}") from None
+    return context
 
 
 @functools.cache
 def _application() -> FastAPI:
     """Return the web application, made once per process, as NiceGUI wants it; ``state.dashboard`` is what it serves."""
     application = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
-    application.add_middleware(AccessMiddleware, state=application.state)
     application.mount(ASSETS_PATH, StaticFiles(directory=Path(__file__).parent / "static"))
 
     @application.get(PICTURE_PATH)
@@ -264,4 +279,6 @@ def _application() -> FastAPI:
         # Who steers is missed much sooner, by what the page repeats.
         reconnect_timeout=10.0,
     )
+    SocketEvents(core.sio)
+    keep_short()
     return application

@@ -9,6 +9,7 @@ from typing import Any
 
 import yaml
 
+from handsteer import plain_yaml
 from handsteer.config import Config, load
 from handsteer.errors import ConfigError
 
@@ -101,8 +102,8 @@ class SettingsFile:
 def _in_order(values: Mapping[str, Any], old: bytes | None) -> dict[str, Any]:
     """Return ``values`` with sections and fields in the order that the old file has them, new ones last."""
     try:
-        order = yaml.safe_load(old or b"")
-    except yaml.YAMLError:
+        order = plain_yaml.parse(old or b"", "", ConfigError)
+    except ConfigError:
         order = None
     return _sorted(values, order)
 

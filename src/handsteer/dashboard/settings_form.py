@@ -7,6 +7,7 @@ from urllib.parse import urlsplit
 
 import yaml
 
+from handsteer import plain_yaml
 from handsteer.config import Config, validate
 from handsteer.errors import ConfigError
 from handsteer.parameters import Description, describe, section_model
@@ -192,8 +193,8 @@ def _number_or_switch(text: str) -> Any:
     if not _SCALAR.fullmatch(text.strip()):
         return text
     try:
-        value = yaml.safe_load(text)
-    except (yaml.YAMLError, ValueError):  # such as 0o9
+        value = plain_yaml.parse(text, "", ConfigError)
+    except ConfigError:  # such as 0b_
         return text
     return value if isinstance(value, bool | int | float) else text
 

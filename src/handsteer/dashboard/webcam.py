@@ -7,6 +7,7 @@ from collections.abc import Callable
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from handsteer.cameras.browser import ChoiceOfCameras
+from handsteer.dashboard.socket_events import is_page_of
 from handsteer.errors import FrameError
 
 FRAMES_PER_S = 30.0
@@ -34,22 +35,22 @@ class FrameSocket:
     async def serve(self, socket: WebSocket) -> None:
         """Take frames until the browser leaves; close with a reason when it cannot be served."""
         await socket.accept()
+        viewer = socket.query_params.get("viewer", "")
         if self._camera is None:
             await socket.close(_NO_CAMERA_HERE, "the camera is not where the page is")
-        elif not self._drives(socket.query_params.get("viewer", "")):
+        elif not (is_page_of(viewer, socket.scope) and self._drives(viewer)):
             await socket.close(_NOT_THE_DRIVER, "only who drives may give a camera: ask to drive first")
         elif not self._in_use.acquire(blocking=False):
             await socket.close(_BUSY, "another browser gives its camera already")
         else:
             try:
-                await self._take(socket, self._camera)
+                await self._take(socket, self._camera, viewer)
             finally:
                 self._camera.browser.forget()
                 self._in_use.release()
 
-    async def _take(self, socket: WebSocket, camera: ChoiceOfCameras) -> None:
+    async def _take(self, socket: WebSocket, camera: ChoiceOfCameras, viewer: str) -> None:
         camera.choose("browser")
-        viewer = socket.query_params.get("viewer", "")
         loop = asyncio.get_running_loop()
         try:
             while self._drives(viewer):

@@ -1,6 +1,7 @@
 """What all nodes share: inboxes that keep the newest message, timers, and one thread that serves both."""
 
 import logging
+import math
 import threading
 from collections import deque
 from collections.abc import Callable, Hashable
@@ -17,6 +18,12 @@ log = logging.getLogger(__name__)
 
 OK, WARN, ERROR = 0, 1, 2
 """Levels of ``diagnostic_msgs/DiagnosticStatus``."""
+
+
+FAILURES_SAID_EVERY_S = 10.0
+"""A callback that goes on failing is logged no more often; a bad picture comes thirty times a second."""
+
+_LONGEST_REASON = 200
 
 
 @dataclass
@@ -50,7 +57,8 @@ class Node:
     Run it on a thread of its own (:meth:`start`, :meth:`stop`), or let the caller turn the crank (:meth:`spin_once`,
     :attr:`next_due_s`) on a :class:`~handsteer.clock.SteppedClock`.
 
-    A callback that raises is logged with its topic and counted in :attr:`callback_errors`; the node goes on.
+    A callback that raises is logged with its topic and counted in :attr:`callback_errors`; the node goes on. What fails
+    again and again is said every :data:`FAILURES_SAID_EVERY_S`.
 
     Args:
         name: ROS node name.
@@ -73,6 +81,7 @@ class Node:
         self._inboxes: list[_Inbox[Any]] = []
         self._timers: list[Timer] = []
         self._new_config: Config | None = None
+        self._failures: dict[tuple[str, type[Exception]], _Failure] = {}
         self._subscriptions: list[Subscription] = []
         self._wake = threading.Condition()
         self._running = False
@@ -209,9 +218,29 @@ class Node:
     def _guard(self, source: str, callback: Callable[..., None], *args: object) -> None:
         try:
             callback(*args)
-        except Exception:
+        except Exception as error:
             self.callback_errors += 1
-            log.exception("%s: callback of %s failed", self.name, source)
+            self._report_failure(source, error)
+
+    def _report_failure(self, source: str, error: Exception) -> None:
+        """Say that a callback has failed: at first with its traceback, later how often, and not too often."""
+        failure = self._failures.setdefault((source, type(error)), _Failure())
+        failure.count += 1
+        now = self.clock.now()
+        if now - failure.said_s < FAILURES_SAID_EVERY_S:
+            return
+        if failure.count == 1:
+            log.error("%s: callback of %s failed", self.name, source, exc_info=error)
+        else:
+            words = str(error)[:_LONGEST_REASON]
+            log.error("%s: callback of %s has failed %d times: %s", self.name, source, failure.count, words)
+        failure.said_s = now
+
+
+@dataclass
+class _Failure:
+    count: int = 0
+    said_s: float = -math.inf
 
 
 @dataclass

@@ -63,6 +63,9 @@ class Joint:
     axis: Vector
 
 
+_LONGEST, _LONGEST_SHOWN = 5_000_000, 100
+
+
 @cache
 def robot_description() -> str:
     """Return the URDF of the handsteer robot."""
@@ -99,12 +102,16 @@ def joints(urdf: str) -> list[Joint]:
 
 
 def _parse(urdf: str) -> ET.Element:
+    if len(urdf) > _LONGEST:
+        raise WorldError(f"robot description: has {len(urdf)} characters, and should have at most {_LONGEST}")
+    if "<!DOCTYPE" in urdf:  # its entities may stand for gigabytes
+        raise WorldError("robot description: a document type is not read here: leave <!DOCTYPE out")
     try:
         robot = ET.fromstring(urdf)
     except (ET.ParseError, ValueError) as error:
-        raise WorldError(f"robot description: not valid XML: {error}") from None
+        raise WorldError(f"robot description: not valid XML: {str(error)[:_LONGEST_SHOWN]}") from None
     if robot.tag != "robot":
-        raise WorldError(f"robot description: expected <robot> at the top, found <{robot.tag}>")
+        raise WorldError(f"robot description: expected <robot> at the top, found <{robot.tag[:_LONGEST_SHOWN]}>")
     return robot
 
 
@@ -122,7 +129,7 @@ def _joint(element: ET.Element) -> Joint:
     name = element.get("name", "")
     parent, child = element.find("parent"), element.find("child")
     if parent is None or child is None:
-        raise WorldError(f"robot description: joint {name!r} needs a <parent> and a <child>")
+        raise WorldError(f"robot description: joint {name[:_LONGEST_SHOWN]!r} needs a <parent> and a <child>")
     axis = element.find("axis")
     xyz, rpy = _origin(element)
     return Joint(
@@ -181,5 +188,7 @@ def _numbers(element: ET.Element, attribute: str, count: int, default: str = "")
         numbers = []
     if len(numbers) != count or not all(math.isfinite(number) for number in numbers):
         wanted = "a number" if count == 1 else f"{count} numbers"
-        raise WorldError(f"robot description: {attribute} of <{element.tag}> must be {wanted}, not {text!r}")
+        raise WorldError(
+            f"robot description: {attribute} of <{element.tag}> must be {wanted}, not {text[:_LONGEST_SHOWN]!r}"
+        )
     return numbers

@@ -20,6 +20,7 @@ from typing import Annotated, Any, Literal
 import yaml
 from pydantic import Field, ValidationError, model_validator
 
+from handsteer import plain_yaml
 from handsteer.config import Section
 from handsteer.errors import WorldError
 from handsteer.robots.protocol import Shape
@@ -156,13 +157,7 @@ def read_world(path: Path) -> World:
     Raises:
         WorldError: As :func:`load_world`.
     """
-    try:
-        text = path.read_text(encoding="utf-8")
-    except OSError as error:
-        raise WorldError(f"cannot read the world {path}: {error.strerror}") from None
-    except ValueError:
-        raise WorldError(f"{path}: not valid YAML") from None
-    return parse_world(text, str(path))
+    return _world(plain_yaml.read(path, str(path), WorldError, f"cannot read the world {path}"), str(path))
 
 
 def parse_world(text: str, source: str) -> World:
@@ -175,12 +170,10 @@ def parse_world(text: str, source: str) -> World:
     Raises:
         WorldError: It is no YAML, or a field in it is wrong; the message names ``source`` and the field.
     """
-    try:
-        values = yaml.safe_load(text)
-    except (yaml.YAMLError, ValueError, RecursionError) as error:
-        line = getattr(getattr(error, "problem_mark", None), "line", None)
-        at = f", line {line + 1}" if line is not None else ""
-        raise WorldError(f"{source}{at}: not valid YAML") from None
+    return _world(plain_yaml.parse(text, source, WorldError), source)
+
+
+def _world(values: Any, source: str) -> World:
     try:
         return World.model_validate({} if values is None else values)
     except ValidationError as error:

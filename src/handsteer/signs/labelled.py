@@ -71,7 +71,7 @@ def read_video_labels(video: Path, signs: Sequence[str]) -> dict[int, str] | Non
     truths: dict[int, str] = {}
     for where, row in _rows(path, ("frame", "sign")):
         if not row["frame"].isdecimal() or int(row["frame"]) in truths:
-            raise LabelError(f"{where}: expected the number of a frame, each once, found {row['frame']!r}")
+            raise LabelError(f"{where}: expected the number of a frame, each once, found {row['frame'][:60]!r}")
         truth = _truth(row["sign"], signs, where)
         if truth is not None:
             truths[int(row["frame"])] = truth
@@ -91,7 +91,7 @@ def _from_index(index: Path, signs: Sequence[str]) -> list[LabelledPhoto]:
         path = index.parent / row["path"]
         truth = _truth(row["sign"], signs, where)
         if truth is not None and not path.is_file():
-            raise LabelError(f"{where}: there is no photo {path}")
+            raise LabelError(f"{where}: there is no photo {_shown(str(path))}")
         kind = row.get("kind") or _kind_of(Path(row["path"]))
         photos.append(LabelledPhoto(path, truth, kind, row.get("person_set", "")))
     return photos
@@ -119,7 +119,7 @@ def _from_subfolders(folder: Path, signs: Sequence[str]) -> list[LabelledPhoto]:
 
 
 def _kind_of(below: Path) -> str:
-    is_negative = below.parts[0].lower() == NEGATIVES
+    is_negative = below.parts[:1] != () and below.parts[0].lower() == NEGATIVES
     return below.parts[1] if is_negative and len(below.parts) > 2 else ""
 
 
@@ -128,7 +128,7 @@ def _truth(name: str, signs: Sequence[str], where: str) -> str | None:
         return None
     sign = find_sign(name, (*signs, NONE))
     if sign is None:
-        raise LabelError(f"{where}: there is no sign {name!r}; the signs are {', '.join((*signs, NONE))}")
+        raise LabelError(f"{where}: there is no sign {name[:60]!r}; the signs are {', '.join((*signs, NONE))}")
     return sign
 
 
@@ -147,3 +147,7 @@ def _rows(path: Path, needed: tuple[str, ...]) -> Iterator[tuple[str, dict[str, 
                 yield where, {name: (value or "").strip() for name, value in row.items() if isinstance(name, str)}
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise LabelError(f"cannot read the labels {path}: {error}") from None
+
+
+def _shown(path: str) -> str:
+    return path if path.isprintable() else repr(path)

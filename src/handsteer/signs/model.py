@@ -76,7 +76,7 @@ def load_model(path: Path = DEFAULT_MODEL) -> SignModel:
     arrays = _FILE.read(path)
     try:
         return _built(arrays)
-    except (KeyError, ValueError, TypeError, AttributeError) as error:
+    except (KeyError, ValueError, TypeError, AttributeError, ArithmeticError, RecursionError) as error:
         raise _FILE.damaged(path, error) from None
 
 

@@ -9,6 +9,8 @@ from handsteer.signs.network import Network
 from handsteer.signs.novelty import Novelty
 from handsteer.signs.npz import Arrays
 
+_LARGEST = 1e9  # no number that was learnt comes near; products of some beyond would be infinite
+
 
 def to_arrays(network: Network, novelty: Novelty) -> dict[str, NDArray[np.float32]]:
     """Return the numbers of both by name, but the limit of the novelty."""
@@ -54,6 +56,6 @@ def from_arrays(arrays: Arrays, inputs: int) -> tuple[Network, Novelty]:
     if not fits:
         raise ValueError("its parts do not fit together")
     numbers = [network.mean, network.scale, *network.weights, *network.biases, novelty.centres, novelty.whitening]
-    if not all(np.isfinite(each).all() for each in [*numbers, np.array(novelty.limit)]):
-        raise ValueError("some of its numbers are not finite")
+    if not all((np.abs(each) <= _LARGEST).all() for each in [*numbers, np.array(novelty.limit)]):
+        raise ValueError(f"some of its numbers are beyond {_LARGEST:g}, or none")
     return network, novelty

@@ -1,10 +1,12 @@
 """Reads .npz files that came from anywhere: arrays only, nothing in them is ever run."""
 
+import math
 import os
 import tempfile
+import zipfile
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +14,16 @@ from numpy.typing import NDArray
 from handsteer.errors import HandsteerError
 
 Arrays = dict[str, NDArray[Any]]
+
+LARGEST_BYTES: Final = 256_000_000
+"""Of all arrays of a file together; half a million hands are as large."""
+
+MOST_ARRAYS: Final = 100
+
+_LONGEST_REASON: Final = 160
+_LAST_CHARACTER: Final = 0x10FFFF
+_SURROGATES: Final = 0xD800 >> 11
+_KINDS: Final = frozenset("biufU")
 
 
 class NpzFormat:
@@ -41,27 +53,25 @@ class NpzFormat:
             HandsteerError: It cannot be read, or is not such a file; of the types given.
         """
         try:
-            with np.load(path, allow_pickle=False) as file:
-                if not isinstance(file, np.lib.npyio.NpzFile):
-                    raise self._corrupt(f"{path}: not a {self.what}; {self.remedy}")
-                arrays = {name: file[name] for name in file.files}
+            with zipfile.ZipFile(path) as file:
+                _check_sizes(file)
+                arrays = {entry.filename.removesuffix(".npy"): _array(file, entry) for entry in file.infolist()}
         except OSError as error:
             reason = error.strerror or error
             raise self._missing(f"cannot read the {self.what} {path} ({reason}): {self.remedy}") from None
-        except HandsteerError:
-            raise
+        except _RefusedError as problem:
+            raise self._corrupt(f"{path}: not a {self.what}: {problem}; {self.remedy}") from None
         except Exception:  # the readers of headers and of packed data raise whatever they stumble on
             raise self._corrupt(f"{path}: not a {self.what}, or damaged; {self.remedy}") from None
         version = arrays.pop("format", None)
         if version is None or version.shape != () or version != self.version:
-            raise self._corrupt(
-                f"{path}: a {self.what} of format {version} is not known, expected {self.version}; {self.remedy}"
-            )
+            known = f"is not known, expected {self.version}"
+            raise self._corrupt(f"{path}: a {self.what} of format {_in_words(version)} {known}; {self.remedy}")
         return arrays
 
     def damaged(self, path: Path, reason: object) -> HandsteerError:
         """Return the error that says that the file ``path`` is damaged."""
-        return self._corrupt(f"{path}: a damaged {self.what} ({reason}); {self.remedy}")
+        return self._corrupt(f"{path}: a damaged {self.what} ({str(reason)[:_LONGEST_REASON]}); {self.remedy}")
 
     def write(self, path: Path, arrays: Mapping[str, Any]) -> None:
         """Write ``arrays`` to ``path``, as a whole or not at all; the same arrays always give the same bytes.
@@ -78,3 +88,45 @@ class NpzFormat:
         except BaseException:
             Path(name).unlink(missing_ok=True)
             raise
+
+
+class _RefusedError(Exception):
+    pass
+
+
+def _check_sizes(file: zipfile.ZipFile) -> None:
+    """Look at what the directory of ``file`` says; no more than that is unpacked of any entry."""
+    entries = file.infolist()
+    if len(entries) > MOST_ARRAYS:
+        raise _RefusedError(f"it has {len(entries)} arrays")
+    size = sum(entry.file_size for entry in entries)
+    if size > LARGEST_BYTES:
+        raise _RefusedError(f"its arrays have {size / 1e6:.0f} MB, and should have at most {LARGEST_BYTES / 1e6:.0f}")
+
+
+def _array(file: zipfile.ZipFile, entry: zipfile.ZipInfo) -> NDArray[Any]:
+    """Return the array of ``entry``, for which no more is taken than the directory says it has."""
+    with file.open(entry) as stream:
+        version = np.lib.format.read_magic(stream)
+        read_header = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+        shape, _, kind = read_header(stream)
+    # In numbers of Python: a shape may be of more elements than a machine's integer holds.
+    if kind.kind not in _KINDS:
+        raise _RefusedError(f"its array {entry.filename[:60]!r} is neither of numbers nor of text")
+    if math.prod(shape) * kind.itemsize > entry.file_size:
+        raise _RefusedError(f"its array {entry.filename[:60]!r} says that it is larger than it is")
+    with file.open(entry) as stream:
+        array: NDArray[Any] = np.lib.format.read_array(stream, allow_pickle=False)
+    if kind.kind == "U" and not _is_text(array):
+        raise _RefusedError(f"its array {entry.filename[:60]!r} has characters that there are not")
+    return array
+
+
+def _is_text(array: NDArray[Any]) -> bool:
+    """Return whether ``array``, of kind U, has characters of Unicode alone; others break Python."""
+    codes = np.frombuffer(array.tobytes(), np.dtype("u4").newbyteorder(array.dtype.byteorder))
+    return not ((codes > _LAST_CHARACTER) | ((codes >> 11) == _SURROGATES)).any()
+
+
+def _in_words(version: NDArray[Any] | None) -> str:
+    return " ".join(str(version).split())[:_LONGEST_REASON]

@@ -79,3 +79,19 @@ def test_names_of_classes_stand_one_a_line(tmp_path: Path) -> None:
         read_class_names(written(tmp_path / "names.csv", "Open", "", "Close"))
     with pytest.raises(DatasetError, match="cannot read the names of the classes"):
         read_class_names(tmp_path / "gone.csv")
+
+
+def test_a_packed_file_may_not_be_endless(tmp_path: Path) -> None:
+    path = tmp_path / "bomb.csv.gz"
+    with gzip.open(path, "wb") as file:
+        file.write(b"9" * 50_000_000)
+    with pytest.raises(DatasetError, match="a line has more than 10000 characters"):
+        read_keypoints(path, {"0": "Hi"}, "me")
+
+
+def test_a_long_number_is_not_repeated_in_full(tmp_path: Path) -> None:
+    path = tmp_path / "long.csv"
+    path.write_text("0," + ",".join(["x" * 200] * 42))
+    with pytest.raises(DatasetError, match="line 1: expected a class and 42 numbers") as caught:
+        read_keypoints(path, {"0": "Hi"}, "me")
+    assert len(str(caught.value)) < 400

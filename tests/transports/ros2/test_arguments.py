@@ -50,7 +50,7 @@ def test_what_launch_files_add_is_taken() -> None:
         ("--ros-args -r __log:=x", "-r __log:=x: there is no __log"),
         ("--ros-args -r /*/a:=b", "-r /*/a:=b: ROS 2 has no wildcards"),
         ("--ros-args -p a", "-p a: it should be a parameter"),
-        ("--ros-args -p a:=[1", "-p a:=[1: '[1' is no YAML value"),
+        ("--ros-args -p a:=[1", "-p a:=[1, line 1: not valid YAML"),
         ("--ros-args --log-level loud", "--log-level loud: it should be one of debug"),
         ("--ros-args --params-file /gone.yaml", "--params-file /gone.yaml: No such file"),
     ],
@@ -113,17 +113,17 @@ def test_parameter_files(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        ("fps: 10", "/fps should be as {"),
-        ("[1, 2]", "it should be as {"),
-        ("", "it should be as {"),
-        ("{a: {}}", "it has no ros__parameters"),
-        ("{a: [", "it is no YAML"),
+        ("fps: 10", ": /fps should be as {"),
+        ("[1, 2]", ": it should be as {"),
+        ("", ": it should be as {"),
+        ("{a: {}}", ": it has no ros__parameters"),
+        ("{a: [", ", line 1: not valid YAML"),
     ],
 )
 def test_wrong_parameter_files(tmp_path: Path, content: str, message: str) -> None:
     file = tmp_path / "params.yaml"
     file.write_text(content)
-    with pytest.raises(TransportError, match=re.escape(f"--params-file {file}: {message}")):
+    with pytest.raises(TransportError, match=re.escape(f"--params-file {file}{message}")):
         parse_arguments(["--ros-args", "--params-file", str(file)])
 
 

@@ -9,6 +9,8 @@ from handsteer.dashboard.panels.elements import box, button, switch, text
 from handsteer.dashboard.state import PageState
 from handsteer.signs.vocabulary import NONE
 
+_MOST_WORDS = 200
+
 
 class CameraPanel:
     """The mirrored picture, what was understood of it, and whose camera it is from.
@@ -78,10 +80,16 @@ class CameraPanel:
             self._own = button("Use the robot's camera", 'data-camera="own"')
             self._trouble = text("trouble", "").props('role="alert"')
         self._own.on("click", use_own)
-        ui.on("webcam", lambda event: self._trouble.set_text(str(event.args.get("words", ""))))
+        ui.on("webcam", lambda event: self._trouble.set_text(read_words(event.args)))
 
     def _show_choice(self, source: str, *, is_given: bool) -> None:
         if (source, is_given) != self._chosen:
             self._chosen = (source, is_given)
             switch(self._browsers, "hidden", on=source == "browser" and is_given)
             switch(self._own, "hidden", on=source == "own")
+
+
+def read_words(sent: object) -> str:
+    """Return what a browser says of its camera, for its own page; nothing of what makes no sense."""
+    words = sent.get("words") if isinstance(sent, dict) else None
+    return words[:_MOST_WORDS] if isinstance(words, str) else ""

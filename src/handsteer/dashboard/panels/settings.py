@@ -11,6 +11,7 @@ from handsteer.errors import ConfigError, HandsteerError
 from handsteer.parameters import section_model
 
 _NONE = "none"
+_LONGEST_SEARCH = 100
 _KEYBOARDS = {"number": 'inputmode="decimal"', "text": "", "list": "", "table": ""}
 
 
@@ -243,7 +244,7 @@ class SettingsPanel:
         switch(self._said, "wrong", on=wrong)
 
     def _filter(self) -> None:
-        words = self._search.value if isinstance(self._search.value, str) else ""
+        words = self._search.value[:_LONGEST_SEARCH] if isinstance(self._search.value, str) else ""
         wanted = [
             row
             for row in self._rows

@@ -150,5 +150,7 @@ class _Axis:
 
 def read_limit(sent: object, low: float, high: float, otherwise: float) -> float:
     """Return the number that a browser sent, put between ``low`` and ``high``; ``otherwise``, too, if it is none."""
-    is_number = isinstance(sent, int | float) and not isinstance(sent, bool) and math.isfinite(sent)
-    return max(low, min(float(sent) if is_number else otherwise, high))  # type: ignore[arg-type]
+    value = otherwise
+    if isinstance(sent, int | float) and not isinstance(sent, bool) and -math.inf < sent < math.inf:
+        value = sent  # put between the bounds as it is: an integer may be too large for any float
+    return float(max(low, min(value, high)))

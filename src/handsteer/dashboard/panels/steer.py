@@ -8,7 +8,7 @@ from handsteer.control.velocity import Velocity
 from handsteer.dashboard.manual import Manual
 from handsteer.dashboard.panels.elements import box, button, card, switch, text
 from handsteer.dashboard.panels.mux import MuxPanel
-from handsteer.dashboard.panels.sliders import Sliders
+from handsteer.dashboard.panels.sliders import Sliders, read_limit
 from handsteer.dashboard.panels.topic import TopicBox
 from handsteer.dashboard.seat import Place
 from handsteer.dashboard.state import PageState
@@ -92,7 +92,7 @@ class SteerPanel:
 
     def _hold(self, sent: object) -> None:
         x, y = read_deflection(sent)
-        top = min(max(float(self._speed.value or 0.0), 0.0), 1.0)
+        top = self._top_mps
         wanted = Velocity(y * top, -x * top * self._TURN_PER_SPEED)
         self._follow(self._manual.hold_pad(wanted, _sent_ms(sent), self._now()))
 
@@ -111,7 +111,11 @@ class SteerPanel:
             self._steer(wanted.linear_mps, wanted.angular_radps)
 
     def _show_speed(self) -> None:
-        self._label.set_text(f"Top speed {self._speed.value:.1f} m/s")
+        self._label.set_text(f"Top speed {self._top_mps:.1f} m/s")
+
+    @property
+    def _top_mps(self) -> float:
+        return read_limit(self._speed.value, 0.0, 1.0, 0.0)
 
 
 def read_deflection(sent: object) -> tuple[float, float]:

@@ -9,6 +9,8 @@ from handsteer.dashboard.panels.elements import box, button, text
 from handsteer.signs.teaching.dataset import Dataset, summarise
 from handsteer.signs.vocabulary import NONE
 
+_LONGEST = 200
+
 
 class NamePanel:
     """Name a sign, or pick one that was taught before.
@@ -42,7 +44,7 @@ class NamePanel:
 
     @property
     def _said(self) -> tuple[str, str]:
-        return str(self._name.value or ""), str(self._person.value or "")
+        return str(self._name.value or "")[:_LONGEST], str(self._person.value or "")[:_LONGEST]
 
     def _pick(self, label: str, words: str) -> None:
         button(words, "").on("click", lambda: self._name.set_value(label))

@@ -9,6 +9,8 @@ from handsteer.dashboard.state import PageState
 from handsteer.errors import TransportError
 from handsteer.messages import STEERING_CMD_VEL
 
+_LONGEST = 200
+
 
 class TopicBox:
     """The topic's name, and what it means that it is this one.
@@ -22,7 +24,7 @@ class TopicBox:
         self._choose = choose
         self._shown = ""
         with box("topic"):
-            self._name = ui.input("topic", value=STEERING_CMD_VEL.name).props("dense outlined maxlength=200")
+            self._name = ui.input("topic", value=STEERING_CMD_VEL.name).props(f"dense outlined maxlength={_LONGEST}")
             self._name.props("spellcheck=false autocapitalize=off")
             if choose is None:
                 self._name.props("readonly")
@@ -51,7 +53,7 @@ class TopicBox:
         if self._choose is None:
             return
         try:
-            self._choose(str(self._name.value).strip())
+            self._choose(str(self._name.value)[:_LONGEST].strip())
         except TransportError as error:
             self._trouble.set_text(str(error))
         else:

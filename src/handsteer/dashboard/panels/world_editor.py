@@ -22,6 +22,7 @@ LARGEST_FILE_BYTES = 64 * 1024
 
 _PATIENCE_S = 5.0
 _STILL_M = 0.02
+_FARTHEST_M = 1000
 
 _READ_FILE = f"""async (event) => {{
     const file = event.target.files[0];
@@ -97,7 +98,7 @@ class WorldEditor:
         """Put the obstacle with this index to x and y in metres, if that is not where it is."""
         world = self._world()
         # A browser may send anything.
-        is_place = all(isinstance(value, int | float) and math.isfinite(value) for value in (x, y))
+        is_place = all(isinstance(value, int | float) and abs(value) <= _FARTHEST_M for value in (x, y))
         if world is None or index >= len(world.obstacles) or not is_place:
             return
         thing = world.obstacles[index]
@@ -147,7 +148,9 @@ class WorldEditor:
             await self._change(lambda world: remove(world, name), f"Deleted {name}.")
 
     async def _load(self) -> None:
-        await self._enter(load_world(self._worlds.value), self._worlds.value)
+        name = self._worlds.value
+        if name in shipped_worlds():  # and no path of a browser's choice
+            await self._enter(load_world(name), name)
 
     async def _open_file(self, sent: object) -> None:
         if not self._allowed():

@@ -6,7 +6,9 @@ const WHY_NOT = {
   NotReadableError: "another program uses the camera",
 };
 
-let giving = null; // {stream, video, sender} while the camera is given
+const LOOK_MS = 10;
+
+let giving = null; // {stream, video, sender, shown} while the camera is given
 
 function sayCamera(state, words = "") {
   emitEvent("webcam", { state, words });
@@ -42,9 +44,7 @@ function sendFrames(viewer) {
   sender.postMessage({ address: address.href });
   sender.onmessage = ({ data }) => {
     if (data.closed !== undefined) keepCamera(data.closed);
-    // A picture that is sent twice would only look newer than it is.
-    else if (video.requestVideoFrameCallback) video.requestVideoFrameCallback(send);
-    else setTimeout(send, 33);
+    else whenNew(video, send);
   };
   const send = async () => {
     const capturedMs = performance.now();
@@ -52,6 +52,23 @@ function sendFrames(viewer) {
     sender.postMessage({ picture, capturedMs }, [picture]);
   };
   sayCamera("on");
+}
+
+// A picture that is sent twice would only look newer than it is.
+function whenNew(video, send) {
+  if (video.requestVideoFrameCallback) {
+    video.requestVideoFrameCallback(send);
+  } else if (giving?.video === video) {
+    const shown = picturesOf(video);
+    if (shown === giving.shown) return void setTimeout(whenNew, LOOK_MS, video, send);
+    giving.shown = shown;
+    send();
+  }
+}
+
+// A figure that is another for each picture; older browsers have one or another.
+function picturesOf(video) {
+  return video.mozPaintedFrames || video.getVideoPlaybackQuality?.().totalVideoFrames || video.currentTime;
 }
 
 function keepCamera(words = "") {

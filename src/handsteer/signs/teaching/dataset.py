@@ -26,6 +26,11 @@ _FILE: Final = NpzFormat(
     remedy="give a file that `handsteer signs collect` or `handsteer signs import` has written",
 )
 _LONGEST_NAME: Final = 40
+# A hand may be half out of the picture, and nearer than it looks.
+_LARGEST_PX: Final = 65_535
+_FARTHEST_PX: Final = 4 * _LARGEST_PX
+_FARTHEST_M: Final = 10.0
+_LONGEST_S: Final = 1e7
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,7 +107,9 @@ def label_for(name: str, known: Sequence[str] = ()) -> str:
     """
     name = " ".join(name.split())
     if not name or not name.isprintable() or len(name) > _LONGEST_NAME:
-        raise DatasetError(f"{name!r} is no name for a sign: give 1 to {_LONGEST_NAME} printable characters, as 'Hi'")
+        raise DatasetError(
+            f"{name[:60]!r} is no name for a sign: give 1 to {_LONGEST_NAME} printable characters, as 'Hi'"
+        )
     return find_sign(name, (*SIGNS, NONE, *known)) or name
 
 
@@ -115,7 +122,7 @@ def load_dataset(path: Path) -> Dataset:
     arrays = _FILE.read(path)
     try:
         return Dataset(tuple(_takes(arrays)))
-    except (KeyError, ValueError, TypeError, IndexError, DatasetError) as error:
+    except (KeyError, ValueError, TypeError, IndexError, ArithmeticError, RecursionError, DatasetError) as error:
         raise _FILE.damaged(path, error) from None
 
 
@@ -159,8 +166,10 @@ def _takes(arrays: Arrays) -> Iterable[Take]:
         len(hands) and not 0 <= rows.min() <= rows.max() < len(facts)
     ):
         raise ValueError("its takes and rows do not fit together")
+    order = np.argsort(rows, kind="stable")
+    bounds = np.searchsorted(rows[order], np.arange(len(facts) + 1))
     for number, fact in enumerate(facts):
-        mine = np.flatnonzero(rows == number)
+        mine = order[bounds[number] : bounds[number + 1]]
         named = {name: str(fact[name]) for name in _FACTS}
         if label_for(named["label"]) != named["label"]:
             raise ValueError(f"take {number} has the label {named['label']!r}")
@@ -178,8 +187,15 @@ def _hands(arrays: Arrays) -> list[Hand]:
     )
     if not fits:
         raise ValueError("its arrays do not fit together")
-    if not np.isfinite(points[..., :2]).all() or not (sizes > 0).all() or not set(handedness) <= {"Left", "Right"}:
-        raise ValueError("some of its landmarks are not finite, or a size or handedness is wrong")
+    if not set(handedness.tolist()) <= {"Left", "Right"}:
+        raise ValueError("a handedness is neither Left nor Right")
+    _check_range("points", points, _FARTHEST_PX)
+    _check_range("world", world, _FARTHEST_M)
+    _check_range("image_size", sizes, _LARGEST_PX, lowest=1)
+    for name, highest in (("handedness_score", 1.0), ("presence", 1.0), ("time_s", _LONGEST_S)):
+        _check_range(name, arrays[name], highest, lowest=0)
+    if not np.isfinite(points[..., :2]).all():
+        raise ValueError("some of its landmarks are not finite")
     return [
         Hand(
             points=points[row],
@@ -191,6 +207,13 @@ def _hands(arrays: Arrays) -> list[Hand]:
         )
         for row in range(count)
     ]
+
+
+def _check_range(name: str, values: NDArray[Any], highest: float, lowest: float | None = None) -> None:
+    """Refuse what no camera has seen, and what learning would never come to an end with; what is unknown is NaN."""
+    low = -highest if lowest is None else lowest
+    if (values < low).any() or (values > highest).any():
+        raise ValueError(f"some of its {name} are not from {low:g} to {highest:g}")
 
 
 @dataclass(frozen=True)

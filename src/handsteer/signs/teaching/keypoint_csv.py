@@ -10,7 +10,7 @@ import itertools
 import zlib
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import Final
+from typing import Final, TextIO, cast
 
 import numpy as np
 
@@ -20,6 +20,8 @@ from handsteer.signs.teaching.dataset import Take
 
 _COLUMNS: Final = 43
 _LONGEST_TAKE: Final = 100
+_LONGEST_LINE: Final = 10_000
+_MOST_ROWS: Final = 1_000_000
 _SIZE_PX: Final = 240
 _FARTHEST: Final = 1.001  # the files have rounded numbers
 
@@ -58,7 +60,8 @@ def read_class_names(path: Path) -> dict[str, str]:
         DatasetError: The file cannot be read, or a line is empty.
     """
     try:
-        names = path.read_text(encoding="utf-8-sig").splitlines()
+        with path.open(encoding="utf-8-sig") as file:
+            names = file.read(_LONGEST_LINE).splitlines()
     except (OSError, UnicodeDecodeError) as error:
         raise DatasetError(f"cannot read the names of the classes {path}: {error}") from None
     if not names or not all(name.strip() for name in names):
@@ -75,11 +78,23 @@ def _parts(hands: Iterable[Hand]) -> Iterator[tuple[Hand, ...]]:
 def _rows(path: Path, *, mirrored: bool) -> Iterator[tuple[str, Hand]]:
     try:
         with gzip.open(path, "rt", newline="") if path.suffix == ".gz" else path.open(newline="") as file:
-            for number, row in enumerate(csv.reader(file), start=1):
+            for number, row in enumerate(csv.reader(_lines(cast(TextIO, file), path)), start=1):
                 if row:
                     yield row[0].strip(), _hand(row, f"{path}, line {number}", mirrored=mirrored)
     except (OSError, EOFError, UnicodeDecodeError, csv.Error, zlib.error) as error:
         raise DatasetError(f"cannot read the keypoints {path}: {error}") from None
+
+
+def _lines(file: TextIO, path: Path) -> Iterator[str]:
+    """Yield the lines of ``file``, which may be small only as long as it is packed."""
+    for _ in range(_MOST_ROWS):
+        line = file.readline(_LONGEST_LINE)
+        if not line:
+            return
+        if len(line) == _LONGEST_LINE:
+            raise DatasetError(f"{path}: a line has more than {_LONGEST_LINE} characters; 43 fields need fewer")
+        yield line
+    raise DatasetError(f"{path}: has more than {_MOST_ROWS} lines")
 
 
 def _hand(row: list[str], where: str, *, mirrored: bool) -> Hand:
@@ -88,7 +103,7 @@ def _hand(row: list[str], where: str, *, mirrored: bool) -> Hand:
     try:
         points = np.array([float(number) for number in row[1:]]).reshape(21, 2)
     except ValueError as error:
-        raise DatasetError(f"{where}: expected a class and 42 numbers, {error}") from None
+        raise DatasetError(f"{where}: expected a class and 42 numbers, {str(error)[:80]}") from None
     if not np.isfinite(points).all() or np.abs(points).max() > _FARTHEST or not np.ptp(points, axis=0).any():
         raise DatasetError(f"{where}: these are not the landmarks of a hand, relative to its wrist and up to 1")
     if mirrored:

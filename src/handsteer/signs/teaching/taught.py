@@ -147,7 +147,7 @@ def load_taught(path: Path) -> TaughtModel:
     arrays = _FILE.read(path)
     try:
         return _built(arrays)
-    except (KeyError, ValueError, TypeError, AttributeError, DatasetError) as error:
+    except (KeyError, ValueError, TypeError, AttributeError, ArithmeticError, RecursionError, DatasetError) as error:
         raise _FILE.damaged(path, error) from None
 
 

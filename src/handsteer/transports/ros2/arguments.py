@@ -10,8 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import yaml
-
+from handsteer import plain_yaml
 from handsteer.errors import TransportError
 from handsteer.transports.ros2.names import Remap
 
@@ -29,6 +28,7 @@ _VALUES = {
     "-e": "an enclave",
     "--log-config-file": "a file",
 }
+_LONGEST_SHOWN = 100
 _LONG = {"--remap": "-r", "--param": "-p", "--enclave": "-e"}
 _UNUSED = ("-e", "--log-config-file")
 _LEVELS = ("debug", "info", "warn", "error", "fatal")
@@ -116,7 +116,8 @@ def _pairs(words: Sequence[str]) -> Iterator[tuple[str, str]]:
         flag = _LONG.get(word, word)
         if not inside and word != "--ros-args":
             raise TransportError(
-                f"{word!r} is no argument of ROS 2: it should be as --ros-args -r image_raw:=camera/image -p fps:=15"
+                f"{word[:_LONGEST_SHOWN]!r} is no argument of ROS 2: it should be as --ros-args "
+                "-r image_raw:=camera/image -p fps:=15"
             )
         if word in {"--ros-args", "--"}:
             inside = word == "--ros-args"
@@ -129,22 +130,24 @@ def _pairs(words: Sequence[str]) -> Iterator[tuple[str, str]]:
             yield word, ""
         elif word not in _WITHOUT_VALUE:
             known = ", ".join(_VALUES)
-            raise TransportError(f"{word!r} is no argument of ROS 2: after --ros-args there may be {known}")
+            raise TransportError(
+                f"{word[:_LONGEST_SHOWN]!r} is no argument of ROS 2: after --ros-args there may be {known}"
+            )
 
 
 def _remap(text: str) -> Iterator[Remap]:
     source, assigned, target = text.partition(":=")
     rule = _RULE.fullmatch(source)
     if not (assigned and target and rule):
-        raise TransportError(f"-r {text}: it should be {_VALUES['-r']}")
+        raise TransportError(f"-r {_shown(text)}: it should be {_VALUES['-r']}")
     name = rule["name"]
     if name.startswith("rosservice://"):
         return  # the nodes have no services
     name = {"__name": "__node"}.get(name, name.removeprefix("rostopic://"))
     if name.startswith("__") and name not in {"__node", "__ns"}:
-        raise TransportError(f"-r {text}: there is no {name}; there are __node and __ns")
+        raise TransportError(f"-r {_shown(text)}: there is no {_shown(name)}; there are __node and __ns")
     if "*" in source or "\\" in target:
-        raise TransportError(f"-r {text}: ROS 2 has no wildcards in remapping rules")
+        raise TransportError(f"-r {_shown(text)}: ROS 2 has no wildcards in remapping rules")
     yield Remap(name, target.removeprefix("rostopic://"), rule["node"])
 
 
@@ -152,23 +155,16 @@ def _parameter(text: str) -> ParameterRule:
     source, assigned, value = text.partition(":=")
     rule = _PARAMETER.fullmatch(source)
     if not (assigned and rule):
-        raise TransportError(f"-p {text}: it should be {_VALUES['-p']}")
-    try:
-        parsed = yaml.safe_load(value)
-    except yaml.YAMLError:
-        raise TransportError(f"-p {text}: {value!r} is no YAML value") from None
+        raise TransportError(f"-p {_shown(text)}: it should be {_VALUES['-p']}")
+    parsed = plain_yaml.parse(value, f"-p {_shown(text)}", TransportError)
     node = rule["node"]
     pattern = "/**" if node is None else node if node.startswith("/") else f"/**/{node}"
     return ParameterRule(pattern, dict(_flat("", {rule["name"]: parsed})))
 
 
 def _parameter_file(path: Path) -> list[ParameterRule]:
-    try:
-        content = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise TransportError(f"--params-file {path}: {error.strerror}") from None
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise TransportError(f"--params-file {path}: it is no YAML ({error})") from None
+    source = f"--params-file {path}"
+    content = plain_yaml.read(path, source, TransportError, source)
     rules = list(_file_rules(path, "", content))
     if not rules:
         raise TransportError(f"--params-file {path}: it has no ros__parameters; it should be as {_FILE_EXAMPLE}")
@@ -199,5 +195,9 @@ def _flat(prefix: str, values: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
 def _log_level(text: str) -> str | None:
     logger, assigned, level = text.rpartition(":=")
     if level.lower() not in _LEVELS:
-        raise TransportError(f"--log-level {text}: it should be one of {', '.join(_LEVELS)}")
+        raise TransportError(f"--log-level {_shown(text)}: it should be one of {', '.join(_LEVELS)}")
     return None if assigned and logger else level.lower()
+
+
+def _shown(text: str) -> str:
+    return text if text.isprintable() and len(text) <= _LONGEST_SHOWN else repr(text[:_LONGEST_SHOWN])

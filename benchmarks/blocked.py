@@ -1,0 +1,147 @@
+"""How late Stop and commands are while the page's server stands still, or a thread keeps the interpreter.
+
+Run ``python benchmarks/blocked.py``. The whole graph runs as in ``handsteer run``, in one process, in real time: the
+virtual hand shows Forward and is taken away, by turns; nobody looks at the page. Each trial waits until the robot is
+driven, publishes ``true`` on ``/stop`` at a planned moment, and waits for the first zero on ``cmd_vel``. The time
+counts from the plan, so that what holds up the benchmark itself is counted too.
+"""
+
+import argparse
+import ctypes
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+import numpy as np
+from nicegui import core
+
+from handsteer.config import load
+from handsteer.dashboard.server import Dashboard
+from handsteer.graph import Graph
+from handsteer.messages import CMD_VEL, STOP, Bool, Twist
+from handsteer.transports.protocol import Received
+
+BLOCKED_S, HELD_S, FREE_S = 5.0, 0.3, 0.05
+DRIVEN_TIMEOUT_S, STOPPED_TIMEOUT_S = 6.0, 5.0
+
+
+class Commands:
+    """The commands that come, and when."""
+
+    def __init__(self) -> None:
+        self._news = threading.Condition()
+        self.came: list[tuple[float, bool]] = []  # when, and whether it moves the robot
+
+    def take(self, received: Received[Twist]) -> None:
+        with self._news:
+            twist = received.message
+            self.came.append((time.perf_counter(), bool(twist.linear.x or twist.angular.z)))
+            self._news.notify_all()
+
+    def wait_for(self, moving: bool, since_s: float, timeout_s: float) -> float | None:
+        """Return when the first command came that does, or does not, move the robot; None when none comes in time."""
+
+        def found() -> float | None:
+            return next((at_s for at_s, moves in self.came if at_s >= since_s and moves is moving), None)
+
+        with self._news:
+            return self._news.wait_for(found, timeout_s)
+
+
+@contextmanager
+def undisturbed() -> Iterator[None]:
+    yield
+
+
+@contextmanager
+def blocked_page() -> Iterator[None]:
+    """Block the event loop of the page's server, for longer than a trial takes."""
+    ended = threading.Event()
+
+    def block() -> None:
+        while not ended.is_set():
+            time.sleep(BLOCKED_S)
+
+    core.loop.call_soon_threadsafe(block)
+    yield
+    ended.set()
+
+
+@contextmanager
+def held_interpreter() -> Iterator[None]:
+    """Hold the interpreter again and again, as a library does that does not let go of it."""
+    ended = threading.Event()
+    usleep = ctypes.PyDLL(None).usleep
+
+    def hold() -> None:
+        while not ended.wait(FREE_S):
+            usleep(int(1e6 * HELD_S))
+
+    thread = threading.Thread(target=hold)
+    thread.start()
+    yield
+    ended.set()
+    thread.join()
+
+
+def measure(
+    graph: Graph, commands: Commands, disturbance: Callable[[], "contextmanager[None]"], trials: int
+) -> tuple[list[float], list[float], int]:
+    """Return milliseconds from each planned Stop to the first zero, and between commands, and undriven trials."""
+    stop = graph.transport.advertise("benchmark", STOP)
+    random = np.random.default_rng(0)
+    late_ms: list[float] = []
+    apart_ms: list[float] = []
+    undriven = 0
+    with disturbance():
+        for _ in range(trials):
+            began_s = time.perf_counter()
+            stop.publish(Bool(data=False))
+            driven = commands.wait_for(True, began_s, DRIVEN_TIMEOUT_S)
+            undriven += driven is None
+            planned_s = time.perf_counter() + random.uniform(0.1, 0.6)
+            time.sleep(max(0.0, planned_s - time.perf_counter()))
+            stop.publish(Bool(data=True))
+            zero_s = commands.wait_for(False, planned_s, STOPPED_TIMEOUT_S)
+            late_ms.append(1000 * (zero_s - planned_s) if zero_s is not None else np.inf)
+            if driven is not None:
+                moments = [at_s for at_s, _ in commands.came if driven <= at_s <= planned_s]
+                apart_ms += (1000 * np.diff(moments)).tolist()
+    return late_ms, apart_ms, undriven
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description="Tell how late Stop is while something stands still.")
+    parser.add_argument("--trials", type=int, default=20, help="of each kind")
+    options = parser.parse_args()
+    config = load(
+        base={
+            "camera": {"source": "virtual", "width": 320, "height": 240, "fps": 30},
+            "virtual_hand": {"script": "NONE:0.6 Forward:1.5"},
+            "dashboard": {"port": 0},
+        }
+    )
+    commands = Commands()
+    with Graph(config) as graph:
+        dashboard = Dashboard.of(graph)
+        dashboard.start()
+        graph.transport.subscribe("benchmark", CMD_VEL, commands.take)
+        graph.start()
+        kinds = {
+            "nothing": undisturbed,
+            f"the page's event loop stands still for {BLOCKED_S:g} s at a time": blocked_page,
+            f"a thread holds the interpreter, {HELD_S:g} s of every {HELD_S + FREE_S:g}": held_interpreter,
+        }
+        print("what disturbs                                                Stop to zero, ms    between commands, ms")
+        print("                                                             median     most     median     most")
+        for name, disturbance in kinds.items():
+            late, apart, undriven = measure(graph, commands, disturbance, options.trials)
+            between = f"{np.median(apart):10.1f} {max(apart):8.1f}" if apart else f"{'-':>10} {'-':>8}"
+            note = f"   {undriven} of {options.trials} not driven at all" if undriven else ""
+            print(f"{name:58} {np.median(late):10.1f} {max(late):8.1f} {between}{note}")
+        dashboard.stop()
+
+
+if __name__ == "__main__":
+    main()

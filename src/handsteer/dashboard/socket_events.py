@@ -1,0 +1,138 @@
+"""What browsers say by the page's websocket, looked at before NiceGUI believes it.
+
+NiceGUI takes the page that an event is for from the event itself. Here a websocket speaks for the page alone that was
+served to the same browser, and only in the shape that its script has.
+"""
+
+import logging
+from collections.abc import Awaitable, Callable, Mapping
+from inspect import isawaitable
+from typing import Any, Final
+from urllib.parse import parse_qs
+
+from nicegui import Client
+from socketio import AsyncServer
+from socketio.exceptions import ConnectionRefusedError as Refused
+
+from handsteer.dashboard.access import SESSION
+
+Check = Callable[[Any], bool]
+log = logging.getLogger(__name__)
+
+_REFUSED: Final = "Implicit handshake failed"
+"""At these words NiceGUI's script loads the page anew, which gives it a session."""
+
+_LONGEST_NAME: Final = 100
+_LONGEST_LOG: Final = 300
+_MOST_ARGUMENTS: Final = 20
+_LEVELS: Final = ("debug", "info", "warning", "error")
+
+
+def _is_name(value: Any) -> bool:
+    return isinstance(value, str) and 0 < len(value) <= _LONGEST_NAME
+
+
+def _is_count(value: Any) -> bool:
+    return isinstance(value, int) and not isinstance(value, bool) and 0 <= value < 2**53
+
+
+def _is_decimal(value: Any) -> bool:
+    return _is_count(value) or (isinstance(value, str) and value.isdecimal() and len(value) <= 16)
+
+
+def _are_arguments(values: Any) -> bool:
+    return (
+        isinstance(values, list)
+        and len(values) <= _MOST_ARGUMENTS
+        and all(each is None or isinstance(each, str) for each in values)
+    )
+
+
+_HANDSHAKE: Final[dict[str, Check]] = {
+    "client_id": _is_name,
+    "tab_id": _is_name,
+    "document_id": _is_name,
+    "next_message_id": _is_decimal,
+}
+_SHAPES: Final[dict[str, dict[str, Check]]] = {
+    "event": {"client_id": _is_name, "id": _is_count, "listener_id": _is_name, "args": _are_arguments},
+    "javascript_response": {"client_id": _is_name, "request_id": _is_name},
+    "ack": {"client_id": _is_name, "next_message_id": _is_count},
+    "log": {"client_id": _is_name, "level": lambda level: level in _LEVELS, "message": lambda _: True},
+}
+
+
+class SocketEvents:
+    """Stands before the handlers that NiceGUI has on its Socket.IO server.
+
+    Args:
+        server: The server; its handlers are replaced.
+    """
+
+    def __init__(self, server: AsyncServer) -> None:
+        self._server = server
+        self._handlers: dict[str, Callable[..., Any]] = dict(server.handlers["/"])
+        self._pages: dict[str, str] = {}  # the page of each websocket that has shaken hands
+        server.on("connect", self._connect)
+        server.on("handshake", self._handshake)
+        server.on("disconnect", self._disconnect)
+        for name in _SHAPES:
+            server.on(name, self._checked(name))
+
+    async def _connect(self, socket: str, environ: dict[str, Any], _: Any = None) -> None:
+        query = {name: values[0] for name, values in parse_qs(str(environ.get("QUERY_STRING", ""))).items()}
+        if query.get("implicit_handshake") == "true" and not await self._shake_hands(socket, query, environ):
+            raise Refused(_REFUSED)
+
+    async def _handshake(self, socket: str, said: Any = None, *_: Any) -> bool:
+        return await self._shake_hands(socket, said, self._server.get_environ(socket) or {})
+
+    async def _shake_hands(self, socket: str, said: Any, environ: dict[str, Any]) -> bool:
+        if not _fits(said, _HANDSHAKE) or not is_page_of(said["client_id"], environ.get("asgi.scope", {})):
+            _note("handshake")
+            return False
+        if not await self._handlers["handshake"](socket, {name: said[name] for name in (*_HANDSHAKE,)} | _old(said)):
+            return False
+        self._pages[socket] = said["client_id"]
+        return True
+
+    def _disconnect(self, socket: str, *_: Any) -> None:
+        self._pages.pop(socket, None)
+        self._handlers["disconnect"](socket)
+
+    def _checked(self, name: str) -> Callable[..., Awaitable[None]]:
+        """Return what takes the events ``name`` of all websockets."""
+
+        async def take(socket: str, said: Any = None, *_: Any) -> None:
+            if not _fits(said, _SHAPES[name]) or self._pages.get(socket) != said["client_id"]:
+                _note(name)
+                return
+            if name == "log":
+                said = {**said, "message": f"the browser says: {str(said['message'])[:_LONGEST_LOG]!r}"}
+            try:
+                answer = self._handlers[name](socket, said)
+                if isawaitable(answer):
+                    await answer
+            except Exception as error:  # NiceGUI believes what it is told
+                _note(name, error)
+
+        return take
+
+
+def is_page_of(page: str, scope: Mapping[str, Any]) -> bool:
+    """Return whether the request of ``scope`` is of the browser to which ``page`` was served."""
+    client = Client.instances.get(page)
+    session = scope.get("state", {}).get(SESSION)
+    return bool(client and session) and client.request.scope["state"].get(SESSION) == session  # type: ignore[union-attr]
+
+
+def _fits(said: Any, shape: dict[str, Check]) -> bool:
+    return isinstance(said, dict) and all(name in said and check(said[name]) for name, check in shape.items())
+
+
+def _old(said: dict[str, Any]) -> dict[str, Any]:
+    return {"old_tab_id": said["old_tab_id"]} if _is_name(said.get("old_tab_id")) else {}
+
+
+def _note(name: str, error: Exception | None = None) -> None:
+    log.warning("an event %r of a browser makes no sense, and was left out%s", name, f": {error!r}" if error else "")

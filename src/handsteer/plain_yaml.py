@@ -1,0 +1,162 @@
+"""Reads YAML that came from anywhere: plain values only, within limits that no file of ours comes near.
+
+A few hundred bytes of YAML can stand for gigabytes (aliases of aliases, merge keys), nest as deep as a stack goes, or
+hold a number that takes minutes to read. So a text is looked through, event by event, before anything is built of it.
+"""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, Final
+
+import yaml
+
+from handsteer.errors import HandsteerError
+
+LARGEST_BYTES: Final = 1_000_000
+"""Of a text; the largest that is shipped has 4 kB."""
+
+MOST_VALUES: Final = 20_000
+"""Keys, values, lists and tables together; a thing of a world has some 20."""
+
+DEEPEST: Final = 32
+"""Lists and tables within one another."""
+
+LONGEST_NUMBER: Final = 64
+"""Characters; Python takes minutes for some of millions."""
+
+_TAG = "tag:yaml.org,2002:"
+_COLLECTIONS = frozenset({f"{_TAG}seq", f"{_TAG}map"})
+_NUMBERS = frozenset({f"{_TAG}int", f"{_TAG}float"})
+_SCALARS = _NUMBERS | {f"{_TAG}str", f"{_TAG}bool", f"{_TAG}null"}
+
+
+# Without libyaml, which all wheels have, the other reads the same, more slowly.
+class _Loader(getattr(yaml, "CSafeLoader", yaml.SafeLoader)):  # type: ignore[misc]
+    """Knows texts, numbers, truth values and null; a date is a text, as in JSON and in ROS 2's parameter files."""
+
+
+_Loader.yaml_implicit_resolvers = {
+    first: [(tag, pattern) for tag, pattern in rules if tag in _SCALARS]
+    for first, rules in yaml.SafeLoader.yaml_implicit_resolvers.items()
+}
+
+
+class _ProblemError(Exception):
+    def __init__(self, reason: str, mark: Any = None) -> None:
+        super().__init__(reason)
+        self.line = getattr(mark, "line", None)
+
+
+def parse(text: str | bytes, source: str, error: type[HandsteerError]) -> Any:
+    """Return the value that ``text`` stands for: None, truth values, numbers, texts, lists and dicts of such.
+
+    Args:
+        text: YAML of at most :data:`LARGEST_BYTES`, without anchors, aliases, merge keys (``<<``) and tags but those of
+            plain values.
+        source: What errors call it, such as the name of a file.
+        error: What is raised.
+
+    Raises:
+        HandsteerError: It is no such text; of the type given. One line names the source, the line and the reason.
+    """
+    try:
+        if len(text) > LARGEST_BYTES:
+            raise _ProblemError(f"is larger than {LARGEST_BYTES // 1000} kB, which no such file should be")
+        _look_through(text)
+        return yaml.load(text, _Loader)
+    except _ProblemError as problem:
+        reason, line = str(problem), problem.line
+    except yaml.YAMLError as problem:
+        reason, line = "not valid YAML", getattr(getattr(problem, "problem_mark", None), "line", None)
+    except ValueError:  # what is no text in UTF-8
+        reason, line = "not valid YAML", None
+    raise error(f"{source}{_at(line, text)}: {reason}") from None
+
+
+def read(path: Path, source: str, error: type[HandsteerError], unreadable: str) -> Any:
+    """Return the value in the file ``path``, as :func:`parse` does.
+
+    Args:
+        path: The file; no more of it is read than may be.
+        source: What errors call it.
+        error: What is raised.
+        unreadable: What the error says when it cannot be read; the system's reason is put behind it.
+
+    Raises:
+        HandsteerError: As :func:`parse`, or the file cannot be read.
+    """
+    try:
+        with path.open("rb") as file:
+            content = file.read(LARGEST_BYTES + 1)
+    except OSError as problem:
+        raise error(f"{unreadable}: {problem.strerror}") from None
+    try:
+        text: str | bytes = content.decode("utf-8-sig") if len(content) <= LARGEST_BYTES else content
+    except UnicodeDecodeError:
+        raise error(f"{source}: not valid YAML") from None
+    return parse(text, source, error)
+
+
+def _at(line: int | None, text: str | bytes) -> str:
+    if line is None:
+        return ""
+    last = (text if isinstance(text, bytes) else text.encode(errors="replace")).rstrip().count(b"\n")
+    return f", line {min(line, last) + 1}"  # libyaml finds the end on a line after the last
+
+
+def _look_through(text: str | bytes) -> None:
+    depth = 0
+    for count, event in enumerate(_events(text)):
+        if count > MOST_VALUES:
+            raise _ProblemError(f"more than {MOST_VALUES} values", event.start_mark)
+        if isinstance(event, yaml.CollectionStartEvent):
+            depth += 1
+            if depth > DEEPEST:
+                raise _ProblemError(f"lists and tables are nested more than {DEEPEST} deep", event.start_mark)
+            if event.tag not in (None, "!", *_COLLECTIONS):
+                raise _unknown_tag(event)
+        elif isinstance(event, yaml.ScalarEvent):
+            _check_scalar(event)
+        else:
+            depth -= 1
+
+
+def _events(text: str | bytes) -> Iterator[Any]:
+    """Yield what begins and ends in ``text``, and its scalars."""
+    for event in yaml.parse(text, _Loader):
+        if isinstance(event, yaml.AliasEvent) or getattr(event, "anchor", None) is not None:
+            raise _ProblemError("anchors (&) and aliases (*) are not read here: write the value out", event.start_mark)
+        if isinstance(event, yaml.ScalarEvent | yaml.CollectionStartEvent | yaml.CollectionEndEvent):
+            yield event
+
+
+def _check_scalar(event: Any) -> None:
+    is_plain = event.tag is None and not event.style
+    if is_plain and event.value == "<<":
+        raise _ProblemError("merge keys (<<) are not read here: write the values out", event.start_mark)
+    found = _RESOLVER.resolve(yaml.ScalarNode, event.value, (True, False))  # type: ignore[no-untyped-call]
+    tag = found if is_plain else event.tag
+    if tag in (None, "!"):
+        return
+    if tag not in _SCALARS:
+        raise _unknown_tag(event)
+    if tag in _NUMBERS and len(event.value) > LONGEST_NUMBER:
+        raise _ProblemError(f"a number of {len(event.value)} characters: {LONGEST_NUMBER} are enough", event.start_mark)
+    if tag not in (f"{_TAG}str", found) and not (tag == f"{_TAG}float" and found == f"{_TAG}int"):
+        name = tag.removeprefix(_TAG)
+        raise _ProblemError(f"{_short(event.value)} cannot be read as !!{name}", event.start_mark)
+
+
+def _unknown_tag(event: Any) -> _ProblemError:
+    return _ProblemError(f"the tag {_short(event.tag)} is not read here: leave it out", event.start_mark)
+
+
+def _short(text: str) -> str:
+    return repr(text if len(text) <= 40 else f"{text[:37]}...")
+
+
+class _Resolver(yaml.resolver.BaseResolver):
+    yaml_implicit_resolvers = _Loader.yaml_implicit_resolvers
+
+
+_RESOLVER = _Resolver()
