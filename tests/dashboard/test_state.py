@@ -67,6 +67,24 @@ NO_HAND = report("no hand is in view", sign="NONE", seen="NONE")
         ),
         (
             {
+                "hand_sign_control": report(
+                    "standing: disarmed, moves once Stop is shown", source="signs", armed="False"
+                ),
+                "hand_sign_recognition": report("no hand is in view", sign="NONE", seen="NONE"),
+            },
+            ("standing", "Standing", "disarmed, moves once Stop is shown"),
+        ),
+        (
+            {
+                "hand_sign_control": report(
+                    "standing: disarmed, moves once Stop is shown", source="signs", armed="False"
+                ),
+                "hand_sign_recognition": report("the camera is frozen: the same picture for 1.0 s", WARN, sign="NONE"),
+            },
+            ("standing", "Standing", "the camera is frozen: the same picture for 1.0 s"),
+        ),
+        (
+            {
                 "hand_sign_control": control("standing: the Stop sign is shown"),
                 "hand_sign_recognition": report("Stop is shown", sign="Stop", seen="Stop"),
             },

@@ -109,7 +109,7 @@ def drive(visit: Visit) -> None:
     page.locator(".lesson").get_by_role("link", name="Drive").click()
     page.get_by_role("button", name="Reset").click()
     page.locator(".banner .headline", has_text="Standing").wait_for()
-    # The empty picture of the robot's own camera must have been seen, or the sign moves nothing after a reset.
+    # The empty picture of the robot's own camera must have been seen for a while, or no sign moves it after a reset.
     visit.wait_until(lambda: "disarmed" not in visit.text(".banner"))
     page.get_by_role("button", name="Use this device's camera").click()
     visit.wait_until(lambda: visit.text(".camera .sign") == "Two")

@@ -243,6 +243,8 @@ def explain(reports: Mapping[str, Report], viewers: Viewers = NOBODY) -> tuple[M
         return "driving", "Driving", reason if robot.level == OK else f"{reason}, but the robot {robot.message}"
     steered = control.values.get("source") == "steering"
     mood, obstacle = ("standing", None) if steered else _why_no_sign(reports)
+    if control.values.get("armed") == str(False) and "seen" in reports.get("hand_sign_recognition", _NO_REPORT).values:
+        obstacle = None  # that no sign is seen is what it waits for
     return mood, "Standing", obstacle or reason
 
 

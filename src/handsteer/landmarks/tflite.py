@@ -1,5 +1,6 @@
 """One TensorFlow Lite model that looks at a square picture."""
 
+import time
 from pathlib import Path
 
 import cv2
@@ -10,6 +11,8 @@ from numpy.typing import NDArray
 from handsteer.errors import ModelCorrupt
 
 _PER_LEVEL = np.float32(1 / 255)
+_TRIES = 5
+_BETWEEN_TRIES_S = 0.001
 
 
 class PictureModel:
@@ -43,5 +46,17 @@ class PictureModel:
         np.multiply(cv2.cvtColor(picture, cv2.COLOR_BGR2RGB), _PER_LEVEL, out=self._levels[0])
         # Copies: the interpreter refuses to run while anything, such as a logged error, holds a view of its memory.
         self._interpreter.set_tensor(self._input, self._levels)
-        self._interpreter.invoke()
+        self._invoke()
         return [self._interpreter.get_tensor(output)[0] for output in self._outputs]
+
+    def _invoke(self) -> None:
+        for tries_left in reversed(range(_TRIES)):
+            try:
+                self._interpreter.invoke()
+            except RuntimeError as error:
+                # It counts the references to its own part; a thread that looks through all objects holds one too.
+                if "internal data" not in str(error) or not tries_left:
+                    raise
+                time.sleep(_BETWEEN_TRIES_S)
+            else:
+                return

@@ -199,6 +199,7 @@ class HandSignControlNode(Node):
             self._reason,
             source=self._driver.source,
             stopped=self._safety.is_stopped,
+            armed=self._safety.signs_wait is None,
             linear_mps=f"{velocity.linear_mps:.3f}",
             angular_radps=f"{velocity.angular_radps:.3f}",
             **({"robot": self._selection.fleet.selected} if self._selection else {}),

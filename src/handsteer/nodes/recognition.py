@@ -117,8 +117,11 @@ class HandSignRecognitionNode(Node):
         began_s = self.clock.now()
         captured_s = received.captured_s if received.captured_s is not None else began_s
         self._refused = self._age.why_refused(began_s, captured_s)
+        image = picture_of(received.message)
         if self._refused is None:
-            self._look_at(picture_of(received.message), received, began_s, captured_s)
+            self._look_at(image, received, began_s, captured_s)
+        else:
+            self._freshness.why_refused(image, 0.0)  # it is not new either when it comes again with another stamp
         if self._refused is not None:
             self._refused_s = began_s  # a stale frame, or one that is not new, is no frame: the watch publishes NONE
 
