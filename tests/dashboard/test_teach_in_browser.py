@@ -109,8 +109,9 @@ def drive(visit: Visit) -> None:
     page.locator(".lesson").get_by_role("link", name="Drive").click()
     page.get_by_role("button", name="Reset").click()
     page.locator(".banner .headline", has_text="Standing").wait_for()
-    # The empty picture of the robot's own camera must have been seen for a while, or no sign moves it after a reset.
-    visit.wait_until(lambda: "disarmed" not in visit.text(".banner"))
+    # A webcam that has left shows nothing, not even that no hand is there: the robot's own camera does.
+    page.get_by_role("button", name="Use the robot's camera").click()
+    visit.wait_until(lambda: "no hand" in visit.text(".banner") and "disarmed" not in visit.text(".banner"))
     page.get_by_role("button", name="Use this device's camera").click()
     visit.wait_until(lambda: visit.text(".camera .sign") == "Two")
     visit.wait_until(lambda: robot.state.angular_radps > 0.2)
