@@ -17,6 +17,8 @@ from handsteer.transports.protocol import Publisher, Received, Subscription, Tra
 from handsteer.transports.stamps import capture_time
 
 M = TypeVar("M")
+_Link = tuple[str, str]
+"""A topic and the node that sends."""
 
 
 @dataclass(frozen=True)
@@ -26,7 +28,7 @@ class LinkFault:
     Attributes:
         drop: How likely each is lost, 0 to 1.
         delay_s: How long each is under way, in seconds.
-        jitter_s: By how much longer at most, by chance; messages may overtake one another by it.
+        jitter_s: By how much longer at most, by chance. As over DDS, Zenoh and TCP, none overtakes another.
         duplicate: How likely each comes twice, 0 to 1.
         reorder: How likely each comes after the next one, 0 to 1; the last one, for which no next one comes, stays
             under way.
@@ -92,6 +94,8 @@ class FaultTransport:
         self._carries_capture_times = carries_capture_times
         self._random = random.Random(seed)
         self._faults: dict[tuple[str, str | None], LinkFault] = {}
+        # When the last message of each link comes, of those that keep their order.
+        self._due_s: dict[_Link, float] = {}
         self.wire = _Wire(inner, clock)
 
     def spoil(self, topic: Topic[Any] | str, fault: LinkFault, *, sender: str | None = None) -> None:
@@ -143,6 +147,7 @@ class FaultTransport:
                 self.wire.hold(link, math.inf, deliver)
             else:
                 due_s = self._clock.now() + fault.delay_s + self._random.uniform(0.0, fault.jitter_s)
+                due_s = self._due_s[link] = max(due_s, self._due_s.get(link, due_s))
                 self.wire.hold(link, due_s, deliver)
                 self.wire.follow(link, due_s)
 
@@ -182,9 +187,6 @@ class FaultPublisher(Generic[M]):
         late = self._lateness is not None and self._lateness.is_late(b"", sent_s, self._transport.now())
         if not late:
             self._inner.publish(message, self._transport.captured(message, captured_s))
-
-
-_Link = tuple[str, str]
 
 
 @dataclass(order=True)
