@@ -1,9 +1,9 @@
 """Whether anything grows, or drifts, when handsteer runs for long.
 
-Run ``python benchmarks/soak.py``; parts by name: ``page``, ``hours``. ``page`` runs the whole graph in this process, on
-a film of the virtual hand at 640x480 and 60 frames a second, with one viewer of the page, while others come and go; all
-of them are in processes of their own. ``hours`` drives for hours of stepped time, all nodes in turn, with a painted hand
-in place of the camera and the landmark models, and the simulated robot.
+Run ``python benchmarks/soak.py``; parts by name: ``page``, ``hours``. ``page`` runs the whole graph in this process,
+on a film of the virtual hand at 640x480 and 60 frames a second, with one viewer of the page, while others come and go;
+all of them are in processes of their own. ``hours`` drives for hours of stepped time, all nodes in turn, with a painted
+hand in place of the camera and the landmark models, and the simulated robot.
 """
 
 import argparse

@@ -1,5 +1,6 @@
 """All five nodes in stepped time, on a transport with faults; each can be frozen, killed and made anew."""
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -50,7 +51,6 @@ SPEED_MPS = 0.3
 REAL_CMD_VEL = Topic("/cmd_vel", Twist, depth=10)
 REAL_ODOM = Topic("/odom", Odometry)
 NO_COVARIANCE = np.zeros(36)
-ARMED = {"arming": "on"} if "arming" in ControlConfig.model_fields else {}
 
 
 class Chain:
@@ -143,7 +143,7 @@ class Chain:
             self._note()
             due_s = min((node.next_due_s for node in alive if node.next_due_s is not None), default=end_s)
             # As often, at least, as the robot's own watchdog looks.
-            self.clock.advance_to(min(due_s, end_s, self.clock.now() + 0.01))
+            self.clock.advance_to(min(due_s, end_s, self.clock.now() + 0.02))
             if self.clock.now() >= end_s:
                 break
         self._note()
@@ -164,10 +164,10 @@ class Chain:
             self.said[status.name] = status.message
 
     def _limits(self) -> ControlConfig:
-        return ControlConfig.model_validate({"max_linear": SPEED_MPS, "linear_step": 0.05, **ARMED})
+        return ControlConfig.model_validate({"max_linear": SPEED_MPS, "linear_step": 0.05})
 
     def _control(self) -> Node:
-        return HandSignControlNode(self.faults, self.clock, self._limits())
+        return HandSignControlNode(self.faults, self.clock, self._limits(), arming=True)
 
     def _robot(self) -> Node:
         return RobotNode(self.faults, self.clock, self._driven(), RobotConfig())
@@ -237,7 +237,7 @@ class RealRobot(Node):
 
     def __init__(self, chain: Chain) -> None:
         super().__init__("real_robot", chain.faults, chain.clock)
-        self.odometry_mps = 0.0
+        self.is_senseless = False
         self._base = chain.base
         self._odom = self.publisher(REAL_ODOM)
         self.subscribe(REAL_CMD_VEL, lambda received: self._base.command(*_speeds(received.message)))
@@ -246,7 +246,8 @@ class RealRobot(Node):
     def _say(self) -> None:
         pose = Pose(Point(0.0, 0.0, 0.0), Quaternion(0.0, 0.0, 0.0, 1.0))
         at = PoseWithCovariance(pose, NO_COVARIANCE)
-        moving = TwistWithCovariance(twist(self.odometry_mps, 0.0), NO_COVARIANCE)
+        speed_mps = self._base.speed_mps if self._base.is_asked_to_move else 0.0
+        moving = TwistWithCovariance(twist(math.nan if self.is_senseless else speed_mps, 0.0), NO_COVARIANCE)
         self._odom.publish(Odometry(Header(self.clock.stamp(self.clock.now()), "odom"), "base_link", at, moving))
 
 

@@ -53,6 +53,7 @@ class Row:
         end: Ends it.
         end_reason: Ends the reason to drive where the fault does not: the robot may drive on till then.
         by_stick: Whether the page's stick drives, and not a hand.
+        lasts_s: For how long.
         is_for_good: Whether the robot has to stand even when the fault is over and neutral was seen.
         make: Builds the chain.
     """
@@ -63,6 +64,7 @@ class Row:
     end: Act = nothing
     end_reason: Act = nothing
     by_stick: bool = False
+    lasts_s: float = 2.0
     is_for_good: bool = False
     make: Callable[[], Chain] = Chain
 
@@ -102,6 +104,7 @@ def _cameras() -> Iterator[Row]:
 
         def end(chain: Chain) -> None:
             chain.camera.recover()
+            chain.run(2.0)  # one that was lost is looked for again now and then
 
         yield Row("camera", words, begin, end, lower_the_hand if leaves else nothing)
 
@@ -130,39 +133,35 @@ def _links() -> Iterator[Row]:
 
             words_too = f"{words}; then the driver lets go" if leaves else words
             ends = lower_the_hand if leaves else nothing
-            yield Row(topic.name, words_too, begin, end, ends, by_stick=topic is STEERING_CMD_VEL)
+            by_stick = topic is STEERING_CMD_VEL
+            yield Row(topic.name, words_too, begin, end, ends, by_stick=by_stick)
+            if fault is CUT:
+                yield Row(topic.name, f"{words} for 1 s", begin, end, ends, by_stick=by_stick, lasts_s=1.0)
 
 
 def _nodes() -> Iterator[Row]:
     for name in ("camera", "recognition", "control", "robot", "steering"):
         by_stick = name == "steering"
-
-        def freeze(chain: Chain, name: str = name) -> None:
-            chain.freeze(name)
-
-        def thaw(chain: Chain, name: str = name) -> None:
-            chain.thaw(name)
-
-        def kill(chain: Chain, name: str = name) -> None:
-            chain.kill(name)
-
-        def make(chain: Chain, name: str = name) -> None:
-            chain.make(name)
+        # Whoever steered has to take the wheel again on the new page.
+        anew = "; its page comes anew" if by_stick else ""
+        soon = "killed, started again 0.3 s later"
+        lets_go = name == "camera"
 
         def kill_and_make(chain: Chain, name: str = name) -> None:
             chain.kill(name)
-            chain.make(name)
+            chain.run(0.3)
+            _made(name)(chain)
 
-        def end(chain: Chain, name: str = name) -> None:
-            chain.end(name)
-
-        yield Row(name, "frozen, then goes on", freeze, thaw, by_stick=by_stick)
-        yield Row(name, "killed, started again later", kill, make, by_stick=by_stick)
-        ends = lower_the_hand if name in {"camera", "steering"} else nothing
-        at_once = "killed, started again at once"
-        yield Row(name, f"{at_once}; then the driver lets go" if ends is not nothing else at_once, kill_and_make,
-                  end_reason=ends, by_stick=by_stick)
-        yield Row(name, "ended, started again later", end, make, by_stick=by_stick)
+        yield Row(name, "frozen for 2 s", _frozen(name), _unfrozen(name), by_stick=by_stick)
+        yield Row(name, f"killed, started again 2 s later{anew}", _killed(name), _made(name), by_stick=by_stick)
+        yield Row(
+            name,
+            f"{soon}; then the driver lets go" if lets_go else f"{soon}{anew}",
+            kill_and_make,
+            end_reason=lower_the_hand if lets_go else nothing,
+            by_stick=by_stick,
+        )
+        yield Row(name, f"ended, started again 2 s later{anew}", _ended(name), _made(name), by_stick=by_stick)
 
 
 def _clocks() -> Iterator[Row]:
@@ -183,17 +182,26 @@ def _values() -> Iterator[Row]:
             chain.freeze("control")
             _beat(chain, CMD_VEL, lambda: twist(SPEED_MPS, number))
 
-        yield Row("/steering/cmd_vel", f"{word}, by another", steer, _still)
+        yield Row("/steering/cmd_vel", f"{word}, by another; then the hand is lowered", steer, _hand_and_still)
         yield Row(CMD_VEL.name, f"{word} in a part, by another; the control is frozen", command, _unfrozen("control"))
-    for words, text in (("an unknown word", "Dance"), ("an empty text", ""), ("a text of 100,000 letters", "F" * 10**5)):
+    for words, text in (
+        ("an unknown word", "Dance"),
+        ("an empty text", ""),
+        ("a text of 100,000 letters", "F" * 10**5),
+    ):
 
         def sign(chain: Chain, text: str = text) -> None:
             chain.freeze("recognition")
             _beat(chain, HAND_SIGN, lambda: String(data=text))
             chain.run(0.5)
 
-        yield Row(HAND_SIGN.name, f"{words}, by another, without an end; the recognition is frozen; then it ends",
-                  sign, _unfrozen("recognition"), _still)
+        yield Row(
+            HAND_SIGN.name,
+            f"{words}, by another, without an end; the recognition is frozen; then it ends",
+            sign,
+            _unfrozen("recognition"),
+            _still,
+        )
     header = Header(stamp=Time(0, 0), frame_id="camera")
     whole = image_message(np.zeros((48, 64, 3), np.uint8), header)
     for words, image in (
@@ -220,15 +228,20 @@ def _seconds() -> Iterator[Row]:
         _beat(chain, CMD_VEL, lambda: twist(SPEED_MPS, 0.0))
         chain.run(0.5)
 
-    yield Row(CMD_VEL.name, "a second publisher drives, the hand is lowered; then it falls silent", drive,
-              end_reason=_still)
+    yield Row(
+        CMD_VEL.name, "a second publisher drives, the hand is lowered; then it falls silent", drive, end_reason=_still
+    )
 
     def show(chain: Chain) -> None:
         chain.show()
         _beat(chain, HAND_SIGN, lambda: String(data="Forward"))
 
-    yield Row(HAND_SIGN.name, "a second publisher says Forward, the hand is lowered; then it falls silent", show,
-              end_reason=_still)
+    yield Row(
+        HAND_SIGN.name,
+        "a second publisher says Forward, the hand is lowered; then it falls silent",
+        show,
+        end_reason=_still,
+    )
 
     def frozen_beside(chain: Chain) -> None:
         last = chain.hand.read().image
@@ -236,8 +249,12 @@ def _seconds() -> Iterator[Row]:
         stamp = chain.clock.stamp
         _beat(chain, IMAGE_RAW, lambda: image_message(last, Header(stamp(chain.clock.now()), "camera")))
 
-    yield Row(IMAGE_RAW.name, "a second camera shows one picture of Forward for ever, the hand is lowered",
-              frozen_beside, _still)
+    yield Row(
+        IMAGE_RAW.name,
+        "a second camera shows one picture of Forward for ever, the hand is lowered",
+        frozen_beside,
+        _still,
+    )
 
     def contradict(chain: Chain) -> None:
         chain.steering.halt()
@@ -278,8 +295,9 @@ def _stops() -> Iterator[Row]:
         def make(chain: Chain, name: str = name) -> None:
             chain.make(name)
 
-        yield Row(STOP.name, f"Stop, said once; the {name} is killed and started again", stop_and_kill, make,
-                  is_for_good=True)
+        yield Row(
+            STOP.name, f"Stop, said once; the {name} is killed and started again", stop_and_kill, make, is_for_good=True
+        )
 
 
 def _real_robots() -> Iterator[Row]:
@@ -287,6 +305,7 @@ def _real_robots() -> Iterator[Row]:
         return (lambda chain: chain.faults.spoil(topic, CUT)), (lambda chain: chain.faults.heal(topic))
 
     yield Row("real robot", "its commands are lost", *cut(REAL_CMD_VEL), make=RemoteChain)
+    yield Row("real robot", "its commands are lost for 1 s", *cut(REAL_CMD_VEL), lasts_s=1.0, make=RemoteChain)
     yield Row("real robot", "its odometry is lost", *cut(REAL_ODOM), make=RemoteChain)
 
     def leave(chain: Chain) -> None:
@@ -300,11 +319,11 @@ def _real_robots() -> Iterator[Row]:
 
     def senseless(chain: Chain) -> None:
         assert isinstance(chain, RemoteChain)
-        chain.real.odometry_mps = math.nan
+        chain.real.is_senseless = True
 
     def sensible(chain: Chain) -> None:
         assert isinstance(chain, RemoteChain)
-        chain.real.odometry_mps = 0.0
+        chain.real.is_senseless = False
 
     yield Row("real robot", "says NaN in its odometry", senseless, sensible, make=RemoteChain)
     for words, begin, end in (
@@ -334,6 +353,12 @@ def _still(chain: Chain) -> None:
         del chain.nodes["another"]
 
 
+def _hand_and_still(chain: Chain) -> None:
+    lower_the_hand(chain)
+    chain.run(0.1)
+    _still(chain)
+
+
 def _frozen(name: str) -> Act:
     return lambda chain: chain.freeze(name)
 
@@ -350,5 +375,14 @@ def _killed(name: str) -> Act:
     return lambda chain: chain.kill(name)
 
 
+def _ended(name: str) -> Act:
+    return lambda chain: chain.end(name)
+
+
 def _made(name: str) -> Act:
-    return lambda chain: chain.make(name)
+    def make(chain: Chain) -> None:
+        chain.make(name)
+        if name == "steering":
+            chain.page.holds_stick = False
+
+    return make

@@ -33,6 +33,7 @@ class Rules:
     _picture_s: float = -math.inf
     _hand_was_neutral: bool = False
     _stick_was_neutral: bool = False
+    _stands_by_s: float = math.inf
 
     def picture(self, *, asks: bool) -> None:
         """A live camera shows a hand that asks for motion, or one that does not, or none."""
@@ -53,8 +54,9 @@ class Rules:
             self._stick_asked_s = self.now_s
 
     def stop(self) -> None:
-        """Somebody says Stop."""
+        """Somebody says Stop: a robot that moves may do so for a moment yet, where the word takes its time."""
         self.is_stopped = True
+        self._stands_by_s = min(self._stands_by_s, self.now_s + PATIENCE_S)
 
     def reset(self) -> None:
         """Somebody takes the Stop back: whoever drives has to let go before anything moves."""
@@ -65,15 +67,24 @@ class Rules:
     def disarm(self) -> None:
         """Something was started, frozen, or away: whoever drives has to let go before anything moves."""
         self._hand_was_neutral = self._stick_was_neutral = False
+        self._stands_by_s = min(self._stands_by_s, self.now_s + PATIENCE_S)
+
+    def stands(self) -> None:
+        """The robot stands: if it has to, then from now on."""
+        if self._stands_by_s < math.inf:
+            self._stands_by_s = -math.inf
 
     def why_not(self) -> str | None:
         """Return why the robot must not be asked to move now; None where it may."""
-        if self.is_stopped:
-            return "Stop was said, and not taken back"
         by_hand = self._is_live(self._hand_asked_s) and self._hand_was_neutral
         by_stick = self._is_live(self._stick_asked_s) and self._stick_was_neutral
-        if by_hand or by_stick:
+        if (by_hand or by_stick) and not self.is_stopped:
+            self._stands_by_s = math.inf
             return None
+        if self.now_s <= self._stands_by_s < math.inf:
+            return None
+        if self.is_stopped:
+            return "Stop was said, and not taken back"
         if self._is_live(self._hand_asked_s) or self._is_live(self._stick_asked_s):
             return "nobody has let go since it was started, frozen, stopped or away"
         return f"nobody has asked for it for {PATIENCE_S} s"

@@ -22,29 +22,34 @@ def render(outcomes: Iterable[Outcome]) -> str:
 
 def cells(outcome: Outcome) -> tuple[str, ...]:
     """Return what stands in the row of ``outcome``; times are rounded to a twentieth of a second, upwards."""
-    again = "yes" if outcome.moves_again else "no"
-    zero = "–" if outcome.zero_s is None else f"{-(-round(outcome.zero_s, 3) // 0.05) * 0.05:.2f}"
-    return (f"`{outcome.where}`" if outcome.where.startswith("/") else outcome.where, outcome.fault, zero, again,
-            outcome.said)
+    twentieths = -(-round((outcome.zero_s or 0.0) * 1000) // 50)
+    return (
+        f"`{outcome.where}`" if outcome.where.startswith("/") else outcome.where,
+        outcome.fault,
+        "-" if outcome.zero_s is None else f"{twentieths / 20:.2f}",
+        "yes" if outcome.moves_again else "no",
+        outcome.said,
+    )
 
 
 def written(part: str) -> list[tuple[str, ...]]:
     """Return the rows of a part of the document, as :func:`cells` gives them."""
-    lines = _between(DOCUMENT.read_text(encoding="utf-8"), part).strip().splitlines()[2:]
+    text = DOCUMENT.read_text(encoding="utf-8")
+    lines = text[slice(*_place(text, part))].strip().splitlines()[2:]
     return [tuple(cell.strip() for cell in line.strip("|").split("|")) for line in lines]
 
 
 def write(part: str, outcomes: Sequence[Outcome]) -> None:
     """Put the rows into their part of the document, in place of those before."""
     text = DOCUMENT.read_text(encoding="utf-8")
-    before = _between(text, part)
-    DOCUMENT.write_text(text.replace(before, f"\n{render(outcomes)}"), encoding="utf-8")
+    start, end = _place(text, part)
+    DOCUMENT.write_text(f"{text[:start]}\n{render(outcomes)}{text[end:]}", encoding="utf-8")
 
 
-def _between(text: str, part: str) -> str:
+def _place(text: str, part: str) -> tuple[int, int]:
     found = re.search(rf"<!-- faults {part} -->\n(.*?)<!-- end of faults {part} -->", text, re.DOTALL)
     assert found, f"{DOCUMENT} has no place for the faults {part}"
-    return found[1]
+    return found.span(1)
 
 
 def _line(cells: Sequence[str]) -> str:

@@ -7,7 +7,6 @@ import logging
 import os
 from collections.abc import Callable
 
-import numpy as np
 from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, precondition, rule
@@ -24,7 +23,6 @@ from handsteer.robots.relay import Relay
 from handsteer.signs.drawing import annotate
 from handsteer.signs.opening import open_classifier
 from handsteer.transports.protocol import Received
-from tests.faults.chain import ARMED
 from tests.faults.domain import Domain
 from tests.faults.painted import FPS, PaintedCamera, painted_recognizer
 from tests.faults.rules import Rules
@@ -100,8 +98,8 @@ class Graph:
         )
 
     def _control(self) -> Node:
-        config = ControlConfig.model_validate({"linear_step": 0.2, "angular_step": 0.2, **ARMED})
-        return HandSignControlNode(self.domain, self.clock, config)
+        config = ControlConfig.model_validate({"linear_step": 0.2, "angular_step": 0.2})
+        return HandSignControlNode(self.domain, self.clock, config, arming=True)
 
 
 _PARTS = ("height", "width", "encoding", "is_bigendian", "step", "data")
@@ -137,6 +135,8 @@ class Histories(RuleBasedStateMachine):
         if self.graph.is_asked_to_move:
             why_not = self.rules.why_not()
             assert why_not is None, f"at {self.rules.now_s:.2f} s the robot is asked to move, though {why_not}"
+        else:
+            self.rules.stands()
 
     @rule(sign=st.sampled_from(MOTIONS + NEUTRAL), frames=st.integers(1, 8))
     def show(self, sign: str, frames: int) -> None:
@@ -233,5 +233,3 @@ Histories.TestCase.settings = settings(
     suppress_health_check=list(HealthCheck),
 )
 TestHistories = Histories.TestCase
-
-assert np  # the painted pictures are arrays
