@@ -1,2 +1,252 @@
-def outcomes():
-    return []
+"""What becomes of faults that only real processes can have: signals, clocks that are set, a full disk, no memory."""
+
+import os
+import resource
+import signal
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from tests.contracts.node_contract import CMD_VEL, FORWARD, ODOM
+from tests.dds.graph import DdsGraph, dds_graph
+from tests.faults.stepped import Outcome
+from tests.processes import Process, eventually
+
+SIGN = "/gesture/hand_sign"
+DIAGNOSTICS = "/diagnostics"
+HELD_STICK = Path(__file__).with_name("held_stick.py")
+SPEED_MPS = 0.3
+FAULT_S, AFTER_S = 1.2, 1.5
+NEUTRAL_S = 1.6
+"""The control arms no earlier than a second after its start."""
+BRAKES_S = 0.6
+"""What a simulated robot needs from its speed to rest, and what others need to see it."""
+SLOWER_MPS = 0.28
+
+NAMES = {
+    "robot": "/robot",
+    "control": "/hand_sign_control",
+    "recognition": "/hand_sign_recognition",
+    "camera": "/my_camera",
+    "steering": "/steering",
+}
+OPTIONS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
+    "robot": (("--world", "empty"), ()),
+    "control": (("--control.arming", "on"), ("-p", f"max_linear:={SPEED_MPS}", "-p", "linear_step:=0.02")),
+    "recognition": ((), ()),
+    "camera": (FORWARD, ()),
+}
+SIGNALS = ("SIGKILL", "SIGSTOP", "SIGHUP", "SIGQUIT", "SIGTSTP", "SIGABRT", "SIGTERM", "SIGINT")
+
+
+@dataclass
+class Rig:
+    """Our nodes as processes in a domain, and a plain program that looks on, and shows signs where no camera does.
+
+    Attributes:
+        graph: The domain.
+        by: What sets the robot in motion: ``signs`` by the plain program, a ``camera`` before a virtual hand, or a
+            ``stick`` that is held.
+    """
+
+    graph: DdsGraph
+    by: str
+    env: dict[str, str] = field(default_factory=dict)
+    nodes: dict[str, Process] = field(default_factory=dict)
+
+    def open(self) -> None:
+        peer = self.graph.peer
+        peer.ask("record", topic=CMD_VEL, type="Twist", fields=["linear.x"])
+        peer.ask("record", topic=ODOM, type="Odometry", fields=["twist.twist.linear.x"])
+        peer.ask("record", topic=DIAGNOSTICS, type="DiagnosticArray", fields=["status.0.name", "status.0.message"])
+        for verb in ("robot", "control"):
+            self.start(verb)
+        if self.by == "signs":
+            peer.ask("advertise", topic=SIGN, type="String")
+        elif self.by == "camera":
+            self.start("recognition")
+        self.graph.env.update(self.env)
+
+    def start(self, verb: str, script: str = "Forward:600") -> None:
+        """Start a node that does not run."""
+        if verb == "steering":
+            env = self.graph.env
+            command = [sys.executable, str(HELD_STICK), "steering", "--transport", "dds"]
+            log = Path(tempfile.mkdtemp(), "steering.log")
+            self.nodes[verb] = Process(command, env, log)
+            self.graph.adopt(self.nodes[verb])
+            return
+        options, ros = OPTIONS[verb]
+        if verb == "camera":
+            ros = ("-p", f"virtual_hand.script:={script}")
+        self.nodes[verb] = self.graph.node(verb, *options, name=NAMES[verb], ros=ros)
+
+    def drive(self) -> None:
+        """Let go, then drive, until the robot is at its limit."""
+        peer = self.graph.peer
+        for verb in ("robot", "control", *(["recognition"] if self.by == "camera" else [])):
+            if verb not in self.nodes or not self.nodes[verb].running:
+                self.start(verb)
+        if self.by == "signs":
+            self.show("NONE")
+            eventually(lambda: peer.ask("listeners", topic=SIGN) > 0)
+            time.sleep(NEUTRAL_S)
+            self.show("Forward")
+        elif self.by == "camera":
+            self.end("camera")
+            self.start("camera", "NONE:3 Forward:600")
+        else:
+            self.end("steering")
+            self.start("steering")
+        eventually(lambda: self.speeds() and self.speeds()[-1][1] > SPEED_MPS - 0.01, what="the robot to drive")
+
+    def show(self, sign: str) -> None:
+        """Let the plain program say a sign 30 times a second."""
+        self.graph.peer.ask("repeat", topic=SIGN, values={"data": sign}, every_s=1 / 30)
+
+    def let_go(self) -> None:
+        """End the reason to drive."""
+        if self.by == "signs":
+            self.show("NONE")
+        else:
+            self.end("camera" if self.by == "camera" else "steering")
+
+    def end(self, verb: str) -> None:
+        if verb in self.nodes:
+            self.nodes.pop(verb).kill()
+
+    def speeds(self, since_s: float = 0.0) -> list[tuple[float, float]]:
+        """Return when, and what the robot's odometry said."""
+        return [(at_s, speed) for at_s, (speed,) in self.graph.peer.ask("get", topic=ODOM) if at_s > since_s]
+
+    def commands(self, since_s: float = 0.0) -> list[tuple[float, float]]:
+        """Return when, and what the robot was told."""
+        return [(at_s, speed) for at_s, (speed,) in self.graph.peer.ask("get", topic=CMD_VEL) if at_s > since_s]
+
+    def said(self, since_s: float) -> str:
+        """Return what the control has said last; what the robot has, where the control said nothing."""
+        words = {name.partition(": ")[2]: text for at_s, (name, text) in self._reports() if at_s > since_s}
+        return str(words.get("hand_sign_control", words.get("robot", "nothing")))
+
+    def _reports(self) -> list[tuple[float, tuple[str, str]]]:
+        return [(at_s, tuple(values)) for at_s, values in self.graph.peer.ask("get", topic=DIAGNOSTICS)]
+
+    def stood_after_s(self, since_s: float) -> float | None:
+        """Return how long it took until the robot was told zero, or braked by itself; None where nobody could see."""
+        zeros = [at_s for at_s, speed in self.commands(since_s) if speed == 0.0]
+        brakes = [at_s for at_s, speed in self.speeds(since_s) if speed < SLOWER_MPS]
+        first = min([*zeros[:1], *brakes[:1]], default=None)
+        return None if first is None else first - since_s
+
+    def moves(self, since_s: float) -> bool:
+        """Return whether the robot was told to move, or moved, since a time."""
+        return any(speed > 0.02 for _, speed in (*self.commands(since_s), *self.speeds(since_s)))
+
+
+@dataclass(frozen=True)
+class Row:
+    """A fault of real processes while the robot drives; attributes as of :class:`tests.faults.rows.Row`."""
+
+    where: str
+    fault: str
+    by: str
+    begin: Callable[[Rig], Any]
+    end: Callable[[Rig], Any]
+    leaves_reason: bool = False
+
+    @property
+    def name(self) -> str:
+        return f"{self.where}: {self.fault}"
+
+
+def rows() -> list[Row]:
+    """Return all rows; those of one way to drive come one after the other."""
+    return sorted([*_signals(), *_memory()], key=lambda row: row.by)
+
+
+def _signals() -> Iterator[Row]:
+    drives = {"camera": "camera", "recognition": "camera", "control": "signs", "robot": "signs", "steering": "stick"}
+    for verb, by in drives.items():
+        for name in SIGNALS:
+
+            def send(rig: Rig, verb: str = verb, name: str = name) -> None:
+                process = rig.nodes[verb]
+                if name == "SIGSTOP":
+                    process.freeze()
+                else:
+                    process.signal(signal.Signals[name])
+
+            def over(rig: Rig, verb: str = verb, name: str = name) -> None:
+                if name == "SIGSTOP":
+                    rig.nodes[verb].signal(signal.SIGCONT)
+                    return
+                assert rig.nodes[verb].popen.wait(10.0) is not None
+                if verb != "steering":  # whoever steered has to take the wheel again on the new page
+                    rig.start(verb)
+
+            after = "SIGCONT" if name == "SIGSTOP" else "started again"
+            yield Row(verb, f"{name}, then {after}", by, send, over)
+
+
+def _memory() -> Iterator[Row]:
+    for verb, by in (("control", "signs"), ("recognition", "camera")):
+
+        def starve(rig: Rig, verb: str = verb) -> None:
+            pid = rig.nodes[verb].popen.pid
+            used = int(Path(f"/proc/{pid}/statm").read_text().split()[0]) * resource.getpagesize()
+            resource.prlimit(pid, resource.RLIMIT_AS, (used, resource.RLIM_INFINITY))
+
+        def feed(rig: Rig, verb: str = verb) -> None:
+            pid = rig.nodes[verb].popen.pid
+            resource.prlimit(pid, resource.RLIMIT_AS, (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
+
+        yield Row(verb, "gets no more memory; then the driver lets go", by, starve, feed, leaves_reason=True)
+
+
+@contextmanager
+def rig(by: str, env: dict[str, str] | None = None) -> Iterator[Rig]:
+    """Let our nodes run as processes for as long as the block lasts."""
+    with tempfile.TemporaryDirectory() as home, dds_graph(Path(home)) as graph:
+        made = Rig(graph, by, env or {})
+        made.open()
+        yield made
+
+
+def outcome_of(row: Row, rig: Rig) -> Outcome:
+    """Drive, let it happen, let it end; whether it drives again, the next row shows."""
+    rig.drive()
+    since_s = time.monotonic()
+    row.begin(rig)
+    if row.leaves_reason:
+        time.sleep(FAULT_S)
+        since_s = time.monotonic()
+        rig.let_go()
+    time.sleep(FAULT_S)
+    said = rig.said(since_s + FAULT_S / 2)
+    # What the robot does whose own process was away, nobody sees.
+    zero_s = None if row.where == "robot" else rig.stood_after_s(since_s)
+    row.end(rig)
+    ended_s = time.monotonic()
+    time.sleep(AFTER_S)
+    return Outcome(row.where, row.fault, zero_s, rig.moves(ended_s + BRAKES_S), True, said)
+
+
+def outcomes() -> list[Outcome]:
+    """Return what becomes of all rows."""
+    found = []
+    for by in dict.fromkeys(row.by for row in rows()):
+        with rig(by) as made:
+            for row in rows():
+                if row.by == by:
+                    found.append(outcome_of(row, made))
+                    print(found[-1], file=sys.stderr, flush=True)  # noqa: T201 - it takes minutes
+    order = {verb: number for number, verb in enumerate(("camera", "recognition", "control", "steering", "robot"))}
+    return sorted(found, key=lambda outcome: order[outcome.where])
+
+
+assert os.name == "posix"

@@ -65,8 +65,10 @@ class Graph:
         header = Header(self.clock.stamp(self.clock.now() - age_s), "camera")
         picture = self.last_image if again else image_message(self.camera.read().image, header)
         if picture is not None:
-            self.last_image = Image(header, *(getattr(picture, name) for name in _PARTS))
-            self.images.publish(self.last_image, self.clock.now() - age_s)
+            image = Image(header, *(getattr(picture, name) for name in _PARTS))
+            # What comes at a wrong time is not looked at: it is new when it comes again.
+            self.last_image = self.last_image if age_s else image
+            self.images.publish(image, self.clock.now() - age_s)
         self.serve()
 
     def serve(self) -> None:
@@ -113,14 +115,14 @@ class Histories(RuleBasedStateMachine):
         logging.disable(logging.CRITICAL)
         self.graph = Graph()
         self.rules = Rules()
-        self.steering = 0.0
 
     def teardown(self) -> None:
         logging.disable(logging.NOTSET)
 
-    @initialize()
-    def begin(self) -> None:
-        self.wait(0.1)
+    @initialize(sign=st.sampled_from(MOTIONS))
+    def begin(self, sign: str) -> None:
+        self.wait(1.2)
+        self.drive(sign)
 
     def wait(self, seconds: float) -> None:
         """Let time pass in moments, and look at each."""
@@ -146,6 +148,24 @@ class Histories(RuleBasedStateMachine):
             self.graph.show(sign)
             self.look()
             self.wait(1 / FPS)
+
+    @rule(sign=st.sampled_from(MOTIONS))
+    def drive(self, sign: str) -> None:
+        self.show("Stop", 2)
+        self.show(sign, 10)
+
+    @rule(sign=st.sampled_from(MOTIONS), frames=st.integers(10, 30))
+    def hold(self, sign: str, frames: int) -> None:
+        self.show(sign, frames)
+
+    @precondition(lambda self: self.rules.is_stopped or not self.graph.linked)
+    @rule()
+    def begin_anew(self) -> None:
+        self.reset()
+        if not self.graph.linked:
+            self.the_robot_comes_back()
+        self.wait(0.4)
+        self.drive("Forward")
 
     @rule(frames=st.integers(1, 30))
     def freeze_the_picture(self, frames: int) -> None:
