@@ -24,6 +24,8 @@ SPEED_MPS = 0.3
 FAULT_S, AFTER_S = 1.2, 1.5
 NEUTRAL_S = 1.6
 """The control arms no earlier than a second after its start."""
+SETS_OFF_S = 8.0
+START_S = 90.0
 BRAKES_S = 0.6
 """What a simulated robot needs from its speed to rest, and what others need to see it."""
 SLOWER_MPS = 0.28
@@ -52,11 +54,12 @@ class Rig:
         graph: The domain.
         by: What sets the robot in motion: ``signs`` by the plain program, a ``camera`` before a virtual hand, or a
             ``stick`` that is held.
+        more_env: Further variables of the environment, by node.
     """
 
     graph: DdsGraph
     by: str
-    env: dict[str, str] = field(default_factory=dict)
+    more_env: dict[str, dict[str, str]] = field(default_factory=dict)
     nodes: dict[str, Process] = field(default_factory=dict)
 
     def open(self) -> None:
@@ -70,10 +73,9 @@ class Rig:
             peer.ask("advertise", topic=SIGN, type="String")
         elif self.by == "camera":
             self.start("recognition")
-        self.graph.env.update(self.env)
 
     def start(self, verb: str, script: str = "Forward:600") -> None:
-        """Start a node that does not run."""
+        """Start a node that does not run, with what :attr:`more_env` has for it."""
         if verb == "steering":
             env = self.graph.env
             command = [sys.executable, str(HELD_STICK), "steering", "--transport", "dds"]
@@ -84,17 +86,23 @@ class Rig:
         options, ros = OPTIONS[verb]
         if verb == "camera":
             ros = ("-p", f"virtual_hand.script:={script}")
-        self.nodes[verb] = self.graph.node(verb, *options, name=NAMES[verb], ros=ros)
+        before, self.graph.env = self.graph.env, {**self.graph.env, **self.more_env.get(verb, {})}
+        try:
+            self.nodes[verb] = self.graph.node(verb, *options, name=NAMES[verb], ros=ros)
+        finally:
+            self.graph.env = before
 
     def drive(self) -> None:
         """Let go, then drive, until the robot is at its limit."""
-        peer = self.graph.peer
         for verb in ("robot", "control", *(["recognition"] if self.by == "camera" else [])):
             if verb not in self.nodes or not self.nodes[verb].running:
                 self.start(verb)
+        eventually(self._has_set_off, START_S, what="the robot to drive")
+
+    def _has_set_off(self) -> bool:
+        """Let go once, and try to drive; a machine that is busy with other things may need more than one try."""
         if self.by == "signs":
             self.show("NONE")
-            eventually(lambda: peer.ask("listeners", topic=SIGN) > 0)
             time.sleep(NEUTRAL_S)
             self.show("Forward")
         elif self.by == "camera":
@@ -103,7 +111,13 @@ class Rig:
         else:
             self.end("steering")
             self.start("steering")
-        eventually(lambda: self.speeds() and self.speeds()[-1][1] > SPEED_MPS - 0.01, what="the robot to drive")
+        patience_s = time.monotonic() + SETS_OFF_S
+        while time.monotonic() < patience_s:
+            if self.speeds() and self.speeds()[-1][1] > SPEED_MPS - 0.01:
+                return True
+            time.sleep(0.05)
+        print(f"has not set off: {self.said(patience_s - 1.0)}", file=sys.stderr)  # noqa: T201
+        return False
 
     def show(self, sign: str) -> None:
         """Let the plain program say a sign 30 times a second."""
@@ -150,7 +164,11 @@ class Rig:
 
 @dataclass(frozen=True)
 class Row:
-    """A fault of real processes while the robot drives; attributes as of :class:`tests.faults.rows.Row`."""
+    """A fault of real processes while the robot drives; attributes as of :class:`tests.faults.rows.Row`.
+
+    Attributes:
+        prepare: Is called before the robot drives.
+    """
 
     where: str
     fault: str
@@ -158,6 +176,7 @@ class Row:
     begin: Callable[[Rig], Any]
     end: Callable[[Rig], Any]
     leaves_reason: bool = False
+    prepare: Callable[[Rig], Any] = lambda _: None
 
     @property
     def name(self) -> str:
@@ -166,7 +185,7 @@ class Row:
 
 def rows() -> list[Row]:
     """Return all rows; those of one way to drive come one after the other."""
-    return sorted([*_signals(), *_memory()], key=lambda row: row.by)
+    return sorted([*_signals(), *_memory(), *_clocks(), *_disk()], key=lambda row: row.by)
 
 
 def _signals() -> Iterator[Row]:
@@ -208,17 +227,73 @@ def _memory() -> Iterator[Row]:
         yield Row(verb, "gets no more memory; then the driver lets go", by, starve, feed, leaves_reason=True)
 
 
+def _clocks() -> Iterator[Row]:
+    library = next(Path("/usr/lib").glob("*/faketime/libfaketimeMT.so.1"), None)
+    if library is None:  # Debian's package faketime
+        return
+    told = Path(tempfile.mkdtemp(), "time")
+    env = {
+        "LD_PRELOAD": str(library),
+        "FAKETIME_TIMESTAMP_FILE": str(told),
+        "FAKETIME_NO_CACHE": "1",
+        "DONT_FAKE_MONOTONIC": "1",
+        "FAKETIME_DONT_FAKE_MONOTONIC": "1",
+    }
+    for verb, by in (("camera", "camera"), ("recognition", "camera"), ("control", "signs"), ("robot", "signs")):
+        for words, seconds in (("ahead", "+3600"), ("back", "-3600")):
+
+            def prepare(rig: Rig, verb: str = verb) -> None:
+                told.write_text("+0\n")
+                rig.end(verb)
+                rig.more_env[verb] = env
+                if verb != "camera":
+                    rig.start(verb)
+
+            def jump(_: Rig, seconds: str = seconds) -> None:
+                told.write_text(f"{seconds}s\n")
+
+            def over(rig: Rig, verb: str = verb) -> None:
+                rig.more_env.pop(verb)
+                rig.end(verb)
+
+            fault = f"its wall clock is set {words} by an hour; then the driver lets go"
+            yield Row(verb, fault, by, jump, over, leaves_reason=True, prepare=prepare)
+
+
+def _disk() -> Iterator[Row]:
+    def prepare(rig: Rig) -> None:
+        rig.end("control")
+        options, ros = OPTIONS["control"]
+        words = ("control", "--transport", "dds", *options, "--ros-args", *ros)
+        with Path("/dev/full").open("wb") as full:
+            command = [sys.executable, "-m", "handsteer", *words]
+            process = Process(command, rig.graph.env, Path(os.devnull), stdout=full, stderr=full)
+        rig.graph.adopt(process)
+        rig.nodes["control"] = process
+
+    def shout(rig: Rig) -> None:
+        for _ in range(3):  # what cannot be read is logged
+            rig.graph.peer.ask("publish_raw", topic=SIGN, hex="0001000003000000fffe0000")
+
+    def over(rig: Rig) -> None:
+        rig.end("control")
+
+    fault = "its log is on a disk that is full; then the driver lets go"
+    yield Row("control", fault, "signs", shout, over, leaves_reason=True, prepare=prepare)
+
+
 @contextmanager
-def rig(by: str, env: dict[str, str] | None = None) -> Iterator[Rig]:
+def rig(by: str) -> Iterator[Rig]:
     """Let our nodes run as processes for as long as the block lasts."""
     with tempfile.TemporaryDirectory() as home, dds_graph(Path(home)) as graph:
-        made = Rig(graph, by, env or {})
+        made = Rig(graph, by)
         made.open()
         yield made
 
 
 def outcome_of(row: Row, rig: Rig) -> Outcome:
     """Drive, let it happen, let it end; whether it drives again, the next row shows."""
+    row.prepare(rig)
     rig.drive()
     since_s = time.monotonic()
     row.begin(rig)
@@ -229,7 +304,7 @@ def outcome_of(row: Row, rig: Rig) -> Outcome:
     time.sleep(FAULT_S)
     said = rig.said(since_s + FAULT_S / 2)
     # What the robot does whose own process was away, nobody sees.
-    zero_s = None if row.where == "robot" else rig.stood_after_s(since_s)
+    zero_s = None if row.where == "robot" and not row.leaves_reason else rig.stood_after_s(since_s)
     row.end(rig)
     ended_s = time.monotonic()
     time.sleep(AFTER_S)
@@ -247,6 +322,3 @@ def outcomes() -> list[Outcome]:
                     print(found[-1], file=sys.stderr, flush=True)  # noqa: T201 - it takes minutes
     order = {verb: number for number, verb in enumerate(("camera", "recognition", "control", "steering", "robot"))}
     return sorted(found, key=lambda outcome: order[outcome.where])
-
-
-assert os.name == "posix"
