@@ -24,7 +24,7 @@ SPEED_MPS = 0.3
 FAULT_S, AFTER_S = 1.2, 1.5
 NEUTRAL_S = 1.6
 """The control arms no earlier than a second after its start."""
-SETS_OFF_S = 8.0
+SETS_OFF_S = 15.0
 START_S = 90.0
 BRAKES_S = 0.6
 """What a simulated robot needs from its speed to rest, and what others need to see it."""

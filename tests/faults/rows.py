@@ -1,86 +1,19 @@
 """Every node and every topic, with every fault that can be had in stepped time: the rows of the table."""
 
-import math
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator
 from typing import Any
 
-import numpy as np
-
-from handsteer.images import image_message
-from handsteer.messages import (
-    CMD_VEL,
-    HAND_SIGN,
-    IMAGE_RAW,
-    STEERING_CMD_VEL,
-    STOP,
-    Bool,
-    Header,
-    Image,
-    String,
-    Time,
-    Topic,
-    twist,
-)
-from handsteer.nodes.node import Node
+from handsteer.messages import CMD_VEL, HAND_SIGN, IMAGE_RAW, STEERING_CMD_VEL, STOP, Topic
 from handsteer.testing.fault_transport import CUT, FROZEN, LinkFault
 from handsteer.testing.faulty_camera import CameraFault
-from tests.faults.chain import REAL_CMD_VEL, REAL_ODOM, SPEED_MPS, Chain, RealRobot, RemoteChain
-
-Act = Callable[[Chain], None]
-
-
-def nothing(_: Chain) -> None:
-    """Do nothing."""
-
-
-def lower_the_hand(chain: Chain) -> None:
-    """End the reason of whoever drives: no sign, no stick."""
-    chain.show()
-    chain.page.holds_stick = False
-    if chain.is_well("steering"):
-        chain.steering.release()
-
-
-@dataclass(frozen=True)
-class Row:
-    """A fault while the robot drives.
-
-    Attributes:
-        where: The node or topic that it befalls.
-        fault: What happens, in words.
-        begin: Makes it happen.
-        end: Ends it.
-        end_reason: Ends the reason to drive where the fault does not: the robot may drive on till then.
-        by_stick: Whether the page's stick drives, and not a hand.
-        lasts_s: For how long.
-        is_for_good: Whether the robot has to stand even when the fault is over and neutral was seen.
-        make: Builds the chain.
-    """
-
-    where: str
-    fault: str
-    begin: Act
-    end: Act = nothing
-    end_reason: Act = nothing
-    by_stick: bool = False
-    lasts_s: float = 2.0
-    is_for_good: bool = False
-    make: Callable[[], Chain] = Chain
-
-    @property
-    def name(self) -> str:
-        return f"{self.where}: {self.fault}"
-
-    @property
-    def leaves_reason(self) -> bool:
-        """Whether the robot may drive on during the fault, until the hand is lowered."""
-        return self.end_reason is not nothing
+from tests.faults.chain import REAL_CMD_VEL, REAL_ODOM, Chain, RealRobot, RemoteChain
+from tests.faults.others import others
+from tests.faults.row import Act, Row, ended, frozen, killed, lower_the_hand, made, nothing, unfrozen
 
 
 def rows() -> list[Row]:
     """Return all rows."""
-    return [*_cameras(), *_links(), *_nodes(), *_clocks(), *_values(), *_seconds(), *_stops(), *_real_robots()]
+    return [*_cameras(), *_links(), *_nodes(), *_clocks(), *others(), *_stops(), *_real_robots()]
 
 
 _CAMERA: dict[CameraFault, tuple[str, bool]] = {
@@ -150,10 +83,10 @@ def _nodes() -> Iterator[Row]:
         def kill_and_make(chain: Chain, name: str = name) -> None:
             chain.kill(name)
             chain.run(0.3)
-            _made(name)(chain)
+            made(name)(chain)
 
-        yield Row(name, "frozen for 2 s", _frozen(name), _unfrozen(name), by_stick=by_stick)
-        yield Row(name, f"killed, started again 2 s later{anew}", _killed(name), _made(name), by_stick=by_stick)
+        yield Row(name, "frozen for 2 s", frozen(name), unfrozen(name), by_stick=by_stick)
+        yield Row(name, f"killed, started again 2 s later{anew}", killed(name), made(name), by_stick=by_stick)
         yield Row(
             name,
             f"{soon}; then the driver lets go" if lets_go else f"{soon}{anew}",
@@ -161,7 +94,7 @@ def _nodes() -> Iterator[Row]:
             end_reason=lower_the_hand if lets_go else nothing,
             by_stick=by_stick,
         )
-        yield Row(name, f"ended, started again 2 s later{anew}", _ended(name), _made(name), by_stick=by_stick)
+        yield Row(name, f"ended, started again 2 s later{anew}", ended(name), made(name), by_stick=by_stick)
 
 
 def _clocks() -> Iterator[Row]:
@@ -169,102 +102,6 @@ def _clocks() -> Iterator[Row]:
         chain.clock.advance(5.0)
 
     yield Row("all nodes", "the machine sleeps for 5 s", jump)
-
-
-def _values() -> Iterator[Row]:
-    for word, number in (("NaN", math.nan), ("infinity", math.inf)):
-
-        def steer(chain: Chain, number: float = number) -> None:
-            chain.page.holds_stick = False
-            _beat(chain, STEERING_CMD_VEL, lambda: twist(number, number))
-
-        def command(chain: Chain, number: float = number) -> None:
-            chain.freeze("control")
-            _beat(chain, CMD_VEL, lambda: twist(SPEED_MPS, number))
-
-        yield Row("/steering/cmd_vel", f"{word}, by another; then the hand is lowered", steer, _hand_and_still)
-        yield Row(CMD_VEL.name, f"{word} in a part, by another; the control is frozen", command, _unfrozen("control"))
-    for words, text in (
-        ("an unknown word", "Dance"),
-        ("an empty text", ""),
-        ("a text of 100,000 letters", "F" * 10**5),
-    ):
-
-        def sign(chain: Chain, text: str = text) -> None:
-            chain.freeze("recognition")
-            _beat(chain, HAND_SIGN, lambda: String(data=text))
-            chain.run(0.5)
-
-        yield Row(
-            HAND_SIGN.name,
-            f"{words}, by another, without an end; the recognition is frozen; then it ends",
-            sign,
-            _unfrozen("recognition"),
-            _still,
-        )
-    header = Header(stamp=Time(0, 0), frame_id="camera")
-    whole = image_message(np.zeros((48, 64, 3), np.uint8), header)
-    for words, image in (
-        ("has no size", Image(header, 0, 0, "bgr8", 0, 0, np.zeros(0, np.uint8))),
-        ("is cut short", Image(header, 48, 64, "bgr8", 0, 192, whole.data[:99])),
-        ("has an unknown encoding", Image(header, 48, 64, "purple8", 0, 192, whole.data)),
-    ):
-
-        def picture(chain: Chain, image: Image = image) -> None:
-            chain.camera.fail("silent")
-            _beat(chain, IMAGE_RAW, lambda: image)
-
-        def over(chain: Chain) -> None:
-            _still(chain)
-            chain.camera.recover()
-
-        yield Row(IMAGE_RAW.name, f"every picture {words}", picture, over)
-
-
-def _seconds() -> Iterator[Row]:
-    def drive(chain: Chain) -> None:
-        chain.show()
-        chain.run(0.5)
-        _beat(chain, CMD_VEL, lambda: twist(SPEED_MPS, 0.0))
-        chain.run(0.5)
-
-    yield Row(
-        CMD_VEL.name, "a second publisher drives, the hand is lowered; then it falls silent", drive, end_reason=_still
-    )
-
-    def show(chain: Chain) -> None:
-        chain.show()
-        _beat(chain, HAND_SIGN, lambda: String(data="Forward"))
-
-    yield Row(
-        HAND_SIGN.name,
-        "a second publisher says Forward, the hand is lowered; then it falls silent",
-        show,
-        end_reason=_still,
-    )
-
-    def frozen_beside(chain: Chain) -> None:
-        last = chain.hand.read().image
-        chain.show()
-        stamp = chain.clock.stamp
-        _beat(chain, IMAGE_RAW, lambda: image_message(last, Header(stamp(chain.clock.now()), "camera")))
-
-    yield Row(
-        IMAGE_RAW.name,
-        "a second camera shows one picture of Forward for ever, the hand is lowered",
-        frozen_beside,
-        _still,
-    )
-
-    def contradict(chain: Chain) -> None:
-        chain.steering.halt()
-        _beat(chain, STOP, lambda: Bool(data=False), every_s=0.13)
-
-    def over(chain: Chain) -> None:
-        _still(chain)
-        chain.steering.reset()
-
-    yield Row(STOP.name, "Stop by the page; another says false again and again", contradict, over)
 
 
 def _stops() -> Iterator[Row]:
@@ -327,62 +164,8 @@ def _real_robots() -> Iterator[Row]:
 
     yield Row("real robot", "says NaN in its odometry", senseless, sensible, make=RemoteChain)
     for words, begin, end in (
-        ("the node in front of it is frozen", _frozen("robot"), _unfrozen("robot")),
-        ("the node in front of it is killed, started again later", _killed("robot"), _made("robot")),
-        ("the control in front of it is killed, started again later", _killed("control"), _made("control")),
+        ("the node in front of it is frozen", frozen("robot"), unfrozen("robot")),
+        ("the node in front of it is killed, started again later", killed("robot"), made("robot")),
+        ("the control in front of it is killed, started again later", killed("control"), made("control")),
     ):
         yield Row("real robot", words, begin, end, make=RemoteChain)
-
-
-class _Beat(Node):
-    """Another program, which publishes without an end."""
-
-    def __init__(self, chain: Chain, topic: Topic[Any], make: Callable[[], object], every_s: float) -> None:
-        super().__init__("another", chain.faults, chain.clock)
-        publisher = self.publisher(topic)
-        self.every(every_s, lambda: publisher.publish(make()))
-
-
-def _beat(chain: Chain, topic: Topic[Any], make: Callable[[], object], every_s: float = 1 / 30) -> None:
-    chain.nodes["another"] = _Beat(chain, topic, make, every_s)
-
-
-def _still(chain: Chain) -> None:
-    if "another" in chain.nodes:
-        chain.domain.kill("another")
-        del chain.nodes["another"]
-
-
-def _hand_and_still(chain: Chain) -> None:
-    lower_the_hand(chain)
-    chain.run(0.1)
-    _still(chain)
-
-
-def _frozen(name: str) -> Act:
-    return lambda chain: chain.freeze(name)
-
-
-def _unfrozen(name: str) -> Act:
-    def end(chain: Chain) -> None:
-        _still(chain)
-        chain.thaw(name)
-
-    return end
-
-
-def _killed(name: str) -> Act:
-    return lambda chain: chain.kill(name)
-
-
-def _ended(name: str) -> Act:
-    return lambda chain: chain.end(name)
-
-
-def _made(name: str) -> Act:
-    def make(chain: Chain) -> None:
-        chain.make(name)
-        if name == "steering":
-            chain.page.holds_stick = False
-
-    return make

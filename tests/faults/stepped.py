@@ -4,7 +4,8 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 from tests.faults.chain import Chain
-from tests.faults.rows import Row, lower_the_hand, rows
+from tests.faults.row import Row, lower_the_hand
+from tests.faults.rows import rows
 
 # Steering that is heard for the first time within two seconds after the start has to let go first.
 START_S, START_WITH_STICK_S = 1.6, 2.1
