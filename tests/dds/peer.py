@@ -2,12 +2,12 @@
 
 Its types are written by hand, from ROS 2's definitions, and cyclonedds itself encodes them. It reads orders as lines of
 JSON from its input and answers each by one line of JSON. ``record`` (topic, type, fields, reliable) starts to note
-messages, ``get`` (topic) returns what was noted as ``[time_s, [values]]``. ``advertise`` (topic, type, reliable) comes
-before ``listeners`` (topic), which returns how many listen, ``publish`` (topic, values, count, period_s) and
-``publish_raw`` (topic, hex); ``repeat`` (topic, values or null, every_s) publishes in the background until the next
-one. ``introduce`` (name) makes it a node for ROS 2, and ``graph`` and ``user_data`` (topic) return what a ROS 2 node
-would know of others. ``call`` (service, type, fields) asks as a client of rmw_cyclonedds_cpp does, and returns the
-reply's fields; ``parameter_client.py`` has its types.
+messages, ``get`` (topic, since_s) returns what was noted as ``[time_s, [values]]``. ``advertise`` (topic, type,
+reliable) comes before ``listeners`` (topic), which returns how many listen, ``publish`` (topic, values, count,
+period_s) and ``publish_raw`` (topic, hex); ``repeat`` (topic, values or null, every_s) publishes in the background
+until the next one. ``introduce`` (name) makes it a node for ROS 2, and ``graph`` and ``user_data`` (topic) return what
+a ROS 2 node would know of others. ``call`` (service, type, fields) asks as a client of rmw_cyclonedds_cpp does, and
+returns the reply's fields; ``parameter_client.py`` has its types.
 
 Arguments: the number of the domain; a configuration of Cyclone DDS where it shall not keep to this machine; the name of
 its machine, if it shall have another.
@@ -271,7 +271,8 @@ def part_of(whole: Any, name: str) -> Any:
 
 
 def get(order: dict[str, Any]) -> list[Any]:
-    return list(noted[order["topic"]])
+    since_s = order.get("since_s", 0.0)
+    return [one for one in noted[order["topic"]] if one[0] > since_s]
 
 
 def advertise(order: dict[str, Any]) -> bool:

@@ -113,7 +113,7 @@ class Rig:
             self.start("steering")
         patience_s = time.monotonic() + SETS_OFF_S
         while time.monotonic() < patience_s:
-            if self.speeds() and self.speeds()[-1][1] > SPEED_MPS - 0.01:
+            if any(speed > SPEED_MPS - 0.01 for _, speed in self.speeds(time.monotonic() - 0.2)):
                 return True
             time.sleep(0.05)
         print(f"has not set off: {self.said(patience_s - 1.0)}", file=sys.stderr)  # noqa: T201
@@ -136,19 +136,17 @@ class Rig:
 
     def speeds(self, since_s: float = 0.0) -> list[tuple[float, float]]:
         """Return when, and what the robot's odometry said."""
-        return [(at_s, speed) for at_s, (speed,) in self.graph.peer.ask("get", topic=ODOM) if at_s > since_s]
+        return [(at_s, speed) for at_s, (speed,) in self.graph.peer.ask("get", topic=ODOM, since_s=since_s)]
 
     def commands(self, since_s: float = 0.0) -> list[tuple[float, float]]:
         """Return when, and what the robot was told."""
-        return [(at_s, speed) for at_s, (speed,) in self.graph.peer.ask("get", topic=CMD_VEL) if at_s > since_s]
+        return [(at_s, speed) for at_s, (speed,) in self.graph.peer.ask("get", topic=CMD_VEL, since_s=since_s)]
 
     def said(self, since_s: float) -> str:
         """Return what the control has said last; what the robot has, where the control said nothing."""
-        words = {name.partition(": ")[2]: text for at_s, (name, text) in self._reports() if at_s > since_s}
+        reports = self.graph.peer.ask("get", topic=DIAGNOSTICS, since_s=since_s)
+        words = {name.partition(": ")[2]: text for _, (name, text) in reports}
         return str(words.get("hand_sign_control", words.get("robot", "nothing")))
-
-    def _reports(self) -> list[tuple[float, tuple[str, str]]]:
-        return [(at_s, tuple(values)) for at_s, values in self.graph.peer.ask("get", topic=DIAGNOSTICS)]
 
     def stood_after_s(self, since_s: float) -> float | None:
         """Return how long it took until the robot was told zero, or braked by itself; None where nobody could see."""
