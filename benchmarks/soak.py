@@ -94,7 +94,10 @@ def visit(port: int, count: int, duration_s: float) -> None:
     async def come_and_go() -> None:
         began_s = time.monotonic()
         for number in range(count):
-            await one_visit(port)
+            try:
+                await one_visit(port)
+            except (OSError, socketio.exceptions.ConnectionError) as why:  # a busy machine, or one that is full
+                print(f"  a visitor did not get in: {why}", flush=True)
             await asyncio.sleep(max(0.0, began_s + (number + 1) * duration_s / count - time.monotonic()))
 
     asyncio.run(come_and_go())
@@ -170,7 +173,8 @@ def soak_hours(hours: float) -> None:
         print(f"memory {end.memory_mb / before.memory_mb - 1:+.1%} (limit {LIMIT_GROWTH:.0%})")
     print(f"robot's time {state.time_s - total_s:+.3f} s against the graph's {total_s:.0f} s; {frames / total_s:.4f} ")
     print(f"frames/s, {odometry / total_s:.4f} odometries/s; callbacks that failed: {failed(chain)}")
-    print(f"the last cycle's {len(last)} commands are {'' if last == first else 'NOT '}those of the first")
+    sums = [tuple(round(sum(column), 3) for column in zip(*each, strict=True)) for each in (first, last)]
+    print(f"commands of the first cycle {len(first)}, added up {sums[0]}; of the last {len(last)}, {sums[1]}")
 
 
 def failed(chain: Chain) -> int:

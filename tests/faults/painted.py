@@ -1,5 +1,7 @@
 """A camera that paints the sign that a hand shows, and what reads it there: the whole chain but the landmark models."""
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -46,7 +48,7 @@ class PaintedLandmarker:
 
     hands = {sign: show_sign(sign) for sign in SIGNS}  # noqa: RUF012
 
-    def detect(self, image: NDArray[np.uint8], *, search: bool = True) -> list[Hand]:
+    def detect(self, image: NDArray[np.uint8], *, search: bool = True, dt_s: float = math.inf) -> list[Hand]:
         row = image[_ROW]
         index = round((float(row.mean()) - 12) / _STEP) - 1
         # Grey and black, of a torn or dark picture, have no noise.
