@@ -33,10 +33,15 @@ class Rules:
     _picture_s: float = -math.inf
     _hand_was_neutral: bool = False
     _stick_was_neutral: bool = False
+    _robot_waits: bool = False
+    _sign: str = "NONE"
     _stands_by_s: float = math.inf
 
-    def picture(self, *, asks: bool) -> None:
-        """A live camera shows a hand that asks for motion, or one that does not, or none."""
+    def picture(self, sign: str, *, asks: bool) -> None:
+        """A live camera shows a hand with a sign that asks for motion, or one that does not, or none."""
+        # While a new sign is not confirmed yet, zero is commanded: that is what a robot waits for that was away.
+        self._robot_waits = self._robot_waits and asks and sign == self._sign
+        self._sign = sign
         if self.now_s - self._picture_s > SURELY_A_GAP_S:
             self._hand_was_neutral = False
         self._picture_s = self.now_s
@@ -47,6 +52,7 @@ class Rules:
 
     def stick(self, *, asks: bool) -> None:
         """Somebody holds the stick, or lets go."""
+        self._robot_waits = self._robot_waits and asks
         paused = self.now_s - self._stick_spoke_s >= STICK_PAUSE_S - _EPSILON_S
         self._stick_was_neutral = self._stick_was_neutral or paused or not asks
         self._stick_spoke_s = self.now_s
@@ -69,6 +75,11 @@ class Rules:
         self._hand_was_neutral = self._stick_was_neutral = False
         self._stands_by_s = min(self._stands_by_s, self.now_s + PATIENCE_S)
 
+    def robot_was_away(self) -> None:
+        """The robot could not hear: whatever was asked of it then is not meant for it now."""
+        self._robot_waits = True
+        self._stands_by_s = min(self._stands_by_s, self.now_s + PATIENCE_S)
+
     def stands(self) -> None:
         """The robot stands: if it has to, then from now on."""
         if self._stands_by_s < math.inf:
@@ -78,13 +89,15 @@ class Rules:
         """Return why the robot must not be asked to move now; None where it may."""
         by_hand = self._is_live(self._hand_asked_s) and self._hand_was_neutral
         by_stick = self._is_live(self._stick_asked_s) and self._stick_was_neutral
-        if (by_hand or by_stick) and not self.is_stopped:
+        if (by_hand or by_stick) and not (self.is_stopped or self._robot_waits):
             self._stands_by_s = math.inf
             return None
         if self.now_s <= self._stands_by_s < math.inf:
             return None
         if self.is_stopped:
             return "Stop was said, and not taken back"
+        if self._robot_waits:
+            return "the robot was away, and nothing else was asked since"
         if self._is_live(self._hand_asked_s) or self._is_live(self._stick_asked_s):
             return "nobody has let go since it was started, frozen, stopped or away"
         return f"nobody has asked for it for {PATIENCE_S} s"

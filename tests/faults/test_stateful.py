@@ -146,7 +146,7 @@ class Histories(RuleBasedStateMachine):
     def show(self, sign: str, frames: int) -> None:
         for _ in range(frames):
             self.rules.now_s = self.graph.clock.now()
-            self.rules.picture(asks=sign in MOTIONS)
+            self.rules.picture(sign, asks=sign in MOTIONS)
             self.graph.show(sign)
             self.look()
             self.wait(1 / FPS)
@@ -237,14 +237,14 @@ class Histories(RuleBasedStateMachine):
     @rule()
     def the_robot_leaves(self) -> None:
         self.graph.linked = False
-        self.rules.disarm()
+        self.rules.robot_was_away()
         self.wait(_TICK_S)
 
     @precondition(lambda self: not self.graph.linked)
     @rule()
     def the_robot_comes_back(self) -> None:
         self.graph.linked = True
-        self.rules.disarm()
+        self.rules.robot_was_away()
         self.wait(_TICK_S)
 
 
