@@ -3,7 +3,7 @@
 from handsteer.clock import Clock
 from handsteer.config import RobotConfig
 from handsteer.robots.diff_drive import DriveState, Velocity, integrate, step, wheel_speeds
-from handsteer.robots.protocol import Obstacle, Pose2D, RobotState
+from handsteer.robots.protocol import Obstacle, Pose2D, RangeScan, RobotState
 
 _DT_S = 0.02
 
@@ -61,6 +61,12 @@ class Base:
         )
 
     def obstacles(self) -> list[Obstacle]:
+        return []
+
+    def scan(self) -> RangeScan | None:
+        return None
+
+    def commanders(self) -> list[str]:
         return []
 
     def reset(self) -> None:

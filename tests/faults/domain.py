@@ -50,6 +50,9 @@ class Domain:
     def readers(self, topic: str) -> list[Deliver]:
         return [deliver for _, name, deliver in self._readers if name == topic]
 
+    def publishers_of(self, topic: Topic[Any]) -> list[str]:
+        return [writer.node for writer in self._writers if writer.topic.name == topic.name]
+
     def full_name(self, node: str) -> str:
         return node
 

@@ -124,6 +124,10 @@ class FaultTransport:
         """Call ``deliver`` for each message on ``topic`` that comes through."""
         return self._inner.subscribe(node, topic, deliver)
 
+    def publishers_of(self, topic: Topic[Any]) -> list[str]:
+        """Return what the transport within knows: faults befall messages, not who is there."""
+        return self._inner.publishers_of(topic)
+
     def full_name(self, node: str) -> str:
         """Return what the transport within calls ``node``."""
         return self._inner.full_name(node)
