@@ -8,7 +8,7 @@ CASES ?= 100000
 # NumPy's threads would wait for one another: the matrices are small, and tests run side by side.
 export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: help run test ros1 test-ros1 ros2 test-ros2 lint unit fuzz format lock bench bench-signs signs-model landmark-model models docs screenshots \
+.PHONY: help run test ros1 test-ros1 ros2 test-ros2 lint unit fuzz format lock bench bench-signs signs-model landmark-model models docs faults soak screenshots \
 	screenshots-ros1 clean
 
 help:
@@ -23,6 +23,8 @@ help:
 	@echo "make bench-signs  print how well signs are told on photos of people"
 	@echo "make signs-model  train the sign model again, from hands that it makes itself; gives the same file"
 	@echo "make landmark-model  make the 8-bit hand landmark model again, of MediaPipe's; gives the same file"
+	@echo "make faults       write the tables of docs/safety.md again: what becomes of every fault"
+	@echo "make soak         a million random events, then hours of driving and of the page (takes an hour or two)"
 	@echo "make docs         write docs/configuration.md again from the configuration"
 	@echo "make screenshots  make the README's pictures again (needs Chromium)"
 	@echo "make screenshots-ros1  make the picture of RViz again (needs ROS 1, rviz, xvfb and imagemagick)"
@@ -78,6 +80,13 @@ QUANTIZER := $(VENV)/quantizer
 landmark-model: models $(QUANTIZER)/.made
 	@$(QUANTIZER)/bin/python scripts/landmark_model/build.py "$$($(BIN)/python -c \
 		'from handsteer.landmarks.models import find_model; print(find_model("hand_landmark_full.tflite"))')"
+
+faults: $(BIN)/.dev models
+	@$(BIN)/python -m tests.faults $(ARGS)
+
+soak: $(BIN)/.dev models
+	@HANDSTEER_STEPS=1000000 $(BIN)/pytest tests/faults/test_stateful.py
+	@$(BIN)/python benchmarks/soak.py
 
 docs: $(BIN)/.dev
 	@$(BIN)/python scripts/configuration_table.py

@@ -106,15 +106,15 @@ def served(script: str, camera: str = "virtual") -> Iterator[Served]:
         graph.close()
 
 
-def film(path: Path, script: str) -> None:
+def film(path: Path, script: str, fps: int = FILM_FPS) -> None:
     """Film the virtual hand going through ``script``."""
     clock = SteppedClock()
     config = load(None, None, {"virtual_hand": {"script": script, "background": "cluttered"}}).virtual_hand
-    hand = VirtualHandCamera(config, width=640, height=480, fps=FILM_FPS, clock=clock)
-    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), FILM_FPS, (640, 480))
-    for _ in range(FILM_S * FILM_FPS):
+    hand = VirtualHandCamera(config, width=640, height=480, fps=fps, clock=clock)
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), fps, (640, 480))
+    for _ in range(FILM_S * fps):
         writer.write(hand.read().image)
-        clock.advance(1 / FILM_FPS)
+        clock.advance(1 / fps)
     writer.release()
 
 

@@ -8,6 +8,10 @@ SAYS = {
     "01_recognize_a_sign": ["Turn Left", "right hand"],
     "02_drive_from_code": ["'Forward'", "the robot is at x"],
     "03_add_a_node": ["Forward", "Backward", "m/s"],
+    "04_let_it_fail": [
+        "pictures are cut off for 2 s: the robot stands",
+        "a fifth of the commands is lost for 2 s: the robot goes on",
+    ],
 }
 
 

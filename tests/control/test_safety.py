@@ -102,6 +102,16 @@ def test_a_stop_holds_until_it_is_reset_and_neutral_was_seen(arming: bool) -> No
     assert show(safety, "Forward")
 
 
+def test_what_passed_between_a_fault_and_the_next_frame_was_no_empty_picture() -> None:
+    safety = armed()
+    safety.step(0.36)  # no sign, as the picture is frozen: recognition says so by a NONE of its own
+    safety.admits_sign("NONE", stops=True)
+    safety.step(0.27)  # then a live picture, of a hand whose sign is not confirmed yet
+    safety.admits_sign("NONE", stops=True)
+    assert not show(safety, "NONE", 0.4)
+    assert not show(safety, "Forward")
+
+
 def test_a_robot_that_was_away_is_driven_after_neutral_only() -> None:
     safety = armed()
     safety.robot_is_away("no robot listens")

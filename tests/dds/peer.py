@@ -2,11 +2,12 @@
 
 Its types are written by hand, from ROS 2's definitions, and cyclonedds itself encodes them. It reads orders as lines of
 JSON from its input and answers each by one line of JSON. ``record`` (topic, type, fields, reliable) starts to note
-messages, ``get`` (topic) returns what was noted as ``[time_s, [values]]``. ``advertise`` (topic, type, reliable) comes
-before ``listeners`` (topic), which returns how many listen, ``publish`` (topic, values, count, period_s) and
-``publish_raw`` (topic, hex). ``introduce`` (name) makes it a node for ROS 2, and ``graph`` and ``user_data``
-(topic) return what a ROS 2 node would know of others. ``call`` (service, type, fields) asks as a client of
-rmw_cyclonedds_cpp does, and returns the reply's fields; ``parameter_client.py`` has its types.
+messages, ``get`` (topic, since_s) returns what was noted as ``[time_s, [values]]``. ``advertise`` (topic, type,
+reliable) comes before ``listeners`` (topic), which returns how many listen, ``publish`` (topic, values, count,
+period_s) and ``publish_raw`` (topic, hex); ``repeat`` (topic, values or null, every_s) publishes in the background
+until the next one. ``introduce`` (name) makes it a node for ROS 2, and ``graph`` and ``user_data`` (topic) return what
+a ROS 2 node would know of others. ``call`` (service, type, fields) asks as a client of rmw_cyclonedds_cpp does, and
+returns the reply's fields; ``parameter_client.py`` has its types.
 
 Arguments: the number of the domain; a configuration of Cyclone DDS where it shall not keep to this machine; the name of
 its machine, if it shall have another.
@@ -217,6 +218,8 @@ participant = DomainParticipant(
 noted: dict[str, list[Any]] = {}
 readers: dict[str, tuple[Any, list[str]]] = {}
 writers: dict[str, Any] = {}
+repeated: dict[str, dict[str, Any] | None] = {}
+repeating: set[str] = set()
 participants = BuiltinDataReader(participant, BuiltinTopicDcpsParticipant)
 endpoints = {
     "writers": BuiltinDataReader(participant, BuiltinTopicDcpsPublication),
@@ -268,7 +271,8 @@ def part_of(whole: Any, name: str) -> Any:
 
 
 def get(order: dict[str, Any]) -> list[Any]:
-    return list(noted[order["topic"]])
+    since_s = order.get("since_s", 0.0)
+    return [one for one in noted[order["topic"]] if one[0] > since_s]
 
 
 def advertise(order: dict[str, Any]) -> bool:
@@ -290,6 +294,24 @@ def publish(order: dict[str, Any]) -> bool:
         writer.write(message)
         time.sleep(order.get("period_s", 0.0))
     return True
+
+
+def repeat(order: dict[str, Any]) -> bool:
+    """Publish again and again, in place of what was repeated on the topic before; nothing where there are no values."""
+    name = order["topic"]
+    repeated[name] = order if order["values"] is not None else None
+    if name not in repeating:
+        repeating.add(name)
+        threading.Thread(target=keep_on, args=(name,), daemon=True).start()
+    return True
+
+
+def keep_on(name: str) -> None:
+    while True:
+        order = repeated[name]
+        if order is not None:
+            publish(order)
+        time.sleep(order["every_s"] if order else 0.01)
 
 
 def publish_raw(order: dict[str, Any]) -> bool:
@@ -390,7 +412,10 @@ def text(of: Qos) -> str:
 
 ORDERS = {
     order.__name__: order
-    for order in (record, get, advertise, listeners, publish, publish_raw, run_clock, introduce, graph, user_data, call)
+    for order in (
+        *(record, get, advertise, listeners, publish, repeat, publish_raw, run_clock),
+        *(introduce, graph, user_data, call),
+    )
 }
 
 threading.Thread(target=collect, daemon=True).start()

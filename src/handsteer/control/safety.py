@@ -48,6 +48,7 @@ class Safety:
         self._steering_age_s = math.inf
         self._last_steering_was_zero = True
         self._neutral_s = 0.0
+        self._was_fault = False
         self._signs_wait: str | None = "has just started" if arming else None
         self._steering_waits = arming
         self.is_stopped = False
@@ -88,6 +89,7 @@ class Safety:
     def fault(self, why: str) -> None:
         """Note that something failed; with ``arming``, signs have to show neutral again."""
         self._neutral_s = 0.0
+        self._was_fault = True
         if self._arming and not self._signs_wait:
             self._signs_wait = why
 
@@ -130,8 +132,10 @@ class Safety:
     def _note_none(self, gap_s: float) -> None:
         if gap_s >= FAULT_GAP_S:
             self.fault("recognition had no frame")
-        else:
+        elif not self._was_fault:
             self._neutral_s += gap_s
+        else:
+            self._was_fault = False  # what passed since the fault was not looked at
 
 
 class Following:

@@ -32,7 +32,7 @@ _ADVICE = {
 
 @dataclass(frozen=True)
 class _Seen:
-    """What the robot last said of itself, and when, in seconds of the machine's monotonic clock."""
+    """What the robot last said of itself, and when, in seconds of its graph's clock."""
 
     pose: Pose2D
     velocity: Velocity
@@ -87,7 +87,7 @@ class RemoteRobot:
         listens = self._cmd_vel.wanted
         self._linked_s = self._linked_s + dt_s if listens else 0.0
         seen = self._seen
-        is_silent = seen is not None and time.monotonic() - seen.at_s > self._config.odom_timeout
+        is_silent = seen is not None and self._session.clock.now() - seen.at_s > self._config.odom_timeout
         self._send(self._relay.step(dt_s, linked=listens and not is_silent))
         pose, velocity = (seen.pose, seen.velocity) if seen else (Pose2D(0.0, 0.0, 0.0), ZERO)
         return RobotState(
@@ -159,7 +159,8 @@ class RemoteRobot:
 
     def _on_odometry(self, received: Received[Any]) -> None:
         message = received.message
-        seen = _of_turtle(message) if self._config.odom_type == "turtlesim_pose" else _of_odometry(message)
+        read = _of_turtle if self._config.odom_type == "turtlesim_pose" else _of_odometry
+        seen = read(message, self._session.clock.now())
         pose = seen.pose
         self._senseless = not all(map(math.isfinite, (pose.x, pose.y, pose.yaw, *_numbers(seen.velocity))))
         if not self._senseless:
@@ -194,15 +195,15 @@ def _full_name(session: Session, name: str) -> str:
     return name if name.startswith("/") else f"{session.name.rpartition('/')[0]}/{name}"
 
 
-def _of_odometry(message: Odometry) -> _Seen:
+def _of_odometry(message: Odometry, at_s: float) -> _Seen:
     at, turned = message.pose.pose.position, message.pose.pose.orientation
     moving = message.twist.twist
-    return _Seen(Pose2D(at.x, at.y, yaw_of(turned)), Velocity(moving.linear.x, moving.angular.z), time.monotonic())
+    return _Seen(Pose2D(at.x, at.y, yaw_of(turned)), Velocity(moving.linear.x, moving.angular.z), at_s)
 
 
-def _of_turtle(message: TurtlePose) -> _Seen:
+def _of_turtle(message: TurtlePose, at_s: float) -> _Seen:
     velocity = Velocity(message.linear_velocity, message.angular_velocity)
-    return _Seen(Pose2D(message.x, message.y, message.theta), velocity, time.monotonic())
+    return _Seen(Pose2D(message.x, message.y, message.theta), velocity, at_s)
 
 
 def _numbers(velocity: Velocity) -> tuple[float, float]:

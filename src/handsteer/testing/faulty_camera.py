@@ -1,15 +1,22 @@
-"""A camera that fails when told to."""
+"""Cameras that fail when told to: one gives a list of events, the other spoils the frames of a camera that works."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Mapping
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
-from handsteer.cameras.protocol import EndOfStream, Frame
+from handsteer.cameras.protocol import Camera, EndOfStream, Frame
 from handsteer.clock import Clock
-from handsteer.errors import CameraError
+from handsteer.errors import CameraError, CameraLost
 
 Event = NDArray[np.uint8] | CameraError | None
+CameraFault = Literal["black", "frozen", "torn", "slow", "stuttering", "silent", "vanishing", "in_the_future", "late"]
+
+CAMERA_FAULTS: tuple[CameraFault, ...] = get_args(CameraFault)
+"""Everything that a :class:`SpoiltCamera` can suffer from."""
+
+_GREY = 128
 
 
 class FaultyCamera:
@@ -42,3 +49,118 @@ class FaultyCamera:
     def close(self) -> None:
         """Note that it was closed."""
         self.closed = True
+
+
+class SpoiltCamera:
+    """A :class:`~handsteer.cameras.protocol.Camera` that works until it is told to fail, and again after that.
+
+    ::
+
+        camera = SpoiltCamera(VirtualHandCamera(...), clock)
+        graph = ...                      # with CameraNode(transport, clock, camera)
+        camera.fail("frozen")            # from the next reading on
+        ...                              # does the robot stand?
+        camera.recover()
+
+    =================  =======================================================================================
+    ``black``          every pixel is 0, as behind a lens cap
+    ``frozen``         the last picture, again and again, each time as if it were new
+    ``torn``           grey below some line, as decoders leave a JPEG that was cut short; the line moves
+    ``slow``           a frame every ``slow_s`` seconds
+    ``stuttering``     frames for ``slow_s`` seconds, none for as long, over and over
+    ``silent``         no frames, and no error
+    ``vanishing``      :class:`~handsteer.errors.CameraLost` at every reading
+    ``in_the_future``  stamps are ``apart_s`` seconds ahead, as by a clock that is not in step
+    ``late``           frames are ``apart_s`` seconds old when they come
+    =================  =======================================================================================
+
+    Args:
+        camera: Gives the frames.
+        clock: The clock that stamps them.
+        slow_s: As above.
+        apart_s: As above.
+        seed: Where the picture is torn.
+
+    Attributes:
+        fault: What it suffers from now; None when it works.
+    """
+
+    def __init__(
+        self, camera: Camera, clock: Clock, *, slow_s: float = 1.0, apart_s: float = 5.0, seed: int = 0
+    ) -> None:
+        self.fault: CameraFault | None = None
+        self._camera = camera
+        self._clock = clock
+        self._slow_s = slow_s
+        self._apart_s = apart_s
+        self._random = np.random.default_rng(seed)
+        self._last: Frame | None = None
+        self._began_s = 0.0
+        self._given_s = 0.0
+        self._spoil: Mapping[CameraFault, Callable[[Frame], Frame | None]] = {
+            "black": lambda frame: Frame(np.zeros_like(frame.image), frame.captured_s),
+            "frozen": self._again,
+            "torn": self._torn,
+            "slow": self._slow,
+            "stuttering": self._stuttering,
+            "silent": lambda _: None,
+            "in_the_future": lambda frame: Frame(frame.image, frame.captured_s + self._apart_s),
+            "late": lambda frame: Frame(frame.image, frame.captured_s - self._apart_s),
+        }
+
+    @property
+    def name(self) -> str:
+        """The name of the camera within."""
+        return self._camera.name
+
+    @property
+    def period_s(self) -> float | None:
+        """The period of the camera within."""
+        return self._camera.period_s
+
+    def fail(self, fault: CameraFault) -> None:
+        """Suffer from ``fault`` from the next reading on; it takes the place of the one before."""
+        if fault not in CAMERA_FAULTS:
+            raise ValueError(f"there is no fault {fault!r} of a camera: use {', '.join(CAMERA_FAULTS)}")
+        self.fault = fault
+        self._began_s = self._given_s = self._clock.now()
+
+    def recover(self) -> None:
+        """Work again from the next reading on."""
+        self.fault = None
+
+    def read(self) -> Frame | None:
+        """Return the next frame as the fault leaves it, or None where it leaves none.
+
+        Raises:
+            CameraLost: It is ``vanishing``.
+        """
+        frame = self._camera.read()
+        if self.fault == "vanishing":
+            raise CameraLost(f"{self.name} has vanished, as it was told to")
+        if frame is None or self.fault is None:
+            self._last = frame or self._last
+            return frame
+        return self._spoil[self.fault](frame)
+
+    def close(self) -> None:
+        """Close the camera within."""
+        self._camera.close()
+
+    def _again(self, frame: Frame) -> Frame:
+        return Frame((self._last or frame).image, frame.captured_s)
+
+    def _torn(self, frame: Frame) -> Frame:
+        image = frame.image.copy()
+        image[self._random.integers(len(image)) :] = _GREY
+        return Frame(image, frame.captured_s)
+
+    def _slow(self, frame: Frame) -> Frame | None:
+        if self._clock.now() - self._given_s < self._slow_s - 1e-9:
+            return None
+        self._given_s = self._clock.now()
+        return frame
+
+    def _stuttering(self, frame: Frame) -> Frame | None:
+        rests = int((self._clock.now() - self._began_s) / self._slow_s) % 2 == 0
+        return None if rests else frame

@@ -1,0 +1,206 @@
+"""Whether anything grows, or drifts, when handsteer runs for long.
+
+Run ``python benchmarks/soak.py``; parts by name: ``page``, ``hours``. ``page`` runs the whole graph in this process,
+on a film of the virtual hand at 640x480 and 60 frames a second, with one viewer of the page, while others come and go;
+all of them are in processes of their own. ``hours`` drives for hours of stepped time, all nodes in turn, with a painted
+hand in place of the camera and the landmark models, and the simulated robot.
+"""
+
+import argparse
+import asyncio
+import gc
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+import urllib.request
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import socketio
+from page import DRIVE, film, load_now, plain_viewers, resident_mb, served
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # for the chain and the visitors that the tests use
+
+from tests.dashboard.network import client_of, drawn, join_query
+from tests.faults.chain import Chain
+from tests.faults.painted import FPS as CAMERA_FPS
+
+from handsteer.config import RobotConfig
+from handsteer.messages import CMD_VEL, IMAGE_RAW, ODOM
+from handsteer.robots.protocol import Robot
+from handsteer.robots.simulated import SimulatedRobot
+
+FPS = 60
+WARM_S = 60.0
+STAY_S = 0.3
+SETTLE_S = 20.0
+LIMIT_GROWTH = 0.02
+CYCLE = (("NONE", 1.0), ("Forward", 2.0), ("Turn Left", 1.0), ("Go", 2.0), ("Backward", 2.0), ("Stop", 2.0))
+CYCLE_S = sum(seconds for _, seconds in CYCLE)
+
+
+@dataclass(frozen=True)
+class Holdings:
+    """What this process holds: resident memory in MB, open files and sockets, threads."""
+
+    memory_mb: float
+    files: int
+    threads: int
+
+    @classmethod
+    def now(cls) -> "Holdings":
+        gc.collect()
+        return cls(resident_mb(), len(list(Path("/proc/self/fd").iterdir())), threading.active_count())
+
+    def __str__(self) -> str:
+        return f"{self.memory_mb:.1f} MB, {self.files} files and sockets, {self.threads} threads"
+
+
+def soak_page(duration_s: float, visits: int) -> None:
+    """Print what the process holds after a minute, and at the end of ``duration_s``, with ``visits`` visits in all."""
+    with tempfile.TemporaryDirectory() as folder:
+        camera = Path(folder) / "film.avi"
+        film(camera, DRIVE, FPS)
+        with served(DRIVE, str(camera)) as page, plain_viewers(page.port, 1):
+            began_s = time.monotonic()
+            visiting_s = duration_s - SETTLE_S
+            command = [sys.executable, __file__, "--visit", str(page.port), str(visits), str(visiting_s)]
+            with subprocess.Popen(command) as visitors:
+                time.sleep(WARM_S)
+                after_a_minute = Holdings.now()
+                print(f"after {WARM_S:.0f} s: {after_a_minute}", flush=True)
+                frames = sum(page.graph.recognition.counts.values())
+                warm_s = time.monotonic()
+                while visitors.poll() is None:
+                    time.sleep(min(60.0, visiting_s / 4))
+                    print(f"  {time.monotonic() - began_s:4.0f} s: {Holdings.now()}", flush=True)
+                    page.commands.clear()  # the benchmark's own notes
+                assert visitors.returncode == 0, "the visitors did not get in"
+            elapsed_s = time.monotonic() - warm_s
+            frames = sum(page.graph.recognition.counts.values()) - frames
+            time.sleep(SETTLE_S)  # a page that is closed is kept for a moment, for who comes back
+            end = Holdings.now()
+    growth = end.memory_mb / after_a_minute.memory_mb - 1
+    print(f"after {duration_s:.0f} s and {visits} visits: {end}; {frames / elapsed_s:.1f} frames/s, {load_now()}")
+    print(f"memory {growth:+.1%} (limit {LIMIT_GROWTH:.0%})")
+
+
+def visit(port: int, count: int, duration_s: float) -> None:
+    """Come and go ``count`` times within ``duration_s``."""
+
+    async def come_and_go() -> None:
+        began_s = time.monotonic()
+        for number in range(count):
+            try:
+                await one_visit(port)
+            except (OSError, socketio.exceptions.ConnectionError) as why:  # a busy machine, or one that is full
+                print(f"  a visitor did not get in: {why}", flush=True)
+            await asyncio.sleep(max(0.0, began_s + (number + 1) * duration_s / count - time.monotonic()))
+
+    asyncio.run(come_and_go())
+
+
+async def one_visit(port: int) -> None:
+    """Fetch the page, join it as its script does, take a picture, look on for a moment, and leave."""
+    address = f"http://127.0.0.1:{port}"
+    with urllib.request.urlopen(address) as answer:
+        html = answer.read().decode()
+    with urllib.request.urlopen(f"{address}/camera.mjpg") as pictures:
+        pictures.read1(65536)
+    page = socketio.AsyncClient()
+    query = join_query(client_of(html))
+    await page.connect(f"{address}?{query}", transports=["websocket"], socketio_path="/_nicegui_ws/socket.io")
+    for event in drawn(html):
+        await page.emit("event", event)
+    await page.sleep(STAY_S)
+    await page.disconnect()
+
+
+class Driven(Chain):
+    """The chain with the simulated robot, and figures that do not grow."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.counts = {topic.name: 0 for topic in (IMAGE_RAW, ODOM)}
+        self.commands: list[tuple[float, float]] = []
+        for topic in (IMAGE_RAW, ODOM):
+            self.faults.subscribe("soak", topic, lambda _, name=topic.name: self._count(name))
+        self.faults.subscribe("soak", CMD_VEL, self._on_command)
+
+    def cycle(self) -> list[tuple[float, float]]:
+        """Show each sign once; return what was commanded."""
+        self.commands.clear()
+        for sign, seconds in CYCLE:
+            self.show(sign)
+            self.run(seconds)
+            self.moments.clear()
+        return list(self.commands)
+
+    def _driven(self) -> Robot:
+        self.robot = SimulatedRobot(RobotConfig(world="empty"))
+        return self.robot
+
+    def _count(self, name: str) -> None:
+        self.counts[name] += 1
+
+    def _on_command(self, received: Any) -> None:
+        twist = received.message
+        self.commands.append((twist.linear.x, twist.angular.z))
+
+
+def soak_hours(hours: float) -> None:
+    """Print what has grown, and what has drifted, after ``hours`` of stepped time."""
+    chain, began_s = Driven(), time.monotonic()
+    chain.run(0.5 / CAMERA_FPS)  # signs change between two frames, so that no rounding decides
+    chain.cycle()
+    cycles = round(hours * 3600 / CYCLE_S)
+    first, begin_s = chain.cycle(), chain.clock.now()
+    before = None
+    for number in range(cycles):
+        last = chain.cycle()
+        if number == cycles // 8:
+            before = Holdings.now()
+            print(f"after {hours / 8:.1f} h: {before}", flush=True)
+    end, passed_s = Holdings.now(), chain.clock.now() - begin_s
+    state = chain.robot.step(0.0)
+    total_s = passed_s + 2 * CYCLE_S
+    frames, odometry = (chain.counts[topic.name] for topic in (IMAGE_RAW, ODOM))
+    print(f"after {hours:.1f} h in {(time.monotonic() - began_s) / 60:.1f} minutes: {end}")
+    if before is not None:
+        print(f"memory {end.memory_mb / before.memory_mb - 1:+.1%} (limit {LIMIT_GROWTH:.0%})")
+    print(f"robot's time {state.time_s - total_s:+.3f} s against the graph's {total_s:.0f} s; {frames / total_s:.4f} ")
+    print(f"frames/s, {odometry / total_s:.4f} odometries/s; callbacks that failed: {failed(chain)}")
+    sums = [tuple(round(sum(column), 3) for column in zip(*each, strict=True)) for each in (first, last)]
+    print(f"commands of the first cycle {len(first)}, added up {sums[0]}; of the last {len(last)}, {sums[1]}")
+
+
+def failed(chain: Chain) -> int:
+    return sum(node.callback_errors for node in chain.nodes.values())
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description="Tell whether anything grows or drifts.")
+    parser.add_argument("parts", nargs="*", help="page, hours; both by default")
+    parser.add_argument("--duration", type=float, default=600.0, help="seconds of page")
+    parser.add_argument("--visits", type=int, default=500, help="who come and go meanwhile")
+    parser.add_argument("--hours", type=float, default=4.0, help="hours of stepped time")
+    parser.add_argument("--visit", nargs=3, metavar=("PORT", "COUNT", "SECONDS"), help=argparse.SUPPRESS)
+    parser.add_argument("--look", nargs=2, type=int, metavar=("PORT", "COUNT"), help=argparse.SUPPRESS)
+    options = parser.parse_args()
+    if options.visit:
+        visit(int(options.visit[0]), int(options.visit[1]), float(options.visit[2]))
+        return
+    parts = {
+        "page": lambda: soak_page(options.duration, options.visits),
+        "hours": lambda: soak_hours(options.hours),
+    }
+    for part in options.parts or parts:
+        print(f"-- {part}", flush=True)
+        parts[part]()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,264 @@
+"""A transport that loses, delays, doubles, mixes up and holds messages, when told to."""
+
+import heapq
+import math
+import random
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any, Generic, TypeVar
+
+from handsteer.clock import Clock
+from handsteer.messages import Topic
+from handsteer.nodes.node import Node
+from handsteer.transports.channels import check_type
+from handsteer.transports.lateness import Lateness
+from handsteer.transports.protocol import Publisher, Received, Subscription, Transport
+from handsteer.transports.stamps import capture_time
+
+M = TypeVar("M")
+_Link = tuple[str, str]
+"""A topic and the node that sends."""
+
+
+@dataclass(frozen=True)
+class LinkFault:
+    """What becomes of the messages of a topic.
+
+    Attributes:
+        drop: How likely each is lost, 0 to 1.
+        delay_s: How long each is under way, in seconds.
+        jitter_s: By how much longer at most, by chance. As over DDS, Zenoh and TCP, none overtakes another.
+        duplicate: How likely each comes twice, 0 to 1.
+        reorder: How likely each comes after the next one, 0 to 1; the last one, for which no next one comes, stays
+            under way.
+        frozen: Nothing comes. What was sent meanwhile comes at once when the fault ends, in its order.
+    """
+
+    drop: float = 0.0
+    delay_s: float = 0.0
+    jitter_s: float = 0.0
+    duplicate: float = 0.0
+    reorder: float = 0.0
+    frozen: bool = False
+
+
+CUT = LinkFault(drop=1.0)
+"""Nothing comes, and nothing of it ever will."""
+FROZEN = LinkFault(frozen=True)
+"""Nothing comes until the fault ends; then all at once."""
+
+
+class FaultTransport:
+    """A :class:`~handsteer.transports.protocol.Transport` around another one, with a fault on any of its topics.
+
+    ::
+
+        transport = FaultTransport(InProcessTransport(), clock, seed=1)
+        graph = Graph(config, clock, transport)
+        graph.add(transport.wire)
+        transport.spoil(CMD_VEL, LinkFault(delay_s=0.2, drop=0.1))
+        graph.run_stepped(10.0)
+        transport.heal(CMD_VEL)
+
+    The same seed and the same messages give the same faults. Messages that are under way are delivered by the node
+    :attr:`wire`, in time of the graph's clock, stepped or real: it has to run with the others.
+
+    Args:
+        inner: Carries the messages.
+        clock: The graph's clock.
+        seed: Of all that happens by chance.
+        guards: Whether late messages are dealt with as handsteer does over DDS and Zenoh: of topics with a
+            ``lifespan_s``, none is delivered that comes by so much later than the quickest one of its sender did. A
+            transport within one process does without, and ROS 1 cannot.
+        carries_capture_times: Whether the time of a frame travels with the sign that it led to. Over ROS it does not:
+            only what has a header has a time then.
+
+    Attributes:
+        wire: Delivers what is under way.
+    """
+
+    def __init__(
+        self,
+        inner: Transport,
+        clock: Clock,
+        *,
+        seed: int = 0,
+        guards: bool = True,
+        carries_capture_times: bool = True,
+    ) -> None:
+        self.crosses_network = inner.crosses_network
+        self._inner = inner
+        self._clock = clock
+        self._guards = guards
+        self._carries_capture_times = carries_capture_times
+        self._random = random.Random(seed)
+        self._faults: dict[tuple[str, str | None], LinkFault] = {}
+        # When the last message of each link comes, of those that keep their order.
+        self._due_s: dict[_Link, float] = {}
+        self.wire = _Wire(inner, clock)
+
+    def spoil(self, topic: Topic[Any] | str, fault: LinkFault, *, sender: str | None = None) -> None:
+        """Let ``fault`` befall the messages of ``topic`` that are sent from now on, in place of the one before.
+
+        Args:
+            topic: The topic, or its name, as ``/image_raw``.
+            fault: What becomes of them.
+            sender: Only those of the node of this name, which goes before what is said of all.
+        """
+        self._faults[_name(topic), sender] = fault
+        if not fault.frozen:
+            self.wire.thaw(_name(topic), sender)
+
+    def heal(self, topic: Topic[Any] | str, *, sender: str | None = None) -> None:
+        """End the fault; what was frozen comes now, what is delayed in its time."""
+        self._faults.pop((_name(topic), sender), None)
+        self.wire.thaw(_name(topic), sender)
+
+    def advertise(self, node: str, topic: Topic[M]) -> "FaultPublisher[M]":
+        """Return the sending end of ``topic`` for the node named ``node``."""
+        lateness = Lateness(topic.lifespan_s) if self._guards and topic.lifespan_s is not None else None
+        return FaultPublisher(self, node, topic, self._inner.advertise(node, topic), lateness)
+
+    def subscribe(self, node: str, topic: Topic[M], deliver: Callable[[Received[M]], None]) -> Subscription:
+        """Call ``deliver`` for each message on ``topic`` that comes through."""
+        return self._inner.subscribe(node, topic, deliver)
+
+    def publishers_of(self, topic: Topic[Any]) -> list[str]:
+        """Return what the transport within knows: faults befall messages, not who is there."""
+        return self._inner.publishers_of(topic)
+
+    def full_name(self, node: str) -> str:
+        """Return what the transport within calls ``node``."""
+        return self._inner.full_name(node)
+
+    def close(self) -> None:
+        """End all publishing and receiving; what is under way is lost."""
+        self.wire.clear()
+        self._inner.close()
+
+    def send(self, node: str, topic: Topic[Any], deliver: Callable[[], None]) -> None:
+        """Call ``deliver`` when a message that ``node`` sends now comes, as often as it does."""
+        fault = self._faults.get((topic.name, node)) or self._faults.get((topic.name, None))
+        if fault is None:
+            deliver()
+            return
+        if self._random.random() < fault.drop:
+            return
+        link = (topic.name, node)
+        for _ in range(2 if self._random.random() < fault.duplicate else 1):
+            if fault.frozen or self._random.random() < fault.reorder:
+                self.wire.hold(link, math.inf, deliver)
+            else:
+                due_s = self._clock.now() + fault.delay_s + self._random.uniform(0.0, fault.jitter_s)
+                due_s = self._due_s[link] = max(due_s, self._due_s.get(link, due_s))
+                self.wire.hold(link, due_s, deliver)
+                self.wire.follow(link, due_s)
+
+    def captured(self, message: object, captured_s: float | None) -> float | None:
+        """Return the capture time that arrives with a ``message`` that was sent with ``captured_s``."""
+        return captured_s if self._carries_capture_times else capture_time(message, self._clock)
+
+    def now(self) -> float:
+        """Return the time of the graph's clock, in seconds."""
+        return self._clock.now()
+
+
+class FaultPublisher(Generic[M]):
+    """The sending end of a topic that may have a fault."""
+
+    def __init__(
+        self, transport: FaultTransport, node: str, topic: Topic[M], inner: Publisher[M], lateness: Lateness | None
+    ) -> None:
+        self._transport = transport
+        self._node = node
+        self._topic = topic
+        self._inner = inner
+        self._lateness = lateness
+
+    @property
+    def wanted(self) -> bool:
+        """Whether anybody listens."""
+        return self._inner.wanted
+
+    def publish(self, message: M, captured_s: float | None = None) -> None:
+        """Send ``message`` on its way."""
+        check_type(self._topic, message)
+        deliver = partial(self._arrive, message, captured_s, self._transport.now())
+        self._transport.send(self._node, self._topic, deliver)
+
+    def _arrive(self, message: M, captured_s: float | None, sent_s: float) -> None:
+        late = self._lateness is not None and self._lateness.is_late(b"", sent_s, self._transport.now())
+        if not late:
+            self._inner.publish(message, self._transport.captured(message, captured_s))
+
+
+@dataclass(order=True)
+class _Message:
+    due_s: float
+    number: int
+    link: _Link = field(compare=False)
+    deliver: Callable[[], None] = field(compare=False)
+
+
+class _Wire(Node):
+    """Holds messages until they are due, and delivers them on its own thread or by the crank of a stepped run."""
+
+    def __init__(self, transport: Transport, clock: Clock) -> None:
+        super().__init__("wire", transport, clock)
+        self._number = 0
+        self._under_way: list[_Message] = []
+        self._waiting: list[_Message] = []
+
+    @property
+    def next_due_s(self) -> float | None:
+        """When the next message comes; None when none is under way."""
+        with self._wake:
+            return self._under_way[0].due_s if self._under_way else None
+
+    def spin_once(self) -> bool:
+        """Deliver what has come; return whether there was anything."""
+        with self._wake:
+            due: list[_Message] = []
+            while self._under_way and self._under_way[0].due_s <= self.clock.now():
+                due.append(heapq.heappop(self._under_way))
+        for message in due:
+            self._guard(message.link[0], message.deliver)
+        return bool(due)
+
+    def hold(self, link: _Link, due_s: float, deliver: Callable[[], None]) -> None:
+        """Call ``deliver`` at ``due_s``; where that is infinite, after another message of ``link``, or once thawed."""
+        with self._wake:
+            self._number += 1
+            message = _Message(due_s, self._number, link, deliver)
+            if math.isinf(due_s):
+                self._waiting.append(message)
+            else:
+                heapq.heappush(self._under_way, message)
+            self._wake.notify()
+
+    def follow(self, link: _Link, due_s: float) -> None:
+        """Let what waits for the message of ``link`` that is due at ``due_s`` come after it."""
+        self._release(lambda waiting: waiting == link, due_s)
+
+    def thaw(self, topic: str, sender: str | None) -> None:
+        """Let all that was held of ``topic``, by ``sender`` or all, come now."""
+        self._release(lambda link: link[0] == topic and sender in (None, link[1]), self.clock.now())
+
+    def clear(self) -> None:
+        """Lose all that is under way."""
+        with self._wake:
+            self._under_way, self._waiting = [], []
+
+    def _release(self, is_meant: Callable[[_Link], bool], due_s: float) -> None:
+        with self._wake:
+            meant = [message for message in self._waiting if is_meant(message.link)]
+            self._waiting = [message for message in self._waiting if not is_meant(message.link)]
+            for message in meant:
+                self._number += 1
+                heapq.heappush(self._under_way, _Message(due_s, self._number, message.link, message.deliver))
+            self._wake.notify()
+
+
+def _name(topic: Topic[Any] | str) -> str:
+    return topic if isinstance(topic, str) else topic.name

@@ -1,0 +1,29 @@
+"""``handsteer steering`` without a page, whose stick somebody holds: ``held_stick.py steering --transport dds …``."""
+
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from handsteer.cli import main, nodes
+
+SPEED_MPS = 0.3
+
+
+@contextmanager
+def held(node: Any, _config: Any) -> Iterator[None]:
+    ended = threading.Event()
+
+    def hold() -> None:
+        node.steer(0.0, 0.0)  # whoever takes the stick has not pushed it yet
+        while not ended.wait(0.1):
+            node.steer(SPEED_MPS, 0.0)
+
+    threading.Thread(target=hold, daemon=True).start()
+    yield
+    ended.set()
+
+
+nodes._served = held
+sys.exit(main())

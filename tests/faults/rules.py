@@ -1,0 +1,106 @@
+"""The rules of docs/safety.md as an onlooker would keep them: when may a robot be asked to move at all?
+
+This is no copy of the code: it knows no node, no filter and no velocity, only what was shown, said and done, and when.
+It is generous: where nodes may take up to half a second, so does it.
+"""
+
+import math
+from dataclasses import dataclass
+
+PATIENCE_S = 0.5
+"""What outlives its reason by more than this is a fault."""
+SURELY_A_GAP_S = 0.6
+"""A silence of this length is one for every node."""
+STICK_PAUSE_S = 0.35
+"""Steering that was silent for so long has let go."""
+_EPSILON_S = 1e-6
+
+
+@dataclass
+class Rules:
+    """What an onlooker knows.
+
+    Attributes:
+        now_s: The time.
+        is_stopped: Whether somebody has said Stop, and nobody has taken it back.
+    """
+
+    now_s: float = 0.0
+    is_stopped: bool = False
+    _hand_asked_s: float = -math.inf
+    _stick_asked_s: float = -math.inf
+    _stick_spoke_s: float = -math.inf
+    _picture_s: float = -math.inf
+    _hand_was_neutral: bool = False
+    _stick_was_neutral: bool = False
+    _robot_waits: bool = False
+    _sign: str = "NONE"
+    _stands_by_s: float = math.inf
+
+    def picture(self, sign: str, *, asks: bool) -> None:
+        """A live camera shows a hand with a sign that asks for motion, or one that does not, or none."""
+        # While a new sign is not confirmed yet, zero is commanded: that is what a robot waits for that was away.
+        self._robot_waits = self._robot_waits and asks and sign == self._sign
+        self._sign = sign
+        if self.now_s - self._picture_s > SURELY_A_GAP_S:
+            self._hand_was_neutral = False
+        self._picture_s = self.now_s
+        if asks:
+            self._hand_asked_s = self.now_s
+        else:
+            self._hand_was_neutral = True
+
+    def stick(self, *, asks: bool) -> None:
+        """Somebody holds the stick, or lets go."""
+        self._robot_waits = self._robot_waits and asks
+        paused = self.now_s - self._stick_spoke_s >= STICK_PAUSE_S - _EPSILON_S
+        self._stick_was_neutral = self._stick_was_neutral or paused or not asks
+        self._stick_spoke_s = self.now_s
+        if asks:
+            self._stick_asked_s = self.now_s
+
+    def stop(self) -> None:
+        """Somebody says Stop: a robot that moves may do so for a moment yet, where the word takes its time."""
+        self.is_stopped = True
+        self._stands_by_s = min(self._stands_by_s, self.now_s + PATIENCE_S)
+
+    def reset(self) -> None:
+        """Somebody takes the Stop back: whoever drives has to let go before anything moves."""
+        if self.is_stopped:
+            self.disarm()
+        self.is_stopped = False
+
+    def disarm(self) -> None:
+        """Something was started, frozen, or away: whoever drives has to let go before anything moves."""
+        self._hand_was_neutral = self._stick_was_neutral = False
+        self._stands_by_s = min(self._stands_by_s, self.now_s + PATIENCE_S)
+
+    def robot_was_away(self) -> None:
+        """The robot could not hear: whatever was asked of it then is not meant for it now."""
+        self._robot_waits = True
+        self._stands_by_s = min(self._stands_by_s, self.now_s + PATIENCE_S)
+
+    def stands(self) -> None:
+        """The robot stands: if it has to, then from now on."""
+        if self._stands_by_s < math.inf:
+            self._stands_by_s = -math.inf
+
+    def why_not(self) -> str | None:
+        """Return why the robot must not be asked to move now; None where it may."""
+        by_hand = self._is_live(self._hand_asked_s) and self._hand_was_neutral
+        by_stick = self._is_live(self._stick_asked_s) and self._stick_was_neutral
+        if (by_hand or by_stick) and not (self.is_stopped or self._robot_waits):
+            self._stands_by_s = math.inf
+            return None
+        if self.now_s <= self._stands_by_s < math.inf:
+            return None
+        if self.is_stopped:
+            return "Stop was said, and not taken back"
+        if self._robot_waits:
+            return "the robot was away, and nothing else was asked since"
+        if self._is_live(self._hand_asked_s) or self._is_live(self._stick_asked_s):
+            return "nobody has let go since it was started, frozen, stopped or away"
+        return f"nobody has asked for it for {PATIENCE_S} s"
+
+    def _is_live(self, asked_s: float) -> bool:
+        return self.now_s - asked_s <= PATIENCE_S + _EPSILON_S

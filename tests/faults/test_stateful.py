@@ -1,0 +1,257 @@
+"""Random histories over the real recognition, control and relay in stepped time: never a motion without a live reason.
+
+``make test`` takes some ten thousand steps, ``make soak`` a million: HANDSTEER_STEPS says how many.
+"""
+
+import logging
+import os
+from collections.abc import Callable
+
+from hypothesis import HealthCheck, settings
+from hypothesis import strategies as st
+from hypothesis.stateful import RuleBasedStateMachine, initialize, precondition, rule
+
+from handsteer.clock import SteppedClock
+from handsteer.config import ControlConfig, RobotConfig, SignsConfig
+from handsteer.images import image_message
+from handsteer.messages import CMD_VEL, IMAGE_RAW, STEERING_CMD_VEL, STOP, Bool, Header, Image, Twist, twist
+from handsteer.nodes.control import HandSignControlNode
+from handsteer.nodes.node import Node
+from handsteer.nodes.recognition import HandSignRecognitionNode
+from handsteer.robots.diff_drive import Velocity
+from handsteer.robots.relay import Relay
+from handsteer.signs.drawing import annotate
+from handsteer.signs.opening import open_classifier
+from handsteer.transports.protocol import Received
+from tests.faults.domain import Domain
+from tests.faults.painted import FPS, PaintedCamera, painted_recognizer
+from tests.faults.rules import Rules
+
+STEPS_A_HISTORY = 50
+STEPS = int(os.environ.get("HANDSTEER_STEPS", "10000"))
+MOTIONS = ("Forward", "Backward", "Turn Left", "Turn Right", "Go")
+"""Go keeps what is: it is a reason to go on."""
+NEUTRAL = ("Stop", "NONE")
+_TICK_S = 1 / 30
+_BEGIN_S = 100.0
+
+
+class Graph:
+    """Recognition, control and the relay to a real robot, and whoever shows, steers and stops."""
+
+    def __init__(self) -> None:
+        self.clock = SteppedClock(_BEGIN_S)
+        self.domain = Domain()
+        self.relay = Relay(RobotConfig())
+        self.linked = True
+        self.camera = PaintedCamera(self.clock)
+        self.images = self.domain.advertise("camera", IMAGE_RAW)
+        self.stick = self.domain.advertise("page", STEERING_CMD_VEL)
+        self.stop = self.domain.advertise("page", STOP)
+        self.domain.subscribe("relay", CMD_VEL, self._on_command)
+        self.last_image: Image | None = None
+        self._make: dict[str, Callable[[], Node]] = {"recognition": self._recognition, "control": self._control}
+        self.nodes = {name: make() for name, make in self._make.items()}
+        self.frozen: set[str] = set()
+
+    @property
+    def is_asked_to_move(self) -> bool:
+        """Whether the real robot was told to move last."""
+        return self.relay.velocity != Velocity()
+
+    def show(self, sign: str, *, age_s: float = 0.0, again: bool = False) -> None:
+        """Give the next picture; or the last one ``again``, as if it were new."""
+        self.camera.sign = sign
+        header = Header(self.clock.stamp(self.clock.now() - age_s), "camera")
+        picture = self.last_image if again else image_message(self.camera.read().image, header)
+        if picture is not None:
+            image = Image(header, *(getattr(picture, name) for name in _PARTS))
+            # What comes at a wrong time is not looked at: it is new when it comes again.
+            self.last_image = self.last_image if age_s else image
+            self.images.publish(image, self.clock.now() - age_s)
+        self.serve()
+
+    def serve(self) -> None:
+        """Let all nodes do what is due."""
+        alive = [node for name, node in self.nodes.items() if name not in self.frozen]
+        while any([node.spin_once() for node in alive]):
+            pass
+
+    def tick(self, seconds: float) -> None:
+        """Let a moment pass for all."""
+        self.clock.advance(seconds)
+        self.serve()
+        self.relay.step(seconds, linked=self.linked)
+
+    def restart(self, name: str) -> None:
+        """Kill a node and start it again."""
+        self.domain.kill(self.nodes[name].name)
+        self.nodes[name] = self._make[name]()
+        self.frozen.discard(name)
+
+    def _on_command(self, received: Received[Twist]) -> None:
+        speeds = received.message
+        self.relay.command(Velocity(speeds.linear.x, speeds.angular.z))
+
+    def _recognition(self) -> Node:
+        config = SignsConfig()
+        return HandSignRecognitionNode(
+            self.domain, self.clock, painted_recognizer(config), config, annotate, open_classifier=open_classifier
+        )
+
+    def _control(self) -> Node:
+        config = ControlConfig.model_validate({"linear_step": 0.2, "angular_step": 0.2})
+        return HandSignControlNode(self.domain, self.clock, config, arming=True)
+
+
+_PARTS = ("height", "width", "encoding", "is_bigendian", "step", "data")
+
+
+class Histories(RuleBasedStateMachine):
+    """Each step is something that people, machines or networks do."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        logging.disable(logging.CRITICAL)
+        self.graph = Graph()
+        self.rules = Rules()
+
+    def teardown(self) -> None:
+        logging.disable(logging.NOTSET)
+
+    @initialize(sign=st.sampled_from(MOTIONS))
+    def begin(self, sign: str) -> None:
+        self.wait(1.2)
+        self.drive(sign)
+        # Or else whatever comes would prove nothing; Go alone sets nothing in motion.
+        assert self.graph.is_asked_to_move == (sign != "Go")
+
+    def wait(self, seconds: float) -> None:
+        """Let time pass in moments, and look at each."""
+        while seconds > 1e-9:
+            moment = min(seconds, _TICK_S)
+            self.graph.tick(moment)
+            self.look()
+            seconds -= moment
+
+    def look(self) -> None:
+        self.rules.now_s = self.graph.clock.now()
+        if self.graph.is_asked_to_move:
+            why_not = self.rules.why_not()
+            assert why_not is None, f"at {self.rules.now_s:.2f} s the robot is asked to move, though {why_not}"
+        else:
+            self.rules.stands()
+
+    @rule(sign=st.sampled_from(MOTIONS + NEUTRAL), frames=st.integers(1, 8))
+    def show(self, sign: str, frames: int) -> None:
+        for _ in range(frames):
+            self.rules.now_s = self.graph.clock.now()
+            self.rules.picture(sign, asks=sign in MOTIONS)
+            self.graph.show(sign)
+            self.look()
+            self.wait(1 / FPS)
+
+    @rule(sign=st.sampled_from(MOTIONS))
+    def drive(self, sign: str) -> None:
+        self.show("Stop", 2)
+        self.show(sign, 10)
+
+    @rule(sign=st.sampled_from(MOTIONS), frames=st.integers(10, 16))
+    def hold(self, sign: str, frames: int) -> None:
+        self.show(sign, frames)
+
+    @precondition(lambda self: self.rules.is_stopped or not self.graph.linked)
+    @rule()
+    def begin_anew(self) -> None:
+        self.reset()
+        if not self.graph.linked:
+            self.the_robot_comes_back()
+        self.wait(0.4)
+        self.drive("Forward")
+
+    @rule(frames=st.integers(1, 20))
+    def freeze_the_picture(self, frames: int) -> None:
+        for _ in range(frames):
+            self.graph.show(self.graph.camera.sign, again=True)
+            self.look()
+            self.wait(1 / FPS)
+
+    @rule(sign=st.sampled_from(MOTIONS + NEUTRAL), frames=st.integers(1, 8), age_s=st.sampled_from([-5.0, 0.6, 5.0]))
+    def show_with_wrong_times(self, sign: str, frames: int, age_s: float) -> None:
+        for _ in range(frames):
+            self.graph.show(sign, age_s=age_s)
+            self.look()
+            self.wait(1 / FPS)
+
+    @rule(speed=st.sampled_from([0.5, -0.5, 0.0, float("nan")]), count=st.integers(1, 5))
+    def steer(self, speed: float, count: int) -> None:
+        for _ in range(count):
+            self.rules.now_s = self.graph.clock.now()
+            self.rules.stick(asks=speed in (0.5, -0.5))
+            self.graph.stick.publish(twist(speed, 0.0))
+            self.graph.serve()
+            self.look()
+            self.wait(0.1)
+
+    @rule()
+    def stop(self) -> None:
+        self.rules.stop()
+        self.graph.stop.publish(Bool(data=True))
+        self.wait(_TICK_S)
+
+    @rule()
+    def reset(self) -> None:
+        self.rules.reset()
+        self.graph.stop.publish(Bool(data=False))
+        self.wait(_TICK_S)
+
+    @rule(seconds=st.sampled_from([0.05, 0.2, 0.34, 0.36, 0.45, 0.7, 1.2]))
+    def nothing_comes(self, seconds: float) -> None:
+        self.wait(seconds)
+
+    @rule(seconds=st.sampled_from([0.1, 0.3, 0.7, 5.0, 100.0]))
+    def the_clock_jumps(self, seconds: float) -> None:
+        self.graph.clock.advance(seconds)
+        if seconds > 0.5:
+            self.rules.disarm()
+        self.graph.relay.step(seconds, linked=self.graph.linked)
+        self.wait(_TICK_S)
+
+    @rule(name=st.sampled_from(["control", "recognition"]))
+    def restart(self, name: str) -> None:
+        if name == "control":
+            self.rules.disarm()
+        self.graph.restart(name)
+        self.wait(_TICK_S)
+
+    @rule(name=st.sampled_from(["control", "recognition"]), seconds=st.sampled_from([0.2, 0.7, 1.5]))
+    def freeze(self, name: str, seconds: float) -> None:
+        self.graph.frozen.add(name)
+        if seconds > 0.6:
+            self.rules.disarm()
+        self.wait(seconds)
+        self.graph.frozen.discard(name)
+        self.wait(_TICK_S)
+
+    @precondition(lambda self: self.graph.linked)
+    @rule()
+    def the_robot_leaves(self) -> None:
+        self.graph.linked = False
+        self.rules.robot_was_away()
+        self.wait(_TICK_S)
+
+    @precondition(lambda self: not self.graph.linked)
+    @rule()
+    def the_robot_comes_back(self) -> None:
+        self.graph.linked = True
+        self.rules.robot_was_away()
+        self.wait(_TICK_S)
+
+
+Histories.TestCase.settings = settings(
+    max_examples=max(1, STEPS // STEPS_A_HISTORY),
+    stateful_step_count=STEPS_A_HISTORY,
+    deadline=None,
+    suppress_health_check=list(HealthCheck),
+)
+TestHistories = Histories.TestCase
