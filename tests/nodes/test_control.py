@@ -1,3 +1,4 @@
+import logging
 import math
 from dataclasses import replace
 
@@ -425,3 +426,44 @@ def test_only_one_robot_is_ever_driven_and_none_before_its_hand_let_go(events: l
             assert bench.moving() == []
     bench.control.stop()
     assert bench.moving() == []
+
+
+def test_who_has_no_page_reads_in_the_log_that_it_waits_for_neutral(caplog: pytest.LogCaptureFixture) -> None:
+    caplog.set_level(logging.INFO)
+    bench = Bench()
+    robot = bench.record(CMD_VEL)
+    bench.nodes = [HandSignControlNode(bench.transport, bench.clock, ControlConfig(), arming=True)]
+    signs = bench.transport.advertise("recognition", HAND_SIGN)
+
+    def show(sign: str, count: int) -> None:
+        for _ in range(count):
+            signs.publish(String(data=sign), bench.clock.now())
+            bench.run(1 / 30)
+
+    show("Forward", 60)
+    assert set(map(str, robot)) == {str(twist(0.0, 0.0))}
+    show("NONE", 20)
+    show("Forward", 3)
+    assert robot[-1].linear.x > 0.0
+    bench.run(1.0)
+    show("Forward", 30)
+    assert robot[-1] == twist(0.0, 0.0)
+    assert [record.message for record in caplog.records if "armed" in record.message] == [
+        "disarmed (has just started): nothing moves by signs before Stop was shown, or no hand",
+        "armed: signs count again",
+        "disarmed (no sign came): nothing moves by signs before Stop was shown, or no hand",
+    ]
+
+
+def test_a_robot_that_nobody_hears_is_not_driven_on() -> None:
+    bench = Bench()
+    node = HandSignControlNode(bench.transport, bench.clock, ControlConfig(), arming=True)
+    bench.nodes = [node]
+    statuses = bench.record(DIAGNOSTICS)
+    signs = bench.transport.advertise("recognition", HAND_SIGN)
+    for sign in ["Stop"] * 60 + ["Forward"] * 60:
+        signs.publish(String(data=sign), bench.clock.now())
+        bench.run(1 / 30)
+    values = {value.key: value.value for value in statuses[-1].status[0].values}
+    assert values["linear_mps"] == "0.000"
+    assert "no robot listens" in statuses[-1].status[0].message

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from handsteer import graph
-from handsteer.cli.options import ConfigFile, Parameters, say, settings, uninterrupted
+from handsteer.cli.options import ConfigFile, Flag, Parameters, say, settings, uninterrupted
 from handsteer.clock import Clock
 from handsteer.config import Config
 from handsteer.nodes.node import Node
@@ -117,6 +117,7 @@ def steering(
     transport: str,
     host: str | None = None,
     port: int | None = None,
+    token: Flag = False,
     config_file: ConfigFile = None,
     parameters: Parameters = None,
 ) -> int:
@@ -135,10 +136,12 @@ def steering(
         Address of this machine that the page is served on; 0.0.0.0 lets other machines in, with a token.
     port
         Port of the page; 0 takes a free one.
+    token
+        Ask everybody for the token in the printed address, on this machine too: for machines that several people use.
     config_file
         YAML file with parameters; ROS parameters go before it, options before both.
     """
-    shorthand = {"dashboard": {"host": host, "port": port}}
+    shorthand = {"dashboard": {"host": host, "port": port, "token": "always" if token else None}}
     job = _Job("steering", "dashboard", graph.make_steering, config_file, parameters, shorthand, _served)
     return _run(job, transport, words)
 

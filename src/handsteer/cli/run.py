@@ -28,6 +28,7 @@ def run(
     world: str | None = None,
     host: str | None = None,
     port: int | None = None,
+    token: Flag = False,
     headless: Flag = False,
     duration: float | None = None,
     fast: Flag = False,
@@ -56,6 +57,8 @@ def run(
         Address of this machine that the page is served on; 0.0.0.0 lets other machines in, with a token.
     port
         Port of the page; 0 takes a free one.
+    token
+        Ask everybody for the token in the printed address, on this machine too: for machines that several people use.
     headless
         Without the page.
     duration
@@ -71,7 +74,7 @@ def run(
     shorthand = {
         "camera": {"source": camera},
         "robot": {**_robot(robot), "world": world},
-        "dashboard": {"host": host, "port": port},
+        "dashboard": {"host": host, "port": port, "token": "always" if token else None},
     }
     base = {"camera": {"at_end": "end"}} if headless else {}
 

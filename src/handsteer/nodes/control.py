@@ -65,6 +65,7 @@ class HandSignControlNode(Node):
         self._following = Following() if arming and not config.robots else None
         self._arming = arming
         self._ramp = Ramp(config)
+        self._waited = False
         self._ramped_s = self._last_step_s = clock.now()
         self._monitor = CollisionMonitor(self, collision_monitor or CollisionMonitorConfig(), self._driver.hold_back)
         self._interruption = Interruption(config.sign_timeout, clock.now())
@@ -135,8 +136,19 @@ class HandSignControlNode(Node):
         elapsed_s = self._elapsed()
         self._look_after_the_robot(elapsed_s)
         self._publish(self._driver.step(elapsed_s))
+        self._log_arming()
         if self._selection:
             self._selection.beat()
+
+    def _log_arming(self) -> None:
+        """Say when signs begin to wait for neutral, and when they need not any more: who has no page sees the log."""
+        waits = self._safety.signs_wait is not None
+        if waits and not self._waited:
+            why = self._safety.signs_wait or "after a reset"
+            log.info("disarmed (%s): nothing moves by signs before Stop was shown, or no hand", why)
+        elif self._waited and not waits:
+            log.info("armed: signs count again")
+        self._waited = waits
 
     def _look_after_the_robot(self, elapsed_s: float) -> None:
         if not self._arming:
