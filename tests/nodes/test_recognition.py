@@ -96,6 +96,16 @@ def test_a_broken_frame_is_no_frame(bench: RecognitionBench) -> None:
     assert len(bench.names) <= 2
 
 
+def test_a_sign_is_bridged_from_when_it_was_seen_and_not_from_when_the_picture_froze(bench: RecognitionBench) -> None:
+    bench.show(frames=99)
+    frozen = image_message(bench.picture(), HEADER)
+    bench.show(frozen)
+    bench.show(frozen, frames=9)
+    bench.signs.clear()
+    bench.show()  # no hand any more
+    assert bench.names == ["NONE"]
+
+
 def test_the_same_picture_again_is_no_frame_whoever_publishes_it(bench: RecognitionBench) -> None:
     statuses = bench.record(DIAGNOSTICS)
     bench.show(frames=6)

@@ -70,6 +70,7 @@ class HandSignRecognitionNode(Node):
         self._open_classifier = open_classifier
         self._model = _version_of(config.model)
         self._last_captured_s: float | None = None
+        self._unseen_s = 0.0
         self._last_frame_s = clock.now()
         self._last_sign_s = clock.now()
         self._last_hand_s: float | None = None
@@ -127,10 +128,13 @@ class HandSignRecognitionNode(Node):
 
     def _look_at(self, image: NDArray[np.uint8], received: Received[M], began_s: float, captured_s: float) -> None:
         dt_s = self._since_last_frame(captured_s)
+        self._unseen_s += dt_s
         self._refused = self._freshness.why_refused(image, dt_s)
         if self._refused is not None:
             return
-        recognition = self._recognizer.step(image, dt_s)
+        # The time of pictures that were not looked at counts: a sign is bridged from when it was seen last.
+        recognition = self._recognizer.step(image, self._unseen_s)
+        self._unseen_s = 0.0
         if recognition.hand is not None:
             self._last_hand_s = began_s
             self._refused = self._freshness.why_hand_refused(recognition.hand.box_px, dt_s)
