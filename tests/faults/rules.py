@@ -13,6 +13,8 @@ SURELY_A_GAP_S = 0.6
 """A silence of this length is one for every node."""
 STICK_PAUSE_S = 0.35
 """Steering that was silent for so long has let go."""
+CHANGES = 2
+"""So many new signs, one after the other, may count as none."""
 _EPSILON_S = 1e-6
 
 
@@ -35,15 +37,19 @@ class Rules:
     _stick_was_neutral: bool = False
     _robot_waits: bool = False
     _sign: str = "NONE"
+    _changes: int = 0
     _stands_by_s: float = math.inf
 
     def picture(self, sign: str, *, asks: bool) -> None:
         """A live camera shows a hand with a sign that asks for motion, or one that does not, or none."""
         # While a new sign is not confirmed yet, zero is commanded: that is what a robot waits for that was away.
         self._robot_waits = self._robot_waits and asks and sign == self._sign
-        self._sign = sign
         if self.now_s - self._picture_s > SURELY_A_GAP_S:
-            self._hand_was_neutral = False
+            self._hand_was_neutral, self._changes = False, 0
+        # A hand that changes its sign again and again shows none for half a second, as far as the control can tell.
+        self._changes += sign != self._sign
+        self._hand_was_neutral = self._hand_was_neutral or self._changes >= CHANGES
+        self._sign = sign
         self._picture_s = self.now_s
         if asks:
             self._hand_asked_s = self.now_s
@@ -52,8 +58,8 @@ class Rules:
 
     def stick(self, *, asks: bool) -> None:
         """Somebody holds the stick, or lets go."""
-        self._robot_waits = self._robot_waits and asks
         paused = self.now_s - self._stick_spoke_s >= STICK_PAUSE_S - _EPSILON_S
+        self._robot_waits = self._robot_waits and asks and not paused
         self._stick_was_neutral = self._stick_was_neutral or paused or not asks
         self._stick_spoke_s = self.now_s
         if asks:
@@ -73,6 +79,7 @@ class Rules:
     def disarm(self) -> None:
         """Something was started, frozen, or away: whoever drives has to let go before anything moves."""
         self._hand_was_neutral = self._stick_was_neutral = False
+        self._changes = 0
         self._stands_by_s = min(self._stands_by_s, self.now_s + PATIENCE_S)
 
     def robot_was_away(self) -> None:
