@@ -13,6 +13,8 @@ SURELY_A_GAP_S = 0.6
 """A silence of this length is one for every node."""
 STICK_PAUSE_S = 0.35
 """Steering that was silent for so long has let go."""
+BRIDGED_S = 0.2
+"""A sign that was shown so recently may still be seen."""
 CHANGES = 2
 """So many new signs, one after the other, may count as none."""
 _EPSILON_S = 1e-6
@@ -37,6 +39,7 @@ class Rules:
     _stick_was_neutral: bool = False
     _robot_waits: bool = False
     _sign: str = "NONE"
+    _is_neutral: bool = False
     _changes: int = 0
     _stands_by_s: float = math.inf
 
@@ -49,7 +52,7 @@ class Rules:
         # A hand that changes its sign again and again shows none for half a second, as far as the control can tell.
         self._changes += sign != self._sign
         self._hand_was_neutral = self._hand_was_neutral or self._changes >= CHANGES
-        self._sign = sign
+        self._sign, self._is_neutral = sign, not asks
         self._picture_s = self.now_s
         if asks:
             self._hand_asked_s = self.now_s
@@ -73,7 +76,10 @@ class Rules:
     def reset(self) -> None:
         """Somebody takes the Stop back: whoever drives has to let go before anything moves."""
         if self.is_stopped:
+            # What is shown just now is still seen for a moment.
+            shows_neutral = self._is_neutral and self.now_s - self._picture_s <= BRIDGED_S
             self.disarm()
+            self._hand_was_neutral = shows_neutral
         self.is_stopped = False
 
     def disarm(self) -> None:
