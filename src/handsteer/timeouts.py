@@ -23,6 +23,9 @@ NEUTRAL_S: Final = 0.5
 """An empty picture is neutral when it has been seen for so long: more than a hand that is missed for a few frames, or a
 sign that is not confirmed yet."""
 
+MOST_OF_ONE_NONE_S: Final = 0.1
+"""What one ``NONE`` counts of that, however long after the sign before it comes."""
+
 ARMING_S: Final = 1.0
 """After its start the control arms no earlier, so that it has heard from others whether the robot was stopped."""
 

@@ -13,6 +13,7 @@ from handsteer.signs.vocabulary import NONE
 from handsteer.timeouts import (
     ARMING_S,
     FAULT_GAP_S,
+    MOST_OF_ONE_NONE_S,
     NEUTRAL_S,
     NOT_FOLLOWING_S,
     ODOMETRY_S,
@@ -133,7 +134,7 @@ class Safety:
         if gap_s >= FAULT_GAP_S:
             self.fault("recognition had no frame")
         elif not self._was_fault:
-            self._neutral_s += gap_s
+            self._neutral_s += min(gap_s, MOST_OF_ONE_NONE_S)
         else:
             self._was_fault = False  # what passed since the fault was not looked at
 
