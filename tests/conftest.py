@@ -2,6 +2,7 @@
 
 import importlib.util
 import shutil
+import signal
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -29,6 +30,10 @@ def data_dir() -> Path:
 def slideshow(data_dir: Path) -> Path:
     """A labelled slide show of people showing signs, 12 frames a second."""
     return data_dir / "videos" / "slideshow_emre_MIT_640x480.mp4"
+
+
+# Whoever starts the tests by nohup lets them, and all that they start, ignore SIGHUP; nodes are tested by it.
+signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

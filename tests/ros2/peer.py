@@ -31,9 +31,11 @@ from rclpy.parameter_client import AsyncParameterClient
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import CompressedImage, Image
-from std_msgs.msg import String
+from std_msgs.msg import Bool, String
 
-TYPES = {kind.__name__: kind for kind in (Clock, CompressedImage, Image, Log, Odometry, String, Twist, TwistStamped)}
+TYPES = {
+    kind.__name__: kind for kind in (Bool, Clock, CompressedImage, Image, Log, Odometry, String, Twist, TwistStamped)
+}
 
 rclpy.init()
 node = rclpy.create_node("looker")

@@ -26,7 +26,7 @@ def test_a_recogniser_loads_nothing_but_what_recognises() -> None:
     assert packages >= {"ai_edge_litert", "cv2", "numpy", "platformdirs", "pydantic"}
     assert not packages & {"cyclopts", "fastapi", "mujoco", "nicegui", "rosbags", "starlette", "tqdm", "xacro", "yaml"}
     rooms = {name.split(".")[1] for name in modules if name.startswith("handsteer.")}
-    assert rooms == {"config", "control", "errors", "landmarks", "presets", "signs"}
+    assert rooms == {"config", "control", "errors", "landmarks", "presets", "signs", "timeouts"}
 
 
 def test_photos_and_videos_are_recognised_without_messages_or_robots() -> None:

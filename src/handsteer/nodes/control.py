@@ -11,7 +11,19 @@ from handsteer.control.effects import tell
 from handsteer.control.fleet import NEXT
 from handsteer.control.safety import Following, Ramp, Safety
 from handsteer.control.velocity import ZERO, Velocity
-from handsteer.messages import CMD_VEL, HAND_SIGN, ODOM, STEERING_CMD_VEL, STOP, Odometry, String, Topic, Twist, command
+from handsteer.messages import (
+    CMD_VEL,
+    HAND_SIGN,
+    ODOM,
+    STEERING_CMD_VEL,
+    STOP,
+    Odometry,
+    Pose,
+    String,
+    Topic,
+    Twist,
+    command,
+)
 from handsteer.nodes.collision_monitor import CollisionMonitor
 from handsteer.nodes.interruption import Interruption
 from handsteer.nodes.latency import LatencyLog
@@ -66,6 +78,7 @@ class HandSignControlNode(Node):
         self._arming = arming
         self._ramp = Ramp(config)
         self._waited = False
+        self._robot_pose: Pose | None = None
         self._ramped_s = self._last_step_s = clock.now()
         self._monitor = CollisionMonitor(self, collision_monitor or CollisionMonitorConfig(), self._driver.hold_back)
         self._interruption = Interruption(config.sign_timeout, clock.now())
@@ -129,8 +142,11 @@ class HandSignControlNode(Node):
 
     def _on_odometry(self, received: Received[Odometry]) -> None:
         assert self._following is not None
-        measured = received.message.twist.twist
-        self._following.note(Velocity(measured.linear.x, measured.angular.z))
+        twist, pose = received.message.twist.twist, received.message.pose.pose
+        measured = Velocity(twist.linear.x, twist.angular.z)
+        has_moved, self._robot_pose = self._robot_pose not in (None, pose), pose
+        # Some odometry leaves its twist at zero; that the pose changes shows that the robot follows.
+        self._following.note(self._driver.velocity if measured.is_zero and has_moved else measured)
 
     def _watch(self) -> None:
         elapsed_s = self._elapsed()
