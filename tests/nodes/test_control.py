@@ -2,6 +2,7 @@ import logging
 import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -11,12 +12,22 @@ from handsteer.messages import (
     CMD_VEL,
     DIAGNOSTICS,
     HAND_SIGN,
+    ODOM,
     SELECT_ROBOT,
     SELECTED_ROBOT,
     STEERING_CMD_VEL,
     STOP,
     Bool,
+    Header,
+    Odometry,
+    Point,
+    Pose,
+    PoseWithCovariance,
+    Quaternion,
     String,
+    Time,
+    Twist,
+    TwistWithCovariance,
     cmd_vel,
     twist,
 )
@@ -453,6 +464,34 @@ def test_who_has_no_page_reads_in_the_log_that_it_waits_for_neutral(caplog: pyte
         "armed: signs count again",
         "disarmed (no sign came): nothing moves by signs before Stop was shown, or no hand",
     ]
+
+
+def test_a_robot_that_is_let_grow_slowly_is_not_said_to_stand() -> None:
+    bench = Bench()
+    config = ControlConfig(max_linear_acceleration=0.05)
+    bench.nodes = [HandSignControlNode(bench.transport, bench.clock, config, arming=True)]
+    twists, statuses = bench.record(CMD_VEL), bench.record(DIAGNOSTICS)
+    odom = bench.transport.advertise("robot", ODOM)
+    steering = bench.transport.advertise("slider", STEERING_CMD_VEL)
+    for _ in range(40):
+        steering.publish(twist(0.0, 0.0))
+        bench.run(0.05)
+    for _ in range(60):
+        steering.publish(twist(1.0, 0.0))
+        odom.publish(odometry(twists[-1]))
+        bench.run(0.05)
+    assert statuses[-1].status[0].message == "driving: steered by hand"
+    assert twists[-1].linear.x == pytest.approx(0.15, abs=0.02)
+
+
+def odometry(moving: Twist) -> Odometry:
+    origin = Pose(position=Point(0.0, 0.0, 0.0), orientation=Quaternion(0.0, 0.0, 0.0, 1.0))
+    return Odometry(
+        header=Header(stamp=Time(0, 0), frame_id="odom"),
+        child_frame_id="base_link",
+        pose=PoseWithCovariance(pose=origin, covariance=np.zeros(36)),
+        twist=TwistWithCovariance(twist=moving, covariance=np.zeros(36)),
+    )
 
 
 def test_a_robot_that_nobody_hears_is_not_driven_on() -> None:

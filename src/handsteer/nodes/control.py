@@ -79,6 +79,7 @@ class HandSignControlNode(Node):
         self._ramp = Ramp(config)
         self._waited = False
         self._robot_pose: Pose | None = None
+        self._commanded = ZERO
         self._ramped_s = self._last_step_s = clock.now()
         self._monitor = CollisionMonitor(self, collision_monitor or CollisionMonitorConfig(), self._driver.hold_back)
         self._interruption = Interruption(config.sign_timeout, clock.now())
@@ -146,7 +147,7 @@ class HandSignControlNode(Node):
         measured = Velocity(twist.linear.x, twist.angular.z)
         has_moved, self._robot_pose = self._robot_pose not in (None, pose), pose
         # Some odometry leaves its twist at zero; that the pose changes shows that the robot follows.
-        self._following.note(self._driver.velocity if measured.is_zero and has_moved else measured)
+        self._following.note(self._commanded if measured.is_zero and has_moved else measured)
 
     def _watch(self) -> None:
         elapsed_s = self._elapsed()
@@ -171,7 +172,7 @@ class HandSignControlNode(Node):
             return
         away = None if self._cmd_vel.wanted else "no robot listens"
         if away is None and self._following is not None:
-            away = self._following.step(elapsed_s, self._driver.velocity)
+            away = self._following.step(elapsed_s, self._commanded)
         if away is not None:
             self._safety.robot_is_away(away)
             self._publish(self._driver.halt())
@@ -203,7 +204,8 @@ class HandSignControlNode(Node):
         now = self.clock.now()
         since_s, self._ramped_s = now - self._ramped_s, now
         ramped = self._ramp.step(velocity, min(since_s, self._config.sign_timeout))
-        self._send(self._cmd_vel, self._monitor.admit(ramped), captured_s)
+        self._commanded = self._monitor.admit(ramped)
+        self._send(self._cmd_vel, self._commanded, captured_s)
         if captured_s is not None:
             self.latency.add(self.clock.now() - captured_s)
 
