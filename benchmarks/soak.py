@@ -15,6 +15,7 @@ import tempfile
 import threading
 import time
 import urllib.request
+import uuid
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -24,7 +25,7 @@ from page import DRIVE, film, load_now, plain_viewers, resident_mb, served
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # for the chain and the visitors that the tests use
 
-from tests.dashboard.network import client_of, drawn, join_query
+from tests.dashboard.network import client_of, cookies_of, drawn, join_query
 from tests.faults.chain import Chain
 from tests.faults.painted import FPS as CAMERA_FPS
 
@@ -107,12 +108,16 @@ async def one_visit(port: int) -> None:
     """Fetch the page, join it as its script does, take a picture, look on for a moment, and leave."""
     address = f"http://127.0.0.1:{port}"
     with urllib.request.urlopen(address) as answer:
-        html = answer.read().decode()
-    with urllib.request.urlopen(f"{address}/camera.mjpg") as pictures:
+        html, cookies = answer.read().decode(), {"Cookie": cookies_of(answer)}
+    with urllib.request.urlopen(urllib.request.Request(f"{address}/camera.mjpg", headers=cookies)) as pictures:
         pictures.read1(65536)
     page = socketio.AsyncClient()
-    query = join_query(client_of(html))
-    await page.connect(f"{address}?{query}", transports=["websocket"], socketio_path="/_nicegui_ws/socket.io")
+    await page.connect(
+        f"{address}?{join_query(client_of(html), tab=uuid.uuid4().hex)}",
+        headers=cookies,
+        transports=["websocket"],
+        socketio_path="/_nicegui_ws/socket.io",
+    )
     for event in drawn(html):
         await page.emit("event", event)
     await page.sleep(STAY_S)
