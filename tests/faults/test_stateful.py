@@ -274,6 +274,16 @@ def test_a_robot_that_comes_back_does_not_follow_what_was_shown_all_the_time(fra
     history.teardown()
 
 
+def test_pictures_with_wrong_times_do_not_make_a_frozen_one_new() -> None:
+    """Found in 185,000 steps: they were remembered in place of what the camera had given before."""
+    history = Histories()
+    history.begin("Forward")
+    history.show_with_wrong_times("Forward", 8, -5.0)
+    history.freeze_the_picture(7)
+    assert not history.graph.is_asked_to_move
+    history.teardown()
+
+
 Histories.TestCase.settings = settings(
     max_examples=max(1, STEPS // STEPS_A_HISTORY),
     stateful_step_count=STEPS_A_HISTORY,
