@@ -51,7 +51,7 @@ def opened(script: str) -> Iterator[Page]:
     hand = {"camera": {"source": "virtual"}, "virtual_hand": {"script": script}}
     with Graph(load(base={**hand, "dashboard": {"port": 0}}), steering=False) as graph, sync_playwright() as playwright:
         dashboard = PageApart()
-        url = dashboard.start()
+        url = dashboard.serve(graph)
         try:
             browser = launch(playwright)
             page = browser.new_page(viewport={"width": WIDTH, "height": HEIGHT}, color_scheme="light")
