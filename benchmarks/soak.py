@@ -2,8 +2,8 @@
 
 Run ``python benchmarks/soak.py``; parts by name: ``page``, ``hours``. ``page`` runs the whole graph in this process,
 and its page in another, on a film of the virtual hand at 640x480 and 60 frames a second, with one viewer of the page,
-while others come and go; all of them are in processes of their own. ``hours`` drives for hours of stepped time, all nodes in turn, with a painted
-hand in place of the camera and the landmark models, and the simulated robot.
+while others come and go; all of them are in processes of their own. ``hours`` drives for hours of stepped time, all
+nodes in turn, with a painted hand in place of the camera and the landmark models, and the simulated robot.
 """
 
 import argparse

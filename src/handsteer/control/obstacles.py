@@ -183,7 +183,7 @@ def _met_while_braking(moving: Velocity, told: Velocity, points: Points, rule: C
 
 def _times(fastest_mps: float, seconds: float) -> Points:
     steps = min(max(math.ceil(fastest_mps * seconds / _STEP_M), _FEWEST_STEPS), _MOST_STEPS)
-    return np.arange(steps + 1) * (seconds / steps)
+    return np.arange(steps + 1, dtype=np.float64) * (seconds / steps)
 
 
 def _met(
@@ -217,7 +217,7 @@ def _met(
 def _first(gap: Points, is_met: NDArray[np.bool_], times_s: Points, least_m: float) -> tuple[int, float]:
     """Return which point is met first, ``is_met`` (K, N), and when, between the steps of ``times_s`` (K,)."""
     at = max(1, int(is_met.any(axis=1).argmax()))
-    (met,) = is_met[: at + 1].any(axis=0).nonzero()
+    met = np.flatnonzero(is_met[: at + 1].any(axis=0))
     before, after = gap[at - 1, met], gap[at, met]
     parts = np.minimum(np.maximum((before - least_m) / np.maximum(before - after, 1e-9), 0.0), 1.0)
     first = int(parts.argmin())
