@@ -135,7 +135,7 @@ def test_a_scan_that_stops_coming_stops_the_robot() -> None:
     bench = MonitorBench()
     bench.show("Forward", 10, ahead(7.0))
     assert bench.command[0] > 0.0
-    bench.show("Forward", 14)
+    bench.show("Forward", 13)
     assert bench.command[0] > 0.0
     bench.show("Forward", 3)
     assert bench.command == (0.0, 0.0)

@@ -58,11 +58,7 @@ class CollisionMonitor:
 
     def explain(self, reason: str) -> str:
         """Return the control's ``reason`` with what slows the robot, as ``driving: Forward, slowed: obstacle …``."""
-        if not self._limiter.rule.enabled:
-            return reason
-        if why := self.why_blind():
-            return f"standing: {why}"
-        hit = self._limiter.hit
+        hit = self._limiter.hit if self._limiter.rule.enabled else None
         if hit is None:
             return reason
         said = hit.describe(self._limiter.rule)
