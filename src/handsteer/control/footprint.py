@@ -110,6 +110,16 @@ def seen_from(poses: Array, points: Array) -> tuple[Array, Array]:
     return seen[: len(poses)], seen[len(poses) :]
 
 
+def after(velocity: Velocity, seconds: float, points: Array) -> Array:
+    """Return where ``points``, (N, 2), are for a robot that has gone on at a steady ``velocity`` for so long."""
+    if velocity.is_zero or not seconds:
+        return points
+    x, y, yaw = on_a_circle(velocity, np.array([seconds]))[0].tolist()
+    cos, sin = math.cos(yaw), math.sin(yaw)
+    seen: Array = np.dot(points - (x, y), np.array(((cos, -sin), (sin, cos))))
+    return seen
+
+
 def _speeds(moving: float, told: float, most: float, early_s: Array, late_s: Array) -> Array:
     """Return the speeds of what goes over to ``told`` for ``early_s``, and brakes for ``late_s``, by ``most``."""
     gap, sign = abs(told - moving), math.copysign(most, told - moving)

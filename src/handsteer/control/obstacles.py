@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handsteer.config import CollisionMonitorConfig
-from handsteer.control.footprint import braking, fastest_mps, gaps, least_gaps, on_a_circle, reach_m, seen_from
+from handsteer.control.footprint import after, braking, fastest_mps, gaps, least_gaps, on_a_circle, reach_m, seen_from
 from handsteer.control.scan_points import Points
 from handsteer.control.velocity import ZERO, Velocity
 
@@ -33,8 +33,8 @@ _GLANCING = 0.05
 _CREEP_M = 0.06
 _STEP_M = 0.03
 _FEWEST_STEPS, _MOST_STEPS = 8, 400
-# Of every fourth pose, none between is farther away than three steps; a hair more, as the poses are added up.
-_ROUGHLY = 3.2
+# Of every third pose, none between is farther away than two steps; a hair more, as the poses are added up.
+_ROUGHLY = 2.1
 _SLOWEST = 0.005
 _NOTHING_MPS = 1e-6
 # Which shares of a velocity that is too fast are tried, of driving and of turning: those first that turn as they were
@@ -192,7 +192,7 @@ def _met(
     """Return what the footprint meets first on its way by ``poses`` (K, 3) at ``times_s`` (K,); None for nothing."""
     # Most points stay far away, which a few poses tell.
     beyond_m = pad_m + _NOISE_M + _ROUGHLY * fastest_mps * times_s[1]
-    near = points[least_gaps(*seen_from(poses[2::4], points), rule).min(axis=0) <= beyond_m]
+    near = points[least_gaps(*seen_from(poses[1::3], points), rule).min(axis=0) <= beyond_m]
     if not len(near):
         return None
     gap = gaps(*seen_from(poses, near), rule)
@@ -270,8 +270,7 @@ class ObstacleLimiter:
         self._moving, self._moving_s = self._followed(now_s), now_s
         self.hit, said = None, ZERO
         if self._points is not None and not self.is_blind(now_s):
-            moved = on_a_circle(self._moving, np.array([self.silence_s(now_s)]))
-            points = np.stack(seen_from(moved, self._points), axis=-1)[0]
+            points = after(self._moving, self.silence_s(now_s), self._points)
             said, self.hit = limit(wanted, points, self.rule, self._moving)
         self._told, self._told_s = said, now_s
         return said
