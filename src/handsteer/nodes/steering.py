@@ -40,7 +40,7 @@ class SteeringNode(Node):
     It speaks to ``hand_sign_control``, which lets steering go before signs, keeps to the limits, and stops both. It can
     be sent to another topic instead (:meth:`send_to`), where it sees to limits and Stop itself. After :meth:`halt` it
     stands whatever its topic is, which ROS may have renamed to that of a robot. After it was held up itself, it has let
-    go: whoever steered may have let go meanwhile.
+    go without a word: whoever steered may have let go meanwhile, and a zero would say that somebody did.
 
     All may be called from any thread.
 
@@ -115,8 +115,9 @@ class SteeringNode(Node):
         """Drive at this velocity from now on: m/s forward, rad/s to the left."""
         with self._lock:
             self._notice_interruption()
-            wanted = Velocity(linear_mps, angular_radps)
-            self._wanted = self._admitted(ZERO if self._interruption.distrusts(self.clock.now()) else wanted)
+            if self._interruption.distrusts(self.clock.now()):
+                return
+            self._wanted = self._admitted(Velocity(linear_mps, angular_radps))
             self._publish(self._wanted)
 
     def release(self) -> None:
@@ -185,8 +186,11 @@ class SteeringNode(Node):
             self._publish(ZERO)
 
     def _notice_interruption(self) -> None:
-        if self._interruption.note(self.clock.now()):
-            self.release()
+        if self._interruption.note(self.clock.now()) and self._wanted is not None:
+            self._wanted = None
+            if self.is_direct:
+                self._safety.disarm()
+                self._publish(ZERO)
 
     def _repeat(self) -> None:
         if self._halted:
