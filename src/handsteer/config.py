@@ -256,7 +256,7 @@ class CollisionMonitorConfig(Section):
 
     enabled: bool = Field(False, description="Whether commands are slowed before obstacles; this needs a topic `scan`")
     source_timeout: float = Field(
-        0.5, gt=0, le=5, description="Without a scan for this long, or when it is older, the robot is stopped [s]"
+        0.45, gt=0, le=5, description="Without a scan for this long, or when it is older, the robot is stopped [s]"
     )
     margin: float = Field(0.15, ge=0, le=5, description="How far before an obstacle in its way the robot stops [m]")
     deceleration: float = Field(0.7, gt=0, le=20, description="How hard the robot surely brakes [m/s²]")

@@ -190,6 +190,8 @@ class HandSignControlNode(Node):
         away = None if self._cmd_vel.wanted else "no robot listens"
         if away is None and self._following is not None:
             away = self._following.step(elapsed_s, self._commanded)
+        if self._monitor.why_blind():
+            away = "laser scans did not come"
         if away is not None:
             self._safety.robot_is_away(away)
             self._publish(self._driver.halt())
@@ -212,7 +214,7 @@ class HandSignControlNode(Node):
         """Start from standing with another robot."""
         assert self._selection is not None
         self._driver.halt()
-        self._safety.disarm()
+        self._safety.disarm("it was selected")
         self._cmd_vel = self._selection.publisher
 
     def _publish(self, velocity: Velocity | None, captured_s: float | None = None) -> None:
@@ -263,6 +265,8 @@ class HandSignControlNode(Node):
         safety = self._safety
         if safety.is_stopped:
             return "standing: stopped, until it is reset"
+        if why_blind := self._monitor.why_blind():
+            return f"standing: {why_blind}"
         source = self._driver.source
         if source == "steering":
             waits = safety.steering_waits
@@ -278,7 +282,7 @@ class HandSignControlNode(Node):
 
     @property
     def _disarmed(self) -> str:
-        return f"{self._selection.fleet.selected} was selected and is disarmed" if self._selection else "disarmed"
+        return f"{self._selection.fleet.selected} is disarmed" if self._selection else "disarmed"
 
     def _latencies(self) -> dict[str, str]:
         """Return the latency's figures; none where the transport does not carry the frame's time with a sign."""
