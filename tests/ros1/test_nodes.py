@@ -1,9 +1,12 @@
 """Our nodes as processes in a real ROS 1 graph, seen by plain rospy nodes and ROS's own tools."""
 
 import itertools
+import os
 import signal
 import subprocess
 import sys
+import threading
+import time
 import urllib.request
 from collections.abc import Iterator, Mapping
 from functools import partial
@@ -14,6 +17,7 @@ import pytest
 from tests.contracts.node_contract import (
     CMD_VEL,
     FORWARD,
+    LIMIT_S,
     ODOM,
     RUN,
     ChainContract,
@@ -162,6 +166,51 @@ def test_when_the_master_goes_away_the_robot_is_stopped(tmp_path: Any) -> None:
         assert driver.process.code() == 2
         driver.expect((0.01, 0.0), (0.0, 0.0))
         assert "no ROS master answers" in driver.process.text
+
+
+def test_kill_9_of_the_master_stops_a_robot_that_is_being_driven_faster(tmp_path: Any) -> None:
+    killed_s: list[float] = []
+
+    with ros1_graph(tmp_path) as graph:
+        driver = Ros1Driver(graph)
+
+        def kill() -> None:
+            graph.kill_master()
+            killed_s.append(time.monotonic())
+
+        killer = threading.Timer(1.0, kill)
+        killer.start()
+        driver.show("Forward", count=150)
+        killer.join()
+        assert driver.process.code() == 2
+        assert "it has gone away, so this node ends" in driver.process.text
+        assert "Traceback" not in driver.process.text
+        at_s, last = driver.commands[-1]
+        assert last == (0.0, 0.0)
+        assert at_s - killed_s[0] <= LIMIT_S
+
+
+def test_a_master_that_only_takes_long_is_waited_for(tmp_path: Any) -> None:
+    with ros1_graph(tmp_path) as graph:
+        driver = Ros1Driver(graph, "--control.sign-timeout", "5")
+        pid = graph.master.getPid("/test")[2]
+        os.kill(pid, signal.SIGSTOP)
+        try:
+            driver.show("Forward", count=80, period_s=0.04)
+        finally:
+            os.kill(pid, signal.SIGCONT)
+        driver.expect(*[(round(0.01 * n, 6), 0.0) for n in range(1, 81)])
+        assert driver.process.running
+
+
+def test_another_master_in_the_place_of_the_first_is_not_taken_for_it(tmp_path: Any) -> None:
+    with ros1_graph(tmp_path) as graph:
+        driver = Ros1Driver(graph, "--control.sign-timeout", "5")
+        driver.show("Forward")
+        driver.expect((0.01, 0.0))
+        graph.restart_master()
+        assert driver.process.code() == 2
+        driver.expect((0.01, 0.0), (0.0, 0.0))
 
 
 class TestChain(ChainContract):
