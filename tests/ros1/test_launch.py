@@ -94,7 +94,7 @@ def test_the_two_terminals_drive_the_robot_by_the_virtual_hand(ros: LaunchGraph)
     }  # fmt: skip
     frames = ros.tell("rostopic", "echo", "-n", "20", "/tf")
     assert 'child_frame_id: "base_link"' in frames
-    assert 'child_frame_id: "front_left_wheel_link"' in frames
+    assert 'child_frame_id: "front_left_wheel"' in frames
     reports = ros.tell("rostopic", "echo", "-n", "60", "/diagnostics/status[0]/name")
     assert all(name.strip("/") in reports for name in CHAIN)
 

@@ -118,16 +118,11 @@ def test_compressed_images_are_renamed_with_the_raw_ones_unless_named_themselves
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (
-            ["control", "_linear_stepp:=0.1"],
-            "ROS parameter /hand_sign_control/linear_stepp: there is no such parameter",
-        ),
+        (["control", "_control_topic:=7"], "ROS parameter /hand_sign_control/control_topic: 7 should be the name of a"),
+        (["recognition", "_show_image:=maybe"], "ROS parameter /hand_sign_recognition/show_image: 'maybe' should be"),
         (["control", "_linear_step:=7"], "ROS parameter /hand_sign_control/linear_step: 7 should be less than or eq"),
         (["control", "_linear_step:=quick"], "ROS parameter /hand_sign_control/linear_step: 'quick' should be a valid"),
-        (
-            ["camera", "_virtual_hand/skn:=dark"],
-            "ROS parameter /my_camera/virtual_hand/skn: there is no such parameter",
-        ),
+        (["camera", "_virtual_hand/skin:=green"], "ROS parameter /my_camera/virtual_hand/skin: 'green' should be"),
         (["camera", "_source:=gone.mp4"], "there is no camera gone.mp4"),
         (["control", "fast"], "'fast' is no argument of ROS: it should be as name:=value"),
         (["control", "--control.linear-step", "7"], "control.linear_step: '7' should be less than or equal to 1"),
@@ -138,12 +133,22 @@ def test_what_is_wrong_is_said_in_one_line(ros1: Ros1Graph, arguments: list[str]
     verb, *rest = arguments
     process = ros1.handsteer(verb, "--transport", "ros1", *rest)
     assert process.code() == 2, process.text
-    for name in ("hand_sign_control/linear_stepp", "hand_sign_control/linear_step", "my_camera"):
+    for name in ("hand_sign_control", "hand_sign_recognition", "my_camera"):
         with_name = f"/{name}"
         if ros1.master.hasParam("/test", with_name)[2]:
             ros1.master.deleteParam("/test", with_name)
     assert [line for line in process.text.splitlines() if line.startswith(f"handsteer: {message}")], process.text
     assert "Traceback" not in process.text
+
+
+def test_a_parameter_that_is_not_known_is_said_and_does_nothing(ros1: Ros1Graph) -> None:
+    driver = Ros1Driver(ros1, parameters={"linear_stepp": 0.5, "robot_description": "robot", "linear_step": 0.02})
+    driver.show("Forward")
+    driver.expect((0.02, 0.0))
+    text = driver.process.text
+    assert text.count(f"{driver.namespace}/{NODE}/linear_stepp does nothing") == 1
+    assert text.count("did you mean linear_step?") == 1
+    assert text.count(f"{driver.namespace}/{NODE}/robot_description does nothing") == 1
 
 
 def test_without_a_master_it_ends_at_once(ros1: Ros1Graph) -> None:

@@ -104,20 +104,18 @@ def test_windows_open_where_there_is_a_display_or_they_are_asked_for(launch: tup
     assert f"/{window}" not in nodes(*launch, f"{arg}:=false", DISPLAY=":0")
 
 
-def test_a_sign_model_is_given_on_only_when_there_is_one() -> None:
-    launch = ("hand_sign_recognition", "ros_hand_gesture_recognition", "sign_control.launch")
-    assert "model" not in run("roslaunch", "--args", *launch, env=ros_environment())
-    given = run("roslaunch", "--args", *launch, "keypoint_classifier_model:=/my model.npz", env=ros_environment())
-    assert "--signs.model /my model.npz" in given
-
-
-def test_labels_beside_the_model_are_refused_in_words() -> None:
-    launch = ("ros_hand_gesture_recognition", "sign_control.launch", "keypoint_classifier_label:=/labels.csv")
-    done = subprocess.run(
-        ["roslaunch", "--nodes", *launch], env=ros_environment(), capture_output=True, text=True, check=False
-    )
-    assert done.returncode != 0
-    assert "a sign model has its labels within" in done.stderr
+def test_the_recognition_is_told_by_the_parameters_that_the_courses_nodes_read() -> None:
+    launch = ("ros_hand_gesture_recognition", "sign_control.launch")
+    told = {
+        "publish_gesture_topic": "/words",
+        "show_image": False,
+        "keypoint_classifier_model": "/my model.npz",
+        "keypoint_classifier_label": "/labels.csv",
+    }
+    given = parameters(*launch, *(f"{name}:={value}" for name, value in told.items()))
+    theirs = {**told, "subscribe_image_topic": "image_raw"}
+    assert {name: given[f"/hand_sign_recognition/{name}"] for name in theirs} == theirs
+    assert given["/hand_sign_control/publish_gesture_topic"] == "/words"
 
 
 def test_the_robot_is_described_by_the_xacro_that_handsteer_simulates() -> None:

@@ -21,6 +21,7 @@ except ImportError as problem:
         f"ROS 1 is not installed for this Python ({problem}): on Debian and Ubuntu, `make ros1` installs it"
     ) from None
 
+from handsteer.transports.ros1 import course
 from handsteer.transports.ros1.master import Lifeline, Master, MasterGone
 from handsteer.transports.ros1.transport import Ros1Transport
 
@@ -47,6 +48,7 @@ class Ros1Session:
 
     Raises:
         TransportError: No master answers, an argument is none of rospy's, or this process has another name already.
+        ConfigError: One of the course's parameters has a wrong value.
     """
 
     def __init__(self, node: str, arguments: Sequence[str]) -> None:
@@ -60,11 +62,12 @@ class Ros1Session:
         self._lost: str | None = None
         self._left = threading.Event()
         _initialise(node, arguments)
-        rospy.on_shutdown(self._on_shutdown)
         self.name: str = rospy.get_name()
-        self.parameters: dict[str, Any] = rospy.get_param("~", {})
+        told = course.translate(node, self.name, rospy.get_param("~", {}), lambda name: rospy.get_param(name, None))
+        self.parameters: dict[str, Any] = told.parameters
+        rospy.on_shutdown(self._on_shutdown)
         self.clock = self._make_clock()
-        self.transport = Ros1Transport(self.clock)
+        self.transport = Ros1Transport(self.clock, told.topics)
         self._watcher = threading.Thread(target=self._watch, name="ros1_session", daemon=True)
         self._watcher.start()
 

@@ -1,7 +1,7 @@
 """Messages over ROS 1: one ROS node for all nodes of this process, as rospy has it."""
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any, Generic, TypeVar
 
@@ -29,13 +29,15 @@ class Ros1Transport:
 
     Args:
         clock: The graph's clock.
+        topics: What topics are called, by the full names that they have otherwise. Remapping goes before it.
     """
 
     # TCP loses no part of a large image, and the course's cameras publish raw ones only.
     crosses_network = False
 
-    def __init__(self, clock: Clock) -> None:
+    def __init__(self, clock: Clock, topics: Mapping[str, str] | None = None) -> None:
         self._clock = clock
+        self._topics = topics or {}
         self._types = TopicTypes()
         self._lock = threading.Lock()
         self._outgoing: dict[str, Ros1Publisher[Any]] = {}
@@ -64,7 +66,7 @@ class Ros1Transport:
 
         A node that was killed stays known to the master for good (``rosnode cleanup``).
         """
-        return self._state.publishers_of(_full_name(topic))
+        return self._state.publishers_of(self._full_name(topic))
 
     def full_name(self, node: str) -> str:
         """Return the ROS node's name and ``node``, as ROS's own diagnostics do: ``r1/my_camera: my_camera``."""
@@ -84,9 +86,21 @@ class Ros1Transport:
 
     def _claim(self, topic: Topic[Any]) -> str:
         """Return the full name of ``topic``, namespace and remappings included, unless it is in use otherwise."""
-        name = _full_name(topic)
+        name = self._full_name(topic)
         self._types.claim(name, topic)
         return name
+
+    def _full_name(self, topic: Topic[Any]) -> str:
+        """Return the name after namespace and remappings, which rospy leaves as it is when it is given."""
+        name = str(rospy.resolve_name(topic.ros_name))
+        is_remapped = name != rosgraph.names.resolve_name(topic.ros_name, rospy.get_name())
+        if is_remapped:
+            return name
+        if topic.name in self._topics:
+            return str(rospy.resolve_name(self._topics[topic.name]))
+        if topic.beneath is None:
+            return name
+        return self._full_name(topic.beneath) + topic.name.removeprefix(topic.beneath.name)
 
     def _receive(self, name: str, topic: Topic[M], send: Deliver[M]) -> Callable[[], None]:
         kind = type_name(topic.type)
@@ -134,12 +148,3 @@ class Ros1Publisher(Generic[M]):
         publisher, self._publisher = self._publisher, None
         if publisher is not None:
             publisher.unregister()
-
-
-def _full_name(topic: Topic[Any]) -> str:
-    """Return the name after namespace and remappings, which rospy leaves as it is when it is given."""
-    name = str(rospy.resolve_name(topic.ros_name))
-    is_remapped = name != rosgraph.names.resolve_name(topic.ros_name, rospy.get_name())
-    if topic.beneath is None or is_remapped:
-        return name
-    return _full_name(topic.beneath) + topic.name.removeprefix(topic.beneath.name)
