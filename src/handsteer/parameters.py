@@ -57,7 +57,7 @@ def from_parameters(parameters: Mapping[str, Any], section: str, node: str) -> d
         section: The node's own section of the configuration.
         node: Full name of the node, for messages.
 
-    As in all of ROS, a parameter that the node does not know does nothing; it is logged, with the nearest that there is.
+    As in all of ROS, a parameter that the node does not know does nothing. It is logged, with the nearest known.
 
     Raises:
         ConfigError: A value is not allowed; the message has the parameter's full name.
