@@ -24,6 +24,7 @@ LAUNCHES = {
         "/hand_sign_control",
     },
     ("ros_mobile_robot", "drive_robot.launch"): {"/robot", "/robot_state_publisher"},
+    ("ros_mobile_robot", "mobile_robot.launch"): {"/joint_state_publisher", "/robot_state_publisher"},
     ("ros_mobile_robot", "steering.launch"): {"/steering"},
 }
 
@@ -37,7 +38,8 @@ ARGS = {
         "keypoint_classifier_label",
     },
     "sign_control.launch": {"publish_gesture_topic", "control_topic", "camera_name", "show_image"},
-    "drive_robot.launch": {"rviz", "rvizconfig", "model", "world", "gazebo"},
+    "mobile_robot.launch": {"config"},
+    "drive_robot.launch": {"gui", "rviz", "rvizconfig", "model", "world", "gazebo"},
     "steering.launch": {"port", "control_topic"},
 }
 
@@ -93,15 +95,28 @@ def test_a_namespace_takes_all_nodes_and_parameters_along(launch: tuple[str, str
     ("launch", "window"),
     [
         (("ros_mobile_robot", "drive_robot.launch"), "rviz"),
+        (("ros_mobile_robot", "mobile_robot.launch"), "rviz"),
         (("ros_hand_gesture_recognition", "hand_sign.launch"), "hand_sign_view"),
         (("ros_hand_gesture_recognition", "sign_control.launch"), "hand_sign_view"),
     ],
 )
 def test_windows_open_where_there_is_a_display_or_they_are_asked_for(launch: tuple[str, str], window: str) -> None:
-    arg = "rviz" if window == "rviz" else "show_image"
+    arg = "gui" if window == "rviz" else "show_image"
     assert f"/{window}" in nodes(*launch, DISPLAY=":0")
     assert f"/{window}" in nodes(*launch, f"{arg}:=true")
     assert f"/{window}" not in nodes(*launch, f"{arg}:=false", DISPLAY=":0")
+
+
+def test_roslaunchs_own_words_for_a_namespace_work() -> None:
+    launch = ("ros_mobile_robot", "drive_robot.launch")
+    assert nodes(*launch, "__ns:=r1") == {"/r1/robot", "/r1/robot_state_publisher"}
+    assert nodes(*launch, "rviz:=true", "gui:=false") == {"/robot", "/robot_state_publisher", "/rviz"}
+
+
+def test_the_links_have_the_names_of_the_course() -> None:
+    urdf = ET.fromstring(str(parameters("ros_mobile_robot", "mobile_robot.launch")["/robot_description"]))
+    wheels = {f"{where}_wheel" for where in ("front_left", "front_right", "rear_left", "rear_right")}
+    assert {"base_link", "chassis", "head", *wheels} <= {link.get("name") for link in urdf.iterfind("link")}
 
 
 def test_the_recognition_is_told_by_the_parameters_that_the_courses_nodes_read() -> None:
