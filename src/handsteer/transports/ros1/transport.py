@@ -1,5 +1,6 @@
 """Messages over ROS 1: one ROS node for all nodes of this process, as rospy has it."""
 
+import re
 import threading
 from collections.abc import Callable, Mapping
 from functools import partial
@@ -20,6 +21,7 @@ M = TypeVar("M")
 
 # With rospy's default of 64 kB, images wait in the socket for a callback that is slower than the camera.
 _BUFFER_BYTES = 2**24
+_PLAYER = re.compile(r"(/\w+)*/play_\d{6,}", re.ASCII)
 
 
 class Ros1Transport:
@@ -107,12 +109,19 @@ class Ros1Transport:
 
         def on_message(theirs: Any) -> None:
             message = from_ros1(theirs, kind)
-            send(Received(message, capture_time(message, self._clock)))
+            captured_s = capture_time(message, self._clock)
+            send(Received(message, captured_s, by_player=captured_s is not None and _is_player(theirs)))
 
         subscriber = rospy.Subscriber(
             name, ros1_type(kind), on_message, queue_size=topic.depth, buff_size=_BUFFER_BYTES, tcp_nodelay=True
         )
         return subscriber.unregister  # type: ignore[no-any-return]
+
+
+def _is_player(theirs: Any) -> bool:
+    """Return whether ``rosbag play`` sent a message: rosbag has no other name for its nodes than play and the time."""
+    header = getattr(theirs, "_connection_header", None) or {}
+    return _PLAYER.fullmatch(header.get("callerid", "")) is not None
 
 
 class Ros1Publisher(Generic[M]):
