@@ -82,6 +82,16 @@ def test_the_courses_recognition_file_starts_ours(course: LaunchGraph, tmp_path:
         assert sum(what in line for line in said) == 1, launch.text
 
 
+def test_the_courses_camera_file_starts_ours(ros: LaunchGraph, tmp_path: Path) -> None:
+    file = tmp_path / "my_cam.launch"
+    node = '<node name="my_webcam" pkg="my_cam" type="image_publisher_launch.py" output="screen">'
+    camera = '<param name="camera_name" type="string" value="$(arg camera_name)"/>'
+    file.write_text(f'<launch><arg name="camera_name" default="/dev/video0"/>{node}{camera}</node></launch>')
+    ros.launch_file(file, "camera_name:=virtual")
+    ros.tell("rostopic", "echo", "-n", "1", "--noarr", "/image_raw")
+    assert ros.talkers("/image_raw") == ["/my_webcam"]
+
+
 @pytest.mark.parametrize("first", ["control", "recognition"])
 def test_the_courses_control_and_our_recognition(course: LaunchGraph, first: str) -> None:
     files: dict[str, Any] = {

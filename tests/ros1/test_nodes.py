@@ -152,7 +152,7 @@ def test_a_parameter_that_is_not_known_is_said_and_does_nothing(ros1: Ros1Graph)
 
 
 def test_without_a_master_it_ends_at_once(ros1: Ros1Graph) -> None:
-    for uri in ("http://localhost:1", "nonsense"):
+    for uri in ("http://localhost:1", "http://localhost:99999", "http://localhost:port", "nonsense"):
         process = ros1.run(
             "env", f"ROS_MASTER_URI={uri}", sys.executable, "-m", "handsteer", "control", "--transport", "ros1"
         )

@@ -1,5 +1,6 @@
 """The ROS 1 master, asked with little patience, and held by a connection that ends with it."""
 
+import http.client
 import select
 import socket
 import urllib.parse
@@ -49,7 +50,7 @@ class Master:
     def _ask(self, method: str, caller: str) -> Any:
         try:
             return getattr(self._proxy, method)(caller)
-        except (OSError, xmlrpc.client.Error) as error:
+        except (OSError, OverflowError, http.client.HTTPException, xmlrpc.client.Error) as error:
             reason = getattr(error, "strerror", None) or error
             kind = MasterGone if isinstance(error, ConnectionRefusedError) else TransportError
             raise kind(
