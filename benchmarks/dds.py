@@ -36,7 +36,7 @@ from handsteer.transports.protocol import Publisher, Received, Transport
 
 WIDTH, HEIGHT = 640, 480
 SETTLE_S = 0.5
-MODULES = ("handsteer.cli.main", "handsteer.cli.nodes", "handsteer.transports.dds.session")
+MODULES = ("handsteer.cli.app", "handsteer.cli.nodes", "handsteer.transports.dds.session")
 # A Twist's own stamp would change its size; what the robot would do with the time in it does not matter here.
 TWISTS = Topic("/benchmark/twist", Twist, depth=10)
 # Deep enough that one is missing only if it was lost on the way; in a graph a newer one takes its place.

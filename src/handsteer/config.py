@@ -114,6 +114,11 @@ class SignsConfig(Section):
         0.5, ge=0, le=10, description="How long the followed hand shows no sign before another that shows one is [s]"
     )
     max_frame_age: float = Field(STALE_S, gt=0, le=10, description="An older frame counts as no frame [s]")
+    recorded: Literal["auto", "always", "never"] = Field(
+        "auto",
+        description="Whether frames with old stamps count, as a recording's: auto takes what rosbag play sends, always "
+        "takes whatever is stamped more than 5 s ago, so it is for recordings alone",
+    )
     image_transport: Literal["auto", "raw", "compressed"] = Field(
         "auto",
         description="Which images are recognised: raw is /image_raw, compressed is /image_raw/compressed; "

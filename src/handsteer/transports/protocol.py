@@ -20,10 +20,12 @@ class Received(Generic[M]):
         message: The message; it is shared with other subscribers, so it is not to be changed.
         captured_s: When the frame that led to this message was captured, in seconds of the graph's clock; None when
             there was no frame, or when the transport cannot carry it.
+        by_player: Whether a player of recordings sent it; False when the transport cannot tell.
     """
 
     message: M
     captured_s: float | None = None
+    by_player: bool = False
 
 
 class Publisher(Protocol[M_contra]):
