@@ -31,7 +31,7 @@ _EXAMPLES = """Examples:
   handsteer recognize photo.jpg                  which sign is it?
   handsteer signs evaluate photos/               how well are signs told?
   handsteer camera --transport ros1              one node, in a ROS 1 graph
-  handsteer camera --transport dds               one node, in a ROS 2 graph; or --transport zenoh
+  handsteer camera --transport auto              one node, in a ROS 2 graph; or ros2, dds, zenoh
   handsteer graph --transport dds                who is in the ROS 2 graph, and how often they speak
   handsteer doctor                               what works on this machine
 """

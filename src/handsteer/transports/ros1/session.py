@@ -3,12 +3,13 @@
 import logging
 import sys
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from handsteer.clock import Clock, SimulatedClock, WallClock
 from handsteer.errors import TransportError
 from handsteer.parameters import NodeParameters
+from handsteer.transports.protocol import Call
 
 try:
     import rosgraph
@@ -62,6 +63,9 @@ class Ros1Session:
 
     def serve(self, parameters: NodeParameters) -> None:
         """Do nothing: ROS 1 has its parameters on the master, and nodes read them when they start."""
+
+    def offer(self, services: Callable[[], Mapping[str, Call]]) -> None:
+        """Do nothing: the nodes of the course have no services."""
 
     def wait(self, timeout_s: float) -> bool:
         """Wait for at most ``timeout_s`` seconds; return whether ROS has asked this process to end (`rosnode kill`).
