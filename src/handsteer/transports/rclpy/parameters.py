@@ -6,6 +6,7 @@ from typing import Any
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor, SetParametersResult
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from rclpy.parameter_service import ParameterService
 
 from handsteer.errors import ConfigError
 from handsteer.parameters import Description, NodeParameters, Value
@@ -20,6 +21,8 @@ _TYPES = {
     "string": Parameter.Type.STRING,
     "strings": Parameter.Type.STRING_ARRAY,
 }
+_SCALARS = (Parameter.Type.BOOL, Parameter.Type.INTEGER, Parameter.Type.DOUBLE)
+_SWITCH = {True: "on", False: "off"}
 _ARRAYS = tuple(kind for kind in Parameter.Type if kind.name.endswith("_ARRAY"))
 
 
@@ -49,6 +52,8 @@ class ParameterLink:
             self._declare(name, value)
         node.add_pre_set_parameters_callback(self._as_meant)
         node.add_on_set_parameters_callback(self._set)
+        # Not before: rclpy would take values for what nobody has declared yet.
+        self._services = ParameterService(node)
 
     def _declare(self, name: str, value: Value) -> None:
         description = self._parameters.describe(name)
@@ -60,18 +65,24 @@ class ParameterLink:
             self._node.declare_parameter(name, value, descriptor, ignore_override=True)
             return
         self._node.declare_parameter(name, kind, descriptor, ignore_override=True)
-        self._node.set_parameters([_parameter(name, kind, value)])
+        typed = float(value) if kind is Parameter.Type.DOUBLE else value  # type: ignore[arg-type]
+        self._node.set_parameters([Parameter(name, kind, typed)])
 
     def _as_meant(self, wanted: list[Parameter]) -> list[Parameter]:
-        """Return ``wanted`` with whole numbers and empty lists, which do not tell their type, as what they are for."""
+        """Return ``wanted`` as what it is for: YAML tells no type of an empty list, and takes ``off`` for no text."""
         return [self._as_declared(one) for one in wanted]
 
     def _as_declared(self, one: Parameter) -> Parameter:
         description = self._parameters.describe(one.name)
         kind = None if description is None else _TYPES[description.kind]
-        is_whole = kind is Parameter.Type.DOUBLE and one.type_ is Parameter.Type.INTEGER
-        is_empty = kind is Parameter.Type.STRING_ARRAY and one.type_ in _ARRAYS and len(one.value) == 0
-        return _parameter(one.name, kind, one.value) if kind and (is_whole or is_empty) else one
+        if kind is Parameter.Type.DOUBLE and one.type_ is Parameter.Type.INTEGER:
+            return Parameter(one.name, kind, float(one.value))
+        if kind is Parameter.Type.STRING_ARRAY and one.type_ in _ARRAYS and len(one.value) == 0:
+            return Parameter(one.name, kind, [])
+        if kind is Parameter.Type.STRING and one.type_ in _SCALARS:
+            text = _SWITCH[one.value] if one.type_ is Parameter.Type.BOOL else str(one.value)
+            return Parameter(one.name, kind, text)
+        return one
 
     def _set(self, wanted: Sequence[Parameter]) -> SetParametersResult:
         try:
@@ -94,10 +105,6 @@ def _is_of_ros(name: str) -> bool:
 
 def _plain(parameter: Parameter) -> Any:
     return list(parameter.value) if parameter.type_ in _ARRAYS else parameter.value
-
-
-def _parameter(name: str, kind: Parameter.Type, value: Any) -> Parameter:
-    return Parameter(name, kind, float(value) if kind is Parameter.Type.DOUBLE else value)
 
 
 def _descriptor(description: Description) -> ParameterDescriptor:

@@ -72,7 +72,7 @@ class RclpySession:
 
     def serve(self, parameters: NodeParameters) -> None:
         """Let rclpy answer ``ros2 param``."""
-        ParameterLink(self._node, parameters)
+        self._parameters = ParameterLink(self._node, parameters)
 
     def offer(self, services: Callable[[], Mapping[str, Call]]) -> None:
         """Let others call the node's services, of std_srvs/Trigger, if this ROS 2 has that package."""
@@ -152,6 +152,7 @@ def _make_node(context: Any, node: str, arguments: Sequence[str]) -> Node:
         return rclpy.create_node(
             node,
             context=context,
+            start_parameter_services=False,
             allow_undeclared_parameters=True,
             automatically_declare_parameters_from_overrides=True,
         )
