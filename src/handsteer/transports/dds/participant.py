@@ -2,11 +2,9 @@
 
 import itertools
 import threading
-import uuid
 from collections.abc import Callable
 from typing import Any
 
-from cyclonedds.builtin import BuiltinDataReader, BuiltinTopicDcpsParticipant
 from cyclonedds.core import DDSException, Policy, Qos
 from cyclonedds.domain import Domain, DomainParticipant
 from cyclonedds.dynamic import get_types_for_typeid
@@ -100,14 +98,6 @@ class Participant:
         self._graph.add(writer)
         return reader, writer
 
-    def participants(self) -> Any:
-        """Return a new reader of who has come to the domain and who has left it; to be served, then left unserved."""
-        return BuiltinDataReader(self._participant, BuiltinTopicDcpsParticipant)
-
-    def tell_of(self, guid: bytes, *, writes: bool) -> None:
-        """Tell others that a reader or writer of this identifier, which is none of Cyclone DDS, is our node's."""
-        self._graph.add_other(uuid.UUID(bytes=guid), writes=writes)
-
     def tick(self, call: Callable[[], None]) -> None:
         """Call ``call`` on the DDS thread, four times a second and whenever something has come."""
         self._dispatcher.tick(call)
@@ -137,10 +127,6 @@ class Participant:
         """
         topic = DdsTopic(self._participant, writer.topic, self._type_of(writer))
         return DataReader(self._participant, topic, qos=counter_qos(writer.qos))
-
-    def leave_unserved(self, reader: Any) -> None:
-        """Serve ``reader`` no more."""
-        self._dispatcher.remove(reader)
 
     def release(self, endpoint: DataWriter[Any] | DataReader[Any]) -> None:
         """Let go of a writer or reader; it is gone when the caller forgets it too."""
