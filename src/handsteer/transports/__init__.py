@@ -1,14 +1,11 @@
 """How messages travel between nodes."""
 
 import importlib.util
-import os
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 
 from handsteer.errors import TransportError
-from handsteer.transports.dds.network import network
-from handsteer.transports.observed import ObservedGraph
 from handsteer.transports.protocol import Session
 
 
@@ -36,33 +33,10 @@ def _ros1(node: str, arguments: Sequence[str]) -> Session:
     return Ros1Session(node, arguments)
 
 
-def observe(transport: str, seconds: float) -> ObservedGraph:
-    """Look at a graph of several processes without becoming one of its nodes.
-
-    It listens to every topic that somebody publishes, so what is made on demand is made meanwhile.
-
-    Args:
-        transport: Which kind of graph, one of :data:`OBSERVERS`.
-        seconds: For how long the rates are measured; 0 leaves them out.
-
-    Raises:
-        TransportError: There is no such transport or graph.
-    """
-    if transport not in OBSERVERS:
-        raise TransportError(f"a graph of {transport!r} cannot be looked at: use {' or '.join(OBSERVERS)}")
-    return OBSERVERS[transport](seconds)
-
-
 def _dds(node: str, arguments: Sequence[str]) -> Session:
     with _cyclonedds():
         from handsteer.transports.dds.session import DdsSession  # noqa: PLC0415
     return DdsSession(node, arguments)
-
-
-def _observe_dds(seconds: float) -> ObservedGraph:
-    with _cyclonedds():
-        from handsteer.transports.dds.observer import observe_domain  # noqa: PLC0415
-    return observe_domain(network(os.environ), seconds)
 
 
 @contextmanager
@@ -131,6 +105,3 @@ TRANSPORTS: dict[str, Callable[[str, Sequence[str]], Session]] = {
     "auto": _auto,
 }
 """What joins a graph of several processes, by name."""
-
-OBSERVERS: dict[str, Callable[[float], ObservedGraph]] = {"dds": _observe_dds}
-"""What looks at a graph of several processes, by name; it is given the seconds for the rates."""

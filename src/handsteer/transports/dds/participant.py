@@ -7,7 +7,6 @@ from typing import Any
 
 from cyclonedds.core import DDSException, Policy, Qos
 from cyclonedds.domain import Domain, DomainParticipant
-from cyclonedds.dynamic import get_types_for_typeid
 from cyclonedds.pub import DataWriter
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic as DdsTopic
@@ -18,15 +17,14 @@ from handsteer.transports.dds.discovery import RosGraph
 from handsteer.transports.dds.dispatcher import Dispatcher
 from handsteer.transports.dds.matching import Endpoint, Matching
 from handsteer.transports.dds.network import Network
-from handsteer.transports.dds.qos import counter_qos, reader_qos, service_qos, writer_qos
+from handsteer.transports.dds.qos import reader_qos, service_qos, writer_qos
 from handsteer.transports.dds.types import dds_type, opaque_type, service_dds_type
 from handsteer.transports.observed import UNNAMED
-from handsteer.transports.ros2.encoding import dds_type_name, ros_type_name, types
+from handsteer.transports.ros2.encoding import dds_type_name
 from handsteer.transports.ros2.names import NodeName
 from handsteer.transports.ros2.service_types import Service
 
 _USER_DATA = b"enclave=/;"
-_DEFINITION_NS = 500_000_000
 
 
 class Participant:
@@ -119,15 +117,6 @@ class Participant:
             if end.publishes and end.topic == name
         ]
 
-    def counter(self, writer: Endpoint) -> DataReader[Any]:
-        """Return a reader that gets what ``writer`` sends, of whatever type, and that is told to nobody as our node's.
-
-        Raises:
-            DDSException: There can be none.
-        """
-        topic = DdsTopic(self._participant, writer.topic, self._type_of(writer))
-        return DataReader(self._participant, topic, qos=counter_qos(writer.qos))
-
     def release(self, endpoint: DataWriter[Any] | DataReader[Any]) -> None:
         """Let go of a writer or reader; it is gone when the caller forgets it too."""
         if isinstance(endpoint, DataReader):
@@ -141,15 +130,6 @@ class Participant:
         self._graph.close()
         self._topics.clear()
         self._participant = self._domain = None
-
-    def _type_of(self, endpoint: Endpoint) -> Any:
-        name = ros_type_name(endpoint.type)
-        if name in types().fielddefs:
-            return dds_type(name)
-        if endpoint.type_id is None:
-            return opaque_type(endpoint.type)
-        definition, _ = get_types_for_typeid(self._participant, endpoint.type_id, _DEFINITION_NS)
-        return opaque_type(endpoint.type, definition)
 
     def _topic(self, topic: Topic[Any]) -> DdsTopic[Any]:
         name = self._dds_name(topic)
