@@ -163,3 +163,10 @@ def test_what_cannot_be_read_and_what_is_said_at_the_end(joined: Join, domain: i
     executor.shutdown()
     node.destroy_node()
     context.shutdown()
+
+
+def test_auto_takes_rclpy_where_it_is() -> None:
+    session = join("auto", "tests", ())
+    assert type(session).__name__ == "RclpySession"
+    session.close()
+    session.close()
