@@ -97,7 +97,7 @@ def test_a_port_in_use_names_the_port(capsys: pytest.CaptureFixture[str]) -> Non
 
 def test_version_and_help(capsys: pytest.CaptureFixture[str]) -> None:
     assert re.fullmatch(r"\d+\.\d+\.\d+\n", prints(capsys, "--version"))
-    verbs = ["run", "recognize", "models", "graph", "doctor", "camera", "recognition", "control", "robot", "steering"]
+    verbs = ["run", "recognize", "models", "doctor", "camera", "recognition", "control", "robot", "steering"]
     for verb in ([], *([verb] for verb in verbs)):
         assert "handsteer " + (verb[0] if verb else "run") in prints(capsys, *verb, "--help").replace("Usage: ", "")
 

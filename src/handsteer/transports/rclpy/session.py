@@ -1,7 +1,6 @@
 """This process as a node of rclpy: name, parameters, time, and the one thread that serves what comes."""
 
 import logging
-import os
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
@@ -61,7 +60,7 @@ class RclpySession:
             self.name: str = self._node.get_fully_qualified_name()
             self.parameters: dict[str, Any] = take_given(self._node)
             self.clock = self._make_clock()
-            self.transport = RclpyTransport(self._node, self.clock, os.environ)
+            self.transport = RclpyTransport(self._node, self.clock)
             self._executor = SingleThreadedExecutor(context=self._context)
             self._executor.add_node(self._node)
             self._thread = threading.Thread(target=self._spin, name="rclpy", daemon=True)

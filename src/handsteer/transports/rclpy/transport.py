@@ -38,10 +38,12 @@ class RclpyTransport:
     Args:
         node: The node.
         clock: The graph's clock.
-        environment: Holds ROS 2's variables, which say how far messages go.
     """
 
-    def __init__(self, node: Node, clock: Clock, environment: Mapping[str, str]) -> None:
+    # Fast DDS loses most raw images even on one machine.
+    crosses_network = True
+
+    def __init__(self, node: Node, clock: Clock) -> None:
         self._node = node
         self._clock = clock
         self._types = TopicTypes()
@@ -50,7 +52,6 @@ class RclpyTransport:
         self._publishers: list[RclpyPublisher[Any]] = []
         self._incoming: dict[str, Fanout[Any]] = {}
         self._is_open = True
-        self.crosses_network = _crosses_network(environment)
 
     def advertise(self, node: str, topic: Topic[M]) -> "RclpyPublisher[M]":
         """Return the sending end of ``topic`` for the node named ``node``."""
@@ -267,11 +268,3 @@ def _refusals(name: str) -> Iterator[None]:
         yield
     except (InvalidTopicNameException, InvalidQosOverridesError, RuntimeError, ValueError) as error:
         raise TransportError(f"{name}: {' '.join(str(error).split())}") from None
-
-
-def _crosses_network(environment: Mapping[str, str]) -> bool:
-    """Return whether ROS 2's variables let messages go beyond this machine, which they do where nothing is set."""
-    if environment.get("ROS_LOCALHOST_ONLY") == "1":
-        return False
-    reach = environment.get("ROS_AUTOMATIC_DISCOVERY_RANGE", "SUBNET").upper()
-    return reach not in {"LOCALHOST", "OFF"} or bool(environment.get("ROS_STATIC_PEERS"))
