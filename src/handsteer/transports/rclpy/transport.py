@@ -78,6 +78,10 @@ class RclpyTransport:
         found = self._node.get_publishers_info_by_topic(_given(self._node, topic))
         return sorted(f"{one.node_namespace.rstrip('/')}/{one.node_name}" for one in found)
 
+    def topic_name(self, topic: Topic[Any]) -> str:
+        """Return the topic's full name in the graph, remapped."""
+        return resolved(self._node, topic)
+
     def full_name(self, node: str) -> str:
         """Return the ROS 2 node's name and ``node``, as ROS's own diagnostics do: ``r1/my_camera: my_camera``."""
         return f"{self._node.get_fully_qualified_name().removeprefix('/')}: {node}"
