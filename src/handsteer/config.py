@@ -19,7 +19,7 @@ from handsteer.timeouts import ODOMETRY_S, ROBOT_S, STALE_S
 
 S = TypeVar("S", bound="Section")
 
-RobotKind = Literal["sim", "dds", "zenoh", "ros1"]
+RobotKind = Literal["sim", "auto", "ros2", "dds", "zenoh", "ros1"]
 _LONGEST_SHOWN = 200
 _NAMESPACE = re.compile(r"[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)
 
@@ -281,7 +281,9 @@ class RobotConfig(Section):
     """The robot, and the world it is simulated in or the topics it listens to."""
 
     kind: RobotKind = Field(
-        "sim", description="sim is the simulated robot; dds (ROS 2), zenoh and ros1 drive a real one, on its topics"
+        "sim",
+        description="sim is the simulated robot; ros2, dds, zenoh and ros1 drive a real one, on its topics, "
+        "auto by ros2 where that is, else by dds",
     )
     preset: Preset | None = Field(
         None, description="A robot whose topics, types and limits are known; a real one is generic unless said"

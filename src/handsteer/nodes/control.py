@@ -17,6 +17,7 @@ from handsteer.messages import (
     ODOM,
     STEERING_CMD_VEL,
     STOP,
+    Bool,
     Odometry,
     Pose,
     String,
@@ -32,7 +33,7 @@ from handsteer.nodes.rivals import Rivals
 from handsteer.nodes.selection import Selection
 from handsteer.nodes.stop_keeper import StopKeeper
 from handsteer.signs.vocabulary import NONE
-from handsteer.transports.protocol import Publisher, Received, Transport
+from handsteer.transports.protocol import Call, Publisher, Received, Transport
 
 log = logging.getLogger(__name__)
 
@@ -111,6 +112,19 @@ class HandSignControlNode(Node):
         self._ramp.reconfigure(config.control)
         self._monitor.reconfigure(config.collision_monitor)
         self._publish(self._driver.reconfigure(config.control))
+
+    def services(self) -> dict[str, Call]:
+        """Return ``stop`` and ``reset``, which do what true and false on ``/stop`` do."""
+        publisher = self.publisher(STOP)
+
+        def say(is_stopped: bool, answer: str) -> str:
+            publisher.publish(Bool(data=is_stopped))
+            return answer
+
+        return {
+            "stop": lambda: say(True, "stopped, until it is reset"),
+            "reset": lambda: say(False, "reset"),
+        }
 
     def on_stop(self) -> None:
         """Leave the robot standing, and those that it left a moment ago."""

@@ -11,7 +11,7 @@ from typing import Any, Generic, TypeVar
 from handsteer.clock import Clock
 from handsteer.config import Config
 from handsteer.messages import DIAGNOSTICS, DiagnosticArray, DiagnosticStatus, Header, KeyValue, Topic
-from handsteer.transports.protocol import Publisher, Received, Subscription, Transport
+from handsteer.transports.protocol import Call, Publisher, Received, Subscription, Transport
 
 M = TypeVar("M")
 log = logging.getLogger(__name__)
@@ -223,6 +223,10 @@ class Node:
 
     def on_reconfigure(self, config: Config) -> None:
         """Take the parameters that can change from ``config``; by default there are none."""
+
+    def services(self) -> dict[str, Call]:
+        """Return what others may ask of this node, by name; by default there is nothing."""
+        return {}
 
     def on_stop(self) -> None:
         """Leave things as they should be left; called last, also after an exception."""
