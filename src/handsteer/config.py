@@ -19,7 +19,7 @@ from handsteer.timeouts import ODOMETRY_S, ROBOT_S, STALE_S
 
 S = TypeVar("S", bound="Section")
 
-RobotKind = Literal["sim", "dds", "zenoh", "ros1"]
+RobotKind = Literal["sim", "auto", "ros2", "dds", "zenoh", "ros1"]
 _LONGEST_SHOWN = 200
 _NAMESPACE = re.compile(r"[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)
 
@@ -114,6 +114,11 @@ class SignsConfig(Section):
         0.5, ge=0, le=10, description="How long the followed hand shows no sign before another that shows one is [s]"
     )
     max_frame_age: float = Field(STALE_S, gt=0, le=10, description="An older frame counts as no frame [s]")
+    recorded: Literal["auto", "always", "never"] = Field(
+        "auto",
+        description="Whether frames with old stamps count, as a recording's: auto takes what rosbag play sends, always "
+        "takes whatever is stamped more than 5 s ago, so it is for recordings alone",
+    )
     image_transport: Literal["auto", "raw", "compressed"] = Field(
         "auto",
         description="Which images are recognised: raw is /image_raw, compressed is /image_raw/compressed; "
@@ -276,7 +281,9 @@ class RobotConfig(Section):
     """The robot, and the world it is simulated in or the topics it listens to."""
 
     kind: RobotKind = Field(
-        "sim", description="sim is the simulated robot; dds (ROS 2), zenoh and ros1 drive a real one, on its topics"
+        "sim",
+        description="sim is the simulated robot; ros2, dds, zenoh and ros1 drive a real one, on its topics, "
+        "auto by ros2 where that is, else by dds",
     )
     preset: Preset | None = Field(
         None, description="A robot whose topics, types and limits are known; a real one is generic unless said"

@@ -270,6 +270,17 @@ def test_steering_that_was_held_through_a_reset_has_to_let_go(bench: ControlBenc
     assert bench.commands[-1] == (0.5, 0)
 
 
+def test_its_services_stop_and_reset_as_the_topic_does(bench: ControlBench) -> None:
+    services = bench.control.services()
+    bench.show("Forward")
+    assert services["stop"]() == "stopped, until it is reset"
+    bench.show("Forward", "Stop", "Forward")
+    assert set(bench.commands[1:]) == {(0, 0)}
+    assert services["reset"]() == "reset"
+    bench.show("Stop", "Forward")
+    assert bench.commands[-1] == (0.01, 0)
+
+
 def test_says_that_it_is_stopped_and_then_disarmed_and_how_it_moves_again(bench: ControlBench) -> None:
     statuses = bench.record(DIAGNOSTICS)
 

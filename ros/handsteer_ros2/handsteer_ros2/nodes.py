@@ -6,6 +6,7 @@ program, else it is looked for in ``PATH``.
 
 import os
 import shutil
+import signal
 import sys
 
 
@@ -42,4 +43,6 @@ def _become(verb: str) -> None:
         sys.exit(f"handsteer_ros2: there is no program {wanted}: install handsteer, or set HANDSTEER to its path")
     words = sys.argv[1:]
     transport = [] if "--transport" in words else ["--transport", "dds"]
+    # Ctrl-C waits until handsteer can end in order: a new program inherits what is blocked.
+    signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT, signal.SIGTERM))
     os.execv(program, [program, verb, *transport, *words])

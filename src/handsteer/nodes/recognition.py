@@ -18,6 +18,7 @@ from handsteer.messages import HAND_SIGN, IMAGE_ANNOTATED, IMAGE_COMPRESSED, IMA
 from handsteer.nodes.frame_age import FrameAge
 from handsteer.nodes.latency import LatencyLog
 from handsteer.nodes.node import OK, WARN, Node
+from handsteer.nodes.recording import Recording
 from handsteer.nodes.stop_keeper import StopKeeper
 from handsteer.signs.protocol import Classifier
 from handsteer.signs.recognizer import Recognition, Recognizer
@@ -76,6 +77,7 @@ class HandSignRecognitionNode(Node):
         self._last_hand_s: float | None = None
         self._age = FrameAge(config.max_frame_age)
         self._freshness = Freshness(config.max_frame_age)
+        self._recording = Recording(config.recorded, config.max_frame_age)
         self._refused: str | None = None
         self._refused_s = -math.inf
         self._recognition: Recognition | None = None
@@ -105,7 +107,7 @@ class HandSignRecognitionNode(Node):
             self._recognizer.use(self._open_classifier(config.signs))
             self._model = version
         self._config = config.signs
-        self._age.limit_s = self._freshness.limit_s = config.signs.max_frame_age
+        self._age.limit_s = self._freshness.limit_s = self._recording.limit_s = config.signs.max_frame_age
         self._recognizer.reconfigure(config.signs)
 
     def _has_other_model(self, config: SignsConfig) -> bool:
@@ -117,7 +119,11 @@ class HandSignRecognitionNode(Node):
     def _on_frame(self, received: Received[M], picture_of: Callable[[M], NDArray[np.uint8]]) -> None:
         began_s = self.clock.now()
         captured_s = received.captured_s if received.captured_s is not None else began_s
+        if self._recording.follows(began_s, captured_s, by_player=received.by_player):
+            captured_s = began_s
         self._refused = self._age.why_refused(began_s, captured_s)
+        if self._refused is not None:
+            self._refused = self._recording.hint(began_s) or self._refused
         image = picture_of(received.message)
         if self._refused is None:
             self._look_at(image, received, began_s, captured_s)
@@ -182,6 +188,7 @@ class HandSignRecognitionNode(Node):
             handedness=seen.hand.handedness if seen.hand else "",
             processing_ms=f"{self.processing.percentile_ms(50):.1f}",
             processing_p99_ms=f"{self.processing.percentile_ms(99):.1f}",
+            recording=self._recording.is_followed,
             frame_age_ms=f"{self._age.age_s * 1000:.0f}",
             clock_ahead_ms=f"{self._age.ahead_s * 1000:.0f}",
         )
@@ -197,7 +204,9 @@ class HandSignRecognitionNode(Node):
         now = self.clock.now()
         if self._refused is not None and now - self._refused_s <= self._config.max_frame_age:
             return self._refused
-        return f"no frame for {now - max(self._last_frame_s, self._refused_s):.1f} s"
+        unseen_s = now - max(self._last_frame_s, self._refused_s)
+        before = f"; before: {self._refused}" if self._refused is not None else ""
+        return f"no frame for {unseen_s:.1f} s{before}"
 
 
 _GONE = (-1, -1)

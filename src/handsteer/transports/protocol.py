@@ -20,10 +20,16 @@ class Received(Generic[M]):
         message: The message; it is shared with other subscribers, so it is not to be changed.
         captured_s: When the frame that led to this message was captured, in seconds of the graph's clock; None when
             there was no frame, or when the transport cannot carry it.
+        by_player: Whether a player of recordings sent it; False when the transport cannot tell.
     """
 
     message: M
     captured_s: float | None = None
+    by_player: bool = False
+
+
+Call = Callable[[], str]
+"""What a service does, at once, on any thread: it returns a sentence, or raises a HandsteerError that says why not."""
 
 
 class Publisher(Protocol[M_contra]):
@@ -120,6 +126,14 @@ class Session(Protocol):
 
     def serve(self, parameters: NodeParameters) -> None:
         """Let others see and set the parameters of this process's node, where the graph has a way to do so."""
+        ...
+
+    def offer(self, services: Callable[[], Mapping[str, Call]]) -> None:
+        """Let others call the services ``~/name`` of this process's node, where the graph can have them so.
+
+        Args:
+            services: Returns the services by name; not asked where the graph has none.
+        """
         ...
 
     def wait(self, timeout_s: float) -> bool:
