@@ -19,7 +19,7 @@ from handsteer.timeouts import ODOMETRY_S, ROBOT_S, STALE_S
 
 S = TypeVar("S", bound="Section")
 
-RobotKind = Literal["sim", "dds", "zenoh", "ros1"]
+RobotKind = Literal["sim", "auto", "ros2", "dds", "zenoh", "ros1"]
 _LONGEST_SHOWN = 200
 _NAMESPACE = re.compile(r"[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)
 
@@ -261,7 +261,7 @@ class CollisionMonitorConfig(Section):
 
     enabled: bool = Field(False, description="Whether commands are slowed before obstacles; this needs a topic `scan`")
     source_timeout: float = Field(
-        0.5, gt=0, le=5, description="Without a scan for this long, or when it is older, the robot is stopped [s]"
+        0.45, gt=0, le=5, description="Without a scan for this long, or when it is older, the robot is stopped [s]"
     )
     margin: float = Field(0.15, ge=0, le=5, description="How far before an obstacle in its way the robot stops [m]")
     deceleration: float = Field(0.7, gt=0, le=20, description="How hard the robot surely brakes [m/s²]")
@@ -281,7 +281,9 @@ class RobotConfig(Section):
     """The robot, and the world it is simulated in or the topics it listens to."""
 
     kind: RobotKind = Field(
-        "sim", description="sim is the simulated robot; dds (ROS 2), zenoh and ros1 drive a real one, on its topics"
+        "sim",
+        description="sim is the simulated robot; ros2, dds, zenoh and ros1 drive a real one, on its topics, "
+        "auto by ros2 where that is, else by dds",
     )
     preset: Preset | None = Field(
         None, description="A robot whose topics, types and limits are known; a real one is generic unless said"

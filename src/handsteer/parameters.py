@@ -8,7 +8,7 @@ import difflib
 import logging
 import threading
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import NoneType
 from typing import Any, Literal, get_args, get_origin
@@ -111,6 +111,7 @@ class Description:
         constraint: What else is asked of its values, in words; empty when nothing is.
         choices: What there is to choose from; empty when that is not all that is allowed.
         why_fixed: Why it cannot be set while the node runs; None when it can.
+        removable: Whether it is an entry of a table, which can be taken away.
     """
 
     kind: Kind
@@ -120,6 +121,7 @@ class Description:
     constraint: str = ""
     choices: tuple[str, ...] = ()
     why_fixed: str | None = None
+    removable: bool = False
 
 
 class NodeParameters:
@@ -168,7 +170,7 @@ class NodeParameters:
         place = self._place(name)
         if place is None or (place.entry is not None and name not in self.values()):
             return None
-        return describe(place.model, place.field)
+        return replace(describe(place.model, place.field), removable=place.entry is not None)
 
     def set(self, changes: Mapping[str, Value | None]) -> None:
         """Set parameters, all of them or none; None takes an entry out of a table.

@@ -18,8 +18,7 @@ _EXAMPLES = """Examples:
   handsteer recognize photo.jpg                  which sign is it?
   handsteer signs evaluate photos/               how well are signs told?
   handsteer camera --transport ros1              one node, in a ROS 1 graph
-  handsteer camera --transport dds               one node, in a ROS 2 graph; or --transport zenoh
-  handsteer graph --transport dds                who is in the ROS 2 graph, and how often they speak
+  handsteer camera --transport auto              one node, in a ROS 2 graph; or ros2, dds, zenoh
   handsteer doctor                               what works on this machine
 """
 
@@ -32,7 +31,7 @@ app = App(
     result_action="return_value",
 )
 # Named, not imported: a verb's module is loaded when it is used.
-for verb in ("run", "recognize", "models", "graph", "doctor"):
+for verb in ("run", "recognize", "models", "doctor"):
     app.command(f"handsteer.cli.{verb}:{verb}", name=verb)
 app.command("handsteer.cli.signs:app", name="signs")
 for verb in ("camera", "recognition", "control", "robot", "steering"):

@@ -128,7 +128,7 @@ class HandSignRecognitionNode(Node):
         if self._refused is None:
             self._look_at(image, received, began_s, captured_s)
         else:
-            self._freshness.why_refused(image, 0.0)  # it is not new either when it comes again with another stamp
+            self._freshness.pass_over(image)
         if self._refused is not None:
             self._refused_s = began_s  # a stale frame, or one that is not new, is no frame: the watch publishes NONE
 

@@ -28,6 +28,10 @@ class Received(Generic[M]):
     by_player: bool = False
 
 
+Call = Callable[[], str]
+"""What a service does, at once, on any thread: it returns a sentence, or raises a HandsteerError that says why not."""
+
+
 class Publisher(Protocol[M_contra]):
     """The sending end of a topic."""
 
@@ -122,6 +126,14 @@ class Session(Protocol):
 
     def serve(self, parameters: NodeParameters) -> None:
         """Let others see and set the parameters of this process's node, where the graph has a way to do so."""
+        ...
+
+    def offer(self, services: Callable[[], Mapping[str, Call]]) -> None:
+        """Let others call the services ``~/name`` of this process's node, where the graph can have them so.
+
+        Args:
+            services: Returns the services by name; not asked where the graph has none.
+        """
         ...
 
     def wait(self, timeout_s: float) -> bool:

@@ -5,12 +5,13 @@ import math
 import sys
 import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from handsteer.clock import Clock, SimulatedClock, WallClock
 from handsteer.errors import TransportError
 from handsteer.parameters import NodeParameters
+from handsteer.transports.protocol import Call
 
 try:
     import rosgraph
@@ -73,6 +74,9 @@ class Ros1Session:
 
     def serve(self, parameters: NodeParameters) -> None:
         """Do nothing: ROS 1 has its parameters on the master, and nodes read them when they start."""
+
+    def offer(self, services: Callable[[], Mapping[str, Call]]) -> None:
+        """Do nothing: the nodes of the course have no services."""
 
     def wait(self, timeout_s: float) -> bool:
         """Wait for at most ``timeout_s`` seconds; return whether ROS has asked this process to end (`rosnode kill`).

@@ -19,8 +19,10 @@ from handsteer.transports.stamps import capture_time
 
 M = TypeVar("M")
 
-# With rospy's default of 64 kB, images wait in the socket for a callback that is slower than the camera.
-_BUFFER_BYTES = 2**24
+# With rospy's default of 64 kB, images wait in the socket for a callback that is slower than the camera. It costs
+# something to have that much ready for every message.
+_BUFFER_BYTES = {"sensor_msgs/msg/Image": 2**24, "sensor_msgs/msg/CompressedImage": 2**22}
+_SMALL_BUFFER_BYTES = 2**16
 _PLAYER = re.compile(r"(/\w+)*/play_\d{6,}", re.ASCII)
 
 
@@ -112,8 +114,9 @@ class Ros1Transport:
             captured_s = capture_time(message, self._clock)
             send(Received(message, captured_s, by_player=captured_s is not None and _is_player(theirs)))
 
+        size = _BUFFER_BYTES.get(kind, _SMALL_BUFFER_BYTES)
         subscriber = rospy.Subscriber(
-            name, ros1_type(kind), on_message, queue_size=topic.depth, buff_size=_BUFFER_BYTES, tcp_nodelay=True
+            name, ros1_type(kind), on_message, queue_size=topic.depth, buff_size=size, tcp_nodelay=True
         )
         return subscriber.unregister  # type: ignore[no-any-return]
 
