@@ -4,7 +4,7 @@ import contextlib
 import socket
 from pathlib import Path
 
-from handsteer.transports.dds.rtps.interfaces import multicast_addresses
+from handsteer.transports.dds.interfaces import multicast_addresses
 
 # RTPS 2.3, section 9.6.1.1: the ports of a domain, and of a participant in it.
 _BASE, _PER_DOMAIN, _PER_PARTICIPANT, _OWN, _LARGEST_DOMAIN = 7400, 250, 2, 10, 232

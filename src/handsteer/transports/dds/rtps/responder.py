@@ -10,8 +10,8 @@ import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
+from handsteer.transports.dds.interfaces import multicast_addresses
 from handsteer.transports.dds.rtps.discovery import Address
-from handsteer.transports.dds.rtps.interfaces import multicast_addresses
 from handsteer.transports.dds.rtps.participant import Outgoing, RtpsParticipant
 from handsteer.transports.dds.rtps.wire import PREFIX_BYTES, VENDOR_UNKNOWN
 
