@@ -22,6 +22,9 @@ PLACES, PLACES_BY_MULTICAST = 33, 120
 # Four raw images: with the engine's own 1 MB, a process that is held up for a frame or two loses one. The system gives
 # what it allows (Linux: net.core.rmem_max), and nothing is said where that is less.
 _RECEIVE_BUFFER = "4MiB"
+# No writer waits for a slow reader, however large its messages are: each keeps a few, and drops older ones for newer.
+# With the engine's own 500 kB, one raw image that is not confirmed yet would keep the next from being sent.
+_UNCONFIRMED = "1GiB"
 _PLACES = {
     "LOCALHOST": "this machine",
     "PEERS": "this machine and ROS_STATIC_PEERS",
@@ -130,7 +133,8 @@ def _config(reach: str, peers: Sequence[str], places: int, own: Sequence[str]) -
         "<CycloneDDS><Domain>"
         f"<General>{_interfaces(own) if within else ''}<AllowMulticast>{multicast}</AllowMulticast></General>"
         f"<Discovery>{index}{announce if own or not within else ''}<Peers>{found}</Peers></Discovery>"
-        f'<Internal><SocketReceiveBufferSize min="default" max="{_RECEIVE_BUFFER}"/></Internal>'
+        f'<Internal><SocketReceiveBufferSize min="default" max="{_RECEIVE_BUFFER}"/>'
+        f"<Watermarks><WhcHigh>{_UNCONFIRMED}</WhcHigh></Watermarks></Internal>"
         "</Domain></CycloneDDS>"
     )
 

@@ -115,6 +115,7 @@ class DdsPublisher(Generic[M]):
         self._participant = participant
         self._topic = topic
         self._writer: Any = participant.writer(topic)
+        self._is_held_up = False
         self._lock = threading.Lock()
 
     @property
@@ -133,8 +134,12 @@ class DdsPublisher(Generic[M]):
             writer.write(writer.data_type(encode(message)))
         except DDSException as error:
             if error.code != DDSException.DDS_RETCODE_TIMEOUT:
-                raise TransportError(f"{self._topic.name} cannot be published: {error}") from None
-            log.warning("%s: a subscriber is too slow, a message was dropped", self._topic.name)
+                raise TransportError(f"{self.name} cannot be published: {error}") from None
+            if not self._is_held_up:
+                log.warning("%s: a subscriber is too slow, and messages are dropped", self.name)
+            self._is_held_up = True
+        else:
+            self._is_held_up = False
 
     def flush(self, timeout_s: float) -> None:
         """Wait until all reliable readers have what was published, for at most ``timeout_s`` seconds."""

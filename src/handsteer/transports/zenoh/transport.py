@@ -17,7 +17,7 @@ from handsteer.transports.channels import Deliver, Fanout, FanoutSubscription, T
 from handsteer.transports.lateness import Lateness
 from handsteer.transports.protocol import Received
 from handsteer.transports.ros2.encoding import decode, encode
-from handsteer.transports.ros2.profiles import Profile, offered, requested
+from handsteer.transports.ros2.profiles import IMAGES, Profile, offered, requested
 from handsteer.transports.stamps import capture_time
 from handsteer.transports.zenoh.keys import attachment, gid, read_attachment
 from handsteer.transports.zenoh.member import Member
@@ -119,9 +119,9 @@ class ZenohPublisher(Generic[M]):
         name, kind = _named(member, topic)
         self.name = name
         key = member.key(name, kind)
-        self._publisher = member.session.declare_publisher(key, **_options(profile))
+        self._publisher = member.session.declare_publisher(key, **_options(topic, profile))
         # It keeps messages for late subscribers, but does not know of any: the plain one beside it does.
-        self._keeper = _keeper(member.session, key, profile) if profile.latched else None
+        self._keeper = _keeper(member.session, key, topic, profile) if profile.latched else None
         self._token, text = member.introduce("publisher", name, kind, profile)
         self._gid = gid(text)
         self._lock = threading.Lock()
@@ -170,28 +170,29 @@ def _named(member: Member, topic: Topic[Any]) -> tuple[str, str]:
     return member.name.topic(topic), type_name(topic.type)
 
 
-def _options(profile: Profile) -> dict[str, Any]:
+def _options(topic: Topic[Any], profile: Profile) -> dict[str, Any]:
     """Return how messages travel.
 
     As in rmw_zenoh, no publisher waits for a subscriber that hangs: its messages are dropped. Signs and commands
     overtake images that go the same way, and are not held back to be sent together with others.
     """
+    is_urgent = profile.reliable and topic.type not in IMAGES
     return {
         "congestion_control": zenoh.CongestionControl.DROP,
         "reliability": zenoh.Reliability.RELIABLE if profile.reliable else zenoh.Reliability.BEST_EFFORT,
-        "priority": zenoh.Priority.INTERACTIVE_HIGH if profile.reliable else zenoh.Priority.DATA,
-        "express": profile.reliable,
+        "priority": zenoh.Priority.INTERACTIVE_HIGH if is_urgent else zenoh.Priority.DATA,
+        "express": is_urgent,
     }
 
 
-def _keeper(session: zenoh.Session, key: str, profile: Profile) -> zenoh.ext.AdvancedPublisher:
+def _keeper(session: zenoh.Session, key: str, topic: Topic[Any], profile: Profile) -> zenoh.ext.AdvancedPublisher:
     return zenoh.ext.declare_advanced_publisher(
         session,
         key,
         cache=zenoh.ext.CacheConfig(profile.depth),
         sample_miss_detection=zenoh.ext.MissDetectionConfig(heartbeat=None, sporadic_heartbeat=_HEARTBEAT_S),
         publisher_detection=True,
-        **_options(profile),
+        **_options(topic, profile),
     )
 
 
