@@ -81,6 +81,12 @@ def test_a_sign_from_a_stale_frame_moves_nothing(bench: ControlBench) -> None:
     assert bench.commands == []
 
 
+def test_a_stop_from_a_stale_frame_stops(bench: ControlBench) -> None:
+    bench.show("Forward")
+    bench.show("Stop", "Forward", age_s=0.6)
+    assert bench.commands == [(0.01, 0), (0, 0)]
+
+
 def test_one_zero_at_the_end(bench: ControlBench) -> None:
     bench.show("Forward")
     bench.control.stop()

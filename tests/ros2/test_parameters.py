@@ -126,3 +126,21 @@ def test_beyond_this_machine_the_network_card_is_used(tmp_path: Path) -> None:
         graph.peer = graph.start_peer()
         graph.node("control", name=f"/{NODE}")
         assert ask(graph, f"/{NODE}", "list_parameters")["result"]["names"][0] == "ramp"
+
+
+@pytest.mark.parametrize(
+    ("verb", "name"),
+    [
+        ("camera", "my_camera"),
+        ("recognition", "hand_sign_recognition"),
+        ("control", "hand_sign_control"),
+        ("robot", "robot"),
+        ("steering", "steering"),
+    ],
+)
+def test_what_is_dumped_can_be_loaded(ros2: Ros2Graph, tmp_path: Path, verb: str, name: str) -> None:
+    """Among it are an empty list, and texts that YAML takes for something else."""
+    options = {"camera": ("--camera.source", "virtual"), "steering": ("--port", "0", "--dashboard.open-browser=false")}
+    words = ("-r", "__ns:=/dumped", *(("-p", "arming:='off'") if verb == "control" else ()))
+    ros2.node(verb, *options.get(verb, ()), name=f"/dumped/{name}", ros=words)
+    assert ros2.peer.ask("reload", node=f"/dumped/{name}", file=str(tmp_path / "dump.yaml")) == []

@@ -121,19 +121,21 @@ class HandSignControlNode(Node):
             self._publish(ZERO)
         else:
             if self._safety.is_stopped:
-                log.info("stop is reset by false on %s, which is published by %s", STOP.name, self._voices(STOP))
+                log.info("stop is reset by false on %s, which is published by %s", *self._told_by(STOP))
             self._safety.reset()
 
-    def _voices(self, topic: Topic[Any]) -> str:
-        return ", ".join(self.transport.publishers_of(topic)) or "nobody that is known"
+    def _told_by(self, topic: Topic[Any]) -> tuple[str, str]:
+        publishers = self.transport.publishers_of(topic)
+        return self.transport.topic_name(topic), ", ".join(publishers) or "nobody that is known"
 
     def _on_sign(self, received: Received[String]) -> None:
         captured_s = received.captured_s
-        if captured_s is not None and self.clock.now() - captured_s > self._config.sign_timeout:
+        is_stale = captured_s is not None and self.clock.now() - captured_s > self._config.sign_timeout
+        if is_stale and action_of(received.message.data, self._config.actions) != "stop":
             return  # a stale frame is no frame: the watchdog goes on counting
         elapsed_s = self._elapsed()
         sign = None if self._interruption.distrusts(self.clock.now()) else received.message.data
-        self._publish(self._driver.step(elapsed_s, sign=self._admitted(sign)), captured_s)
+        self._publish(self._driver.step(elapsed_s, sign=self._admitted(sign)), None if is_stale else captured_s)
 
     def _on_steering(self, received: Received[Twist]) -> None:
         wanted = Velocity(received.message.linear.x, received.message.angular.z)

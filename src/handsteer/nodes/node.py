@@ -87,10 +87,17 @@ class Node:
         self._running = False
         self._stopped = False
         self._thread: threading.Thread | None = None
-        self._diagnostics = transport.advertise(name, DIAGNOSTICS)
+        self._topics: dict[str, set[str]] = {"publishes": set(), "listens to": set()}
+        self._diagnostics = self.publisher(DIAGNOSTICS)
+
+    @property
+    def topics(self) -> str:
+        """What it publishes and listens to, in words, by the names that others know."""
+        return "; ".join(f"{does} {', '.join(sorted(names)) or 'nothing'}" for does, names in self._topics.items())
 
     def publisher(self, topic: Topic[M]) -> Publisher[M]:
         """Return the sending end of ``topic``."""
+        self._topics["publishes"].add(self.transport.topic_name(topic))
         return self.transport.advertise(self.name, topic)
 
     def subscribe(
@@ -108,7 +115,9 @@ class Node:
             callback: Runs on this node's thread.
             key: For a topic that several nodes publish to: keeps the newest message for each value of ``key(message)``.
         """
-        inbox = _Inbox(topic.name, callback, key, 1 if key else topic.depth)
+        name = self.transport.topic_name(topic)
+        self._topics["listens to"].add(name)
+        inbox = _Inbox(name, callback, key, 1 if key else topic.depth)
         self._inboxes.append(inbox)
 
         def deliver(received: Received[M]) -> None:

@@ -16,6 +16,7 @@ from handsteer.errors import ConfigError, ModelError
 from handsteer.images import bgr_image, image_message, jpeg_picture
 from handsteer.messages import HAND_SIGN, IMAGE_ANNOTATED, IMAGE_COMPRESSED, IMAGE_RAW, CompressedImage, Image, String
 from handsteer.nodes.frame_age import FrameAge
+from handsteer.nodes.interruption import Interruption
 from handsteer.nodes.latency import LatencyLog
 from handsteer.nodes.node import OK, WARN, Node
 from handsteer.nodes.stop_keeper import StopKeeper
@@ -76,6 +77,7 @@ class HandSignRecognitionNode(Node):
         self._last_hand_s: float | None = None
         self._age = FrameAge(config.max_frame_age)
         self._freshness = Freshness(config.max_frame_age)
+        self._interruption = Interruption(config.max_frame_age, clock.now())
         self._refused: str | None = None
         self._refused_s = -math.inf
         self._recognition: Recognition | None = None
@@ -105,7 +107,7 @@ class HandSignRecognitionNode(Node):
             self._recognizer.use(self._open_classifier(config.signs))
             self._model = version
         self._config = config.signs
-        self._age.limit_s = self._freshness.limit_s = config.signs.max_frame_age
+        self._age.limit_s = self._freshness.limit_s = self._interruption.limit_s = config.signs.max_frame_age
         self._recognizer.reconfigure(config.signs)
 
     def _has_other_model(self, config: SignsConfig) -> bool:
@@ -117,7 +119,10 @@ class HandSignRecognitionNode(Node):
     def _on_frame(self, received: Received[M], picture_of: Callable[[M], NDArray[np.uint8]]) -> None:
         began_s = self.clock.now()
         captured_s = received.captured_s if received.captured_s is not None else began_s
+        self._interruption.note(began_s)
         self._refused = self._age.why_refused(began_s, captured_s)
+        if self._refused is None and self._interruption.distrusts(began_s):
+            self._refused = "this process was held up, and frames may have waited meanwhile"
         image = picture_of(received.message)
         if self._refused is None:
             self._look_at(image, received, began_s, captured_s)
@@ -135,6 +140,9 @@ class HandSignRecognitionNode(Node):
         # The time of pictures that were not looked at counts: a sign is bridged from when it was seen last.
         recognition = self._recognizer.step(image, self._unseen_s)
         self._unseen_s = 0.0
+        self._refused = self._why_too_late(began_s)
+        if self._refused is not None:
+            return
         if recognition.hand is not None:
             self._last_hand_s = began_s
             self._refused = self._freshness.why_hand_refused(recognition.hand.box_px, dt_s)
@@ -149,6 +157,14 @@ class HandSignRecognitionNode(Node):
             header = received.message.header
             self._annotated.publish(image_message(self._annotate(image, recognition), header), received.captured_s)
 
+    def _why_too_late(self, began_s: float) -> str | None:
+        """Return why a frame that was fresh has no sign: this process was stopped, or held up, while it was read."""
+        age_s = max(0.0, self._age.age_s) + self.clock.now() - began_s
+        if age_s <= self._config.max_frame_age:
+            return None
+        self._recognizer.reset()
+        return f"a frame was {age_s:.1f} s old when its sign was told: was this process held up?"
+
     def _since_last_frame(self, captured_s: float) -> float:
         last_s = captured_s if self._last_captured_s is None else self._last_captured_s
         self._last_captured_s = captured_s
@@ -156,6 +172,7 @@ class HandSignRecognitionNode(Node):
 
     def _watch(self) -> None:
         now = self.clock.now()
+        self._interruption.note(now)
         if now - self._last_frame_s <= self._config.max_frame_age:
             return
         period_s = _SILENCE_PERIOD_S if self._recognition is None else self._config.max_frame_age

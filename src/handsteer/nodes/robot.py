@@ -38,6 +38,7 @@ from handsteer.messages import (
     TwistStamped,
     TwistWithCovariance,
     Vector3,
+    is_zero,
     twist,
     twist_in,
 )
@@ -158,7 +159,7 @@ class RobotNode(Node):
     def _on_command(self, received: Received[Twist | TwistStamped]) -> None:
         now = self.clock.now()
         self._notice_interruption(now)
-        if self._interruption.distrusts(now) or self._is_old(received.message, now):
+        if not is_zero(received.message) and (self._interruption.distrusts(now) or self._is_old(received.message, now)):
             return
         command = twist_in(received.message)
         self._tell(Velocity(command.linear.x, command.angular.z))

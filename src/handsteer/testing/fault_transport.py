@@ -128,6 +128,10 @@ class FaultTransport:
         """Return what the transport within knows: faults befall messages, not who is there."""
         return self._inner.publishers_of(topic)
 
+    def topic_name(self, topic: Topic[Any]) -> str:
+        """Return what the transport within calls ``topic``."""
+        return self._inner.topic_name(topic)
+
     def full_name(self, node: str) -> str:
         """Return what the transport within calls ``node``."""
         return self._inner.full_name(node)
@@ -189,7 +193,7 @@ class FaultPublisher(Generic[M]):
 
     def _arrive(self, message: M, captured_s: float | None, sent_s: float) -> None:
         late = self._lateness is not None and self._lateness.is_late(b"", sent_s, self._transport.now())
-        if not late:
+        if not late or (self._topic.stops is not None and self._topic.stops(message)):
             self._inner.publish(message, self._transport.captured(message, captured_s))
 
 

@@ -87,6 +87,10 @@ class Transport(Protocol):
         """
         ...
 
+    def topic_name(self, topic: Topic[Any]) -> str:
+        """Return what others know ``topic`` by: its full name, with namespace and remapping."""
+        ...
+
     def full_name(self, node: str) -> str:
         """Return what others know the node named ``node`` by: ``process: node`` where it has a process of its own."""
         ...
