@@ -28,10 +28,12 @@ from rosbags.typesys.stores.ros2_jazzy import nav_msgs__msg__Odometry as Odometr
 from rosbags.typesys.stores.ros2_jazzy import rcl_interfaces__msg__Log as Log
 from rosbags.typesys.stores.ros2_jazzy import rcl_interfaces__msg__ParameterEvent as ParameterEvent
 from rosbags.typesys.stores.ros2_jazzy import rosgraph_msgs__msg__Clock as ClockMessage
+from rosbags.typesys.stores.ros2_jazzy import sensor_msgs__msg__CameraInfo as CameraInfo
 from rosbags.typesys.stores.ros2_jazzy import sensor_msgs__msg__CompressedImage as CompressedImage
 from rosbags.typesys.stores.ros2_jazzy import sensor_msgs__msg__Image as Image
 from rosbags.typesys.stores.ros2_jazzy import sensor_msgs__msg__JointState as JointState
 from rosbags.typesys.stores.ros2_jazzy import sensor_msgs__msg__LaserScan as LaserScan
+from rosbags.typesys.stores.ros2_jazzy import sensor_msgs__msg__RegionOfInterest as RegionOfInterest
 from rosbags.typesys.stores.ros2_jazzy import std_msgs__msg__Bool as Bool
 from rosbags.typesys.stores.ros2_jazzy import std_msgs__msg__ColorRGBA as ColorRGBA
 from rosbags.typesys.stores.ros2_jazzy import std_msgs__msg__Header as Header
@@ -46,6 +48,7 @@ from handsteer.timeouts import STALE_S
 
 __all__ = [
     "Bool",
+    "CameraInfo",
     "ClockMessage",
     "ColorRGBA",
     "CompressedImage",
@@ -67,6 +70,7 @@ __all__ = [
     "Pose",
     "PoseWithCovariance",
     "Quaternion",
+    "RegionOfInterest",
     "String",
     "TFMessage",
     "Time",
@@ -153,6 +157,7 @@ def is_zero(message: "Twist | TwistStamped") -> bool:
 
 IMAGE_RAW = Topic("/image_raw", Image)
 IMAGE_COMPRESSED = Topic("/image_raw/compressed", CompressedImage, beneath=IMAGE_RAW)
+CAMERA_INFO = Topic("/camera_info", CameraInfo)
 # Each sign makes the robot a step faster, so none may be lost when several come at once.
 HAND_SIGN = Topic(
     "/gesture/hand_sign",

@@ -169,6 +169,29 @@ def test_images_reach_who_wants_them_reliable_and_one_that_hangs_holds_up_nobody
         assert "dropped" not in camera.text
 
 
+def test_several_robots_share_one_tree_of_transforms(tmp_path: Path) -> None:
+    with dds_graph(tmp_path) as graph:
+        for name, words in (("r1", ()), ("r2", ()), ("alone", ("-r", "/tf:=tf"))):
+            topic = f"/{name}{ODOM}"
+            graph.peer.ask("record", topic=topic, type="Odometry", fields=["header.frame_id", "child_frame_id"])
+            graph.node("robot", name=f"/{name}/robot", ros=("-r", f"__ns:=/{name}", *words))
+            seen = eventually(lambda: graph.peer.ask("get", topic=topic))  # noqa: B023
+            prefix = "" if words else f"{name}/"
+            assert seen[0][1] == [f"{prefix}odom", f"{prefix}base_link"]
+
+
+def test_a_node_says_once_that_it_is_ready_and_names_its_topics_as_others_know_them(tmp_path: Path) -> None:
+    with dds_graph(tmp_path) as graph:
+        words = ("-r", "__ns:=/r1", "-r", "image_raw:=/front/image", "-r", "camera_info:=/front/camera_info")
+        camera = graph.node("camera", *FORWARD, name="/r1/my_camera", ros=words)
+        line = (
+            "/r1/my_camera is ready: publishes /diagnostics, /front/camera_info, /front/image, "
+            "/front/image/compressed, /r1/stopped; listens to /r1/stop"
+        )
+        eventually(lambda: line in camera.text, 10.0, what=line)
+        assert camera.text.count("is ready") == 1
+
+
 def test_raw_images_for_another_machine_are_warned_of_once(tmp_path: Path) -> None:
     with dds_graph(tmp_path) as graph:
         near, far, farther = graph.peer, graph.start_peer("far"), graph.start_peer("farther")

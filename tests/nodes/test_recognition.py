@@ -114,6 +114,19 @@ def test_a_frame_without_a_time_that_waited_while_the_process_was_stopped_is_non
     assert set(bench.names) <= {"NONE"}
 
 
+def test_a_camera_with_compressed_images_only_is_taken_by_itself(caplog: pytest.LogCaptureFixture) -> None:
+    caplog.set_level("INFO")
+    bench = RecognitionBench()
+    del bench.images  # a publisher that nobody holds is gone
+    compressed = bench.transport.advertise("camera", IMAGE_COMPRESSED)
+    bench.run(0.6)
+    for _ in range(6):
+        compressed.publish(jpeg_message(bench.picture(), HEADER), bench.clock.now())
+        bench.run(1 / 30)
+    assert bench.names[-1] == "Forward"
+    assert "nobody publishes /image_raw: images are taken from /image_raw/compressed, of camera" in caplog.text
+
+
 def test_a_broken_frame_is_no_frame(bench: RecognitionBench) -> None:
     bench.show(frames=6)
     bench.show(BROKEN)

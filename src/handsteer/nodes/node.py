@@ -105,7 +105,7 @@ class Node:
         topic: Topic[M],
         callback: Callable[[Received[M]], None],
         key: Callable[[M], Hashable] | None = None,
-    ) -> None:
+    ) -> Subscription:
         """Call ``callback`` with the newest message of ``topic``; older ones that were not served are dropped.
 
         For a topic of some depth, as many of the newest messages are kept, and served in their order.
@@ -114,6 +114,9 @@ class Node:
             topic: What to listen to.
             callback: Runs on this node's thread.
             key: For a topic that several nodes publish to: keeps the newest message for each value of ``key(message)``.
+
+        Returns:
+            What ends it; the node's end does, too.
         """
         name = self.transport.topic_name(topic)
         self._topics["listens to"].add(name)
@@ -125,7 +128,9 @@ class Node:
                 inbox.put(received)
                 self._wake.notify()
 
-        self._subscriptions.append(self.transport.subscribe(self.name, topic, deliver))
+        subscription = self.transport.subscribe(self.name, topic, deliver)
+        self._subscriptions.append(subscription)
+        return subscription
 
     def every(self, period_s: float, callback: Callable[[], None]) -> "Timer":
         """Call ``callback`` every ``period_s`` seconds; a beat that is missed is left out, not made up for."""

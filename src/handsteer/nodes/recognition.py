@@ -1,6 +1,7 @@
 """The node ``hand_sign_recognition``: a frame in, the name of a sign out."""
 
 import json
+import logging
 import math
 from collections.abc import Callable
 from pathlib import Path
@@ -23,13 +24,16 @@ from handsteer.nodes.stop_keeper import StopKeeper
 from handsteer.signs.protocol import Classifier
 from handsteer.signs.recognizer import Recognition, Recognizer
 from handsteer.signs.vocabulary import NONE
-from handsteer.transports.protocol import Received, Transport
+from handsteer.transports.protocol import Received, Subscription, Transport
 
 _WATCH_PERIOD_S = 0.02
 # Further apart than FAULT_GAP_S, so that the control takes them for what they are: frames that were not looked at.
 _SILENCE_PERIOD_S = 0.5
 _DIAGNOSE_PERIOD_S = 0.1
+_CHOOSE_PERIOD_S = 0.5
 _SHORTLY_S = 3.0
+
+log = logging.getLogger(__name__)
 
 M = TypeVar("M", Image, CompressedImage)
 Annotate = Callable[[NDArray[np.uint8], Recognition], NDArray[np.uint8]]
@@ -85,10 +89,10 @@ class HandSignRecognitionNode(Node):
         self._sign = self.publisher(HAND_SIGN)
         self._annotated = self.publisher(IMAGE_ANNOTATED)
         wanted = config.image_transport
-        if wanted == "compressed" or (wanted == "auto" and transport.crosses_network):
-            self.subscribe(IMAGE_COMPRESSED, lambda received: self._on_frame(received, jpeg_picture))
-        else:
-            self.subscribe(IMAGE_RAW, lambda received: self._on_frame(received, bgr_image))
+        self._compressed = wanted == "compressed" or (wanted == "auto" and transport.crosses_network)
+        self._images = self._take_images()
+        if wanted == "auto":
+            self.every(_CHOOSE_PERIOD_S, self._choose_images)
         self.every(_WATCH_PERIOD_S, self._watch)
         self.every(_DIAGNOSE_PERIOD_S, self._report)
 
@@ -164,6 +168,23 @@ class HandSignRecognitionNode(Node):
             return None
         self._recognizer.reset()
         return f"a frame was {age_s:.1f} s old when its sign was told: was this process held up?"
+
+    def _take_images(self) -> Subscription:
+        if self._compressed:
+            return self.subscribe(IMAGE_COMPRESSED, lambda received: self._on_frame(received, jpeg_picture))
+        return self.subscribe(IMAGE_RAW, lambda received: self._on_frame(received, bgr_image))
+
+    def _choose_images(self) -> None:
+        """Take the other kind of images where a camera has only that."""
+        taken, other = (IMAGE_COMPRESSED, IMAGE_RAW) if self._compressed else (IMAGE_RAW, IMAGE_COMPRESSED)
+        names = self.transport.publishers_of
+        if names(taken) or not names(other):
+            return
+        self._images.close()
+        self._compressed = not self._compressed
+        self._images = self._take_images()
+        here, there = (self.transport.topic_name(topic) for topic in (taken, other))
+        log.info("nobody publishes %s: images are taken from %s, of %s", here, there, ", ".join(names(other)))
 
     def _since_last_frame(self, captured_s: float) -> float:
         last_s = captured_s if self._last_captured_s is None else self._last_captured_s

@@ -68,8 +68,8 @@ _LONGEST_STEP_S = 0.1
 _LEAP_M = 0.5
 _NO_STAMP = Time(sec=0, nanosec=0)
 
-# The diagonal that ROS's diff_drive_controller is usually configured with: x, y, z, roll, pitch, yaw.
-_COVARIANCE = np.diag([0.001, 0.001, 1e6, 1e6, 1e6, 1000.0]).reshape(-1)
+# Variances of x, y, z, roll, pitch and yaw, in m² and rad²: wheels tell of the plane, and of nothing else.
+_COVARIANCE = np.diag([0.001, 0.001, 1e6, 1e6, 1e6, 0.01]).reshape(-1)
 
 
 class RobotNode(Node):

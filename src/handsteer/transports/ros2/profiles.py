@@ -8,11 +8,11 @@ late one is of no use. ``/clock`` is best effort.
 from dataclasses import dataclass
 from typing import Any
 
-from handsteer.messages import ClockMessage, CompressedImage, Image, JointState, LaserScan, Odometry, Topic
+from handsteer.messages import CameraInfo, ClockMessage, CompressedImage, Image, JointState, LaserScan, Odometry, Topic
 
 IMAGES = (Image, CompressedImage)
 """What is large, and gives way to all else on the same link."""
-_SENSOR_DATA = (*IMAGES, Odometry, JointState, LaserScan)
+_SENSOR_DATA = (*IMAGES, CameraInfo, Odometry, JointState, LaserScan)
 # Enough for what is lost on the way to be sent again before the next one has come; older ones are of no use to anybody.
 _IMAGES_KEPT = 3
 
