@@ -1,23 +1,27 @@
-"""How late Stop and commands are while the page's server stands still, or a thread keeps the interpreter.
+"""How late Stop and commands are while the page's process is held up.
 
-Run ``python benchmarks/blocked.py``. The whole graph runs as in ``handsteer run``, in one process, in real time: the
-virtual hand shows Forward and is taken away, by turns; nobody looks at the page. Each trial waits until the robot is
-driven, publishes ``true`` on ``/stop`` at a planned moment, and waits for the first zero on ``cmd_vel``. The time
-counts from the plan, so that what holds up the benchmark itself is counted too.
+Run ``python benchmarks/blocked.py``. The whole graph runs as in ``handsteer run``, in real time, with the page in a
+process of its own: the virtual hand shows Forward and is taken away, by turns; nobody looks at the page. Each trial
+waits until the robot is driven, publishes ``true`` on ``/stop`` at a planned moment, and waits for the first zero on
+``cmd_vel``. The time counts from the plan, so that what holds up the benchmark itself is counted too. The last row
+holds the interpreter of the graph's own process, which nothing in handsteer does, to show what that would cost.
 """
 
 import argparse
 import ctypes
+import os
+import signal
+import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
 import numpy as np
-from nicegui import core
 
 from handsteer.config import load
-from handsteer.dashboard.server import Dashboard
+from handsteer.dashboard.apart import PageApart
 from handsteer.graph import Graph
 from handsteer.messages import CMD_VEL, STOP, Bool, Twist
 from handsteer.transports.protocol import Received
@@ -54,18 +58,35 @@ def undisturbed() -> Iterator[None]:
     yield
 
 
-@contextmanager
-def blocked_page() -> Iterator[None]:
-    """Block the event loop of the page's server, for longer than a trial takes."""
-    ended = threading.Event()
+# Python runs this in the page's process at its start.
+HINDERED = f"""
+import ctypes, signal, threading, time
 
-    def block() -> None:
-        while not ended.is_set():
-            time.sleep(BLOCKED_S)
+def hold():
+    usleep = ctypes.PyDLL(None).usleep
+    while True:
+        usleep({int(1e6 * HELD_S)})
+        time.sleep({FREE_S})
 
+def block():
+    while True:
+        time.sleep({BLOCKED_S})
+
+def block_loop():
+    from nicegui import core
     core.loop.call_soon_threadsafe(block)
-    yield
-    ended.set()
+
+signal.signal(signal.SIGUSR1, lambda *_: threading.Thread(target=hold, daemon=True).start())
+signal.signal(signal.SIGUSR2, lambda *_: block_loop())
+"""
+
+
+def page_that_can_be_held() -> PageApart:
+    """Return a page whose process holds its interpreter at SIGUSR1, and blocks its event loop at SIGUSR2."""
+    folder = Path(tempfile.mkdtemp())
+    (folder / "sitecustomize.py").write_text(HINDERED)
+    os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, [str(folder), os.environ.get("PYTHONPATH")]))
+    return PageApart()
 
 
 @contextmanager
@@ -115,6 +136,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="Tell how late Stop is while something stands still.")
     parser.add_argument("--trials", type=int, default=20, help="of each kind")
     options = parser.parse_args()
+    page = page_that_can_be_held()
+
+    @contextmanager
+    def after(number: signal.Signals) -> Iterator[None]:
+        page.process.send_signal(number)
+        yield
+
     config = load(
         base={
             "camera": {"source": "virtual", "width": 320, "height": 240, "fps": 30},
@@ -123,15 +151,18 @@ def main() -> None:
         }
     )
     commands = Commands()
-    with Graph(config) as graph:
-        dashboard = Dashboard.of(graph)
-        dashboard.start()
+    with Graph(config, steering=False) as graph:
+        page.serve(graph)
         graph.transport.subscribe("benchmark", CMD_VEL, commands.take)
         graph.start()
         kinds = {
             "nothing": undisturbed,
-            f"the page's event loop stands still for {BLOCKED_S:g} s at a time": blocked_page,
-            f"a thread holds the interpreter, {HELD_S:g} s of every {HELD_S + FREE_S:g}": held_interpreter,
+            "the page's event loop stands still": lambda: after(signal.SIGUSR2),
+            f"a thread there also holds the interpreter, {HELD_S:g} s of {HELD_S + FREE_S:g}": lambda: after(
+                signal.SIGUSR1
+            ),
+            "the page's process is stopped": lambda: after(signal.SIGSTOP),
+            f"the interpreter of the graph's process is held, {HELD_S:g} s of {HELD_S + FREE_S:g}": held_interpreter,
         }
         print("what disturbs                                                Stop to zero, ms    between commands, ms")
         print("                                                             median     most     median     most")
@@ -140,7 +171,7 @@ def main() -> None:
             between = f"{np.median(apart):10.1f} {max(apart):8.1f}" if apart else f"{'-':>10} {'-':>8}"
             note = f"   {undriven} of {options.trials} not driven at all" if undriven else ""
             print(f"{name:58} {np.median(late):10.1f} {max(late):8.1f} {between}{note}")
-        dashboard.stop()
+        page.stop()
 
 
 if __name__ == "__main__":

@@ -1,11 +1,11 @@
 """What the page costs, and how soon a robot stands whose driver is gone.
 
 Run ``python benchmarks/page.py``; parts by name: ``bytes``, ``viewers``, ``deaf``, ``gone``. The whole graph runs in
-this process, at 640x480 and 30 frames a second. One real Chromium tells the bytes and the stopping times. What viewers
-cost is told with plain ones, in a process of their own, who take the pictures, the figures, the 3D view and the plots
-as a browser does but draw nothing: a browser that draws on the same processors would only tell what drawing costs. For
-the same reason the camera is a film of the virtual hand then, as a webcam does not draw either; ``--camera virtual``
-draws it. Rounds with none, one and four of them alternate, so that a busy machine slows all alike.
+this process, its page in another, at 640x480 and 30 frames a second. One real Chromium tells the bytes and the stopping
+times. What viewers cost is told with plain ones, in a process of their own, who take the pictures, the figures, the 3D
+view and the plots as a browser does but draw nothing: a browser that draws on the same processors would only tell what
+drawing costs. For the same reason the camera is a film of the virtual hand then, as a webcam does not draw either;
+``--camera virtual`` draws it. Rounds with none, one and four of them alternate, so that a busy machine slows all alike.
 """
 
 import argparse
@@ -36,7 +36,7 @@ from tests.dashboard.network import Relay, client_of, cookies_of, deaf, deaf_pag
 from handsteer.cameras.virtual import VirtualHandCamera
 from handsteer.clock import SteppedClock
 from handsteer.config import load
-from handsteer.dashboard.server import Dashboard
+from handsteer.dashboard.apart import PageApart
 from handsteer.graph import Graph
 from handsteer.messages import CMD_VEL, Twist
 from handsteer.nodes.latency import LatencyLog
@@ -66,17 +66,17 @@ class Served:
             "virtual_hand": {"script": script, "background": "cluttered"},
             "dashboard": {"port": 0},
         }
-        self.graph = Graph(load(None, None, settings))
+        self.graph = Graph(load(None, None, settings), steering=False)
         self.commands: list[tuple[float, float]] = []
         self.graph.transport.subscribe("benchmark", CMD_VEL, self._on_command)
-        self._dashboard = Dashboard.of(self.graph)
-        self.url = self._dashboard.start()
+        self._page = PageApart()
+        self.url = self._page.serve(self.graph)
         self.port = urlsplit(self.url).port or 0
         self.graph.start()
 
     def close(self) -> None:
         self.graph.stop()
-        self._dashboard.stop()
+        self._page.stop()
 
     def _on_command(self, received: Received[Twist]) -> None:
         self.commands.append((time.monotonic(), received.message.linear.x))

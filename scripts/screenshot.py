@@ -15,7 +15,7 @@ from chromium import launch
 from playwright.sync_api import Page, sync_playwright
 
 from handsteer.config import load
-from handsteer.dashboard.server import Dashboard
+from handsteer.dashboard.apart import PageApart
 from handsteer.errors import HandsteerError
 from handsteer.graph import Graph
 
@@ -49,9 +49,9 @@ def main() -> None:
 def opened(script: str) -> Iterator[Page]:
     """Show the page of a graph whose virtual hand shows ``script``."""
     hand = {"camera": {"source": "virtual"}, "virtual_hand": {"script": script}}
-    with Graph(load(base={**hand, "dashboard": {"port": 0}})) as graph, sync_playwright() as playwright:
-        dashboard = Dashboard.of(graph)
-        url = dashboard.start()
+    with Graph(load(base={**hand, "dashboard": {"port": 0}}), steering=False) as graph, sync_playwright() as playwright:
+        dashboard = PageApart()
+        url = dashboard.serve(graph)
         try:
             browser = launch(playwright)
             page = browser.new_page(viewport={"width": WIDTH, "height": HEIGHT}, color_scheme="light")

@@ -13,6 +13,7 @@ into a velocity, and :mod:`handsteer.robots` follow it. A transport (:mod:`hands
 
 import logging
 import math
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -56,6 +57,7 @@ class Graph:
         transport: Within this process by default.
         link: This process in the graph of a real robot, for ``robot.kind`` other than ``sim``; the caller closes it
             after this graph.
+        steering: Whether the node ``steering`` is among them; the page of another process has its own.
 
     Raises:
         HandsteerError: A part cannot be used (camera, model, world); the message says what to do.
@@ -67,6 +69,8 @@ class Graph:
         clock: Clock | None = None,
         transport: Transport | None = None,
         link: Session | None = None,
+        *,
+        steering: bool = True,
     ) -> None:
         self.config = config
         self.clock = clock or RealClock()
@@ -77,15 +81,27 @@ class Graph:
         self.cameras = open_cameras(config, self.clock)
         self.camera = make_camera(config, *wires, self.cameras)
         self.control = make_control(config, *wires, simulated=config.robot.kind == "sim")
-        self.steering = make_steering(config, *wires)
+        self._steering = make_steering(config, *wires) if steering else None
         self._added: tuple[Node, ...] = ()
         self._link = link
         self._began_s = self.clock.now()
 
     @property
+    def steering(self) -> SteeringNode:
+        """The node ``steering``.
+
+        Raises:
+            ConfigError: The graph was made without it.
+        """
+        if self._steering is None:
+            raise ConfigError("this graph was made without the node steering")
+        return self._steering
+
+    @property
     def nodes(self) -> tuple[Node, ...]:
         """The nodes in the order in which they are stopped: first the one that says zero, last the one that obeys."""
-        return (self.control, self.steering, self.camera, self.recognition, *self._added, self.robot)
+        steering = () if self._steering is None else (self._steering,)
+        return (self.control, *steering, self.camera, self.recognition, *self._added, self.robot)
 
     def add(self, node: Node) -> None:
         """Let ``node``, on this graph's transport and clock, run and stop with the others."""
@@ -103,15 +119,19 @@ class Graph:
         for node in reversed(self.nodes):
             node.start()
 
-    def wait(self, duration_s: float | None = None) -> None:
+    def wait(self, duration_s: float | None = None, until: Callable[[], bool] = lambda: False) -> None:
         """Wait until ``duration_s`` seconds have passed, or the camera's file or a real robot's graph ends the run.
+
+        Args:
+            duration_s: How long to wait at most; for ever by default.
+            until: Asked five times a second; true ends the wait.
 
         Raises:
             TransportError: The graph of a real robot is gone.
         """
         end_s = self.clock.now() + (math.inf if duration_s is None else duration_s)
         while not self.camera.ended.wait(max(0.0, min(_LOOK_PERIOD_S, end_s - self.clock.now()))):
-            if self.clock.now() >= end_s or (self._link is not None and self._link.wait(0.0)):
+            if self.clock.now() >= end_s or (self._link is not None and self._link.wait(0.0)) or until():
                 return
 
     def stop(self) -> None:

@@ -38,7 +38,7 @@ gates:
 @contextmanager
 def looking_at(world: object) -> Iterator[Visit]:
     """Show the page with ``world``."""
-    with visiting("NONE:600", robot={"world": str(world)}) as visit:
+    with visiting("NONE:600", steering=True, robot={"world": str(world)}) as visit:
         visit.wait_until(lambda: visit.text(".banner .reason") == "no hand is in view")
         yield visit
 

@@ -11,7 +11,7 @@ from playwright.sync_api import ConsoleMessage, Page, Request, ViewportSize, syn
 from scripts import chromium
 
 from handsteer.config import load
-from handsteer.dashboard.server import Dashboard
+from handsteer.dashboard.apart import PageApart
 from handsteer.graph import Graph
 
 PATIENCE_MS = 60_000
@@ -56,13 +56,16 @@ class Visit:
 
 
 @contextmanager
-def visiting(script: str, path: str = "/", webcam: Path | None = None, **sections: dict[str, Any]) -> Iterator[Visit]:
+def visiting(
+    script: str, path: str = "/", webcam: Path | None = None, *, steering: bool = False, **sections: dict[str, Any]
+) -> Iterator[Visit]:
     """Show a page of a whole graph that sees the virtual hand; the hand begins once the browser shows the page.
 
     Args:
         script: What the virtual hand shows.
         path: Which page.
         webcam: The video that the browser takes for its own camera.
+        steering: Whether the graph has a node ``steering`` beside that of the page.
         sections: Further configuration by section.
     """
     base = {
@@ -70,9 +73,9 @@ def visiting(script: str, path: str = "/", webcam: Path | None = None, **section
         "virtual_hand": {"script": script},
         "dashboard": {"port": 0},
     }
-    with Graph(load(None, base, sections)) as graph, sync_playwright() as playwright:
-        dashboard = Dashboard.of(graph)
-        url = dashboard.start()
+    with Graph(load(None, base, sections), steering=steering) as graph, sync_playwright() as playwright:
+        served = PageApart()
+        url = served.serve(graph)
         browser = chromium.launch(playwright, webcam)
         try:
             visit = Visit(browser.new_page(viewport=WINDOW), graph)
@@ -86,4 +89,4 @@ def visiting(script: str, path: str = "/", webcam: Path | None = None, **section
             yield visit
         finally:
             browser.close()
-            dashboard.stop()
+            served.stop()

@@ -46,6 +46,18 @@ def bench() -> Bench:
     return Bench()
 
 
+def test_after_it_was_held_up_nothing_that_was_asked_before_is_sent(bench: Bench) -> None:
+    bench.node.steer(0.5, 0.0)
+    bench.step(10.0)  # the process was frozen
+    assert bench.mux[-1] == (0.0, 0.0)
+    bench.node.steer(0.5, 0.0)  # what a browser had sent meanwhile
+    bench.step(0.05)
+    assert bench.mux[1:] == [(0.0, 0.0)] * (len(bench.mux) - 1)
+    bench.step()
+    bench.node.steer(0.5, 0.0)
+    assert bench.mux[-1] == (0.5, 0.0)
+
+
 def let_go_once(bench: Bench) -> None:
     bench.node.steer(0.0, 0.0)
 

@@ -50,7 +50,7 @@ class BrowserCamera:
             FrameError: It is no such frame, or too large.
         """
         now = self._clock.now()
-        sent_s = _check(data)
+        sent_s = check_frame(data)
         with self._news:
             leaked_s = _LEAK * max(0.0, now - self._heard_s)
             self._offset_s, self._heard_s = min(self._offset_s + leaked_s, now - sent_s), now
@@ -159,7 +159,7 @@ class ChoiceOfCameras:
 HEADER_BYTES = _HEADER.size
 
 
-def _check(data: bytes) -> float:
+def check_frame(data: bytes) -> float:
     """Return when a frame was captured, in seconds of the browser's clock."""
     if not HEADER_BYTES < len(data) <= LARGEST_BYTES:
         raise FrameError(f"a frame of {len(data)} bytes: it should have at most {LARGEST_BYTES}")

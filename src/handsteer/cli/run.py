@@ -11,6 +11,7 @@ from handsteer.cli.options import ConfigFile, Flag, Parameters, say, uninterrupt
 from handsteer.cli.options import settings as make_settings
 from handsteer.clock import RealClock, SteppedClock
 from handsteer.config import Config
+from handsteer.dashboard.apart import PageApart
 from handsteer.errors import ConfigError
 from handsteer.graph import Graph, Summary
 from handsteer.parameters import from_parameters
@@ -123,40 +124,42 @@ def _linked(
 def _drive(
     settings: Config, link: Session | None, duration: float | None, file: Path | None, *, headless: bool, fast: bool
 ) -> Summary:
-    with Graph(settings, SteppedClock() if fast else RealClock(), link=link) as graph:
-        try:
-            _run_until_end(graph, duration, file, headless=headless, fast=fast)
-        except KeyboardInterrupt:
-            say("stopping: the robot is told to stand")
-        finally:
+    # It loads its libraries while this process loads the models.
+    page = None if headless else PageApart()
+    try:
+        with Graph(settings, SteppedClock() if fast else RealClock(), link=link, steering=page is None) as graph:
+            try:
+                _run_until_end(graph, duration, file, page, fast=fast)
+            except KeyboardInterrupt:
+                say("stopping: the robot is told to stand")
+            finally:
+                with uninterrupted():
+                    graph.stop()
+            return graph.summary()
+    finally:
+        if page is not None:
             with uninterrupted():
-                graph.stop()
-        return graph.summary()
+                page.stop()
 
 
-def _run_until_end(graph: Graph, duration: float | None, file: Path | None, *, headless: bool, fast: bool) -> None:
+def _run_until_end(
+    graph: Graph, duration: float | None, file: Path | None, page: PageApart | None, *, fast: bool
+) -> None:
     if fast:
         graph.run_stepped(*([] if duration is None else [duration]))
         return
-    if headless:
+    if page is None:
         graph.start()
         graph.wait(duration)
         return
-    # The page's libraries take a second to load, which a headless run need not wait for.
-    from handsteer.dashboard.server import Dashboard  # noqa: PLC0415
-
-    dashboard = Dashboard.of(graph, file)
-    url = dashboard.start()
-    try:
-        graph.start()
-        say(f"the page is at {url}; Ctrl-C ends")
-        if graph.config.dashboard.opens_browser:
-            webbrowser.open(url)
-        graph.wait(duration)
-    finally:
-        with uninterrupted():
-            graph.stop()
-            dashboard.stop()
+    url = page.serve(graph, file)
+    graph.start()
+    say(f"the page is at {url}; Ctrl-C ends")
+    if graph.config.dashboard.opens_browser:
+        webbrowser.open(url)
+    graph.wait(duration, until=lambda: page.is_gone)
+    if page.is_gone:
+        raise page.why_gone()
 
 
 def _summary_text(summary: Summary) -> str:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from nicegui import ui
 
-from handsteer.cameras.browser import ChoiceOfCameras
+from handsteer.dashboard.joined import Cameras, RobotInWorld
 from handsteer.dashboard.node import DashboardNode
 from handsteer.dashboard.panels.banner import Banner
 from handsteer.dashboard.panels.seat import SeatPanel
@@ -14,7 +14,6 @@ from handsteer.dashboard.settings_store import Settings
 from handsteer.dashboard.state import PageState
 from handsteer.dashboard.teaching.teaching import Teaching
 from handsteer.dashboard.watch import WhileWatched
-from handsteer.nodes.robot import RobotNode
 
 PICTURE_PATH = "/camera.mjpg"
 WEBCAM_PATH = "/camera"
@@ -39,17 +38,17 @@ _THEME_ICON = (
 
 @dataclass(frozen=True)
 class Local:
-    """What of the graph is in this process, where pages do more than topics let them; None is in another process.
+    """What pages reach of the graph beside its topics; None is out of their reach.
 
     Attributes:
         cameras: The graph's camera, which a browser's may stand in for.
-        robot: The node of the robot, whose world people edit.
+        robot: The robot whose world people edit.
         settings: The graph's parameters.
         teaching: Gives lessons.
     """
 
-    cameras: ChoiceOfCameras | None = None
-    robot: RobotNode | None = None
+    cameras: Cameras | None = None
+    robot: RobotInWorld | None = None
     settings: Settings | None = None
     teaching: Teaching | None = None
 
@@ -60,7 +59,7 @@ class Served:
 
     Attributes:
         node: Is joined for as long as a browser shows a page.
-        local: What of the graph is in this process.
+        local: What pages reach of the graph beside its topics.
         topics: Whether steering by hand may go to other topics than the control's.
     """
 

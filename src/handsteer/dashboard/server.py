@@ -25,6 +25,7 @@ from handsteer.dashboard.doors import Doors
 from handsteer.dashboard.drive import DrivePage
 from handsteer.dashboard.headers import HEADERS
 from handsteer.dashboard.history import VelocityHistory
+from handsteer.dashboard.joined import JoinedGraph
 from handsteer.dashboard.node import DashboardNode
 from handsteer.dashboard.page import ASSETS_PATH, ICON, PICTURE_PATH, WEBCAM_PATH, Local, Served
 from handsteer.dashboard.page_log import keep_short
@@ -38,7 +39,7 @@ from handsteer.dashboard.teaching.teaching import Teaching
 from handsteer.dashboard.watch import WhileWatched
 from handsteer.dashboard.webcam import FrameSocket
 from handsteer.errors import DashboardError
-from handsteer.graph import Graph, cmd_vel_topic
+from handsteer.graph import cmd_vel_topic
 from handsteer.messages import CMD_VEL, Topic
 from handsteer.nodes.steering import SteeringNode
 from handsteer.transports.protocol import Transport
@@ -64,7 +65,7 @@ class Dashboard:
         steering: Drives when people steer on the page.
         config: Where the page is served, and how.
         cmd_vel: The topic of the commands that are shown.
-        local: What of the graph is in this process; nothing but the steering by default.
+        local: What pages reach of the graph beside its topics; nothing by default.
         topics: Whether steering by hand may go to other topics than the control's, where other robots may be.
 
     Attributes:
@@ -96,8 +97,8 @@ class Dashboard:
         self._thread: threading.Thread | None = None
 
     @classmethod
-    def of(cls, graph: Graph, file: Path | None = None) -> "Dashboard":
-        """Return the page of a graph whose nodes are all in this process.
+    def of(cls, graph: JoinedGraph, file: Path | None = None) -> "Dashboard":
+        """Return the page of a graph that this process has a part in.
 
         Args:
             graph: What the page is of.

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from handsteer.cameras.browser import ChoiceOfCameras
+from handsteer.dashboard.joined import Cameras
 from handsteer.dashboard.socket_events import is_page_of
 from handsteer.errors import FrameError
 
@@ -23,11 +23,11 @@ class FrameSocket:
     """The websocket by which the browser of who drives gives its webcam; one at a time.
 
     Args:
-        camera: Takes the frames; None where the camera is not in this process.
+        camera: Takes the frames; None where the camera cannot be reached from here.
         drives: Tells whether the viewer of this id has the driver's seat, which it is given if it is free.
     """
 
-    def __init__(self, camera: ChoiceOfCameras | None, drives: Callable[[str], bool]) -> None:
+    def __init__(self, camera: Cameras | None, drives: Callable[[str], bool]) -> None:
         self._camera = camera
         self._drives = drives
         self._in_use = threading.Lock()
@@ -49,7 +49,7 @@ class FrameSocket:
                 self._camera.browser.forget()
                 self._in_use.release()
 
-    async def _take(self, socket: WebSocket, camera: ChoiceOfCameras, viewer: str) -> None:
+    async def _take(self, socket: WebSocket, camera: Cameras, viewer: str) -> None:
         camera.choose("browser")
         loop = asyncio.get_running_loop()
         try:

@@ -11,8 +11,10 @@ from handsteer.control.safety import Ramp, Safety
 from handsteer.control.velocity import ZERO, Velocity
 from handsteer.errors import TransportError
 from handsteer.messages import CMD_VEL, STEERING_CMD_VEL, STOP, Bool, Topic, command
+from handsteer.nodes.interruption import Interruption
 from handsteer.nodes.node import Node
 from handsteer.nodes.stop_keeper import StopKeeper
+from handsteer.timeouts import STALE_S
 from handsteer.transports.protocol import Publisher, Received, Transport
 
 _PERIOD_S = 0.1
@@ -37,7 +39,8 @@ class SteeringNode(Node):
 
     It speaks to ``hand_sign_control``, which lets steering go before signs, keeps to the limits, and stops both. It can
     be sent to another topic instead (:meth:`send_to`), where it sees to limits and Stop itself. After :meth:`halt` it
-    stands whatever its topic is, which ROS may have renamed to that of a robot.
+    stands whatever its topic is, which ROS may have renamed to that of a robot. After it was held up itself, it has let
+    go: whoever steered may have let go meanwhile.
 
     All may be called from any thread.
 
@@ -58,6 +61,7 @@ class SteeringNode(Node):
         self._wanted: Velocity | None = None
         self._halted = False
         self._heard_stop: bool | None = None
+        self._interruption = Interruption(STALE_S, clock.now())
         self._safety = Safety(self._config, arming=False)
         self._ramp = Ramp(self._config)
         self._last_step_s = self._last_sent_s = clock.now()
@@ -110,7 +114,9 @@ class SteeringNode(Node):
     def steer(self, linear_mps: float, angular_radps: float) -> None:
         """Drive at this velocity from now on: m/s forward, rad/s to the left."""
         with self._lock:
-            self._wanted = self._admitted(Velocity(linear_mps, angular_radps))
+            self._notice_interruption()
+            wanted = Velocity(linear_mps, angular_radps)
+            self._wanted = self._admitted(ZERO if self._interruption.distrusts(self.clock.now()) else wanted)
             self._publish(self._wanted)
 
     def release(self) -> None:
@@ -178,10 +184,15 @@ class SteeringNode(Node):
         if self.is_direct:
             self._publish(ZERO)
 
+    def _notice_interruption(self) -> None:
+        if self._interruption.note(self.clock.now()):
+            self.release()
+
     def _repeat(self) -> None:
         if self._halted:
             self._stop.publish(Bool(data=True))
         with self._lock:
+            self._notice_interruption()
             if self._wanted is not None:
                 self._publish(self._wanted)
             elif self.is_direct and self.is_stopped:

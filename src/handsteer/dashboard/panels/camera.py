@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 from nicegui import ui
 
-from handsteer.cameras.browser import ChoiceOfCameras
+from handsteer.dashboard.joined import Cameras
 from handsteer.dashboard.panels.elements import box, button, switch, text
 from handsteer.dashboard.state import PageState
 from handsteer.signs.vocabulary import NONE
@@ -25,9 +25,7 @@ class CameraPanel:
         stage: Holds the picture, and what lies over it.
     """
 
-    def __init__(
-        self, picture_url: str, cameras: ChoiceOfCameras | None, viewer: str, use_own: Callable[[], None]
-    ) -> None:
+    def __init__(self, picture_url: str, cameras: Cameras | None, viewer: str, use_own: Callable[[], None]) -> None:
         self._cameras = cameras
         with ui.element("section").classes("card viewer camera"):
             with box("stage") as self.stage:

@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 from nicegui import ui
 
+from handsteer.dashboard.joined import RobotInWorld
 from handsteer.dashboard.node import WorldState
 from handsteer.dashboard.panels.course import CourseLine
 from handsteer.dashboard.panels.elements import box, button, switch, text
@@ -12,7 +13,6 @@ from handsteer.dashboard.panels.world_editor import WorldEditor
 from handsteer.dashboard.scene import WorldView
 from handsteer.dashboard.scene_objects import View
 from handsteer.dashboard.state import PageState
-from handsteer.nodes.robot import RobotNode
 
 _VIEWS: tuple[tuple[View, str, str], ...] = (
     ("orbit", "Orbit", "drag to look around"),
@@ -25,12 +25,12 @@ class WorldPanel:
     """The robot in its world.
 
     Args:
-        robot: The node of the robot, if it is in this process.
+        robot: The robot, if its world can be reached from here.
         may: Returns whether this viewer drives; it is given the seat if that is free.
         watches: Returns whether somebody else drives.
     """
 
-    def __init__(self, robot: RobotNode | None, may: Callable[[], bool], watches: Callable[[], bool]) -> None:
+    def __init__(self, robot: RobotInWorld | None, may: Callable[[], bool], watches: Callable[[], bool]) -> None:
         self._watches = watches
         self._collisions: int | None = None
         self._flashes = 0
@@ -54,6 +54,7 @@ class WorldPanel:
     def update(self, state: PageState, world: WorldState) -> None:
         """Show ``state`` and ``world``."""
         self._view.update(world)
+        self._editor.place = world.robot
         self._foot.update(state)
         self._course.update(state.course)
         self._flash(state.collisions)

@@ -4,17 +4,18 @@ import asyncio
 import math
 from collections.abc import Callable
 from concurrent.futures import Future
+from functools import partial
 from typing import Any, get_args
 
 from nicegui import ui
 
+from handsteer.dashboard.joined import RobotInWorld
 from handsteer.dashboard.panels.elements import box, button, switch, tag, text
 from handsteer.dashboard.panels.thing_form import ThingForm
 from handsteer.dashboard.scene import WorldView
 from handsteer.errors import WorldError
-from handsteer.nodes.robot import RobotNode
 from handsteer.robots.editing import MOST_OBSTACLES, Change, add, edit, remove
-from handsteer.robots.protocol import Shape
+from handsteer.robots.protocol import Pose2D, Shape
 from handsteer.robots.world import Thing, World, load_world, parse_world, shipped_worlds, write_world
 
 LARGEST_FILE_BYTES = 64 * 1024
@@ -35,17 +36,22 @@ class WorldEditor:
     """Changes the world of a simulated robot, for whoever drives.
 
     Args:
-        robot: The node of the robot, if it is in this process.
+        robot: The robot, if its world can be reached from here.
         may: Returns whether this viewer drives.
         view: Shows the world.
+
+    Attributes:
+        is_open: Whether the world is edited.
+        place: Where the robot is; new things are put near it.
     """
 
-    def __init__(self, robot: RobotNode | None, may: Callable[[], bool], view: WorldView) -> None:
+    def __init__(self, robot: RobotInWorld | None, may: Callable[[], bool], view: WorldView) -> None:
         self._robot = robot
         self._may = may
         self._view = view
         self._chosen: str | None = None
         self.is_open = False
+        self.place = Pose2D(0.0, 0.0, 0.0)
         with box("editor off") as self._box:
             with box("row"):
                 tag("h2", "", "Add")
@@ -133,7 +139,7 @@ class WorldEditor:
     async def _add(self, shape: Shape) -> None:
         if (robot := self._robot) is None or (before := self._world()) is None:
             return
-        if await self._change(lambda world: add(world, shape, robot.state.truth), ""):
+        if await self._change(partial(add, shape=shape, robot=self.place), ""):
             known = {thing.name for thing in before.obstacles}
             world = robot.world or before
             new = [thing.name for thing in world.obstacles if thing.name not in known]
@@ -141,11 +147,11 @@ class WorldEditor:
             self._say(f"Added {new[-1]}." if new else "")
 
     async def _edit(self, name: str, fields: dict[str, Any]) -> None:
-        await self._change(lambda world: edit(world, name, fields), "")
+        await self._change(partial(edit, name=name, fields=fields), "")
 
     async def _remove(self) -> None:
         if name := self._chosen:
-            await self._change(lambda world: remove(world, name), f"Deleted {name}.")
+            await self._change(partial(remove, name=name), f"Deleted {name}.")
 
     async def _load(self) -> None:
         name = self._worlds.value

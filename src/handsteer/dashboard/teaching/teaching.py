@@ -12,10 +12,10 @@ import yaml
 from handsteer.clock import Clock
 from handsteer.config import Config, ControlConfig, TeachConfig, validate
 from handsteer.control.actions import ACTIONS, Action, action_of
+from handsteer.dashboard.joined import JoinedGraph
 from handsteer.dashboard.teaching.lesson import Lesson, View
 from handsteer.dashboard.teaching.node import Eyes, LessonNode
 from handsteer.errors import ConfigError, DatasetError
-from handsteer.graph import Graph
 from handsteer.signs.opening import open_classifier, open_landmarker
 from handsteer.signs.teaching.collect import Facts
 from handsteer.signs.teaching.dataset import Dataset, label_for, load_dataset, save_dataset
@@ -63,7 +63,7 @@ class _Given:
 
 
 class Teaching:
-    """One lesson at a time on a graph that runs in this process; may be used from any thread.
+    """One lesson at a time on a running graph; may be used from any thread.
 
     Files are read and written by :meth:`known`, :meth:`begin` and :meth:`keep`.
 
@@ -96,8 +96,8 @@ class Teaching:
         self._closed = False
 
     @classmethod
-    def of(cls, graph: Graph) -> "Teaching":
-        """Return the teaching on a graph whose nodes are all in this process."""
+    def of(cls, graph: JoinedGraph) -> "Teaching":
+        """Return the teaching on a graph."""
         config = graph.config
         eyes = Eyes(
             open_landmarker=lambda: open_landmarker(config),

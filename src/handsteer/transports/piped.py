@@ -1,0 +1,281 @@
+"""Nodes of a process of its own, in a graph of another one: both ends of a pipe between a program and its child.
+
+The child's nodes use a :class:`PipedTransport`; a :class:`Gateway` in the parent publishes and subscribes for them on
+the graph's own transport. Both sit on a :class:`Pipe`, which others may use beside them. Either process may stand still
+for as long as it likes: the other one goes on, keeps the newest messages for it, and drops the rest.
+"""
+
+import contextlib
+import itertools
+import logging
+import pickle
+import threading
+import time
+import weakref
+from collections import deque
+from collections.abc import Callable, Hashable
+from typing import IO, Any, Generic, TypeVar
+
+from handsteer.errors import TransportError
+from handsteer.messages import CompressedImage, Image, Topic
+from handsteer.transports.channels import Deliver, Fanout, FanoutSubscription, TopicTypes, check_type
+from handsteer.transports.protocol import Publisher, Received, Subscription, Transport
+
+M = TypeVar("M")
+log = logging.getLogger(__name__)
+
+_KEPT = 16
+"""Messages of a topic that wait for a process that stands still; more than any topic's depth."""
+
+_MOST_WAITING = 1000
+"""Things said that must not be dropped: a process that takes none of so many does not answer."""
+
+
+class Pipe:
+    """One end of a pipe to another process of this program, which is trusted: what comes is unpickled.
+
+    Args:
+        source: What the other process writes.
+        sink: What it reads.
+
+    Attributes:
+        ended: Set when either end is closed, or the other process has ended.
+    """
+
+    def __init__(self, source: IO[bytes], sink: IO[bytes]) -> None:
+        self._source = source
+        self._sink = sink
+        self._handlers: dict[str, Callable[..., object]] = {}
+        self._news = threading.Condition()
+        self._queues: dict[Hashable, deque[tuple[Any, ...]]] = {}
+        self._order: deque[Hashable] = deque()
+        self._writer = threading.Thread(target=self._write, name="pipe_write", daemon=True)
+        self.ended = threading.Event()
+
+    def on(self, kind: str, handler: Callable[..., object]) -> None:
+        """Call ``handler`` with what the other end says of this ``kind``, on the thread that reads.
+
+        All handlers must be there before the start.
+        """
+        self._handlers[kind] = handler
+
+    def start(self) -> None:
+        """Begin to read and to write, on threads of their own."""
+        self._writer.start()
+        threading.Thread(target=self._read, name="pipe_read", daemon=True).start()
+
+    def say(self, kind: str, *what: object, key: Hashable = None, keep: int = _MOST_WAITING) -> None:
+        """Have the other end's handler of ``kind`` called with ``what``, in the order of all that is said.
+
+        Returns at once. Of what was said with the same ``key``, the newest ``keep`` wait for an end that does not read.
+
+        Raises:
+            TransportError: Without a key: too much waits already.
+        """
+        with self._news:
+            if self.ended.is_set():
+                return
+            queue = self._queues.setdefault(key, deque(maxlen=keep))
+            if len(queue) < keep:
+                self._order.append(key)
+            elif key is None:
+                raise TransportError("the other process does not answer")
+            queue.append((kind, *what))
+            self._news.notify()
+
+    def close(self, timeout_s: float = 0.0) -> None:
+        """Say no more, and let the other end see the end; may be called twice.
+
+        Args:
+            timeout_s: How long to wait for the other end to take what was said before.
+        """
+        with self._news:
+            self.ended.set()
+            self._news.notify()
+        if self._writer.ident is not None:
+            self._writer.join(timeout_s)
+
+    def _read(self) -> None:
+        try:
+            while True:
+                kind, *what = pickle.load(self._source)
+                self._take(kind, what)
+        except (EOFError, OSError, ValueError, pickle.UnpicklingError):
+            self.close()
+
+    def _take(self, kind: str, what: list[Any]) -> None:
+        try:
+            self._handlers[kind](*what)
+        except Exception:
+            log.exception("what another process said of %s has failed", kind)
+
+    def _write(self) -> None:
+        try:
+            while (said := self._next()) is not None:
+                pickle.dump(said, self._sink, protocol=5)
+                self._sink.flush()
+        except (OSError, ValueError):
+            self.ended.set()
+        with contextlib.suppress(OSError):
+            self._sink.close()
+
+    def _next(self) -> tuple[Any, ...] | None:
+        with self._news:
+            self._news.wait_for(lambda: self._order or self.ended.is_set())
+            if not self._order:
+                return None
+            key = self._order.popleft()
+            said = self._queues[key].popleft()
+            if not self._queues[key]:
+                del self._queues[key]
+            return said
+
+
+class PipedTransport:
+    """A :class:`~handsteer.transports.protocol.Transport` for nodes whose graph is at the other end of a pipe.
+
+    Args:
+        pipe: Not started yet; a :class:`Gateway` is at its other end.
+    """
+
+    crosses_network = False
+
+    def __init__(self, pipe: Pipe) -> None:
+        self._pipe = pipe
+        self._types = TopicTypes()
+        self._lock = threading.Lock()
+        self._numbers = itertools.count()
+        self._fanouts: dict[str, Fanout[Any]] = {}
+        self._publishers: weakref.WeakSet[PipedPublisher[Any]] = weakref.WeakSet()
+        pipe.on("message", self._on_message)
+
+    def advertise(self, node: str, topic: Topic[M]) -> "PipedPublisher[M]":
+        """Return the sending end of ``topic`` for the node named ``node``."""
+        self._types.claim(topic.name, topic)
+        publisher = PipedPublisher(self._pipe, next(self._numbers), topic, node)
+        with self._lock:
+            self._publishers.add(publisher)
+        return publisher
+
+    def subscribe(self, node: str, topic: Topic[M], deliver: Deliver[M]) -> FanoutSubscription[M]:
+        """Call ``deliver`` for each message on ``topic`` from now on, on the thread that reads."""
+        self._types.claim(topic.name, topic)
+
+        def receive(_send: Deliver[M]) -> Callable[[], None]:
+            self._pipe.say("subscribe", node, topic)
+            return lambda: self._pipe.say("unsubscribe", topic.name)
+
+        with self._lock:
+            fanout = self._fanouts.setdefault(topic.name, Fanout(latched=topic.latched, receive=receive))
+        return fanout.add(deliver)
+
+    def publishers_of(self, topic: Topic[Any]) -> list[str]:
+        """Return the names of the nodes of this process that hold a sending end of ``topic``."""
+        with self._lock:
+            return sorted(publisher.node for publisher in self._publishers if publisher.topic == topic.name)
+
+    def full_name(self, node: str) -> str:
+        """Return ``node``: it is one of the other process's graph."""
+        return node
+
+    def close(self) -> None:
+        """End all publishing and receiving; may be called twice."""
+        with self._lock:
+            fanouts, self._fanouts = self._fanouts, {}
+            publishers = list(self._publishers)
+            self._publishers.clear()
+        for fanout in fanouts.values():
+            fanout.close()
+        for publisher in publishers:
+            publisher.close()
+
+    def _on_message(self, name: str, received: Received[Any]) -> None:
+        fanout = self._fanouts.get(name)
+        if fanout is not None:
+            fanout.send(received)
+
+
+class PipedPublisher(Generic[M]):
+    """The sending end of a topic.
+
+    Attributes:
+        node: Name of the node that has it.
+        topic: Name of the topic.
+    """
+
+    wanted = True
+    """Whoever listens is in the other process."""
+
+    def __init__(self, pipe: Pipe, number: int, topic: Topic[M], node: str) -> None:
+        self.node = node
+        self.topic = topic.name
+        self._topic = topic
+        self._pipe = pipe
+        self._number = number
+        pipe.say("advertise", number, node, topic)
+        self._end = weakref.finalize(self, pipe.say, "unadvertise", number)
+
+    def publish(self, message: M, captured_s: float | None = None) -> None:
+        """Send ``message`` to the other process."""
+        check_type(self._topic, message)
+        if self._end.alive:
+            # Both processes have the same monotonic clock, since their machine was started.
+            sent = (self._number, Received(message, captured_s), time.monotonic())
+            self._pipe.say("publish", *sent, key=self._number, keep=_kept(self._topic))
+
+    def close(self) -> None:
+        """Publish no more; may be called twice."""
+        self._end()
+
+
+class Gateway:
+    """Publishes and subscribes on a graph's transport, for the nodes at the other end of a pipe.
+
+    Args:
+        pipe: Not started yet; a :class:`PipedTransport` is at its other end.
+        transport: The graph's.
+    """
+
+    def __init__(self, pipe: Pipe, transport: Transport) -> None:
+        self._pipe = pipe
+        self._transport = transport
+        self._publishers: dict[int, tuple[Publisher[Any], Topic[Any]]] = {}
+        self._subscriptions: dict[str, Subscription] = {}
+        for handler in (self._advertise, self._unadvertise, self._publish, self._subscribe, self._unsubscribe):
+            pipe.on(handler.__name__.removeprefix("_"), handler)
+
+    def close(self) -> None:
+        """End all publishing and receiving; may be called twice."""
+        self._publishers.clear()
+        while self._subscriptions:
+            self._subscriptions.popitem()[1].close()
+
+    def _advertise(self, number: int, node: str, topic: Topic[Any]) -> None:
+        self._publishers[number] = (self._transport.advertise(node, topic), topic)
+
+    def _unadvertise(self, number: int) -> None:
+        self._publishers.pop(number, None)
+
+    def _publish(self, number: int, received: Received[Any], sent_s: float) -> None:
+        publisher, topic = self._publishers.get(number, (None, None))
+        if publisher is None or topic is None:
+            return
+        if topic.lifespan_s is None or time.monotonic() - sent_s <= topic.lifespan_s:
+            publisher.publish(received.message, received.captured_s)
+
+    def _subscribe(self, node: str, topic: Topic[Any]) -> None:
+        def deliver(received: Received[Any]) -> None:
+            self._pipe.say("message", topic.name, received, key=topic.name, keep=_kept(topic))
+
+        self._unsubscribe(topic.name)
+        self._subscriptions[topic.name] = self._transport.subscribe(node, topic, deliver)
+
+    def _unsubscribe(self, name: str) -> None:
+        subscription = self._subscriptions.pop(name, None)
+        if subscription is not None:
+            subscription.close()
+
+
+def _kept(topic: Topic[Any]) -> int:
+    """Return how many messages of ``topic`` may wait; of pictures the newest, as they are large."""
+    return 1 if topic.type in (Image, CompressedImage) else _KEPT

@@ -1,0 +1,185 @@
+import os
+import pickle
+import threading
+import time
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from handsteer.errors import TransportError
+from handsteer.images import image_message
+from handsteer.messages import CMD_VEL, HAND_SIGN, IMAGE_RAW, STEERING_CMD_VEL, Header, String, Time, Twist, twist
+from handsteer.transports.in_process import InProcessTransport
+from handsteer.transports.piped import Gateway, Pipe, PipedTransport
+from handsteer.transports.protocol import Received, Transport
+from tests.contracts.transport_contract import TransportContract, eventually
+
+
+def joined() -> tuple[Pipe, Pipe]:
+    """Return both ends of a pipe, not started."""
+    there, back = os.pipe(), os.pipe()
+    return (
+        Pipe(os.fdopen(back[0], "rb"), os.fdopen(there[1], "wb")),
+        Pipe(os.fdopen(there[0], "rb"), os.fdopen(back[1], "wb")),
+    )
+
+
+class Both:
+    """A graph, and nodes of another process in it."""
+
+    def __init__(self) -> None:
+        self.near, self.far = joined()
+        self.graph = InProcessTransport()
+        self.gateway = Gateway(self.near, self.graph)
+        self.transport = PipedTransport(self.far)
+
+    def start(self) -> None:
+        self.near.start()
+        self.far.start()
+
+    def close(self) -> None:
+        self.transport.close()
+        self.far.close()
+        self.near.close()
+        self.gateway.close()
+        self.graph.close()
+
+
+@pytest.fixture
+def both() -> Iterator[Both]:
+    both = Both()
+    yield both
+    both.close()
+
+
+class TestPiped(TransportContract):
+    settle_s = 0.3
+
+    @pytest.fixture
+    def transport(self, both: Both) -> Transport:  # type: ignore[override]
+        both.start()
+        return both.transport
+
+    def test_wanted_tells_whether_anybody_listens(self, transport: Transport) -> None:
+        # Who does is in the other process, and the nodes that use this transport publish little.
+        assert transport.advertise("talker", CMD_VEL).wanted
+
+
+def test_messages_pass_both_ways_with_their_capture_times(both: Both) -> None:
+    heard_here: list[Received[String]] = []
+    heard_there: list[Received[Twist]] = []
+    both.transport.subscribe("page", HAND_SIGN, heard_here.append)
+    both.graph.subscribe("control", STEERING_CMD_VEL, heard_there.append)
+    both.start()
+    both.transport.advertise("steering", STEERING_CMD_VEL).publish(twist(0.5, -1.0))
+    assert eventually(lambda: heard_there)
+    assert heard_there[0] == Received(twist(0.5, -1.0))
+    assert eventually(lambda: both.graph.advertise("recognition", HAND_SIGN).wanted)
+    both.graph.advertise("recognition", HAND_SIGN).publish(String(data="Go"), 12.5)
+    assert eventually(lambda: heard_here)
+    assert heard_here[0] == Received(String(data="Go"), 12.5)
+
+
+def test_the_graph_counts_publishers_of_the_other_process_until_they_are_gone(both: Both) -> None:
+    both.start()
+    publisher = both.transport.advertise("steering", CMD_VEL)
+    assert eventually(lambda: both.graph.publishers_of(CMD_VEL) == ["steering"])
+    del publisher
+    assert eventually(lambda: both.graph.publishers_of(CMD_VEL) == [])
+
+
+def test_a_process_that_stands_still_gets_the_newest_only_and_holds_up_nobody(both: Both) -> None:
+    signs: list[str] = []
+    pictures: list[Received[object]] = []
+    in_callback, let_go = threading.Event(), threading.Event()
+
+    def hang(received: Received[String]) -> None:
+        signs.append(received.message.data)
+        in_callback.set()
+        let_go.wait(10)
+
+    both.transport.subscribe("page", HAND_SIGN, hang)
+    both.transport.subscribe("page", IMAGE_RAW, pictures.append)
+    both.start()
+    publisher, camera = both.graph.advertise("recognition", HAND_SIGN), both.graph.advertise("camera", IMAGE_RAW)
+    assert eventually(lambda: publisher.wanted and camera.wanted)
+    publisher.publish(String(data="first"))
+    assert in_callback.wait(10)
+    header = Header(stamp=Time(sec=0, nanosec=0), frame_id="camera")
+    for number in range(300):  # 270 MB of pictures
+        publisher.publish(String(data=str(number)))
+        camera.publish(image_message(np.full((480, 640, 3), number % 256, np.uint8), header))
+    let_go.set()
+    assert eventually(lambda: signs[-1] == "299")
+    assert eventually(lambda: pictures and pictures[-1].message.data[0] == 299 % 256)  # type: ignore[attr-defined]
+    assert signs == sorted(signs[:1]) + sorted(signs[1:], key=int)  # in order
+    # What was on its way, and what may wait.
+    assert len(pictures) < 10
+
+
+def test_a_steering_command_that_waited_too_long_is_not_obeyed(both: Both) -> None:
+    heard: list[Received[Twist]] = []
+    both.graph.subscribe("control", STEERING_CMD_VEL, heard.append)
+    publisher = both.transport.advertise("steering", STEERING_CMD_VEL)
+    publisher.publish(twist(1.0, 0.0))
+    assert STEERING_CMD_VEL.lifespan_s is not None
+    time.sleep(STEERING_CMD_VEL.lifespan_s + 0.05)
+    publisher.publish(twist(0.0, 0.0))
+    both.start()
+    assert eventually(lambda: heard)
+    assert [received.message.linear.x for received in heard] == [0.0]
+
+
+def test_the_end_of_one_end_is_the_end_of_both(both: Both) -> None:
+    both.start()
+    both.far.close()
+    assert both.near.ended.wait(10)
+    both.transport.advertise("steering", CMD_VEL).publish(twist(1.0, 0.0))  # to nobody
+
+
+def test_what_is_said_before_the_end_arrives() -> None:
+    near, far = joined()
+    heard: list[int] = []
+    near.on("number", heard.append)
+    near.start()
+    far.start()
+    for number in range(100):
+        far.say("number", number)
+    far.close(10.0)
+    assert near.ended.wait(10)
+    assert heard == list(range(100))
+
+
+def test_an_end_that_takes_nothing_is_not_said_more_than_a_thousand_things() -> None:
+    _, far = joined()
+    for number in range(1000):
+        far.say("number", number)
+    with pytest.raises(TransportError, match="does not answer"):
+        far.say("number", 1000)
+
+
+def test_damage_ends_the_pipe() -> None:
+    source, sink = os.pipe()
+    pipe = Pipe(os.fdopen(source, "rb"), os.fdopen(os.open(os.devnull, os.O_WRONLY), "wb"))
+    pipe.start()
+    os.write(sink, pickle.dumps(("kind",))[:-1] + b"no pickle")
+    os.close(sink)
+    assert pipe.ended.wait(10)
+
+
+def test_a_handler_that_fails_is_logged_and_the_next_one_called(caplog: pytest.LogCaptureFixture) -> None:
+    near, far = joined()
+    heard: list[int] = []
+
+    def handler(number: int) -> None:
+        heard.append(1 // number)
+
+    near.on("number", handler)
+    near.start()
+    far.start()
+    far.say("number", 0)
+    far.say("number", 1)
+    assert eventually(lambda: heard == [1])
+    assert "number has failed" in caplog.text
+    far.close()
