@@ -37,9 +37,9 @@ from tests.nodes.stepping import Bench
 
 
 class ControlBench(Bench):
-    def __init__(self) -> None:
+    def __init__(self, *, arming: bool = False) -> None:
         super().__init__()
-        self.control = HandSignControlNode(self.transport, self.clock, ControlConfig())
+        self.control = HandSignControlNode(self.transport, self.clock, ControlConfig(), arming=arming)
         self.steering = SteeringNode(self.transport, self.clock)
         self.nodes = [self.steering, self.control]
         self.signs = self.transport.advertise("recognition", HAND_SIGN)

@@ -193,7 +193,7 @@ class FaultPublisher(Generic[M]):
 
     def _arrive(self, message: M, captured_s: float | None, sent_s: float) -> None:
         late = self._lateness is not None and self._lateness.is_late(b"", sent_s, self._transport.now())
-        if not late or (self._topic.stops is not None and self._topic.stops(message)):
+        if not late:
             self._inner.publish(message, self._transport.captured(message, captured_s))
 
 

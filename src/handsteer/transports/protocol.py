@@ -20,10 +20,13 @@ class Received(Generic[M]):
         message: The message; it is shared with other subscribers, so it is not to be changed.
         captured_s: When the frame that led to this message was captured, in seconds of the graph's clock; None when
             there was no frame, or when the transport cannot carry it.
+        is_late: Whether it was held up on its way for longer than messages of its topic live: of these only those
+            come that stop the robot (``Topic.stops``), and they show nothing of what is wanted now.
     """
 
     message: M
     captured_s: float | None = None
+    is_late: bool = False
 
 
 class Publisher(Protocol[M_contra]):
