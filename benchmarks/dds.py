@@ -1,9 +1,9 @@
 """What a wire of ROS 2 costs: the way of a Twist and an image between two processes, and the time to the first command.
 
-Run ``python benchmarks/dds.py`` with cyclonedds installed, ``python benchmarks/dds.py --transport zenoh`` with
-eclipse-zenoh, whose router runs beside. A second process listens and tells how old each message was
-when a node's callback got it; both read the same monotonic clock. The same is measured within one process, message by
-message in turn, as what the nodes themselves cost.
+Run ``python benchmarks/dds.py`` with cyclonedds installed; with ``--transport zenoh`` and eclipse-zenoh, whose router
+runs beside; or, after ``make ros2``, ``.venv/ros2/bin/python benchmarks/dds.py --transport ros2`` for rclpy. A second
+process listens and tells how old each message was when a node's callback got it; both read the same monotonic clock.
+The same is measured within one process, message by message in turn, as what the nodes themselves cost.
 """
 
 import argparse
@@ -36,7 +36,12 @@ from handsteer.transports.protocol import Publisher, Received, Transport
 
 WIDTH, HEIGHT = 640, 480
 SETTLE_S = 0.5
-MODULES = ("handsteer.cli.main", "handsteer.cli.nodes", "handsteer.transports.dds.session")
+MODULES = ("handsteer.cli.app", "handsteer.cli.nodes")
+SESSIONS = {
+    "dds": "handsteer.transports.dds.session",
+    "zenoh": "handsteer.transports.zenoh.session",
+    "ros2": "handsteer.transports.rclpy.session",
+}
 # A Twist's own stamp would change its size; what the robot would do with the time in it does not matter here.
 TWISTS = Topic("/benchmark/twist", Twist, depth=10)
 # Deep enough that one is missing only if it was lost on the way; in a graph a newer one takes its place.
@@ -99,7 +104,7 @@ def listen(topic: Topic[Any], transport: str) -> None:
 @contextmanager
 def network(transport: str) -> Iterator[None]:
     """Give this process and those that it starts a network of their own, by their environment."""
-    os.environ["ROS_DOMAIN_ID"] = str(free_domain())
+    os.environ |= {"ROS_DOMAIN_ID": str(free_domain()), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
     if transport != "zenoh":
         yield
         return
@@ -183,16 +188,16 @@ def first_command_s(wire: str) -> float:
     return took_s
 
 
-def loading_s() -> float:
+def loading_s(wire: str) -> float:
     """Return the seconds that it takes a new process to load what the control needs, and to end."""
     began_s = time.monotonic()
-    subprocess.run([sys.executable, "-c", f"import {', '.join(MODULES)}"], check=True)
+    subprocess.run([sys.executable, "-c", f"import {', '.join((*MODULES, SESSIONS[wire]))}"], check=True)
     return time.monotonic() - began_s
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description="Measure what a wire of ROS 2 costs.")
-    parser.add_argument("--transport", choices=("dds", "zenoh"), default="dds")
+    parser.add_argument("--transport", choices=("dds", "zenoh", "ros2"), default="dds")
     parser.add_argument("--twists", type=int, default=2000, help="Twists to send, 200 a second")
     parser.add_argument("--images", type=int, default=300, help="images to send, 30 a second")
     parser.add_argument("--runs", type=int, default=3, help="how often all is measured")
@@ -207,7 +212,7 @@ def main() -> None:
 
 def report(options: argparse.Namespace) -> None:
     print(f"load of the machine before: {load()}")
-    starts = [(first_command_s(options.transport), loading_s()) for _ in range(options.runs)]
+    starts = [(first_command_s(options.transport), loading_s(options.transport)) for _ in range(options.runs)]
     print(
         f"first command after the start of the control {row([first for first, _ in starts])} s, "
         f"of which Python's modules take {row([loading for _, loading in starts])} s"

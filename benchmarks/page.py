@@ -72,6 +72,7 @@ class Served:
         self._page = PageApart()
         self.url = self._page.serve(self.graph)
         self.port = urlsplit(self.url).port or 0
+        self.process = str(self._page.process.pid)
         self.graph.start()
 
     def close(self) -> None:
@@ -199,8 +200,8 @@ def count_viewers(rounds: int, duration_s: float, camera: str) -> None:
     print(f"(limit for 4: {LIMIT_SLOWER:.0%} slower; {rounds} rounds of {duration_s:.0f} s each, {load_now()})")
 
 
-def resident_mb() -> float:
-    return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6
+def resident_mb(process: str = "self") -> float:
+    return int(Path(f"/proc/{process}/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6
 
 
 def count_deaf(rounds: int, duration_s: float, camera: str) -> None:

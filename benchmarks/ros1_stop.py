@@ -1,4 +1,4 @@
-"""How soon the robot is stopped over ROS 1 when a node dies by kill -9 while it drives.
+"""How soon the robot is stopped over ROS 1 when a node, or the master, dies by kill -9 while it drives.
 
 Run ``python benchmarks/ros1_stop.py`` after ``make ros1``. All nodes run as processes, with a real roscore, and the
 virtual hand shows ``Forward``. Counted is the time from the kill to the first zero on the robot's topic; where no node
@@ -27,6 +27,7 @@ NODES = {
     "recognition": ("/hand_sign_recognition", []),
     "camera": ("/my_camera", CAMERA),
 }
+VICTIMS = ("camera", "recognition", "control", "master")
 LIMIT_MS = 500
 
 
@@ -42,7 +43,10 @@ def stop_ms(graph: Ros1Graph, victim: str) -> float:
     nodes = {verb: graph.node(verb, *options, name=name) for verb, (name, options) in NODES.items()}
     eventually(lambda: noted(peer, ODOM) and noted(peer, ODOM)[-1][1] > SLOWER_MPS, what="the robot to drive")
     killed_s = time.monotonic()
-    nodes[victim].popen.kill()
+    if victim == "master":
+        graph.kill_master()
+    else:
+        nodes[victim].popen.kill()
     topic, limit = (ODOM, SLOWER_MPS) if victim == "control" else (CMD_VEL, 1e-9)
     eventually(lambda: [value for _, value in noted(peer, topic, killed_s) if value < limit], 5.0, what="zero velocity")
     stopped_s = next(at_s for at_s, value in noted(peer, topic, killed_s) if value < limit)
@@ -52,10 +56,11 @@ def stop_ms(graph: Ros1Graph, victim: str) -> float:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description="Time how soon the robot is stopped when a node dies.")
-    parser.add_argument("--times", type=int, default=5, help="how often each node is killed")
+    parser = argparse.ArgumentParser(description="Time how soon the robot is stopped when a node or the master dies.")
+    parser.add_argument("--times", type=int, default=5, help="how often each is killed")
+    parser.add_argument("--only", choices=VICTIMS, help="kill nothing else")
     options = parser.parse_args()
-    for victim in ("camera", "recognition", "control"):
+    for victim in VICTIMS if options.only is None else [options.only]:
         times = []
         for _ in range(options.times):
             with tempfile.TemporaryDirectory() as home, ros1_graph(Path(home)) as graph:

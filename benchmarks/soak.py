@@ -1,9 +1,9 @@
 """Whether anything grows, or drifts, when handsteer runs for long.
 
 Run ``python benchmarks/soak.py``; parts by name: ``page``, ``hours``. ``page`` runs the whole graph in this process,
-on a film of the virtual hand at 640x480 and 60 frames a second, with one viewer of the page, while others come and go;
-all of them are in processes of their own. ``hours`` drives for hours of stepped time, all nodes in turn, with a painted
-hand in place of the camera and the landmark models, and the simulated robot.
+and its page in another, on a film of the virtual hand at 640x480 and 60 frames a second, with one viewer of the page,
+while others come and go; all of them are in processes of their own. ``hours`` drives for hours of stepped time, all
+nodes in turn, with a painted hand in place of the camera and the landmark models, and the simulated robot.
 """
 
 import argparse
@@ -12,9 +12,9 @@ import gc
 import subprocess
 import sys
 import tempfile
-import threading
 import time
 import urllib.request
+import uuid
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -24,7 +24,7 @@ from page import DRIVE, film, load_now, plain_viewers, resident_mb, served
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # for the chain and the visitors that the tests use
 
-from tests.dashboard.network import client_of, drawn, join_query
+from tests.dashboard.network import client_of, cookies_of, drawn, join_query
 from tests.faults.chain import Chain
 from tests.faults.painted import FPS as CAMERA_FPS
 
@@ -38,25 +38,36 @@ WARM_S = 60.0
 STAY_S = 0.3
 SETTLE_S = 20.0
 LIMIT_GROWTH = 0.02
+_COUNTED = ("fd", "task")
 CYCLE = (("NONE", 1.0), ("Forward", 2.0), ("Turn Left", 1.0), ("Go", 2.0), ("Backward", 2.0), ("Stop", 2.0))
 CYCLE_S = sum(seconds for _, seconds in CYCLE)
 
 
 @dataclass(frozen=True)
 class Holdings:
-    """What this process holds: resident memory in MB, open files and sockets, threads."""
+    """What processes hold: resident memory in MB, open files and sockets, threads."""
 
-    memory_mb: float
+    memory_mb: tuple[float, ...]
     files: int
     threads: int
 
     @classmethod
-    def now(cls) -> "Holdings":
+    def now(cls, *others: str) -> "Holdings":
+        """Look at this process, and at ``others`` by their numbers."""
         gc.collect()
-        return cls(resident_mb(), len(list(Path("/proc/self/fd").iterdir())), threading.active_count())
+        each = ("self", *others)
+        files, threads = (sum(len(list(Path(f"/proc/{one}/{what}").iterdir())) for one in each) for what in _COUNTED)
+        return cls(tuple(map(resident_mb, each)), files, threads)
+
+    def growth_since(self, before: "Holdings") -> str:
+        grown = [now / then - 1 for now, then in zip(self.memory_mb, before.memory_mb, strict=True)]
+        by_process = f" ({', '.join(f'{one:+.1%}' for one in grown)})" if len(grown) > 1 else ""
+        whole = sum(self.memory_mb) / sum(before.memory_mb) - 1
+        return f"memory {whole:+.1%}{by_process} (limit {LIMIT_GROWTH:.0%})"
 
     def __str__(self) -> str:
-        return f"{self.memory_mb:.1f} MB, {self.files} files and sockets, {self.threads} threads"
+        memory = " + ".join(f"{one:.1f}" for one in self.memory_mb)
+        return f"{memory} MB, {self.files} files and sockets, {self.threads} threads"
 
 
 def soak_page(duration_s: float, visits: int) -> None:
@@ -70,22 +81,21 @@ def soak_page(duration_s: float, visits: int) -> None:
             command = [sys.executable, __file__, "--visit", str(page.port), str(visits), str(visiting_s)]
             with subprocess.Popen(command) as visitors:
                 time.sleep(WARM_S)
-                after_a_minute = Holdings.now()
+                after_a_minute = Holdings.now(page.process)
                 print(f"after {WARM_S:.0f} s: {after_a_minute}", flush=True)
                 frames = sum(page.graph.recognition.counts.values())
                 warm_s = time.monotonic()
                 while visitors.poll() is None:
                     time.sleep(min(60.0, visiting_s / 4))
-                    print(f"  {time.monotonic() - began_s:4.0f} s: {Holdings.now()}", flush=True)
+                    print(f"  {time.monotonic() - began_s:4.0f} s: {Holdings.now(page.process)}", flush=True)
                     page.commands.clear()  # the benchmark's own notes
                 assert visitors.returncode == 0, "the visitors did not get in"
             elapsed_s = time.monotonic() - warm_s
             frames = sum(page.graph.recognition.counts.values()) - frames
             time.sleep(SETTLE_S)  # a page that is closed is kept for a moment, for who comes back
-            end = Holdings.now()
-    growth = end.memory_mb / after_a_minute.memory_mb - 1
+            end = Holdings.now(page.process)
     print(f"after {duration_s:.0f} s and {visits} visits: {end}; {frames / elapsed_s:.1f} frames/s, {load_now()}")
-    print(f"memory {growth:+.1%} (limit {LIMIT_GROWTH:.0%})")
+    print(end.growth_since(after_a_minute))
 
 
 def visit(port: int, count: int, duration_s: float) -> None:
@@ -107,12 +117,16 @@ async def one_visit(port: int) -> None:
     """Fetch the page, join it as its script does, take a picture, look on for a moment, and leave."""
     address = f"http://127.0.0.1:{port}"
     with urllib.request.urlopen(address) as answer:
-        html = answer.read().decode()
-    with urllib.request.urlopen(f"{address}/camera.mjpg") as pictures:
+        html, cookies = answer.read().decode(), {"Cookie": cookies_of(answer)}
+    with urllib.request.urlopen(urllib.request.Request(f"{address}/camera.mjpg", headers=cookies)) as pictures:
         pictures.read1(65536)
     page = socketio.AsyncClient()
-    query = join_query(client_of(html))
-    await page.connect(f"{address}?{query}", transports=["websocket"], socketio_path="/_nicegui_ws/socket.io")
+    await page.connect(
+        f"{address}?{join_query(client_of(html), tab=uuid.uuid4().hex)}",
+        headers=cookies,
+        transports=["websocket"],
+        socketio_path="/_nicegui_ws/socket.io",
+    )
     for event in drawn(html):
         await page.emit("event", event)
     await page.sleep(STAY_S)
@@ -170,7 +184,7 @@ def soak_hours(hours: float) -> None:
     frames, odometry = (chain.counts[topic.name] for topic in (IMAGE_RAW, ODOM))
     print(f"after {hours:.1f} h in {(time.monotonic() - began_s) / 60:.1f} minutes: {end}")
     if before is not None:
-        print(f"memory {end.memory_mb / before.memory_mb - 1:+.1%} (limit {LIMIT_GROWTH:.0%})")
+        print(end.growth_since(before))
     print(f"robot's time {state.time_s - total_s:+.3f} s against the graph's {total_s:.0f} s; {frames / total_s:.4f} ")
     print(f"frames/s, {odometry / total_s:.4f} odometries/s; callbacks that failed: {failed(chain)}")
     sums = [tuple(round(sum(column), 3) for column in zip(*each, strict=True)) for each in (first, last)]

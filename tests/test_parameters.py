@@ -1,3 +1,4 @@
+import re
 from typing import Any
 
 import pytest
@@ -26,20 +27,34 @@ def test_a_number_may_name_a_webcam() -> None:
 @pytest.mark.parametrize(
     ("parameters", "message"),
     [
-        (
-            {"min_confidense": 0.9},
-            r"ROS parameter /r1/hand_sign_recognition/min_confidense: there is no such",
-        ),
         ({"min_confidence": 2}, r"ROS parameter /r1/hand_sign_recognition/min_confidence: 2 should be less than or eq"),
         ({"landmarks": {"model": "big"}}, r"/r1/hand_sign_recognition/landmarks/model: 'big' should be 'fast', 'f"),
-        ({"landmarks": {"modl": "full"}}, r"/r1/hand_sign_recognition/landmarks/modl: there is no such parameter"),
-        ({"landmarks": "full"}, r"/r1/hand_sign_recognition/landmarks: there is no such parameter"),
     ],
     ids=str,
 )
 def test_what_is_wrong_has_its_full_name(parameters: dict[str, Any], message: str) -> None:
     with pytest.raises(ConfigError, match=message):
         from_parameters(parameters, "signs", NODE)
+
+
+@pytest.mark.parametrize(
+    ("parameters", "said"),
+    [
+        ({"min_confidense": 0.5}, "/min_confidense does nothing, .*: did you mean min_confidence"),
+        ({"modell": "lite"}, "/modell does nothing, .*: did you mean model"),
+        ({"max_hand": 1}, "/max_hand does nothing, .*: did you mean landmarks/max_hands"),
+        ({"landmarks": {"modl": "full"}}, "/landmarks/modl does nothing, .*: did you mean landmarks/model"),
+        ({"landmarks": "full"}, "/landmarks does nothing, .*: did you mean landmarks/model"),
+        ({"robot_description": "<robot/>"}, "/robot_description does nothing, for there is no such parameter$"),
+    ],
+    ids=str,
+)
+def test_what_is_not_known_is_said_once_and_left_out(
+    parameters: dict[str, Any], said: str, caplog: pytest.LogCaptureFixture
+) -> None:
+    assert from_parameters({**parameters, "min_confidence": 0.9}, "signs", NODE) == {"signs": {"min_confidence": 0.9}}
+    (line,) = caplog.messages
+    assert re.search(f"^ROS parameter {NODE}{said}", line)
 
 
 def test_no_parameter_is_hidden_by_a_section_of_the_same_name() -> None:

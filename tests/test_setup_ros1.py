@@ -9,6 +9,14 @@ import pytest
 
 SCRIPT = Path(__file__).resolve().parents[1] / "scripts" / "setup-ros1"
 
+APT_GET = """#!/bin/sh
+echo "$*" >> "$HERE/said"
+[ "$1" = update ] || exit 1
+[ "$(wc -l < "$HERE/said")" -gt 2 ] && exit 0
+echo "E: Could not get lock /var/lib/apt/lists/lock. It is held by process 7 (apt-get)" >&2
+exit 100
+"""
+
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="a shell script")
 
 
@@ -37,3 +45,34 @@ def test_without_an_environment_it_says_what_makes_one(tmp_path: Path) -> None:
     done = run(Path(script), os.environ["PATH"])
     assert done.returncode == 2
     assert done.stderr.splitlines() == ["ROS 1 set-up: there is no .venv yet: run make ros1, which makes it"]
+
+
+def test_it_waits_while_another_apt_is_at_work(tmp_path: Path) -> None:
+    """With an apt-get that is locked twice, and then cannot install; nothing of the machine is touched."""
+    programs = {
+        "apt-get": APT_GET,
+        "apt-cache": "#!/bin/sh\necho there\n",
+        "dpkg-query": "#!/bin/sh\nexit 1\n",
+        "id": "#!/bin/sh\necho 0\n",
+        "sleep": "#!/bin/sh\n",
+    }
+    for name, text in programs.items():
+        (tmp_path / name).write_text(text)
+        (tmp_path / name).chmod(0o755)
+    root = tmp_path / "root"
+    (root / "scripts").mkdir(parents=True)
+    (root / ".venv/bin").mkdir(parents=True)
+    (root / ".venv/bin/python").symlink_to("/bin/true")
+    shutil.copy(SCRIPT, root / "scripts")
+    env = {**os.environ, "PATH": f"{tmp_path}:{os.environ['PATH']}", "HERE": str(tmp_path)}
+    done = subprocess.run(
+        [root / "scripts/setup-ros1"], env=env, capture_output=True, text=True, check=False, stdin=subprocess.DEVNULL
+    )
+    said = (tmp_path / "said").read_text().splitlines()
+    assert said[:3] == ["update -qq"] * 3
+    assert "DPkg::Lock::Timeout" in said[3]
+    assert "install" in said[3]
+    for package in ("rosservice", "rosmsg", "roswtf", "rosbag"):
+        assert f"python3-{package}" in said[3]
+    assert done.stderr.count("another apt is at work") == 1
+    assert done.returncode == 2

@@ -19,7 +19,7 @@ from handsteer.timeouts import ODOMETRY_S, ROBOT_S, STALE_S
 
 S = TypeVar("S", bound="Section")
 
-RobotKind = Literal["sim", "dds", "zenoh", "ros1"]
+RobotKind = Literal["sim", "auto", "ros2", "dds", "zenoh", "ros1"]
 _LONGEST_SHOWN = 200
 _NAMESPACE = re.compile(r"[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)
 
@@ -128,6 +128,11 @@ class SignsConfig(Section):
         0.5, ge=0, le=10, description="How long the followed hand shows no sign before another that shows one is [s]"
     )
     max_frame_age: float = Field(STALE_S, gt=0, le=10, description="An older frame counts as no frame [s]")
+    recorded: Literal["auto", "always", "never"] = Field(
+        "auto",
+        description="Whether frames with old stamps count, as a recording's: auto takes what rosbag play sends, always "
+        "takes whatever is stamped more than 5 s ago, so it is for recordings alone",
+    )
     image_transport: Literal["auto", "raw", "compressed"] = Field(
         "auto",
         description="Which images are recognised: raw is /image_raw, compressed is /image_raw/compressed; "
@@ -270,7 +275,7 @@ class CollisionMonitorConfig(Section):
 
     enabled: bool = Field(False, description="Whether commands are slowed before obstacles; this needs a topic `scan`")
     source_timeout: float = Field(
-        0.5, gt=0, le=5, description="Without a scan for this long, or when it is older, the robot is stopped [s]"
+        0.45, gt=0, le=5, description="Without a scan for this long, or when it is older, the robot is stopped [s]"
     )
     margin: float = Field(0.15, ge=0, le=5, description="How far before an obstacle in its way the robot stops [m]")
     deceleration: float = Field(0.7, gt=0, le=20, description="How hard the robot surely brakes [m/s²]")
@@ -290,7 +295,9 @@ class RobotConfig(Section):
     """The robot, and the world it is simulated in or the topics it listens to."""
 
     kind: RobotKind = Field(
-        "sim", description="sim is the simulated robot; dds (ROS 2), zenoh and ros1 drive a real one, on its topics"
+        "sim",
+        description="sim is the simulated robot; ros2, dds, zenoh and ros1 drive a real one, on its topics, "
+        "auto by ros2 where that is, else by dds",
     )
     preset: Preset | None = Field(
         None, description="A robot whose topics, types and limits are known; a real one is generic unless said"

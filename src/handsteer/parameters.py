@@ -4,9 +4,11 @@ A node's own section stands flat, others are nested by name: of ``hand_sign_reco
 ``signs.min_confidence`` and ``landmarks.model`` is itself.
 """
 
+import difflib
+import logging
 import threading
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import NoneType
 from typing import Any, Literal, get_args, get_origin
@@ -44,6 +46,8 @@ _WORDS: dict[Kind, str] = {
 _USED_TOGETHER = {"camera": ("virtual_hand",), "signs": ("landmarks",), "control": ("collision_monitor",)}
 _AT_START = "it is read when the node starts: give it then"
 
+log = logging.getLogger(__name__)
+
 
 def from_parameters(parameters: Mapping[str, Any], section: str, node: str) -> dict[str, Any]:
     """Return ``parameters`` nested as in :class:`~handsteer.config.Config`.
@@ -53,8 +57,10 @@ def from_parameters(parameters: Mapping[str, Any], section: str, node: str) -> d
         section: The node's own section of the configuration.
         node: Full name of the node, for messages.
 
+    As in all of ROS, a parameter that the node does not know does nothing. It is logged, with the nearest known.
+
     Raises:
-        ConfigError: A name is unknown or a value is not allowed; the message has the parameter's full name.
+        ConfigError: A value is not allowed; the message has the parameter's full name.
     """
     values: dict[str, Any] = {}
     for name, value in parameters.items():
@@ -62,11 +68,26 @@ def from_parameters(parameters: Mapping[str, Any], section: str, node: str) -> d
             values.setdefault(section, {})[name] = _checked(section, name, value, f"{node}/{name}")
         elif name in Config.model_fields and isinstance(value, Mapping):
             for inner, of in value.items():
-                values.setdefault(name, {})[inner] = _checked(name, inner, of, f"{node}/{name}/{inner}")
+                if inner in _fields(name):
+                    values.setdefault(name, {})[inner] = _checked(name, inner, of, f"{node}/{name}/{inner}")
+                else:
+                    _say_unknown(f"{node}/{name}/{inner}", inner, {field: f"{name}/{field}" for field in _fields(name)})
         else:
-            known = ", ".join(_fields(section))
-            raise ConfigError(f"ROS parameter {node}/{name}: there is no such parameter; there are {known}")
+            _say_unknown(f"{node}/{name}", name, _names(section))
     return values
+
+
+def _names(section: str) -> dict[str, str]:
+    """Return what may be meant by a name, of a section or of those used with it, and what that is called in full."""
+    others = {f"{used}/{name}": f"{used}/{name}" for used in _USED_TOGETHER.get(section, ()) for name in _fields(used)}
+    nested = {full.rpartition("/")[2]: full for full in others}
+    return others | nested | {name: name for name in _fields(section)}
+
+
+def _say_unknown(full_name: str, name: str, known: Mapping[str, str]) -> None:
+    near = difflib.get_close_matches(str(name), known, n=1)
+    hint = f": did you mean {known[near[0]]}?" if near else ""
+    log.warning("ROS parameter %s does nothing, for there is no such parameter%s", full_name, hint)
 
 
 def _checked(section: str, name: str, value: Any, full_name: str) -> Any:
@@ -90,6 +111,7 @@ class Description:
         constraint: What else is asked of its values, in words; empty when nothing is.
         choices: What there is to choose from; empty when that is not all that is allowed.
         why_fixed: Why it cannot be set while the node runs; None when it can.
+        removable: Whether it is an entry of a table, which can be taken away.
     """
 
     kind: Kind
@@ -99,6 +121,7 @@ class Description:
     constraint: str = ""
     choices: tuple[str, ...] = ()
     why_fixed: str | None = None
+    removable: bool = False
 
 
 class NodeParameters:
@@ -147,7 +170,7 @@ class NodeParameters:
         place = self._place(name)
         if place is None or (place.entry is not None and name not in self.values()):
             return None
-        return describe(place.model, place.field)
+        return replace(describe(place.model, place.field), removable=place.entry is not None)
 
     def set(self, changes: Mapping[str, Value | None]) -> None:
         """Set parameters, all of them or none; None takes an entry out of a table.

@@ -35,6 +35,9 @@ STEERING_AT_START_S: Final = 2.0
 HELD_UP_S: Final = 0.1
 """How long after a process was held up messages may still come out of sockets and queues, and are not obeyed."""
 
+RECORDED_S: Final = 5.0
+"""No link delays frames by so much: what is older is a recording, or was stamped by a clock that is not in step."""
+
 RESYNC_S: Final = 1.0
 """How long frames are watched after their clock was set, before they are timed by it anew."""
 

@@ -21,6 +21,7 @@ class FakeCapture:
     def __init__(self, *reads: Any) -> None:
         self.reads = list(reads)
         self.settings: dict[int, float] = {}
+        self.size: tuple[int, int] | None = None  # where it is not the one that was asked for
         self.released = False
 
     def isOpened(self) -> bool:  # noqa: N802
@@ -31,6 +32,10 @@ class FakeCapture:
         if isinstance(image, Exception):
             raise image
         return image is not None, image
+
+    def get(self, prop: int) -> float:
+        sides = (cv2.CAP_PROP_FRAME_WIDTH, cv2.CAP_PROP_FRAME_HEIGHT)
+        return self.size[sides.index(prop)] if self.size else self.settings[prop]
 
     def set(self, prop: int, value: float) -> bool:
         self.settings[prop] = value
@@ -102,6 +107,25 @@ def test_a_device_that_gives_no_picture() -> None:
 def test_an_address_that_does_not_answer() -> None:
     with pytest.raises(CameraNotFound, match=r"no picture comes from rtsp://127\.0\.0\.1:9/x: check the address"):
         Webcam("rtsp://127.0.0.1:9/x", SteppedClock())
+
+
+def test_a_camera_that_would_give_far_too_large_pictures_is_asked_for_none() -> None:
+    capture = FakeCapture(IMAGE)
+    capture.size = (20000, 20000)
+    with pytest.raises(CameraUnreadable, match="gives pictures of 20000x20000: they should have at most 16777216"):
+        Webcam("rtsp://camera", SteppedClock(), open_capture=lambda _: capture)
+    assert len(capture.reads) == 1
+    assert capture.released
+
+
+def test_a_camera_whose_pictures_become_far_too_large_is_lost() -> None:
+    large = np.broadcast_to(np.uint8(7), (20000, 20000, 3))
+    captures = iter([FakeCapture(IMAGE, large), FakeCapture(IMAGE)])
+    camera = Webcam("rtsp://camera", SteppedClock(), open_capture=lambda _: next(captures))
+    camera.read()
+    with pytest.raises(CameraLost, match="20000x20000"):
+        camera.read()
+    assert camera.read() is not None
 
 
 def test_what_a_source_is() -> None:

@@ -97,7 +97,7 @@ def test_a_port_in_use_names_the_port(capsys: pytest.CaptureFixture[str]) -> Non
 
 def test_version_and_help(capsys: pytest.CaptureFixture[str]) -> None:
     assert re.fullmatch(r"\d+\.\d+\.\d+\n", prints(capsys, "--version"))
-    verbs = ["run", "recognize", "models", "graph", "doctor", "camera", "recognition", "control", "robot", "steering"]
+    verbs = ["run", "recognize", "models", "doctor", "camera", "recognition", "control", "robot", "steering"]
     for verb in ([], *([verb] for verb in verbs)):
         assert "handsteer " + (verb[0] if verb else "run") in prints(capsys, *verb, "--help").replace("Usage: ", "")
 
@@ -201,7 +201,7 @@ def test_help_says_what_each_verb_does(capsys: pytest.CaptureFixture[str], argum
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--robot", "hal"], "robot.kind: 'hal' should be 'sim', 'dds', 'zenoh' or 'ros1'"),
+        (["--robot", "hal"], "robot.kind: 'hal' should be 'sim', 'auto', 'ros2', 'dds', 'zenoh' or 'ros1'"),
         (["--robot", "dds", "--fast"], "--fast runs on simulated time, which a real robot (robot.kind dds) does not"),
         (["--ros-args", "-r", "a:=b"], "'--ros-args': a simulated robot has no graph to take it"),
         (["--control.cmd-vel-type=twist", "--robot.cmd-vel-type=twist_stamped"], "control.cmd_vel_type is twist and"),

@@ -189,3 +189,62 @@ def test_it_remembers_that_the_robot_still_turns() -> None:
         limiter.limit(before, 0.0)
         limiter.see(on_the_left, 1.0)
     assert turned.limit(Velocity(0.6, 0.0), 1.0).linear_mps < straight.limit(Velocity(0.6, 0.0), 1.0).linear_mps
+
+
+class Driven:
+    """A robot among points that stay where they are; it follows commands, and gets faster and slower as it is let."""
+
+    def __init__(self, points: Points, accelerates: float = 1.0) -> None:
+        self.points = points
+        self.limiter = ObstacleLimiter(RULE)
+        self.moving = ZERO
+        self.now_s = 0.0
+        self.least_gap_m = math.inf
+        self._brakes = np.array([RULE.deceleration, RULE.angular_deceleration])
+        self._accelerates = accelerates
+
+    def drive(self, wanted: Velocity, seconds: float, *, says_how_it_moves: bool = True) -> None:
+        for number in range(round(seconds * 50)):
+            if number % 5 == 0:
+                self.limiter.see(self.points, self.now_s)
+            if says_how_it_moves:
+                self.limiter.feel(self.moving, self.now_s)
+            told = self.limiter.limit(wanted, self.now_s)
+            self._move(np.array([told.linear_mps, told.angular_radps]))
+
+    def _move(self, told: Points) -> None:
+        now = np.array([self.moving.linear_mps, self.moving.angular_radps])
+        rate = np.where(np.abs(told) > np.abs(now), self._brakes * self._accelerates, self._brakes)
+        self.moving = Velocity(*(now + np.clip(told - now, -rate / 50, rate / 50)).tolist())
+        self.points = np.stack(seen_from(on_a_circle(self.moving, np.array([0.02])), self.points), axis=-1)[0]
+        self.now_s += 0.02
+        self.least_gap_m = min(self.least_gap_m, float(gaps(self.points[:, 0], self.points[:, 1], RULE).min()))
+
+
+def test_a_corner_does_not_creep_to_a_wall_a_little_with_each_command() -> None:
+    """Its way is so nearly along the wall that each command by itself seems to be one that passes by."""
+    along = np.linspace(-2, 2, 801)[:, None] * [math.cos(0.95), math.sin(0.95)]
+    robot = Driven(along + at((-RULE.back - 0.011, SIDE + 0.014)))
+    robot.drive(Velocity(-0.4, -1.1), 10.0)
+    assert robot.least_gap_m > 0.003
+    robot.drive(Velocity(0.0, 1.0), 1.0)
+    assert robot.moving.angular_radps > 0.3, "it can turn away"
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_robot_that_gets_fast_sooner_than_it_brakes_stops_in_time(side: float) -> None:
+    wall = wall_ahead(1.1) * [1.0, side]
+    hasty = Driven(wall, accelerates=10.0)
+    hasty.drive(Velocity(1.0, 0.0), 3.0)
+    assert hasty.least_gap_m > RULE.margin - 0.05
+
+
+def test_it_believes_odometry_more_than_what_was_commanded() -> None:
+    """A robot that does not turn yet goes straight for a while, whatever it was told a moment ago."""
+    said = []
+    for moving in (Velocity(0.6, 0.0), Velocity(0.6, 2.0)):
+        limiter = ObstacleLimiter(RULE)
+        limiter.see(wall_ahead(0.4), 0.0)
+        limiter.feel(moving, 0.0)
+        said.append(limiter.limit(Velocity(0.6, 2.0), 0.0).linear_mps)
+    assert said[0] < said[1]

@@ -148,6 +148,6 @@ def drawn(html: str) -> list[dict[str, Any]]:
     ]
 
 
-def join_query(client: str) -> str:
-    """Return the words by which a page's websocket says whose it is."""
-    return f"client_id={client}&tab_id=tab&document_id=document&next_message_id=0&implicit_handshake=true"
+def join_query(client: str, tab: str = "tab") -> str:
+    """Return the words by which a page's websocket says whose it is; a browser has another ``tab`` for each page."""
+    return f"client_id={client}&tab_id={tab}&document_id=document&next_message_id=0&implicit_handshake=true"

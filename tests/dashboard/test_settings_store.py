@@ -128,7 +128,7 @@ SECTIONS = {
     "robot": st.fixed_dictionaries(
         {},
         optional={
-            "kind": st.sampled_from(["sim", "dds", "ros1"]),
+            "kind": st.sampled_from(["sim", "auto", "ros2", "dds", "ros1"]),
             "preset": st.sampled_from([None, *PRESETS]),
             "max_linear": st.floats(0.1, 10),
             "cmd_vel_type": st.sampled_from(["twist", "twist_stamped"]),

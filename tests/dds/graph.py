@@ -49,11 +49,16 @@ class DdsGraph:
     Attributes:
         env: Environment of the processes.
         peer: The plain program.
+        transport: What joins our nodes.
+        python: What runs them.
 
     Args:
         home: Folder for logs.
         peer: Command that starts the plain program; the domain is added.
     """
+
+    transport = "dds"
+    python = sys.executable
 
     def __init__(self, home: Path, peer: Sequence[str] = (sys.executable, str(PEER))) -> None:
         self._home = home
@@ -89,14 +94,18 @@ class DdsGraph:
     def handsteer(self, *arguments: str) -> Process:
         """Start ``handsteer`` with ``arguments`` in this domain."""
         log = self._home / f"process_{len(self._processes)}.log"
-        process = Process([sys.executable, "-m", "handsteer", *arguments], self.env, log)
+        process = Process([self.python, "-m", "handsteer", *arguments], self.env, log)
         self._processes.append(process)
         return process
 
     def node(self, verb: str, *arguments: str, name: str, ros: tuple[str, ...] = ()) -> Process:
         """Start one of handsteer's nodes and wait until it is in the graph under ``name``."""
         process = self.handsteer(
-            verb, "--transport", "dds", *as_tests_drive(verb, arguments), *(("--ros-args", *ros) if ros else ())
+            verb,
+            "--transport",
+            self.transport,
+            *as_tests_drive(verb, arguments),
+            *(("--ros-args", *ros) if ros else ()),
         )
         eventually(lambda: name in self.nodes() or not process.running, what=f"{name} to start")
         assert process.running, process.text

@@ -164,14 +164,6 @@ class Clock(IdlStruct, typename="rosgraph_msgs::msg::dds_::Clock_"):
 
 
 @dataclass
-class Battery(IdlStruct, typename="my_robot::msg::dds_::Battery_"):
-    """A type of somebody's own, which no library knows."""
-
-    cells: sequence[float64] = field(default_factory=list)
-    charge: int32 = 0
-
-
-@dataclass
 class Gid(IdlStruct, typename="rmw_dds_common::msg::dds_::Gid_"):
     data: array[uint8, 16]
 
@@ -203,7 +195,6 @@ TYPES = {
         Clock,
         Log,
         ParameterEvent,
-        Battery,
     )
 }
 RELIABLE, BEST_EFFORT = Policy.Reliability.Reliable(1_000_000_000), Policy.Reliability.BestEffort

@@ -117,7 +117,6 @@ def test_the_discovery_itself_carries_the_hash_of_ros2(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["-p", "linear_stepp:=0.1"], "ROS parameter /hand_sign_control/linear_stepp: there is no such parameter"),
         (["-p", "linear_step:=7"], "ROS parameter /hand_sign_control/linear_step: 7 should be less than or eq"),
         (["-p", "use_sim_time:=7"], "parameter use_sim_time is 7: it should be true or false"),
         (["-r", "__ns:=r1"], "__ns:=r1: a namespace starts with a slash"),
@@ -130,6 +129,19 @@ def test_what_is_wrong_is_said_in_one_line(dds: DdsGraph, words: list[str], mess
     assert process.code() == 2, process.text
     assert [line for line in process.text.splitlines() if line.startswith(f"handsteer: {message}")], process.text
     assert "Traceback" not in process.text
+
+
+def test_a_file_of_parameters_may_be_shared_with_other_nodes(dds: DdsGraph, tmp_path: Path) -> None:
+    file = tmp_path / "all.yaml"
+    shared = "robot_description: <robot/>, linear_stepp: 0.5, linear_step: 0.02, landmarks: {modl: full}"
+    file.write_text(f'"/**": {{ros__parameters: {{{shared}}}}}\n')
+    driver = DdsDriver(dds, "--ros-args", "--params-file", str(file))
+    driver.show("Forward")
+    driver.expect((0.02, 0.0))
+    text = driver.process.text
+    for name in ("robot_description", "linear_stepp", "landmarks/modl"):
+        assert text.count(f"{name} does nothing, for there is no such parameter") == 1
+    assert "did you mean linear_step?" in text
 
 
 def test_what_does_not_fit_is_said_in_words(tmp_path: Path) -> None:

@@ -154,11 +154,13 @@ class Drive:
         machines: Where it runs.
         peer: Looks on.
         nodes: The processes by verb.
+        listener: Hears what nodes report; the same by default.
     """
 
     machines: TwoMachines
     peer: Peer
     nodes: dict[str, Process]
+    listener: Peer | None = None
 
     def odometry(self, since_s: float = 0.0) -> list[Odometry]:
         """Return what the robot has said since a time."""
@@ -167,7 +169,7 @@ class Drive:
 
     def reports(self, node: str, since_s: float = 0.0) -> list[str]:
         """Return what a node has said on /diagnostics since ``time.monotonic()`` was ``since_s``."""
-        noted = self.peer.ask("get", topic=DIAGNOSTICS)
+        noted = (self.listener or self.peer).ask("get", topic=DIAGNOSTICS)
         return [message for at_s, (name, message) in noted if name.endswith(f": {node}") and at_s > since_s]
 
     def until_fast(self) -> None:

@@ -3,11 +3,11 @@
 import logging
 import sys
 
-from tests.faults import processes
+from tests.faults import networks, processes
 from tests.faults.stepped import outcomes
 from tests.faults.table import write
 
-PARTS = {"stepped": lambda: list(outcomes().values()), "processes": processes.outcomes}
+PARTS = {"stepped": lambda: list(outcomes().values()), "processes": processes.outcomes, "networks": networks.outcomes}
 
 
 def main(parts: list[str]) -> None:

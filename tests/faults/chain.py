@@ -40,7 +40,7 @@ from handsteer.signs.opening import open_classifier
 from handsteer.signs.vocabulary import NONE
 from handsteer.testing.fault_transport import FaultTransport
 from handsteer.testing.faulty_camera import SpoiltCamera
-from handsteer.transports.protocol import Received
+from handsteer.transports.protocol import Call, Received
 from tests.faults.base import Base
 from tests.faults.domain import Domain
 from tests.faults.painted import PaintedCamera, painted_recognizer
@@ -221,6 +221,9 @@ class _Session:
     clock: SteppedClock
     name: str = "/robot"
     parameters: Mapping[str, Any] = field(default_factory=dict)
+
+    def offer(self, services: Callable[[], Mapping[str, Call]]) -> None:
+        pass
 
     def serve(self, parameters: NodeParameters) -> None:
         pass

@@ -9,11 +9,12 @@ from handsteer.testing.faulty_camera import CameraFault
 from tests.faults.chain import REAL_CMD_VEL, REAL_ODOM, Chain, RealRobot, RemoteChain
 from tests.faults.others import others
 from tests.faults.row import Act, Row, ended, frozen, killed, lower_the_hand, made, nothing, unfrozen
+from tests.faults.scanners import scanners
 
 
 def rows() -> list[Row]:
     """Return all rows."""
-    return [*_cameras(), *_links(), *_nodes(), *_clocks(), *others(), *_stops(), *_real_robots()]
+    return [*_cameras(), *_links(), *_nodes(), *_clocks(), *others(), *_stops(), *_real_robots(), *scanners()]
 
 
 _CAMERA: dict[CameraFault, tuple[str, bool]] = {

@@ -15,6 +15,8 @@ STICK_PAUSE_S = 0.35
 """Steering that was silent for so long has let go."""
 BRIDGED_S = 0.2
 """A sign that was shown so recently may still be seen."""
+CONFIRMED_S = 0.2
+"""A new sign counts by then."""
 CHANGES = 2
 """So many new signs, one after the other, may count as none."""
 _EPSILON_S = 1e-6
@@ -39,12 +41,15 @@ class Rules:
     _stick_was_neutral: bool = False
     _robot_waits: bool = False
     _sign: str = "NONE"
+    _changed_s: float = -math.inf
     _is_neutral: bool = False
     _changes: int = 0
     _stands_by_s: float = math.inf
 
     def picture(self, sign: str, *, asks: bool) -> None:
         """A live camera shows a hand with a sign that asks for motion, or one that does not, or none."""
+        if sign != self._sign:
+            self._changed_s = self.now_s
         # While a new sign is not confirmed yet, zero is commanded: that is what a robot waits for that was away.
         self._robot_waits = self._robot_waits and asks and sign == self._sign
         if self.now_s - self._picture_s > SURELY_A_GAP_S:
@@ -89,8 +94,11 @@ class Rules:
         self._stands_by_s = min(self._stands_by_s, self.now_s + PATIENCE_S)
 
     def robot_was_away(self) -> None:
-        """The robot could not hear: whatever was asked of it then is not meant for it now."""
-        self._robot_waits = True
+        """The robot could not hear: whatever was asked of it then is not meant for it now.
+
+        Where the sign has just changed, the zero that it waits for is still to come.
+        """
+        self._robot_waits = self.now_s - self._changed_s > CONFIRMED_S
         self._stands_by_s = min(self._stands_by_s, self.now_s + PATIENCE_S)
 
     def stands(self) -> None:

@@ -7,6 +7,7 @@ import logging
 import os
 from collections.abc import Callable
 
+import pytest
 from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, precondition, rule
@@ -246,6 +247,41 @@ class Histories(RuleBasedStateMachine):
         self.graph.linked = True
         self.rules.robot_was_away()
         self.wait(_TICK_S)
+
+
+def test_a_robot_that_comes_back_while_a_new_sign_is_not_confirmed_yet_may_follow_it() -> None:
+    """Found in 155,000 steps: zero is commanded after it has come back, and so it may move."""
+    history = Histories()
+    history.begin("Forward")
+    history.hold("Forward", 10)
+    history.the_robot_leaves()
+    history.show("Backward", 1)
+    history.the_robot_comes_back()
+    history.hold("Backward", 10)
+    assert history.graph.relay.velocity.linear_mps < 0
+    history.teardown()
+
+
+@pytest.mark.parametrize("frames", [8, 16])
+def test_a_robot_that_comes_back_does_not_follow_what_was_shown_all_the_time(frames: int) -> None:
+    history = Histories()
+    history.begin("Forward")
+    history.the_robot_leaves()
+    history.show("Backward", frames)
+    history.the_robot_comes_back()
+    history.hold("Backward", 16)
+    assert not history.graph.is_asked_to_move
+    history.teardown()
+
+
+def test_pictures_with_wrong_times_do_not_make_a_frozen_one_new() -> None:
+    """Found in 185,000 steps: they were remembered in place of what the camera had given before."""
+    history = Histories()
+    history.begin("Forward")
+    history.show_with_wrong_times("Forward", 8, -5.0)
+    history.freeze_the_picture(7)
+    assert not history.graph.is_asked_to_move
+    history.teardown()
 
 
 Histories.TestCase.settings = settings(

@@ -7,7 +7,24 @@ import numpy as np
 import pytest
 
 from handsteer.config import CollisionMonitorConfig, Config, ControlConfig, RobotConfig
-from handsteer.messages import CMD_VEL, DIAGNOSTICS, HAND_SIGN, SCAN, Header, LaserScan, String
+from handsteer.messages import (
+    CMD_VEL,
+    DIAGNOSTICS,
+    HAND_SIGN,
+    ODOM,
+    SCAN,
+    Header,
+    LaserScan,
+    Odometry,
+    Point,
+    Pose,
+    PoseWithCovariance,
+    Quaternion,
+    String,
+    Time,
+    TwistWithCovariance,
+    twist,
+)
 from handsteer.nodes.control import HandSignControlNode
 from handsteer.nodes.robot import RobotNode
 from handsteer.nodes.scans import scan_message
@@ -118,7 +135,7 @@ def test_a_scan_that_stops_coming_stops_the_robot() -> None:
     bench = MonitorBench()
     bench.show("Forward", 10, ahead(7.0))
     assert bench.command[0] > 0.0
-    bench.show("Forward", 14)
+    bench.show("Forward", 13)
     assert bench.command[0] > 0.0
     bench.show("Forward", 3)
     assert bench.command == (0.0, 0.0)
@@ -149,6 +166,35 @@ def test_it_can_be_turned_on_and_off_while_it_runs() -> None:
     bench.control.reconfigure(Config())
     bench.show("Forward", 5)
     assert bench.command[0] > 0.0
+
+
+def odometry(linear_mps: float, x_m: float = 0.0) -> Odometry:
+    at = Pose(Point(x_m, 0.0, 0.0), Quaternion(0.0, 0.0, 0.0, 1.0))
+    moves = TwistWithCovariance(twist(linear_mps, 0.0), np.zeros(36))
+    return Odometry(Header(Time(1, 0), "odom"), "base_link", PoseWithCovariance(at, np.zeros(36)), moves)
+
+
+@pytest.mark.parametrize(
+    ("says", "is_slower"),
+    [
+        pytest.param([odometry(0.6)], True, id="faster than commanded"),
+        pytest.param([odometry(math.nan)], False, id="not a number"),
+        pytest.param([odometry(0.0, 1.0), odometry(0.0, 2.0)], False, id="a twist that is left at zero"),
+    ],
+)
+def test_how_fast_the_robot_is_it_hears_from_odometry(says: list[Odometry], *, is_slower: bool) -> None:
+    told = []
+    for messages in (says, [odometry(math.nan)] * len(says)):
+        bench = MonitorBench(control=ControlConfig(linear_step=0.1, angular_step=2.0, max_angular=2.0))
+        publisher = bench.transport.advertise("robot", ODOM)
+        bench.show("Forward", 5, ahead(7.0))
+        for message in messages:
+            publisher.publish(message)
+            bench.scan(ahead(0.57))
+            bench.run(0.01)
+        bench.show("Turn Left", 1, ahead(0.57))
+        told.append(bench.command[0])
+    assert (told[0] < told[1]) == is_slower
 
 
 def test_several_robots_are_refused() -> None:

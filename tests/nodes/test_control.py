@@ -276,6 +276,17 @@ def test_steering_that_was_held_through_a_reset_has_to_let_go(bench: ControlBenc
     assert bench.commands[-1] == (0.5, 0)
 
 
+def test_its_services_stop_and_reset_as_the_topic_does(bench: ControlBench) -> None:
+    services = bench.control.services()
+    bench.show("Forward")
+    assert services["stop"]() == "stopped, until it is reset"
+    bench.show("Forward", "Stop", "Forward")
+    assert set(bench.commands[1:]) == {(0, 0)}
+    assert services["reset"]() == "reset"
+    bench.show("Stop", "Forward")
+    assert bench.commands[-1] == (0.01, 0)
+
+
 def test_says_that_it_is_stopped_and_then_disarmed_and_how_it_moves_again(bench: ControlBench) -> None:
     statuses = bench.record(DIAGNOSTICS)
 
@@ -338,10 +349,11 @@ def test_whatever_happens_a_stopped_robot_stands(events: list[str]) -> None:
 class FleetBench(Bench):
     NAMES = ("r1", "r2", "r3")
 
-    def __init__(self) -> None:
+    def __init__(self, *, arming: bool = False) -> None:
         super().__init__()
+        self.reports = self.record(DIAGNOSTICS)
         config = ControlConfig.model_validate({"robots": self.NAMES, "actions": {"Peace": "next_robot"}})
-        self.control = HandSignControlNode(self.transport, self.clock, config)
+        self.control = HandSignControlNode(self.transport, self.clock, config, arming=arming)
         self.steering = SteeringNode(self.transport, self.clock)
         self.nodes = [self.steering, self.control]
         self.signs = self.transport.advertise("recognition", HAND_SIGN)
@@ -357,6 +369,10 @@ class FleetBench(Bench):
     def choose(self, name: str) -> None:
         self.select.publish(String(data=name))
         self.run(0.02)
+
+    def reason(self) -> str:
+        self.run(0.1)
+        return str(self.reports[-1].status[0].message)
 
     def moving(self) -> list[str]:
         return [name for name, told in self.told.items() if told and told[-1].linear.x != 0.0]
@@ -408,6 +424,21 @@ def test_steering_has_to_let_go_too_before_it_drives_the_next_robot() -> None:
     bench.steering.steer(0.2, 0.0)
     bench.run(0.5)
     assert bench.moving() == ["r2"]
+
+
+def test_it_says_whether_another_robot_was_selected_or_something_failed() -> None:
+    bench = FleetBench(arming=True)
+    bench.show("NONE", 60)
+    bench.show("Forward", 5)
+    assert bench.reason() == "driving: Forward"
+    bench.choose("r2")
+    bench.show("Forward", 5)
+    assert bench.reason() == "standing: r2 is disarmed (it was selected), moves once Stop is shown, or no hand"
+    bench.show("NONE", 30)
+    bench.show("Forward", 5)
+    assert bench.moving() == ["r2"]
+    bench.run(1.0)
+    assert bench.reason() == "standing: r2 is disarmed (no sign came), moves once Stop is shown, or no hand"
 
 
 def test_a_robot_that_is_not_there_is_not_selected(caplog: pytest.LogCaptureFixture) -> None:

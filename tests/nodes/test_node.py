@@ -1,11 +1,13 @@
 import re
 import threading
+import time
+from collections.abc import Iterator
 
 import pytest
 
 from handsteer.clock import RealClock, SteppedClock
 from handsteer.config import Config
-from handsteer.messages import DIAGNOSTICS, DiagnosticArray, Topic
+from handsteer.messages import DIAGNOSTICS, HAND_SIGN, DiagnosticArray, String, Topic
 from handsteer.nodes.node import OK, WARN, Node
 from handsteer.transports.in_process import InProcessTransport
 from handsteer.transports.protocol import Received
@@ -173,3 +175,99 @@ def test_another_failure_is_said_at_once(caplog: pytest.LogCaptureFixture) -> No
         publisher.publish(number)
         node.spin_once()
     assert [record.exc_info and record.exc_info[0] for record in caplog.records] == [KeyError, ValueError]
+
+
+class QuickNode(Node):
+    is_quick = True
+
+
+@pytest.fixture
+def quick() -> Iterator[tuple[InProcessTransport, QuickNode]]:
+    transport = InProcessTransport()
+    node = QuickNode("quick", transport, RealClock())
+    yield transport, node
+    node.stop()
+
+
+def test_a_quick_node_is_served_by_the_thread_that_delivers(quick: tuple[InProcessTransport, QuickNode]) -> None:
+    transport, node = quick
+    threads: list[threading.Thread] = []
+    node.subscribe(HAND_SIGN, lambda _: threads.append(threading.current_thread()))
+    node.start()
+    talker = transport.advertise("talker", HAND_SIGN)
+    for number in range(20):
+        talker.publish(String(data="Go"))
+        eventually(lambda number=number: len(threads) > number)
+    eventually(lambda: len(threads) == 20)
+    assert threading.current_thread() in threads
+
+
+def test_a_quick_node_hears_nothing_before_its_start(quick: tuple[InProcessTransport, QuickNode]) -> None:
+    transport, node = quick
+    came = threading.Event()
+    node.subscribe(HAND_SIGN, lambda _: came.set())
+    transport.advertise("talker", HAND_SIGN).publish(String(data="Go"))
+    assert not came.is_set()
+    node.start()
+    assert came.wait(10)
+
+
+def test_callbacks_of_a_quick_node_never_run_side_by_side_and_none_is_lost(
+    quick: tuple[InProcessTransport, QuickNode],
+) -> None:
+    transport, node = quick
+    inside, most, sums = [0], [0], {name: 0 for name in ("/a", "/b", "/c")}
+
+    def callback(received: Received[String], name: str) -> None:
+        inside[0] += 1
+        most[0] = max(most[0], inside[0])
+        time.sleep(0.0002)
+        sums[name] = int(received.message.data)
+        inside[0] -= 1
+
+    def talk(name: str) -> None:
+        talker = transport.advertise("talker", Topic(name, String))
+        for number in range(1, 301):
+            talker.publish(String(data=str(number)))
+
+    for name in sums:
+        node.subscribe(Topic(name, String), lambda received, name=name: callback(received, name))
+    node.every(0.001, lambda: None)
+    node.start()
+    talkers = [threading.Thread(target=talk, args=(name,)) for name in sums]
+    for each in talkers:
+        each.start()
+    for each in talkers:
+        each.join()
+    eventually(lambda: set(sums.values()) == {300}, what="the newest of each topic")
+    assert most == [1]
+
+
+def test_a_quick_node_may_publish_to_itself(quick: tuple[InProcessTransport, QuickNode]) -> None:
+    transport, node = quick
+    again, done = node.publisher(Topic("/again", String)), threading.Event()
+    node.subscribe(HAND_SIGN, lambda received: again.publish(received.message))
+    node.subscribe(Topic("/again", String), lambda _: done.set())
+    node.start()
+    transport.advertise("talker", HAND_SIGN).publish(String(data="Go"))
+    assert done.wait(10)
+
+
+def test_a_quick_node_that_hangs_is_said_to_be_stuck(quick: tuple[InProcessTransport, QuickNode]) -> None:
+    transport, node = quick
+    inside, let_go = threading.Event(), threading.Event()
+
+    def hang(_: object) -> None:
+        inside.set()
+        let_go.wait(10)
+
+    node.subscribe(HAND_SIGN, hang)
+    node.start()
+    talker = threading.Thread(
+        target=lambda: transport.advertise("talker", HAND_SIGN).publish(String(data="Go")), daemon=True
+    )
+    talker.start()
+    assert inside.wait(10)
+    node.stop(0.05)
+    assert node.stuck
+    let_go.set()

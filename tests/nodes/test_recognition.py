@@ -240,6 +240,28 @@ def test_frames_that_come_late_are_told_from_none() -> None:
     )
 
 
+def test_a_recording_is_followed_when_that_is_asked_for() -> None:
+    bench = RecognitionBench(SignsConfig(recorded="always"))
+    bench.show(frames=10, age_s=86_400.0)
+    assert bench.names[-1] == "Forward"
+    bench.run(0.5)
+    assert bench.names[-1] == "NONE"  # it has ended
+
+
+def test_what_may_be_a_recording_is_not_followed_by_itself_and_says_how() -> None:
+    bench = RecognitionBench()
+    statuses = bench.record(DIAGNOSTICS)
+    bench.show(frames=60, age_s=3 * 86_400.0)
+    assert set(bench.names) == {"NONE"}
+    assert (
+        "stamped 3 days ago, and come in step: if they are a recording's, set the param"
+        in statuses[-1].status[0].message
+    )
+    bench.run(1.0)
+    assert "no frame for 1." in statuses[-1].status[0].message
+    assert "before: frames are stamped 3 days ago" in statuses[-1].status[0].message
+
+
 def test_frames_of_a_clock_that_is_far_ahead_are_no_frames() -> None:
     bench = RecognitionBench()
     statuses = bench.record(DIAGNOSTICS)

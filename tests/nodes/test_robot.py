@@ -65,6 +65,17 @@ def test_coordinate_frames_are_named_as_configured() -> None:
     assert (transform.header.frame_id, transform.child_frame_id) == ("r1/odom", "r1/base_link")
 
 
+def test_its_service_counts_the_odometry_from_where_the_robot_stands() -> None:
+    bench = RobotBench()
+    bench.drive(2.0)
+    robot = bench.nodes[0]
+    assert isinstance(robot, RobotNode)
+    before = robot.state.truth
+    assert robot.services()["reset_odometry"]() == "the odometry counts from here"
+    bench.run(0.1)
+    assert bench.newest.pose.pose.position.x < 0.1 < before.x <= robot.state.truth.x
+
+
 def test_after_it_was_held_up_it_brakes_and_obeys_nothing_that_waited() -> None:
     bench = RobotBench()
     bench.drive(1.0)

@@ -29,9 +29,9 @@ def test_joints_are_those_of_the_robot() -> None:
 
 def test_visuals_are_those_of_the_robot() -> None:
     shapes = {visual.link: visual for visual in visuals(robot_description())}
-    assert shapes["chassis_link"].size == (0.4, 0.4, 0.1)
-    assert shapes["head_link"].size == (0.04, 0.04, 0.04)
-    wheel = shapes["rear_left_wheel_link"]
+    assert shapes["chassis"].size == (0.4, 0.4, 0.1)
+    assert shapes["head"].size == (0.04, 0.04, 0.04)
+    wheel = shapes["rear_left_wheel"]
     assert wheel.shape == "cylinder"
     assert wheel.size == (0.12, 0.12, 0.04)
     assert wheel.rpy[0] == pytest.approx(1.5708, abs=1e-4)
@@ -42,7 +42,7 @@ def test_masses_and_inertias_as_another_reader_sees_them() -> None:
     spec = mujoco.MjSpec.from_string(robot_description())
     spec.compiler.fusestatic = False
     model = spec.compile()
-    chassis, wheels = model.body("chassis_link"), [model.body(name.replace("joint", "link")) for name in WHEELS]
+    chassis, wheels = model.body("chassis"), [model.body(name.removesuffix("_joint")) for name in WHEELS]
     assert chassis.mass == 1.0
     assert max(chassis.inertia) == pytest.approx(1.0 / 12 * (0.4**2 + 0.4**2))
     assert all(wheel.mass == 0.3 for wheel in wheels)
@@ -50,7 +50,7 @@ def test_masses_and_inertias_as_another_reader_sees_them() -> None:
 
 
 def test_the_wheels_stand_on_the_floor_of_base_link() -> None:
-    (chassis,) = (joint for joint in joints(robot_description()) if joint.child == "chassis_link")
+    (chassis,) = (joint for joint in joints(robot_description()) if joint.child == "chassis")
     assert chassis.parent == "base_link"
     assert chassis.xyz[2] == 0.06
 

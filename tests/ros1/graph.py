@@ -50,6 +50,18 @@ class Ros1Graph:
         eventually(lambda: "/rosout" in self.nodes(), what="roscore")
         return self
 
+    def restart_master(self) -> None:
+        """Kill the master's process, and start another at the same address; roscore ends itself meanwhile."""
+        self.kill_master()
+        self.run("rosmaster", "--core", "-p", self.uri.rpartition(":")[2])
+        eventually(self._master_answers, what="the other master")
+
+    def _master_answers(self) -> bool:
+        try:
+            return bool(self.master.getPid("/test"))
+        except OSError:
+            return False
+
     def stop(self) -> None:
         """End all processes, the master last."""
         for process in self._processes:
@@ -66,6 +78,10 @@ class Ros1Graph:
                 os.killpg(self._core.pid, signal.SIGKILL)
                 self._core.wait()
             self._core = None
+
+    def kill_master(self) -> None:
+        """Kill the master's process, which says nothing to anybody."""
+        os.kill(self.master.getPid("/test")[2], signal.SIGKILL)
 
     def nodes(self) -> set[str]:
         """Return the full names of all nodes; empty when no master answers."""

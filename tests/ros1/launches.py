@@ -102,6 +102,13 @@ class LaunchGraph(Ros1Graph):
         self._processes.append(launch)
         return launch
 
+    def launch_file(self, file: Path, *args: str) -> Launch:
+        """Start ``roslaunch`` on a file that is in no package."""
+        log = self._home / f"launch_{len(self._processes)}.log"
+        launch = Launch(["roslaunch", "--wait", str(file), *args], self.env, log)
+        self._processes.append(launch)
+        return launch
+
     def record(self, topics: dict[str, str]) -> Recorder:
         """Note what comes on ``topics``, given as type by name."""
         return Recorder(self.peer(), topics)

@@ -94,7 +94,7 @@ def test_the_two_terminals_drive_the_robot_by_the_virtual_hand(ros: LaunchGraph)
     }  # fmt: skip
     frames = ros.tell("rostopic", "echo", "-n", "20", "/tf")
     assert 'child_frame_id: "base_link"' in frames
-    assert 'child_frame_id: "front_left_wheel_link"' in frames
+    assert 'child_frame_id: "front_left_wheel"' in frames
     reports = ros.tell("rostopic", "echo", "-n", "60", "/diagnostics/status[0]/name")
     assert all(name.strip("/") in reports for name in CHAIN)
 
@@ -337,3 +337,12 @@ def test_rviz_shows_the_robot_driving(tmp_path: Path) -> None:
     assert np.count_nonzero((blue > red + 60) & (blue > green + 20)) > 300, "the blue chassis"
     assert np.count_nonzero((red > blue + 60) & (green > blue + 20)) > 300, "the trail of odometry, the obstacles"
     assert np.count_nonzero(hand[..., 1] > hand[..., 0] + 60) > 100, "the green word in the picture with the hand"
+
+
+@pytest.mark.skipif(
+    not Path("/usr/share/joint_state_publisher").exists(), reason="there is no joint_state_publisher: make ros1"
+)
+def test_the_model_alone_has_all_its_frames(ros: LaunchGraph) -> None:
+    ros.launch("ros_mobile_robot", "mobile_robot.launch", "gui:=false")
+    frames = ros.tell("rostopic", "echo", "-n", "20", "/tf")
+    assert all(f'child_frame_id: "{side}_wheel"' in frames for side in ("front_left", "rear_right"))

@@ -1,9 +1,12 @@
 """Our nodes as processes in a real ROS 1 graph, seen by plain rospy nodes and ROS's own tools."""
 
 import itertools
+import os
 import signal
 import subprocess
 import sys
+import threading
+import time
 import urllib.request
 from collections.abc import Iterator, Mapping
 from functools import partial
@@ -14,6 +17,7 @@ import pytest
 from tests.contracts.node_contract import (
     CMD_VEL,
     FORWARD,
+    LIMIT_S,
     ODOM,
     RUN,
     ChainContract,
@@ -114,16 +118,11 @@ def test_compressed_images_are_renamed_with_the_raw_ones_unless_named_themselves
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (
-            ["control", "_linear_stepp:=0.1"],
-            "ROS parameter /hand_sign_control/linear_stepp: there is no such parameter",
-        ),
+        (["control", "_control_topic:=7"], "ROS parameter /hand_sign_control/control_topic: 7 should be the name of a"),
+        (["recognition", "_show_image:=maybe"], "ROS parameter /hand_sign_recognition/show_image: 'maybe' should be"),
         (["control", "_linear_step:=7"], "ROS parameter /hand_sign_control/linear_step: 7 should be less than or eq"),
         (["control", "_linear_step:=quick"], "ROS parameter /hand_sign_control/linear_step: 'quick' should be a valid"),
-        (
-            ["camera", "_virtual_hand/skn:=dark"],
-            "ROS parameter /my_camera/virtual_hand/skn: there is no such parameter",
-        ),
+        (["camera", "_virtual_hand/skin:=green"], "ROS parameter /my_camera/virtual_hand/skin: 'green' should be"),
         (["camera", "_source:=gone.mp4"], "there is no camera gone.mp4"),
         (["control", "fast"], "'fast' is no argument of ROS: it should be as name:=value"),
         (["control", "--control.linear-step", "7"], "control.linear_step: '7' should be less than or equal to 1"),
@@ -134,7 +133,7 @@ def test_what_is_wrong_is_said_in_one_line(ros1: Ros1Graph, arguments: list[str]
     verb, *rest = arguments
     process = ros1.handsteer(verb, "--transport", "ros1", *rest)
     assert process.code() == 2, process.text
-    for name in ("hand_sign_control/linear_stepp", "hand_sign_control/linear_step", "my_camera"):
+    for name in ("hand_sign_control", "hand_sign_recognition", "my_camera"):
         with_name = f"/{name}"
         if ros1.master.hasParam("/test", with_name)[2]:
             ros1.master.deleteParam("/test", with_name)
@@ -142,8 +141,18 @@ def test_what_is_wrong_is_said_in_one_line(ros1: Ros1Graph, arguments: list[str]
     assert "Traceback" not in process.text
 
 
+def test_a_parameter_that_is_not_known_is_said_and_does_nothing(ros1: Ros1Graph) -> None:
+    driver = Ros1Driver(ros1, parameters={"linear_stepp": 0.5, "robot_description": "robot", "linear_step": 0.02})
+    driver.show("Forward")
+    driver.expect((0.02, 0.0))
+    text = driver.process.text
+    assert text.count(f"{driver.namespace}/{NODE}/linear_stepp does nothing") == 1
+    assert text.count("did you mean linear_step?") == 1
+    assert text.count(f"{driver.namespace}/{NODE}/robot_description does nothing") == 1
+
+
 def test_without_a_master_it_ends_at_once(ros1: Ros1Graph) -> None:
-    for uri in ("http://localhost:1", "nonsense"):
+    for uri in ("http://localhost:1", "http://localhost:99999", "http://localhost:port", "nonsense"):
         process = ros1.run(
             "env", f"ROS_MASTER_URI={uri}", sys.executable, "-m", "handsteer", "control", "--transport", "ros1"
         )
@@ -162,6 +171,51 @@ def test_when_the_master_goes_away_the_robot_is_stopped(tmp_path: Any) -> None:
         assert driver.process.code() == 2
         driver.expect((0.01, 0.0), (0.0, 0.0))
         assert "no ROS master answers" in driver.process.text
+
+
+def test_kill_9_of_the_master_stops_a_robot_that_is_being_driven_faster(tmp_path: Any) -> None:
+    killed_s: list[float] = []
+
+    with ros1_graph(tmp_path) as graph:
+        driver = Ros1Driver(graph)
+
+        def kill() -> None:
+            graph.kill_master()
+            killed_s.append(time.monotonic())
+
+        killer = threading.Timer(1.0, kill)
+        killer.start()
+        driver.show("Forward", count=150)
+        killer.join()
+        assert driver.process.code() == 2
+        assert "it has gone away, so this node ends" in driver.process.text
+        assert "Traceback" not in driver.process.text
+        at_s, last = driver.commands[-1]
+        assert last == (0.0, 0.0)
+        assert at_s - killed_s[0] <= LIMIT_S
+
+
+def test_a_master_that_only_takes_long_is_waited_for(tmp_path: Any) -> None:
+    with ros1_graph(tmp_path) as graph:
+        driver = Ros1Driver(graph, "--control.sign-timeout", "5")
+        pid = graph.master.getPid("/test")[2]
+        os.kill(pid, signal.SIGSTOP)
+        try:
+            driver.show("Forward", count=80, period_s=0.04)
+        finally:
+            os.kill(pid, signal.SIGCONT)
+        driver.expect(*[(round(0.01 * n, 6), 0.0) for n in range(1, 81)])
+        assert driver.process.running
+
+
+def test_another_master_in_the_place_of_the_first_is_not_taken_for_it(tmp_path: Any) -> None:
+    with ros1_graph(tmp_path) as graph:
+        driver = Ros1Driver(graph, "--control.sign-timeout", "5")
+        driver.show("Forward")
+        driver.expect((0.01, 0.0))
+        graph.restart_master()
+        assert driver.process.code() == 2
+        driver.expect((0.01, 0.0), (0.0, 0.0))
 
 
 class TestChain(ChainContract):

@@ -24,6 +24,7 @@ LAUNCHES = {
         "/hand_sign_control",
     },
     ("ros_mobile_robot", "drive_robot.launch"): {"/robot", "/robot_state_publisher"},
+    ("ros_mobile_robot", "mobile_robot.launch"): {"/joint_state_publisher", "/robot_state_publisher"},
     ("ros_mobile_robot", "steering.launch"): {"/steering"},
 }
 
@@ -37,7 +38,8 @@ ARGS = {
         "keypoint_classifier_label",
     },
     "sign_control.launch": {"publish_gesture_topic", "control_topic", "camera_name", "show_image"},
-    "drive_robot.launch": {"rviz", "rvizconfig", "model", "world", "gazebo"},
+    "mobile_robot.launch": {"config"},
+    "drive_robot.launch": {"gui", "rviz", "rvizconfig", "model", "world", "gazebo"},
     "steering.launch": {"port", "control_topic"},
 }
 
@@ -93,31 +95,42 @@ def test_a_namespace_takes_all_nodes_and_parameters_along(launch: tuple[str, str
     ("launch", "window"),
     [
         (("ros_mobile_robot", "drive_robot.launch"), "rviz"),
+        (("ros_mobile_robot", "mobile_robot.launch"), "rviz"),
         (("ros_hand_gesture_recognition", "hand_sign.launch"), "hand_sign_view"),
         (("ros_hand_gesture_recognition", "sign_control.launch"), "hand_sign_view"),
     ],
 )
 def test_windows_open_where_there_is_a_display_or_they_are_asked_for(launch: tuple[str, str], window: str) -> None:
-    arg = "rviz" if window == "rviz" else "show_image"
+    arg = "gui" if window == "rviz" else "show_image"
     assert f"/{window}" in nodes(*launch, DISPLAY=":0")
     assert f"/{window}" in nodes(*launch, f"{arg}:=true")
     assert f"/{window}" not in nodes(*launch, f"{arg}:=false", DISPLAY=":0")
 
 
-def test_a_sign_model_is_given_on_only_when_there_is_one() -> None:
-    launch = ("hand_sign_recognition", "ros_hand_gesture_recognition", "sign_control.launch")
-    assert "model" not in run("roslaunch", "--args", *launch, env=ros_environment())
-    given = run("roslaunch", "--args", *launch, "keypoint_classifier_model:=/my model.npz", env=ros_environment())
-    assert "--signs.model /my model.npz" in given
+def test_roslaunchs_own_words_for_a_namespace_work() -> None:
+    launch = ("ros_mobile_robot", "drive_robot.launch")
+    assert nodes(*launch, "__ns:=r1") == {"/r1/robot", "/r1/robot_state_publisher"}
+    assert nodes(*launch, "rviz:=true", "gui:=false") == {"/robot", "/robot_state_publisher", "/rviz"}
 
 
-def test_labels_beside_the_model_are_refused_in_words() -> None:
-    launch = ("ros_hand_gesture_recognition", "sign_control.launch", "keypoint_classifier_label:=/labels.csv")
-    done = subprocess.run(
-        ["roslaunch", "--nodes", *launch], env=ros_environment(), capture_output=True, text=True, check=False
-    )
-    assert done.returncode != 0
-    assert "a sign model has its labels within" in done.stderr
+def test_the_links_have_the_names_of_the_course() -> None:
+    urdf = ET.fromstring(str(parameters("ros_mobile_robot", "mobile_robot.launch")["/robot_description"]))
+    wheels = {f"{where}_wheel" for where in ("front_left", "front_right", "rear_left", "rear_right")}
+    assert {"base_link", "chassis", "head", *wheels} <= {link.get("name") for link in urdf.iterfind("link")}
+
+
+def test_the_recognition_is_told_by_the_parameters_that_the_courses_nodes_read() -> None:
+    launch = ("ros_hand_gesture_recognition", "sign_control.launch")
+    told = {
+        "publish_gesture_topic": "/words",
+        "show_image": False,
+        "keypoint_classifier_model": "/my model.npz",
+        "keypoint_classifier_label": "/labels.csv",
+    }
+    given = parameters(*launch, *(f"{name}:={value}" for name, value in told.items()))
+    theirs = {**told, "subscribe_image_topic": "image_raw"}
+    assert {name: given[f"/hand_sign_recognition/{name}"] for name in theirs} == theirs
+    assert given["/hand_sign_control/publish_gesture_topic"] == "/words"
 
 
 def test_the_robot_is_described_by_the_xacro_that_handsteer_simulates() -> None:

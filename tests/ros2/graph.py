@@ -13,9 +13,16 @@ PYTHON = Path(sys.prefix) / "ros2" / "bin" / "python"
 
 
 class Ros2Graph(DdsGraph):
-    """The processes of a test in a domain, with a node of a real ROS 2 among them that looks on."""
+    """The processes of a test in a domain, with a node of a real ROS 2 among them that looks on.
 
-    def __init__(self, home: Path) -> None:
+    Args:
+        home: Folder for logs.
+        transport: What joins our nodes; ``ros2`` makes them nodes of that same ROS 2.
+    """
+
+    def __init__(self, home: Path, transport: str = "dds") -> None:
+        self.transport = transport
+        self.python = str(PYTHON) if transport == "ros2" else sys.executable
         super().__init__(home, (str(PYTHON), str(PEER)))
 
     def publishes(self, node: str, topic: str) -> bool:
@@ -24,9 +31,9 @@ class Ros2Graph(DdsGraph):
 
 
 @contextlib.contextmanager
-def ros2_graph(home: Path) -> Iterator[Ros2Graph]:
+def ros2_graph(home: Path, transport: str = "dds") -> Iterator[Ros2Graph]:
     """A domain with a ROS 2 node in it, for as long as the block lasts."""
-    graph = Ros2Graph(home)
+    graph = Ros2Graph(home, transport)
     try:
         yield graph
     finally:

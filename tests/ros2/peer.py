@@ -5,15 +5,14 @@ It reads orders as lines of JSON from its input and answers each by one line of 
 says, ``topics`` what ``ros2 topic list -t`` says, ``shift`` (from, to, type) publishes on one topic what comes on
 another, ``services`` (node) returns those of a node, ``servers`` (service) counts who offers it, and ``names`` the
 full names of all nodes. ``parameters`` (node, call, arguments) calls one of the parameter services as rclpy's own
-client does, and returns the reply's fields, or None when nobody answers; ``timed_calls`` (node, count) returns how
-many seconds each of some calls of ``list_parameters`` takes, after a first one; ``fresh_clients`` (node, count) lists
-the parameters by as many clients, one after the other, each a participant of its own as ``ros2 param`` is one, and
-returns how many names each got, and after how many seconds.
+client does, and returns the reply's fields, or None when nobody answers; ``dump`` (node) returns all values as
+``ros2 param dump`` writes them, and ``load`` (node, values) sets them as ``ros2 param load`` does; ``call`` (service)
+calls one of std_srvs/Trigger.
 """
 
 import json
-import os
 import sys
+import tempfile
 import threading
 import time
 from contextlib import suppress
@@ -26,7 +25,7 @@ import yaml
 from builtin_interfaces.msg import Time
 from geometry_msgs.msg import Twist, TwistStamped
 from nav_msgs.msg import Odometry
-from rcl_interfaces.msg import Log
+from rcl_interfaces.msg import Log, ParameterValue
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.parameter import Parameter, parameter_dict_from_yaml_file, parameter_value_to_python
 from rclpy.parameter_client import AsyncParameterClient
@@ -34,6 +33,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import CompressedImage, Image
 from std_msgs.msg import Bool, String
+from std_srvs.srv import Trigger
 
 TYPES = {
     kind.__name__: kind for kind in (Bool, Clock, CompressedImage, Image, Log, Odometry, String, Twist, TwistStamped)
@@ -153,24 +153,7 @@ def parameters(order: dict[str, Any]) -> Any:
     if not client.wait_for_services(20.0):
         return None
     arguments = [Parameter(**one) if isinstance(one, dict) else one for one in order["arguments"]]
-    answer = getattr(client, order["call"])(arguments)
-    deadline_s = time.monotonic() + order.get("timeout_s", 10.0)
-    while not answer.done() and time.monotonic() < deadline_s:
-        time.sleep(0.001)
-    return fields(answer.result()) if answer.done() else None
-
-
-def timed_calls(order: dict[str, Any]) -> list[float]:
-    client = clients[order["node"]]
-    return [timed_call(client) for _ in range(order["count"])]
-
-
-def timed_call(client: AsyncParameterClient) -> float:
-    done = threading.Event()
-    began_s = time.monotonic()
-    client.list_parameters([]).add_done_callback(lambda _: done.set())
-    assert done.wait(10.0)
-    return time.monotonic() - began_s
+    return waited(getattr(client, order["call"])(arguments), order.get("timeout_s", 10.0))
 
 
 def fields(message: Any) -> Any:
@@ -181,28 +164,32 @@ def fields(message: Any) -> Any:
     return [fields(one) for one in message]
 
 
-def fresh_clients(order: dict[str, Any]) -> list[tuple[int, float]]:
-    return [fresh_client(order["node"]) for _ in range(order["count"])]
+def dump(order: dict[str, Any]) -> dict[str, Any]:
+    names = parameters({**order, "call": "list_parameters", "arguments": []})["result"]["names"]
+    found = parameters({**order, "call": "get_parameters", "arguments": sorted(names)})["values"]
+    values = [ParameterValue(**value) for value in found]
+    return dict(zip(sorted(names), map(parameter_value_to_python, values), strict=True))
 
 
-def fresh_client(name: str) -> tuple[int, float]:
-    began_s = time.monotonic()
-    context = rclpy.Context()
-    context.init(domain_id=int(os.environ["ROS_DOMAIN_ID"]))
-    asker = rclpy.create_node("asker", context=context, start_parameter_services=False)
-    executor = SingleThreadedExecutor(context=context)
-    executor.add_node(asker)
-    client = AsyncParameterClient(asker, name)
-    found = 0
-    if client.wait_for_services(20.0):
-        answer = client.list_parameters([])
-        executor.spin_until_future_complete(answer, 5.0)
-        found = len(answer.result().result.names) if answer.done() else 0
-    took_s = time.monotonic() - began_s
-    executor.shutdown()
-    asker.destroy_node()
-    context.shutdown()
-    return found, took_s
+def load(order: dict[str, Any]) -> Any:
+    """As a file in YAML, whose empty lists say nothing of what they are for."""
+    with tempfile.NamedTemporaryFile("w", suffix=".yaml") as file:
+        yaml.safe_dump({order["node"]: {"ros__parameters": order["values"]}}, file)
+        file.flush()
+        answer = clients[order["node"]].load_parameter_file(file.name)
+        return waited(answer, 10.0)
+
+
+def call(order: dict[str, Any]) -> Any:
+    client = node.create_client(Trigger, order["service"])
+    return waited(client.call_async(Trigger.Request()), 10.0) if client.wait_for_service(20.0) else None
+
+
+def waited(answer: Any, timeout_s: float) -> Any:
+    deadline_s = time.monotonic() + timeout_s
+    while not answer.done() and time.monotonic() < deadline_s:
+        time.sleep(0.001)
+    return fields(answer.result()) if answer.done() else None
 
 
 def endpoints(order: dict[str, Any]) -> list[dict[str, Any]]:
@@ -261,9 +248,10 @@ ORDERS = {
         servers,
         names,
         parameters,
-        timed_calls,
         reload,
-        fresh_clients,
+        dump,
+        load,
+        call,
         endpoints,
     )
 }

@@ -1,4 +1,7 @@
-"""Our nodes among those of a real ROS 2: rclpy, on Fast DDS."""
+"""Our nodes among those of a real ROS 2, rclpy on Fast DDS: as nodes of rclpy themselves, and over Cyclone DDS.
+
+With test_rclpy.py and test_parameters.py these are the rows of the table in docs/ros2.md.
+"""
 
 import signal
 import time
@@ -29,9 +32,24 @@ pytestmark = [
 ]
 
 
+TRANSPORTS = ("ros2", "dds")
+
+
+@pytest.fixture(scope="module", params=TRANSPORTS)
+def ros2(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Ros2Graph]:
+    with ros2_graph(tmp_path_factory.mktemp("ros2"), request.param) as graph:
+        yield graph
+
+
+@pytest.fixture(params=TRANSPORTS)
+def fresh(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Ros2Graph]:
+    with ros2_graph(tmp_path, request.param) as graph:
+        yield graph
+
+
 @pytest.fixture(scope="module")
-def ros2(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Ros2Graph]:
-    with ros2_graph(tmp_path_factory.mktemp("ros2")) as graph:
+def dds(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Ros2Graph]:
+    with ros2_graph(tmp_path_factory.mktemp("dds")) as graph:
         yield graph
 
 
@@ -42,10 +60,10 @@ class TestControl(ControlContract):
 
 
 class TestChain(ChainContract):
-    @pytest.fixture(scope="class")
+    @pytest.fixture(scope="class", params=TRANSPORTS)
     @classmethod
-    def chain(cls, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Running]:
-        with ros2_graph(tmp_path_factory.mktemp("chain")) as graph:
+    def chain(cls, request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Running]:
+        with ros2_graph(tmp_path_factory.mktemp("chain"), request.param) as graph:
             yield driving_chain(graph)
 
 
@@ -148,34 +166,33 @@ def test_raw_pictures_reach_an_rclpy_that_wants_them_reliable(ros2: Ros2Graph) -
     assert {size for _, (size,) in pictures} == {320 * 240 * 3}
 
 
-def test_raw_images_for_fast_dds_are_warned_of(ros2: Ros2Graph) -> None:
-    ros2.peer.ask("record", topic="/raw/image_raw", type="Image", fields=["width"], reliable=False, depth=1)
-    camera = ros2.node("camera", *FORWARD, name="/raw/my_camera", ros=("-r", "__ns:=/raw"))
+def test_raw_images_for_fast_dds_are_warned_of(dds: Ros2Graph) -> None:
+    dds.peer.ask("record", topic="/raw/image_raw", type="Image", fields=["width"], reliable=False, depth=1)
+    camera = dds.node("camera", *FORWARD, name="/raw/my_camera", ros=("-r", "__ns:=/raw"))
     line = "/raw/image_raw: /looker takes raw images"
     eventually(lambda: line in camera.text, what=line)
 
 
-def test_what_a_node_logs_is_on_rosout(ros2: Ros2Graph) -> None:
+def test_what_a_node_logs_is_on_rosout(dds: Ros2Graph) -> None:
     """The log is latched: what was said before anybody listened is told, too."""
-    ros2.peer.ask("record", topic="/told/image_raw", type="Image", fields=["width"], depth=1, latched=True)
-    camera = ros2.node("camera", *FORWARD, name="/told/my_camera", ros=("-r", "__ns:=/told"))
+    dds.peer.ask("record", topic="/told/image_raw", type="Image", fields=["width"], depth=1, latched=True)
+    camera = dds.node("camera", *FORWARD, name="/told/my_camera", ros=("-r", "__ns:=/told"))
     eventually(lambda: "nothing passes" in camera.text)
-    ros2.peer.ask("record", topic="/rosout", type="Log", fields=["level", "name", "msg"], latched=True)
-    logged = eventually(lambda: [one for _, one in ros2.peer.ask("get", topic="/rosout") if one[1] == "told.my_camera"])
+    dds.peer.ask("record", topic="/rosout", type="Log", fields=["level", "name", "msg"], latched=True)
+    logged = eventually(lambda: [one for _, one in dds.peer.ask("get", topic="/rosout") if one[1] == "told.my_camera"])
     assert logged[0][0] == 30
     assert logged[0][2].startswith("/told/image_raw: nothing passes")
 
 
-def test_the_time_of_ros2_is_followed(tmp_path: Path) -> None:
-    with ros2_graph(tmp_path) as graph:
-        peer = graph.peer
-        peer.ask("advertise", topic="/clock", type="Clock", reliable=False, depth=1)
-        topic = "/image_raw/compressed"
-        peer.ask("record", topic=topic, type="CompressedImage", fields=["header.stamp"], reliable=False)
-        graph.node("camera", *FORWARD, name="/my_camera", ros=("-p", "use_sim_time:=true"))
-        eventually(lambda: peer.ask("listeners", topic="/clock") > 0)
-        peer.ask("run_clock", from_s=1000.0, seconds=30.0)
-        eventually(lambda: [v for _, (v,) in peer.ask("get", topic=topic) if 1000.0 < v < 1040.0], 15.0)
+def test_the_time_of_ros2_is_followed(fresh: Ros2Graph) -> None:
+    peer = fresh.peer
+    peer.ask("advertise", topic="/clock", type="Clock", reliable=False, depth=1)
+    topic = "/image_raw/compressed"
+    peer.ask("record", topic=topic, type="CompressedImage", fields=["header.stamp"], reliable=False)
+    fresh.node("camera", *FORWARD, name="/my_camera", ros=("-p", "use_sim_time:=true"))
+    eventually(lambda: peer.ask("listeners", topic="/clock") > 0)
+    peer.ask("run_clock", from_s=1000.0, seconds=30.0)
+    eventually(lambda: [v for _, (v,) in peer.ask("get", topic=topic) if 1000.0 < v < 1040.0], 15.0)
 
 
 def test_profiles_that_do_not_fit_are_said_in_words(tmp_path: Path) -> None:
@@ -191,10 +208,9 @@ def test_profiles_that_do_not_fit_are_said_in_words(tmp_path: Path) -> None:
         assert graph.peer.ask("get", topic="/image_raw") == []
 
 
-def test_a_node_of_ros2_that_is_killed_is_no_harm(ros2: Ros2Graph, tmp_path: Path) -> None:
-    with ros2_graph(tmp_path) as graph:
-        control = graph.node("control", name=f"/{NODE}")
-        graph.peer.kill()
-        time.sleep(0.5)
-        assert control.running
-        assert "Traceback" not in control.text
+def test_a_node_of_ros2_that_is_killed_is_no_harm(fresh: Ros2Graph) -> None:
+    control = fresh.node("control", name=f"/{NODE}")
+    fresh.peer.kill()
+    time.sleep(0.5)
+    assert control.running
+    assert "Traceback" not in control.text

@@ -22,9 +22,9 @@ CAMERA = ("--headless", "--json", "--camera", "virtual", "--camera.width", "320"
 FIELDS = ["twist.linear.x", "header.stamp", "header.frame_id"]
 
 
-@pytest.fixture
-def ros2(tmp_path: Path) -> Iterator[Ros2Graph]:
-    with ros2_graph(tmp_path) as graph:
+@pytest.fixture(params=("ros2", "dds"))
+def ros2(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Ros2Graph]:
+    with ros2_graph(tmp_path, request.param) as graph:
         yield graph
 
 

@@ -1,7 +1,6 @@
 """``ros2 param`` on one machine asks our node on another, over a link that loses frames."""
 
 import os
-import sys
 from pathlib import Path
 
 import pytest
@@ -12,7 +11,6 @@ from tests.distributed.network import NoNamespacesError, two_machines
 from tests.processes import Peer, Process
 from tests.ros2.graph import PEER, PYTHON
 
-pytest.importorskip("cyclonedds")
 pytestmark = [
     pytest.mark.ros2,
     pytest.mark.slow,
@@ -26,13 +24,13 @@ def test_parameters_are_listed_and_set_from_another_machine(tmp_path: Path) -> N
     try:
         with two_machines(tmp_path) as (robot, workstation, link):
             link.shape(delay_s=0.005, loss=0.05)
-            words = robot.command(sys.executable, "-m", "handsteer", "control", "--transport", "dds")
+            words = robot.command(str(PYTHON), "-m", "handsteer", "control", "--transport", "ros2")
             control = Process(words, env, tmp_path / "control.log")
             peer = Peer(workstation.command(str(PYTHON), str(PEER)), env, tmp_path / "peer.log")
             for _ in range(10):
                 reply = peer.ask("parameters", node=f"/{NODE}", call="list_parameters", arguments=[])
                 assert reply is not None, control.text
-                assert reply["result"]["names"][0] == "ramp"
+                assert "ramp" in reply["result"]["names"]
             change = {"name": "max_linear", "value": 0.2}
             results = peer.ask("parameters", node=f"/{NODE}", call="set_parameters", arguments=[change])["results"]
             assert results == [{"successful": True, "reason": ""}]

@@ -50,13 +50,14 @@ def test_a_launch_file_starts_executables_that_are_there(launch: Path) -> None:
 
 
 @pytest.mark.parametrize("file", sorted((PACKAGE / "config").glob("*.yaml")), ids=lambda path: path.name)
-def test_every_parameter_of_the_files_is_one_of_the_nodes(file: Path) -> None:
+def test_every_parameter_of_the_files_is_one_of_the_nodes(file: Path, caplog: pytest.LogCaptureFixture) -> None:
     said = parse_arguments(["--ros-args", "--params-file", str(file)])
     for pattern in yaml.safe_load(file.read_text()):
         node = pattern.rpartition("/")[2]
         parameters = said.parameters(f"/r1/{node}")
         assert parameters
         from_parameters(parameters, SECTIONS[node], node)
+        assert not caplog.messages
 
 
 @pytest.fixture(scope="module")

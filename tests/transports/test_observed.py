@@ -4,7 +4,7 @@ TWIST, STRING = "geometry_msgs/msg/Twist", "std_msgs/msg/String"
 
 
 def topic(name: str, *types: str, publishers: tuple[str, ...] = ()) -> ObservedTopic:
-    return ObservedTopic(name, types, publishers, (), None)
+    return ObservedTopic(name, types, publishers)
 
 
 def test_nothing_is_amiss() -> None:

@@ -7,6 +7,7 @@ program, that is run: handsteer in an environment of its own.
 import importlib.util
 import os
 import shutil
+import signal
 import sys
 
 
@@ -49,4 +50,6 @@ def _run(verb: str) -> None:
     if program is None:
         sys.exit(f"handsteer_ros2: there is no program {wanted}: install handsteer, or set HANDSTEER to its path")
     # In place of this process, so that signals of ``ros2 launch`` reach the node itself.
+    # Ctrl-C waits until handsteer can end in order: a new program inherits what is blocked.
+    signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT, signal.SIGTERM))
     os.execv(program, [program, verb, *transport, *words])

@@ -1,9 +1,15 @@
-#!/usr/bin/env python3
+#!/usr/bin/env -S python3 -S
 """Simulates the robot, in Gazebo's place (chapter 11 of the course): ``handsteer robot`` as a ROS node."""
 
-import os
-import sys
-from pathlib import Path
+try:
+    import os
+    import signal
+    import sys
+    from pathlib import Path
 
-NODE = Path(__file__).resolve().parents[2] / "handsteer_node"
-os.execv(NODE, [str(NODE), "robot", *sys.argv[1:]])
+    # Ctrl-C waits until handsteer can end in order: a new program inherits what is blocked.
+    signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT, signal.SIGTERM))
+    node = Path(__file__).resolve().parents[2] / "handsteer_node"
+    os.execv(node, [str(node), "robot", *sys.argv[1:]])
+except KeyboardInterrupt:
+    pass  # nothing has begun yet

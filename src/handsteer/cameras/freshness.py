@@ -33,6 +33,7 @@ class Freshness:
         self._image: NDArray[np.uint8] | None = None
         self._before: NDArray[np.uint8] | None = None
         self._samples: deque[bytes] = deque(maxlen=_REMEMBERED)
+        self._passed_over: deque[bytes] = deque(maxlen=_REMEMBERED)
         self._hand_frozen_s = 0.0
 
     def why_refused(self, image: NDArray[np.uint8], dt_s: float) -> str | None:
@@ -42,14 +43,9 @@ class Freshness:
             image: (height, width, 3) uint8.
             dt_s: Seconds since the picture before, >= 0.
         """
-        step = max(1, image.shape[0] // _SAMPLED_ROWS)
-        rows = image[step // 2 :: step]
+        rows, step = _sampled(image)
         sample = rows.tobytes()
-        is_same = sample in self._samples
-        if is_same:
-            self._samples.remove(sample)
-        self._samples.append(sample)
-        if is_same:
+        if _remember(sample, self._samples) or sample in self._passed_over:
             self.frozen_s += dt_s
             return f"the camera is frozen: the same picture for {self.frozen_s:.1f} s"
         self.frozen_s = 0.0
@@ -57,6 +53,13 @@ class Freshness:
         if rows[:, ::step].mean() < _BLACK:
             return "the picture is black: is the lens covered?"
         return None
+
+    def pass_over(self, image: NDArray[np.uint8]) -> None:
+        """Note a picture that is not looked at: it is not new either when it comes again.
+
+        Those that were looked at are remembered beside them, however many are passed over.
+        """
+        _remember(_sampled(image)[0].tobytes(), self._passed_over)
 
     def why_hand_refused(self, box: Box, dt_s: float) -> str | None:
         """Return why the hand in ``box`` of the last picture is not seen now, in words; None when it is.
@@ -80,3 +83,18 @@ class Freshness:
         now, then = image[there], before[there]
         # Most pictures differ in the first rows that are looked at.
         return bool(now.size) and np.array_equal(now[::16], then[::16]) and np.array_equal(now, then)
+
+
+def _sampled(image: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], int]:
+    """Return the rows that are compared, and how many rows of ``image`` there are for each."""
+    step = max(1, image.shape[0] // _SAMPLED_ROWS)
+    return image[step // 2 :: step], step
+
+
+def _remember(sample: bytes, samples: deque[bytes]) -> bool:
+    """Make ``sample`` the newest of ``samples``; return whether it was among them."""
+    is_known = sample in samples
+    if is_known:
+        samples.remove(sample)
+    samples.append(sample)
+    return is_known

@@ -12,6 +12,7 @@ import cv2
 from handsteer.cameras.protocol import Frame
 from handsteer.clock import Clock
 from handsteer.errors import CameraError, CameraInUse, CameraLost, CameraNotFound, CameraUnreadable
+from handsteer.picture_files import MOST_PIXELS
 
 _OPEN_TIMEOUT_MS = 5000
 _READ_TIMEOUT_MS = 2000
@@ -23,6 +24,7 @@ class Capture(Protocol):
 
     def isOpened(self) -> bool: ...  # noqa: D102, N802 - OpenCV's name
     def read(self) -> tuple[bool, Any]: ...  # noqa: D102
+    def get(self, prop: int) -> float: ...  # noqa: D102
     def set(self, prop: int, value: float) -> bool: ...  # noqa: D102
     def release(self) -> None: ...  # noqa: D102
 
@@ -43,7 +45,7 @@ class Webcam:
     Raises:
         CameraNotFound: There is no such device, or the address does not answer.
         CameraInUse: Another program holds the device.
-        CameraUnreadable: The device opens, but gives no picture.
+        CameraUnreadable: The device opens, but gives no picture, or larger ones than any camera should.
     """
 
     period_s = None
@@ -87,7 +89,10 @@ class Webcam:
                 return self._open()
             except CameraError as error:
                 raise CameraLost(str(error)) from None
-        frame = self._grab()
+        try:
+            frame = self._grab()
+        except CameraUnreadable as error:
+            raise CameraLost(str(error)) from None
         if frame is None:
             self.close()
             raise CameraLost(f"{self.name} gives no more frames: is it still plugged in?")
@@ -109,6 +114,7 @@ class Webcam:
         for prop, value in self._settings.items():
             capture.set(prop, value)
         self._capture = capture
+        self._check_size(round(capture.get(cv2.CAP_PROP_FRAME_WIDTH)), round(capture.get(cv2.CAP_PROP_FRAME_HEIGHT)))
         for _ in range(_FIRST_FRAME_TRIES):  # some webcams give empty frames while they warm up
             frame = self._grab()
             if frame is not None:
@@ -123,7 +129,18 @@ class Webcam:
             done, image = self._capture.read()
         except cv2.error:
             return None
-        return Frame(image, self._clock.now()) if done and image is not None and image.size else None
+        if not done or image is None or not image.size:
+            return None
+        self._check_size(image.shape[1], image.shape[0])  # what comes by a network may change its size
+        return Frame(image, self._clock.now())
+
+    def _check_size(self, width: int, height: int) -> None:
+        if width * height > MOST_PIXELS:
+            self.close()
+            raise CameraUnreadable(
+                f"{self.name} gives pictures of {width}x{height}: they should have at most {MOST_PIXELS} pixels; "
+                "let it give smaller ones"
+            )
 
 
 def is_address(source: str) -> bool:

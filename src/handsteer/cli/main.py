@@ -1,142 +1,30 @@
-"""The command line as a whole: its verbs, and what becomes of errors."""
+"""Where the command line starts: signals end it in order from the first moment on, then all else is loaded."""
 
-import logging
-import math
-import os
-import signal
 import sys
-import time
-from collections.abc import Callable
-from types import FrameType
 
-from cyclopts import App, CycloptsError, ValidationError
-from pydantic import ValidationError as PydanticError
+from handsteer.cli import signals
 
-from handsteer import __version__, config
-from handsteer.cli.options import say
-from handsteer.errors import HandsteerError
-
-# Another signal so soon after one is the same wish; it must not cut off what the first one has begun.
-_SAME_WISH_S = 1.0
-
-_ENDING = (
-    *("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT", "SIGABRT", "SIGTSTP", "SIGTTIN", "SIGTTOU", "SIGUSR1", "SIGUSR2"),
-    *("SIGALRM", "SIGVTALRM", "SIGPROF", "SIGXCPU", "SIGIO", "SIGPWR", "SIGSTKFLT", "SIGSYS", "SIGBREAK"),
+# An interrupt is the ordinary end of these, also before they have begun: what starts them is not to call it a failure.
+_UNTIL_INTERRUPTED = frozenset(
+    ("run", "camera", "recognition", "control", "robot", "robots", "steering", "zenoh-router")
 )
-"""Signals whose default is to end a program, or to hold it, as Ctrl-Z does; the robot would hear nothing of it."""
-
-_EXAMPLES = """Examples:
-  handsteer run                                  drive, and open the page
-  handsteer run --headless --duration 30 --json  no page, one summary at the end
-  handsteer recognize photo.jpg                  which sign is it?
-  handsteer signs evaluate photos/               how well are signs told?
-  handsteer camera --transport ros1              one node, in a ROS 1 graph
-  handsteer camera --transport dds               one node, in a ROS 2 graph; or --transport zenoh
-  handsteer graph --transport dds                who is in the ROS 2 graph, and how often they speak
-  handsteer doctor                               what works on this machine
-"""
-
-app = App(
-    name="handsteer",
-    help="Drive a mobile robot with your hand signs.",
-    help_epilogue=_EXAMPLES,
-    version=__version__,
-    help_format="plaintext",
-    result_action="return_value",
-)
-# Named, not imported: a verb's module is loaded when it is used.
-for verb in ("run", "recognize", "models", "graph", "doctor"):
-    app.command(f"handsteer.cli.{verb}:{verb}", name=verb)
-app.command("handsteer.cli.signs:app", name="signs")
-for verb in ("camera", "recognition", "control", "robot", "steering"):
-    app.command(f"handsteer.cli.nodes:{verb}", name=verb, group="One node of a graph of several processes")
-app.command(
-    "handsteer.cli.zenoh_router:zenoh_router", name="zenoh-router", group="One node of a graph of several processes"
-)
-app.command("handsteer.cli.robots:robots", name="robots", group="One node of a graph of several processes")
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Run the command line; exit code 0 when all went well, 2 when the input was wrong."""
-    logging.basicConfig(level=logging.INFO, format="handsteer: %(message)s", stream=sys.stderr)
-    for noisy in ("uvicorn", "asyncio", "httpx", "watchfiles", "rospy"):
-        logging.getLogger(noisy).setLevel(logging.WARNING)
-    _end_on_signals()
-    words = _ros_words_last(sys.argv[1:] if arguments is None else arguments)
-    _load_what_help_lists(app, words)
+    """Run the command line; exit code 0 when all went well, 2 when the input was wrong, 130 when it was interrupted.
+
+    What runs until it is interrupted ends with 0 then.
+    """
+    words = sys.argv[1:] if arguments is None else arguments
+    interrupted = 0 if words and words[0] in _UNTIL_INTERRUPTED else 130
+    signals.end_at_once(interrupted)
     try:
-        sys.exit(app(words, exit_on_error=False, print_error=False) or 0)
-    except CycloptsError as error:
-        _fail(_problem(error))
-    except HandsteerError as error:
-        _fail(str(error))
-    except BrokenPipeError:  # the reader of our output has left, as `head` does
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        sys.exit(0)
+        # It takes half a second to load.
+        from handsteer.cli.app import run  # noqa: PLC0415
+
+        code = run(words)
     except KeyboardInterrupt:
-        sys.exit(130)
-
-
-def _load_what_help_lists(group: App, arguments: list[str]) -> None:
-    """Load the verbs of a group that is asked for help or named alone: their descriptions are listed then."""
-    if not arguments or arguments[0] in group.help_flags:
-        for verb in group:
-            group[verb]
-    elif arguments[0] in set(group):
-        _load_what_help_lists(group[arguments[0]], arguments[1:])
-
-
-def _ros_words_last(arguments: list[str]) -> list[str]:
-    """Return ``arguments`` with what stands between ``--ros-args`` and ``--`` moved to the end, where options end.
-
-    ROS 2 allows them anywhere, and ``ros2 launch`` appends its own.
-    """
-    ours: list[str] = []
-    ros: list[str] = []
-    inside = False
-    for argument in arguments:
-        inside = inside or argument == "--ros-args"
-        (ros if inside else ours).append(argument)
-        inside = inside and argument != "--"
-    return [*ours, *([] if "--" in ours else ["--"]), *ros] if ros else ours
-
-
-def _end_on_signals() -> None:
-    """End the program in order, which leaves the robot standing, on each signal that would end or hold it otherwise.
-
-    SIGKILL and SIGSTOP cannot be caught, and after a crash (SIGSEGV and its like) nothing can be said any more.
-    """
-    interrupt = _interrupter()
-    for name in _ENDING:
-        number = getattr(signal, name, None)
-        if number is None:
-            continue  # not on this system
-        # Whoever starts a program by nohup wants it to outlive the terminal. SIGINT is taken even so: a shell lets its
-        # background jobs ignore it, and a robot must be stopped all the same.
-        if name == "SIGHUP" and signal.getsignal(number) == signal.SIG_IGN:
-            continue
-        signal.signal(number, interrupt)
-
-
-def _interrupter() -> Callable[[int, FrameType | None], None]:
-    raised_s = -math.inf
-
-    def interrupt(_signal: int, _frame: FrameType | None) -> None:
-        nonlocal raised_s
-        now_s = time.monotonic()
-        if now_s - raised_s >= _SAME_WISH_S:
-            raised_s = now_s
-            raise KeyboardInterrupt
-
-    return interrupt
-
-
-def _problem(error: CycloptsError) -> str:
-    if isinstance(error, ValidationError) and isinstance(error.__cause__, PydanticError):
-        return config.describe(error.__cause__)
-    return f"{str(error).rstrip('.')}; see handsteer --help"
-
-
-def _fail(message: str) -> None:
-    say(" ".join(message.split()))
-    sys.exit(2)
+        code = interrupted
+    finally:
+        signals.end_in_order()
+    sys.exit(code)

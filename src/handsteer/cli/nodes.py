@@ -40,7 +40,8 @@ def camera(
         In the transport's own words. ROS 1: topic:=other, __name:=name, __ns:=namespace, _parameter:=value.
         ROS 2: --ros-args -r topic:=other -r __node:=name -r __ns:=/namespace -p parameter:=value --params-file file.
     transport
-        What joins the nodes: dds or zenoh (both ROS 2), or ros1.
+        What joins the nodes: ros2 (by rclpy), dds or zenoh (ROS 2 without ROS here), auto (ros2 where it is, else dds),
+        or ros1.
     camera
         auto, virtual, a webcam's index or /dev/videoN, an address (rtsp, http), a video file or a folder of photos.
     config_file
@@ -61,7 +62,8 @@ def recognition(*words: str, transport: str, config_file: ConfigFile = None, par
         In the transport's own words. ROS 1: topic:=other, __name:=name, __ns:=namespace, _parameter:=value.
         ROS 2: --ros-args -r topic:=other -r __node:=name -r __ns:=/namespace -p parameter:=value --params-file file.
     transport
-        What joins the nodes: dds or zenoh (both ROS 2), or ros1.
+        What joins the nodes: ros2 (by rclpy), dds or zenoh (ROS 2 without ROS here), auto (ros2 where it is, else dds),
+        or ros1.
     config_file
         YAML file with parameters; ROS parameters go before it, options before both.
     """
@@ -80,7 +82,8 @@ def control(*words: str, transport: str, config_file: ConfigFile = None, paramet
         In the transport's own words. ROS 1: topic:=other, __name:=name, __ns:=namespace, _parameter:=value.
         ROS 2: --ros-args -r topic:=other -r __node:=name -r __ns:=/namespace -p parameter:=value --params-file file.
     transport
-        What joins the nodes: dds or zenoh (both ROS 2), or ros1.
+        What joins the nodes: ros2 (by rclpy), dds or zenoh (ROS 2 without ROS here), auto (ros2 where it is, else dds),
+        or ros1.
     config_file
         YAML file with parameters; ROS parameters go before it, options before both.
     """
@@ -105,7 +108,8 @@ def robot(
         In the transport's own words. ROS 1: topic:=other, __name:=name, __ns:=namespace, _parameter:=value.
         ROS 2: --ros-args -r topic:=other -r __node:=name -r __ns:=/namespace -p parameter:=value --params-file file.
     transport
-        What joins the nodes: dds or zenoh (both ROS 2), or ros1.
+        What joins the nodes: ros2 (by rclpy), dds or zenoh (ROS 2 without ROS here), auto (ros2 where it is, else dds),
+        or ros1.
     world
         Name of a shipped world, or a YAML file.
     config_file
@@ -134,7 +138,8 @@ def steering(
         In the transport's own words. ROS 1: topic:=other, __name:=name, __ns:=namespace, _parameter:=value.
         ROS 2: --ros-args -r topic:=other -r __node:=name -r __ns:=/namespace -p parameter:=value --params-file file.
     transport
-        What joins the nodes: dds or zenoh (both ROS 2), or ros1.
+        What joins the nodes: ros2 (by rclpy), dds or zenoh (ROS 2 without ROS here), auto (ros2 where it is, else dds),
+        or ros1.
     host
         Address of this machine that the page is served on; 0.0.0.0 lets other machines in, with a token.
     port
@@ -204,6 +209,7 @@ def _run(job: _Job, transport: str, words: tuple[str, ...]) -> int:
         config = job.settings(from_parameters(session.parameters, job.section, session.name))
         node = job.make(config, session.transport, session.clock)
         session.serve(NodeParameters(config, job.section, node.reconfigure, node.check))
+        session.offer(node.services)
         _run_until_end(node, session, job.beside(node, config))
     except KeyboardInterrupt:
         pass  # the ordinary end of a node

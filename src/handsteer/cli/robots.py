@@ -27,7 +27,7 @@ def robots(count: int, /, *, transport: str, world: str | None = None) -> int:
     count
         How many.
     transport
-        What joins the nodes: dds (ROS 2) or ros1.
+        What joins the nodes: ros2, dds or zenoh (ROS 2), auto, or ros1.
     world
         Name of a shipped world, or a YAML file.
     """

@@ -50,8 +50,9 @@ def run(
         auto, virtual, browser (that of whoever looks at the page), a webcam's index or /dev/videoN, an address (rtsp,
         http), a video file or a folder of photos.
     robot
-        sim, the simulated one. Or a real one: dds (ROS 2), zenoh or ros1, whatever listens to cmd_vel there; or, in
-        ROS 2, turtlebot3_burger, turtlebot3_waffle, turtlebot4 or turtlesim, whose topics and limits are known.
+        sim, the simulated one. Or a real one, whatever listens to cmd_vel there: ros2 (by rclpy), dds or zenoh (ROS 2
+        without ROS here), auto (ros2 where it is, else dds) or ros1. Or, by auto, turtlebot3_burger,
+        turtlebot3_waffle, turtlebot4 or turtlesim, whose topics and limits are known.
     world
         Name of a shipped world, or a YAML file.
     host
@@ -94,7 +95,7 @@ def run(
 
 def _robot(name: str | None) -> dict[str, str | None]:
     """Return the parameters that ``--robot name`` is short for: the kind of robot, or one that is known."""
-    return {"kind": "dds", "preset": name} if name in PRESETS else {"kind": name}
+    return {"kind": "auto", "preset": name} if name in PRESETS else {"kind": name}
 
 
 @contextmanager
@@ -108,7 +109,7 @@ def _linked(
         raise ConfigError("control.robots is for `handsteer control`: a run drives one robot")
     if kind == "sim":
         if words:
-            raise ConfigError(f"{words[0]!r}: a simulated robot has no graph to take it; choose one by --robot dds")
+            raise ConfigError(f"{words[0]!r}: a simulated robot has no graph to take it; choose one by --robot auto")
         yield settings, None
         return
     if fast:

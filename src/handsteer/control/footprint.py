@@ -10,6 +10,8 @@ from handsteer.control.velocity import Velocity
 
 Array = NDArray[np.float64]
 
+_STRAIGHT_RADPS = 1e-9
+
 
 def gaps(x: Array, y: Array, rule: CollisionMonitorConfig) -> Array:
     """Return how far points at ``x`` and ``y`` in the base frame are from the robot, in metres; within, it is below 0.
@@ -19,10 +21,24 @@ def gaps(x: Array, y: Array, rule: CollisionMonitorConfig) -> Array:
         y: To the left, of the same shape.
         rule: How far the robot reaches.
     """
-    along = np.maximum(x - rule.front, -x - rule.back)
-    across = np.abs(y) - rule.side
-    outside: Array = np.hypot(np.maximum(along, 0.0), np.maximum(across, 0.0))
+    along, across = _beyond(x, y, rule)
+    ahead, aside = np.maximum(along, 0.0), np.maximum(across, 0.0)
+    outside: Array = np.sqrt(ahead * ahead + aside * aside)  # as np.hypot, in a third of the time
     return outside + np.minimum(np.maximum(along, across), 0.0)
+
+
+def least_gaps(x: Array, y: Array, rule: CollisionMonitorConfig) -> Array:
+    """Return what :func:`gaps` are at least; takes a third of the time."""
+    along, across = _beyond(x, y, rule)
+    return np.maximum(along, across, out=along)
+
+
+def _beyond(x: Array, y: Array, rule: CollisionMonitorConfig) -> tuple[Array, Array]:
+    """Return how far points are beyond front or back, and beyond the sides."""
+    along, across = np.abs(x - (rule.front - rule.back) / 2), np.abs(y)
+    along -= (rule.front + rule.back) / 2
+    across -= rule.side
+    return along, across
 
 
 def reach_m(rule: CollisionMonitorConfig) -> float:
@@ -38,10 +54,18 @@ def fastest_mps(velocity: Velocity, rule: CollisionMonitorConfig) -> float:
 
 def on_a_circle(velocity: Velocity, times_s: Array) -> Array:
     """Return where a robot that goes on at a steady ``velocity`` is at ``times_s``, (K,): (K, 3) x, y and yaw."""
-    turned = velocity.angular_radps * times_s
-    # sin(a) / a holds for a straight line, too.
-    chord = velocity.linear_mps * times_s * np.sinc(turned / math.tau)
-    return np.stack([chord * np.cos(turned / 2), chord * np.sin(turned / 2), turned], axis=1)
+    v, w = velocity.linear_mps, velocity.angular_radps
+    poses = np.zeros((len(times_s), 3))
+    if abs(w) < _STRAIGHT_RADPS:
+        poses[:, 0] = v * times_s
+        return poses
+    half = (w / 2) * times_s
+    sine = np.sin(half)
+    chord = sine * (2 * v / w)
+    np.multiply(chord, np.cos(half), out=poses[:, 0])
+    np.multiply(chord, sine, out=poses[:, 1])
+    np.add(half, half, out=poses[:, 2])
+    return poses
 
 
 def braking(moving: Velocity, told: Velocity, rule: CollisionMonitorConfig, delay_s: float, times_s: Array) -> Array:
@@ -54,23 +78,51 @@ def braking(moving: Velocity, told: Velocity, rule: CollisionMonitorConfig, dela
         delay_s: When it is told to stand.
         times_s: (K,), at equal intervals from 0.
     """
-    v = _speeds(moving.linear_mps, told.linear_mps, rule.deceleration, delay_s, times_s)
-    w = _speeds(moving.angular_radps, told.angular_radps, rule.angular_deceleration, delay_s, times_s)
-    step_s = times_s[1]
-    yaw = np.concatenate([[0.0], np.cumsum((w[1:] + w[:-1]) / 2 * step_s)])
-    way, middle = (v[1:] + v[:-1]) / 2 * step_s, (yaw[1:] + yaw[:-1]) / 2
-    x, y = np.cumsum(way * np.cos(middle)), np.cumsum(way * np.sin(middle))
-    return np.stack([np.concatenate([[0.0], x]), np.concatenate([[0.0], y]), yaw], axis=1)
+    early_s = np.minimum(times_s, delay_s)
+    late_s = times_s - early_s
+    v = _speeds(moving.linear_mps, told.linear_mps, rule.deceleration, early_s, late_s)
+    poses = np.zeros((len(times_s), 3))
+    half_step_s = times_s[1] / 2
+    way = (v[1:] + v[:-1]) * half_step_s
+    if not (moving.angular_radps or told.angular_radps):
+        way.cumsum(out=poses[1:, 0])
+        return poses
+    w = _speeds(moving.angular_radps, told.angular_radps, rule.angular_deceleration, early_s, late_s)
+    turned = (w[1:] + w[:-1]) * half_step_s
+    yaw = turned.cumsum(out=poses[1:, 2])
+    middle = yaw - turned / 2
+    (way * np.cos(middle)).cumsum(out=poses[1:, 0])
+    (way * np.sin(middle)).cumsum(out=poses[1:, 1])
+    return poses
 
 
 def seen_from(poses: Array, points: Array) -> tuple[Array, Array]:
     """Return x and y, (K, N) each, of ``points`` (N, 2) as a robot sees them from ``poses`` (K, 3) x, y and yaw."""
-    x, y, yaw = (poses[:, number, None] for number in range(3))
-    dx, dy = points[:, 0] - x, points[:, 1] - y
-    return dx * np.cos(yaw) + dy * np.sin(yaw), dy * np.cos(yaw) - dx * np.sin(yaw)
+    x, y, yaw = poses[:, 0], poses[:, 1], poses[:, 2]
+    cos, sin = np.cos(yaw), np.sin(yaw)
+    turns = np.empty((2 * len(poses), 2))
+    turns[: len(poses), 0] = turns[len(poses) :, 1] = cos
+    turns[: len(poses), 1] = sin
+    turns[len(poses) :, 0] = -sin
+    seen = np.dot(turns, points.T)
+    seen[: len(poses)] -= (x * cos + y * sin)[:, None]
+    seen[len(poses) :] -= (y * cos - x * sin)[:, None]
+    return seen[: len(poses)], seen[len(poses) :]
 
 
-def _speeds(moving: float, told: float, most: float, delay_s: float, times_s: Array) -> Array:
-    before, after = most * np.minimum(times_s, delay_s), most * np.maximum(times_s - delay_s, 0.0)
-    speeds: Array = moving + np.clip(told - moving, -before, before)
-    return speeds - np.clip(speeds, -after, after)
+def after(velocity: Velocity, seconds: float, points: Array) -> Array:
+    """Return where ``points``, (N, 2), are for a robot that has gone on at a steady ``velocity`` for so long."""
+    if velocity.is_zero or not seconds:
+        return points
+    x, y, yaw = on_a_circle(velocity, np.array([seconds]))[0].tolist()
+    cos, sin = math.cos(yaw), math.sin(yaw)
+    seen: Array = np.dot(points - (x, y), np.array(((cos, -sin), (sin, cos))))
+    return seen
+
+
+def _speeds(moving: float, told: float, most: float, early_s: Array, late_s: Array) -> Array:
+    """Return the speeds of what goes over to ``told`` for ``early_s``, and brakes for ``late_s``, by ``most``."""
+    gap, sign = abs(told - moving), math.copysign(most, told - moving)
+    speeds: Array = moving + np.minimum(early_s, gap / most) * sign if gap else np.full(len(early_s), told)
+    brakes = late_s * most
+    return speeds - np.minimum(np.maximum(speeds, -brakes), brakes)

@@ -10,9 +10,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from handsteer.config import CollisionMonitorConfig
-from handsteer.control.footprint import braking, fastest_mps, gaps, on_a_circle, reach_m, seen_from
+from handsteer.control.footprint import after, braking, fastest_mps, gaps, least_gaps, on_a_circle, reach_m, seen_from
 from handsteer.control.scan_points import Points
 from handsteer.control.velocity import ZERO, Velocity
 
@@ -24,11 +25,16 @@ _PAD_S = 0.03
 
 # Who is nearer already may come no nearer than by this, which is the noise of a scan.
 _NOISE_M = 0.01
+# But a robot that turns by more than this, so near to something, is to come no nearer than by this.
+_SWING_RAD = 0.03
+_NEARER_M = 0.001
 # Of the robot's own speed: what is near and comes nearer so slowly is passed along.
 _GLANCING = 0.05
 _CREEP_M = 0.06
 _STEP_M = 0.03
 _FEWEST_STEPS, _MOST_STEPS = 8, 400
+# Of every third pose, none between is farther away than two steps; a hair more, as the poses are added up.
+_ROUGHLY = 2.1
 _SLOWEST = 0.005
 _NOTHING_MPS = 1e-6
 # Which shares of a velocity that is too fast are tried, of driving and of turning: those first that turn as they were
@@ -79,6 +85,9 @@ def limit(
     """
     if wanted.is_zero or not len(points):
         return wanted, None
+    points = _within_reach(wanted, points, rule, moving)
+    if not len(points):
+        return wanted, None
     share, hit = turn, _ = _share(wanted, points, rule)
     if hit and wanted.linear_mps and wanted.angular_radps:
         turn, _ = _share(Velocity(0.0, wanted.angular_radps), points, rule)
@@ -94,6 +103,17 @@ def limit(
         if met.time_s > latest_s:
             best, latest_s = slower, met.time_s
     return best, None if best == wanted else hit
+
+
+def _within_reach(wanted: Velocity, points: Points, rule: CollisionMonitorConfig, moving: Velocity) -> Points:
+    """Return those of ``points`` that a robot could meet, however it is slowed."""
+    v = max(abs(moving.linear_mps), abs(wanted.linear_mps))
+    w = max(abs(moving.angular_radps), abs(wanted.angular_radps))
+    way_m = v * (rule.reaction_time + max(v / rule.deceleration, w / rule.angular_deceleration))
+    pad_m = _PAD_M + _PAD_S * fastest_mps(Velocity(v, w), rule) + _NOISE_M
+    far_m = way_m + rule.margin + _CREEP_M + reach_m(rule) + pad_m
+    x, y = points[:, 0], points[:, 1]
+    return points[x * x + y * y <= far_m**2]
 
 
 def _scaled(velocity: Velocity, linear: float, angular: float) -> Velocity:
@@ -163,39 +183,45 @@ def _met_while_braking(moving: Velocity, told: Velocity, points: Points, rule: C
 
 def _times(fastest_mps: float, seconds: float) -> Points:
     steps = min(max(math.ceil(fastest_mps * seconds / _STEP_M), _FEWEST_STEPS), _MOST_STEPS)
-    return np.linspace(0.0, seconds, steps + 1)
+    return np.arange(steps + 1, dtype=np.float64) * (seconds / steps)
 
 
 def _met(
     poses: Points, times_s: Points, points: Points, rule: CollisionMonitorConfig, *, pad_m: float, fastest_mps: float
 ) -> Hit | None:
     """Return what the footprint meets first on its way by ``poses`` (K, 3) at ``times_s`` (K,); None for nothing."""
-    way_m = float(np.hypot(poses[:, 0], poses[:, 1]).max())
-    near = points[np.hypot(points[:, 0], points[:, 1]) <= way_m + reach_m(rule) + pad_m]
+    # Most points stay far away, which a few poses tell.
+    beyond_m = pad_m + _NOISE_M + _ROUGHLY * fastest_mps * times_s[1]
+    near = points[least_gaps(*seen_from(poses[1::3], points), rule).min(axis=0) <= beyond_m]
     if not len(near):
         return None
     gap = gaps(*seen_from(poses, near), rule)
-    # Where something is within the pad already, the robot may still pass by what gets no nearer.
-    met_s = _met_s(gap, times_s, min(pad_m, float(gap[0].min()) - _NOISE_M))
-    comes_nearer = gap[1] - gap[0] < -_GLANCING * fastest_mps * times_s[1]
-    met_s[(gap[0] < pad_m) & comes_nearer & np.isfinite(met_s)] = 0.0
-    first = int(met_s.argmin())
-    if not math.isfinite(met_s[first]):
-        return None
-    return Hit(float(near[first, 0]), float(near[first, 1]), float(gap[0, first]), float(met_s[first]))
-
-
-def _met_s(gap: Points, times_s: Points, least_m: float) -> Points:
-    """Return when each point first is as near as ``least_m``, (N,), from its gaps at ``times_s``, (K, N); else inf."""
+    gap_m = float(gap[0].min())
+    # Where something is within the pad already, the robot may still pass by what gets no nearer. A corner that swings
+    # towards a wall gets nearer by less than a scan's noise each time, but each time again.
+    swings = gap_m < _NOISE_M and float(np.abs(poses[:, 2]).max()) > _SWING_RAD
+    least_m = min(pad_m, gap_m - (_NEARER_M if swings else _NOISE_M))
     is_met = gap <= least_m
-    step = is_met.argmax(axis=0)
-    met_s = np.full(gap.shape[1], np.inf)
-    (met,) = np.nonzero(is_met.any(axis=0))
-    at = np.maximum(step[met], 1)
+    met = is_met.any(axis=0)
+    if not met.any():
+        return None
+    comes_nearer = (gap[0] < pad_m) & (gap[1] - gap[0] < -_GLANCING * fastest_mps * times_s[1])
+    at_once = met if swings else met & comes_nearer
+    if at_once.any():
+        first, time_s = int(at_once.argmax()), 0.0
+    else:
+        first, time_s = _first(gap, is_met, times_s, least_m)
+    return Hit(float(near[first, 0]), float(near[first, 1]), float(gap[0, first]), time_s)
+
+
+def _first(gap: Points, is_met: NDArray[np.bool_], times_s: Points, least_m: float) -> tuple[int, float]:
+    """Return which point is met first, ``is_met`` (K, N), and when, between the steps of ``times_s`` (K,)."""
+    at = max(1, int(is_met.any(axis=1).argmax()))
+    met = np.flatnonzero(is_met[: at + 1].any(axis=0))
     before, after = gap[at - 1, met], gap[at, met]
-    part = np.clip((before - least_m) / np.maximum(before - after, 1e-9), 0.0, 1.0)
-    met_s[met] = times_s[at - 1] + part * (times_s[at] - times_s[at - 1])
-    return met_s
+    parts = np.minimum(np.maximum((before - least_m) / np.maximum(before - after, 1e-9), 0.0), 1.0)
+    first = int(parts.argmin())
+    return int(met[first]), float(times_s[at - 1] + parts[first] * (times_s[at] - times_s[at - 1]))
 
 
 class ObstacleLimiter:
@@ -214,12 +240,19 @@ class ObstacleLimiter:
         self._points: Points | None = None
         self._measured_s = -math.inf
         self._moving = self._told = ZERO
-        self._told_s = -math.inf
+        self._moving_s = self._told_s = -math.inf
         self.hit: Hit | None = None
 
     def see(self, points: Points, measured_s: float) -> None:
         """Take a scan that was measured at ``measured_s``, in seconds of the caller's clock."""
         self._points, self._measured_s = points, measured_s
+
+    def feel(self, moving: Velocity, measured_s: float) -> None:
+        """Take how the robot moved at ``measured_s``, as its odometry says; finite.
+
+        Without it, the robot is taken to follow commands as hard as it surely brakes: most get faster sooner.
+        """
+        self._moving, self._moving_s = moving, measured_s
 
     def silence_s(self, now_s: float) -> float:
         """Return how old the newest scan is at ``now_s``; infinity when there is none."""
@@ -234,18 +267,17 @@ class ObstacleLimiter:
 
         The robot has gone on since the scan was measured, and so the points are taken to be elsewhere.
         """
-        self._moving = self._followed(now_s)
+        self._moving, self._moving_s = self._followed(now_s), now_s
         self.hit, said = None, ZERO
         if self._points is not None and not self.is_blind(now_s):
-            moved = on_a_circle(self._moving, np.array([self.silence_s(now_s)]))
-            points = np.stack(seen_from(moved, self._points), axis=-1)[0]
+            points = after(self._moving, self.silence_s(now_s), self._points)
             said, self.hit = limit(wanted, points, self.rule, self._moving)
         self._told, self._told_s = said, now_s
         return said
 
     def _followed(self, now_s: float) -> Velocity:
-        """Return how a robot with these brakes moves at ``now_s``, after what it was told."""
-        elapsed_s = max(0.0, now_s - self._told_s)
+        """Return how a robot with these brakes moves at ``now_s``, after what it did last and was told."""
+        elapsed_s = max(0.0, now_s - max(self._moving_s, self._told_s))
         if not math.isfinite(elapsed_s):
             return ZERO
         return Velocity(

@@ -1,5 +1,6 @@
 """The process that serves the page of another process's graph; :mod:`handsteer.dashboard.apart` starts it."""
 
+import gc
 import itertools
 import logging
 import logging.handlers
@@ -175,6 +176,10 @@ def serve(pipe: Pipe) -> None:
     dashboard = Dashboard.of(graph, graph.join())
     pipe.say("served", dashboard.start())
     graph.steering.start()
+    # What is there now stays. Where collections need not look through it they are quick, and come as soon as a few
+    # pages were left, of which each takes a megabyte.
+    gc.collect()
+    gc.freeze()
     while not (end.wait(_LOOK_PERIOD_S) or pipe.ended.is_set()):
         pass
     graph.steering.stop()

@@ -12,7 +12,7 @@ from typing import Any
 
 import uvicorn
 from fastapi import FastAPI
-from nicegui import core, ui
+from nicegui import app, core, ui
 from starlette.responses import Response
 from starlette.staticfiles import StaticFiles
 from starlette.websockets import WebSocket
@@ -36,6 +36,7 @@ from handsteer.dashboard.settings_store import Settings
 from handsteer.dashboard.socket_events import SocketEvents
 from handsteer.dashboard.teach import TeachPage
 from handsteer.dashboard.teaching.teaching import Teaching
+from handsteer.dashboard.unjoined import Unjoined
 from handsteer.dashboard.watch import WhileWatched
 from handsteer.dashboard.webcam import FrameSocket
 from handsteer.errors import DashboardError
@@ -254,17 +255,19 @@ def _application() -> FastAPI:
     async def webcam(socket: WebSocket) -> None:
         await application.state.dashboard.webcam.serve(socket)
 
+    unjoined = Unjoined()
+
     @ui.page("/")
     def index() -> None:
-        DrivePage(application.state.dashboard.served)
+        unjoined.add(DrivePage(application.state.dashboard.served).client)
 
     @ui.page("/settings")
     def settings() -> None:
-        SettingsPage(application.state.dashboard.served)
+        unjoined.add(SettingsPage(application.state.dashboard.served).client)
 
     @ui.page("/teach")
     def teach() -> None:
-        TeachPage(application.state.dashboard.served)
+        unjoined.add(TeachPage(application.state.dashboard.served).client)
 
     ui.run_with(
         application,
@@ -280,6 +283,8 @@ def _application() -> FastAPI:
         # Who steers is missed much sooner, by what the page repeats.
         reconnect_timeout=10.0,
     )
+    # Else something of each tab that ever looked is kept for 30 days; no page here keeps anything in it.
+    app.storage.max_tab_storage_age = 0.0
     SocketEvents(core.sio)
     keep_short()
     return application

@@ -4,7 +4,6 @@ import ctypes.util
 import importlib.util
 import os
 import platform
-import shutil
 import socket
 
 from handsteer.cameras.webcam import Webcam, webcams
@@ -78,10 +77,11 @@ def _port(port: int) -> Finding:
 
 def _ros() -> list[Finding]:
     ros1 = "rospy can be imported" if importlib.util.find_spec("rospy") else "no rospy (Debian, Ubuntu: make ros1)"
-    ros2 = "ros2 is on the path" if shutil.which("ros2") else "no ros2 command"
+    has_rclpy = importlib.util.find_spec("rclpy") is not None
+    ros2 = "rclpy can be imported" if has_rclpy else "no rclpy for this Python: is a ROS 2 sourced?"
     return [
         Finding("ros 1", "ok" if importlib.util.find_spec("rospy") else "optional", f"{ros1}; not needed to run"),
-        Finding("ros 2", "ok" if shutil.which("ros2") else "optional", f"{ros2}; not needed to run"),
+        Finding("ros 2", "ok" if has_rclpy else "optional", f"{ros2}; not needed to run"),
     ]
 
 

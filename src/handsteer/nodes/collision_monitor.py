@@ -8,7 +8,7 @@ from handsteer.config import CollisionMonitorConfig
 from handsteer.control.obstacles import ObstacleLimiter
 from handsteer.control.scan_points import points_of
 from handsteer.control.velocity import Velocity
-from handsteer.messages import SCAN, LaserScan
+from handsteer.messages import ODOM, SCAN, LaserScan, Odometry, Pose
 from handsteer.nodes.node import Node
 from handsteer.transports.protocol import Received
 
@@ -16,7 +16,7 @@ log = logging.getLogger(__name__)
 
 
 class CollisionMonitor:
-    """Listens to the laser scanner once it is enabled, and from then on.
+    """Listens to the laser scanner, and to the robot's odometry, once it is enabled, and from then on.
 
     Args:
         node: The control.
@@ -30,6 +30,7 @@ class CollisionMonitor:
         self._limiter = ObstacleLimiter(rule)
         self._listens = False
         self._came_s = -math.inf
+        self._pose: Pose | None = None
         self._is_broken = False
         self._stands = False
         self.reconfigure(rule)
@@ -41,6 +42,7 @@ class CollisionMonitor:
         if rule.enabled and not self._listens:
             self._listens = True
             self._node.subscribe(SCAN, self._on_scan)
+            self._node.subscribe(ODOM, self._on_odometry)
 
     def admit(self, wanted: Velocity) -> Velocity:
         """Return what may be commanded instead of ``wanted``."""
@@ -56,11 +58,7 @@ class CollisionMonitor:
 
     def explain(self, reason: str) -> str:
         """Return the control's ``reason`` with what slows the robot, as ``driving: Forward, slowed: obstacle …``."""
-        if not self._limiter.rule.enabled:
-            return reason
-        if why := self.why_blind():
-            return f"standing: {why}"
-        hit = self._limiter.hit
+        hit = self._limiter.hit if self._limiter.rule.enabled else None
         if hit is None:
             return reason
         said = hit.describe(self._limiter.rule)
@@ -96,3 +94,13 @@ class CollisionMonitor:
         if points is not None:
             captured_s = now if received.captured_s is None else received.captured_s
             self._limiter.see(points, min(captured_s, now))
+
+    def _on_odometry(self, received: Received[Odometry]) -> None:
+        now = self._node.clock.now()
+        twist, pose = received.message.twist.twist, received.message.pose.pose
+        moving = Velocity(twist.linear.x, twist.angular.z)
+        has_moved, self._pose = self._pose not in (None, pose), pose
+        # Some odometry leaves its twist at zero: then what was commanded tells more.
+        if moving.is_finite and not (moving.is_zero and has_moved):
+            captured_s = now if received.captured_s is None else received.captured_s
+            self._limiter.feel(moving, min(captured_s, now))

@@ -17,6 +17,7 @@ from handsteer.messages import (
     ODOM,
     STEERING_CMD_VEL,
     STOP,
+    Bool,
     Odometry,
     Pose,
     String,
@@ -32,11 +33,14 @@ from handsteer.nodes.rivals import Rivals
 from handsteer.nodes.selection import Selection
 from handsteer.nodes.stop_keeper import StopKeeper
 from handsteer.signs.vocabulary import NONE
-from handsteer.transports.protocol import Publisher, Received, Transport
+from handsteer.transports.protocol import Call, Publisher, Received, Transport
 
 log = logging.getLogger(__name__)
 
 _WATCHDOG_PERIOD_S = 0.02
+# Nothing that the watchdog looks for comes sooner after a message, which does the same work, or while nobody drives.
+# Whole beats after it the timeout of 0.35 s has passed; a hair more, as sums of times are not exact.
+_CALM_S = 0.09 + 1e-7
 _DIAGNOSE_PERIOD_S = 0.1
 
 
@@ -58,6 +62,8 @@ class HandSignControlNode(Node):
     Attributes:
         latency: From the capture of a frame to the Twist that it led to.
     """
+
+    is_quick = True
 
     def __init__(
         self,
@@ -95,7 +101,7 @@ class HandSignControlNode(Node):
         self.subscribe(HAND_SIGN, self._on_sign)
         if self._following:
             self.subscribe(ODOM, self._on_odometry)
-        self.every(_WATCHDOG_PERIOD_S, self._watch)
+        self._watchdog = self.every(_WATCHDOG_PERIOD_S, self._watch)
         self.every(_DIAGNOSE_PERIOD_S, self._report)
 
     def on_reconfigure(self, config: Config) -> None:
@@ -106,6 +112,19 @@ class HandSignControlNode(Node):
         self._ramp.reconfigure(config.control)
         self._monitor.reconfigure(config.collision_monitor)
         self._publish(self._driver.reconfigure(config.control))
+
+    def services(self) -> dict[str, Call]:
+        """Return ``stop`` and ``reset``, which do what true and false on ``/stop`` do."""
+        publisher = self.publisher(STOP)
+
+        def say(is_stopped: bool, answer: str) -> str:
+            publisher.publish(Bool(data=is_stopped))
+            return answer
+
+        return {
+            "stop": lambda: say(True, "stopped, until it is reset"),
+            "reset": lambda: say(False, "reset"),
+        }
 
     def on_stop(self) -> None:
         """Leave the robot standing, and those that it left a moment ago."""
@@ -136,7 +155,9 @@ class HandSignControlNode(Node):
             return
         elapsed_s = self._elapsed()
         sign = None if self._interruption.distrusts(self.clock.now()) else received.message.data
+        self._look_after_the_robot(elapsed_s)
         self._publish(self._driver.step(elapsed_s, sign=self._admitted(sign)), captured_s)
+        self._calm_down()
 
     def _on_steering(self, received: Received[Twist]) -> None:
         wanted = Velocity(received.message.linear.x, received.message.angular.z)
@@ -145,6 +166,7 @@ class HandSignControlNode(Node):
             return
         elapsed_s = self._elapsed()
         steering = None if self._interruption.distrusts(self.clock.now()) else self._steered(wanted)
+        self._look_after_the_robot(elapsed_s)
         self._publish(self._driver.step(elapsed_s, steering=steering))
 
     def _obey_late(self, *, is_stop: bool) -> None:
@@ -167,6 +189,15 @@ class HandSignControlNode(Node):
         self._log_arming()
         if self._selection:
             self._selection.beat()
+        if self._driver.source == "nobody":
+            self._calm_down()
+
+    def _calm_down(self) -> None:
+        """Let the watchdog sleep for a while: waking up fifty times a second costs more than all signs do."""
+        self._log_arming()
+        # The beat is that of the selection, too; and steering ends on time also where signs come all the while.
+        if self._selection is None and self._driver.source != "steering":
+            self._watchdog.delay_until(self.clock.now() + _CALM_S)
 
     def _log_arming(self) -> None:
         """Say when signs begin to wait for neutral, and when they need not any more: who has no page sees the log."""
@@ -184,6 +215,8 @@ class HandSignControlNode(Node):
         away = None if self._cmd_vel.wanted else "no robot listens"
         if away is None and self._following is not None:
             away = self._following.step(elapsed_s, self._commanded)
+        if self._monitor.why_blind():
+            away = "laser scans did not come"
         if away is not None:
             self._safety.robot_is_away(away)
             self._publish(self._driver.halt())
@@ -206,7 +239,7 @@ class HandSignControlNode(Node):
         """Start from standing with another robot."""
         assert self._selection is not None
         self._driver.halt()
-        self._safety.disarm()
+        self._safety.disarm("it was selected")
         self._cmd_vel = self._selection.publisher
 
     def _publish(self, velocity: Velocity | None, captured_s: float | None = None) -> None:
@@ -234,6 +267,8 @@ class HandSignControlNode(Node):
         return elapsed_s
 
     def _report(self) -> None:
+        if not self.is_diagnosed:
+            return
         velocity = self._driver.velocity
         self.diagnose(
             WARN if self._rivals.warning or self._monitor.why_blind() else OK,
@@ -255,6 +290,8 @@ class HandSignControlNode(Node):
         safety = self._safety
         if safety.is_stopped:
             return "standing: stopped, until it is reset"
+        if why_blind := self._monitor.why_blind():
+            return f"standing: {why_blind}"
         source = self._driver.source
         if source == "steering":
             waits = safety.steering_waits
@@ -270,7 +307,7 @@ class HandSignControlNode(Node):
 
     @property
     def _disarmed(self) -> str:
-        return f"{self._selection.fleet.selected} was selected and is disarmed" if self._selection else "disarmed"
+        return f"{self._selection.fleet.selected} is disarmed" if self._selection else "disarmed"
 
     def _latencies(self) -> dict[str, str]:
         """Return the latency's figures; none where the transport does not carry the frame's time with a sign."""

@@ -11,7 +11,7 @@ from typing import Any, Generic, TypeVar
 from handsteer.clock import Clock
 from handsteer.config import Config
 from handsteer.messages import DIAGNOSTICS, DiagnosticArray, DiagnosticStatus, Header, KeyValue, Topic
-from handsteer.transports.protocol import Publisher, Received, Subscription, Transport
+from handsteer.transports.protocol import Call, Publisher, Received, Subscription, Transport
 
 M = TypeVar("M")
 log = logging.getLogger(__name__)
@@ -54,8 +54,9 @@ class Timer:
 class Node:
     """A named part of the graph; its callbacks and timers run one at a time, never side by side.
 
-    Run it on a thread of its own (:meth:`start`, :meth:`stop`), or let the caller turn the crank (:meth:`spin_once`,
-    :attr:`next_due_s`) on a :class:`~handsteer.clock.SteppedClock`.
+    Run it on a thread of its own (:meth:`start`, :meth:`stop`); a node that :attr:`is_quick` also uses the threads that
+    deliver its messages, which saves a message the way to another thread. Or let the caller turn the crank
+    (:meth:`spin_once`, :attr:`next_due_s`) on a :class:`~handsteer.clock.SteppedClock`.
 
     A callback that raises is logged with its topic and counted in :attr:`callback_errors`; the node goes on. What fails
     again and again is said every :data:`FAILURES_SAID_EVERY_S`.
@@ -66,10 +67,13 @@ class Node:
         clock: The graph's clock; timers follow it.
 
     Attributes:
+        is_quick: Whether all callbacks return within a fraction of a millisecond, whatever others do.
         ended: Set when the node has nothing more to do.
         callback_errors: Callbacks that have failed.
         stuck: True when a callback was still under way when :meth:`stop` gave up waiting for it.
     """
+
+    is_quick = False
 
     def __init__(self, name: str, transport: Transport, clock: Clock) -> None:
         self.name = name
@@ -84,6 +88,7 @@ class Node:
         self._failures: dict[tuple[str, type[Exception]], _Failure] = {}
         self._subscriptions: list[Subscription] = []
         self._wake = threading.Condition()
+        self._serving = threading.Lock()
         self._running = False
         self._stopped = False
         self._thread: threading.Thread | None = None
@@ -126,7 +131,15 @@ class Node:
         def deliver(received: Received[M]) -> None:
             with self._wake:
                 inbox.put(received)
-                self._wake.notify()
+            # Where somebody serves already, this thread may be in the midst of a callback.
+            if self.is_quick and self._running and self._serving.acquire(blocking=False):
+                try:
+                    self.spin_once()
+                finally:
+                    self._serving.release()
+            else:
+                with self._wake:
+                    self._wake.notify()
 
         subscription = self.transport.subscribe(self.name, topic, deliver)
         self._subscriptions.append(subscription)
@@ -148,9 +161,14 @@ class Node:
             self._new_config = config
             self._wake.notify()
 
+    @property
+    def is_diagnosed(self) -> bool:
+        """Whether anybody hears what :meth:`diagnose` says."""
+        return self._diagnostics.wanted
+
     def diagnose(self, level: int, message: str, **values: object) -> None:
         """Publish this node's state on ``/diagnostics``: a level, a sentence for people, and named values."""
-        if self._diagnostics.wanted:
+        if self.is_diagnosed:
             pairs = [KeyValue(key, str(value)) for key, value in values.items()]
             status = DiagnosticStatus(
                 level=level, name=self.transport.full_name(self.name), message=message, hardware_id="", values=pairs
@@ -206,7 +224,13 @@ class Node:
         if self._thread is not None and self._thread is not threading.current_thread():
             self._thread.join(timeout_s)
             self.stuck = self._thread.is_alive()
-        self._guard("stop", self.on_stop)
+        is_free = self._serving.acquire(timeout=0.0 if self.stuck else timeout_s)
+        try:
+            self.stuck = not is_free
+            self._guard("stop", self.on_stop)
+        finally:
+            if is_free:
+                self._serving.release()
 
     def check(self, config: Config) -> None:
         """Raise ConfigError if :meth:`reconfigure` could not take ``config``; may be called from any thread."""
@@ -214,12 +238,18 @@ class Node:
     def on_reconfigure(self, config: Config) -> None:
         """Take the parameters that can change from ``config``; by default there are none."""
 
+    def services(self) -> dict[str, Call]:
+        """Return what others may ask of this node, by name; by default there is nothing."""
+        return {}
+
     def on_stop(self) -> None:
         """Leave things as they should be left; called last, also after an exception."""
 
     def _run(self) -> None:
         while self._running:
-            if not self.spin_once():
+            with self._serving:
+                was_busy = self.spin_once()
+            if not was_busy:
                 self._wait()
 
     def _wait(self) -> None:

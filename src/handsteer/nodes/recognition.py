@@ -20,6 +20,7 @@ from handsteer.nodes.frame_age import FrameAge
 from handsteer.nodes.interruption import Interruption
 from handsteer.nodes.latency import LatencyLog
 from handsteer.nodes.node import OK, WARN, Node
+from handsteer.nodes.recording import Recording
 from handsteer.nodes.stop_keeper import StopKeeper
 from handsteer.signs.protocol import Classifier
 from handsteer.signs.recognizer import Recognition, Recognizer
@@ -82,6 +83,7 @@ class HandSignRecognitionNode(Node):
         self._age = FrameAge(config.max_frame_age)
         self._freshness = Freshness(config.max_frame_age)
         self._interruption = Interruption(config.max_frame_age, clock.now())
+        self._recording = Recording(config.recorded, config.max_frame_age)
         self._refused: str | None = None
         self._refused_s = -math.inf
         self._recognition: Recognition | None = None
@@ -111,7 +113,8 @@ class HandSignRecognitionNode(Node):
             self._recognizer.use(self._open_classifier(config.signs))
             self._model = version
         self._config = config.signs
-        self._age.limit_s = self._freshness.limit_s = self._interruption.limit_s = config.signs.max_frame_age
+        limit_s = config.signs.max_frame_age
+        self._age.limit_s = self._freshness.limit_s = self._recording.limit_s = self._interruption.limit_s = limit_s
         self._recognizer.reconfigure(config.signs)
 
     def _has_other_model(self, config: SignsConfig) -> bool:
@@ -124,14 +127,18 @@ class HandSignRecognitionNode(Node):
         began_s = self.clock.now()
         captured_s = received.captured_s if received.captured_s is not None else began_s
         self._interruption.note(began_s)
+        if self._recording.follows(began_s, captured_s, by_player=received.by_player):
+            captured_s = began_s
         self._refused = self._age.why_refused(began_s, captured_s)
+        if self._refused is not None:
+            self._refused = self._recording.hint(began_s) or self._refused
         if self._refused is None and self._interruption.distrusts(began_s):
             self._refused = "this process was held up, and frames may have waited meanwhile"
         image = picture_of(received.message)
         if self._refused is None:
             self._look_at(image, received, began_s, captured_s)
         else:
-            self._freshness.why_refused(image, 0.0)  # it is not new either when it comes again with another stamp
+            self._freshness.pass_over(image)
         if self._refused is not None:
             self._refused_s = began_s  # a stale frame, or one that is not new, is no frame: the watch publishes NONE
 
@@ -220,6 +227,7 @@ class HandSignRecognitionNode(Node):
             handedness=seen.hand.handedness if seen.hand else "",
             processing_ms=f"{self.processing.percentile_ms(50):.1f}",
             processing_p99_ms=f"{self.processing.percentile_ms(99):.1f}",
+            recording=self._recording.is_followed,
             frame_age_ms=f"{self._age.age_s * 1000:.0f}",
             clock_ahead_ms=f"{self._age.ahead_s * 1000:.0f}",
         )
@@ -235,7 +243,9 @@ class HandSignRecognitionNode(Node):
         now = self.clock.now()
         if self._refused is not None and now - self._refused_s <= self._config.max_frame_age:
             return self._refused
-        return f"no frame for {now - max(self._last_frame_s, self._refused_s):.1f} s"
+        unseen_s = now - max(self._last_frame_s, self._refused_s)
+        before = f"; before: {self._refused}" if self._refused is not None else ""
+        return f"no frame for {unseen_s:.1f} s{before}"
 
 
 _GONE = (-1, -1)

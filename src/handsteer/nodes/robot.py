@@ -54,7 +54,7 @@ from handsteer.robots.diff_drive import Velocity
 from handsteer.robots.editing import Change, InWorld
 from handsteer.robots.protocol import Pose2D, Robot, RobotState
 from handsteer.robots.world import World
-from handsteer.transports.protocol import Received, Transport
+from handsteer.transports.protocol import Call, Received, Transport
 
 log = logging.getLogger(__name__)
 
@@ -150,6 +150,18 @@ class RobotNode(Node):
     def reset(self) -> Future[None]:
         """Put the robot and all things to where they were at the start; else as :meth:`change_world`."""
         return self._changes.ask(lambda: self._start_anew(lambda robot: robot.reset()))
+
+    def services(self) -> dict[str, Call]:
+        """Return ``reset_odometry``, which counts from where the robot stands; a real one has none of ours."""
+        robot = self._in_world
+        if robot is None:
+            return {}
+
+        def reset() -> str:
+            self._changes.ask(robot.reset_odometry)
+            return "the odometry counts from here"
+
+        return {"reset_odometry": reset}
 
     def on_stop(self) -> None:
         """Leave it standing."""

@@ -39,8 +39,8 @@ class SteeringNode(Node):
 
     It speaks to ``hand_sign_control``, which lets steering go before signs, keeps to the limits, and stops both. It can
     be sent to another topic instead (:meth:`send_to`), where it sees to limits and Stop itself. After :meth:`halt` it
-    stands whatever its topic is, which ROS may have renamed to that of a robot. After it was held up itself, it has let
-    go: whoever steered may have let go meanwhile.
+    stands whatever its topic is, which ROS may have renamed to that of a robot. After it was held up itself, who
+    steers has to let go once: what is heard then may be old, and nobody knows what happened meanwhile.
 
     All may be called from any thread.
 
@@ -62,6 +62,7 @@ class SteeringNode(Node):
         self._halted = False
         self._heard_stop: bool | None = None
         self._interruption = Interruption(STALE_S, clock.now())
+        self._was_held_up = False
         self._safety = Safety(self._config, arming=False)
         self._ramp = Ramp(self._config)
         self._last_step_s = self._last_sent_s = clock.now()
@@ -116,14 +117,17 @@ class SteeringNode(Node):
         with self._lock:
             self._notice_interruption()
             wanted = Velocity(linear_mps, angular_radps)
-            self._wanted = self._admitted(ZERO if self._interruption.distrusts(self.clock.now()) else wanted)
+            if self._was_held_up and (not wanted.is_zero or self._interruption.distrusts(self.clock.now())):
+                return
+            self._was_held_up = False
+            self._wanted = self._admitted(wanted)
             self._publish(self._wanted)
 
     def release(self) -> None:
         """Stop, and let others drive."""
         with self._lock:
-            if self._wanted is not None:
-                self._wanted = None
+            if self._wanted is not None or self._was_held_up:
+                self._wanted, self._was_held_up = None, False
                 self._publish(ZERO)
 
     def halt(self) -> None:
@@ -185,8 +189,10 @@ class SteeringNode(Node):
             self._publish(ZERO)
 
     def _notice_interruption(self) -> None:
-        if self._interruption.note(self.clock.now()):
-            self.release()
+        if self._interruption.note(self.clock.now()) and self._wanted is not None:
+            self._wanted, self._was_held_up = None, True
+            if self.is_direct:  # elsewhere a zero would be taken for letting go
+                self._publish(ZERO)
 
     def _repeat(self) -> None:
         if self._halted:

@@ -54,6 +54,10 @@ class InWorld(Robot, Protocol):
         """
         ...
 
+    def reset_odometry(self) -> None:
+        """Let the odometry be 0 where the robot is, without moving it."""
+        ...
+
 
 def add(world: World, shape: Shape, robot: Pose2D) -> World:
     """Return ``world`` with one thing more, at the first free place in front of ``robot``, under a name of its own.

@@ -23,8 +23,8 @@ _LOOK_AGAIN_S = 0.02
 _ZEROS_AT_THE_END = 5
 _BETWEEN_ZEROS_S = 0.02
 _ODOMETRY_DUE_S = 3.0
+_IN_ROS2 = "is its ROS_DOMAIN_ID the same, and, if it is another machine, ROS_AUTOMATIC_DISCOVERY_RANGE=SUBNET set?"
 _ADVICE = {
-    "dds": "is its ROS_DOMAIN_ID the same, and, if it is another machine, ROS_AUTOMATIC_DISCOVERY_RANGE=SUBNET set?",
     "zenoh": "is it connected to the same Zenoh router?",
     "ros1": "is its ROS_MASTER_URI the same?",
 }
@@ -183,7 +183,8 @@ class RemoteRobot:
 
     def _nobody_listens(self) -> str:
         name, kind = _full_name(self._session, self._config.cmd_vel_topic), type_name(self._topic.type)
-        return f"nobody listens on {name} for {kind}; is it on, are topic and type right, {_ADVICE[self._config.kind]}"
+        advice = _ADVICE.get(self._config.kind, _IN_ROS2)
+        return f"nobody listens on {name} for {kind}; is it on, are topic and type right, {advice}"
 
 
 def _topic(name: str, kind: type[Any], depth: int) -> Topic[Any]:

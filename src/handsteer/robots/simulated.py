@@ -134,6 +134,10 @@ class SimulatedRobot:
         self._collisions = 0
         self._touched_until: dict[str, int] = {}
 
+    def reset_odometry(self) -> None:
+        """Let the odometry be 0 where the robot is, without moving it."""
+        self._odometry = Pose2D(0.0, 0.0, 0.0)
+
     def close(self) -> None:
         """Forget the last command, so that it stands at once; may be called twice."""
         self._command = None

@@ -1,12 +1,11 @@
 """How messages travel between nodes."""
 
-import os
+import importlib.util
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 
 from handsteer.errors import TransportError
-from handsteer.transports.dds.network import network
-from handsteer.transports.observed import ObservedGraph
 from handsteer.transports.protocol import Session
 
 
@@ -34,33 +33,10 @@ def _ros1(node: str, arguments: Sequence[str]) -> Session:
     return Ros1Session(node, arguments)
 
 
-def observe(transport: str, seconds: float) -> ObservedGraph:
-    """Look at a graph of several processes without becoming one of its nodes.
-
-    It listens to every topic that somebody publishes, so what is made on demand is made meanwhile.
-
-    Args:
-        transport: Which kind of graph, one of :data:`OBSERVERS`.
-        seconds: For how long the rates are measured; 0 leaves them out.
-
-    Raises:
-        TransportError: There is no such transport or graph.
-    """
-    if transport not in OBSERVERS:
-        raise TransportError(f"a graph of {transport!r} cannot be looked at: use {' or '.join(OBSERVERS)}")
-    return OBSERVERS[transport](seconds)
-
-
 def _dds(node: str, arguments: Sequence[str]) -> Session:
     with _cyclonedds():
         from handsteer.transports.dds.session import DdsSession  # noqa: PLC0415
     return DdsSession(node, arguments)
-
-
-def _observe_dds(seconds: float) -> ObservedGraph:
-    with _cyclonedds():
-        from handsteer.transports.dds.observer import observe_domain  # noqa: PLC0415
-    return observe_domain(network(os.environ), seconds)
 
 
 @contextmanager
@@ -84,10 +60,36 @@ def _zenoh(node: str, arguments: Sequence[str]) -> Session:
     return ZenohSession(node, arguments)
 
 
+def _ros2(node: str, arguments: Sequence[str]) -> Session:
+    if importlib.util.find_spec("rclpy") is None:
+        raise TransportError(f"the transport ros2 needs rclpy, {_WITHOUT_RCLPY}; --transport dds needs no ROS 2")
+    try:
+        from handsteer.transports.rclpy.session import RclpySession  # noqa: PLC0415
+    except ImportError as problem:
+        raise TransportError(f"rclpy is there but cannot be loaded ({problem}): is a ROS 2 sourced?") from None
+    return RclpySession(node, arguments)
+
+
+def _auto(node: str, arguments: Sequence[str]) -> Session:
+    if importlib.util.find_spec("rclpy") is not None:
+        return _ros2(node, arguments)
+    if importlib.util.find_spec("cyclonedds") is None:
+        raise TransportError(
+            f"there is no ROS 2 here, and nothing that speaks its wire: neither rclpy, {_WITHOUT_RCLPY}; "
+            "nor the package cyclonedds (pip install 'cyclonedds>=11,<12')"
+        )
+    return _dds(node, arguments)
+
+
 def _lacking(problem: ModuleNotFoundError, message: str, *modules: str) -> Exception:
     """Return ``message`` as an error when what is missing is one of ``modules``, else ``problem`` itself."""
     return TransportError(message) if (problem.name or "").partition(".")[0] in modules else problem
 
+
+_WITHOUT_RCLPY = (
+    f"which this Python ({sys.version_info[0]}.{sys.version_info[1]}) does not find: source ROS 2 "
+    "(source /opt/ros/jazzy/setup.bash) and start handsteer with the Python that it is for"
+)
 
 WITHOUT_ZENOH = (
     "the transport zenoh needs the packages eclipse-zenoh and xxhash: "
@@ -95,8 +97,11 @@ WITHOUT_ZENOH = (
 )
 """What is said where Zenoh is not installed."""
 
-TRANSPORTS: dict[str, Callable[[str, Sequence[str]], Session]] = {"ros1": _ros1, "dds": _dds, "zenoh": _zenoh}
+TRANSPORTS: dict[str, Callable[[str, Sequence[str]], Session]] = {
+    "ros1": _ros1,
+    "ros2": _ros2,
+    "dds": _dds,
+    "zenoh": _zenoh,
+    "auto": _auto,
+}
 """What joins a graph of several processes, by name."""
-
-OBSERVERS: dict[str, Callable[[float], ObservedGraph]] = {"dds": _observe_dds}
-"""What looks at a graph of several processes, by name; it is given the seconds for the rates."""

@@ -5,13 +5,14 @@ import os
 import sys
 
 from handsteer.errors import TransportError
-from handsteer.transports import observe
+from handsteer.transports.dds.network import network
+from handsteer.transports.dds.observer import observe_domain
 
 
 def main() -> None:
     """Print nodes, topics and what is amiss; exit code 2 when the domain cannot be joined."""
     try:
-        seen = observe("dds", 0).as_dict()
+        seen = observe_domain(network(os.environ)).as_dict()
     except TransportError as error:
         sys.stderr.write(f"{error}\n")
         sys.stderr.flush()

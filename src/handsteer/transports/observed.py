@@ -12,21 +12,17 @@ _VELOCITIES = {"geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped", "geo
 
 @dataclass(frozen=True)
 class ObservedTopic:
-    """A topic, and who is at its ends.
+    """A topic, and who publishes it.
 
     Attributes:
         name: Full name, as ``/r1/image_raw``.
         types: Its types, as ``sensor_msgs/msg/Image``; more than one is a fault.
         publishers: The node of each publisher; a node that has two is there twice.
-        subscribers: Likewise.
-        rate_hz: Messages a second, from all publishers together; None where it was not measured.
     """
 
     name: str
     types: tuple[str, ...]
     publishers: tuple[str, ...]
-    subscribers: tuple[str, ...]
-    rate_hz: float | None
 
 
 @dataclass(frozen=True)

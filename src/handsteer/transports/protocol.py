@@ -22,11 +22,17 @@ class Received(Generic[M]):
             there was no frame, or when the transport cannot carry it.
         is_late: Whether it was held up on its way for longer than messages of its topic live: of these only those
             come that stop the robot (``Topic.stops``), and they show nothing of what is wanted now.
+        by_player: Whether a player of recordings sent it; False when the transport cannot tell.
     """
 
     message: M
     captured_s: float | None = None
     is_late: bool = False
+    by_player: bool = False
+
+
+Call = Callable[[], str]
+"""What a service does, at once, on any thread: it returns a sentence, or raises a HandsteerError that says why not."""
 
 
 class Publisher(Protocol[M_contra]):
@@ -127,6 +133,14 @@ class Session(Protocol):
 
     def serve(self, parameters: NodeParameters) -> None:
         """Let others see and set the parameters of this process's node, where the graph has a way to do so."""
+        ...
+
+    def offer(self, services: Callable[[], Mapping[str, Call]]) -> None:
+        """Let others call the services ``~/name`` of this process's node, where the graph can have them so.
+
+        Args:
+            services: Returns the services by name; not asked where the graph has none.
+        """
         ...
 
     def wait(self, timeout_s: float) -> bool:

@@ -54,12 +54,6 @@ class RosGraph:
             self._list_of(endpoint).append(endpoint.guid)
             self._tell()
 
-    def add_other(self, endpoint: uuid.UUID, *, writes: bool) -> None:
-        """Tell others that a writer, or else a reader, of this identifier belongs to our node."""
-        with self._lock:
-            (self._writers if writes else self._readers).append(endpoint)
-            self._tell()
-
     def remove(self, endpoint: DataWriter[Any] | DataReader[Any]) -> None:
         """Tell others that ``endpoint`` is gone."""
         with self._lock:

@@ -46,14 +46,12 @@ class Endpoint:
         type: Name of its type in DDS.
         qos: What it offers or requests.
         publishes: Whether it is a publisher.
-        type_id: By what its definition can be asked for; None where its DDS does not tell.
     """
 
     topic: str
     type: str
     qos: Qos
     publishes: bool
-    type_id: Any = None
 
     @property
     def kind(self) -> str:
@@ -123,9 +121,7 @@ class Matching:
                 continue
             with self._lock:
                 if seen.sample_info.valid_data and seen.qos is not None:
-                    self._theirs[seen.key] = Endpoint(
-                        seen.topic_name, seen.type_name, seen.qos, publishes, seen.type_id
-                    )
+                    self._theirs[seen.key] = Endpoint(seen.topic_name, seen.type_name, seen.qos, publishes)
                     self._compare(seen.key)
                 else:
                     self._forget(seen.key)

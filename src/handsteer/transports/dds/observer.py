@@ -1,11 +1,7 @@
-"""Looks at a DDS domain as ROS 2's nodes fill it: who publishes and subscribes to what, and how often."""
+"""Looks at a DDS domain as ROS 2's nodes fill it: who publishes what, and what does not fit."""
 
 import time
 from collections.abc import Callable, Iterable
-from typing import Any
-
-from cyclonedds.core import DDSException
-from cyclonedds.internal import InvalidSample
 
 from handsteer.transports.dds.matching import Endpoint
 from handsteer.transports.dds.network import Network
@@ -20,20 +16,17 @@ _HIDDEN = "_"
 _TOPIC = "rt/"
 _LOOK_S = 0.02
 _AT_LEAST_S, _QUIET_S, _AT_MOST_S = 0.6, 0.4, 3.0
-# Fast DDS tells the names of nodes up to three seconds after their publishers and subscribers.
-_NAMES_S, _NAMES_AT_A_GLANCE_S = 4.0, 2.0
-_JOIN_S = 0.2
-_TAKE = 50
+# Fast DDS tells the names of nodes up to three seconds after their publishers and subscribers; most come sooner.
+_NAMES_S = 2.0
 
 Ends = list[tuple[Endpoint, str | None]]
 
 
-def observe_domain(network: Network, seconds: float) -> ObservedGraph:
+def observe_domain(network: Network) -> ObservedGraph:
     """Return the graph in a domain.
 
     Args:
         network: The domain, and where to look for others.
-        seconds: For how long the rates of topics are measured; 0 leaves them out, and waits less for late names.
 
     Raises:
         TransportError: The domain cannot be joined.
@@ -42,13 +35,8 @@ def observe_domain(network: Network, seconds: float) -> ObservedGraph:
     try:
         began_s = time.monotonic()
         _wait_until_quiet(participant)
-        rates = _rates(participant, seconds) if seconds > 0 else {}
-        _wait(
-            lambda: all(node for _, node in participant.others()[1]),
-            began_s + (_NAMES_S if seconds > 0 else _NAMES_AT_A_GLANCE_S),
-        )
-        nodes, ends = participant.others()
-        return _graph(network.place, nodes, ends, rates)
+        _wait(lambda: all(node for _, node in participant.others()[1]), began_s + _NAMES_S)
+        return _graph(network.place, *participant.others())
     finally:
         participant.close()
 
@@ -74,49 +62,19 @@ def _wait_until_quiet(participant: Participant) -> None:
     _wait(quiet, began_s + _AT_MOST_S)
 
 
-def _rates(participant: Participant, seconds: float) -> dict[str, float]:
-    """Return the messages a second on each topic that somebody publishes and that can be read."""
-    readers: dict[str, Any] = {}
-    for end, _ in participant.others()[1]:
-        if end.publishes and end.topic.startswith(_TOPIC) and end.topic not in readers:
-            try:
-                readers[end.topic] = participant.counter(end)
-            except DDSException:
-                continue  # of a type that cannot be had; the topic is listed without its rate
-    _count(readers, _JOIN_S)
-    counts = _count(readers, seconds)
-    return {
-        topic: counts[topic] / seconds
-        for topic, reader in readers.items()
-        if reader.get_subscription_matched_status().current_count
-    }
-
-
-def _count(readers: dict[str, Any], seconds: float) -> dict[str, int]:
-    counts = dict.fromkeys(readers, 0)
-    deadline_s = time.monotonic() + seconds
-    while time.monotonic() < deadline_s:
-        for topic, reader in readers.items():
-            counts[topic] += sum(not isinstance(sample, InvalidSample) for sample in reader.take(_TAKE))
-        time.sleep(_LOOK_S)
-    return counts
-
-
-def _graph(place: str, nodes: Iterable[str], ends: Ends, rates: dict[str, float]) -> ObservedGraph:
+def _graph(place: str, nodes: Iterable[str], ends: Ends) -> ObservedGraph:
     shown = tuple(sorted(name for name in nodes if not _is_hidden(name)))
     seen = [(end, node or UNNAMED) for end, node in ends if end.topic.startswith(_TOPIC) and not _is_hidden(node or "")]
-    topics = tuple(_topic(name, seen, rates) for name in sorted({end.topic for end, _ in seen}))
+    topics = tuple(_topic(name, seen) for name in sorted({end.topic for end, _ in seen}))
     return ObservedGraph(place, shown, topics, (*amiss(shown, topics), *_misfits(seen)))
 
 
-def _topic(name: str, ends: list[tuple[Endpoint, str]], rates: dict[str, float]) -> ObservedTopic:
+def _topic(name: str, ends: list[tuple[Endpoint, str]]) -> ObservedTopic:
     here = [(end, node) for end, node in ends if end.topic == name]
     return ObservedTopic(
         name=_ros_topic(name),
         types=tuple(sorted({ros_type_name(end.type) for end, _ in here})),
         publishers=tuple(sorted(node for end, node in here if end.publishes)),
-        subscribers=tuple(sorted(node for end, node in here if not end.publishes)),
-        rate_hz=rates.get(name),
     )
 
 

@@ -2,14 +2,11 @@
 
 import itertools
 import threading
-import uuid
 from collections.abc import Callable
 from typing import Any
 
-from cyclonedds.builtin import BuiltinDataReader, BuiltinTopicDcpsParticipant
 from cyclonedds.core import DDSException, Policy, Qos
 from cyclonedds.domain import Domain, DomainParticipant
-from cyclonedds.dynamic import get_types_for_typeid
 from cyclonedds.pub import DataWriter
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic as DdsTopic
@@ -20,15 +17,14 @@ from handsteer.transports.dds.discovery import RosGraph
 from handsteer.transports.dds.dispatcher import Dispatcher
 from handsteer.transports.dds.matching import Endpoint, Matching
 from handsteer.transports.dds.network import Network
-from handsteer.transports.dds.qos import counter_qos, reader_qos, service_qos, writer_qos
+from handsteer.transports.dds.qos import reader_qos, service_qos, writer_qos
 from handsteer.transports.dds.types import dds_type, opaque_type, service_dds_type
 from handsteer.transports.observed import UNNAMED
-from handsteer.transports.ros2.encoding import dds_type_name, ros_type_name, types
+from handsteer.transports.ros2.encoding import dds_type_name
 from handsteer.transports.ros2.names import NodeName
 from handsteer.transports.ros2.service_types import Service
 
 _USER_DATA = b"enclave=/;"
-_DEFINITION_NS = 500_000_000
 
 
 class Participant:
@@ -100,14 +96,6 @@ class Participant:
         self._graph.add(writer)
         return reader, writer
 
-    def participants(self) -> Any:
-        """Return a new reader of who has come to the domain and who has left it; to be served, then left unserved."""
-        return BuiltinDataReader(self._participant, BuiltinTopicDcpsParticipant)
-
-    def tell_of(self, guid: bytes, *, writes: bool) -> None:
-        """Tell others that a reader or writer of this identifier, which is none of Cyclone DDS, is our node's."""
-        self._graph.add_other(uuid.UUID(bytes=guid), writes=writes)
-
     def tick(self, call: Callable[[], None]) -> None:
         """Call ``call`` on the DDS thread, four times a second and whenever something has come."""
         self._dispatcher.tick(call)
@@ -129,19 +117,6 @@ class Participant:
             if end.publishes and end.topic == name
         ]
 
-    def counter(self, writer: Endpoint) -> DataReader[Any]:
-        """Return a reader that gets what ``writer`` sends, of whatever type, and that is told to nobody as our node's.
-
-        Raises:
-            DDSException: There can be none.
-        """
-        topic = DdsTopic(self._participant, writer.topic, self._type_of(writer))
-        return DataReader(self._participant, topic, qos=counter_qos(writer.qos))
-
-    def leave_unserved(self, reader: Any) -> None:
-        """Serve ``reader`` no more."""
-        self._dispatcher.remove(reader)
-
     def release(self, endpoint: DataWriter[Any] | DataReader[Any]) -> None:
         """Let go of a writer or reader; it is gone when the caller forgets it too."""
         if isinstance(endpoint, DataReader):
@@ -155,15 +130,6 @@ class Participant:
         self._graph.close()
         self._topics.clear()
         self._participant = self._domain = None
-
-    def _type_of(self, endpoint: Endpoint) -> Any:
-        name = ros_type_name(endpoint.type)
-        if name in types().fielddefs:
-            return dds_type(name)
-        if endpoint.type_id is None:
-            return opaque_type(endpoint.type)
-        definition, _ = get_types_for_typeid(self._participant, endpoint.type_id, _DEFINITION_NS)
-        return opaque_type(endpoint.type, definition)
 
     def _topic(self, topic: Topic[Any]) -> DdsTopic[Any]:
         name = self._dds_name(topic)

@@ -25,7 +25,6 @@ _LIVELINESS = (
 _NEVER_NS = 2**63 - 1
 _NS_PER_S = 1_000_000_000
 _REQUESTS = 1000
-_COUNTED_AT_ONCE = 50
 
 
 def writer_qos(topic: Topic[Any]) -> Qos:
@@ -41,13 +40,6 @@ def writer_qos(topic: Topic[Any]) -> Qos:
 def reader_qos(topic: Topic[Any]) -> Qos:
     """Return what a subscriber of ``topic`` requests."""
     return _qos(topic, requested(topic))
-
-
-def counter_qos(offered: Qos) -> Qos:
-    """Return what somebody requests who takes whatever comes, from a publisher that offers ``offered``."""
-    ownership = _find(offered, "Ownership", Policy.Ownership.Shared)
-    anyhow = Policy.DataRepresentation(use_cdrv0_representation=True, use_xcdrv2_representation=True)
-    return Qos(_BEST_EFFORT, _VOLATILE, Policy.History.KeepLast(_COUNTED_AT_ONCE), ownership, anyhow)
 
 
 def discovery_qos(name: str, depth: int) -> Qos:

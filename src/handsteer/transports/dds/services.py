@@ -4,8 +4,7 @@ Before the body of both stand 16 bytes that tell which request a reply is for: e
 int64, that counts its requests. They are no part of ROS 2's type, and its own nodes send no definition in which they
 would be missed. A client's reader and writer have the same ``clientid=``
 in their user data, a server's the same ``serviceid=``. A client of Fast DDS says in the headers of RTPS instead who
-asks, which Cyclone DDS shows to nobody: :mod:`~handsteer.transports.dds.fast_dds` answers it, and it is left alone
-here.
+asks, which Cyclone DDS shows to nobody: it is left alone here, and needs nodes by rclpy.
 """
 
 import logging

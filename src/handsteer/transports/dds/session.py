@@ -5,7 +5,6 @@ from collections.abc import Callable
 from typing import Any
 
 from handsteer.clock import Clock
-from handsteer.transports.dds.fast_dds import FastDdsServices
 from handsteer.transports.dds.network import network
 from handsteer.transports.dds.participant import Participant
 from handsteer.transports.dds.services import ServiceServer
@@ -18,22 +17,14 @@ from handsteer.transports.ros2.session import Ros2Session
 class DdsSession(Ros2Session):
     """A :class:`~handsteer.transports.protocol.Session` of ROS 2, over DDS."""
 
-    _fast_dds: FastDdsServices | None = None
-
     def close(self) -> None:
         """Deliver what was published, then leave the graph; may be called twice."""
-        if self._fast_dds is not None:
-            self._fast_dds.close()
         super().close()
         self._participant.close()
 
     def _connect(self, name: NodeName, clock: Clock) -> DdsTransport:
-        self._network = network(os.environ)
-        self._participant = Participant(self._network, name)
+        self._participant = Participant(network(os.environ), name)
         return DdsTransport(self._participant, clock)
 
     def _answer(self, name: str, service: Service, answer: Callable[[Any], Any]) -> ServiceServer:
-        if self._fast_dds is None:
-            self._fast_dds = FastDdsServices(self._participant, self._network)
-        self._fast_dds.add(name, service, answer)
         return ServiceServer(self._participant, name, service, answer)

@@ -217,4 +217,4 @@ class _Reception(Generic[M]):
             self._is_broken = True
             return
         if not late or (self._topic.stops is not None and self._topic.stops(message)):
-            self._send(Received(message, capture_time(message, self._clock), late))
+            self._send(Received(message, capture_time(message, self._clock), is_late=late))

@@ -48,16 +48,9 @@ def _struct(name: str, distribution: str, before: dict[str, Any]) -> Any:
     return _passing(struct)
 
 
-def opaque_type(name: str, struct: Any = None) -> Any:
-    """Return a DDS type of the name ``name`` in DDS that lets the bytes of any message pass.
-
-    Args:
-        name: As ``my_robot::msg::dds_::Battery_``.
-        struct: Its definition, where the other side has told one, which cyclonedds then compares; else there is none.
-    """
-    if struct is None:
-        struct = make_idl_struct("Opaque", name, {"raw": idl.uint8}, dataclassify=False)
-    return _passing(struct)
+def opaque_type(name: str) -> Any:
+    """Return a DDS type that lets the bytes of any message pass; ``name`` is as ``std_msgs::msg::dds_::String_``."""
+    return _passing(make_idl_struct("Opaque", name, {"raw": idl.uint8}, dataclassify=False))
 
 
 def _passing(struct: Any) -> Any:

@@ -1,11 +1,19 @@
-"""The ROS 1 master, asked with little patience."""
+"""The ROS 1 master, asked with little patience, and held by a connection that ends with it."""
 
+import http.client
+import select
+import socket
+import urllib.parse
 import xmlrpc.client
 from typing import Any
 
 from handsteer.errors import TransportError
 
 _TIMEOUT_S = 2.0
+
+
+class MasterGone(TransportError):  # noqa: N818 - reads as the other ends of a connection do
+    """There is no master at the address: the machine itself refuses to connect."""
 
 
 class Master:
@@ -18,9 +26,14 @@ class Master:
         except OSError:
             raise TransportError(f"ROS_MASTER_URI is {uri!r}: it should be as http://localhost:11311") from None
 
-    def ping(self) -> None:
-        """Raise TransportError unless it answers."""
-        self._ask("getPid", "/handsteer")
+    def ping(self) -> int:
+        """Return the number of its process.
+
+        Raises:
+            MasterGone: Nobody listens at its address.
+            TransportError: It does not answer in time; it may be busy.
+        """
+        return int(self._ask("getPid", "/handsteer")[2])
 
     def publishers(self, caller: str) -> dict[str, list[str]]:
         """Return the nodes that publish each topic, by full names.
@@ -37,11 +50,52 @@ class Master:
     def _ask(self, method: str, caller: str) -> Any:
         try:
             return getattr(self._proxy, method)(caller)
-        except (OSError, xmlrpc.client.Error) as error:
+        except (OSError, OverflowError, http.client.HTTPException, xmlrpc.client.Error) as error:
             reason = getattr(error, "strerror", None) or error
-            raise TransportError(
+            kind = MasterGone if isinstance(error, ConnectionRefusedError) else TransportError
+            raise kind(
                 f"no ROS master answers at {self._uri} ({reason}): start roscore, or set ROS_MASTER_URI"
             ) from None
+
+
+class Lifeline:
+    """An idle connection to the master: the system closes it when the master dies, however that dies.
+
+    So its death is known at once, and nothing is asked of a master that is busy. A machine that is cut off or loses
+    its power closes nothing.
+
+    Args:
+        uri: Address of the master.
+    """
+
+    def __init__(self, uri: str) -> None:
+        parts = urllib.parse.urlsplit(uri)
+        self._address = (parts.hostname or "", parts.port or 80)
+        self._socket: socket.socket | None = None
+
+    def wait(self, timeout_s: float) -> bool:
+        """Wait for ``timeout_s`` seconds while the connection holds; return whether it does.
+
+        It is made where there is none; that it cannot be made is said as late as that it breaks at once.
+        """
+        try:
+            if self._socket is None:
+                self._socket = socket.create_connection(self._address, _TIMEOUT_S)
+            poll = select.poll()  # select() cannot take the sockets of a process that has many files open
+            poll.register(self._socket, select.POLLIN)
+            # The master says nothing unasked, so what can be read is the end.
+            broken = bool(poll.poll(timeout_s * 1000))
+        except OSError:
+            broken = True
+        if broken:
+            self.close()
+        return not broken
+
+    def close(self) -> None:
+        """Let go; may be called twice."""
+        if self._socket is not None:
+            self._socket.close()
+            self._socket = None
 
 
 class _ImpatientTransport(xmlrpc.client.Transport):

@@ -1,14 +1,17 @@
 """This process as a node of a ROS 1 graph: name, parameters, time, and what becomes of it when the master is gone."""
 
 import logging
+import math
 import sys
 import threading
-from collections.abc import Sequence
+import time
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from handsteer.clock import Clock, SimulatedClock, WallClock
 from handsteer.errors import TransportError
 from handsteer.parameters import NodeParameters
+from handsteer.transports.protocol import Call
 
 try:
     import rosgraph
@@ -19,11 +22,15 @@ except ImportError as problem:
         f"ROS 1 is not installed for this Python ({problem}): on Debian and Ubuntu, `make ros1` installs it"
     ) from None
 
-from handsteer.transports.ros1.master import Master
+from handsteer.transports.ros1 import course
+from handsteer.transports.ros1.master import Lifeline, Master, MasterGone
 from handsteer.transports.ros1.transport import Ros1Transport
 
 _PING_PERIOD_S = 0.5
+_PING_AGAIN_S = 0.02
+# A master that is slow to answer is busy, and none to stop a robot for.
 _PINGS_UNTIL_LOST = 3
+_SILENT_UNTIL_LOST_S = 1.5
 _CLOCK_SILENCE_S = 2.0
 # rospy sends on threads of its own and does not tell when they are done.
 _DELIVER_S = 0.1
@@ -42,26 +49,34 @@ class Ros1Session:
 
     Raises:
         TransportError: No master answers, an argument is none of rospy's, or this process has another name already.
+        ConfigError: One of the course's parameters has a wrong value.
     """
 
     def __init__(self, node: str, arguments: Sequence[str]) -> None:
         _refuse_what_rospy_would_ignore(arguments)
-        self._master = Master(rosgraph.get_master_uri())
-        self._master.ping()
+        uri = rosgraph.get_master_uri()
+        self._master = Master(uri)
+        self._master_pid = self._master.ping()
+        self._lifeline = Lifeline(uri)
+        self._failures, self._failing_since_s = 0, math.inf
         self._asked_to_end = threading.Event()
         self._lost: str | None = None
         self._left = threading.Event()
         _initialise(node, arguments)
-        rospy.on_shutdown(self._on_shutdown)
         self.name: str = rospy.get_name()
-        self.parameters: dict[str, Any] = rospy.get_param("~", {})
+        told = course.translate(node, self.name, rospy.get_param("~", {}), lambda name: rospy.get_param(name, None))
+        self.parameters: dict[str, Any] = told.parameters
+        rospy.on_shutdown(self._on_shutdown)
         self.clock = self._make_clock()
-        self.transport = Ros1Transport(self.clock)
+        self.transport = Ros1Transport(self.clock, told.topics)
         self._watcher = threading.Thread(target=self._watch, name="ros1_session", daemon=True)
         self._watcher.start()
 
     def serve(self, parameters: NodeParameters) -> None:
         """Do nothing: ROS 1 has its parameters on the master, and nodes read them when they start."""
+
+    def offer(self, services: Callable[[], Mapping[str, Call]]) -> None:
+        """Do nothing: the nodes of the course have no services."""
 
     def wait(self, timeout_s: float) -> bool:
         """Wait for at most ``timeout_s`` seconds; return whether ROS has asked this process to end (`rosnode kill`).
@@ -91,20 +106,33 @@ class Ros1Session:
         return clock
 
     def _watch(self) -> None:
-        failures, was_silent = 0, False
-        while not self._left.wait(_PING_PERIOD_S):
-            try:
-                self._master.ping()
-                failures = 0
-            except TransportError as error:
-                failures += 1
-                if failures == _PINGS_UNTIL_LOST:
-                    self._lost = f"{error}: it has gone away, so this node ends"
-                    self._asked_to_end.set()
+        was_silent = False
+        while not self._left.is_set():
+            if not self._lifeline.wait(_PING_PERIOD_S):
+                self._left.wait(_PING_AGAIN_S)  # a master that holds no line is not asked without a pause
+            self._lost = self._why_lost()
+            if self._lost is not None:
+                self._asked_to_end.set()
+                return
             silent = isinstance(self.clock, SimulatedClock) and self.clock.silence_s > _CLOCK_SILENCE_S
             if silent and not was_silent:
                 log.warning("/use_sim_time is set, but /clock stands still: frames count as old, the robot stands")
             was_silent = silent
+
+    def _why_lost(self) -> str | None:
+        """Return why there is no master any more; None while it answers, or may only be busy."""
+        try:
+            if self._master.ping() == self._master_pid:
+                self._failures, self._failing_since_s = 0, math.inf
+                return None
+        except MasterGone as error:
+            return f"{error}: it has gone away, so this node ends"
+        except TransportError as error:
+            now_s = time.monotonic()
+            self._failures, self._failing_since_s = self._failures + 1, min(self._failing_since_s, now_s)
+            lasted = now_s - self._failing_since_s >= _SILENT_UNTIL_LOST_S
+            return f"{error}: this node ends" if lasted and self._failures >= _PINGS_UNTIL_LOST else None
+        return "another ROS master has taken the place of the one that this node joined, and does not know it: it ends"
 
     def _on_shutdown(self) -> None:
         """Hold rospy's shutdown up until the nodes have said their last: `rosnode kill`, or another of this name."""

@@ -1,7 +1,8 @@
 """Messages over ROS 1: one ROS node for all nodes of this process, as rospy has it."""
 
+import re
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any, Generic, TypeVar
 
@@ -18,8 +19,11 @@ from handsteer.transports.stamps import capture_time
 
 M = TypeVar("M")
 
-# With rospy's default of 64 kB, images wait in the socket for a callback that is slower than the camera.
-_BUFFER_BYTES = 2**24
+# With rospy's default of 64 kB, images wait in the socket for a callback that is slower than the camera. It costs
+# something to have that much ready for every message.
+_BUFFER_BYTES = {"sensor_msgs/msg/Image": 2**24, "sensor_msgs/msg/CompressedImage": 2**22}
+_SMALL_BUFFER_BYTES = 2**16
+_PLAYER = re.compile(r"(/\w+)*/play_\d{6,}", re.ASCII)
 
 
 class Ros1Transport:
@@ -29,13 +33,15 @@ class Ros1Transport:
 
     Args:
         clock: The graph's clock.
+        topics: What topics are called, by the full names that they have otherwise. Remapping goes before it.
     """
 
     # TCP loses no part of a large image, and the course's cameras publish raw ones only.
     crosses_network = False
 
-    def __init__(self, clock: Clock) -> None:
+    def __init__(self, clock: Clock, topics: Mapping[str, str] | None = None) -> None:
         self._clock = clock
+        self._topics = topics or {}
         self._types = TopicTypes()
         self._lock = threading.Lock()
         self._outgoing: dict[str, Ros1Publisher[Any]] = {}
@@ -64,11 +70,11 @@ class Ros1Transport:
 
         A node that was killed stays known to the master for good (``rosnode cleanup``).
         """
-        return self._state.publishers_of(_full_name(topic))
+        return self._state.publishers_of(self._full_name(topic))
 
     def topic_name(self, topic: Topic[Any]) -> str:
         """Return the topic's full name in the graph, remapped."""
-        return _full_name(topic)
+        return self._full_name(topic)
 
     def full_name(self, node: str) -> str:
         """Return the ROS node's name and ``node``, as ROS's own diagnostics do: ``r1/my_camera: my_camera``."""
@@ -88,21 +94,41 @@ class Ros1Transport:
 
     def _claim(self, topic: Topic[Any]) -> str:
         """Return the full name of ``topic``, namespace and remappings included, unless it is in use otherwise."""
-        name = _full_name(topic)
+        name = self._full_name(topic)
         self._types.claim(name, topic)
         return name
+
+    def _full_name(self, topic: Topic[Any]) -> str:
+        """Return the name after namespace and remappings, which rospy leaves as it is when it is given."""
+        name = str(rospy.resolve_name(topic.ros_name))
+        is_remapped = name != rosgraph.names.resolve_name(topic.ros_name, rospy.get_name())
+        if is_remapped:
+            return name
+        if topic.name in self._topics:
+            return str(rospy.resolve_name(self._topics[topic.name]))
+        if topic.beneath is None:
+            return name
+        return self._full_name(topic.beneath) + topic.name.removeprefix(topic.beneath.name)
 
     def _receive(self, name: str, topic: Topic[M], send: Deliver[M]) -> Callable[[], None]:
         kind = type_name(topic.type)
 
         def on_message(theirs: Any) -> None:
             message = from_ros1(theirs, kind)
-            send(Received(message, capture_time(message, self._clock)))
+            captured_s = capture_time(message, self._clock)
+            send(Received(message, captured_s, by_player=captured_s is not None and _is_player(theirs)))
 
+        size = _BUFFER_BYTES.get(kind, _SMALL_BUFFER_BYTES)
         subscriber = rospy.Subscriber(
-            name, ros1_type(kind), on_message, queue_size=topic.depth, buff_size=_BUFFER_BYTES, tcp_nodelay=True
+            name, ros1_type(kind), on_message, queue_size=topic.depth, buff_size=size, tcp_nodelay=True
         )
         return subscriber.unregister  # type: ignore[no-any-return]
+
+
+def _is_player(theirs: Any) -> bool:
+    """Return whether ``rosbag play`` sent a message: rosbag has no other name for its nodes than play and the time."""
+    header = getattr(theirs, "_connection_header", None) or {}
+    return _PLAYER.fullmatch(header.get("callerid", "")) is not None
 
 
 class Ros1Publisher(Generic[M]):
@@ -138,12 +164,3 @@ class Ros1Publisher(Generic[M]):
         publisher, self._publisher = self._publisher, None
         if publisher is not None:
             publisher.unregister()
-
-
-def _full_name(topic: Topic[Any]) -> str:
-    """Return the name after namespace and remappings, which rospy leaves as it is when it is given."""
-    name = str(rospy.resolve_name(topic.ros_name))
-    is_remapped = name != rosgraph.names.resolve_name(topic.ros_name, rospy.get_name())
-    if topic.beneath is None or is_remapped:
-        return name
-    return _full_name(topic.beneath) + topic.name.removeprefix(topic.beneath.name)

@@ -75,17 +75,26 @@ class Arguments:
         for rule in self.rules:
             if rule.fits(node):
                 flat.update(rule.values)
-        nested: dict[str, Any] = {}
-        for name, value in flat.items():
-            *sections, last = name.split(".")
-            place = nested
-            for section in sections:
-                inner = place.setdefault(section, {})
-                if not isinstance(inner, dict):
-                    raise TransportError(f"parameter {name}: {section} is a value already, it cannot have parts too")
-                place = inner
-            place[last] = value
-        return nested
+        return nested(flat)
+
+
+def nested(flat: Mapping[str, Any]) -> dict[str, Any]:
+    """Return parameters by name, ``virtual_hand.script``, as tables within tables.
+
+    Raises:
+        TransportError: A name stands for a value and for a table.
+    """
+    found: dict[str, Any] = {}
+    for name, value in flat.items():
+        *sections, last = name.split(".")
+        place = found
+        for section in sections:
+            inner = place.setdefault(section, {})
+            if not isinstance(inner, dict):
+                raise TransportError(f"parameter {name}: {section} is a value already, it cannot have parts too")
+            place = inner
+        place[last] = value
+    return found
 
 
 def parse_arguments(words: Sequence[str]) -> Arguments:

@@ -3,14 +3,14 @@
 import logging
 import threading
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Protocol
 
 from handsteer.clock import Clock, SimulatedClock, WallClock, to_seconds
 from handsteer.errors import TransportError
 from handsteer.messages import CLOCK, Log, Time
 from handsteer.parameters import NodeParameters
-from handsteer.transports.protocol import Publisher, Transport
+from handsteer.transports.protocol import Call, Publisher, Transport
 from handsteer.transports.ros2.arguments import parse_arguments
 from handsteer.transports.ros2.names import NodeName, identify
 from handsteer.transports.ros2.parameter_services import PARAMETER_EVENTS, ParameterServices
@@ -86,6 +86,9 @@ class Ros2Session(ABC):
         events = self.transport.advertise(self.name, PARAMETER_EVENTS)
         answering = ParameterServices(self.name, parameters, self._stamp, events.publish)
         self._servers += [self._answer(*service) for service in answering.services]
+
+    def offer(self, services: Callable[[], Mapping[str, Call]]) -> None:  # noqa: B027 # one for all that lack them
+        """Do nothing: only rclpy has services of any type."""
 
     def wait(self, timeout_s: float) -> bool:
         """Wait for at most ``timeout_s`` seconds; return whether this session has been closed.

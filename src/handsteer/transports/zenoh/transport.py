@@ -267,7 +267,7 @@ class _Reception(Generic[M]):
             return
         is_obeyed = not late or (self._topic.stops is not None and self._topic.stops(message))
         if is_obeyed and not self._is_closed:
-            self._send(Received(message, capture_time(message, self._clock), late))
+            self._send(Received(message, capture_time(message, self._clock), is_late=late))
 
 
 def _subscriber(session: zenoh.Session, key: str, profile: Profile) -> Any:

@@ -1,0 +1,98 @@
+"""The command line as a whole: its verbs, and what becomes of errors."""
+
+import logging
+import os
+import sys
+
+from cyclopts import App, CycloptsError, ValidationError
+from pydantic import ValidationError as PydanticError
+
+from handsteer import __version__, config
+from handsteer.cli import signals
+from handsteer.cli.options import say
+from handsteer.errors import HandsteerError
+
+_EXAMPLES = """Examples:
+  handsteer run                                  drive, and open the page
+  handsteer run --headless --duration 30 --json  no page, one summary at the end
+  handsteer recognize photo.jpg                  which sign is it?
+  handsteer signs evaluate photos/               how well are signs told?
+  handsteer camera --transport ros1              one node, in a ROS 1 graph
+  handsteer camera --transport auto              one node, in a ROS 2 graph; or ros2, dds, zenoh
+  handsteer doctor                               what works on this machine
+"""
+
+app = App(
+    name="handsteer",
+    help="Drive a mobile robot with your hand signs.",
+    help_epilogue=_EXAMPLES,
+    version=__version__,
+    help_format="plaintext",
+    result_action="return_value",
+)
+# Named, not imported: a verb's module is loaded when it is used.
+for verb in ("run", "recognize", "models", "doctor"):
+    app.command(f"handsteer.cli.{verb}:{verb}", name=verb)
+app.command("handsteer.cli.signs:app", name="signs")
+for verb in ("camera", "recognition", "control", "robot", "steering"):
+    app.command(f"handsteer.cli.nodes:{verb}", name=verb, group="One node of a graph of several processes")
+app.command(
+    "handsteer.cli.zenoh_router:zenoh_router", name="zenoh-router", group="One node of a graph of several processes"
+)
+app.command("handsteer.cli.robots:robots", name="robots", group="One node of a graph of several processes")
+
+
+def run(words: list[str]) -> int:
+    """Run the verb that ``words`` name; return the exit code, 0 when all went well, 2 when the input was wrong."""
+    logging.basicConfig(level=logging.INFO, format="handsteer: %(message)s", stream=sys.stderr)
+    for noisy in ("uvicorn", "asyncio", "httpx", "watchfiles", "rospy"):
+        logging.getLogger(noisy).setLevel(logging.WARNING)
+    words = _ros_words_last(words)
+    _load_what_help_lists(app, words)
+    try:
+        verb, given, _ = app.parse_args(words, exit_on_error=False, print_error=False)
+        # The verb is loaded now. What it begins is to be left in order.
+        signals.end_in_order()
+        return verb(*given.args, **given.kwargs) or 0
+    except CycloptsError as error:
+        return _fail(_problem(error))
+    except HandsteerError as error:
+        return _fail(str(error))
+    except BrokenPipeError:  # the reader of our output has left, as `head` does
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+
+
+def _load_what_help_lists(group: App, arguments: list[str]) -> None:
+    """Load the verbs of a group that is asked for help or named alone: their descriptions are listed then."""
+    if not arguments or arguments[0] in group.help_flags:
+        for verb in group:
+            group[verb]
+    elif arguments[0] in set(group):
+        _load_what_help_lists(group[arguments[0]], arguments[1:])
+
+
+def _ros_words_last(arguments: list[str]) -> list[str]:
+    """Return ``arguments`` with what stands between ``--ros-args`` and ``--`` moved to the end, where options end.
+
+    ROS 2 allows them anywhere, and ``ros2 launch`` appends its own.
+    """
+    ours: list[str] = []
+    ros: list[str] = []
+    inside = False
+    for argument in arguments:
+        inside = inside or argument == "--ros-args"
+        (ros if inside else ours).append(argument)
+        inside = inside and argument != "--"
+    return [*ours, *([] if "--" in ours else ["--"]), *ros] if ros else ours
+
+
+def _problem(error: CycloptsError) -> str:
+    if isinstance(error, ValidationError) and isinstance(error.__cause__, PydanticError):
+        return config.describe(error.__cause__)
+    return f"{str(error).rstrip('.')}; see handsteer --help"
+
+
+def _fail(message: str) -> int:
+    say(" ".join(message.split()))
+    return 2

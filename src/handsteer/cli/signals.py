@@ -1,0 +1,69 @@
+"""What becomes of signals: they end the program in order, whatever it is just doing.
+
+It loads next to nothing itself, for a signal may come while the rest is loaded.
+"""
+
+import math
+import os
+import signal
+import sys
+import time
+from collections.abc import Callable
+from types import FrameType
+
+# Another signal so soon after one is the same wish; it must not cut off what the first one has begun.
+_SAME_WISH_S = 1.0
+
+_ENDING = (
+    *("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT", "SIGABRT", "SIGTSTP", "SIGTTIN", "SIGTTOU", "SIGUSR1", "SIGUSR2"),
+    *("SIGALRM", "SIGVTALRM", "SIGPROF", "SIGXCPU", "SIGIO", "SIGPWR", "SIGSTKFLT", "SIGSYS", "SIGBREAK"),
+)
+"""Signals whose default is to end a program, or to hold it, as Ctrl-Z does; the robot would hear nothing of it."""
+
+Handler = Callable[[int, FrameType | None], None]
+
+
+def end_at_once(code: int) -> None:
+    """Let signals end the program with exit code ``code``, while there is nothing yet to be left in order.
+
+    An exception would surface in the midst of whatever is being loaded, which prints it or swallows it.
+    """
+
+    def end(_signal: int, _frame: FrameType | None) -> None:
+        os._exit(code)
+
+    _handle(end)
+
+
+def end_in_order() -> None:
+    """Let each signal that would end or hold the program raise KeyboardInterrupt, which leaves the robot standing.
+
+    SIGKILL and SIGSTOP cannot be caught, and after a crash (SIGSEGV and its like) nothing can be said any more.
+    """
+    raised_s = -math.inf
+
+    def interrupt(_signal: int, _frame: FrameType | None) -> None:
+        nonlocal raised_s
+        now_s = time.monotonic()
+        if now_s - raised_s >= _SAME_WISH_S:
+            raised_s = now_s
+            raise KeyboardInterrupt
+
+    _handle(interrupt)
+
+
+def _handle(handler: Handler) -> None:
+    numbers = []
+    for name in _ENDING:
+        number = getattr(signal, name, None)
+        if number is None:
+            continue  # not on this system
+        # Whoever starts a program by nohup wants it to outlive the terminal. SIGINT is taken even so: a shell lets its
+        # background jobs ignore it, and a robot must be stopped all the same.
+        if name == "SIGHUP" and signal.getsignal(number) == signal.SIG_IGN:
+            continue
+        signal.signal(number, handler)
+        numbers.append(number)
+    if sys.platform != "win32":
+        # Whoever started the program may have blocked them until now, when they can be taken.
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, numbers)

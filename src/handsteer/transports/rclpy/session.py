@@ -1,0 +1,160 @@
+"""This process as a node of rclpy: name, parameters, time, and the one thread that serves what comes."""
+
+import logging
+import threading
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from typing import Any
+
+import rclpy
+from rclpy.clock import JumpThreshold
+from rclpy.duration import Duration
+from rclpy.exceptions import NameValidationException
+from rclpy.executors import ExternalShutdownException, ShutdownException, SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+from rclpy.utilities import remove_ros_args
+
+from handsteer.clock import Clock, SimulatedClock, WallClock
+from handsteer.errors import HandsteerError, TransportError
+from handsteer.parameters import NodeParameters
+from handsteer.transports.protocol import Call
+from handsteer.transports.rclpy.log import RosLog
+from handsteer.transports.rclpy.parameters import ParameterLink, take_given
+from handsteer.transports.rclpy.transport import RclpyTransport
+from handsteer.transports.rclpy.types import ros_class
+
+_CLOCK_SILENCE_S = 2.0
+_DELIVER_S = 0.2
+_LEAVE_S = 2.0
+_AFTER_FAILURE_S = 0.05
+_ANY_JUMP = JumpThreshold(min_forward=Duration(nanoseconds=1), min_backward=Duration(nanoseconds=-1))
+_TRIGGER = "std_srvs/srv/Trigger"
+
+log = logging.getLogger(__name__)
+
+
+class RclpySession:
+    """A :class:`~handsteer.transports.protocol.Session` of ROS 2, by a node of rclpy.
+
+    What ROS 2 has for every node is rclpy's own here: arguments and remapping, parameters and ``qos_overrides``,
+    ``use_sim_time``, the log, ``get_type_description``.
+
+    Args:
+        node: Name of the node, unless ``arguments`` rename it.
+        arguments: ROS 2's own, after ``--ros-args``.
+
+    Raises:
+        TransportError: An argument is wrong, or the middleware cannot be started.
+    """
+
+    def __init__(self, node: str, arguments: Sequence[str]) -> None:
+        self._left = threading.Event()
+        self._was_silent = False
+        self._context = rclpy.Context()
+        self._executor: SingleThreadedExecutor | None = None
+        self._log: RosLog | None = None
+        self._node = _make_node(self._context, node, arguments)
+        try:
+            self._log = RosLog(self._node.get_logger())
+            self.name: str = self._node.get_fully_qualified_name()
+            self.parameters: dict[str, Any] = take_given(self._node)
+            self.clock = self._make_clock()
+            self.transport = RclpyTransport(self._node, self.clock)
+            self._executor = SingleThreadedExecutor(context=self._context)
+            self._executor.add_node(self._node)
+            self._thread = threading.Thread(target=self._spin, name="rclpy", daemon=True)
+            self._thread.start()
+        except BaseException:  # an interrupt too: what stays open keeps the process from ending
+            self.close()
+            raise
+
+    def serve(self, parameters: NodeParameters) -> None:
+        """Let rclpy answer ``ros2 param``."""
+        self._parameters = ParameterLink(self._node, parameters)
+
+    def offer(self, services: Callable[[], Mapping[str, Call]]) -> None:
+        """Let others call the node's services, of std_srvs/Trigger, if this ROS 2 has that package."""
+        trigger = ros_class(_TRIGGER)
+        if trigger is None:
+            log.info("the node's services are left out: this ROS 2 lacks the package std_srvs")
+            return
+        for name, call in services().items():
+            self._node.create_service(trigger, f"~/{name}", partial(_answer, call))
+
+    def wait(self, timeout_s: float) -> bool:
+        """Wait for at most ``timeout_s`` seconds; return whether rclpy has been shut down, or this session closed."""
+        silent = isinstance(self.clock, SimulatedClock) and self.clock.silence_s > _CLOCK_SILENCE_S
+        if silent and not self._was_silent:
+            log.warning("use_sim_time is set, but /clock stands still: frames count as old, the robot stands")
+        self._was_silent = silent
+        return self._left.wait(timeout_s) or not self._context.ok()
+
+    def close(self) -> None:
+        """Deliver what was published, then leave the graph; may be called twice."""
+        if self._left.is_set():
+            return
+        self._left.set()
+        if self._executor is not None:
+            self.transport.flush(_DELIVER_S)
+            self.transport.close()
+            self._executor.shutdown()
+            self._thread.join(_LEAVE_S)
+        if self._log is not None:
+            self._log.close()
+        self._node.destroy_node()
+        self._context.try_shutdown()
+        self._context.destroy()
+
+    def _make_clock(self) -> Clock:
+        if not self._node.get_parameter("use_sim_time").value:
+            return WallClock()
+        simulated, theirs = SimulatedClock(), self._node.get_clock()
+        # Kept, or rclpy would forget it.
+        self._jumps = theirs.create_jump_callback(
+            _ANY_JUMP, post_callback=lambda _: simulated.tell(theirs.now().nanoseconds / 1e9)
+        )
+        return simulated
+
+    def _spin(self) -> None:
+        executor = self._executor
+        assert executor is not None
+        while not self._left.is_set():
+            try:
+                executor.spin_once()
+            except (ExternalShutdownException, ShutdownException):
+                return
+            except Exception:
+                if not self._left.is_set():
+                    log.exception("ROS 2: what has come could not be served")
+                    self._left.wait(_AFTER_FAILURE_S)  # what fails again and again must not take the whole machine
+
+
+def _answer(call: Call, _request: Any, reply: Any) -> Any:
+    try:
+        reply.message, reply.success = call(), True
+    except HandsteerError as error:
+        reply.message, reply.success = str(error), False
+    return reply
+
+
+def _make_node(context: Any, node: str, arguments: Sequence[str]) -> Node:
+    try:
+        # Ours handle the signals: a robot is to be told to stand before the middleware goes.
+        rclpy.init(args=list(arguments), context=context, signal_handler_options=SignalHandlerOptions.NO)
+        left_over = remove_ros_args(list(arguments))
+        if left_over:
+            raise TransportError(
+                f"{left_over[0]!r} is no argument of ROS 2: it should be as --ros-args "
+                "-r image_raw:=camera/image -p fps:=15"
+            )
+        return rclpy.create_node(
+            node,
+            context=context,
+            start_parameter_services=False,
+            allow_undeclared_parameters=True,
+            automatically_declare_parameters_from_overrides=True,
+        )
+    except (RuntimeError, ValueError, NameValidationException) as error:
+        context.try_shutdown()
+        raise TransportError(f"cannot join ROS 2 as {node}: {' '.join(str(error).split())}") from None

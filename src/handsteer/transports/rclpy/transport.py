@@ -1,0 +1,274 @@
+"""Messages by rclpy: one ROS 2 node for all nodes of this process, and serialised messages in and out."""
+
+import logging
+import threading
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from functools import partial
+from typing import Any, Generic, TypeVar
+
+from rclpy.duration import Duration
+from rclpy.exceptions import InvalidTopicNameException
+from rclpy.node import Node
+from rclpy.qos_overriding_options import InvalidQosOverridesError, QoSOverridingOptions
+
+from handsteer.clock import Clock
+from handsteer.errors import TransportError
+from handsteer.messages import Topic, type_name
+from handsteer.transports.channels import Deliver, Fanout, FanoutSubscription, TopicTypes, check_type
+from handsteer.transports.lateness import Lateness
+from handsteer.transports.protocol import Received
+from handsteer.transports.rclpy.qos import publisher_qos, subscription_qos
+from handsteer.transports.rclpy.types import ros_class
+from handsteer.transports.ros2.encoding import decode, encode
+from handsteer.transports.stamps import capture_time
+
+M = TypeVar("M")
+
+log = logging.getLogger(__name__)
+
+
+class RclpyTransport:
+    """A :class:`~handsteer.transports.protocol.Transport` by a node of rclpy, which somebody else spins.
+
+    Capture times travel in the stamps of message headers; messages without a header come without one. A topic whose
+    message type this ROS 2 lacks is said once, and left out.
+
+    Args:
+        node: The node.
+        clock: The graph's clock.
+    """
+
+    # Fast DDS loses most raw images even on one machine.
+    crosses_network = True
+
+    def __init__(self, node: Node, clock: Clock) -> None:
+        self._node = node
+        self._clock = clock
+        self._types = TopicTypes()
+        self._lock = threading.Lock()
+        self._lacking: set[str] = set()
+        self._publishers: list[RclpyPublisher[Any]] = []
+        self._incoming: dict[str, Fanout[Any]] = {}
+        self._is_open = True
+
+    def advertise(self, node: str, topic: Topic[M]) -> "RclpyPublisher[M]":
+        """Return the sending end of ``topic`` for the node named ``node``."""
+        name = self._claim(topic)
+        publisher = RclpyPublisher(self._node, topic, name, self._class_of(topic))
+        with self._lock:
+            self._publishers.append(publisher)
+        return publisher
+
+    def subscribe(self, node: str, topic: Topic[M], deliver: Deliver[M]) -> FanoutSubscription[M]:
+        """Call ``deliver`` for each message on ``topic`` from now on, on the thread that spins the node."""
+        name = self._claim(topic)
+        with self._lock:
+            if name not in self._incoming:
+                receive = partial(self._receive, topic)
+                self._incoming[name] = Fanout(latched=topic.latched, receive=receive)
+            fanout: Fanout[M] = self._incoming[name]
+        return fanout.add(deliver)
+
+    def publishers_of(self, topic: Topic[Any]) -> list[str]:
+        """Return the full names of the ROS 2 nodes that publish ``topic``; those that were killed stay for a while."""
+        if not self._is_open:
+            return []
+        found = self._node.get_publishers_info_by_topic(_given(self._node, topic))
+        return sorted(f"{one.node_namespace.rstrip('/')}/{one.node_name}" for one in found)
+
+    def topic_name(self, topic: Topic[Any]) -> str:
+        """Return the topic's full name in the graph, remapped."""
+        return resolved(self._node, topic)
+
+    def full_name(self, node: str) -> str:
+        """Return the ROS 2 node's name and ``node``, as ROS's own diagnostics do: ``r1/my_camera: my_camera``."""
+        return f"{self._node.get_fully_qualified_name().removeprefix('/')}: {node}"
+
+    def flush(self, timeout_s: float) -> None:
+        """Wait until all reliable subscribers have what was published, for at most ``timeout_s`` seconds."""
+        deadline_s = time.monotonic() + timeout_s
+        with self._lock:
+            publishers = list(self._publishers)
+        for publisher in publishers:
+            publisher.flush(max(0.0, deadline_s - time.monotonic()))
+
+    def close(self) -> None:
+        """End all publishing and receiving; may be called twice."""
+        self._is_open = False
+        with self._lock:
+            publishers, self._publishers = self._publishers, []
+            incoming, self._incoming = self._incoming, {}
+        for publisher in publishers:
+            publisher.close()
+        for channel in incoming.values():
+            channel.close()
+
+    def _claim(self, topic: Topic[Any]) -> str:
+        name = resolved(self._node, topic)
+        self._types.claim(name, topic)
+        return name
+
+    def _class_of(self, topic: Topic[Any]) -> Any | None:
+        kind = type_name(topic.type)
+        found = ros_class(kind)
+        package = kind.partition("/")[0]
+        if found is None and package not in self._lacking:
+            self._lacking.add(package)
+            log.warning(
+                "%s is left out: this ROS 2 lacks the package %s (sudo apt install ros-$ROS_DISTRO-%s)",
+                resolved(self._node, topic),
+                package,
+                package.replace("_", "-"),
+            )
+        return found
+
+    def _receive(self, topic: Topic[M], send: Deliver[M]) -> Callable[[], None]:
+        kind = self._class_of(topic)
+        return (lambda: None) if kind is None else _Reception(self._node, topic, kind, self._clock, send).close
+
+
+class RclpyPublisher(Generic[M]):
+    """The sending end of a topic.
+
+    Args:
+        node: The node of rclpy.
+        topic: The topic.
+        name: Its full name.
+        kind: ROS 2's class for its messages; None where there is none, so that nobody ever listens.
+    """
+
+    def __init__(self, node: Node, topic: Topic[M], name: str, kind: Any | None) -> None:
+        self._node = node
+        self._topic = topic
+        self._lock = threading.Lock()
+        self._publisher: Any = None
+        if kind is not None:
+            with _refusals(name):
+                self._publisher = node.create_publisher(
+                    kind, _given(node, topic), publisher_qos(topic), qos_overriding_options=_overriding(node, name)
+                )
+
+    @property
+    def wanted(self) -> bool:
+        """Whether anybody listens, in this process or another."""
+        publisher = self._publisher
+        return publisher is not None and publisher.get_subscription_count() > 0
+
+    def publish(self, message: M, captured_s: float | None = None) -> None:
+        """Give ``message`` to rclpy; a subscriber that is too slow for it goes without."""
+        check_type(self._topic, message)
+        publisher = self._publisher
+        if publisher is None or not (self._topic.latched or self.wanted):
+            return
+        try:
+            publisher.publish(encode(message))
+        except RuntimeError as error:
+            raise TransportError(f"{self._topic.name} cannot be published: {error}") from None
+
+    def flush(self, timeout_s: float) -> None:
+        """Wait until all reliable subscribers have what was published, for at most ``timeout_s`` seconds."""
+        publisher = self._publisher
+        if publisher is None:
+            return
+        try:
+            confirmed = publisher.wait_for_all_acked(Duration(seconds=timeout_s))
+        except RuntimeError:  # not every middleware can tell
+            return
+        if not confirmed:
+            log.info("%s: not every subscriber has confirmed the last message", self._topic.name)
+
+    def close(self) -> None:
+        """Send no more; may be called twice."""
+        with self._lock:
+            publisher, self._publisher = self._publisher, None
+        if publisher is not None:
+            self._node.destroy_publisher(publisher)
+
+
+class _Reception(Generic[M]):
+    """A subscription, whose messages are decoded and passed on."""
+
+    def __init__(self, node: Node, topic: Topic[M], kind: Any, clock: Clock, send: Deliver[M]) -> None:
+        self._node = node
+        self._topic = topic
+        self._clock = clock
+        self._send = send
+        self._is_broken = False
+        self._lateness = None if topic.lifespan_s is None else Lateness(topic.lifespan_s)
+        self._was_late = False
+        self._name = name = resolved(node, topic)
+        with _refusals(name):
+            self._subscription: Any = node.create_subscription(
+                kind,
+                _given(node, topic),
+                self._on_message,
+                subscription_qos(topic),
+                qos_overriding_options=_overriding(node, name),
+                raw=True,
+            )
+
+    def close(self) -> None:
+        """Receive no more."""
+        self._node.destroy_subscription(self._subscription)
+
+    def _on_message(self, raw: bytes, info: Mapping[str, int]) -> None:
+        late = self._is_late(info.get("source_timestamp", 0))
+        try:
+            message = decode(raw, type_name(self._topic.type))
+        except Exception as error:
+            # Whatever the network brings must not end the receiving.
+            if not self._is_broken:
+                log.warning("%s: a message of %d bytes cannot be read: %s", self._name, len(raw), error)
+            self._is_broken = True
+            return
+        if not late or (self._topic.stops is not None and self._topic.stops(message)):
+            self._send(Received(message, capture_time(message, self._clock), is_late=late))
+
+    def _is_late(self, sent_ns: int) -> bool:
+        if self._lateness is None or sent_ns <= 0:  # not every middleware tells when a message was sent
+            return False
+        late = self._lateness.is_late(b"", sent_ns / 1e9, time.monotonic())
+        if late and not self._was_late:
+            log.warning(
+                "%s: messages come over %g s late and are not obeyed, but for stops: has the link stood still, has the "
+                "clock of their sender been set back, or have several senders clocks that differ?",
+                self._name,
+                self._topic.lifespan_s,
+            )
+        self._was_late = late
+        return late
+
+
+def resolved(node: Node, topic: Topic[Any]) -> str:
+    """Return the full name of ``topic``, remapped.
+
+    Raises:
+        TransportError: It is given a name that is not allowed.
+    """
+    with _refusals(topic.name):
+        return str(node.resolve_topic_name(_given(node, topic)))
+
+
+def _given(node: Node, topic: Topic[Any]) -> str:
+    """Return the name to give to rclpy, which expands and remaps it; one that is beneath a topic moves with that."""
+    beneath, name = topic.beneath, topic.ros_name
+    if beneath is None or node.resolve_topic_name(name) != node.resolve_topic_name(name, only_expand=True):
+        return name
+    return resolved(node, beneath) + topic.name.removeprefix(beneath.name)
+
+
+def _overriding(node: Node, name: str) -> QoSOverridingOptions | None:
+    """Let ``qos_overrides`` change the profile of the topic of this full name, where any are given."""
+    given = node.get_parameters_by_prefix(f"qos_overrides.{name}")
+    return QoSOverridingOptions.with_default_policies() if given else None
+
+
+@contextmanager
+def _refusals(name: str) -> Iterator[None]:
+    """Say what rclpy raises of the topic of this name as an error of ours."""
+    try:
+        yield
+    except (InvalidTopicNameException, InvalidQosOverridesError, RuntimeError, ValueError) as error:
+        raise TransportError(f"{name}: {' '.join(str(error).split())}") from None

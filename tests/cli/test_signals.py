@@ -1,0 +1,77 @@
+"""Signals at any moment of the start: no traceback, and the exit code of an ordinary end."""
+
+import os
+import signal
+import sys
+import threading
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+
+from tests.processes import Process, free_port
+from tests.ros1.graph import Ros1Graph
+from tests.ros1.launches import ROS, ros_environment
+
+pytestmark = pytest.mark.slow
+
+MOMENTS = 30
+LATEST_S = 1.5
+HANDSTEER = (sys.executable, "-m", "handsteer")
+
+
+def block() -> None:
+    """As our launch scripts do: signals wait until the program takes them, so the interpreter's own start is no gap."""
+    signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT, signal.SIGTERM))
+
+
+def ends(command: Sequence[str], env: dict[str, str], home: Path, *, code: int = 0, moments: int = MOMENTS) -> None:
+    """Start ``command`` again and again, each time ended by a signal at a later moment, and look at how."""
+    for number in range(moments):
+        wish = (signal.SIGINT, signal.SIGTERM)[number % 2]
+        process = Process(list(command), env, home / f"{number}.log", preexec_fn=block)
+        moment_s = number * LATEST_S / moments
+        try:
+            threading.Event().wait(moment_s)
+            process.signal(wish)
+            assert (process.code(), "Traceback" in process.text) == (code, False), (moment_s, wish, process.text)
+        finally:
+            process.kill()
+
+
+def test_a_run(tmp_path: Path) -> None:
+    command = [
+        *HANDSTEER,
+        "run",
+        "--headless",
+        "--camera",
+        "virtual",
+        "--camera.width",
+        "320",
+        "--camera.height",
+        "240",
+    ]
+    ends(command, dict(os.environ), tmp_path)
+
+
+def test_what_has_an_end_of_its_own_was_interrupted(tmp_path: Path) -> None:
+    env = {**os.environ, "PYTHONPROFILEIMPORTTIME": "1"}  # which takes long enough to be interrupted
+    ends([*HANDSTEER, "signs", "evaluate", "--help"], env, tmp_path, code=130, moments=1)
+
+
+def test_a_node_over_dds(tmp_path: Path) -> None:
+    pytest.importorskip("cyclonedds")
+    env = {**os.environ, "ROS_DOMAIN_ID": str(10 + free_port() % 30), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+    ends([*HANDSTEER, "control", "--transport", "dds"], env, tmp_path)
+
+
+@pytest.mark.ros1
+def test_a_node_over_ros1(ros1: Ros1Graph, tmp_path: Path) -> None:
+    ends([*HANDSTEER, "recognition", "--transport", "ros1"], ros1.env, tmp_path)
+
+
+@pytest.mark.ros1
+@pytest.mark.skipif(not Path(sys.executable).with_name("handsteer").exists(), reason="handsteer is not installed")
+def test_an_executable_of_the_courses_packages(ros1: Ros1Graph, tmp_path: Path) -> None:
+    env = {**ros_environment(), **{name: ros1.env[name] for name in ("ROS_MASTER_URI", "ROS_HOME")}}
+    ends([str(ROS / "ros_hand_gesture_recognition/scripts/sign_to_controller.py")], env, tmp_path)

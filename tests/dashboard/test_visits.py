@@ -1,0 +1,64 @@
+"""What a visit leaves behind: nothing, whether the browser has joined its page or not."""
+
+import gc
+import urllib.parse
+from collections import Counter
+
+import pytest
+from nicegui import Client
+
+from handsteer.dashboard.history import Sample
+from handsteer.dashboard.unjoined import MOST_UNJOINED
+from tests.dashboard.network import client_of, join_query
+from tests.dashboard.served import Site
+from tests.dashboard.sockets import PageSocket
+from tests.processes import eventually
+
+PATHS = ("/", "/teach", "/settings")
+VISITS = 30
+
+
+def visit(site: Site, number: int) -> None:
+    """Come, look and leave, as another tab each time."""
+    html, cookies = site.page(PATHS[number % len(PATHS)])
+    with PageSocket(site, html, cookies, join_query(client_of(html), tab=f"tab-{number}")) as page:
+        assert page.joined
+        page.answered("ack", {"client_id": page.client, "next_message_id": 0})
+
+
+def objects() -> Counter[str]:
+    """Return how many there are of each kind, but for what is bounded by its own."""
+    urllib.parse.clear_cache()
+    gc.collect()
+    kinds = [type(each) for each in gc.get_objects() if not isinstance(each, Sample)]
+    return Counter(f"{kind.__module__}.{kind.__qualname__}" for kind in kinds)
+
+
+@pytest.mark.slow
+def test_a_visit_leaves_nothing_behind(site: Site) -> None:
+    def visit_all(begin: int) -> Counter[str]:
+        for number in range(begin, begin + VISITS):
+            visit(site, number)
+        eventually(lambda: not Client.instances, what="the pages to be gone")
+        return objects()
+
+    before = visit_all(0)
+
+    def grown() -> dict[str, int]:
+        return {kind: more for kind, more in (objects() - before).items() if more >= VISITS // len(PATHS)}
+
+    visit_all(VISITS)
+    # What a tab stored is looked through every ten seconds.
+    eventually(lambda: not grown(), what=f"nothing of {VISITS} visits to be left; there is {grown()}")
+
+
+def test_pages_that_nobody_joins_do_not_pile_up(site: Site) -> None:
+    html, cookies = site.page()
+    with PageSocket(site, html, cookies) as page:
+        for _ in range(MOST_UNJOINED + 5):
+            site.page()
+        newest, cookies = site.page()
+        assert len(Client.instances) <= MOST_UNJOINED + 1
+        assert page.client in Client.instances, "who has joined stays"
+        with PageSocket(site, newest, cookies) as other:
+            assert other.joined

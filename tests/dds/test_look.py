@@ -1,0 +1,46 @@
+"""What the doctor sees of a domain with our nodes and others in it."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+pytest.importorskip("cyclonedds")
+
+from tests.dds.graph import DdsGraph, dds_graph
+from tests.processes import eventually
+
+DRIVEN = "robot_diff_drive_controller/cmd_vel:=/robot_diff_drive_controller/cmd_vel"
+
+
+def look(domain: DdsGraph) -> dict[str, Any]:
+    command = [sys.executable, "-m", "handsteer.transports.look"]
+    done = subprocess.run(command, env=domain.env, capture_output=True, text=True, timeout=120, check=False)
+    assert done.returncode == 0, done.stderr
+    return dict(json.loads(done.stdout))
+
+
+def test_nodes_topics_and_what_is_amiss(tmp_path: Path) -> None:
+    with dds_graph(tmp_path) as domain:
+        domain.node("control", name="/hand_sign_control")
+        domain.node("control", name="/r1/other", ros=("-r", "__ns:=/r1", "-r", "__node:=other", "-r", DRIVEN))
+        domain.peer.ask("advertise", topic="/eye", type="Image", reliable=False)
+        domain.peer.ask("introduce", name="talker")
+        viewer = domain.start_peer()
+        viewer.ask("record", topic="/eye", type="Image", fields=["height"], reliable=True)
+        viewer.ask("introduce", name="viewer")
+        seen = eventually(lambda: found if len((found := look(domain))["nodes"]) == 4 else None, what="all nodes")
+    assert seen["place"] == f"domain {domain.domain}, this machine"
+    assert seen["nodes"] == ["/hand_sign_control", "/r1/other", "/talker", "/viewer"]
+    topics = {topic["name"]: topic for topic in seen["topics"]}
+    assert topics["/gesture/hand_sign"]["types"] == ["std_msgs/msg/String"]
+    assert topics["/gesture/hand_sign"]["publishers"] == []
+    driven, eye = seen["warnings"]
+    assert driven.startswith("/robot_diff_drive_controller/cmd_vel has 2 publishers (/hand_sign_control, /r1/other)")
+    assert eye == (
+        "/eye: nothing passes from /talker to /viewer: the publisher is best effort, the subscriber wants reliable "
+        "(offered: best effort, volatile, keep last 100; requested: reliable, volatile, keep last 100)"
+    )

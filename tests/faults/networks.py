@@ -1,0 +1,118 @@
+"""What becomes of a link between two machines that is cut, slow or bad: real processes in two network namespaces."""
+
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from tests.distributed.graph import SPEED_MPS, Drive, TwoMachines
+from tests.distributed.network import Link, two_machines
+from tests.faults.stepped import Outcome
+
+SCRIPT = "NONE:4 Forward:600"
+FAULT_S, AFTER_S = 2.0, 1.5
+BRAKES_S = 0.6
+MOVES_MPS = 0.02
+LAYOUTS = {
+    "camera and robot, the others beyond the link": ("camera",),
+    "robot, the others beyond the link": (),
+    "camera, control and robot, recognition beyond the link": ("camera", "control"),
+}
+"""What is on the robot's machine, in words, and which nodes these are beside it."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """A fault of the link while the robot drives; attributes as of :class:`tests.faults.row.Row`.
+
+    Attributes:
+        where: The layout.
+        begin: Returns when it happened, in Unix time.
+    """
+
+    where: str
+    fault: str
+    begin: Callable[[Link], float]
+    lasts_s: float = FAULT_S
+
+    @property
+    def name(self) -> str:
+        return f"{self.where}: {self.fault}"
+
+
+def rows() -> list[Row]:
+    """Return all rows; those of one layout come one after the other."""
+    return [
+        Row(layout, f"{words} for {lasts_s:g} s", begin, lasts_s)
+        for layout in LAYOUTS
+        for words, begin, lasts_s in (
+            ("the link is cut", Link.cut, FAULT_S),
+            ("the link is cut", Link.cut, 0.7),
+            ("all comes 0.8 s late", _slow, FAULT_S),
+        )
+    ]
+
+
+def _slow(link: Link) -> float:
+    began_s = time.time()
+    link.shape(delay_s=0.8)
+    return began_s
+
+
+@contextmanager
+def drive(layout: str) -> Iterator[Drive]:
+    """Let the nodes of a layout run, all but the camera, for as long as the block lasts."""
+    with tempfile.TemporaryDirectory() as home, two_machines(Path(home)) as (robot, workstation, link):
+        machines = TwoMachines(Path(home), robot, workstation, link)
+        near = LAYOUTS[layout]
+        try:
+            peer = machines.onlooker(robot if "control" in near else workstation)
+            control = machines.node(
+                robot if "control" in near else workstation,
+                "control",
+                "--control.arming",
+                "on",
+                ros=("-p", f"max_linear:={SPEED_MPS}", "-p", "linear_step:=0.02"),
+            )
+            nodes = {
+                "robot": machines.node(robot, "robot", "--world", "empty"),
+                "control": control,
+                "recognition": machines.node(workstation, "recognition", ros=("-p", "image_transport:=compressed")),
+            }
+            yield Drive(machines, machines.onlooker(robot), nodes, peer)
+        finally:
+            machines.stop()
+
+
+def outcome_of(row: Row, drive: Drive) -> Outcome:
+    """Drive, let it happen, let it end; whether it drives again, the next row shows."""
+    machines = drive.machines
+    near = "camera" in LAYOUTS[row.where]
+    drive.nodes["camera"] = machines.camera(SCRIPT, on=machines.robot if near else machines.workstation)
+    drive.until_fast()
+    began_s, heard_s = row.begin(machines.link), time.monotonic()
+    time.sleep(row.lasts_s)
+    machines.link.shape()
+    ended_s = time.time()
+    time.sleep(AFTER_S)
+    slower = [one.at_s for one in drive.odometry(began_s) if one.speed_mps < SPEED_MPS - 0.02]
+    moves = any(one.speed_mps > MOVES_MPS for one in drive.odometry(ended_s + BRAKES_S))
+    said = [text for text in drive.reports("hand_sign_control", heard_s) if text.startswith("standing")]
+    drive.nodes.pop("camera").kill()
+    zero_s = slower[0] - began_s if slower else None
+    return Outcome(row.where, row.fault, zero_s, moves, True, said[0] if said else "nothing")
+
+
+def outcomes() -> list[Outcome]:
+    """Return what becomes of all rows; needs root."""
+    found = []
+    for layout in LAYOUTS:
+        with drive(layout) as made:
+            for row in rows():
+                if row.where == layout:
+                    found.append(outcome_of(row, made))
+                    print(found[-1], file=sys.stderr, flush=True)  # noqa: T201 - it takes minutes
+    return found

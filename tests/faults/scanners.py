@@ -1,0 +1,99 @@
+"""Rows of a laser scanner that fails, while the control slows the robot before what it sees."""
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from handsteer.config import CollisionMonitorConfig, RobotConfig
+from handsteer.messages import SCAN
+from handsteer.nodes.control import HandSignControlNode
+from handsteer.nodes.node import Node
+from handsteer.robots.protocol import RangeScan, Robot
+from handsteer.testing.fault_transport import CUT, FROZEN, LinkFault
+from tests.faults.base import Base
+from tests.faults.chain import Chain
+from tests.faults.row import Row, lower_the_hand, nothing
+
+RAYS = 360
+FREE = RangeScan(-math.pi, math.tau / RAYS, 0.05, 8.0, np.full(RAYS, 7.0, np.float32))
+
+
+class ScannedChain(Chain):
+    """The chain with a scanner in a hall without obstacles, and a control that listens to it."""
+
+    def _driven(self) -> Robot:
+        self.base = self.scanner = ScannedBase(self.clock, RobotConfig())
+        return self.base
+
+    def _control(self) -> Node:
+        rule = CollisionMonitorConfig(enabled=True)
+        return HandSignControlNode(self.faults, self.clock, self._limits(), collision_monitor=rule, arming=True)
+
+
+class ScannedBase(Base):
+    """The robot's base with a scanner.
+
+    Attributes:
+        sees: What that gives; None for nothing.
+    """
+
+    sees: RangeScan | None = FREE
+
+    def scan(self) -> RangeScan | None:
+        return self.sees
+
+
+def scanners() -> Iterator[Row]:
+    """Return all of them."""
+    yield from _links()
+    for words, sees, leaves in (
+        ("the scanner gives nothing any more", None, False),
+        ("the scanner gives NaN", _with(math.nan), False),
+        ("the scanner gives 0", _with(0.0), False),
+        ("the scanner gives no rays", replace(FREE, ranges=FREE.ranges[:0]), False),
+        ("the scanner's angles are NaN", replace(FREE, angle_increment=math.nan), False),
+        ("the scanner stamps scans 5 s back", replace(FREE, age_s=5.0), False),
+        ("the scanner stamps scans 5 s ahead; then the driver lets go", replace(FREE, age_s=-5.0), True),
+        ("the scanner gives NaN but for a third of its rays; then the driver lets go", _with_gaps(), True),
+    ):
+        yield _row(words, _shows(sees), _shows(FREE), leaves=leaves)
+
+
+def _links() -> Iterator[Row]:
+    for words, fault, leaves in (
+        ("nothing comes", CUT, False),
+        ("half is lost; then the driver lets go", LinkFault(drop=0.5), True),
+        ("comes 1 s late", LinkFault(delay_s=1.0), False),
+        ("comes 0 to 0.3 s late; then the driver lets go", LinkFault(jitter_s=0.3), True),
+        ("comes in another order; then the driver lets go", LinkFault(reorder=0.5), True),
+        ("stands still, then all comes at once", FROZEN, False),
+    ):
+
+        def begin(chain: Chain, fault: LinkFault = fault) -> None:
+            chain.faults.spoil(SCAN, fault)
+
+        yield _row(words, begin, lambda chain: chain.faults.heal(SCAN), leaves=leaves)
+
+
+def _row(words: str, begin: Callable[[Chain], None], end: Callable[[Chain], None], *, leaves: bool) -> Row:
+    return Row(SCAN.name, words, begin, end, lower_the_hand if leaves else nothing, make=ScannedChain)
+
+
+def _shows(sees: RangeScan | None) -> Callable[[Chain], None]:
+    def show(chain: Chain) -> None:
+        assert isinstance(chain, ScannedChain)
+        chain.scanner.sees = sees
+
+    return show
+
+
+def _with(metres: float) -> RangeScan:
+    return replace(FREE, ranges=np.full(RAYS, metres, np.float32))
+
+
+def _with_gaps() -> RangeScan:
+    ranges = np.full(RAYS, np.nan, np.float32)
+    ranges[::3] = 7.0
+    return replace(FREE, ranges=ranges)

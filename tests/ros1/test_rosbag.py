@@ -1,0 +1,88 @@
+"""A camera's images in a bag of the real rosbag: played again, they drive as they did."""
+
+import shutil
+import signal
+import time
+from itertools import groupby
+from pathlib import Path
+
+import pytest
+
+from tests.processes import eventually
+from tests.ros1.launches import LaunchGraph, Recorder
+
+pytestmark = [
+    pytest.mark.ros1,
+    pytest.mark.slow,
+    pytest.mark.skipif(not shutil.which("rosbag"), reason="there is no rosbag: make ros1"),
+]
+
+HAND_SIGN = "/gesture/hand_sign"
+ODOM = "/robot_diff_drive_controller/odom"
+TOPICS = {HAND_SIGN: "std_msgs/String", ODOM: "nav_msgs/Odometry"}
+PACKAGE = "ros_hand_gesture_recognition"
+SHOWN = ["Stop", "Forward", "Turn Left"]
+
+
+def order(record: Recorder, since_s: float) -> list[str]:
+    """Return the signs that lasted for some frames, in their order, without those where no hand was seen."""
+    words = [str(sign["word"]) for sign in record.of(HAND_SIGN, since_s)]
+    lasted = [word for word, group in groupby(words) if len(list(group)) >= 4 and word != "NONE"]
+    return [word for word, _ in groupby(lasted)]
+
+
+def bag_of_the_drawn_hand(ros: LaunchGraph, record: Recorder, path: Path) -> None:
+    """Record what the camera shows while it drives the robot live."""
+    script = "Stop:4 Forward:4 Turn Left:4 NONE:600"
+    for name, value in {"virtual_hand/script": script, "width": 320, "height": 240, "fps": 10}.items():
+        ros.set_parameter(f"/my_camera/{name}", value)
+    recorder = ros.run("rosbag", "record", "-O", str(path), "/image_raw")
+    eventually(lambda: any(name.startswith("/record_") for name in ros.nodes()), what="rosbag record")
+    camera = ros.run("rosrun", "my_cam", "image_publisher.py", "_source:=virtual")
+    eventually(lambda: order(record, 0.0) == SHOWN, what="the signs, live")
+    camera.signal(signal.SIGINT)
+    camera.code()
+    recorder.signal(signal.SIGINT)
+    recorder.code()
+    eventually(path.exists, what="the bag")
+
+
+def test_a_bag_drives_as_the_camera_did(ros: LaunchGraph, tmp_path: Path) -> None:
+    bag = tmp_path / "drive.bag"
+    record = ros.record(TOPICS)
+    ros.launch("ros_mobile_robot", "drive_robot.launch", "world:=empty")
+    recognition = ros.run("rosrun", PACKAGE, "hand_sign_recognition.py")
+    ros.run("rosrun", PACKAGE, "sign_to_controller.py")
+    eventually(lambda: "/hand_sign_recognition" in ros.listeners("/image_raw"), what="the recognition")
+    eventually(lambda: "/hand_sign_control" in ros.listeners(HAND_SIGN), what="the control")
+    eventually(lambda: record.of(ODOM), what="the robot")
+    bag_of_the_drawn_hand(ros, record, bag)
+    eventually(lambda: abs(record.of(ODOM)[-1]["linear"]) < 0.01, what="the robot to stand")
+
+    played_s = time.monotonic()
+    ros.tell("rosbag", "play", "--delay", "1", str(bag))
+    assert order(record, played_s) == SHOWN
+    assert max(odom["linear"] for odom in record.of(ODOM, played_s)) > 0.05
+    assert "they are followed, as a recording's" in recognition.text
+    eventually(lambda: record.of(HAND_SIGN)[-1]["word"] == "NONE", what="NONE once it has ended")
+    eventually(lambda: abs(record.of(ODOM)[-1]["linear"]) < 0.01, what="the robot to stand")
+
+
+def test_a_bag_that_comes_by_another_node_is_followed_when_asked_for(ros: LaunchGraph, tmp_path: Path) -> None:
+    """As from ``image_transport republish``: nothing tells that it is a player's."""
+    bag = tmp_path / "drive.bag"
+    record = ros.record({HAND_SIGN: "std_msgs/String", "/careful": "std_msgs/String"})
+    ros.run("rosrun", PACKAGE, "hand_sign_recognition.py", "__name:=willing", "_recorded:=always")
+    eventually(lambda: ros.listeners("/image_raw"), what="the recognition")
+    bag_of_the_drawn_hand(ros, record, bag)
+    # One that has seen the camera itself would take the bag for the camera with another clock.
+    careful = ["__name:=careful", "_publish_gesture_topic:=/careful"]
+    recognition = ros.run("rosrun", PACKAGE, "hand_sign_recognition.py", *careful)
+    eventually(lambda: "/careful" in ros.listeners("/image_raw"), what="the other recognition")
+
+    played_s = time.monotonic()
+    # Older than any link delays, by its first frame: the bag itself is longer.
+    ros.tell("rosbag", "play", "--delay", "1", str(bag), "__name:=republish")
+    assert order(record, played_s) == SHOWN
+    assert {sign["word"] for sign in record.of("/careful", played_s)} == {"NONE"}
+    assert "set the parameter recorded to always" in recognition.text
