@@ -22,6 +22,8 @@ setup(
         (f"share/{NAME}", ["package.xml"]),
         (f"share/{NAME}/launch", files("launch", "*.launch.py")),
         (f"share/{NAME}/config", files("config", "*.yaml")),
+        (f"share/{NAME}/rviz", files("rviz", "*.rviz")),
+        (f"share/{NAME}/urdf", files("urdf", "*.xacro")),
     ],
     install_requires=["setuptools"],
     zip_safe=True,

@@ -55,7 +55,21 @@ class CameraConfig(Section):
         "a headless run ends unless told otherwise",
     )
     photo_duration: float = Field(1.0, gt=0, le=3600, description="How long each photo of a folder is shown [s]")
-    frame_id: str = Field("camera", description="Coordinate frame that stands in the header of each image")
+    frame_id: str = Field(
+        "camera_optical_frame",
+        description="Coordinate frame that stands in the header of each image, as REP 103 has it: z forward, x right; "
+        "in a namespace that shares /tf with others, /r1, its default is r1/camera_optical_frame",
+    )
+    calibration: Path | None = Field(
+        None,
+        description="YAML file of ROS's camera_calibration, for camera_info; without one it says so",
+    )
+
+    @field_validator("calibration", mode="before")
+    @classmethod
+    def _empty_is_none(cls, path: object) -> object:
+        # The parameters of ROS have no null.
+        return None if path == "" else path
 
 
 class VirtualHandConfig(Section):
@@ -122,7 +136,7 @@ class SignsConfig(Section):
     image_transport: Literal["auto", "raw", "compressed"] = Field(
         "auto",
         description="Which images are recognised: raw is /image_raw, compressed is /image_raw/compressed; "
-        "auto is compressed where others may be on other machines (DDS beyond localhost)",
+        "auto is compressed where others may be on other machines (DDS beyond localhost), or whichever there is",
     )
 
     @field_validator("model", mode="before")
@@ -319,6 +333,11 @@ class RobotConfig(Section):
     odom_frame_id: str = Field("odom", description="Coordinate frame of the odometry")
     base_frame_id: str = Field("base_link", description="Coordinate frame of the robot")
     scan_frame_id: str = Field("base_scan", description="Coordinate frame of the laser scanner")
+    frame_prefix: str = Field(
+        "auto",
+        description="What stands before the names of these frames, as robot_state_publisher has it; auto is the node's "
+        "namespace (r1/) where several robots share /tf, and nothing where the topic is remapped",
+    )
     publish_clock: bool = Field(False, description="Whether it publishes /clock; it then runs on real time itself")
 
 

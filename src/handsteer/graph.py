@@ -18,6 +18,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from handsteer.cameras.browser import BrowserCamera, ChoiceOfCameras, NoCamera
+from handsteer.cameras.calibration import read_calibration
 from handsteer.cameras.choose import open_camera
 from handsteer.cameras.protocol import Camera
 from handsteer.clock import Clock, RealClock, SimulatedClock, SteppedClock, WallClock
@@ -26,6 +27,7 @@ from handsteer.errors import ConfigError
 from handsteer.messages import Topic, cmd_vel
 from handsteer.nodes.camera import CameraNode
 from handsteer.nodes.control import HandSignControlNode
+from handsteer.nodes.frames import frame_prefix, prefixed
 from handsteer.nodes.node import Node
 from handsteer.nodes.recognition import HandSignRecognitionNode
 from handsteer.nodes.robot import RobotNode
@@ -246,10 +248,16 @@ def make_camera(config: Config, transport: Transport, clock: Clock, camera: Came
         camera: What gives the frames; None opens the one that ``config`` names.
 
     Raises:
-        CameraError: The camera cannot be used.
+        CameraError: The camera, or its calibration, cannot be used.
     """
     camera = camera or open_camera(config.camera, config.virtual_hand, clock)
-    return CameraNode(transport, clock, camera, config.camera.frame_id)
+    calibration = (
+        None if config.camera.calibration is None else read_calibration(config.camera.calibration.expanduser())
+    )
+    frame_id = config.camera.frame_id
+    if "frame_id" not in config.camera.model_fields_set:
+        frame_id = frame_prefix(transport, "my_camera") + frame_id
+    return CameraNode(transport, clock, camera, frame_id, calibration)
 
 
 def open_cameras(config: Config, clock: Clock) -> ChoiceOfCameras:
@@ -320,7 +328,7 @@ def make_robot(config: Config, transport: Transport, clock: Clock, link: Session
         clock = WallClock()
     topic = cmd_vel_topic(config)
     robot = open_robot(config.robot, link, topic, config.control.cmd_vel_frame_id)
-    return RobotNode(transport, clock, robot, config.robot, topic)
+    return RobotNode(transport, clock, robot, prefixed(config.robot, transport), topic)
 
 
 def make_steering(config: Config, transport: Transport, clock: Clock) -> SteeringNode:

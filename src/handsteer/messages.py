@@ -5,6 +5,7 @@ They are used as values: once published, a message is not changed any more.
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Generic, TypeVar
 
@@ -27,10 +28,12 @@ from rosbags.typesys.stores.ros2_jazzy import nav_msgs__msg__Odometry as Odometr
 from rosbags.typesys.stores.ros2_jazzy import rcl_interfaces__msg__Log as Log
 from rosbags.typesys.stores.ros2_jazzy import rcl_interfaces__msg__ParameterEvent as ParameterEvent
 from rosbags.typesys.stores.ros2_jazzy import rosgraph_msgs__msg__Clock as ClockMessage
+from rosbags.typesys.stores.ros2_jazzy import sensor_msgs__msg__CameraInfo as CameraInfo
 from rosbags.typesys.stores.ros2_jazzy import sensor_msgs__msg__CompressedImage as CompressedImage
 from rosbags.typesys.stores.ros2_jazzy import sensor_msgs__msg__Image as Image
 from rosbags.typesys.stores.ros2_jazzy import sensor_msgs__msg__JointState as JointState
 from rosbags.typesys.stores.ros2_jazzy import sensor_msgs__msg__LaserScan as LaserScan
+from rosbags.typesys.stores.ros2_jazzy import sensor_msgs__msg__RegionOfInterest as RegionOfInterest
 from rosbags.typesys.stores.ros2_jazzy import std_msgs__msg__Bool as Bool
 from rosbags.typesys.stores.ros2_jazzy import std_msgs__msg__ColorRGBA as ColorRGBA
 from rosbags.typesys.stores.ros2_jazzy import std_msgs__msg__Header as Header
@@ -45,6 +48,7 @@ from handsteer.timeouts import STALE_S
 
 __all__ = [
     "Bool",
+    "CameraInfo",
     "ClockMessage",
     "ColorRGBA",
     "CompressedImage",
@@ -66,6 +70,7 @@ __all__ = [
     "Pose",
     "PoseWithCovariance",
     "Quaternion",
+    "RegionOfInterest",
     "String",
     "TFMessage",
     "Time",
@@ -79,6 +84,7 @@ __all__ = [
     "Vector3",
     "cmd_vel",
     "command",
+    "is_zero",
     "twist",
     "twist_in",
     "type_name",
@@ -86,6 +92,9 @@ __all__ = [
 ]
 
 M = TypeVar("M")
+
+STOPPING_SIGNS = frozenset({"Stop", "NONE"})
+"""What stops the robot whatever is configured, as handsteer.control.actions has it."""
 
 
 @dataclass
@@ -122,6 +131,7 @@ class Topic(Generic[M]):
         depth: How many messages may wait for a subscriber that is busy; older ones are dropped (ROS 2: keep last).
         lifespan_s: A message that has not arrived after so long is not to arrive at all; None for no limit.
         beneath: The topic whose name it extends; it is renamed with it, as the topics of ROS's image_transport are.
+        stops: Tells a message that stops the robot, which is to be obeyed however late it comes; None where none does.
     """
 
     name: str
@@ -131,6 +141,7 @@ class Topic(Generic[M]):
     depth: int = 1
     lifespan_s: float | None = None
     beneath: "Topic[Any] | None" = None
+    stops: Callable[[Any], bool] | None = None
 
     @property
     def ros_name(self) -> str:
@@ -138,19 +149,32 @@ class Topic(Generic[M]):
         return self.name if self.is_global else self.name.removeprefix("/")
 
 
+def is_zero(message: "Twist | TwistStamped") -> bool:
+    """Return whether a velocity command tells to stand."""
+    command = twist_in(message)
+    return command.linear.x == 0.0 and command.angular.z == 0.0
+
+
 IMAGE_RAW = Topic("/image_raw", Image)
 IMAGE_COMPRESSED = Topic("/image_raw/compressed", CompressedImage, beneath=IMAGE_RAW)
+CAMERA_INFO = Topic("/camera_info", CameraInfo)
 # Each sign makes the robot a step faster, so none may be lost when several come at once.
-HAND_SIGN = Topic("/gesture/hand_sign", String, depth=10, lifespan_s=STALE_S)
+HAND_SIGN = Topic(
+    "/gesture/hand_sign",
+    String,
+    depth=10,
+    lifespan_s=STALE_S,
+    stops=lambda sign: sign.data in STOPPING_SIGNS,
+)
 IMAGE_ANNOTATED = Topic("/gesture/image_annotated", Image)
-CMD_VEL = Topic("/robot_diff_drive_controller/cmd_vel", Twist, depth=10, lifespan_s=STALE_S)
+CMD_VEL = Topic("/robot_diff_drive_controller/cmd_vel", Twist, depth=10, lifespan_s=STALE_S, stops=is_zero)
 SELECT_ROBOT = Topic("/select_robot", String, depth=10)
 SELECTED_ROBOT = Topic("/selected_robot", String, latched=True)
 # True stops the robot, whoever drives; false lets it drive again. No stop may get lost.
 STOP = Topic("/stop", Bool, depth=10)
 # What the nodes remember of it, for one that starts anew: each that runs says so.
 STOPPED = Topic("/stopped", Bool, latched=True)
-STEERING_CMD_VEL = Topic("/steering/cmd_vel", Twist, lifespan_s=STALE_S)
+STEERING_CMD_VEL = Topic("/steering/cmd_vel", Twist, lifespan_s=STALE_S, stops=is_zero)
 ODOM = Topic("/robot_diff_drive_controller/odom", Odometry)
 TF = Topic("/tf", TFMessage, is_global=True, depth=10)
 JOINT_STATES = Topic("/joint_states", JointState)

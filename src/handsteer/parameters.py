@@ -183,7 +183,7 @@ class NodeParameters:
         """
         with self._lock:
             now = self.values()
-            wanted = {name: value for name, value in changes.items() if name not in now or now[name] != value}
+            wanted = {name: value for name, value in changes.items() if not self._is_already(name, value, now)}
             if not wanted and not any(self._names_file(name) for name in changes):
                 return
             nested = self._config.model_dump()
@@ -196,6 +196,17 @@ class NodeParameters:
                 raise ConfigError(str(error).removeprefix(f"{self._section}.")) from None
             self._config = config
             self._apply(config)
+
+    def _is_already(self, name: str, value: Value | None, now: Mapping[str, Value]) -> bool:
+        """Return whether a parameter has this value, also as tools give it that read texts as YAML: false for "off"."""
+        place = self._place(name)
+        if name not in now or now[name] == value or place is None or place.entry is not None or value is None:
+            return name in now and now[name] == value
+        try:
+            config = validate(Config, {place.section: {place.field: value}})
+        except ConfigError:
+            return False
+        return bool(plain(getattr(getattr(config, place.section), place.field)) == now[name])
 
     def _entries(self, config: Config, section: str) -> list[tuple[str, Value]]:
         prefix = "" if section == self._section else f"{section}."

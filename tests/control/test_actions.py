@@ -3,10 +3,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from handsteer.config import ControlConfig
-from handsteer.control.actions import ACTIONS, EFFECTS, action_of, motion_signs
+from handsteer.control.actions import ACTIONS, ALWAYS_STOP, EFFECTS, action_of, motion_signs
 from handsteer.control.driver import Driver
 from handsteer.control.sign_control import SignControl
 from handsteer.control.velocity import ZERO, Velocity
+from handsteer.messages import STOPPING_SIGNS
 from handsteer.signs.vocabulary import FORWARD, GO, MOTION_SIGNS, NONE, SIGNS, STOP, TURN_LEFT
 
 DT = 1 / 30
@@ -14,6 +15,10 @@ DT = 1 / 30
 
 def config(**values: object) -> ControlConfig:
     return ControlConfig.model_validate(values)
+
+
+def test_what_always_stops_is_what_comes_through_however_late() -> None:
+    assert ALWAYS_STOP == STOPPING_SIGNS
 
 
 def test_without_a_table_the_motion_signs_are_the_built_in_ones() -> None:

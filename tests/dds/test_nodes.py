@@ -147,18 +147,61 @@ def test_a_file_of_parameters_may_be_shared_with_other_nodes(dds: DdsGraph, tmp_
 def test_what_does_not_fit_is_said_in_words(tmp_path: Path) -> None:
     with dds_graph(tmp_path) as graph:
         peer = graph.peer
-        peer.ask("record", topic="/image_raw", type="Image", fields=["width"], depth=5)
+        peer.ask("record", topic="/image_raw", type="Image", fields=["width"], depth=5, latched=True)
         peer.ask("advertise", topic="/gesture/hand_sign", type="Twist")
         peer.ask("introduce", name="viewer")
         camera = graph.node("camera", *FORWARD, name="/my_camera")
         control = graph.node("control", name=f"/{NODE}")
-        profile = "the publisher is best effort, the subscriber wants reliable"
+        profile = "the publisher is volatile, the subscriber wants transient local"
         line = f"/image_raw: nothing passes between our publisher and the subscriber of /viewer: {profile}"
         eventually(lambda: line in camera.text, 10.0, what=line)
-        assert "(ours: best effort, volatile, keep last 1; theirs: reliable, volatile" in camera.text
+        assert "(ours: reliable, volatile, keep last 3; theirs: reliable, transient local" in camera.text
         types = "ours has the type std_msgs/msg/String, theirs geometry_msgs/msg/Twist"
         eventually(lambda: types in control.text, 10.0, what=types)
         assert peer.ask("get", topic="/image_raw") == []
+
+
+def test_images_reach_who_wants_them_reliable_and_one_that_hangs_holds_up_nobody(tmp_path: Path) -> None:
+    """As the subscribers of all tutorials do, which have a depth of 10 and no more."""
+    with dds_graph(tmp_path) as graph:
+        hangs, goes_on = graph.peer, graph.start_peer()
+        topics = {"/image_raw": "Image", "/image_raw/compressed": "CompressedImage"}
+        for topic, kind in topics.items():
+            hangs.ask("record", topic=topic, type=kind, fields=["header.stamp"], depth=10)
+            goes_on.ask("record", topic=topic, type=kind, fields=["header.stamp"], depth=10)
+        camera = graph.node("camera", "--camera", "virtual", name="/my_camera")
+        for peer in (hangs, goes_on):
+            eventually(lambda: all(len(peer.ask("get", topic=topic)) > 5 for topic in topics))  # noqa: B023
+        hangs.freeze()
+        frozen_s = time.monotonic()
+        for topic in topics:
+            eventually(lambda: len(goes_on.ask("get", topic=topic, since_s=frozen_s)) > 40, what=topic)  # noqa: B023
+            stamps = [stamp for _, (stamp,) in goes_on.ask("get", topic=topic, since_s=frozen_s)]
+            assert stamps == sorted(set(stamps))
+        assert "dropped" not in camera.text
+
+
+def test_several_robots_share_one_tree_of_transforms(tmp_path: Path) -> None:
+    with dds_graph(tmp_path) as graph:
+        for name, words in (("r1", ()), ("r2", ()), ("alone", ("-r", "/tf:=tf"))):
+            topic = f"/{name}{ODOM}"
+            graph.peer.ask("record", topic=topic, type="Odometry", fields=["header.frame_id", "child_frame_id"])
+            graph.node("robot", name=f"/{name}/robot", ros=("-r", f"__ns:=/{name}", *words))
+            seen = eventually(lambda: graph.peer.ask("get", topic=topic))  # noqa: B023
+            prefix = "" if words else f"{name}/"
+            assert seen[0][1] == [f"{prefix}odom", f"{prefix}base_link"]
+
+
+def test_a_node_says_once_that_it_is_ready_and_names_its_topics_as_others_know_them(tmp_path: Path) -> None:
+    with dds_graph(tmp_path) as graph:
+        words = ("-r", "__ns:=/r1", "-r", "image_raw:=/front/image", "-r", "camera_info:=/front/camera_info")
+        camera = graph.node("camera", *FORWARD, name="/r1/my_camera", ros=words)
+        line = (
+            "/r1/my_camera is ready: publishes /diagnostics, /front/camera_info, /front/image, "
+            "/front/image/compressed, /r1/stopped; listens to /r1/stop"
+        )
+        eventually(lambda: line in camera.text, 10.0, what=line)
+        assert camera.text.count("is ready") == 1
 
 
 def test_raw_images_for_another_machine_are_warned_of_once(tmp_path: Path) -> None:

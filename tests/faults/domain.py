@@ -53,6 +53,9 @@ class Domain:
     def publishers_of(self, topic: Topic[Any]) -> list[str]:
         return [writer.node for writer in self._writers if writer.topic.name == topic.name]
 
+    def topic_name(self, topic: Topic[Any]) -> str:
+        return topic.name
+
     def full_name(self, node: str) -> str:
         return node
 

@@ -1,10 +1,13 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from handsteer.cameras.calibration import uncalibrated
 from handsteer.clock import to_seconds
 from handsteer.errors import CameraLost
 from handsteer.images import bgr_image
-from handsteer.messages import DIAGNOSTICS, IMAGE_COMPRESSED, IMAGE_RAW
+from handsteer.messages import CAMERA_INFO, DIAGNOSTICS, IMAGE_COMPRESSED, IMAGE_RAW, CameraInfo
 from handsteer.nodes.camera import CameraNode
 from handsteer.testing.faulty_camera import Event, FaultyCamera
 from tests.nodes.stepping import Bench
@@ -27,7 +30,7 @@ def test_frames_go_out_with_their_capture_time() -> None:
     images = bench.record(IMAGE_RAW)
     bench.run(0.15)
     assert [round(to_seconds(image.header.stamp), 3) for image in images] == [0.96, 1.06]
-    assert images[0].header.frame_id == "camera"
+    assert images[0].header.frame_id == "camera_optical_frame"
     np.testing.assert_array_equal(bgr_image(images[0]), ONE)
     assert node.frames == 2
 
@@ -38,6 +41,23 @@ def test_jpeg_is_made_on_demand() -> None:
     compressed = bench.record(IMAGE_COMPRESSED)
     bench.run(0.1)
     assert len(compressed) == 1
+
+
+def test_camera_info_says_with_each_image_what_is_known(caplog: pytest.LogCaptureFixture) -> None:
+    def of(known: CameraInfo | None) -> CameraInfo:
+        bench, _, camera = start(ONE, TWO)
+        bench.nodes = [CameraNode(bench.transport, bench.clock, camera, calibration=known)]
+        images, infos = bench.record(IMAGE_RAW), bench.record(CAMERA_INFO)
+        bench.run(0.15)
+        assert [info.header for info in infos] == [image.header for image in images]
+        assert {(info.width, info.height) for info in infos} == {(64, 48)}
+        return infos[0]
+
+    lens = replace(uncalibrated(64, 48), k=np.eye(3).reshape(-1))
+    assert not np.any(of(None).k)
+    assert np.any(of(lens).k)
+    assert not np.any(of(replace(lens, width=65)).k)
+    assert "the calibration is for pictures of 65 x 48, and these have 64 x 48: it is not used" in caplog.text
 
 
 def test_a_lost_camera_is_tried_again_with_growing_pauses(caplog: pytest.LogCaptureFixture) -> None:

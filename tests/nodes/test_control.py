@@ -37,9 +37,9 @@ from tests.nodes.stepping import Bench
 
 
 class ControlBench(Bench):
-    def __init__(self) -> None:
+    def __init__(self, *, arming: bool = False) -> None:
         super().__init__()
-        self.control = HandSignControlNode(self.transport, self.clock, ControlConfig())
+        self.control = HandSignControlNode(self.transport, self.clock, ControlConfig(), arming=arming)
         self.steering = SteeringNode(self.transport, self.clock)
         self.nodes = [self.steering, self.control]
         self.signs = self.transport.advertise("recognition", HAND_SIGN)
@@ -79,6 +79,12 @@ def test_when_signs_stop_one_zero_within_the_timeout_then_silence(bench: Control
 def test_a_sign_from_a_stale_frame_moves_nothing(bench: ControlBench) -> None:
     bench.show(*["Forward"] * 30, age_s=0.6)
     assert bench.commands == []
+
+
+def test_a_stop_from_a_stale_frame_stops(bench: ControlBench) -> None:
+    bench.show("Forward")
+    bench.show("Stop", "Forward", age_s=0.6)
+    assert bench.commands == [(0.01, 0), (0, 0)]
 
 
 def test_one_zero_at_the_end(bench: ControlBench) -> None:

@@ -1,4 +1,5 @@
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from handsteer.parameters import NodeParameters
 from handsteer.signs.drawing import annotate
 from handsteer.signs.model import load_model
 from handsteer.signs.opening import open_classifier
-from handsteer.signs.recognizer import Recognizer
+from handsteer.signs.recognizer import Recognition, Recognizer
 from handsteer.signs.teaching.taught import save_taught
 from handsteer.signs.trained import TrainedClassifier
 from handsteer.signs.vocabulary import FORWARD
@@ -82,6 +83,48 @@ def test_a_stale_frame_is_no_frame(bench: RecognitionBench) -> None:
     assert bench.names == []
     bench.show(frames=10, age_s=0.6)
     assert set(bench.names) == {"NONE"}
+
+
+def test_a_sign_that_was_being_told_when_the_process_was_stopped_is_not_said(
+    bench: RecognitionBench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bench.show(frames=6)
+    bench.signs.clear()
+    step = Recognizer.step
+
+    def frozen(self: Recognizer, *arguments: Any) -> Recognition:
+        bench.clock.advance(2.5)
+        return step(self, *arguments)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Recognizer, "step", frozen)
+        bench.show()
+    bench.show(frames=6)
+    assert set(bench.names[:3]) == {"NONE"}
+    bench.show(frames=6)
+    assert bench.names[-1] == "Forward"
+
+
+def test_a_frame_without_a_time_that_waited_while_the_process_was_stopped_is_none(bench: RecognitionBench) -> None:
+    bench.show(frames=6)
+    bench.signs.clear()
+    bench.images.publish(image_message(bench.picture(), HEADER))
+    bench.clock.advance(2.5)
+    bench.run(0.02)
+    assert set(bench.names) <= {"NONE"}
+
+
+def test_a_camera_with_compressed_images_only_is_taken_by_itself(caplog: pytest.LogCaptureFixture) -> None:
+    caplog.set_level("INFO")
+    bench = RecognitionBench()
+    del bench.images  # a publisher that nobody holds is gone
+    compressed = bench.transport.advertise("camera", IMAGE_COMPRESSED)
+    bench.run(0.6)
+    for _ in range(6):
+        compressed.publish(jpeg_message(bench.picture(), HEADER), bench.clock.now())
+        bench.run(1 / 30)
+    assert bench.names[-1] == "Forward"
+    assert "nobody publishes /image_raw: images are taken from /image_raw/compressed, of camera" in caplog.text
 
 
 def test_a_broken_frame_is_no_frame(bench: RecognitionBench) -> None:

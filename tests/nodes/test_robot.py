@@ -115,6 +115,17 @@ def test_a_stamped_command_that_is_old_is_not_obeyed(age_s: float | None, speed:
     assert bench.newest.twist.twist.linear.x == pytest.approx(speed, abs=0.02)
 
 
+def test_a_zero_is_obeyed_however_old_it_is() -> None:
+    bench = RobotBench(cmd_vel_type="twist_stamped", cmd_vel_timeout=5.0)
+    bench.clock.advance(10.0)
+    bench.run(0.3)
+    for speed, age_s in ((0.3, 0.0), (0.0, 6.0)):
+        stamp = bench.clock.stamp(bench.clock.now() - age_s)
+        bench.commands.publish(TwistStamped(header=Header(stamp=stamp, frame_id="base_link"), twist=twist(speed, 0.0)))
+        bench.run(1.0)
+        assert bench.newest.twist.twist.linear.x == pytest.approx(speed, abs=0.02)
+
+
 def test_the_world_changes_while_the_robot_drives_and_it_stands_then() -> None:
     bench = RobotBench()
     (robot,) = bench.nodes

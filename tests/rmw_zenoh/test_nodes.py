@@ -89,7 +89,14 @@ def test_signs_that_were_held_up_on_their_way_are_not_obeyed(network: ZenohGraph
     network.peer.ask("publish", count=5, **old)
     driver.show("Turn Left")
     driver.expect((0.01, 0.0), (0.02, 0.0), (0.02, 0.1))
-    assert "messages come over 0.35 s late and are not obeyed" in driver.process.text
+    assert f"{driver.signs}: messages come over 0.35 s late and are not obeyed" in driver.process.text
+
+
+def test_a_stop_that_was_held_up_on_its_way_is_obeyed(network: ZenohGraph) -> None:
+    driver = DdsDriver(network, "--control.sign-timeout", "5")
+    driver.show("Forward", count=2)
+    network.peer.ask("publish", topic=driver.signs, values={"data": "Stop"}, age_s=0.6)
+    driver.expect((0.01, 0.0), (0.02, 0.0), (0.0, 0.0))
 
 
 def test_ros2_sees_the_node_by_its_names_types_hashes_and_profiles(network: ZenohGraph) -> None:

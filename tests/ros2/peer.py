@@ -17,6 +17,7 @@ import threading
 import time
 from contextlib import suppress
 from functools import reduce
+from pathlib import Path
 from typing import Any
 
 import rclpy
@@ -26,7 +27,7 @@ from geometry_msgs.msg import Twist, TwistStamped
 from nav_msgs.msg import Odometry
 from rcl_interfaces.msg import Log, ParameterValue
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
-from rclpy.parameter import Parameter, parameter_value_to_python
+from rclpy.parameter import Parameter, parameter_dict_from_yaml_file, parameter_value_to_python
 from rclpy.parameter_client import AsyncParameterClient
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rosgraph_msgs.msg import Clock
@@ -210,6 +211,27 @@ def endpoints(order: dict[str, Any]) -> list[dict[str, Any]]:
     ]
 
 
+def reload(order: dict[str, Any]) -> list[str]:
+    """Write all parameters of a node to a file and load that again, as ``ros2 param`` does; return what is refused."""
+    client = AsyncParameterClient(node, order["node"])
+    assert client.wait_for_services(20.0)
+    names = wait_for(client.list_parameters([])).result.names
+    values = wait_for(client.get_parameters(names)).values
+    kept = {name: parameter_value_to_python(value) for name, value in zip(names, values, strict=True)}
+    Path(order["file"]).write_text(yaml.dump({order["node"]: {"ros__parameters": kept}}))
+    parameters = parameter_dict_from_yaml_file(order["file"], target_nodes=[order["node"]])
+    results = wait_for(client.set_parameters(list(parameters.values()))).results
+    return [f"{name}: {one.reason}" for name, one in zip(parameters, results, strict=True) if not one.successful]
+
+
+def wait_for(answer: Any) -> Any:
+    deadline_s = time.monotonic() + 20.0
+    while not answer.done():
+        assert time.monotonic() < deadline_s
+        time.sleep(0.001)
+    return answer.result()
+
+
 ORDERS = {
     order.__name__: order
     for order in (
@@ -226,6 +248,7 @@ ORDERS = {
         servers,
         names,
         parameters,
+        reload,
         dump,
         load,
         call,

@@ -144,16 +144,26 @@ def test_pictures_of_a_ros2_camera_are_recognised(ros2: Ros2Graph) -> None:
     eventually(lambda: ["Forward"] in [values for _, values in peer.ask("get", topic="/brain/gesture/hand_sign")])
 
 
-def test_compressed_pictures_reach_rclpy(ros2: Ros2Graph) -> None:
+@pytest.mark.parametrize("reliable", [False, True])
+def test_compressed_pictures_reach_rclpy(ros2: Ros2Graph, reliable: bool) -> None:
     """``benchmarks/ros2.py`` counts how many."""
     peer = ros2.peer
-    topic = "/film/image_raw/compressed"
-    peer.ask("record", topic=topic, type="CompressedImage", fields=["header.stamp", "data"], reliable=False, depth=5)
-    ros2.node("camera", "--camera", "virtual", name="/film/my_camera", ros=("-r", "__ns:=/film", *SCRIPT))
+    place = f"film_{reliable}".lower()
+    topic = f"/{place}/image_raw/compressed"
+    wanted = {"fields": ["header.stamp", "data"], "reliable": reliable, "depth": 10}
+    peer.ask("record", topic=topic, type="CompressedImage", **wanted)
+    ros2.node("camera", "--camera", "virtual", name=f"/{place}/my_camera", ros=("-r", f"__ns:=/{place}", *SCRIPT))
     pictures = eventually(lambda: len(found := peer.ask("get", topic=topic)) >= 60 and found)
     stamps = [stamp for _, (stamp, _) in pictures]
     assert stamps == sorted(set(stamps))
     assert all(1000 < size < 200_000 for _, (_, size) in pictures)
+
+
+def test_raw_pictures_reach_an_rclpy_that_wants_them_reliable(ros2: Ros2Graph) -> None:
+    ros2.peer.ask("record", topic="/sure/image_raw", type="Image", fields=["data"], depth=10)
+    ros2.node("camera", *FORWARD, name="/sure/my_camera", ros=("-r", "__ns:=/sure", *SCRIPT))
+    pictures = eventually(lambda: len(found := ros2.peer.ask("get", topic="/sure/image_raw")) >= 30 and found)
+    assert {size for _, (size,) in pictures} == {320 * 240 * 3}
 
 
 def test_raw_images_for_fast_dds_are_warned_of(dds: Ros2Graph) -> None:
@@ -165,7 +175,7 @@ def test_raw_images_for_fast_dds_are_warned_of(dds: Ros2Graph) -> None:
 
 def test_what_a_node_logs_is_on_rosout(dds: Ros2Graph) -> None:
     """The log is latched: what was said before anybody listened is told, too."""
-    dds.peer.ask("record", topic="/told/image_raw", type="Image", fields=["width"], depth=1)
+    dds.peer.ask("record", topic="/told/image_raw", type="Image", fields=["width"], depth=1, latched=True)
     camera = dds.node("camera", *FORWARD, name="/told/my_camera", ros=("-r", "__ns:=/told"))
     eventually(lambda: "nothing passes" in camera.text)
     dds.peer.ask("record", topic="/rosout", type="Log", fields=["level", "name", "msg"], latched=True)
@@ -187,11 +197,11 @@ def test_the_time_of_ros2_is_followed(fresh: Ros2Graph) -> None:
 
 def test_profiles_that_do_not_fit_are_said_in_words(tmp_path: Path) -> None:
     with ros2_graph(tmp_path) as graph:
-        graph.peer.ask("record", topic="/image_raw", type="Image", fields=["width"], depth=5)
+        graph.peer.ask("record", topic="/image_raw", type="Image", fields=["width"], depth=5, latched=True)
         camera = graph.node("camera", *FORWARD, name="/my_camera")
         line = (
             "/image_raw: nothing passes between our publisher and the subscriber of /looker: "
-            "the publisher is best effort, the subscriber wants reliable"
+            "the publisher is volatile, the subscriber wants transient local"
         )
         eventually(lambda: line in camera.text, 10.0, what=line)
         time.sleep(0.2)

@@ -22,6 +22,7 @@ SENT = [
     "std_msgs/msg/String",
     "sensor_msgs/msg/Image",
     "sensor_msgs/msg/CompressedImage",
+    "sensor_msgs/msg/CameraInfo",
     "sensor_msgs/msg/JointState",
     "sensor_msgs/msg/LaserScan",
     "geometry_msgs/msg/Twist",

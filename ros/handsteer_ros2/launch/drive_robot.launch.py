@@ -1,51 +1,83 @@
-"""The simulated robot, and the page that shows it and steers it.
+"""The simulated robot with its transforms, the page that shows it and steers it, and RViz if asked for.
 
-ros2 launch handsteer_ros2 drive_robot.launch.py namespace:=r1 world:=empty page:=false
+ros2 launch handsteer_ros2 drive_robot.launch.py namespace:=r1 world:=empty port:=8081 rviz:=true
 """
 
-from launch import LaunchDescription
-from launch.actions import DeclareLaunchArgument
+from ament_index_python.packages import PackageNotFoundError, get_package_share_directory
+from handsteer_ros2.arguments import PACKAGE, common, node, text
+from launch import LaunchContext, LaunchDescription
+from launch.actions import DeclareLaunchArgument, LogInfo, OpaqueFunction
 from launch.conditions import IfCondition
-from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
+from launch.substitutions import Command, LaunchConfiguration, PathJoinSubstitution
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 from launch_ros.substitutions import FindPackageShare
 
-PACKAGE = "handsteer_ros2"
-PARAMETERS = PathJoinSubstitution([FindPackageShare(PACKAGE), "config", "drive_robot.yaml"])
+SHARE = FindPackageShare(PACKAGE)
+PARAMETERS = PathJoinSubstitution([SHARE, "config", "drive_robot.yaml"])
 
 
 def generate_launch_description() -> LaunchDescription:
     """Return the arguments and the nodes."""
-    common = {
-        "package": PACKAGE,
-        "namespace": LaunchConfiguration("namespace"),
-        "output": "screen",
-    }
-    transport = ["--transport", LaunchConfiguration("transport")]
-    use_sim_time = {"use_sim_time": ParameterValue(LaunchConfiguration("use_sim_time"), value_type=bool)}
+    kind = {"cmd_vel_type": text("cmd_vel_type")}
     return LaunchDescription(
         [
-            DeclareLaunchArgument("namespace", default_value="", description="Namespace of all nodes, as r1"),
-            DeclareLaunchArgument("use_sim_time", default_value="false", description="Follow /clock"),
-            DeclareLaunchArgument("params_file", default_value=PARAMETERS, description="YAML file with parameters"),
-            DeclareLaunchArgument("transport", default_value="dds", description="dds or zenoh"),
+            *common(PARAMETERS),
             DeclareLaunchArgument("world", default_value="obstacles", description="Name of a world, or a YAML file"),
             DeclareLaunchArgument("page", default_value="true", description="Serve the page"),
-            Node(
-                executable="robot",
-                name="robot",
-                arguments=[*transport, "--world", LaunchConfiguration("world")],
-                parameters=[LaunchConfiguration("params_file"), use_sim_time],
-                **common,
-            ),
-            Node(
-                executable="steering",
-                name="steering",
-                arguments=transport,
-                parameters=[use_sim_time],
+            DeclareLaunchArgument("port", default_value="8080", description="Port of the page; 0 takes a free one"),
+            DeclareLaunchArgument("rviz", default_value="false", description="Show the robot in RViz"),
+            node("robot", "robot", parameters={**kind, "world": text("world")}),
+            node(
+                "steering",
+                "steering",
+                *("--port", LaunchConfiguration("port"), "--control.cmd-vel-type", LaunchConfiguration("cmd_vel_type")),
                 condition=IfCondition(LaunchConfiguration("page")),
-                **common,
             ),
+            OpaqueFunction(function=_transforms),
+            OpaqueFunction(function=_rviz, condition=IfCondition(LaunchConfiguration("rviz"))),
         ]
     )
+
+
+def _prefix(context: LaunchContext) -> str:
+    """Return what stands before the names of frames: the namespace, as the robot itself has it."""
+    namespace = LaunchConfiguration("namespace").perform(context).strip("/")
+    return f"{namespace}/" if namespace else ""
+
+
+def _transforms(context: LaunchContext) -> list[Node | LogInfo]:
+    """Return what tells where the wheels and the scanner are, from base_link, if it is installed."""
+    try:
+        get_package_share_directory("robot_state_publisher")
+    except PackageNotFoundError:
+        return [LogInfo(msg="robot_state_publisher is not installed: /tf ends at base_link")]
+    model = PathJoinSubstitution([SHARE, "urdf", "handsteer_robot.urdf.xacro"])
+    return [
+        Node(
+            package="robot_state_publisher",
+            executable="robot_state_publisher",
+            namespace=LaunchConfiguration("namespace"),
+            parameters=[
+                {
+                    "robot_description": ParameterValue(Command(["xacro ", model]), value_type=str),
+                    "frame_prefix": _prefix(context),
+                    "use_sim_time": ParameterValue(LaunchConfiguration("use_sim_time"), value_type=bool),
+                }
+            ],
+            output="screen",
+        )
+    ]
+
+
+def _rviz(context: LaunchContext) -> list[Node]:
+    view = PathJoinSubstitution([SHARE, "rviz", "drive_robot.rviz"])
+    return [
+        Node(
+            package="rviz2",
+            executable="rviz2",
+            namespace=LaunchConfiguration("namespace"),
+            arguments=["-d", view, "-f", f"{_prefix(context)}odom"],
+            parameters=[{"use_sim_time": ParameterValue(LaunchConfiguration("use_sim_time"), value_type=bool)}],
+        )
+    ]

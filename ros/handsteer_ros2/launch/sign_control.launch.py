@@ -1,45 +1,37 @@
 """Camera, recognition and control: what turns hand signs into velocities.
 
-ros2 launch handsteer_ros2 sign_control.launch.py cmd_vel:=/cmd_vel namespace:=r1 transport:=dds
+ros2 launch handsteer_ros2 sign_control.launch.py camera:=/dev/video0 cmd_vel:=/cmd_vel cmd_vel_type:=twist_stamped
+ros2 launch handsteer_ros2 sign_control.launch.py camera:=none image:=/front/image_raw namespace:=r1
 """
 
+from handsteer_ros2.arguments import PACKAGE, common, node, text
 from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument
-from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
-from launch_ros.actions import Node
-from launch_ros.parameter_descriptions import ParameterValue
+from launch.conditions import IfCondition
+from launch.substitutions import LaunchConfiguration, NotEqualsSubstitution, PathJoinSubstitution
 from launch_ros.substitutions import FindPackageShare
 
-PACKAGE = "handsteer_ros2"
-NODES = {"camera": "my_camera", "recognition": "hand_sign_recognition", "control": "hand_sign_control"}
 PARAMETERS = PathJoinSubstitution([FindPackageShare(PACKAGE), "config", "sign_control.yaml"])
 
 
 def generate_launch_description() -> LaunchDescription:
     """Return the arguments and the nodes."""
-    arguments = [
-        DeclareLaunchArgument("namespace", default_value="", description="Namespace of all nodes, as r1"),
-        DeclareLaunchArgument("use_sim_time", default_value="false", description="Follow /clock"),
-        DeclareLaunchArgument("params_file", default_value=PARAMETERS, description="YAML file with parameters"),
-        DeclareLaunchArgument("transport", default_value="dds", description="dds or zenoh"),
-        DeclareLaunchArgument(
-            "cmd_vel", default_value="robot_diff_drive_controller/cmd_vel", description="Topic of the commands"
-        ),
-    ]
-    return LaunchDescription([*arguments, *(_node(verb, name) for verb, name in NODES.items())])
-
-
-def _node(verb: str, name: str) -> Node:
-    return Node(
-        package=PACKAGE,
-        executable=verb,
-        name=name,
-        namespace=LaunchConfiguration("namespace"),
-        arguments=["--transport", LaunchConfiguration("transport")],
-        parameters=[
-            LaunchConfiguration("params_file"),
-            {"use_sim_time": ParameterValue(LaunchConfiguration("use_sim_time"), value_type=bool)},
-        ],
-        remappings=[("robot_diff_drive_controller/cmd_vel", LaunchConfiguration("cmd_vel"))],
-        output="screen",
+    images = [("image_raw", LaunchConfiguration("image"))]
+    has_camera = IfCondition(NotEqualsSubstitution(LaunchConfiguration("camera"), "none"))
+    return LaunchDescription(
+        [
+            *common(PARAMETERS),
+            DeclareLaunchArgument(
+                "camera",
+                default_value="auto",
+                description="auto, virtual, a webcam's index or /dev/videoN, an address (rtsp, http), a video file or "
+                "a folder; none where another node publishes the images",
+            ),
+            DeclareLaunchArgument(
+                "image", default_value="image_raw", description="Topic of the images; compressed ones are beneath it"
+            ),
+            node("camera", "my_camera", parameters={"source": text("camera")}, remappings=images, condition=has_camera),
+            node("recognition", "hand_sign_recognition", remappings=images),
+            node("control", "hand_sign_control", parameters={"cmd_vel_type": text("cmd_vel_type")}),
+        ]
     )

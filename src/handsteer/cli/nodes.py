@@ -1,5 +1,6 @@
 """``handsteer camera``, ``recognition``, ``control``, ``robot``, ``steering``: one node of a graph, as a process."""
 
+import logging
 import webbrowser
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
@@ -18,6 +19,8 @@ from handsteer.transports import join
 from handsteer.transports.protocol import Session, Transport
 
 _LOOK_PERIOD_S = 0.2
+
+log = logging.getLogger(__name__)
 
 
 def camera(
@@ -221,6 +224,7 @@ def _run_until_end(node: Node, session: Session, beside: AbstractContextManager[
     try:
         with beside:
             node.start()
+            log.info("%s is ready: %s", session.name, node.topics)
             while not (node.ended.is_set() or session.wait(_LOOK_PERIOD_S)):
                 pass
     finally:

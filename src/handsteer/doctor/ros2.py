@@ -118,8 +118,9 @@ def _nobody(here: Network, is_inhabited: bool, elsewhere: Mapping[int, Sight]) -
     seen = {domain: sight.others for domain, sight in elsewhere.items() if sight.others}
     if is_inhabited and here.reach != "SUBNET":
         return _wrong(
-            f"{here.place}: somebody is in this domain on this machine, but is not seen; it may look "
-            "at the subnet, as ROS 2 does by itself: set ROS_AUTOMATIC_DISCOVERY_RANGE=SUBNET here, or LOCALHOST there"
+            f"{here.place}: somebody is in this domain on this machine, but is not seen; it may look at another "
+            "network card, or at none: unset ROS_LOCALHOST_ONLY, and set ROS_AUTOMATIC_DISCOVERY_RANGE=SUBNET on both "
+            "sides"
         )
     if seen:
         others = "; ".join(f"domain {domain} has {_some(nodes)}" for domain, nodes in seen.items())

@@ -1,13 +1,15 @@
 """The node ``my_camera``: frames out, whatever the camera does."""
 
 import logging
+from dataclasses import replace
 
+from handsteer.cameras.calibration import uncalibrated
 from handsteer.cameras.freshness import Freshness
 from handsteer.cameras.protocol import Camera, EndOfStream, Frame
 from handsteer.clock import Clock
 from handsteer.errors import CameraError
 from handsteer.images import image_message, jpeg_message
-from handsteer.messages import IMAGE_COMPRESSED, IMAGE_RAW, Header
+from handsteer.messages import CAMERA_INFO, IMAGE_COMPRESSED, IMAGE_RAW, CameraInfo, Header
 from handsteer.nodes.node import ERROR, OK, Node
 from handsteer.nodes.stop_keeper import StopKeeper
 from handsteer.timeouts import STALE_S
@@ -31,17 +33,27 @@ class CameraNode(Node):
         clock: The graph's clock.
         camera: Gives the frames.
         frame_id: Coordinate frame of the images.
+        calibration: What is known of the lens, for pictures of its size; None when nothing is.
 
     Attributes:
         ended: Set when a file has ended and shall end the run.
         frames: How many frames were published.
     """
 
-    def __init__(self, transport: Transport, clock: Clock, camera: Camera, frame_id: str = "camera") -> None:
+    def __init__(
+        self,
+        transport: Transport,
+        clock: Clock,
+        camera: Camera,
+        frame_id: str = "camera_optical_frame",
+        calibration: CameraInfo | None = None,
+    ) -> None:
         super().__init__("my_camera", transport, clock)
         self.frames = 0
         self._camera = camera
         self._frame_id = frame_id
+        self._calibration = calibration
+        self._fits = True
         self._retry_s = _FIRST_RETRY_S
         self._state = (OK, f"{camera.name}: waiting for the first frame")
         self._last_frame_s = clock.now()
@@ -51,6 +63,7 @@ class CameraNode(Node):
         StopKeeper(self)
         self._image = self.publisher(IMAGE_RAW)
         self._compressed = self.publisher(IMAGE_COMPRESSED)
+        self._info = self.publisher(CAMERA_INFO)
         self._reading = self.every(camera.period_s or 0.0, self._read)
         self.every(_DIAGNOSE_PERIOD_S, self._report)
 
@@ -90,6 +103,22 @@ class CameraNode(Node):
         self._image.publish(image_message(frame.image, header), frame.captured_s)
         if self._compressed.wanted:
             self._compressed.publish(jpeg_message(frame.image, header), frame.captured_s)
+
+        if self._info.wanted:
+            self._info.publish(replace(self._info_for(frame), header=header), frame.captured_s)
+
+    def _info_for(self, frame: Frame) -> CameraInfo:
+        """Return the calibration; one of another size says nothing of this picture."""
+        height, width = frame.image.shape[:2]
+        known = self._calibration
+        fits = known is not None and (known.width, known.height) == (width, height)
+        if known is not None and self._fits and not fits:
+            log.warning(
+                "the calibration is for pictures of %d x %d, and these have %d x %d: it is not used",
+                *(known.width, known.height, width, height),
+            )
+        self._fits = known is None or fits
+        return known if known is not None and fits else uncalibrated(width, height)
 
     def _is_new(self, frame: Frame) -> bool:
         elapsed_s, self._last_read_s = frame.captured_s - self._last_read_s, frame.captured_s

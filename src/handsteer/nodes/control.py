@@ -140,16 +140,19 @@ class HandSignControlNode(Node):
             self._publish(ZERO)
         else:
             if self._safety.is_stopped:
-                log.info("stop is reset by false on %s, which is published by %s", STOP.name, self._voices(STOP))
+                log.info("stop is reset by false on %s, which is published by %s", *self._told_by(STOP))
             self._safety.reset()
 
-    def _voices(self, topic: Topic[Any]) -> str:
-        return ", ".join(self.transport.publishers_of(topic)) or "nobody that is known"
+    def _told_by(self, topic: Topic[Any]) -> tuple[str, str]:
+        publishers = self.transport.publishers_of(topic)
+        return self.transport.topic_name(topic), ", ".join(publishers) or "nobody that is known"
 
     def _on_sign(self, received: Received[String]) -> None:
         captured_s = received.captured_s
-        if captured_s is not None and self.clock.now() - captured_s > self._config.sign_timeout:
-            return  # a stale frame is no frame: the watchdog goes on counting
+        is_stale = captured_s is not None and self.clock.now() - captured_s > self._config.sign_timeout
+        if is_stale or received.is_late:  # a stale frame is no frame: the watchdog goes on counting
+            self._obey_late(is_stop=action_of(received.message.data, self._config.actions) == "stop")
+            return
         elapsed_s = self._elapsed()
         sign = None if self._interruption.distrusts(self.clock.now()) else received.message.data
         self._look_after_the_robot(elapsed_s)
@@ -158,10 +161,18 @@ class HandSignControlNode(Node):
 
     def _on_steering(self, received: Received[Twist]) -> None:
         wanted = Velocity(received.message.linear.x, received.message.angular.z)
+        if received.is_late:
+            self._obey_late(is_stop=wanted.is_zero)
+            return
         elapsed_s = self._elapsed()
         steering = None if self._interruption.distrusts(self.clock.now()) else self._steered(wanted)
         self._look_after_the_robot(elapsed_s)
         self._publish(self._driver.step(elapsed_s, steering=steering))
+
+    def _obey_late(self, *, is_stop: bool) -> None:
+        """Stop for a Stop that comes late; it tells nothing of what is shown now, so it arms nothing."""
+        if is_stop:
+            self._publish(self._driver.halt())
 
     def _on_odometry(self, received: Received[Odometry]) -> None:
         assert self._following is not None

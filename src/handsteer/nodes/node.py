@@ -92,10 +92,17 @@ class Node:
         self._running = False
         self._stopped = False
         self._thread: threading.Thread | None = None
-        self._diagnostics = transport.advertise(name, DIAGNOSTICS)
+        self._topics: dict[str, set[str]] = {"publishes": set(), "listens to": set()}
+        self._diagnostics = self.publisher(DIAGNOSTICS)
+
+    @property
+    def topics(self) -> str:
+        """What it publishes and listens to, in words, by the names that others know."""
+        return "; ".join(f"{does} {', '.join(sorted(names)) or 'nothing'}" for does, names in self._topics.items())
 
     def publisher(self, topic: Topic[M]) -> Publisher[M]:
         """Return the sending end of ``topic``."""
+        self._topics["publishes"].add(self.transport.topic_name(topic))
         return self.transport.advertise(self.name, topic)
 
     def subscribe(
@@ -103,7 +110,7 @@ class Node:
         topic: Topic[M],
         callback: Callable[[Received[M]], None],
         key: Callable[[M], Hashable] | None = None,
-    ) -> None:
+    ) -> Subscription:
         """Call ``callback`` with the newest message of ``topic``; older ones that were not served are dropped.
 
         For a topic of some depth, as many of the newest messages are kept, and served in their order.
@@ -112,8 +119,13 @@ class Node:
             topic: What to listen to.
             callback: Runs on this node's thread.
             key: For a topic that several nodes publish to: keeps the newest message for each value of ``key(message)``.
+
+        Returns:
+            What ends it; the node's end does, too.
         """
-        inbox = _Inbox(topic.name, callback, key, 1 if key else topic.depth)
+        name = self.transport.topic_name(topic)
+        self._topics["listens to"].add(name)
+        inbox = _Inbox(name, callback, key, 1 if key else topic.depth)
         self._inboxes.append(inbox)
 
         def deliver(received: Received[M]) -> None:
@@ -129,7 +141,9 @@ class Node:
                 with self._wake:
                     self._wake.notify()
 
-        self._subscriptions.append(self.transport.subscribe(self.name, topic, deliver))
+        subscription = self.transport.subscribe(self.name, topic, deliver)
+        self._subscriptions.append(subscription)
+        return subscription
 
     def every(self, period_s: float, callback: Callable[[], None]) -> "Timer":
         """Call ``callback`` every ``period_s`` seconds; a beat that is missed is left out, not made up for."""

@@ -1,6 +1,7 @@
 """The node ``hand_sign_recognition``: a frame in, the name of a sign out."""
 
 import json
+import logging
 import math
 from collections.abc import Callable
 from pathlib import Path
@@ -16,6 +17,7 @@ from handsteer.errors import ConfigError, ModelError
 from handsteer.images import bgr_image, image_message, jpeg_picture
 from handsteer.messages import HAND_SIGN, IMAGE_ANNOTATED, IMAGE_COMPRESSED, IMAGE_RAW, CompressedImage, Image, String
 from handsteer.nodes.frame_age import FrameAge
+from handsteer.nodes.interruption import Interruption
 from handsteer.nodes.latency import LatencyLog
 from handsteer.nodes.node import OK, WARN, Node
 from handsteer.nodes.recording import Recording
@@ -23,13 +25,16 @@ from handsteer.nodes.stop_keeper import StopKeeper
 from handsteer.signs.protocol import Classifier
 from handsteer.signs.recognizer import Recognition, Recognizer
 from handsteer.signs.vocabulary import NONE
-from handsteer.transports.protocol import Received, Transport
+from handsteer.transports.protocol import Received, Subscription, Transport
 
 _WATCH_PERIOD_S = 0.02
 # Further apart than FAULT_GAP_S, so that the control takes them for what they are: frames that were not looked at.
 _SILENCE_PERIOD_S = 0.5
 _DIAGNOSE_PERIOD_S = 0.1
+_CHOOSE_PERIOD_S = 0.5
 _SHORTLY_S = 3.0
+
+log = logging.getLogger(__name__)
 
 M = TypeVar("M", Image, CompressedImage)
 Annotate = Callable[[NDArray[np.uint8], Recognition], NDArray[np.uint8]]
@@ -77,6 +82,7 @@ class HandSignRecognitionNode(Node):
         self._last_hand_s: float | None = None
         self._age = FrameAge(config.max_frame_age)
         self._freshness = Freshness(config.max_frame_age)
+        self._interruption = Interruption(config.max_frame_age, clock.now())
         self._recording = Recording(config.recorded, config.max_frame_age)
         self._refused: str | None = None
         self._refused_s = -math.inf
@@ -85,10 +91,10 @@ class HandSignRecognitionNode(Node):
         self._sign = self.publisher(HAND_SIGN)
         self._annotated = self.publisher(IMAGE_ANNOTATED)
         wanted = config.image_transport
-        if wanted == "compressed" or (wanted == "auto" and transport.crosses_network):
-            self.subscribe(IMAGE_COMPRESSED, lambda received: self._on_frame(received, jpeg_picture))
-        else:
-            self.subscribe(IMAGE_RAW, lambda received: self._on_frame(received, bgr_image))
+        self._compressed = wanted == "compressed" or (wanted == "auto" and transport.crosses_network)
+        self._images = self._take_images()
+        if wanted == "auto":
+            self.every(_CHOOSE_PERIOD_S, self._choose_images)
         self.every(_WATCH_PERIOD_S, self._watch)
         self.every(_DIAGNOSE_PERIOD_S, self._report)
 
@@ -107,7 +113,8 @@ class HandSignRecognitionNode(Node):
             self._recognizer.use(self._open_classifier(config.signs))
             self._model = version
         self._config = config.signs
-        self._age.limit_s = self._freshness.limit_s = self._recording.limit_s = config.signs.max_frame_age
+        limit_s = config.signs.max_frame_age
+        self._age.limit_s = self._freshness.limit_s = self._recording.limit_s = self._interruption.limit_s = limit_s
         self._recognizer.reconfigure(config.signs)
 
     def _has_other_model(self, config: SignsConfig) -> bool:
@@ -119,11 +126,14 @@ class HandSignRecognitionNode(Node):
     def _on_frame(self, received: Received[M], picture_of: Callable[[M], NDArray[np.uint8]]) -> None:
         began_s = self.clock.now()
         captured_s = received.captured_s if received.captured_s is not None else began_s
+        self._interruption.note(began_s)
         if self._recording.follows(began_s, captured_s, by_player=received.by_player):
             captured_s = began_s
         self._refused = self._age.why_refused(began_s, captured_s)
         if self._refused is not None:
             self._refused = self._recording.hint(began_s) or self._refused
+        if self._refused is None and self._interruption.distrusts(began_s):
+            self._refused = "this process was held up, and frames may have waited meanwhile"
         image = picture_of(received.message)
         if self._refused is None:
             self._look_at(image, received, began_s, captured_s)
@@ -141,6 +151,9 @@ class HandSignRecognitionNode(Node):
         # The time of pictures that were not looked at counts: a sign is bridged from when it was seen last.
         recognition = self._recognizer.step(image, self._unseen_s)
         self._unseen_s = 0.0
+        self._refused = self._why_too_late(began_s)
+        if self._refused is not None:
+            return
         if recognition.hand is not None:
             self._last_hand_s = began_s
             self._refused = self._freshness.why_hand_refused(recognition.hand.box_px, dt_s)
@@ -155,6 +168,31 @@ class HandSignRecognitionNode(Node):
             header = received.message.header
             self._annotated.publish(image_message(self._annotate(image, recognition), header), received.captured_s)
 
+    def _why_too_late(self, began_s: float) -> str | None:
+        """Return why a frame that was fresh has no sign: this process was stopped, or held up, while it was read."""
+        age_s = max(0.0, self._age.age_s) + self.clock.now() - began_s
+        if age_s <= self._config.max_frame_age:
+            return None
+        self._recognizer.reset()
+        return f"a frame was {age_s:.1f} s old when its sign was told: was this process held up?"
+
+    def _take_images(self) -> Subscription:
+        if self._compressed:
+            return self.subscribe(IMAGE_COMPRESSED, lambda received: self._on_frame(received, jpeg_picture))
+        return self.subscribe(IMAGE_RAW, lambda received: self._on_frame(received, bgr_image))
+
+    def _choose_images(self) -> None:
+        """Take the other kind of images where a camera has only that."""
+        taken, other = (IMAGE_COMPRESSED, IMAGE_RAW) if self._compressed else (IMAGE_RAW, IMAGE_COMPRESSED)
+        names = self.transport.publishers_of
+        if names(taken) or not names(other):
+            return
+        self._images.close()
+        self._compressed = not self._compressed
+        self._images = self._take_images()
+        here, there = (self.transport.topic_name(topic) for topic in (taken, other))
+        log.info("nobody publishes %s: images are taken from %s, of %s", here, there, ", ".join(names(other)))
+
     def _since_last_frame(self, captured_s: float) -> float:
         last_s = captured_s if self._last_captured_s is None else self._last_captured_s
         self._last_captured_s = captured_s
@@ -162,6 +200,7 @@ class HandSignRecognitionNode(Node):
 
     def _watch(self) -> None:
         now = self.clock.now()
+        self._interruption.note(now)
         if now - self._last_frame_s <= self._config.max_frame_age:
             return
         period_s = _SILENCE_PERIOD_S if self._recognition is None else self._config.max_frame_age

@@ -32,7 +32,7 @@ class Rivals:
     def __init__(self, node: Node, topics: Sequence[Topic[Any]], elsewhere: dict[str, Look] | None = None) -> None:
         self.warning = ""
         self._node = node
-        self._looks: dict[str, Look] = {topic.name: self._look_at(topic) for topic in topics}
+        self._looks: dict[str, Look] = {node.transport.topic_name(topic): self._look_at(topic) for topic in topics}
         self._looks |= elsewhere or {}
         self._seen: dict[str, int] = {}
         self._said: set[str] = set()

@@ -38,6 +38,7 @@ from handsteer.messages import (
     TwistStamped,
     TwistWithCovariance,
     Vector3,
+    is_zero,
     twist,
     twist_in,
 )
@@ -67,8 +68,8 @@ _LONGEST_STEP_S = 0.1
 _LEAP_M = 0.5
 _NO_STAMP = Time(sec=0, nanosec=0)
 
-# The diagonal that ROS's diff_drive_controller is usually configured with: x, y, z, roll, pitch, yaw.
-_COVARIANCE = np.diag([0.001, 0.001, 1e6, 1e6, 1e6, 1000.0]).reshape(-1)
+# Variances of x, y, z, roll, pitch and yaw, in m² and rad²: wheels tell of the plane, and of nothing else.
+_COVARIANCE = np.diag([0.001, 0.001, 1e6, 1e6, 1e6, 0.01]).reshape(-1)
 
 
 class RobotNode(Node):
@@ -170,7 +171,7 @@ class RobotNode(Node):
     def _on_command(self, received: Received[Twist | TwistStamped]) -> None:
         now = self.clock.now()
         self._notice_interruption(now)
-        if self._interruption.distrusts(now) or self._is_old(received.message, now):
+        if not is_zero(received.message) and (self._interruption.distrusts(now) or self._is_old(received.message, now)):
             return
         command = twist_in(received.message)
         self._tell(Velocity(command.linear.x, command.angular.z))

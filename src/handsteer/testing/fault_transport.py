@@ -128,6 +128,10 @@ class FaultTransport:
         """Return what the transport within knows: faults befall messages, not who is there."""
         return self._inner.publishers_of(topic)
 
+    def topic_name(self, topic: Topic[Any]) -> str:
+        """Return what the transport within calls ``topic``."""
+        return self._inner.topic_name(topic)
+
     def full_name(self, node: str) -> str:
         """Return what the transport within calls ``node``."""
         return self._inner.full_name(node)

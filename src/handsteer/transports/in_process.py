@@ -38,6 +38,10 @@ class InProcessTransport:
         with self._lock:
             return sorted(publisher.node for publisher in self._publishers if publisher.topic == topic.name)
 
+    def topic_name(self, topic: Topic[Any]) -> str:
+        """Return its name."""
+        return topic.name
+
     def full_name(self, node: str) -> str:
         """Return ``node``."""
         return node

@@ -174,6 +174,10 @@ class PipedTransport:
         with self._lock:
             return sorted(publisher.node for publisher in self._publishers if publisher.topic == topic.name)
 
+    def topic_name(self, topic: Topic[Any]) -> str:
+        """Return its name, as the other process's graph has it."""
+        return topic.name
+
     def full_name(self, node: str) -> str:
         """Return ``node``: it is one of the other process's graph."""
         return node

@@ -20,11 +20,14 @@ class Received(Generic[M]):
         message: The message; it is shared with other subscribers, so it is not to be changed.
         captured_s: When the frame that led to this message was captured, in seconds of the graph's clock; None when
             there was no frame, or when the transport cannot carry it.
+        is_late: Whether it was held up on its way for longer than messages of its topic live: of these only those
+            come that stop the robot (``Topic.stops``), and they show nothing of what is wanted now.
         by_player: Whether a player of recordings sent it; False when the transport cannot tell.
     """
 
     message: M
     captured_s: float | None = None
+    is_late: bool = False
     by_player: bool = False
 
 
@@ -91,6 +94,10 @@ class Transport(Protocol):
         Each publisher counts: a node that has two is there twice, and so are two nodes of one name. Those of other
         processes may be known late, and are missed for some seconds when they were killed.
         """
+        ...
+
+    def topic_name(self, topic: Topic[Any]) -> str:
+        """Return what others know ``topic`` by: its full name, with namespace and remapping."""
         ...
 
     def full_name(self, node: str) -> str:

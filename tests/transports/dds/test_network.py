@@ -7,21 +7,20 @@ from handsteer.errors import TransportError
 from handsteer.transports.dds.network import network
 
 
-def settings(**environment: str) -> dict[str, object]:
-    """Return what Cyclone DDS is told."""
-    config = network(environment).config
+def settings(*addresses: str, **environment: str) -> dict[str, object]:
+    """Return what Cyclone DDS is told on a machine with these addresses."""
+    config = network(environment, addresses).config
     assert config is not None
     tree = ET.fromstring(config)
-    interface = tree.find(".//NetworkInterface")
     return {
-        "interface": None if interface is None else interface.get("address"),
+        "interfaces": [one.get("address") for one in tree.iter("NetworkInterface")],
         "multicast": tree.findtext(".//AllowMulticast"),
         "index": tree.findtext(".//ParticipantIndex"),
         "peers": [peer.get("address") for peer in tree.iter("Peer")],
     }
 
 
-LOOPBACK = {"interface": "127.0.0.1", "multicast": "false", "index": "auto", "peers": ["127.0.0.1"]}
+LOOPBACK = {"interfaces": ["127.0.0.1"], "multicast": "false", "index": "auto", "peers": ["127.0.0.1"]}
 
 
 @pytest.mark.parametrize(
@@ -37,14 +36,24 @@ def test_this_machine_only(environment: dict[str, str]) -> None:
     assert settings(**environment) == LOOPBACK
 
 
+def test_who_looks_at_the_subnet_is_met_on_this_machine() -> None:
+    """None is the card that Cyclone DDS chooses; as many peers are told of us as it can be."""
+    met = settings("10.0.0.7", "10.1.0.7", "10.2.0.7", "10.3.0.7")
+    assert met["interfaces"] == [None, "127.0.0.1"]
+    assert met["multicast"] == "false"
+    assert met["peers"] == ["127.0.0.1", "10.0.0.7", "10.1.0.7", "10.2.0.7"]
+    for environment in ({"ROS_LOCALHOST_ONLY": "1"}, {"ROS_AUTOMATIC_DISCOVERY_RANGE": "OFF"}):
+        assert settings("10.0.0.7", **environment)["interfaces"] == ["127.0.0.1"]
+
+
 @pytest.mark.parametrize("environment", [{"ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"}, {"ROS_LOCALHOST_ONLY": "0"}])
 def test_the_subnet(environment: dict[str, str]) -> None:
-    assert settings(**environment) == {"interface": None, "multicast": "true", "index": "auto", "peers": []}
+    assert settings(**environment) == {"interfaces": [], "multicast": "true", "index": "auto", "peers": []}
 
 
 def test_static_peers() -> None:
     assert settings(ROS_STATIC_PEERS="10.0.0.1; robot.local;") == {
-        "interface": None,
+        "interfaces": [],
         "multicast": "false",
         "index": "auto",
         "peers": ["127.0.0.1", "10.0.0.1", "robot.local"],
@@ -55,10 +64,15 @@ def test_static_peers() -> None:
 
 @pytest.mark.parametrize(
     ("environment", "interval"),
-    [({}, None), ({"ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"}, "2 s"), ({"ROS_STATIC_PEERS": "10.0.0.1"}, "2 s")],
+    [
+        ({}, "2 s"),
+        ({"ROS_LOCALHOST_ONLY": "1"}, None),
+        ({"ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"}, "2 s"),
+        ({"ROS_STATIC_PEERS": "10.0.0.1"}, "2 s"),
+    ],
 )
-def test_over_a_network_we_say_often_that_we_are_there(environment: dict[str, str], interval: str | None) -> None:
-    config = network(environment).config
+def test_to_others_we_say_often_that_we_are_there(environment: dict[str, str], interval: str | None) -> None:
+    config = network(environment, ["10.0.0.7"]).config
     assert config is not None
     assert ET.fromstring(config).findtext(".//SPDPInterval") == interval
 

@@ -5,7 +5,7 @@ pytest.importorskip("cyclonedds")
 from cyclonedds.core import Policy, Qos
 
 from handsteer.config import RobotConfig
-from handsteer.messages import CMD_VEL, HAND_SIGN, IMAGE_RAW, ODOM, ROBOT_DESCRIPTION, STEERING_CMD_VEL, Topic
+from handsteer.messages import CLOCK, CMD_VEL, HAND_SIGN, IMAGE_RAW, ODOM, ROBOT_DESCRIPTION, STEERING_CMD_VEL, Topic
 from handsteer.transports.dds.qos import describe, misfits, reader_qos, writer_qos
 
 RELIABLE = Policy.Reliability.Reliable(0)
@@ -16,7 +16,8 @@ RELIABLE = Policy.Reliability.Reliable(0)
     [
         (CMD_VEL, "reliable, volatile, keep last 10", "reliable, volatile, keep last 10"),
         (HAND_SIGN, "reliable, volatile, keep last 10", "reliable, volatile, keep last 10"),
-        (IMAGE_RAW, "best effort, volatile, keep last 1", "best effort, volatile, keep last 1"),
+        (IMAGE_RAW, "reliable, volatile, keep last 3", "best effort, volatile, keep last 1"),
+        (CLOCK, "best effort, volatile, keep last 1", "best effort, volatile, keep last 1"),
         (ODOM, "reliable, volatile, keep last 1", "best effort, volatile, keep last 1"),
         (ROBOT_DESCRIPTION, "reliable, transient local, keep last 1", "reliable, transient local, keep last 1"),
     ],

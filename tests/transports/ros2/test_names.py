@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from handsteer.errors import TransportError
-from handsteer.messages import CLOCK, CMD_VEL, IMAGE_RAW, TF
+from handsteer.messages import CLOCK, CMD_VEL, IMAGE_COMPRESSED, IMAGE_RAW, TF
 from handsteer.transports.ros2.names import NodeName, Remap, identify
 
 TOKENS = st.from_regex(r"[A-Za-z_][A-Za-z0-9_]{0,8}", fullmatch=True)
@@ -30,6 +30,14 @@ VALID = re.compile(r"(/[A-Za-z_]\w*)+", re.ASCII)
 )
 def test_expansion(name: str, full: str) -> None:
     assert NodeName("cam", "/r1").expand(name) == full
+
+
+def test_compressed_images_are_renamed_with_the_raw_ones_unless_they_have_a_rule_of_their_own() -> None:
+    eye = NodeName("cam", "/r1", (Remap("image_raw", "/x"),))
+    assert (eye.topic(IMAGE_RAW), eye.topic(IMAGE_COMPRESSED)) == ("/x", "/x/compressed")
+    eye = NodeName("cam", "/r1", (Remap("image_raw", "/x"), Remap("image_raw/compressed", "jpeg")))
+    assert (eye.topic(IMAGE_RAW), eye.topic(IMAGE_COMPRESSED)) == ("/x", "/r1/jpeg")
+    assert NodeName("cam", "/r1").topic(IMAGE_COMPRESSED) == "/r1/image_raw/compressed"
 
 
 @pytest.mark.parametrize("name", ["", "/", "a//b", "a/", "1a", "a/2b", "a b", "~a", "a-b", "é", "{wrong}/a", "a" * 300])

@@ -126,7 +126,7 @@ def test_a_set_is_checked_applied_and_told() -> None:
         ("max_linear", float("nan"), "max_linear: nan should be a finite number"),
         ("max_linear", "fast", "max_linear: 'fast' should be a number"),
         ("max_linear", True, "max_linear: True should be a number"),
-        ("max_linear", [], "max_linear: a list of numbers should be a single value"),
+        ("max_linear", [], "max_linear: [] should be a number"),
         ("max_linear", None, "max_linear cannot be taken away, only set to another value"),
         ("ramp", "steep", "ramp: 'steep' should be 'per_message' or 'per_second'"),
         ("max_liner", 0.3, "max_liner: there is no such parameter; there are ramp, linear_step"),

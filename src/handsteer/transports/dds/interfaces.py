@@ -9,12 +9,12 @@ try:
 except ModuleNotFoundError:  # Windows
     fcntl = None  # type: ignore[assignment]
 
-_UP, _LOOPBACK, _MULTICAST = 0x1, 0x8, 0x1000
+_UP, _LOOPBACK, _POINT_TO_POINT, _MULTICAST = 0x1, 0x8, 0x10, 0x1000
 _GET_FLAGS, _GET_ADDRESS = 0x8913, 0x8915
 
 
 def multicast_addresses() -> dict[str, str]:
-    """Return the IPv4 address of each network interface that is up and has multicast, without loopback.
+    """Return the IPv4 address of each network interface that is up and has multicast, without loopback and tunnels.
 
     Empty where the system does not tell (Windows).
     """
@@ -25,6 +25,6 @@ def multicast_addresses() -> dict[str, str]:
             with contextlib.suppress(OSError):
                 (flags,) = struct.unpack_from("H", fcntl.ioctl(asking, _GET_FLAGS, request), 16)
                 address = socket.inet_ntoa(fcntl.ioctl(asking, _GET_ADDRESS, request)[20:24])
-                if flags & _UP and flags & _MULTICAST and not flags & _LOOPBACK:
+                if flags & _UP and flags & _MULTICAST and not flags & (_LOOPBACK | _POINT_TO_POINT):
                     found[name] = address
     return found

@@ -1,22 +1,30 @@
 """Which DDS domain to join and over which network, as ROS 2's environment variables say."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from handsteer.errors import TransportError
+from handsteer.transports.dds.interfaces import multicast_addresses
 from handsteer.transports.ros2.domain import domain_id
 
 _RANGES = ("LOCALHOST", "SUBNET", "OFF", "SYSTEM_DEFAULT")
 _ADDRESS = re.compile(r"[A-Za-z0-9_.:%\[\]-]+")
-# How soon others find us again after a cut that was so long that they gave us up: Cyclone's default is half a minute.
+# How soon others find us whose own words do not reach us, or again after a cut that was so long that they gave us up:
+# Cyclone's default is half a minute.
 _ANNOUNCE_S = 2
+# To each address go as many packets as there are places. Who looks at the subnet by Cyclone DDS listens on one network
+# card only, the first good one.
+_OWN_ADDRESSES = 3
 # Every process of a machine has the two UDP ports of its index: known to firewalls, and to others by address alone.
 # Where others are looked for by address, all their ports are tried, so that there are fewer.
 PLACES, PLACES_BY_MULTICAST = 33, 120
 # Four raw images: with the engine's own 1 MB, a process that is held up for a frame or two loses one. The system gives
 # what it allows (Linux: net.core.rmem_max), and nothing is said where that is less.
 _RECEIVE_BUFFER = "4MiB"
+# No writer waits for a slow reader, however large its messages are: each keeps a few, and drops older ones for newer.
+# With the engine's own 500 kB, one raw image that is not confirmed yet would keep the next from being sent.
+_UNCONFIRMED = "1GiB"
 _PLACES = {
     "LOCALHOST": "this machine",
     "PEERS": "this machine and ROS_STATIC_PEERS",
@@ -61,11 +69,15 @@ class Network:
         return f"domain {self.domain}, {_PLACES[self.reach]}"
 
 
-def network(environment: Mapping[str, str]) -> Network:
+def network(environment: Mapping[str, str], addresses: Sequence[str] | None = None) -> Network:
     """Return what ``environment`` says; without a word of it, only this machine is looked at.
 
     ``ROS_DOMAIN_ID``, ``ROS_LOCALHOST_ONLY``, ``ROS_AUTOMATIC_DISCOVERY_RANGE``, ``ROS_STATIC_PEERS`` and
     ``ROS_DISTRO`` count as in ROS 2; the user's ``CYCLONEDDS_URI`` goes before all but the domain.
+
+    Args:
+        environment: Environment variables.
+        addresses: Those of this machine's network cards, where who looks at the subnet listens; None asks the system.
 
     Raises:
         TransportError: A variable has a value that is not allowed.
@@ -82,7 +94,11 @@ def network(environment: Mapping[str, str]) -> Network:
         return Network(domain, None, distribution, reach, peers=tuple(peers), asked=reach)
     places = PLACES_BY_MULTICAST if reach == "SUBNET" and not peers else PLACES
     found = "PEERS" if peers and reach == "LOCALHOST" else reach
-    return Network(domain, _config(reach, peers, places), distribution, found, places, tuple(peers), reach)
+    own: Sequence[str] = []
+    if reach == "LOCALHOST" and not peers and environment.get("ROS_LOCALHOST_ONLY") != "1":
+        own = list(multicast_addresses().values()) if addresses is None else addresses
+    config = _config(reach, peers, places, own[:_OWN_ADDRESSES])
+    return Network(domain, config, distribution, found, places, tuple(peers), reach)
 
 
 def _range(environment: Mapping[str, str]) -> str:
@@ -106,18 +122,28 @@ def _peers(text: str) -> list[str]:
     return peers
 
 
-def _config(reach: str, peers: list[str], places: int) -> str:
-    interface = '<Interfaces><NetworkInterface address="127.0.0.1"/></Interfaces>'
-    alone = reach in {"LOCALHOST", "OFF"} and not peers
+def _config(reach: str, peers: Sequence[str], places: int, own: Sequence[str]) -> str:
     multicast = "true" if reach == "SUBNET" else "false"
-    everyone = [*(["127.0.0.1"] if reach == "LOCALHOST" else []), *peers]
+    everyone = [*(["127.0.0.1"] if reach == "LOCALHOST" else []), *own, *peers]
     found = "".join(f'<Peer address="{peer}"/>' for peer in everyone)
     index = f"<ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>{places - 1}</MaxAutoParticipantIndex>"
     announce = f"<SPDPInterval>{_ANNOUNCE_S} s</SPDPInterval>"
+    within = reach in {"LOCALHOST", "OFF"} and not peers
     return (
         "<CycloneDDS><Domain>"
-        f"<General>{interface if alone else ''}<AllowMulticast>{multicast}</AllowMulticast></General>"
-        f"<Discovery>{index}{'' if alone else announce}<Peers>{found}</Peers></Discovery>"
-        f'<Internal><SocketReceiveBufferSize min="default" max="{_RECEIVE_BUFFER}"/></Internal>'
+        f"<General>{_interfaces(own) if within else ''}<AllowMulticast>{multicast}</AllowMulticast></General>"
+        f"<Discovery>{index}{announce if own or not within else ''}<Peers>{found}</Peers></Discovery>"
+        f'<Internal><SocketReceiveBufferSize min="default" max="{_RECEIVE_BUFFER}"/>'
+        f"<Watermarks><WhcHigh>{_UNCONFIRMED}</WhcHigh></Watermarks></Internal>"
         "</Domain></CycloneDDS>"
     )
+
+
+def _interfaces(own: Sequence[str]) -> str:
+    """Return the network cards that are used by who stays within this machine.
+
+    Who looks at the subnet by Cyclone DDS is not on loopback, so it is met on the card that both choose. Without
+    multicast no other machine is told of us, nor heard. Our own nodes stay on loopback, whatever becomes of the card.
+    """
+    card = '<NetworkInterface autodetermine="true"/>' if own else ""
+    return f'<Interfaces>{card}<NetworkInterface address="127.0.0.1"/></Interfaces>'

@@ -71,6 +71,10 @@ class DdsTransport:
             ours = [self._participant.name.full for publisher in self._publishers if publisher.name == name]
         return sorted([*ours, *self._participant.publishers_of(topic)])
 
+    def topic_name(self, topic: Topic[Any]) -> str:
+        """Return the topic's full name in the graph, remapped."""
+        return self._participant.name.topic(topic)
+
     def full_name(self, node: str) -> str:
         """Return the ROS 2 node's name and ``node``, as ROS's own diagnostics do: ``r1/my_camera: my_camera``."""
         return f"{self._participant.name.full.removeprefix('/')}: {node}"
@@ -115,6 +119,7 @@ class DdsPublisher(Generic[M]):
         self._participant = participant
         self._topic = topic
         self._writer: Any = participant.writer(topic)
+        self._is_held_up = False
         self._lock = threading.Lock()
 
     @property
@@ -133,8 +138,12 @@ class DdsPublisher(Generic[M]):
             writer.write(writer.data_type(encode(message)))
         except DDSException as error:
             if error.code != DDSException.DDS_RETCODE_TIMEOUT:
-                raise TransportError(f"{self._topic.name} cannot be published: {error}") from None
-            log.warning("%s: a subscriber is too slow, a message was dropped", self._topic.name)
+                raise TransportError(f"{self.name} cannot be published: {error}") from None
+            if not self._is_held_up:
+                log.warning("%s: a subscriber is too slow, and messages are dropped", self.name)
+            self._is_held_up = True
+        else:
+            self._is_held_up = False
 
     def flush(self, timeout_s: float) -> None:
         """Wait until all reliable readers have what was published, for at most ``timeout_s`` seconds."""
@@ -144,7 +153,7 @@ class DdsPublisher(Generic[M]):
                 writer.wait_for_acks(round(timeout_s * 1e9))
             except (DDSException, AttributeError):
                 # cyclonedds 11.0.1 stumbles over its own name of the time-out; whoever has not answered is given up.
-                log.info("%s: not every subscriber has confirmed the last message", self._topic.name)
+                log.info("%s: not every subscriber has confirmed the last message", self.name)
 
     def close(self) -> None:
         """Send no more; may be called twice."""
@@ -165,6 +174,7 @@ class _Reception(Generic[M]):
         self._is_broken = False
         self._lateness = None if topic.lifespan_s is None else Lateness(topic.lifespan_s)
         self._was_late = False
+        self._name = participant.name.topic(topic)
         self._reader: Any = participant.reader(topic)
         participant.serve(self._reader, self._serve)
 
@@ -179,8 +189,8 @@ class _Reception(Generic[M]):
             return
         for sample in reader.take(self._topic.depth):
             # A writer that leaves sends one without a message.
-            if not isinstance(sample, InvalidSample) and not self._is_late(sample.sample_info):
-                self._pass_on(sample.raw)
+            if not isinstance(sample, InvalidSample):
+                self._pass_on(sample.raw, late=self._is_late(sample.sample_info))
 
     def _is_late(self, info: Any) -> bool:
         if self._lateness is None or info.source_timestamp <= 0:  # RTPS lets a sender leave its time out
@@ -189,21 +199,22 @@ class _Reception(Generic[M]):
         late = self._lateness.is_late(sender, info.source_timestamp / 1e9, time.monotonic())
         if late and not self._was_late:
             log.warning(
-                "%s: messages come over %g s late and are not obeyed: has the link stood still, or has the clock of "
-                "their sender been set back?",
-                self._topic.name,
+                "%s: messages come over %g s late and are not obeyed, but for stops: has the link stood still, or has "
+                "the clock of their sender been set back?",
+                self._name,
                 self._topic.lifespan_s,
             )
         self._was_late = late
         return late
 
-    def _pass_on(self, raw: bytes) -> None:
+    def _pass_on(self, raw: bytes, *, late: bool) -> None:
         try:
             message = decode(raw, type_name(self._topic.type))
         except Exception as error:
             # Whatever the network brings must not end the receiving.
             if not self._is_broken:
-                log.warning("%s: a message of %d bytes cannot be read: %s", self._topic.name, len(raw), error)
+                log.warning("%s: a message of %d bytes cannot be read: %s", self._name, len(raw), error)
             self._is_broken = True
             return
-        self._send(Received(message, capture_time(message, self._clock)))
+        if not late or (self._topic.stops is not None and self._topic.stops(message)):
+            self._send(Received(message, capture_time(message, self._clock), is_late=late))

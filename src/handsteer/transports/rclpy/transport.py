@@ -198,7 +198,7 @@ class _Reception(Generic[M]):
         self._is_broken = False
         self._lateness = None if topic.lifespan_s is None else Lateness(topic.lifespan_s)
         self._was_late = False
-        name = resolved(node, topic)
+        self._name = name = resolved(node, topic)
         with _refusals(name):
             self._subscription: Any = node.create_subscription(
                 kind,
@@ -214,17 +214,17 @@ class _Reception(Generic[M]):
         self._node.destroy_subscription(self._subscription)
 
     def _on_message(self, raw: bytes, info: Mapping[str, int]) -> None:
-        if self._is_late(info.get("source_timestamp", 0)):
-            return
+        late = self._is_late(info.get("source_timestamp", 0))
         try:
             message = decode(raw, type_name(self._topic.type))
         except Exception as error:
             # Whatever the network brings must not end the receiving.
             if not self._is_broken:
-                log.warning("%s: a message of %d bytes cannot be read: %s", self._topic.name, len(raw), error)
+                log.warning("%s: a message of %d bytes cannot be read: %s", self._name, len(raw), error)
             self._is_broken = True
             return
-        self._send(Received(message, capture_time(message, self._clock)))
+        if not late or (self._topic.stops is not None and self._topic.stops(message)):
+            self._send(Received(message, capture_time(message, self._clock), is_late=late))
 
     def _is_late(self, sent_ns: int) -> bool:
         if self._lateness is None or sent_ns <= 0:  # not every middleware tells when a message was sent
@@ -232,9 +232,9 @@ class _Reception(Generic[M]):
         late = self._lateness.is_late(b"", sent_ns / 1e9, time.monotonic())
         if late and not self._was_late:
             log.warning(
-                "%s: messages come over %g s late and are not obeyed: has the link stood still, has the clock of "
-                "their sender been set back, or have several senders clocks that differ?",
-                self._topic.name,
+                "%s: messages come over %g s late and are not obeyed, but for stops: has the link stood still, has the "
+                "clock of their sender been set back, or have several senders clocks that differ?",
+                self._name,
                 self._topic.lifespan_s,
             )
         self._was_late = late

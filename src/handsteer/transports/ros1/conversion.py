@@ -53,12 +53,12 @@ def from_ros1(message: Any, name: str) -> Any:
 @functools.cache
 def _writer(name: str) -> Convert:
     there = ros1_type(name)
-    steps = [(field, _write_as(kind)) for field, kind in _fields(name) if field in there.__slots__]
+    steps = [(field, named, _write_as(kind)) for field, kind in _fields(name) if (named := _there(field, there))]
 
     def write(ours: Any) -> Any:
         theirs = there()
-        for field, convert in steps:
-            setattr(theirs, field, convert(getattr(ours, field)))
+        for field, named, convert in steps:
+            setattr(theirs, named, convert(getattr(ours, field)))
         return theirs
 
     return write
@@ -67,14 +67,19 @@ def _writer(name: str) -> Convert:
 @functools.cache
 def _reader(name: str) -> Convert:
     here, there = _ours(name), ros1_type(name)
-    steps = [(field, _read_as(kind)) for field, kind in _fields(name) if field in there.__slots__]
-    absent = [(field, kind) for field, kind in _fields(name) if field not in there.__slots__]
+    steps = [(field, named, _read_as(kind)) for field, kind in _fields(name) if (named := _there(field, there))]
+    absent = [(field, kind) for field, kind in _fields(name) if not _there(field, there)]
 
     def read(theirs: Any) -> Any:
-        values = {field: convert(getattr(theirs, field)) for field, convert in steps}
+        values = {field: convert(getattr(theirs, named)) for field, named, convert in steps}
         return here(**values, **{field: _default(kind) for field, kind in absent})
 
     return read
+
+
+def _there(field: str, kind: Any) -> str:
+    """Return the name of our ``field`` in rospy's class; empty where it has none. A calibration's K is large there."""
+    return next((name for name in (field, field.upper()) if name in kind.__slots__), "")
 
 
 def _fields(name: str) -> list[tuple[str, Any]]:

@@ -72,6 +72,10 @@ class Ros1Transport:
         """
         return self._state.publishers_of(self._full_name(topic))
 
+    def topic_name(self, topic: Topic[Any]) -> str:
+        """Return the topic's full name in the graph, remapped."""
+        return self._full_name(topic)
+
     def full_name(self, node: str) -> str:
         """Return the ROS node's name and ``node``, as ROS's own diagnostics do: ``r1/my_camera: my_camera``."""
         return f"{rospy.get_name().removeprefix('/')}: {node}"

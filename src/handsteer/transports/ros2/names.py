@@ -6,6 +6,7 @@ Source of the rules: design.ros2.org/articles/topic_and_service_names.html and s
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from handsteer.errors import TransportError
 from handsteer.messages import Topic
@@ -54,8 +55,10 @@ class NodeName:
         """The full name, as ``/r1/my_camera``."""
         return f"{self.namespace.rstrip('/')}/{self.name}"
 
-    def topic(self, topic: Topic[object]) -> str:
+    def topic(self, topic: Topic[Any]) -> str:
         """Return the full name of ``topic``, as ``/r1/image_raw``, remapped.
+
+        One that extends another's is renamed with it, unless it has a rule of its own.
 
         Raises:
             TransportError: A rule gives it a name that is not allowed.
@@ -64,7 +67,9 @@ class NodeName:
         for rule in self.remaps:
             if rule.applies_to(self.name) and self.expand(rule.source) == full:
                 return self.expand(rule.target)
-        return full
+        return (
+            full if topic.beneath is None else self.topic(topic.beneath) + topic.name.removeprefix(topic.beneath.name)
+        )
 
     def expand(self, name: str) -> str:
         """Return the full name for one that may be relative (``a``), private (``~/a``) or hold ``{node}``, ``{ns}``.

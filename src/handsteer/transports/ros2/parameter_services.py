@@ -31,6 +31,7 @@ NOT_SET = 0
 _TYPES = {"bool": 1, "integer": 2, "double": 3, "string": 4, "strings": 9}
 _FIELDS = {1: "bool_value", 2: "integer_value", 3: "double_value", 4: "string_value", 9: "string_array_value"}
 _ARRAYS = ("byte_array_value", "bool_array_value", "integer_array_value", "double_array_value", "string_array_value")
+_EMPTY = dict(zip((5, 6, 7, 8, 9), _ARRAYS, strict=True))
 _INTERFACES = "rcl_interfaces/msg"
 
 
@@ -156,6 +157,8 @@ def _read(parameter: Any) -> Any:
     kind = parameter.value.type
     if kind == NOT_SET:
         return None
+    if kind in _EMPTY and not len(getattr(parameter.value, _EMPTY[kind])):
+        return []  # who reads a file cannot tell of what an empty list is
     if kind not in _FIELDS:
         raise ConfigError(f"{parameter.name}: a list of numbers should be a single value")
     value = getattr(parameter.value, _FIELDS[kind])

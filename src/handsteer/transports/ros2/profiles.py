@@ -1,17 +1,20 @@
 """Quality of service: what we offer and request for each kind of topic, whatever carries it.
 
-Commands, signs and what follows from them are reliable. Images and ``/clock`` are best effort, as ROS 2's
-``sensor_data`` has it: a late one is of no use. Of a robot's state and its scans we offer reliable and request best
-effort, which fits with any robot.
+Commands, signs and what follows from them are reliable. Of images, a robot's state and its scans we offer reliable and
+request best effort, as REP 2003 has it for what sensors give: that fits with whoever is at the other end, and for us a
+late one is of no use. ``/clock`` is best effort.
 """
 
 from dataclasses import dataclass
 from typing import Any
 
-from handsteer.messages import ClockMessage, CompressedImage, Image, JointState, LaserScan, Odometry, Topic
+from handsteer.messages import CameraInfo, ClockMessage, CompressedImage, Image, JointState, LaserScan, Odometry, Topic
 
-_SENSOR_DATA = (Image, CompressedImage, ClockMessage)
-_STATE = (Odometry, JointState, LaserScan)
+IMAGES = (Image, CompressedImage)
+"""What is large, and gives way to all else on the same link."""
+_SENSOR_DATA = (*IMAGES, CameraInfo, Odometry, JointState, LaserScan)
+# Enough for what is lost on the way to be sent again before the next one has come; older ones are of no use to anybody.
+_IMAGES_KEPT = 3
 
 
 @dataclass(frozen=True)
@@ -31,9 +34,10 @@ class Profile:
 
 def offered(topic: Topic[Any]) -> Profile:
     """Return what a publisher of ``topic`` offers."""
-    return Profile(topic.type not in _SENSOR_DATA, topic.latched, topic.depth)
+    depth = max(topic.depth, _IMAGES_KEPT) if topic.type in IMAGES else topic.depth
+    return Profile(topic.type is not ClockMessage, topic.latched, depth)
 
 
 def requested(topic: Topic[Any]) -> Profile:
     """Return what a subscriber of ``topic`` requests."""
-    return Profile(topic.type not in (*_SENSOR_DATA, *_STATE), topic.latched, topic.depth)
+    return Profile(topic.type not in (*_SENSOR_DATA, ClockMessage), topic.latched, topic.depth)

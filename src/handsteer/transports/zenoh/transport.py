@@ -17,7 +17,7 @@ from handsteer.transports.channels import Deliver, Fanout, FanoutSubscription, T
 from handsteer.transports.lateness import Lateness
 from handsteer.transports.protocol import Received
 from handsteer.transports.ros2.encoding import decode, encode
-from handsteer.transports.ros2.profiles import Profile, offered, requested
+from handsteer.transports.ros2.profiles import IMAGES, Profile, offered, requested
 from handsteer.transports.stamps import capture_time
 from handsteer.transports.zenoh.keys import attachment, gid, read_attachment
 from handsteer.transports.zenoh.member import Member
@@ -78,6 +78,10 @@ class ZenohTransport:
             ours = [self._member.name.full for publisher in self._publishers if publisher.name == name]
         return sorted([*ours, *self._member.publishers_of(name)])
 
+    def topic_name(self, topic: Topic[Any]) -> str:
+        """Return the topic's full name in the graph, remapped."""
+        return self._member.name.topic(topic)
+
     def full_name(self, node: str) -> str:
         """Return the ROS 2 node's name and ``node``, as ROS's own diagnostics do: ``r1/my_camera: my_camera``."""
         return f"{self._member.name.full.removeprefix('/')}: {node}"
@@ -119,9 +123,9 @@ class ZenohPublisher(Generic[M]):
         name, kind = _named(member, topic)
         self.name = name
         key = member.key(name, kind)
-        self._publisher = member.session.declare_publisher(key, **_options(profile))
+        self._publisher = member.session.declare_publisher(key, **_options(topic, profile))
         # It keeps messages for late subscribers, but does not know of any: the plain one beside it does.
-        self._keeper = _keeper(member.session, key, profile) if profile.latched else None
+        self._keeper = _keeper(member.session, key, topic, profile) if profile.latched else None
         self._token, text = member.introduce("publisher", name, kind, profile)
         self._gid = gid(text)
         self._lock = threading.Lock()
@@ -151,7 +155,7 @@ class ZenohPublisher(Generic[M]):
             try:
                 put(raw, attachment=attachment(self._number, time.time_ns(), self._gid))
             except zenoh.ZError as error:
-                raise TransportError(f"{self._topic.name} cannot be published: {error}") from None
+                raise TransportError(f"{self.name} cannot be published: {error}") from None
 
     def close(self) -> None:
         """Send no more; may be called twice."""
@@ -170,28 +174,29 @@ def _named(member: Member, topic: Topic[Any]) -> tuple[str, str]:
     return member.name.topic(topic), type_name(topic.type)
 
 
-def _options(profile: Profile) -> dict[str, Any]:
+def _options(topic: Topic[Any], profile: Profile) -> dict[str, Any]:
     """Return how messages travel.
 
     As in rmw_zenoh, no publisher waits for a subscriber that hangs: its messages are dropped. Signs and commands
     overtake images that go the same way, and are not held back to be sent together with others.
     """
+    is_urgent = profile.reliable and topic.type not in IMAGES
     return {
         "congestion_control": zenoh.CongestionControl.DROP,
         "reliability": zenoh.Reliability.RELIABLE if profile.reliable else zenoh.Reliability.BEST_EFFORT,
-        "priority": zenoh.Priority.INTERACTIVE_HIGH if profile.reliable else zenoh.Priority.DATA,
-        "express": profile.reliable,
+        "priority": zenoh.Priority.INTERACTIVE_HIGH if is_urgent else zenoh.Priority.DATA,
+        "express": is_urgent,
     }
 
 
-def _keeper(session: zenoh.Session, key: str, profile: Profile) -> zenoh.ext.AdvancedPublisher:
+def _keeper(session: zenoh.Session, key: str, topic: Topic[Any], profile: Profile) -> zenoh.ext.AdvancedPublisher:
     return zenoh.ext.declare_advanced_publisher(
         session,
         key,
         cache=zenoh.ext.CacheConfig(profile.depth),
         sample_miss_detection=zenoh.ext.MissDetectionConfig(heartbeat=None, sporadic_heartbeat=_HEARTBEAT_S),
         publisher_detection=True,
-        **_options(profile),
+        **_options(topic, profile),
     )
 
 
@@ -211,6 +216,7 @@ class _Reception(Generic[M]):
         self._was_late = False
         profile = requested(topic)
         name, kind = _named(member, topic)
+        self._name = name
         self._subscriber = _subscriber(member.session, member.key(name, kind), profile)
         self._token, _ = member.introduce("subscriber", name, kind, profile)
         self._thread = threading.Thread(target=self._run, name=f"zenoh {topic.name}", daemon=True)
@@ -229,8 +235,8 @@ class _Reception(Generic[M]):
                 sample = ring.recv()
             except zenoh.ZError:  # it has been closed
                 return
-            if sample.kind == zenoh.SampleKind.PUT and not self._is_late(sample.attachment):
-                self._pass_on(sample.payload.to_bytes())
+            if sample.kind == zenoh.SampleKind.PUT:
+                self._pass_on(sample.payload.to_bytes(), late=self._is_late(sample.attachment))
 
     def _is_late(self, attached: zenoh.ZBytes | None) -> bool:
         if self._lateness is None or attached is None:
@@ -242,25 +248,26 @@ class _Reception(Generic[M]):
         late = self._lateness.is_late(sender, time_ns / 1e9, time.monotonic())
         if late and not self._was_late:
             log.warning(
-                "%s: messages come over %g s late and are not obeyed: has the link stood still, or has the clock of "
-                "their sender been set back?",
-                self._topic.name,
+                "%s: messages come over %g s late and are not obeyed, but for stops: has the link stood still, or has "
+                "the clock of their sender been set back?",
+                self._name,
                 self._topic.lifespan_s,
             )
         self._was_late = late
         return late
 
-    def _pass_on(self, raw: bytes) -> None:
+    def _pass_on(self, raw: bytes, *, late: bool) -> None:
         try:
             message = decode(raw, type_name(self._topic.type))
         except Exception as error:
             # Whatever the network brings must not end the receiving.
             if not self._is_broken:
-                log.warning("%s: a message of %d bytes cannot be read: %s", self._topic.name, len(raw), error)
+                log.warning("%s: a message of %d bytes cannot be read: %s", self._name, len(raw), error)
             self._is_broken = True
             return
-        if not self._is_closed:
-            self._send(Received(message, capture_time(message, self._clock)))
+        is_obeyed = not late or (self._topic.stops is not None and self._topic.stops(message))
+        if is_obeyed and not self._is_closed:
+            self._send(Received(message, capture_time(message, self._clock), is_late=late))
 
 
 def _subscriber(session: zenoh.Session, key: str, profile: Profile) -> Any:

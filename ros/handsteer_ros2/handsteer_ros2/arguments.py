@@ -1,0 +1,81 @@
+"""What the launch files share: their arguments, and how a node of handsteer is started."""
+
+from typing import Any
+
+from launch.actions import DeclareLaunchArgument, SetEnvironmentVariable
+from launch.conditions import IfCondition
+from launch.substitutions import LaunchConfiguration, NotEqualsSubstitution
+from launch_ros.actions import Node
+from launch_ros.parameter_descriptions import ParameterValue
+
+PACKAGE = "handsteer_ros2"
+CMD_VEL = "robot_diff_drive_controller/cmd_vel"
+
+
+def common(params_file: Any) -> list[Any]:
+    """Return the arguments of all launch files, and what they set.
+
+    Args:
+        params_file: Where the parameters are unless another file is named.
+    """
+    return [
+        DeclareLaunchArgument("namespace", default_value="", description="Namespace of all nodes, as r1"),
+        DeclareLaunchArgument("use_sim_time", default_value="false", description="Follow /clock"),
+        DeclareLaunchArgument("params_file", default_value=params_file, description="YAML file with parameters"),
+        DeclareLaunchArgument(
+            "transport",
+            default_value="auto",
+            choices=["auto", "ros2", "dds", "zenoh"],
+            description="auto is rclpy (ros2) where Python has it, else Cyclone DDS (dds)",
+        ),
+        DeclareLaunchArgument("cmd_vel", default_value=CMD_VEL, description="Topic of the commands"),
+        DeclareLaunchArgument(
+            "cmd_vel_type",
+            default_value="twist",
+            choices=["twist", "twist_stamped"],
+            description="Type of the commands; Jazzy's diff_drive_controller takes twist_stamped",
+        ),
+        DeclareLaunchArgument("respawn", default_value="true", description="Start a node anew that has ended"),
+        DeclareLaunchArgument(
+            "discovery_range",
+            default_value="",
+            choices=["", "LOCALHOST", "SUBNET", "OFF", "SYSTEM_DEFAULT"],
+            description="ROS_AUTOMATIC_DISCOVERY_RANGE of all nodes; empty leaves the environment's",
+        ),
+        SetEnvironmentVariable(
+            "ROS_AUTOMATIC_DISCOVERY_RANGE",
+            LaunchConfiguration("discovery_range"),
+            condition=IfCondition(NotEqualsSubstitution(LaunchConfiguration("discovery_range"), "")),
+        ),
+    ]
+
+
+def text(argument: str) -> ParameterValue:
+    """Return an argument as a parameter that is a text, also where it looks like a number."""
+    return ParameterValue(LaunchConfiguration(argument), value_type=str)
+
+
+def node(verb: str, name: str, *words: Any, parameters: dict[str, Any] | None = None, **more: Any) -> Node:
+    """Return one of handsteer's nodes.
+
+    Args:
+        verb: The executable.
+        name: Its name in the graph.
+        words: Further words of its command line.
+        parameters: Parameters that go before those of the file.
+        more: As launch_ros has it.
+    """
+    simulated = ParameterValue(LaunchConfiguration("use_sim_time"), value_type=bool)
+    return Node(
+        package=PACKAGE,
+        executable=verb,
+        name=name,
+        namespace=LaunchConfiguration("namespace"),
+        arguments=["--transport", LaunchConfiguration("transport"), *words],
+        parameters=[LaunchConfiguration("params_file"), {"use_sim_time": simulated, **(parameters or {})}],
+        remappings=[(CMD_VEL, LaunchConfiguration("cmd_vel")), *more.pop("remappings", [])],
+        respawn=LaunchConfiguration("respawn"),
+        respawn_delay=1.0,
+        output="screen",
+        **more,
+    )
