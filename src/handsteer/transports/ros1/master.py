@@ -1,5 +1,6 @@
 """The ROS 1 master, asked with little patience, and held by a connection that ends with it."""
 
+import errno
 import http.client
 import select
 import socket
@@ -10,6 +11,7 @@ from typing import Any
 from handsteer.errors import TransportError
 
 _TIMEOUT_S = 2.0
+_LISTENS_OR_IS_BUSY = (0, errno.EAGAIN, errno.EINPROGRESS, errno.ETIMEDOUT)
 
 
 class MasterGone(TransportError):  # noqa: N818 - reads as the other ends of a connection do
@@ -52,7 +54,8 @@ class Master:
             return getattr(self._proxy, method)(caller)
         except (OSError, OverflowError, http.client.HTTPException, xmlrpc.client.Error) as error:
             reason = getattr(error, "strerror", None) or error
-            kind = MasterGone if isinstance(error, ConnectionRefusedError) else TransportError
+            refused = isinstance(error, ConnectionRefusedError) and _nobody_listens(self._uri)
+            kind = MasterGone if refused else TransportError
             raise kind(
                 f"no ROS master answers at {self._uri} ({reason}): start roscore, or set ROS_MASTER_URI"
             ) from None
@@ -69,8 +72,7 @@ class Lifeline:
     """
 
     def __init__(self, uri: str) -> None:
-        parts = urllib.parse.urlsplit(uri)
-        self._address = (parts.hostname or "", parts.port or 80)
+        self._address = _address(uri)
         self._socket: socket.socket | None = None
 
     def wait(self, timeout_s: float) -> bool:
@@ -96,6 +98,26 @@ class Lifeline:
         if self._socket is not None:
             self._socket.close()
             self._socket = None
+
+
+def _address(uri: str) -> tuple[str, int]:
+    parts = urllib.parse.urlsplit(uri)
+    return parts.hostname or "", parts.port or 80
+
+
+def _nobody_listens(uri: str) -> bool:
+    """Return whether each address of the master refuses at once: localhost has two, and one may only be busy."""
+    try:
+        found = socket.getaddrinfo(*_address(uri), type=socket.SOCK_STREAM)
+        return not any(_may_listen(family, address) for family, *_, address in found)
+    except (OSError, ValueError):
+        return False
+
+
+def _may_listen(family: int, address: Any) -> bool:
+    with socket.socket(family, socket.SOCK_STREAM) as probe:
+        probe.settimeout(_TIMEOUT_S)
+        return probe.connect_ex(address) in _LISTENS_OR_IS_BUSY
 
 
 class _ImpatientTransport(xmlrpc.client.Transport):
