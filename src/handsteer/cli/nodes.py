@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from handsteer import graph
-from handsteer.cli.options import ConfigFile, Flag, Parameters, say, settings, uninterrupted
+from handsteer.cli.options import ConfigFile, Flag, Parameters, keep_what_is_loaded, say, settings, uninterrupted
 from handsteer.clock import Clock
 from handsteer.config import Config
 from handsteer.nodes.node import Node
@@ -223,6 +223,7 @@ def _run(job: _Job, transport: str, words: tuple[str, ...]) -> int:
 def _run_until_end(node: Node, session: Session, beside: AbstractContextManager[None]) -> None:
     try:
         with beside:
+            keep_what_is_loaded()
             node.start()
             log.info("%s is ready: %s", session.name, node.topics)
             while not (node.ended.is_set() or session.wait(_LOOK_PERIOD_S)):

@@ -1,5 +1,6 @@
 """What the verbs share: options that come from the configuration, and how to speak to people."""
 
+import gc
 import signal
 import sys
 from collections.abc import Iterator
@@ -39,6 +40,12 @@ def settings(
 def say(message: str) -> None:
     """Tell people something, apart from the output."""
     print(f"handsteer: {message}", file=sys.stderr, flush=True)
+
+
+def keep_what_is_loaded() -> None:
+    """Let the garbage collector leave alone what was loaded until now; looking at all of it holds up every thread."""
+    gc.collect()
+    gc.freeze()
 
 
 @contextmanager

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from handsteer.cli.options import ConfigFile, Flag, Parameters, say, uninterrupted
+from handsteer.cli.options import ConfigFile, Flag, Parameters, keep_what_is_loaded, say, uninterrupted
 from handsteer.cli.options import settings as make_settings
 from handsteer.clock import RealClock, SteppedClock
 from handsteer.config import Config
@@ -149,6 +149,7 @@ def _run_until_end(
     if fast:
         graph.run_stepped(*([] if duration is None else [duration]))
         return
+    keep_what_is_loaded()
     if page is None:
         graph.start()
         graph.wait(duration)
