@@ -24,8 +24,7 @@ def assert_stopped(drive: Drive, since_s: float) -> None:
 
 
 def test_a_firewall_has_to_open_only_the_ports_of_the_domain(machines: TwoMachines) -> None:
-    # 7400 + 250 x domain: two ports for all, and two more a process; from 7649 + 250 x domain downwards one a node, for
-    # ros2 param on Fast DDS.
+    # 7400 + 250 x domain: two ports for all, and two more a process.
     machines.domain = 3
     machines.link.shape(**WIFI)
     drive = machines.start()
@@ -36,7 +35,6 @@ def test_a_firewall_has_to_open_only_the_ports_of_the_domain(machines: TwoMachin
         assert {port for port in ports if port < 20000} == {
             *(8150, 8151),
             *range(8160, 8160 + 2 * processes),
-            *(8397, 8399),
         }
 
 

@@ -169,10 +169,3 @@ def test_beyond_this_machine_the_network_card_is_used(tmp_path: Path) -> None:
         graph.peer = graph.start_peer()
         graph.node("control", name=f"/{NODE}")
         assert ask(graph, f"/{NODE}", "list_parameters")["result"]["names"]
-
-
-def test_over_dds_a_file_of_what_was_dumped_can_be_loaded(tmp_path: Path) -> None:
-    """Among it are an empty list, and texts that YAML takes for something else."""
-    with ros2_graph(tmp_path) as graph:
-        graph.node("control", name=f"/{NODE}", ros=("-p", "arming:='off'"))
-        assert graph.peer.ask("reload", node=f"/{NODE}", file=str(tmp_path / "dump.yaml")) == []
