@@ -38,6 +38,10 @@ HELD_UP_S: Final = 0.1
 RECORDED_S: Final = 5.0
 """No link delays frames by so much: what is older is a recording, or was stamped by a clock that is not in step."""
 
+BURST_S: Final = 0.01
+"""Messages that follow one another faster than this, from the moment at which a process went on, have waited, however
+long a busy machine takes to bring them; no camera and no node sends so fast."""
+
 RESYNC_S: Final = 1.0
 """How long frames are watched after their clock was set, before they are timed by it anew."""
 

@@ -8,7 +8,7 @@ import sys
 import tempfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 from tests.processes import Peer, Process, as_tests_drive, eventually
 
@@ -74,6 +74,14 @@ class DdsGraph:
     def stop(self) -> None:
         """End all processes."""
         for process in self._processes:
+            process.kill()
+
+    @contextlib.contextmanager
+    def test(self) -> Iterator[Self]:
+        """End what is started within this block, as else all nodes of a module's tests would run side by side."""
+        before = len(self._processes)
+        yield self
+        for process in self._processes[before:]:
             process.kill()
 
     def start_peer(self, machine: str = "") -> Peer:

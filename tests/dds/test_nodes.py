@@ -28,9 +28,15 @@ pytestmark = pytest.mark.slow
 
 
 @pytest.fixture(scope="module")
-def dds(tmp_path_factory: pytest.TempPathFactory) -> Iterator[DdsGraph]:
+def dds_domain(tmp_path_factory: pytest.TempPathFactory) -> Iterator[DdsGraph]:
     with dds_graph(tmp_path_factory.mktemp("dds")) as graph:
         yield graph
+
+
+@pytest.fixture
+def dds(dds_domain: DdsGraph) -> Iterator[DdsGraph]:
+    with dds_domain.test():
+        yield dds_domain
 
 
 class TestControl(ControlContract):

@@ -36,9 +36,15 @@ TRANSPORTS = ("ros2", "dds")
 
 
 @pytest.fixture(scope="module", params=TRANSPORTS)
-def ros2(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Ros2Graph]:
+def ros2_domain(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Ros2Graph]:
     with ros2_graph(tmp_path_factory.mktemp("ros2"), request.param) as graph:
         yield graph
+
+
+@pytest.fixture
+def ros2(ros2_domain: Ros2Graph) -> Iterator[Ros2Graph]:
+    with ros2_domain.test():
+        yield ros2_domain
 
 
 @pytest.fixture(params=TRANSPORTS)
@@ -48,9 +54,15 @@ def fresh(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Ros2Graph]
 
 
 @pytest.fixture(scope="module")
-def dds(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Ros2Graph]:
+def dds_domain(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Ros2Graph]:
     with ros2_graph(tmp_path_factory.mktemp("dds")) as graph:
         yield graph
+
+
+@pytest.fixture
+def dds(dds_domain: Ros2Graph) -> Iterator[Ros2Graph]:
+    with dds_domain.test():
+        yield dds_domain
 
 
 class TestControl(ControlContract):

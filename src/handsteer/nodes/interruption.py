@@ -1,6 +1,6 @@
 """What a node that was itself held up does with messages that waited meanwhile: nothing, for they may be old."""
 
-from handsteer.timeouts import HELD_UP_S
+from handsteer.timeouts import BURST_S, HELD_UP_S
 
 
 class Interruption:
@@ -17,6 +17,8 @@ class Interruption:
         self.limit_s = limit_s
         self._noted_s = now_s
         self._distrust_until_s = now_s
+        self._asked_s = now_s
+        self._in_burst = False
 
     def note(self, now_s: float) -> bool:
         """Note that the node runs; return whether it has just come out of an interruption."""
@@ -24,8 +26,12 @@ class Interruption:
         self._noted_s = now_s
         if interrupted:
             self._distrust_until_s = now_s + HELD_UP_S
+            self._in_burst = True
         return interrupted
 
     def distrusts(self, now_s: float) -> bool:
-        """Return whether a message that comes now may have waited during an interruption."""
-        return now_s < self._distrust_until_s
+        """Return whether a message that comes now may have waited during an interruption; ask once for each."""
+        gap_s, self._asked_s = now_s - self._asked_s, now_s
+        if now_s >= self._distrust_until_s and gap_s >= BURST_S:
+            self._in_burst = False
+        return self._in_burst
