@@ -155,6 +155,12 @@ def is_zero(message: "Twist | TwistStamped") -> bool:
     return command.linear.x == 0.0 and command.angular.z == 0.0
 
 
+def is_stopping(sign: String) -> bool:
+    """Return whether a sign stops the robot whatever is configured."""
+    return sign.data in STOPPING_SIGNS
+
+
+# The functions of topics have names, so that a topic can be sent to another process.
 IMAGE_RAW = Topic("/image_raw", Image)
 IMAGE_COMPRESSED = Topic("/image_raw/compressed", CompressedImage, beneath=IMAGE_RAW)
 CAMERA_INFO = Topic("/camera_info", CameraInfo)
@@ -164,7 +170,7 @@ HAND_SIGN = Topic(
     String,
     depth=10,
     lifespan_s=STALE_S,
-    stops=lambda sign: sign.data in STOPPING_SIGNS,
+    stops=is_stopping,
 )
 IMAGE_ANNOTATED = Topic("/gesture/image_annotated", Image)
 CMD_VEL = Topic("/robot_diff_drive_controller/cmd_vel", Twist, depth=10, lifespan_s=STALE_S, stops=is_zero)

@@ -7,13 +7,27 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
+from handsteer import messages
 from handsteer.errors import TransportError
 from handsteer.images import image_message
-from handsteer.messages import CMD_VEL, HAND_SIGN, IMAGE_RAW, STEERING_CMD_VEL, Header, String, Time, Twist, twist
+from handsteer.messages import (
+    CMD_VEL,
+    HAND_SIGN,
+    IMAGE_RAW,
+    STEERING_CMD_VEL,
+    Header,
+    String,
+    Time,
+    Topic,
+    Twist,
+    twist,
+)
 from handsteer.transports.in_process import InProcessTransport
 from handsteer.transports.piped import Gateway, Pipe, PipedTransport
 from handsteer.transports.protocol import Received, Transport
 from tests.contracts.transport_contract import TransportContract, eventually
+
+TOPICS = [value for value in vars(messages).values() if isinstance(value, Topic)]
 
 
 def joined() -> tuple[Pipe, Pipe]:
@@ -166,6 +180,21 @@ def test_damage_ends_the_pipe() -> None:
     os.write(sink, pickle.dumps(("kind",))[:-1] + b"no pickle")
     os.close(sink)
     assert pipe.ended.wait(10)
+
+
+def test_what_cannot_be_told_ends_the_pipe_and_is_logged(caplog: pytest.LogCaptureFixture) -> None:
+    near, far = joined()
+    near.start()
+    far.start()
+    far.say("function", lambda: None)
+    assert far.ended.wait(10)
+    assert near.ended.wait(10)
+    assert "cannot be told" in caplog.text
+
+
+@pytest.mark.parametrize("topic", TOPICS, ids=lambda topic: topic.name)
+def test_every_topic_can_be_used_from_another_process(topic: Topic[object]) -> None:
+    assert pickle.loads(pickle.dumps(topic)) == topic
 
 
 def test_a_handler_that_fails_is_logged_and_the_next_one_called(caplog: pytest.LogCaptureFixture) -> None:

@@ -115,7 +115,11 @@ class Pipe:
                 pickle.dump(said, self._sink, protocol=5)
                 self._sink.flush()
         except (OSError, ValueError):
-            self.ended.set()
+            pass  # the other end is closed
+        except Exception:
+            log.exception("what another process was to hear cannot be told")
+        # Nothing can be said any more, whatever it was: the other end had better know.
+        self.ended.set()
         with contextlib.suppress(OSError):
             self._sink.close()
 
