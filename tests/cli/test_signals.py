@@ -34,7 +34,10 @@ def ends(command: Sequence[str], env: dict[str, str], home: Path, *, code: int =
         try:
             threading.Event().wait(moment_s)
             process.signal(wish)
-            assert (process.code(), "Traceback" in process.text) == (code, False), (moment_s, wish, process.text)
+            ended = process.code()
+            # On a busy machine the interpreter itself ends by the signal once in a few hundred times, without a word.
+            assert ended in (code, -wish), (moment_s, wish, process.text)
+            assert "Traceback" not in process.text, (moment_s, wish)
         finally:
             process.kill()
 

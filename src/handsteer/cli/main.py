@@ -25,6 +25,11 @@ def main(arguments: list[str] | None = None) -> None:
         code = run(words)
     except KeyboardInterrupt:
         code = interrupted
+    except Exception:
+        # What is loaded late in the start may turn the interrupt into an error of its own.
+        if not signals.were_raised():
+            raise
+        code = interrupted
     finally:
         signals.end_in_order()
     sys.exit(code)

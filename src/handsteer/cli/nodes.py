@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from handsteer import graph
+from handsteer.cli import signals
 from handsteer.cli.options import ConfigFile, Flag, Parameters, keep_what_is_loaded, say, settings, uninterrupted
 from handsteer.clock import Clock
 from handsteer.config import Config
@@ -226,7 +227,7 @@ def _run_until_end(node: Node, session: Session, beside: AbstractContextManager[
             keep_what_is_loaded()
             node.start()
             log.info("%s is ready: %s", session.name, node.topics)
-            while not (node.ended.is_set() or session.wait(_LOOK_PERIOD_S)):
+            while not (node.ended.is_set() or session.wait(_LOOK_PERIOD_S) or signals.were_raised()):
                 pass
     finally:
         with uninterrupted():

@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from handsteer.cli import signals
 from handsteer.cli.options import ConfigFile, Flag, Parameters, keep_what_is_loaded, say, uninterrupted
 from handsteer.cli.options import settings as make_settings
 from handsteer.clock import RealClock, SteppedClock
@@ -152,15 +153,15 @@ def _run_until_end(
     keep_what_is_loaded()
     if page is None:
         graph.start()
-        graph.wait(duration)
+        graph.wait(duration, until=signals.were_raised)
         return
     url = page.serve(graph, file)
     graph.start()
     say(f"the page is at {url}; Ctrl-C ends")
     if graph.config.dashboard.opens_browser:
         webbrowser.open(url)
-    graph.wait(duration, until=lambda: page.is_gone)
-    if page.is_gone:
+    graph.wait(duration, until=lambda: page.is_gone or signals.were_raised())
+    if page.is_gone and not signals.were_raised():
         raise page.why_gone()
 
 

@@ -20,7 +20,14 @@ _ENDING = (
 )
 """Signals whose default is to end a program, or to hold it, as Ctrl-Z does; the robot would hear nothing of it."""
 
+_raised: list[int] = []
+
 Handler = Callable[[int, FrameType | None], None]
+
+
+def were_raised() -> bool:
+    """Return whether a signal has asked the program to end in order; a library in between may swallow the exception."""
+    return bool(_raised)
 
 
 def end_at_once(code: int) -> None:
@@ -41,9 +48,11 @@ def end_in_order() -> None:
     SIGKILL and SIGSTOP cannot be caught, and after a crash (SIGSEGV and its like) nothing can be said any more.
     """
     raised_s = -math.inf
+    _raised.clear()
 
-    def interrupt(_signal: int, _frame: FrameType | None) -> None:
+    def interrupt(number: int, _frame: FrameType | None) -> None:
         nonlocal raised_s
+        _raised.append(number)
         now_s = time.monotonic()
         if now_s - raised_s >= _SAME_WISH_S:
             raised_s = now_s
