@@ -27,6 +27,12 @@ def visit(site: Site, number: int) -> None:
         page.answered("ack", {"client_id": page.client, "next_message_id": 0})
 
 
+@pytest.fixture(autouse=True)
+def _pages_of_this_test_alone() -> None:
+    """NiceGUI keeps the pages of a process, also of sites of earlier tests that have ended with pages left."""
+    Client.instances.clear()
+
+
 def objects() -> Counter[str]:
     """Return how many there are of each kind, but for what is bounded by its own."""
     urllib.parse.clear_cache()
