@@ -46,8 +46,6 @@ class Network:
         reach: One of ROS 2's ranges, ``PEERS`` for this machine and static peers, or ``CYCLONEDDS_URI``.
         places: How many participants of the domain find ports of their own on this machine; None when it is not ours
             to say.
-        peers: Further machines that are looked at, as in ``ROS_STATIC_PEERS``.
-        asked: The range that ROS 2's variables ask for, where ``CYCLONEDDS_URI`` goes before it, too.
     """
 
     domain: int
@@ -55,8 +53,6 @@ class Network:
     distribution: str = "jazzy"
     reach: str = "LOCALHOST"
     places: int | None = None
-    peers: tuple[str, ...] = ()
-    asked: str = "LOCALHOST"
 
     @property
     def is_local(self) -> bool:
@@ -89,16 +85,16 @@ def network(environment: Mapping[str, str], addresses: Sequence[str] | None = No
     if environment.get("ROS_LOCALHOST_ONLY") == "1" or reach == "OFF":
         peers = []
     if environment.get("CYCLONEDDS_URI"):
-        return Network(domain, None, distribution, "CYCLONEDDS_URI", peers=tuple(peers), asked=reach)
+        return Network(domain, None, distribution, "CYCLONEDDS_URI")
     if reach == "SYSTEM_DEFAULT":
-        return Network(domain, None, distribution, reach, peers=tuple(peers), asked=reach)
+        return Network(domain, None, distribution, reach)
     places = PLACES_BY_MULTICAST if reach == "SUBNET" and not peers else PLACES
     found = "PEERS" if peers and reach == "LOCALHOST" else reach
     own: Sequence[str] = []
     if reach == "LOCALHOST" and not peers and environment.get("ROS_LOCALHOST_ONLY") != "1":
         own = list(multicast_addresses().values()) if addresses is None else addresses
     config = _config(reach, peers, places, own[:_OWN_ADDRESSES])
-    return Network(domain, config, distribution, found, places, tuple(peers), reach)
+    return Network(domain, config, distribution, found, places)
 
 
 def _range(environment: Mapping[str, str]) -> str:

@@ -12,13 +12,11 @@ from cyclonedds.internal import InvalidSample
 
 from handsteer.clock import Clock
 from handsteer.errors import TransportError
-from handsteer.messages import Topic, type_name
+from handsteer.messages import Topic
 from handsteer.transports.channels import Deliver, Fanout, FanoutSubscription, TopicTypes, check_type
 from handsteer.transports.dds.participant import Participant
-from handsteer.transports.lateness import Lateness
-from handsteer.transports.protocol import Received
-from handsteer.transports.ros2.encoding import decode, encode
-from handsteer.transports.stamps import capture_time
+from handsteer.transports.ros2.encoding import encode
+from handsteer.transports.ros2.intake import Intake
 
 M = TypeVar("M")
 
@@ -168,13 +166,8 @@ class _Reception(Generic[M]):
 
     def __init__(self, participant: Participant, topic: Topic[M], clock: Clock, send: Deliver[M]) -> None:
         self._participant = participant
-        self._topic = topic
-        self._clock = clock
-        self._send = send
-        self._is_broken = False
-        self._lateness = None if topic.lifespan_s is None else Lateness(topic.lifespan_s)
-        self._was_late = False
-        self._name = participant.name.topic(topic)
+        self._depth = topic.depth
+        self._intake = Intake(topic, participant.name.topic(topic), clock, send)
         self._reader: Any = participant.reader(topic)
         participant.serve(self._reader, self._serve)
 
@@ -187,34 +180,10 @@ class _Reception(Generic[M]):
         reader = self._reader
         if reader is None:
             return
-        for sample in reader.take(self._topic.depth):
+        for sample in reader.take(self._depth):
             # A writer that leaves sends one without a message.
             if not isinstance(sample, InvalidSample):
-                self._pass_on(sample.raw, late=self._is_late(sample.sample_info))
-
-    def _is_late(self, info: Any) -> bool:
-        if self._lateness is None or info.source_timestamp <= 0:  # RTPS lets a sender leave its time out
-            return False
-        sender = info.publication_handle.to_bytes(8, "big")
-        late = self._lateness.is_late(sender, info.source_timestamp / 1e9, time.monotonic())
-        if late and not self._was_late:
-            log.warning(
-                "%s: messages come over %g s late and are not obeyed, but for stops: has the link stood still, or has "
-                "the clock of their sender been set back?",
-                self._name,
-                self._topic.lifespan_s,
-            )
-        self._was_late = late
-        return late
-
-    def _pass_on(self, raw: bytes, *, late: bool) -> None:
-        try:
-            message = decode(raw, type_name(self._topic.type))
-        except Exception as error:
-            # Whatever the network brings must not end the receiving.
-            if not self._is_broken:
-                log.warning("%s: a message of %d bytes cannot be read: %s", self._name, len(raw), error)
-            self._is_broken = True
-            return
-        if not late or (self._topic.stops is not None and self._topic.stops(message)):
-            self._send(Received(message, capture_time(message, self._clock), is_late=late))
+                info = sample.sample_info
+                # RTPS lets a sender leave its time out.
+                sent_s = info.source_timestamp / 1e9 if info.source_timestamp > 0 else None
+                self._intake.take(sample.raw, info.publication_handle.to_bytes(8, "big"), sent_s)

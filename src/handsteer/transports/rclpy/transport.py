@@ -17,12 +17,10 @@ from handsteer.clock import Clock
 from handsteer.errors import TransportError
 from handsteer.messages import Topic, type_name
 from handsteer.transports.channels import Deliver, Fanout, FanoutSubscription, TopicTypes, check_type
-from handsteer.transports.lateness import Lateness
-from handsteer.transports.protocol import Received
 from handsteer.transports.rclpy.qos import publisher_qos, subscription_qos
 from handsteer.transports.rclpy.types import ros_class
-from handsteer.transports.ros2.encoding import decode, encode
-from handsteer.transports.stamps import capture_time
+from handsteer.transports.ros2.encoding import encode
+from handsteer.transports.ros2.intake import Intake
 
 M = TypeVar("M")
 
@@ -192,13 +190,8 @@ class _Reception(Generic[M]):
 
     def __init__(self, node: Node, topic: Topic[M], kind: Any, clock: Clock, send: Deliver[M]) -> None:
         self._node = node
-        self._topic = topic
-        self._clock = clock
-        self._send = send
-        self._is_broken = False
-        self._lateness = None if topic.lifespan_s is None else Lateness(topic.lifespan_s)
-        self._was_late = False
-        self._name = name = resolved(node, topic)
+        name = resolved(node, topic)
+        self._intake = Intake(topic, name, clock, send)
         with _refusals(name):
             self._subscription: Any = node.create_subscription(
                 kind,
@@ -214,31 +207,8 @@ class _Reception(Generic[M]):
         self._node.destroy_subscription(self._subscription)
 
     def _on_message(self, raw: bytes, info: Mapping[str, int]) -> None:
-        late = self._is_late(info.get("source_timestamp", 0))
-        try:
-            message = decode(raw, type_name(self._topic.type))
-        except Exception as error:
-            # Whatever the network brings must not end the receiving.
-            if not self._is_broken:
-                log.warning("%s: a message of %d bytes cannot be read: %s", self._name, len(raw), error)
-            self._is_broken = True
-            return
-        if not late or (self._topic.stops is not None and self._topic.stops(message)):
-            self._send(Received(message, capture_time(message, self._clock), is_late=late))
-
-    def _is_late(self, sent_ns: int) -> bool:
-        if self._lateness is None or sent_ns <= 0:  # not every middleware tells when a message was sent
-            return False
-        late = self._lateness.is_late(b"", sent_ns / 1e9, time.monotonic())
-        if late and not self._was_late:
-            log.warning(
-                "%s: messages come over %g s late and are not obeyed, but for stops: has the link stood still, has the "
-                "clock of their sender been set back, or have several senders clocks that differ?",
-                self._name,
-                self._topic.lifespan_s,
-            )
-        self._was_late = late
-        return late
+        sent_ns = info.get("source_timestamp", 0)  # not every middleware tells
+        self._intake.take(raw, sent_s=sent_ns / 1e9 if sent_ns > 0 else None)
 
 
 def resolved(node: Node, topic: Topic[Any]) -> str:

@@ -14,11 +14,10 @@ from handsteer.clock import Clock
 from handsteer.errors import TransportError
 from handsteer.messages import Topic, type_name
 from handsteer.transports.channels import Deliver, Fanout, FanoutSubscription, TopicTypes, check_type
-from handsteer.transports.lateness import Lateness
 from handsteer.transports.protocol import Received
-from handsteer.transports.ros2.encoding import decode, encode
+from handsteer.transports.ros2.encoding import encode
+from handsteer.transports.ros2.intake import Intake
 from handsteer.transports.ros2.profiles import IMAGES, Profile, offered, requested
-from handsteer.transports.stamps import capture_time
 from handsteer.transports.zenoh.keys import attachment, gid, read_attachment
 from handsteer.transports.zenoh.member import Member
 
@@ -207,16 +206,11 @@ class _Reception(Generic[M]):
     """
 
     def __init__(self, member: Member, topic: Topic[M], clock: Clock, send: Deliver[M]) -> None:
-        self._topic = topic
-        self._clock = clock
         self._send = send
         self._is_closed = False
-        self._is_broken = False
-        self._lateness = None if topic.lifespan_s is None else Lateness(topic.lifespan_s)
-        self._was_late = False
         profile = requested(topic)
         name, kind = _named(member, topic)
-        self._name = name
+        self._intake = Intake(topic, name, clock, self._pass_on)
         self._subscriber = _subscriber(member.session, member.key(name, kind), profile)
         self._token, _ = member.introduce("subscriber", name, kind, profile)
         self._thread = threading.Thread(target=self._run, name=f"zenoh {topic.name}", daemon=True)
@@ -236,38 +230,22 @@ class _Reception(Generic[M]):
             except zenoh.ZError:  # it has been closed
                 return
             if sample.kind == zenoh.SampleKind.PUT:
-                self._pass_on(sample.payload.to_bytes(), late=self._is_late(sample.attachment))
+                self._intake.take(sample.payload.to_bytes(), *_sending(sample.attachment))
 
-    def _is_late(self, attached: zenoh.ZBytes | None) -> bool:
-        if self._lateness is None or attached is None:
-            return False
-        try:
-            _, time_ns, sender = read_attachment(attached.to_bytes())
-        except ValueError:
-            return False  # of a sender that is not ROS 2, or of an older one: when it was sent is not known
-        late = self._lateness.is_late(sender, time_ns / 1e9, time.monotonic())
-        if late and not self._was_late:
-            log.warning(
-                "%s: messages come over %g s late and are not obeyed, but for stops: has the link stood still, or has "
-                "the clock of their sender been set back?",
-                self._name,
-                self._topic.lifespan_s,
-            )
-        self._was_late = late
-        return late
+    def _pass_on(self, received: Received[M]) -> None:
+        if not self._is_closed:
+            self._send(received)
 
-    def _pass_on(self, raw: bytes, *, late: bool) -> None:
-        try:
-            message = decode(raw, type_name(self._topic.type))
-        except Exception as error:
-            # Whatever the network brings must not end the receiving.
-            if not self._is_broken:
-                log.warning("%s: a message of %d bytes cannot be read: %s", self._name, len(raw), error)
-            self._is_broken = True
-            return
-        is_obeyed = not late or (self._topic.stops is not None and self._topic.stops(message))
-        if is_obeyed and not self._is_closed:
-            self._send(Received(message, capture_time(message, self._clock), is_late=late))
+
+def _sending(attached: zenoh.ZBytes | None) -> tuple[bytes, float | None]:
+    """Return who has sent a message and when; nobody and None of one that is not ROS 2, or of an older one."""
+    if attached is None:
+        return b"", None
+    try:
+        _, time_ns, sender = read_attachment(attached.to_bytes())
+    except ValueError:
+        return b"", None
+    return sender, time_ns / 1e9
 
 
 def _subscriber(session: zenoh.Session, key: str, profile: Profile) -> Any:

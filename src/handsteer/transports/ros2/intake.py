@@ -1,0 +1,73 @@
+"""What becomes of a serialised message that has come, whatever has carried it."""
+
+import logging
+import time
+from typing import Generic, TypeVar
+
+from handsteer.clock import Clock
+from handsteer.messages import Topic, type_name
+from handsteer.transports.channels import Deliver
+from handsteer.transports.lateness import Lateness
+from handsteer.transports.protocol import Received
+from handsteer.transports.ros2.encoding import decode
+from handsteer.transports.stamps import capture_time
+
+M = TypeVar("M")
+
+log = logging.getLogger(__name__)
+
+
+class Intake(Generic[M]):
+    """Decodes the messages of a topic and passes them on, but for late ones that do not stop the robot.
+
+    What cannot be read, and what comes late, is logged once, as long as it goes on.
+
+    Args:
+        topic: What comes.
+        name: The topic's name as others know it.
+        clock: The graph's clock.
+        send: Gets the messages.
+    """
+
+    def __init__(self, topic: Topic[M], name: str, clock: Clock, send: Deliver[M]) -> None:
+        self._topic = topic
+        self._name = name
+        self._clock = clock
+        self._send = send
+        self._lateness = None if topic.lifespan_s is None else Lateness(topic.lifespan_s)
+        self._was_late = self._is_broken = False
+
+    def take(self, raw: bytes, sender: bytes = b"", sent_s: float | None = None) -> None:
+        """Take one message.
+
+        Args:
+            raw: The message.
+            sender: Who sent it; empty where that is not known.
+            sent_s: When, in seconds of the sender's clock; None where that is not known.
+        """
+        is_late = self._is_late(sender, sent_s)
+        try:
+            message = decode(raw, type_name(self._topic.type))
+        except Exception as error:
+            # Whatever the network brings must not end the receiving.
+            if not self._is_broken:
+                log.warning("%s: a message of %d bytes cannot be read: %s", self._name, len(raw), error)
+            self._is_broken = True
+            return
+        if not is_late or (self._topic.stops is not None and self._topic.stops(message)):
+            self._send(Received(message, capture_time(message, self._clock), is_late=is_late))
+
+    def _is_late(self, sender: bytes, sent_s: float | None) -> bool:
+        if self._lateness is None or sent_s is None:
+            return False
+        is_late = self._lateness.is_late(sender, sent_s, time.monotonic())
+        if is_late and not self._was_late:
+            log.warning(
+                "%s: messages come over %g s late and are not obeyed, but for stops: has the link stood still, has the "
+                "clock of their sender been set back%s?",
+                self._name,
+                self._topic.lifespan_s,
+                "" if sender else ", or have several senders clocks that differ",
+            )
+        self._was_late = is_late
+        return is_late
