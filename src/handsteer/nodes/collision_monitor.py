@@ -8,8 +8,9 @@ from handsteer.config import CollisionMonitorConfig
 from handsteer.control.obstacles import ObstacleLimiter
 from handsteer.control.scan_points import points_of
 from handsteer.control.velocity import Velocity
-from handsteer.messages import ODOM, SCAN, LaserScan, Odometry, Pose
+from handsteer.messages import ODOM, SCAN, LaserScan, Odometry
 from handsteer.nodes.node import Node
+from handsteer.nodes.odometry import MeasuredVelocity
 from handsteer.transports.protocol import Received
 
 log = logging.getLogger(__name__)
@@ -30,7 +31,7 @@ class CollisionMonitor:
         self._limiter = ObstacleLimiter(rule)
         self._listens = False
         self._came_s = -math.inf
-        self._pose: Pose | None = None
+        self._measured = MeasuredVelocity()
         self._is_broken = False
         self._stands = False
         self.reconfigure(rule)
@@ -96,11 +97,9 @@ class CollisionMonitor:
             self._limiter.see(points, min(captured_s, now))
 
     def _on_odometry(self, received: Received[Odometry]) -> None:
-        now = self._node.clock.now()
-        twist, pose = received.message.twist.twist, received.message.pose.pose
-        moving = Velocity(twist.linear.x, twist.angular.z)
-        has_moved, self._pose = self._pose not in (None, pose), pose
-        # Some odometry leaves its twist at zero: then what was commanded tells more.
-        if moving.is_finite and not (moving.is_zero and has_moved):
+        moving = self._measured.read(received.message)
+        # Where that is not known, what was commanded tells more.
+        if moving is not None and moving.is_finite:
+            now = self._node.clock.now()
             captured_s = now if received.captured_s is None else received.captured_s
             self._limiter.feel(moving, min(captured_s, now))

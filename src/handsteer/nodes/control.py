@@ -19,7 +19,6 @@ from handsteer.messages import (
     STOP,
     Bool,
     Odometry,
-    Pose,
     String,
     Topic,
     Twist,
@@ -29,6 +28,7 @@ from handsteer.nodes.collision_monitor import CollisionMonitor
 from handsteer.nodes.interruption import Interruption
 from handsteer.nodes.latency import LatencyLog
 from handsteer.nodes.node import OK, WARN, Node
+from handsteer.nodes.odometry import MeasuredVelocity
 from handsteer.nodes.rivals import Rivals
 from handsteer.nodes.selection import Selection
 from handsteer.nodes.stop_keeper import StopKeeper
@@ -84,7 +84,7 @@ class HandSignControlNode(Node):
         self._arming = arming
         self._ramp = Ramp(config)
         self._waited = False
-        self._robot_pose: Pose | None = None
+        self._measured = MeasuredVelocity()
         self._commanded = ZERO
         self._ramped_s = self._last_step_s = clock.now()
         self._monitor = CollisionMonitor(self, collision_monitor or CollisionMonitorConfig(), self._driver.hold_back)
@@ -176,11 +176,8 @@ class HandSignControlNode(Node):
 
     def _on_odometry(self, received: Received[Odometry]) -> None:
         assert self._following is not None
-        twist, pose = received.message.twist.twist, received.message.pose.pose
-        measured = Velocity(twist.linear.x, twist.angular.z)
-        has_moved, self._robot_pose = self._robot_pose not in (None, pose), pose
-        # Some odometry leaves its twist at zero; that the pose changes shows that the robot follows.
-        self._following.note(self._commanded if measured.is_zero and has_moved else measured)
+        measured = self._measured.read(received.message)
+        self._following.note(self._commanded if measured is None else measured)
 
     def _watch(self) -> None:
         elapsed_s = self._elapsed()
