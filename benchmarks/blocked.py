@@ -27,6 +27,8 @@ from handsteer.messages import CMD_VEL, STOP, Bool, Twist
 from handsteer.transports.protocol import Received
 
 BLOCKED_S, HELD_S, FREE_S = 5.0, 0.3, 0.05
+# Every node says on /stopped what it has heard; a reset that comes before the last of them has is undone by it.
+HEARD_S = 0.5
 DRIVEN_TIMEOUT_S, STOPPED_TIMEOUT_S = 6.0, 5.0
 
 
@@ -117,18 +119,20 @@ def measure(
     undriven = 0
     with disturbance():
         for _ in range(trials):
+            time.sleep(HEARD_S)
             began_s = time.perf_counter()
             stop.publish(Bool(data=False))
             driven = commands.wait_for(True, began_s, DRIVEN_TIMEOUT_S)
-            undriven += driven is None
+            if driven is None:  # what is standing already tells nothing
+                undriven += 1
+                continue
             planned_s = time.perf_counter() + random.uniform(0.1, 0.6)
             time.sleep(max(0.0, planned_s - time.perf_counter()))
             stop.publish(Bool(data=True))
             zero_s = commands.wait_for(False, planned_s, STOPPED_TIMEOUT_S)
             late_ms.append(1000 * (zero_s - planned_s) if zero_s is not None else np.inf)
-            if driven is not None:
-                moments = [at_s for at_s, _ in commands.came if driven <= at_s <= planned_s]
-                apart_ms += (1000 * np.diff(moments)).tolist()
+            moments = [at_s for at_s, _ in commands.came if driven <= at_s <= planned_s]
+            apart_ms += (1000 * np.diff(moments)).tolist()
     return late_ms, apart_ms, undriven
 
 
@@ -146,7 +150,7 @@ def main() -> None:
     config = load(
         base={
             "camera": {"source": "virtual", "width": 320, "height": 240, "fps": 30},
-            "virtual_hand": {"script": "NONE:0.6 Forward:1.5"},
+            "virtual_hand": {"script": "NONE:1 Forward:1.5"},
             "dashboard": {"port": 0},
         }
     )
@@ -170,7 +174,8 @@ def main() -> None:
             late, apart, undriven = measure(graph, commands, disturbance, options.trials)
             between = f"{np.median(apart):10.1f} {max(apart):8.1f}" if apart else f"{'-':>10} {'-':>8}"
             note = f"   {undriven} of {options.trials} not driven at all" if undriven else ""
-            print(f"{name:58} {np.median(late):10.1f} {max(late):8.1f} {between}{note}")
+            stopped = f"{np.median(late):10.1f} {max(late):8.1f}" if late else f"{'-':>10} {'-':>8}"
+            print(f"{name:58} {stopped} {between}{note}")
         page.stop()
 
 
