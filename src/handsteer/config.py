@@ -7,9 +7,9 @@ have them, units are SI (REP 103) and stand in brackets in each description.
 import os
 import re
 from pathlib import Path
-from typing import Any, ClassVar, Literal, TypeVar
+from typing import Annotated, Any, ClassVar, Literal, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, field_validator, model_validator
 
 from handsteer.control.actions import ALWAYS_STOP, BUILT_IN, Action
 from handsteer.errors import ConfigError
@@ -20,6 +20,9 @@ from handsteer.timeouts import ODOMETRY_S, ROBOT_S, STALE_S
 S = TypeVar("S", bound="Section")
 
 RobotKind = Literal["sim", "auto", "ros2", "dds", "zenoh", "ros1"]
+Recorded = Literal["auto", "always", "never"]
+# The parameters of ROS have no null.
+OptionalPath = Annotated[Path | None, BeforeValidator(lambda path: None if path == "" else path)]
 _LONGEST_SHOWN = 200
 _NAMESPACE = re.compile(r"[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)
 
@@ -60,16 +63,11 @@ class CameraConfig(Section):
         description="Coordinate frame that stands in the header of each image, as REP 103 has it: z forward, x right; "
         "in a namespace that shares /tf with others, /r1, its default is r1/camera_optical_frame",
     )
-    calibration: Path | None = Field(
+    calibration: OptionalPath = Field(
         None,
-        description="YAML file of ROS's camera_calibration, for camera_info; without one it says so",
+        description="YAML file of ROS's camera_calibration, for camera_info; without one, camera_info is all zeros "
+        "(uncalibrated)",
     )
-
-    @field_validator("calibration", mode="before")
-    @classmethod
-    def _empty_is_none(cls, path: object) -> object:
-        # The parameters of ROS have no null.
-        return None if path == "" else path
 
 
 class VirtualHandConfig(Section):
@@ -115,7 +113,7 @@ class SignsConfig(Section):
         {"model", "min_confidence", "keep_confidence", "confirm_time", "bridge_time", "switch_time", "max_frame_age"}
     )
 
-    model: Path | None = Field(
+    model: OptionalPath = Field(
         None, description="File of taught signs, as `handsteer signs train` writes it; none has the shipped signs only"
     )
     min_confidence: float = Field(0.8, ge=0, le=1, description="Confidence from which a sign is seen")
@@ -128,7 +126,7 @@ class SignsConfig(Section):
         0.5, ge=0, le=10, description="How long the followed hand shows no sign before another that shows one is [s]"
     )
     max_frame_age: float = Field(STALE_S, gt=0, le=10, description="An older frame counts as no frame [s]")
-    recorded: Literal["auto", "always", "never"] = Field(
+    recorded: Recorded = Field(
         "auto",
         description="Whether frames with old stamps count, as a recording's: auto takes what rosbag play sends, always "
         "takes whatever is stamped more than 5 s ago, so it is for recordings alone",
@@ -138,12 +136,6 @@ class SignsConfig(Section):
         description="Which images are recognised: raw is /image_raw, compressed is /image_raw/compressed; "
         "auto is compressed where others may be on other machines (DDS beyond localhost), or whichever there is",
     )
-
-    @field_validator("model", mode="before")
-    @classmethod
-    def _empty_is_none(cls, model: object) -> object:
-        # The parameters of ROS have no null.
-        return None if model == "" else model
 
 
 class ControlConfig(Section):

@@ -35,7 +35,7 @@ def ends(command: Sequence[str], env: dict[str, str], home: Path, *, code: int =
             threading.Event().wait(moment_s)
             process.signal(wish)
             ended = process.code()
-            # On a busy machine the interpreter itself ends by the signal once in a few hundred times, without a word.
+            # Seen once on a busy machine: the interpreter itself ended by the signal, without a word.
             assert ended in (code, -wish), (moment_s, wish, process.text)
             assert "Traceback" not in process.text, (moment_s, wish)
         finally:

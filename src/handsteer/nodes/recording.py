@@ -1,11 +1,9 @@
 """Frames of a recording, which are stamped by another day's clock, and frames that only come late."""
 
 import logging
-from typing import Literal
 
+from handsteer.config import Recorded
 from handsteer.timeouts import RECORDED_S, RESYNC_S, STALE_S
-
-Recorded = Literal["auto", "always", "never"]
 
 log = logging.getLogger(__name__)
 
