@@ -44,7 +44,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """
     for item in items:
         if item.get_closest_marker("slow"):
-            item.add_marker(pytest.mark.flaky(reruns=0, reruns_delay=3))
+            item.add_marker(pytest.mark.flaky(reruns=1, reruns_delay=3))
 
 
 def pytest_runtest_setup(item: pytest.Item) -> None:

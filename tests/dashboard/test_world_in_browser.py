@@ -90,12 +90,9 @@ def press(page: Page, name: str) -> None:
 def test_three_views_go_along_with_the_robot_and_its_way_is_drawn() -> None:
     with looking_at("empty") as visit:
         page, robot = visit.page, visit.graph.robot
-        steering = visit.graph.steering
-        steering.steer(0.0, 1.0)
-        visit.wait_until(lambda: robot.state.truth.yaw > 1.2)
-        steering.steer(0.5, 0.0)
-        visit.wait_until(lambda: robot.state.truth.y > 1.5)
-        steering.release()
+        visit.steer_until(0.0, 1.0, lambda: robot.state.truth.yaw > 1.2)
+        visit.steer_until(0.5, 0.0, lambda: robot.state.truth.y > 1.5)
+        visit.graph.steering.release()
         visit.wait_until(lambda: abs(robot.state.linear_mps) < 0.001)
         visit.wait_until(lambda: trail_points(page) > 8)
         at = robot.state.truth
@@ -126,8 +123,7 @@ def test_the_wheels_turn_as_the_joint_states_say() -> None:
             angles.update(zip(received.message.name, received.message.position.tolist(), strict=True))
 
         visit.graph.transport.subscribe("test", JOINT_STATES, keep)
-        visit.graph.steering.steer(0.2, 0.5)
-        visit.wait_until(lambda: robot.state.truth.yaw > 1.0)
+        visit.steer_until(0.2, 0.5, lambda: robot.state.truth.yaw > 1.0)
         visit.graph.steering.release()
         visit.wait_until(lambda: abs(robot.state.linear_mps) < 0.001)
         wheels = [joint for joint in joints(robot_description()) if joint.type == "continuous"]
@@ -213,9 +209,8 @@ def test_the_course_counts_gates_and_bumps_and_only_the_driver_edits(tmp_path: P
         visit.wait_until(lambda: "gates 0/3" in visit.text(".course"))
         page.get_by_text("Ask to drive").click()
         page.locator(".seat .role", has_text="you drive").wait_for()
-        visit.graph.steering.steer(0.5, 0.0)
-        visit.wait_until(lambda: "gates 2/3" in visit.text(".course"))
-        visit.wait_until(lambda: "bumps 1" in visit.text(".course"))
+        visit.steer_until(0.5, 0.0, lambda: "gates 2/3" in visit.text(".course"))
+        visit.steer_until(0.5, 0.0, lambda: "bumps 1" in visit.text(".course"))
         page.locator(".world .stage.bump-a").wait_for()
         visit.wait_until(lambda: red_boxes(page) == 1)
         visit.graph.steering.release()

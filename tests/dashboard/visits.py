@@ -1,5 +1,7 @@
 """A browser that looks at the page of a running graph."""
 
+import math
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -15,6 +17,7 @@ from handsteer.dashboard.apart import PageApart
 from handsteer.graph import Graph
 
 PATIENCE_MS = 60_000
+_STANDS_S = 1.0
 # Small: without a graphics card, each pixel costs.
 WINDOW: ViewportSize = {"width": 1000, "height": 600}
 
@@ -45,6 +48,28 @@ class Visit:
                 return
             self.page.wait_for_timeout(50)
         pytest.fail(f"waited in vain; the page says: {self.text('body')}; {self.troubles}")
+
+    def steer_until(self, linear_mps: float, angular_radps: float, condition: Callable[[], bool]) -> None:
+        """Steer as a person does: who sees the robot stand lets go and steers again.
+
+        A machine that was held up ends what was steered, and rightly so.
+        """
+        steering, stood_s = self.graph.steering, -math.inf
+        assert steering is not None
+
+        def drives() -> bool:
+            nonlocal stood_s
+            state, now_s = self.graph.robot.state, time.monotonic()
+            if abs(state.linear_mps) + abs(state.angular_radps) > 0.01:
+                stood_s = now_s
+            elif now_s - stood_s > _STANDS_S:
+                steering.release()
+                steering.steer(linear_mps, angular_radps)
+                stood_s = now_s
+            return condition()
+
+        steering.release()
+        self.wait_until(drives)
 
     def note_message(self, message: ConsoleMessage) -> None:
         if message.type in ("error", "warning") and "GPU stall" not in message.text:
@@ -83,6 +108,8 @@ def visiting(
             visit.page.on("console", visit.note_message)
             visit.page.on("pageerror", lambda error: visit.troubles.append(str(error)))
             visit.page.on("request", visit.note_request)
+            # Shown with a test that fails: a page that lost its connection loads itself again, and forgets its inputs.
+            visit.page.on("framenavigated", lambda frame: print(f"{time.monotonic():.1f} s: loaded {frame.url}"))
             visit.page.goto(url + path)
             visit.page.locator(".banner").wait_for()
             graph.start()

@@ -40,6 +40,8 @@ def bag_of_the_drawn_hand(ros: LaunchGraph, record: Recorder, path: Path) -> Non
     eventually(lambda: any(name.startswith("/record_") for name in ros.nodes()), what="rosbag record")
     camera = ros.run("rosrun", "my_cam", "image_publisher.py", "_source:=virtual")
     eventually(lambda: order(record, 0.0) == SHOWN, what="the signs, live")
+    # The last sign to its end: what is cut off here could be too short to be seen again.
+    eventually(lambda: record.of(HAND_SIGN)[-1]["word"] == "NONE", what="the hand to be gone")
     camera.signal(signal.SIGINT)
     camera.code()
     recorder.signal(signal.SIGINT)

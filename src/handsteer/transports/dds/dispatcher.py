@@ -28,6 +28,8 @@ class Dispatcher:
     """
 
     def __init__(self, participant: DomainParticipant) -> None:
+        # Kept while its thread serves: a start that a signal breaks off forgets the participant without closing it.
+        self._participant: DomainParticipant | None = participant
         self._waitset = WaitSet(participant)
         self._guard = GuardCondition(participant)
         self._waitset.attach(self._guard)
@@ -68,6 +70,7 @@ class Dispatcher:
                 self._thread.join(_LEAVE_TIMEOUT_S)
             for reader in list(self._served):
                 self.remove(reader)
+            self._participant = None
 
     def _run(self) -> None:
         while not self._closing.is_set():
