@@ -35,7 +35,7 @@ class RecognitionBench(Bench):
         super().__init__()
         config = config or SignsConfig()
         landmarker = RecordedLandmarker([[hand or show_sign(FORWARD)]] * 100)
-        recognizer = Recognizer(landmarker, TrainedClassifier(load_model()), config)
+        recognizer = Recognizer(Config(signs=config), landmarker=landmarker, classifier=TrainedClassifier(load_model()))
         self.node = HandSignRecognitionNode(
             self.transport, self.clock, recognizer, config, annotate, open_classifier=open_classifier
         )

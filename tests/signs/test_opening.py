@@ -6,9 +6,8 @@ import sys
 
 RECOGNISE_AN_ARRAY = """
 import numpy as np
-from handsteer.config import Config
-from handsteer.signs.opening import open_recognizer
-open_recognizer(Config()).step(np.zeros((480, 640, 3), np.uint8), 0.0)
+from handsteer import Recognizer
+Recognizer().step(np.zeros((480, 640, 3), np.uint8), 0.0)
 """
 LOADED = "import json, sys; print(json.dumps(sorted(sys.modules)))"
 
