@@ -40,6 +40,7 @@ lint: $(BIN)/.dev
 	@$(BIN)/ruff format --check .
 	@$(BIN)/ruff check .
 	@$(BIN)/mypy
+	@$(BIN)/lint-imports --no-logo --cache-dir .mypy_cache/imports > $(BIN)/.imports || { cat $(BIN)/.imports; exit 1; }
 	@$(BIN)/python scripts/configuration_table.py --check
 
 unit: $(BIN)/.dev models

@@ -22,7 +22,7 @@ from handsteer.signs.labelled import LabelledPhoto, read_photo_labels
 from handsteer.signs.recognizer import Recognizer
 from handsteer.signs.training.split import part_of
 from handsteer.signs.views import View
-from handsteer.signs.vocabulary import FORWARD, MOTION_SIGNS, NONE, SIGNS, TURN_LEFT, TURN_RIGHT
+from handsteer.types import FORWARD, MOTION_SIGNS, NONE, SIGNS, TURN_LEFT, TURN_RIGHT
 
 DATA = Path(__file__).parents[2] / "shared" / "data"
 FOLDERS = ("hagrid-dev", "photos")

@@ -13,11 +13,11 @@ from handsteer import Config, Recognizer, Teleop, Velocity
 from handsteer.cameras.noise import SensorNoise
 from handsteer.clock import SteppedClock
 from handsteer.config import CameraConfig, ControlConfig, VirtualHandConfig
-from handsteer.control.velocity import ZERO
 from handsteer.errors import FrameError
 from handsteer.graph import Graph
 from handsteer.images import bgr_image
 from handsteer.messages import CMD_VEL, IMAGE_RAW
+from handsteer.types import ZERO
 from tests.faults.painted import PaintedCamera, painted_recognizer
 
 DT_S = 1 / 30

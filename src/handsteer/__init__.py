@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
     from handsteer.config import Config
-    from handsteer.control.velocity import Velocity
     from handsteer.signs.recognizer import Recognizer
     from handsteer.teleop import Teleop
+    from handsteer.types import Velocity
 
 __version__ = "0.1.0"
 __all__ = ["Config", "Recognizer", "Teleop", "Velocity"]
@@ -25,7 +25,7 @@ _HOMES: Final = {
     "Config": "handsteer.config",
     "Recognizer": "handsteer.signs.recognizer",
     "Teleop": "handsteer.teleop",
-    "Velocity": "handsteer.control.velocity",
+    "Velocity": "handsteer.types",
 }
 
 

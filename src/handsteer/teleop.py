@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from handsteer.cameras.freshness import Freshness
 from handsteer.config import Config
 from handsteer.control.control import Control
-from handsteer.control.velocity import ZERO, Velocity
 from handsteer.signs.recognizer import Recognition, Recognizer
+from handsteer.types import ZERO, Velocity
 
 
 class Teleop:

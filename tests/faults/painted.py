@@ -11,7 +11,7 @@ from handsteer.config import Config, SignsConfig
 from handsteer.landmarks.protocol import Hand
 from handsteer.signs.protocol import SignGuess
 from handsteer.signs.recognizer import Recognizer
-from handsteer.signs.vocabulary import NONE
+from handsteer.types import NONE
 from tests.signs.hands import show_sign
 
 SIGNS = ("Forward", "Backward", "Turn Left", "Turn Right", "Go", "Stop")

@@ -19,7 +19,7 @@ from handsteer.signs.opening import open_classifier
 from handsteer.signs.recognizer import Recognition, Recognizer
 from handsteer.signs.teaching.taught import save_taught
 from handsteer.signs.trained import TrainedClassifier
-from handsteer.signs.vocabulary import FORWARD
+from handsteer.types import FORWARD
 from tests.nodes.stepping import Bench
 from tests.signs.hands import show_fingers, show_sign
 from tests.signs.teaching.models import model

@@ -20,7 +20,7 @@ from handsteer.signs.labelled import LabelledPhoto, read_video_labels
 from handsteer.signs.recognizer import Recognizer
 from handsteer.signs.video_figures import video_report
 from handsteer.signs.views import View
-from handsteer.signs.vocabulary import BACKWARD, FORWARD, MOTION_SIGNS, NONE, SIGNS, STOP, TURN_LEFT, TURN_RIGHT
+from handsteer.types import BACKWARD, FORWARD, MOTION_SIGNS, NONE, SIGNS, STOP, TURN_LEFT, TURN_RIGHT
 
 Picture = NDArray[np.uint8]
 

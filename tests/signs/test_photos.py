@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from handsteer.signs.recognizer import Recognizer
-from handsteer.signs.vocabulary import MOTION_SIGNS, NONE
+from handsteer.types import MOTION_SIGNS, NONE
 
 pytestmark = pytest.mark.slow
 

@@ -8,7 +8,7 @@ from handsteer.landmarks.recorded import RecordedLandmarker
 from handsteer.signs.model import load_model
 from handsteer.signs.recognizer import Recognizer
 from handsteer.signs.trained import TrainedClassifier
-from handsteer.signs.vocabulary import FORWARD, GO, NONE, SIGNS, STOP
+from handsteer.types import FORWARD, GO, NONE, SIGNS, STOP
 from tests.signs.hands import moved, show_fingers, show_sign
 
 IMAGE = np.zeros((480, 640, 3), np.uint8)

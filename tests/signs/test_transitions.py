@@ -8,7 +8,7 @@ from handsteer.cameras.virtual import VirtualHandCamera
 from handsteer.clock import SteppedClock
 from handsteer.config import VirtualHandConfig
 from handsteer.signs.recognizer import Recognizer
-from handsteer.signs.vocabulary import MOTION_SIGNS, NONE, SIGNS
+from handsteer.types import MOTION_SIGNS, NONE, SIGNS
 
 FPS = 30
 SHOWN_S = 0.7

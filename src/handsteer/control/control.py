@@ -1,11 +1,9 @@
 """Signs and steering in, safe velocities out: the part of ``hand_sign_control`` that knows nothing of nodes."""
 
 from handsteer.config import ControlConfig
-from handsteer.control.actions import action_of
 from handsteer.control.driver import Driver
 from handsteer.control.safety import Ramp, Safety
-from handsteer.control.velocity import ZERO, Velocity
-from handsteer.signs.vocabulary import NONE
+from handsteer.types import NONE, ZERO, Velocity, action_of
 
 
 class Control:

@@ -13,7 +13,7 @@ from handsteer.signs.filter import SignFilter
 from handsteer.signs.opening import open_classifier, open_landmarker
 from handsteer.signs.operator import Operator, Place
 from handsteer.signs.protocol import Classifier, SignGuess
-from handsteer.signs.vocabulary import NONE
+from handsteer.types import NONE
 
 _NOTHING = SignGuess(NONE, 0.0)
 

@@ -13,7 +13,6 @@ from tqdm import tqdm
 from handsteer.cli.options import ConfigFile, Flag, Parameters, settings
 from handsteer.cli.signs.evaluation_tables import evaluation_tables
 from handsteer.config import Config
-from handsteer.control.actions import motion_signs
 from handsteer.errors import EvaluationError
 from handsteer.signs.calibration_pictures import draw_reliability, draw_sweep
 from handsteer.signs.confusion_picture import draw_confusion
@@ -25,6 +24,7 @@ from handsteer.signs.protocol import Classifier
 from handsteer.signs.recognizer import Recognizer
 from handsteer.signs.sources import LabelledFolder, LabelledHands, LabelledVideo, PhotoRun, Source, open_source
 from handsteer.signs.views import View
+from handsteer.types import motion_signs
 
 
 def evaluate(
