@@ -31,7 +31,7 @@ app = App(
     result_action="return_value",
 )
 # Named, not imported: a verb's module is loaded when it is used.
-for verb in ("run", "recognize", "models", "doctor"):
+for verb in ("run", "recognize", "models", "doctor", "ros"):
     app.command(f"handsteer.cli.{verb}:{verb}", name=verb)
 app.command("handsteer.cli.signs:app", name="signs")
 for verb in ("camera", "recognition", "control", "robot", "steering"):
