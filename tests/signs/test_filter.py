@@ -30,13 +30,13 @@ def test_another_sign_for_two_frames_is_swallowed() -> None:
 
 
 def test_a_short_loss_is_bridged_and_a_long_one_is_not() -> None:
-    signs = SignFilter(SignsConfig(bridge_time=0.1))
+    signs = SignFilter(SignsConfig(dropout_hold=0.1))
     show(signs, FORWARD, 10)
     assert show(signs, NONE, 5) == [FORWARD, FORWARD, FORWARD, NONE, NONE]
 
 
 def test_from_one_sign_to_another_the_first_holds_until_the_second_counts() -> None:
-    signs = SignFilter(SignsConfig(confirm_time=0.1, bridge_time=0.1))
+    signs = SignFilter(SignsConfig(confirm_time=0.1, dropout_hold=0.1))
     show(signs, GO, 10)
     assert show(signs, FORWARD, 4) == [GO, GO, GO, FORWARD]
 

@@ -9,7 +9,7 @@ class SignFilter:
 
     - ``Stop`` counts at its first frame.
     - Any other sign counts once a hand that is held still has shown it, frame after frame, for ``confirm_time``.
-    - A sign that counts goes on counting for up to ``bridge_time`` in which it is not seen; then it is ``NONE``.
+    - A sign that counts goes on counting for up to ``dropout_hold`` in which it is not seen; then it is ``NONE``.
     """
 
     def __init__(self, config: SignsConfig) -> None:
@@ -52,7 +52,7 @@ class SignFilter:
         self._unseen_s += dt_s
         if seen != NONE and self._candidate_s >= self._config.confirm_time:
             self._accept(seen)
-        elif self._unseen_s > self._config.bridge_time:
+        elif self._unseen_s > self._config.dropout_hold:
             self.sign = NONE
         return self.sign
 
