@@ -1,3 +1,5 @@
+from itertools import pairwise
+
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -15,6 +17,14 @@ def show(signs: SignFilter, seen: str, frames: int) -> list[str]:
 def test_a_sign_counts_within_100_ms_at_30_frames_a_second() -> None:
     signs = SignFilter(SignsConfig())
     assert show(signs, FORWARD, 5) == [NONE, NONE, NONE, FORWARD, FORWARD]
+
+
+@given(st.floats(0, 1e6), st.sampled_from([10, 30, 60]))
+def test_it_takes_as_many_frames_however_stamps_are_rounded(start_s: float, fps: int) -> None:
+    signs, stamps = SignFilter(SignsConfig()), [start_s + frame / fps for frame in range(10)]
+    intervals = [0.0, *(after - before for before, after in pairwise(stamps))]
+    assert [signs.step(FORWARD, dt_s) for dt_s in intervals].index(FORWARD) == fps // 10
+    assert [signs.step(NONE, 1 / fps) for _ in range(10)].count(FORWARD) == fps // 10
 
 
 def test_stop_counts_at_its_first_frame() -> None:

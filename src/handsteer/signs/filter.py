@@ -3,6 +3,9 @@
 from handsteer.config import SignsConfig
 from handsteer.types import NONE, STOP
 
+# Frames that come in step have stamps that do not: without it, rounding decides about a whole frame.
+_SLACK_S = 0.001
+
 
 class SignFilter:
     """Confirms signs, and bridges short losses.
@@ -50,9 +53,9 @@ class SignFilter:
         self._candidate_s = self._candidate_s + dt_s if still and seen == self._candidate else 0.0
         self._candidate = seen
         self._unseen_s += dt_s
-        if seen != NONE and self._candidate_s >= self._config.confirm_time:
+        if seen != NONE and self._candidate_s >= self._config.confirm_time - _SLACK_S:
             self._accept(seen)
-        elif self._unseen_s > self._config.dropout_hold:
+        elif self._unseen_s > self._config.dropout_hold + _SLACK_S:
             self.sign = NONE
         return self.sign
 
