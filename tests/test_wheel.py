@@ -11,6 +11,7 @@ REPOSITORY = Path(__file__).resolve().parents[1]
 UV = Path(sys.executable).with_name("uv")
 
 pytestmark = [
+    pytest.mark.exhaustive,
     pytest.mark.slow,
     pytest.mark.skipif(not UV.exists(), reason="there is no uv: scripts/setup installs it"),
 ]
