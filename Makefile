@@ -1,4 +1,4 @@
-# Two commands matter: `make run` drives the robot, `make test` checks everything. Both set up what they need in .venv.
+# Two commands matter: `make run` drives the robot, `make test` checks it. Both set up what they need in .venv.
 
 VENV := .venv
 BIN := $(VENV)/bin
