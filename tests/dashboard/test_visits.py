@@ -62,6 +62,7 @@ def test_a_visit_leaves_nothing_behind(site: Site) -> None:
     eventually(lambda: not grown(), what=f"nothing of {VISITS} visits to be left; there is {grown()}")
 
 
+@pytest.mark.slow
 def test_pages_that_nobody_joins_do_not_pile_up(site: Site) -> None:
     html, cookies = site.page()
     with PageSocket(site, html, cookies) as page:
