@@ -11,11 +11,10 @@ from typing import Annotated, Any, ClassVar, Literal, TypeVar
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, field_validator, model_validator
 
-from handsteer.control.actions import ALWAYS_STOP, BUILT_IN, Action
 from handsteer.errors import ConfigError
 from handsteer.presets import CmdVelType, Preset, preset
-from handsteer.signs.vocabulary import find_sign
 from handsteer.timeouts import ODOMETRY_S, ROBOT_S, STALE_S
+from handsteer.types import ALWAYS_STOP, BUILT_IN, Action, Handedness, find_sign
 
 S = TypeVar("S", bound="Section")
 
@@ -78,7 +77,7 @@ class VirtualHandConfig(Section):
         description="Signs to show with their durations in seconds, over and over; NONE lowers the hand; "
         "Peace, Three, Four, Horns, Call and OK are there to be taught",
     )
-    handedness: Literal["Left", "Right"] = Field("Right", description="Which hand")
+    handedness: Handedness = Field("Right", description="Which hand")
     skin: Literal["light", "medium", "dark"] = Field("medium", description="Skin tone")
     background: Literal["plain", "cluttered"] = Field("plain", description="What is behind the hand")
     sleeve: bool = Field(True, description="Whether the forearm wears a sleeve")

@@ -7,9 +7,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from handsteer.config import Config, load
-from handsteer.control.actions import ACTIONS
 from handsteer.dashboard.settings_form import LONGEST_TEXT, MASK, FormField, form, mask
 from handsteer.errors import ConfigError
+from handsteer.types import ACTIONS
 
 FIELDS = {field.path: field for fields in form().values() for field in fields}
 

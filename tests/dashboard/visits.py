@@ -1,5 +1,6 @@
 """A browser that looks at the page of a running graph."""
 
+import logging
 import math
 import time
 from collections.abc import Callable, Iterator
@@ -15,6 +16,8 @@ from scripts import chromium
 from handsteer.config import load
 from handsteer.dashboard.apart import PageApart
 from handsteer.graph import Graph
+
+log = logging.getLogger(__name__)
 
 PATIENCE_MS = 60_000
 _STANDS_S = 1.0
@@ -109,7 +112,7 @@ def visiting(
             visit.page.on("pageerror", lambda error: visit.troubles.append(str(error)))
             visit.page.on("request", visit.note_request)
             # Shown with a test that fails: a page that lost its connection loads itself again, and forgets its inputs.
-            visit.page.on("framenavigated", lambda frame: print(f"{time.monotonic():.1f} s: loaded {frame.url}"))
+            visit.page.on("framenavigated", lambda frame: log.warning("loaded %s", frame.url))
             visit.page.goto(url + path)
             visit.page.locator(".banner").wait_for()
             graph.start()

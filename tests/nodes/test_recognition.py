@@ -19,7 +19,7 @@ from handsteer.signs.opening import open_classifier
 from handsteer.signs.recognizer import Recognition, Recognizer
 from handsteer.signs.teaching.taught import save_taught
 from handsteer.signs.trained import TrainedClassifier
-from handsteer.signs.vocabulary import FORWARD
+from handsteer.types import FORWARD
 from tests.nodes.stepping import Bench
 from tests.signs.hands import show_fingers, show_sign
 from tests.signs.teaching.models import model
@@ -35,7 +35,7 @@ class RecognitionBench(Bench):
         super().__init__()
         config = config or SignsConfig()
         landmarker = RecordedLandmarker([[hand or show_sign(FORWARD)]] * 100)
-        recognizer = Recognizer(landmarker, TrainedClassifier(load_model()), config)
+        recognizer = Recognizer(Config(signs=config), landmarker=landmarker, classifier=TrainedClassifier(load_model()))
         self.node = HandSignRecognitionNode(
             self.transport, self.clock, recognizer, config, annotate, open_classifier=open_classifier
         )

@@ -3,7 +3,7 @@ from hypothesis import strategies as st
 
 from handsteer.config import SignsConfig
 from handsteer.signs.filter import SignFilter
-from handsteer.signs.vocabulary import FORWARD, GO, NONE, SIGNS, STOP, TURN_LEFT
+from handsteer.types import FORWARD, GO, NONE, SIGNS, STOP, TURN_LEFT
 
 DT = 1 / 30
 

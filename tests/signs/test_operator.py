@@ -2,7 +2,7 @@ from handsteer.config import SignsConfig
 from handsteer.landmarks.protocol import Hand
 from handsteer.signs.operator import Operator
 from handsteer.signs.protocol import SignGuess
-from handsteer.signs.vocabulary import FORWARD, GO, NONE, STOP
+from handsteer.types import FORWARD, GO, NONE, STOP
 from tests.signs.hands import moved, show_sign
 
 DT = 1 / 30

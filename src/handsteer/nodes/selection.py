@@ -6,10 +6,10 @@ from dataclasses import replace
 from typing import Any
 
 from handsteer.control.fleet import Fleet
-from handsteer.control.velocity import ZERO, Velocity
 from handsteer.messages import SELECT_ROBOT, SELECTED_ROBOT, String, Topic
 from handsteer.nodes.node import Node
 from handsteer.transports.protocol import Publisher, Received
+from handsteer.types import ZERO, Velocity
 
 log = logging.getLogger(__name__)
 

@@ -10,9 +10,10 @@ from handsteer.config import RobotConfig
 from handsteer.messages import CMD_VEL, LaserScan, Odometry, Topic, TurtlePose, command, type_name, yaw_of
 from handsteer.robots.description import robot_description
 from handsteer.robots.diff_drive import Velocity
-from handsteer.robots.protocol import Obstacle, Pose2D, RangeScan, RobotState
+from handsteer.robots.protocol import Obstacle, RangeScan, RobotState
 from handsteer.robots.relay import ZERO, Relay
 from handsteer.transports.protocol import Received, Session
+from handsteer.types import Pose2D
 
 log = logging.getLogger(__name__)
 

@@ -1,7 +1,7 @@
 """Over time: when a sign that is seen comes to count."""
 
 from handsteer.config import SignsConfig
-from handsteer.signs.vocabulary import NONE, STOP
+from handsteer.types import NONE, STOP
 
 
 class SignFilter:

@@ -11,7 +11,7 @@ from handsteer.config import SignsConfig
 from handsteer.landmarks.protocol import Hand
 from handsteer.signs.features import KNUCKLES, WRIST
 from handsteer.signs.protocol import SignGuess
-from handsteer.signs.vocabulary import NONE, STOP
+from handsteer.types import NONE, STOP
 
 _PALM: Final = [WRIST, *KNUCKLES]
 _JUMP: Final = 1.0
