@@ -20,7 +20,7 @@ from handsteer.parameters import NodeParameters, from_parameters
 from handsteer.transports import join
 from handsteer.transports.protocol import Session, Transport
 
-_LOOK_PERIOD_S = 0.2
+_LOOK_PERIOD_S = 0.5
 
 log = logging.getLogger(__name__)
 

@@ -24,6 +24,7 @@ FAILURES_SAID_EVERY_S = 10.0
 """A callback that goes on failing is logged no more often; a bad picture comes thirty times a second."""
 
 _LONGEST_REASON = 200
+_LOOK_FOR_LISTENERS_S = 0.5
 
 
 @dataclass
@@ -150,6 +151,20 @@ class Node:
         timer = Timer(period_s, callback, self.clock.now())
         self._timers.append(timer)
         return timer
+
+    def diagnose_every(self, period_s: float, report: Callable[[], None]) -> None:
+        """Call ``report``, which tells this node's state by :meth:`diagnose`, every ``period_s`` seconds.
+
+        While nobody listens it is left out, and a new listener hears the first one within half a second.
+        """
+
+        def beat() -> None:
+            if self.is_diagnosed:
+                report()
+            else:
+                timer.delay_until(self.clock.now() + _LOOK_FOR_LISTENERS_S)
+
+        timer = self.every(period_s, beat)
 
     def reconfigure(self, config: Config) -> None:
         """Take the parameters that can change while the node runs (``live`` of each section) from ``config``.
