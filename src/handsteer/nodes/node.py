@@ -204,7 +204,7 @@ class Node:
         """
         with self._wake:
             config, self._new_config = self._new_config, None
-            work = [(inbox, received) for inbox in self._inboxes for received in inbox.take()]
+            work = [(inbox, received) for inbox in self._inboxes if inbox.filled for received in inbox.take()]
         if config is not None:
             self._guard("reconfigure", self.on_reconfigure, config)
         for inbox, received in work:

@@ -139,7 +139,6 @@ class HandSignRecognitionNode(Node):
             self._look_at(image, received, began_s, captured_s)
         else:
             self._freshness.pass_over(image)
-        self._watchdog.delay_until(began_s + min(CALM_S, self._config.max_frame_age))
         if self._refused is not None:
             self._refused_s = began_s  # a stale frame, or one that is not new, is no frame: the watch publishes NONE
 
@@ -161,6 +160,7 @@ class HandSignRecognitionNode(Node):
             if self._refused is not None:
                 return
         self._last_frame_s = self._last_sign_s = began_s
+        self._watchdog.delay_until(began_s + min(CALM_S, self._config.max_frame_age))
         self._recognition = recognition
         self.counts[recognition.sign] = self.counts.get(recognition.sign, 0) + 1
         self._sign.publish(String(data=recognition.sign), received.captured_s)
