@@ -1,4 +1,4 @@
-# Two commands matter: `make run` drives the robot, `make test` checks everything. Both set up what they need in .venv.
+# Two commands matter: `make run` drives the robot, `make test` checks it. Both set up what they need in .venv.
 
 VENV := .venv
 BIN := $(VENV)/bin
@@ -8,12 +8,18 @@ CASES ?= 100000
 # NumPy's threads would wait for one another: the matrices are small, and tests run side by side.
 export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: help run test ros1 test-ros1 ros2 test-ros2 lint unit fuzz format lock bench bench-signs signs-model landmark-model models docs faults soak screenshots \
+# Tests of real processes wait more than they compute.
+WORKERS ?= $(shell echo $$((2 * $$(getconf _NPROCESSORS_ONLN))))
+PLAIN := not (ros1 or ros2 or netns or exhaustive)
+
+.PHONY: help run check test test-all ros1 test-ros1 ros2 test-ros2 lint fuzz format lock bench bench-signs signs-model landmark-model models docs faults soak screenshots \
 	screenshots-ros1 clean
 
 help:
 	@echo "make run          drive the robot: your webcam, or the virtual hand (options: make run ARGS='--camera 0')"
-	@echo "make test         everything that CI checks: format, lint, types, tests"
+	@echo "make check        format, lint, types and the fast tests: before each commit"
+	@echo "make test         all that a plain machine can check; the rest needs ROS, or root, or takes long:"
+	@echo "make test-all     what CI checks: make test, ROS 1, ROS 2, networks of several machines, every kill"
 	@echo "make fuzz         try 100,000 damaged or hostile inputs on each reader (fewer: make fuzz CASES=5000)"
 	@echo "make ros1         install ROS 1 from Debian's or Ubuntu's packages, for handsteer ... --transport ros1"
 	@echo "make test-ros1    check what runs on ROS 1"
@@ -34,7 +40,14 @@ help:
 run: $(BIN)/.run models
 	@$(BIN)/handsteer run $(ARGS)
 
-test: lint unit
+check: lint models
+	@$(BIN)/pytest -n auto -m "not (slow or browser)" $(ARGS)
+
+test: lint models
+	@$(BIN)/pytest -n $(WORKERS) --dist loadfile -m "$(PLAIN)" --durations=10 $(ARGS)
+
+test-all: lint models
+	@$(BIN)/pytest -n $(WORKERS) --dist loadfile --durations=30 $(ARGS)
 
 lint: $(BIN)/.dev
 	@$(BIN)/ruff format --check .
@@ -42,9 +55,6 @@ lint: $(BIN)/.dev
 	@$(BIN)/mypy
 	@$(BIN)/lint-imports --no-logo --cache-dir .mypy_cache/imports > $(BIN)/.imports || { cat $(BIN)/.imports; exit 1; }
 	@$(BIN)/python scripts/configuration_table.py --check
-
-unit: $(BIN)/.dev models
-	@$(BIN)/pytest -n auto --dist loadfile $(ARGS)
 
 fuzz: $(BIN)/.dev models
 	@HANDSTEER_FUZZ_CASES=$(CASES) $(BIN)/pytest -n auto tests/fuzz $(ARGS)

@@ -58,7 +58,7 @@ def message(of: Any, *given: Any) -> str:
         ("camera.width", "63"),
         ("camera.width", "64.5"),
         ("landmarks.max_hands", "3"),
-        ("landmarks.second_look", "perhaps"),
+        ("landmarks.refine_new_hands", "perhaps"),
         ("control.ramp", "quickly"),
         ("robot.preset", "roomba"),
         ("dashboard.host", "''"),

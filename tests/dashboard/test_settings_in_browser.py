@@ -37,9 +37,9 @@ def test_the_driver_sets_what_the_robot_does_and_saves_it(tmp_path: Path, monkey
         expect(row(page, "control.max_linear")).to_contain_text("changed")
         expect(page.locator(".seat .role")).to_have_text("you drive")
 
-        of(page, "landmarks.second_look").click()
-        expect(row(page, "landmarks.second_look")).to_contain_text("waits for the next start")
-        assert graph.config.landmarks.second_look
+        of(page, "landmarks.refine_new_hands").click()
+        expect(row(page, "landmarks.refine_new_hands")).to_contain_text("waits for the next start")
+        assert graph.config.landmarks.refine_new_hands
         of(page, "robot.preset").click()
         page.get_by_role("option", name="turtlebot4").click()
         expect(of(page, "robot.max_linear")).to_have_value("0.306")
@@ -59,7 +59,11 @@ def test_the_driver_sets_what_the_robot_does_and_saves_it(tmp_path: Path, monkey
         page.get_by_role("button", name="Save").click()
         expect(page.locator(".said")).to_have_text("saved to handsteer.yaml")
         saved = load(tmp_path / "handsteer.yaml")
-        assert (saved.control.max_linear, saved.robot.preset, saved.landmarks.second_look) == (0.4, "turtlebot4", False)
+        assert (saved.control.max_linear, saved.robot.preset, saved.landmarks.refine_new_hands) == (
+            0.4,
+            "turtlebot4",
+            False,
+        )
         assert saved.camera.fps == 5
 
         page.get_by_label("Set control.max_linear to its default").click()

@@ -305,7 +305,7 @@ def test_none_comes_within_the_timeout_and_a_moment(bench: RecognitionBench) -> 
 
 def test_other_confidences_and_times_count_from_the_next_frame(bench: RecognitionBench) -> None:
     bench.show(frames=6)
-    bench.node.reconfigure(Config.model_validate({"signs": {"min_confidence": 1.0, "keep_confidence": 1.0}}))
+    bench.node.reconfigure(Config.model_validate({"signs": {"min_confidence": 1.0, "release_confidence": 1.0}}))
     bench.show(frames=6)
     assert bench.names[-2:] == ["NONE"] * 2
     bench.node.reconfigure(Config.model_validate({"signs": {"confirm_time": 0.0}}))

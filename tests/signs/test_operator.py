@@ -9,7 +9,7 @@ DT = 1 / 30
 HAND = show_sign(STOP)
 LEFT, RIGHT = moved(HAND, -180), moved(HAND, 180)
 SMALL = moved(HAND, 180, scale=0.4)
-CONFIG = SignsConfig(switch_time=0.5, bridge_time=0.1)
+CONFIG = SignsConfig(switch_time=0.5, dropout_hold=0.1)
 
 
 def look(operator: Operator, *seen: tuple[Hand, str], frames: int = 1) -> Hand | None:

@@ -76,7 +76,7 @@ def test_stop_counts_at_its_first_frame_however_the_hand_moves() -> None:
 @pytest.mark.parametrize("x_px", [0.0, 30.0, 200.0])
 def test_another_sign_counts_as_soon_wherever_the_hand_is_by_then(x_px: float) -> None:
     hands = [show_sign(GO)] * 10 + [moved(HAND, x_px=x_px)] * 10
-    stream = reading([[hand] for hand in hands], bridge_time=0.0)
+    stream = reading([[hand] for hand in hands], dropout_hold=0.0)
     signs = [stream.step(IMAGE, 1 / 30).sign for _ in range(20)]
     # A hand that jumps by more than its size is another hand, which is seen from the next frame on.
     assert signs.index(FORWARD) <= (14 if x_px > 100 else 13)

@@ -155,5 +155,5 @@ class Recognizer:
 
     def _seen(self, guess: SignGuess) -> SignGuess:
         """Return ``guess`` if it is sure enough, else ``NONE``; the sign that counts need be less sure to be kept."""
-        least = self._config.keep_confidence if guess.sign == self._filter.sign else self._config.min_confidence
+        least = self._config.release_confidence if guess.sign == self._filter.sign else self._config.min_confidence
         return guess if guess.confidence >= min(least, self._config.min_confidence) else _NOTHING
