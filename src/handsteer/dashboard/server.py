@@ -40,7 +40,7 @@ from handsteer.dashboard.unjoined import Unjoined
 from handsteer.dashboard.watch import WhileWatched
 from handsteer.dashboard.webcam import FrameSocket
 from handsteer.errors import DashboardError
-from handsteer.graph import cmd_vel_topic
+from handsteer.making import cmd_vel_topic
 from handsteer.messages import CMD_VEL, Topic
 from handsteer.nodes.steering import SteeringNode
 from handsteer.transports.protocol import Transport
