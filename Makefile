@@ -8,11 +8,9 @@ CASES ?= 100000
 # NumPy's threads would wait for one another: the matrices are small, and tests run side by side.
 export OPENBLAS_NUM_THREADS := 1
 
-# Tests of real processes wait more than they compute.
-WORKERS ?= $(shell echo $$((2 * $$(getconf _NPROCESSORS_ONLN))))
 PLAIN := not (ros1 or ros2 or netns or exhaustive)
 
-.PHONY: help run check test test-all ros1 test-ros1 ros2 test-ros2 lint fuzz format lock bench bench-signs signs-model landmark-model models docs faults soak screenshots \
+.PHONY: help run check test test-all ros1 test-ros1 ros2 test-ros2 lint fuzz format lock bench bench-signs signs-model landmark-model models docs site faults soak screenshots \
 	screenshots-ros1 clean
 
 help:
@@ -32,6 +30,7 @@ help:
 	@echo "make faults       write the tables of docs/safety.md again: what becomes of every fault"
 	@echo "make soak         a million random events, then hours of driving and of the page (takes an hour or two)"
 	@echo "make docs         write docs/configuration.md again from the configuration"
+	@echo "make site         make a site of the documentation, with the API's pages"
 	@echo "make screenshots  make the README's pictures again (needs Chromium)"
 	@echo "make screenshots-ros1  make the picture of RViz again (needs ROS 1, rviz, xvfb and imagemagick)"
 	@echo "make lock         make the requirements files again from pyproject.toml"
@@ -44,10 +43,10 @@ check: lint models
 	@$(BIN)/pytest -n auto -m "not (slow or browser)" $(ARGS)
 
 test: lint models
-	@$(BIN)/pytest -n $(WORKERS) --dist loadfile -m "$(PLAIN)" --durations=10 $(ARGS)
+	@$(BIN)/pytest -n auto --dist loadfile -m "$(PLAIN)" --durations=10 $(ARGS)
 
 test-all: lint models
-	@$(BIN)/pytest -n $(WORKERS) --dist loadfile --durations=30 $(ARGS)
+	@$(BIN)/pytest -n auto --dist loadfile --durations=30 $(ARGS)
 
 lint: $(BIN)/.dev
 	@$(BIN)/ruff format --check .
@@ -115,6 +114,10 @@ $(BIN)/.run: scripts/setup requirements.txt pyproject.toml
 $(BIN)/.dev: scripts/setup requirements-dev.txt pyproject.toml | $(BIN)/.run
 	@scripts/setup requirements-dev.txt && touch $@
 
+site: $(BIN)/.dev
+	@$(BIN)/sphinx-build --quiet --fail-on-warning --doctree-dir .mypy_cache/site docs site
+	@echo "the site is in site/index.html"
+
 $(QUANTIZER)/.made: requirements-quantizer.txt | $(BIN)/.run
 	@$(BIN)/python -m venv --without-pip $(QUANTIZER)
 	@PATH="$(BIN):$$PATH" VIRTUAL_ENV="$(CURDIR)/$(QUANTIZER)" uv pip install --quiet --require-hashes \
@@ -132,4 +135,4 @@ lock:
 	@PATH="$(BIN):$$PATH" $(COMPILE) --group pyproject.toml:quantizer --output-file requirements-quantizer.txt
 
 clean:
-	@rm -rf $(VENV) .mypy_cache .pytest_cache .ruff_cache .hypothesis
+	@rm -rf $(VENV) .mypy_cache .pytest_cache .ruff_cache .hypothesis site
