@@ -1,5 +1,7 @@
 """Where the command line starts: signals end it in order from the first moment on, then all else is loaded."""
 
+import gc
+import os
 import sys
 
 from handsteer.cli import signals
@@ -35,9 +37,16 @@ def main(arguments: list[str] | None = None) -> None:
 def _run(words: list[str]) -> int:
     # Both take some tenths of a second to load, the one with all our own options 0.1 s more.
     if _is_of_ros_alone(words):
-        from handsteer.cli.one_node import run_of_ros  # noqa: PLC0415
+        # Nothing of what is loaded is garbage, and looking for some takes a tenth of the start.
+        gc.disable()
+        # Nor is any plugin wanted for the parameters, for which all packages that are installed would be searched.
+        os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
+        try:
+            from handsteer.cli.one_node import run_of_ros  # noqa: PLC0415
 
-        return run_of_ros(words[0], words[3:])
+            return run_of_ros(words[0], words[3:])
+        finally:
+            gc.enable()
     from handsteer.cli.app import run  # noqa: PLC0415
 
     return run(words)

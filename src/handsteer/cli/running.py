@@ -65,8 +65,9 @@ def say(message: str) -> None:
 
 def keep_what_is_loaded() -> None:
     """Let the garbage collector leave alone what was loaded until now; looking at all of it holds up every thread."""
-    gc.collect()
+    # The little garbage that is kept so costs less than looking for it.
     gc.freeze()
+    gc.enable()
 
 
 @contextmanager
