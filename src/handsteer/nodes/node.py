@@ -269,10 +269,16 @@ class Node:
 
     def _wait(self) -> None:
         with self._wake:
-            idle = self._new_config is None and not any(inbox.filled for inbox in self._inboxes)
-            if self._running and idle:
+            while self._running and not self._has_work:
                 due = self.next_due_s
                 self.clock.wait(self._wake, None if due is None else max(0.0, due - self.clock.now()))
+
+    @property
+    def _has_work(self) -> bool:
+        # A timer may have been delayed meanwhile.
+        due = self.next_due_s
+        is_due = due is not None and due <= self.clock.now()
+        return is_due or self._new_config is not None or any(inbox.filled for inbox in self._inboxes)
 
     def _guard(self, source: str, callback: Callable[..., None], *args: object) -> None:
         try:
