@@ -41,6 +41,7 @@ class Connection:
 def ends() -> Iterator[tuple[socket.socket, socket.socket]]:
     here, there = socket.socketpair()
     with here, there:
+        here.settimeout(60)
         here.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 4096)
         yield here, there
 

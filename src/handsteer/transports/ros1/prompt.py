@@ -35,6 +35,8 @@ class PromptConnection:
         self._connection = connection
         self._depth = depth
         self._queue: QueuedConnection | None = None
+        # Python waits in spite of MSG_DONTWAIT where a socket has a time limit, and rospy gives new ones such.
+        connection.socket.setblocking(True)
 
     def __getattr__(self, name: str) -> Any:
         # All else is the connection's, as rospy's own queue has it.
