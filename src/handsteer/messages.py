@@ -4,6 +4,7 @@ The message classes are the typed dataclasses of ``rosbags``: the same definitio
 They are used as values: once published, a message is not changed any more.
 """
 
+import builtins
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -131,6 +132,7 @@ class Topic(Generic[M]):
         depth: How many messages may wait for a subscriber that is busy; older ones are dropped (ROS 2: keep last).
         lifespan_s: A message that has not arrived after so long is not to arrive at all; None for no limit.
         beneath: The topic whose name it extends; it is renamed with it, as the topics of ROS's image_transport are.
+        or_type: Another class that its sending end may have instead, as subscribers take it; None where it has one.
         stops: Tells a message that stops the robot, which is to be obeyed however late it comes; None where none does.
     """
 
@@ -142,6 +144,7 @@ class Topic(Generic[M]):
     lifespan_s: float | None = None
     beneath: "Topic[Any] | None" = None
     stops: Callable[[Any], bool] | None = None
+    or_type: builtins.type[Any] | None = None
 
     @property
     def ros_name(self) -> str:
@@ -203,7 +206,9 @@ def twist(linear_mps: float, angular_radps: float) -> Twist:
 
 def cmd_vel(kind: CmdVelType, topic: Topic[Any] = CMD_VEL) -> Topic[Any]:
     """Return ``topic``, a topic of velocity commands, with messages of ``kind``."""
-    return replace(topic, type=TwistStamped if kind == "twist_stamped" else Twist)
+    kinds = {"twist": (Twist, None), "twist_stamped": (TwistStamped, None), "auto": (Twist, TwistStamped)}
+    of, instead = kinds[kind]
+    return replace(topic, type=of, or_type=instead)
 
 
 def command(topic: Topic[Any], linear_mps: float, angular_radps: float, stamp: Time, frame_id: str) -> Any:
