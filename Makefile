@@ -1,4 +1,4 @@
-# Two commands matter: `make run` drives the robot, `make test` checks everything. Both set up what they need in .venv.
+# Two commands matter: `make run` drives the robot, `make test` checks it. Both set up what they need in .venv.
 
 VENV := .venv
 BIN := $(VENV)/bin
@@ -8,12 +8,16 @@ CASES ?= 100000
 # NumPy's threads would wait for one another: the matrices are small, and tests run side by side.
 export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: help run test ros1 test-ros1 ros2 test-ros2 lint unit fuzz format lock bench bench-signs signs-model landmark-model models docs faults soak screenshots \
+PLAIN := not (ros1 or ros2 or netns or exhaustive)
+
+.PHONY: help run check test test-all ros1 test-ros1 ros2 test-ros2 lint fuzz format lock bench bench-signs signs-model landmark-model models docs site faults soak screenshots \
 	screenshots-ros1 clean
 
 help:
 	@echo "make run          drive the robot: your webcam, or the virtual hand (options: make run ARGS='--camera 0')"
-	@echo "make test         everything that CI checks: format, lint, types, tests"
+	@echo "make check        format, lint, types and the fast tests: before each commit"
+	@echo "make test         all that a plain machine can check; the rest needs ROS, or root, or takes long:"
+	@echo "make test-all     what CI checks: make test, ROS 1, ROS 2, networks of several machines, every kill"
 	@echo "make fuzz         try 100,000 damaged or hostile inputs on each reader (fewer: make fuzz CASES=5000)"
 	@echo "make ros1         install ROS 1 from Debian's or Ubuntu's packages, for handsteer ... --transport ros1"
 	@echo "make test-ros1    check what runs on ROS 1"
@@ -26,6 +30,7 @@ help:
 	@echo "make faults       write the tables of docs/safety.md again: what becomes of every fault"
 	@echo "make soak         a million random events, then hours of driving and of the page (takes an hour or two)"
 	@echo "make docs         write docs/configuration.md again from the configuration"
+	@echo "make site         make a site of the documentation, with the API's pages"
 	@echo "make screenshots  make the README's pictures again (needs Chromium)"
 	@echo "make screenshots-ros1  make the picture of RViz again (needs ROS 1, rviz, xvfb and imagemagick)"
 	@echo "make lock         make the requirements files again from pyproject.toml"
@@ -34,16 +39,21 @@ help:
 run: $(BIN)/.run models
 	@$(BIN)/handsteer run $(ARGS)
 
-test: lint unit
+check: lint models
+	@$(BIN)/pytest -n auto -m "not (slow or browser)" $(ARGS)
+
+test: lint models
+	@$(BIN)/pytest -n auto --dist loadfile -m "$(PLAIN)" --durations=10 $(ARGS)
+
+test-all: lint models
+	@$(BIN)/pytest -n auto --dist loadfile --durations=30 $(ARGS)
 
 lint: $(BIN)/.dev
 	@$(BIN)/ruff format --check .
 	@$(BIN)/ruff check .
 	@$(BIN)/mypy
+	@$(BIN)/lint-imports --no-logo --cache-dir .mypy_cache/imports > $(BIN)/.imports || { cat $(BIN)/.imports; exit 1; }
 	@$(BIN)/python scripts/configuration_table.py --check
-
-unit: $(BIN)/.dev models
-	@$(BIN)/pytest -n auto --dist loadfile $(ARGS)
 
 fuzz: $(BIN)/.dev models
 	@HANDSTEER_FUZZ_CASES=$(CASES) $(BIN)/pytest -n auto tests/fuzz $(ARGS)
@@ -104,6 +114,10 @@ $(BIN)/.run: scripts/setup requirements.txt pyproject.toml
 $(BIN)/.dev: scripts/setup requirements-dev.txt pyproject.toml | $(BIN)/.run
 	@scripts/setup requirements-dev.txt && touch $@
 
+site: $(BIN)/.dev
+	@$(BIN)/sphinx-build --quiet --fail-on-warning --doctree-dir .mypy_cache/site docs site
+	@echo "the site is in site/index.html"
+
 $(QUANTIZER)/.made: requirements-quantizer.txt | $(BIN)/.run
 	@$(BIN)/python -m venv --without-pip $(QUANTIZER)
 	@PATH="$(BIN):$$PATH" VIRTUAL_ENV="$(CURDIR)/$(QUANTIZER)" uv pip install --quiet --require-hashes \
@@ -114,11 +128,11 @@ COMPILE = uv pip compile --quiet --universal --python-version 3.11 --generate-ha
 	--no-emit-index-url --no-annotate --no-header --upgrade
 lock:
 	@test -x $(BIN)/uv || { python3 -m venv $(VENV) && $(BIN)/python -m pip install --quiet uv; }
-	@PATH="$(BIN):$$PATH" $(COMPILE) pyproject.toml --group setup --output-file requirements.txt
-	@PATH="$(BIN):$$PATH" $(COMPILE) pyproject.toml --group setup --group dev --output-file requirements-dev.txt
+	@PATH="$(BIN):$$PATH" $(COMPILE) pyproject.toml --extra sim --extra page --group setup --output-file requirements.txt
+	@PATH="$(BIN):$$PATH" $(COMPILE) pyproject.toml --extra all --group setup --group dev --output-file requirements-dev.txt
 	@PATH="$(BIN):$$PATH" $(COMPILE) --group pyproject.toml:ros2 --output-file requirements-ros2.txt
 	@echo "mediapipe==0.10.21" | PATH="$(BIN):$$PATH" $(COMPILE) - --output-file benchmarks/tutorial-requirements.txt
 	@PATH="$(BIN):$$PATH" $(COMPILE) --group pyproject.toml:quantizer --output-file requirements-quantizer.txt
 
 clean:
-	@rm -rf $(VENV) .mypy_cache .pytest_cache .ruff_cache .hypothesis
+	@rm -rf $(VENV) .mypy_cache .pytest_cache .ruff_cache .hypothesis site

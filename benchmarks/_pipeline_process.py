@@ -77,12 +77,11 @@ def _tutorial() -> Step:
 def _handsteer(*, drawing: bool) -> Step:
     import cv2  # noqa: PLC0415
 
-    from handsteer.config import Config  # noqa: PLC0415
     from handsteer.signs.drawing import annotate  # noqa: PLC0415
-    from handsteer.signs.opening import open_recognizer  # noqa: PLC0415
+    from handsteer.signs.recognizer import Recognizer  # noqa: PLC0415
 
     cv2.setNumThreads(1)
-    recognizer = open_recognizer(Config())
+    recognizer = Recognizer()
 
     def step(image: Any, dt_s: float) -> bool:
         recognition = recognizer.step(image, dt_s)

@@ -12,7 +12,6 @@ import numpy as np
 from handsteer.clock import SteppedClock
 from handsteer.config import CollisionMonitorConfig, ControlConfig, RobotConfig
 from handsteer.control.obstacles import ObstacleLimiter
-from handsteer.control.velocity import Velocity
 from handsteer.nodes.control import HandSignControlNode
 from handsteer.nodes.node import Node
 from handsteer.nodes.robot import RobotNode
@@ -21,6 +20,7 @@ from handsteer.robots.protocol import RangeScan
 from handsteer.robots.simulated import SimulatedRobot
 from handsteer.robots.world import World
 from handsteer.transports.in_process import InProcessTransport
+from handsteer.types import Velocity
 
 DRIVES, COMMANDS, POSTS = 30, 60, 8
 WALLS = [

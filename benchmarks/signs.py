@@ -15,15 +15,14 @@ from pathlib import Path
 
 import cv2
 
-from handsteer.config import Config
 from handsteer.signs.evaluate import evaluate_photos
 from handsteer.signs.figures import PhotoResult
 from handsteer.signs.intervals import Share
 from handsteer.signs.labelled import LabelledPhoto, read_photo_labels
-from handsteer.signs.opening import open_recognizer
+from handsteer.signs.recognizer import Recognizer
 from handsteer.signs.training.split import part_of
 from handsteer.signs.views import View
-from handsteer.signs.vocabulary import FORWARD, MOTION_SIGNS, NONE, SIGNS, TURN_LEFT, TURN_RIGHT
+from handsteer.types import FORWARD, MOTION_SIGNS, NONE, SIGNS, TURN_LEFT, TURN_RIGHT
 
 DATA = Path(__file__).parents[2] / "shared" / "data"
 FOLDERS = ("hagrid-dev", "photos")
@@ -67,7 +66,7 @@ def read_photos(folder: Path, part: str) -> list[LabelledPhoto]:
 
 def look_at(photos: list[LabelledPhoto], tilts: list[float]) -> Iterator[tuple[str, PhotoResult]]:
     """Yield the row of the table and the result of each photo in each view."""
-    recognizer = open_recognizer(Config())
+    recognizer = Recognizer()
     forward = [photo for photo in photos if photo.truth == FORWARD]
     thumbs = [photo for photo in photos if photo.kind in THUMBS]
     turned = [(photos, 0.0), (forward, 180.0), (thumbs, 90.0), (thumbs, -90.0)]

@@ -6,24 +6,24 @@ Run ``python examples/01_recognize_a_sign.py photo.jpg``; without a photo, a vir
 import sys
 from pathlib import Path
 
+from handsteer import Recognizer
 from handsteer.cameras.files import read_photo
 from handsteer.cameras.virtual import VirtualHandCamera
 from handsteer.clock import SteppedClock
-from handsteer.config import Config, VirtualHandConfig
-from handsteer.signs.opening import open_recognizer
+from handsteer.config import VirtualHandConfig
 
 
 def main() -> None:
     if len(sys.argv) > 1:
-        image = read_photo(Path(sys.argv[1]))
+        image = read_photo(Path(sys.argv[1]))  # as cv2.imread, with a clear error, and turned as the photo says
     else:
         clock = SteppedClock()
         camera = VirtualHandCamera(VirtualHandConfig(script="Turn Left:5"), width=640, height=480, fps=30, clock=clock)
         clock.advance(2.0)
         image = camera.read().image
 
-    recognition = open_recognizer(Config()).step(image, 0.0)
-    print(f"{recognition.seen} ({recognition.confidence:.0%})")
+    recognition = Recognizer().recognize(image)
+    print(f"{recognition.sign} ({recognition.confidence:.0%})")
     if recognition.hand is not None:
         wrist = recognition.hand.pixels[0]
         print(f"a {recognition.hand.handedness.lower()} hand, its wrist at {wrist[0]:.0f}, {wrist[1]:.0f} px")

@@ -5,14 +5,13 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from handsteer.config import Config
 from handsteer.hand.backgrounds import make_background
 from handsteer.hand.kinematics import angles_of, pose_skeleton
 from handsteer.hand.placement import Pinhole
 from handsteer.hand.poses import HandPose, View, sign_pose
 from handsteer.hand.renderer import Look, render
-from handsteer.signs.opening import open_recognizer
-from handsteer.signs.vocabulary import NONE, SIGNS
+from handsteer.signs.recognizer import Recognizer
+from handsteer.types import NONE, SIGNS
 
 FOLDER = Path(__file__).resolve().parents[1] / "docs" / "pictures"
 SIDE = 240
@@ -65,7 +64,7 @@ def tile(label: str, pose: HandPose) -> np.ndarray:
     camera = Pinhole.webcam(640, 480)
     placement = pose.view.placement("Right")
     picture = render(pose_skeleton(pose.angles), placement, camera, Look(), make_background("plain", 640, 480))
-    recognition = open_recognizer(Config()).step(picture, 0.0)
+    recognition = Recognizer().recognize(picture)
     place = recognition.hand.pixels[:, :2] if recognition.hand else np.array([[320.0, 240.0]])
     middle = ((place.min(axis=0) + place.max(axis=0)) / 2).clip(SIDE / 2, (640 - SIDE / 2, 480 - SIDE / 2)).astype(int)
     left, top = middle - SIDE // 2

@@ -8,7 +8,7 @@ import numpy as np
 from handsteer.cameras.virtual import VirtualHandCamera
 from handsteer.clock import SteppedClock
 from handsteer.config import VirtualHandConfig
-from handsteer.signs.vocabulary import BACKWARD, FORWARD, GO, STOP, TURN_LEFT, TURN_RIGHT
+from handsteer.types import BACKWARD, FORWARD, GO, STOP, TURN_LEFT, TURN_RIGHT
 
 OUT = Path(__file__).resolve().parents[1] / "docs" / "images" / "signs.png"
 SIDE, LABEL = 200, 30

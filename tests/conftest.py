@@ -15,6 +15,8 @@ from tests.ros1.graph import Ros1Graph, ros1_graph
 settings.register_profile("handsteer", deadline=None)
 settings.load_profile("handsteer")
 
+_NETWORKS = {"machines", "alone"}
+
 DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 
 
@@ -37,12 +39,14 @@ signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Run a slow test that has failed once more.
+    """Run a slow test that has failed once more, and mark what makes networks by the fixtures that make them.
 
-    Those drive real processes in real time, which a machine that is busy with other things may upset once. What is
+    Slow ones drive real processes in real time, which a machine that is busy with other things may upset once. What is
     wrong fails twice; the last line of the run counts what was run again.
     """
     for item in items:
+        if set(getattr(item, "fixturenames", ())) & _NETWORKS:
+            item.add_marker(pytest.mark.netns)
         if item.get_closest_marker("slow"):
             item.add_marker(pytest.mark.flaky(reruns=1, reruns_delay=3))
 

@@ -103,3 +103,18 @@ def test_every_known_robot_is_allowed(name: str) -> None:
 def test_robots_have_names_that_differ(robots: list[str]) -> None:
     with pytest.raises(ConfigError, match=r"control.robots: .* should name each robot once"):
         load(None, {"control": {"robots": robots}})
+
+
+def test_old_names_still_count_with_one_warning(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(config, "_OLD_NAMES_SEEN", set())
+    path = tmp_path / "old.yaml"
+    path.write_text("signs: {bridge_time: 0.3, keep_confidence: 0.6}\nlandmarks: {second_look: false}")
+    settings = load(path)
+    assert (settings.signs.dropout_hold, settings.signs.release_confidence) == (0.3, 0.6)
+    assert not settings.landmarks.refine_new_hands
+    assert load(path, None, {"signs": {"dropout_hold": 0.4}}).signs.dropout_hold == 0.4
+    assert load(None, {"signs": {"dropout_hold": 0.4}}, {"signs": {"bridge_time": 0.5}}).signs.dropout_hold == 0.5
+    said = [record.getMessage() for record in caplog.records if "bridge_time" in record.getMessage()]
+    assert said == ["the parameter bridge_time is called dropout_hold now; the old name still counts"]

@@ -12,6 +12,7 @@ SAYS = {
         "pictures are cut off for 2 s: the robot stands",
         "a fifth of the commands is lost for 2 s: the robot goes on",
     ],
+    "05_teleop_in_your_program": ["disarmed", "driving: Forward", "the robot is at x"],
 }
 
 

@@ -9,8 +9,8 @@ from handsteer.config import CameraConfig, Config, ControlConfig, RobotConfig, V
 from handsteer.errors import ConfigError
 from handsteer.graph import Graph
 from handsteer.messages import CMD_VEL, HAND_SIGN, ODOM, TF
-from handsteer.robots.protocol import Pose2D
 from handsteer.testing.trace import Trace
+from handsteer.types import Pose2D
 
 
 def drive(config: Config, duration_s: float = math.inf) -> tuple[Graph, Trace]:

@@ -117,3 +117,13 @@ def test_whatever_is_set_the_configuration_stays_valid(changes: dict[str, Any]) 
         after = parameters.values()
         assert all(after[name] == value for name, value in changes.items())
         Config.model_validate({"control": {name: after[name] for name in LIVE}})
+
+
+def test_old_names_still_count() -> None:
+    assert from_parameters({"bridge_time": 0.3, "landmarks": {"second_look": False}}, "signs", "/node") == {
+        "signs": {"dropout_hold": 0.3},
+        "landmarks": {"refine_new_hands": False},
+    }
+    applied: list[Config] = []
+    NodeParameters(Config(), "signs", applied.append).set({"bridge_time": 0.3})
+    assert applied[-1].signs.dropout_hold == 0.3

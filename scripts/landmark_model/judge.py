@@ -14,8 +14,8 @@ from ai_edge_litert.interpreter import Interpreter
 from crops import Half, crops, photos
 
 from handsteer.config import Config
-from handsteer.graph import open_recognizer
 from handsteer.landmarks.models import find_model
+from handsteer.signs.recognizer import Recognizer
 
 MODELS = ("full", "fast")
 
@@ -72,7 +72,7 @@ def spread(values: np.ndarray) -> str:
 
 
 def report_signs(folders: list[Path], half: Half) -> None:
-    recognizers = [open_recognizer(Config.model_validate({"landmarks": {"model": model}})) for model in MODELS]
+    recognizers = [Recognizer(Config.model_validate({"landmarks": {"model": model}})) for model in MODELS]
     told = []
     for name, photo in photos(folders, half):
         both = []

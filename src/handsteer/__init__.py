@@ -1,6 +1,40 @@
 """Drive a mobile robot with your hand signs.
 
-Start reading at :mod:`handsteer.graph`: it shows the whole flow on one page.
+>>> from handsteer import Recognizer
+>>> Recognizer().recognize(image).sign
+'Forward'
+
+:class:`Recognizer` tells the signs in pictures, :class:`Teleop` turns a stream of images into velocities,
+:class:`Config` holds everything that can be set, :class:`Velocity` is what a robot is told. Start reading at
+:mod:`handsteer.teleop`, then :mod:`handsteer.graph`, which has the same in nodes that topics join.
 """
 
+import importlib
+from typing import TYPE_CHECKING, Any, Final
+
+if TYPE_CHECKING:
+    from handsteer.config import Config
+    from handsteer.signs.recognizer import Recognizer
+    from handsteer.teleop import Teleop
+    from handsteer.types import Velocity
+
 __version__ = "0.1.0"
+__all__ = ["Config", "Recognizer", "Teleop", "Velocity"]
+
+_HOMES: Final = {
+    "Config": "handsteer.config",
+    "Recognizer": "handsteer.signs.recognizer",
+    "Teleop": "handsteer.teleop",
+    "Velocity": "handsteer.types",
+}
+
+
+def __getattr__(name: str) -> Any:
+    """Load a public name when it is asked for first: the command line and each node load no more than they need."""
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(importlib.import_module(_HOMES[name]), name)
+
+
+def __dir__() -> list[str]:
+    return sorted([*globals(), *__all__])

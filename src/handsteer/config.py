@@ -4,17 +4,20 @@ The YAML file, the command line and the settings of the page all come from these
 have them, units are SI (REP 103) and stand in brackets in each description.
 """
 
+import logging
 import re
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, TypeVar
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, field_validator, model_validator
 
-from handsteer.control.actions import ALWAYS_STOP, BUILT_IN, Action
 from handsteer.errors import ConfigError
 from handsteer.presets import CmdVelType, Preset, preset
-from handsteer.signs.vocabulary import find_sign
 from handsteer.timeouts import ODOMETRY_S, ROBOT_S, STALE_S
+from handsteer.types import ALWAYS_STOP, BUILT_IN, Action, Handedness, find_sign
+
+log = logging.getLogger(__name__)
 
 S = TypeVar("S", bound="Section")
 
@@ -23,6 +26,7 @@ Recorded = Literal["auto", "always", "never"]
 # The parameters of ROS have no null.
 OptionalPath = Annotated[Path | None, BeforeValidator(lambda path: None if path == "" else path)]
 _LONGEST_SHOWN = 200
+_OLD_NAMES_SEEN: set[str] = set()
 _NAMESPACE = re.compile(r"[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)
 
 
@@ -31,10 +35,32 @@ class Section(BaseModel):
 
     Attributes:
         live: Those that can change while a node runs; the others are read when it starts.
+        renamed: New names of parameters by their old ones, which still count.
     """
 
     live: ClassVar[frozenset[str]] = frozenset()
+    renamed: ClassVar[Mapping[str, str]] = {}
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, validate_default=True)
+
+    @classmethod
+    def new_name(cls, name: str) -> str:
+        """Return what the parameter ``name`` is called now; an old name is warned of once."""
+        new = cls.renamed.get(name, name)
+        if new != name and name not in _OLD_NAMES_SEEN:
+            _OLD_NAMES_SEEN.add(name)
+            log.warning("the parameter %s is called %s now; the old name still counts", name, new)
+        return new
+
+    @model_validator(mode="before")
+    @classmethod
+    def by_new_names(cls, values: Any) -> Any:
+        """Return ``values`` with the parameters that have an old name under their new one, unless that is there too."""
+        if not (isinstance(values, dict) and cls.renamed.keys() & values.keys()):
+            return values
+        renamed = {name: value for name, value in values.items() if name not in cls.renamed}
+        for old in cls.renamed.keys() & values.keys():
+            renamed.setdefault(cls.new_name(old), values[old])
+        return renamed
 
 
 class CameraConfig(Section):
@@ -77,7 +103,7 @@ class VirtualHandConfig(Section):
         description="Signs to show with their durations in seconds, over and over; NONE lowers the hand; "
         "Peace, Three, Four, Horns, Call and OK are there to be taught",
     )
-    handedness: Literal["Left", "Right"] = Field("Right", description="Which hand")
+    handedness: Handedness = Field("Right", description="Which hand")
     skin: Literal["light", "medium", "dark"] = Field("medium", description="Skin tone")
     background: Literal["plain", "cluttered"] = Field("plain", description="What is behind the hand")
     sleeve: bool = Field(True, description="Whether the forearm wears a sleeve")
@@ -86,6 +112,8 @@ class VirtualHandConfig(Section):
 
 class LandmarksConfig(Section):
     """How the hand is found in a frame."""
+
+    renamed = {"second_look": "refine_new_hands"}
 
     model: Literal["fast", "full", "lite"] = Field(
         "fast",
@@ -96,7 +124,7 @@ class LandmarksConfig(Section):
         2, ge=1, le=2, description="How many hands are looked for in a frame, to choose the one that shows a sign"
     )
     min_detection_confidence: float = Field(0.3, ge=0, le=1, description="Score from which a palm counts as found")
-    second_look: bool = Field(True, description="Look twice at a hand that is new, which reads it better")
+    refine_new_hands: bool = Field(True, description="Look twice at a hand that is new, which reads it better")
     wide_search: bool = Field(
         True,
         description="Look for hands also as if they were smaller, and in the middle of the frame; finds more near ones",
@@ -106,21 +134,33 @@ class LandmarksConfig(Section):
 
 
 class SignsConfig(Section):
-    """How the sign is told from the landmarks, and when it counts."""
+    """How the sign is recognised from the landmarks, and when it counts."""
+
+    renamed = {"bridge_time": "dropout_hold", "keep_confidence": "release_confidence"}
 
     live = frozenset(
-        {"model", "min_confidence", "keep_confidence", "confirm_time", "bridge_time", "switch_time", "max_frame_age"}
+        {
+            "model",
+            "min_confidence",
+            "release_confidence",
+            "confirm_time",
+            "dropout_hold",
+            "switch_time",
+            "max_frame_age",
+        }
     )
 
     model: OptionalPath = Field(
         None, description="File of taught signs, as `handsteer signs train` writes it; none has the shipped signs only"
     )
     min_confidence: float = Field(0.8, ge=0, le=1, description="Confidence from which a sign is seen")
-    keep_confidence: float = Field(0.5, ge=0, le=1, description="Confidence down to which the sign that counts is seen")
+    release_confidence: float = Field(
+        0.5, ge=0, le=1, description="Confidence down to which the sign that counts is seen"
+    )
     confirm_time: float = Field(
         0.1, ge=0, le=2, description="How long a sign must be seen before it counts; Stop counts at once [s]"
     )
-    bridge_time: float = Field(0.1, ge=0, le=2, description="How long a lost hand keeps its sign [s]")
+    dropout_hold: float = Field(0.1, ge=0, le=2, description="How long a lost hand keeps its sign [s]")
     switch_time: float = Field(
         0.5, ge=0, le=10, description="How long the followed hand shows no sign before another that shows one is [s]"
     )
@@ -410,9 +450,9 @@ def load(path: Path | None = None, base: dict[str, Any] | None = None, *override
     Raises:
         ConfigError: The file cannot be read, or a field is unknown or out of range; the message names it.
     """
-    values = _merge(base or {}, _read_yaml(path) if path else {})
-    for changes in overrides:
-        values = _merge(values, changes)
+    values: dict[str, Any] = {}
+    for changes in (base or {}, _read_yaml(path) if path else {}, *overrides):
+        values = _merge(values, _with_new_names(changes))
     return validate(Config, _merge(_preset(values), values), f" (also read: {path})" if path else "")
 
 
@@ -473,6 +513,15 @@ def _read_yaml(path: Path) -> dict[str, Any]:
     if not isinstance(values, dict):
         raise ConfigError(f"{path}: expected sections such as 'control:' at the top, found {type(values).__name__}")
     return values
+
+
+def _with_new_names(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the sections of ``values`` with new names only, so that an old one in a later source still counts."""
+    models = {name: field.annotation for name, field in Config.model_fields.items()}
+    return {
+        name: models[name].by_new_names(of) if name in models else of  # type: ignore[union-attr]
+        for name, of in values.items()
+    }
 
 
 def _merge(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:

@@ -20,11 +20,15 @@
     ├── PoseError              a hand pose or a script of signs is wrong
     ├── WorldError             a world file or robot description is wrong
     ├── TransportError         a topic cannot be published or subscribed to
-    └── DashboardError         the web page cannot be served
+    ├── DashboardError         the web page cannot be served
+    └── PackageMissing         what was asked for needs a Python package that is not installed
 
 A message is one line that says what was wrong, where, and what would be right.
 Only :mod:`handsteer.cli` prints one and exits (with code 2).
 """
+
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 
 class HandsteerError(Exception):
@@ -101,3 +105,28 @@ class TransportError(HandsteerError):
 
 class DashboardError(HandsteerError):
     """The web page cannot be served."""
+
+
+class PackageMissing(HandsteerError):  # noqa: N818
+    """What was asked for needs a Python package that is not installed."""
+
+
+@contextmanager
+def needing(what: str, extra: str, *modules: str) -> Iterator[None]:
+    """Say how to install what an import within the block lacks.
+
+    Args:
+        what: What needs it, for people, as ``the simulated robot``.
+        extra: The extra of handsteer that installs it, as ``sim``.
+        modules: The modules that the extra installs; what else is missing is raised as it is.
+
+    Raises:
+        PackageMissing: One of ``modules`` is not there.
+    """
+    try:
+        yield
+    except ModuleNotFoundError as problem:
+        module = (problem.name or "").partition(".")[0]
+        if module not in modules:
+            raise
+        raise PackageMissing(f"{what} needs the package {module}: run pip install 'handsteer[{extra}]'") from None

@@ -34,12 +34,12 @@ from handsteer.nodes.robot import RobotNode
 from handsteer.nodes.steering import SteeringNode
 from handsteer.robots import open_robot
 from handsteer.robots.course import CourseState
-from handsteer.robots.protocol import Pose2D
 from handsteer.signs.drawing import annotate
-from handsteer.signs.opening import open_classifier, open_recognizer
-from handsteer.signs.vocabulary import NONE, find_sign
+from handsteer.signs.opening import open_classifier
+from handsteer.signs.recognizer import Recognizer
 from handsteer.transports.in_process import InProcessTransport
 from handsteer.transports.protocol import Session, Transport
+from handsteer.types import NONE, Pose2D, find_sign
 
 log = logging.getLogger(__name__)
 
@@ -277,7 +277,7 @@ def make_recognition(config: Config, transport: Transport, clock: Clock) -> Hand
     Raises:
         ModelError: A landmark model or the sign model is missing or broken.
     """
-    recognizer = open_recognizer(config)
+    recognizer = Recognizer(config)
     _warn_of_unknown_signs(config, recognizer.signs)
     return HandSignRecognitionNode(
         transport, clock, recognizer, config.signs, annotate, open_classifier=open_classifier

@@ -95,7 +95,7 @@ __all__ = [
 M = TypeVar("M")
 
 STOPPING_SIGNS = frozenset({"Stop", "NONE"})
-"""What stops the robot whatever is configured, as handsteer.control.actions has it."""
+"""What stops the robot whatever is configured, as handsteer.types has it."""
 
 
 @dataclass

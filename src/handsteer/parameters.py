@@ -63,11 +63,13 @@ def from_parameters(parameters: Mapping[str, Any], section: str, node: str) -> d
         ConfigError: A value is not allowed; the message has the parameter's full name.
     """
     values: dict[str, Any] = {}
-    for name, value in parameters.items():
+    for given, value in parameters.items():
+        name = section_model(section).new_name(given)
         if name in _fields(section):
             values.setdefault(section, {})[name] = _checked(section, name, value, f"{node}/{name}")
         elif name in Config.model_fields and isinstance(value, Mapping):
-            for inner, of in value.items():
+            for given_inner, of in value.items():
+                inner = section_model(name).new_name(given_inner)
                 if inner in _fields(name):
                     values.setdefault(name, {})[inner] = _checked(name, inner, of, f"{node}/{name}/{inner}")
                 else:
@@ -245,12 +247,14 @@ class NodeParameters:
 
     def _place(self, name: str) -> "_Place | None":
         section, rest = self._section, name
-        if name.partition(".")[0] not in _fields(section):
+        own = section_model(section)
+        if name.partition(".")[0] not in {*own.model_fields, *own.renamed}:
             section, _, rest = name.partition(".")
         if section not in self._sections:
             return None
-        field, _, entry = rest.partition(".")
         model = section_model(section)
+        field, _, entry = rest.partition(".")
+        field = model.renamed.get(field, field)
         if field not in model.model_fields or _is_table(model, field) != bool(entry):
             return None
         return _Place(section, model, field, entry or None)

@@ -57,9 +57,7 @@ def recognize(source: Path, recognizer: Recognizer) -> Iterator[FrameResult]:
 
 def _photos(paths: list[Path], recognizer: Recognizer) -> Iterator[FrameResult]:
     for path in paths:
-        recognizer.reset()
-        recognition = recognizer.step(read_photo(path), 0.0)
-        yield _result(str(path), 0, 0.0, recognition, recognition.seen)
+        yield _result(str(path), 0, 0.0, recognizer.recognize(read_photo(path)))
 
 
 def _video(path: Path, recognizer: Recognizer) -> Iterator[FrameResult]:
@@ -67,16 +65,16 @@ def _video(path: Path, recognizer: Recognizer) -> Iterator[FrameResult]:
     for number, frame in enumerate(video_frames(path)):
         recognition = recognizer.step(frame.image, frame.captured_s - last_s)
         last_s = frame.captured_s
-        yield _result(str(path), number, frame.captured_s, recognition, recognition.sign)
+        yield _result(str(path), number, frame.captured_s, recognition)
 
 
-def _result(source: str, number: int, time_s: float, recognition: Recognition, sign: str) -> FrameResult:
+def _result(source: str, number: int, time_s: float, recognition: Recognition) -> FrameResult:
     hand = recognition.hand
     return FrameResult(
         source=source,
         frame=number,
         time_s=round(time_s, 6),
-        sign=sign,
+        sign=recognition.sign,
         seen=recognition.seen,
         confidence=round(recognition.confidence, 4),
         handedness=hand.handedness if hand else None,

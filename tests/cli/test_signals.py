@@ -13,7 +13,7 @@ from tests.processes import Process, free_port
 from tests.ros1.graph import Ros1Graph
 from tests.ros1.launches import ROS, ros_environment
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.exhaustive, pytest.mark.slow]
 
 MOMENTS = 30
 LATEST_S = 1.5

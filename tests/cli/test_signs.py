@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from handsteer.signs.recognizer import Recognizer
-from handsteer.signs.vocabulary import SIGNS
+from handsteer.types import SIGNS
 from tests.cli.test_cli import fails, prints
 
 

@@ -6,8 +6,7 @@ from hypothesis import strategies as st
 
 from handsteer.config import ControlConfig
 from handsteer.control.driver import Driver
-from handsteer.control.velocity import ZERO, Velocity
-from handsteer.signs.vocabulary import FORWARD, GO, NONE, STOP
+from handsteer.types import FORWARD, GO, NONE, STOP, ZERO, Velocity
 
 DT = 1 / 30
 

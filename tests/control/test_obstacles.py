@@ -11,7 +11,7 @@ from handsteer.config import CollisionMonitorConfig
 from handsteer.control.footprint import gaps, on_a_circle, seen_from
 from handsteer.control.obstacles import ObstacleLimiter, limit
 from handsteer.control.scan_points import Points
-from handsteer.control.velocity import ZERO, Velocity
+from handsteer.types import ZERO, Velocity
 
 RULE = CollisionMonitorConfig(enabled=True)
 FRONT, SIDE = RULE.front, RULE.side

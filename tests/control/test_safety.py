@@ -6,8 +6,8 @@ from hypothesis import strategies as st
 
 from handsteer.config import ControlConfig
 from handsteer.control.safety import Allowance, Following, Ramp, Safety
-from handsteer.control.velocity import ZERO, Velocity
 from handsteer.timeouts import ARMING_S, FAULT_GAP_S, NEUTRAL_S, STEERING_AT_START_S
+from handsteer.types import ZERO, Velocity
 
 FRAME_S = 1 / 30
 CONFIG = ControlConfig()

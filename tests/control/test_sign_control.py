@@ -6,8 +6,7 @@ from hypothesis import strategies as st
 
 from handsteer.config import ControlConfig
 from handsteer.control.sign_control import SignControl
-from handsteer.control.velocity import ZERO, Velocity
-from handsteer.signs.vocabulary import BACKWARD, FORWARD, GO, NONE, SIGNS, STOP, TURN_LEFT, TURN_RIGHT
+from handsteer.types import BACKWARD, FORWARD, GO, NONE, SIGNS, STOP, TURN_LEFT, TURN_RIGHT, ZERO, Velocity
 
 DT = 1 / 30
 signs = st.sampled_from([*SIGNS, NONE, "a word nobody knows", ""])

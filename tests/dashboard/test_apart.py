@@ -24,9 +24,9 @@ from handsteer.errors import ConfigError, DashboardError, FrameError, TransportE
 from handsteer.graph import Graph
 from handsteer.messages import CMD_VEL, STOP, Bool, Twist
 from handsteer.robots.editing import add, remove
-from handsteer.robots.protocol import Pose2D
 from handsteer.robots.world import load_world
 from handsteer.transports.protocol import Received
+from handsteer.types import Pose2D
 from tests.contracts.transport_contract import eventually
 from tests.processes import Process
 from tests.transports.test_piped import joined

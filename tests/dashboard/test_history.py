@@ -1,6 +1,6 @@
-from handsteer.control.velocity import Velocity
 from handsteer.dashboard.history import PERIOD_S, SPAN_S, Sample, VelocityHistory
 from handsteer.dashboard.panels.plot import rows_of
+from handsteer.types import Velocity
 
 
 def driven(history: VelocityHistory, seconds: float, begin_s: float = 0.0) -> float:

@@ -5,11 +5,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from handsteer.config import Config, ControlConfig
-from handsteer.control.actions import ACTIONS, action_of
 from handsteer.control.effects import effect_of, tell, told
 from handsteer.dashboard.panels.legend import legend
 from handsteer.dashboard.state import known_signs
-from handsteer.signs.vocabulary import SIGNS
+from handsteer.types import ACTIONS, SIGNS, action_of
 
 
 def effects(signs: tuple[str, ...], rule: ControlConfig | None) -> dict[str, tuple[str, str]]:

@@ -9,7 +9,7 @@ from handsteer.landmarks.protocol import Hand
 from handsteer.signs.protocol import SignGuess
 from handsteer.signs.recognizer import Recognition
 from handsteer.signs.teaching.collect import Facts
-from handsteer.signs.vocabulary import NONE
+from handsteer.types import NONE
 from tests.dashboard.lessons import REPORT
 from tests.signs.hands import show_sign
 from tests.signs.teaching.models import model

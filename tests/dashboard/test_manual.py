@@ -4,8 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from handsteer.control.velocity import ZERO, Velocity
 from handsteer.dashboard.manual import SLIDERS_TIMEOUT_S, Manual
+from handsteer.types import ZERO, Velocity
 
 SLOW, FAST = Velocity(0.2, 0.1), Velocity(-0.4, 1.0)
 # The page's clock has nothing in common with ours.

@@ -5,7 +5,6 @@ import pytest
 
 from handsteer.clock import SteppedClock
 from handsteer.config import ControlConfig
-from handsteer.control.velocity import Velocity
 from handsteer.dashboard.node import HOLD_TIMEOUT_S, DashboardNode
 from handsteer.dashboard.watch import WhileWatched
 from handsteer.errors import TransportError
@@ -37,9 +36,9 @@ from handsteer.nodes.control import HandSignControlNode
 from handsteer.nodes.steering import SteeringNode
 from handsteer.robots.course import CourseState
 from handsteer.robots.description import robot_description
-from handsteer.robots.protocol import Pose2D
 from handsteer.transports.in_process import InProcessTransport
 from handsteer.transports.protocol import Received
+from handsteer.types import Pose2D, Velocity
 
 
 class Bench:

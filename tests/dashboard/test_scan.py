@@ -4,7 +4,7 @@ import numpy as np
 
 from handsteer.dashboard.scan import MOST_POINTS, scan_points
 from handsteer.messages import Header, LaserScan, Time
-from handsteer.robots.protocol import Pose2D
+from handsteer.types import Pose2D
 
 
 def scan(*ranges: float, increment: float = math.pi / 2) -> LaserScan:

@@ -7,9 +7,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from handsteer.config import Config, load
-from handsteer.control.actions import ACTIONS
 from handsteer.dashboard.settings_form import LONGEST_TEXT, MASK, FormField, form, mask
 from handsteer.errors import ConfigError
+from handsteer.types import ACTIONS
 
 FIELDS = {field.path: field for fields in form().values() for field in fields}
 
@@ -58,7 +58,7 @@ def message(of: Any, *given: Any) -> str:
         ("camera.width", "63"),
         ("camera.width", "64.5"),
         ("landmarks.max_hands", "3"),
-        ("landmarks.second_look", "perhaps"),
+        ("landmarks.refine_new_hands", "perhaps"),
         ("control.ramp", "quickly"),
         ("robot.preset", "roomba"),
         ("dashboard.host", "''"),

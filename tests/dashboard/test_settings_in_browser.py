@@ -21,6 +21,19 @@ def row(page: Page, path: str) -> Locator:
     return page.locator(".setting", has=of(page, path))
 
 
+def search(page: Page, words: str, count: int) -> None:
+    """Search until ``count`` are left; a page that has lost its connection loads itself again, with an empty search."""
+    for patience_ms in (PATIENCE_MS // 4, PATIENCE_MS):
+        page.get_by_label("Search the parameters").fill(words)
+        try:
+            expect(page.locator(".setting:visible")).to_have_count(count, timeout=patience_ms)
+        except AssertionError:
+            if patience_ms == PATIENCE_MS:
+                raise
+        else:
+            return
+
+
 def test_the_driver_sets_what_the_robot_does_and_saves_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     with visiting("NONE:600", "/settings", camera={"fps": 5}) as visit:
@@ -37,9 +50,9 @@ def test_the_driver_sets_what_the_robot_does_and_saves_it(tmp_path: Path, monkey
         expect(row(page, "control.max_linear")).to_contain_text("changed")
         expect(page.locator(".seat .role")).to_have_text("you drive")
 
-        of(page, "landmarks.second_look").click()
-        expect(row(page, "landmarks.second_look")).to_contain_text("waits for the next start")
-        assert graph.config.landmarks.second_look
+        of(page, "landmarks.refine_new_hands").click()
+        expect(row(page, "landmarks.refine_new_hands")).to_contain_text("waits for the next start")
+        assert graph.config.landmarks.refine_new_hands
         of(page, "robot.preset").click()
         page.get_by_role("option", name="turtlebot4").click()
         expect(of(page, "robot.max_linear")).to_have_value("0.306")
@@ -52,14 +65,17 @@ def test_the_driver_sets_what_the_robot_does_and_saves_it(tmp_path: Path, monkey
         expect(row(page, "control.cmd_vel_type")).to_contain_text("they should be the same")
         expect(of(page, "control.cmd_vel_type")).to_have_value("twist")
 
-        page.get_by_label("Search the parameters").fill("highest turning")
-        expect(page.locator(".setting:visible")).to_have_count(1)
+        search(page, "highest turning", 1)
         page.get_by_label("Search the parameters").fill("")
         expect(page.locator(".state")).to_have_text("not saved yet")
         page.get_by_role("button", name="Save").click()
         expect(page.locator(".said")).to_have_text("saved to handsteer.yaml")
         saved = load(tmp_path / "handsteer.yaml")
-        assert (saved.control.max_linear, saved.robot.preset, saved.landmarks.second_look) == (0.4, "turtlebot4", False)
+        assert (saved.control.max_linear, saved.robot.preset, saved.landmarks.refine_new_hands) == (
+            0.4,
+            "turtlebot4",
+            False,
+        )
         assert saved.camera.fps == 5
 
         page.get_by_label("Set control.max_linear to its default").click()

@@ -4,7 +4,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from handsteer.control.velocity import ZERO, Velocity
 from handsteer.dashboard.panels.banner import spoken
 from handsteer.dashboard.panels.mux import entries
 from handsteer.dashboard.panels.sliders import read_limit
@@ -20,7 +19,7 @@ from handsteer.dashboard.state import (
     frame_rate,
     place_in_world,
 )
-from handsteer.robots.protocol import Pose2D
+from handsteer.types import ZERO, Pose2D, Velocity
 
 OK, WARN, ERROR = 0, 1, 2
 FINITE = st.floats(-100, 100)

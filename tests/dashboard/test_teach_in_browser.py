@@ -61,7 +61,7 @@ def test_a_sign_is_taught_from_the_browsers_webcam_and_drives(
     two_fingers: Path, plan: dict[str, Any], tmp_path: Path
 ) -> None:
     # A machine that draws the world in software, and has little time, is slow to send its camera's frames.
-    patient = {"signs": {"max_frame_age": 2.0, "bridge_time": 1.0}, "control": {"sign_timeout": 2.0}}
+    patient = {"signs": {"max_frame_age": 2.0, "dropout_hold": 1.0}, "control": {"sign_timeout": 2.0}}
     with visiting("NONE:600", "/teach", webcam=two_fingers, teach=plan, **patient) as visit:
         teach(visit)
         keep(visit)

@@ -5,13 +5,12 @@ import dataclasses
 import pytest
 
 from handsteer.config import TeachConfig
-from handsteer.control.actions import EFFECTS, Action
 from handsteer.dashboard.panels.teach_collect import counted, said_now
 from handsteer.dashboard.panels.teach_result import opinion
 from handsteer.dashboard.teaching.lesson import Collected, Lesson, View
 from handsteer.signs.recognizer import Recognition
 from handsteer.signs.teaching.collect import Facts, Status
-from handsteer.signs.vocabulary import NONE
+from handsteer.types import EFFECTS, NONE, Action
 from tests.dashboard.served import Site
 from tests.signs.hands import show_sign
 from tests.signs.teaching.takes import take

@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from handsteer.dashboard.trail import LEAP_M, MOST_POINTS, STEP_M, Trail
-from handsteer.robots.protocol import Pose2D
+from handsteer.types import Pose2D
 
 
 def gone(*xs: float) -> Trail:

@@ -41,6 +41,7 @@ def objects() -> Counter[str]:
     return Counter(f"{kind.__module__}.{kind.__qualname__}" for kind in kinds)
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_a_visit_leaves_nothing_behind(site: Site) -> None:
     def visit_all() -> Counter[str]:

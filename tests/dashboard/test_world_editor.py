@@ -4,8 +4,9 @@ from handsteer.dashboard.panels.thing_form import figures
 from handsteer.dashboard.panels.world_editor import LARGEST_FILE_BYTES, read_file
 from handsteer.errors import WorldError
 from handsteer.robots.editing import add, edit
-from handsteer.robots.protocol import Pose2D, Shape
+from handsteer.robots.protocol import Shape
 from handsteer.robots.world import World
+from handsteer.types import Pose2D
 
 
 def test_a_file_comes_with_its_name() -> None:

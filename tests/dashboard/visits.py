@@ -1,5 +1,6 @@
 """A browser that looks at the page of a running graph."""
 
+import logging
 import math
 import time
 from collections.abc import Callable, Iterator
@@ -9,12 +10,15 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from playwright.sync_api import ConsoleMessage, Page, Request, ViewportSize, sync_playwright
+from playwright.sync_api import ConsoleMessage, Page, Request, ViewportSize
 from scripts import chromium
 
 from handsteer.config import load
 from handsteer.dashboard.apart import PageApart
 from handsteer.graph import Graph
+from tests.dashboard.browsers import a_browser
+
+log = logging.getLogger(__name__)
 
 PATIENCE_MS = 60_000
 _STANDS_S = 1.0
@@ -98,22 +102,21 @@ def visiting(
         "virtual_hand": {"script": script},
         "dashboard": {"port": 0},
     }
-    with Graph(load(None, base, sections), steering=steering) as graph, sync_playwright() as playwright:
+    with Graph(load(None, base, sections), steering=steering) as graph, a_browser(webcam) as browser:
         served = PageApart()
         url = served.serve(graph)
-        browser = chromium.launch(playwright, webcam)
+        visit = Visit(browser.new_page(viewport=WINDOW), graph)
         try:
-            visit = Visit(browser.new_page(viewport=WINDOW), graph)
             visit.page.set_default_timeout(PATIENCE_MS)
             visit.page.on("console", visit.note_message)
             visit.page.on("pageerror", lambda error: visit.troubles.append(str(error)))
             visit.page.on("request", visit.note_request)
             # Shown with a test that fails: a page that lost its connection loads itself again, and forgets its inputs.
-            visit.page.on("framenavigated", lambda frame: print(f"{time.monotonic():.1f} s: loaded {frame.url}"))
+            visit.page.on("framenavigated", lambda frame: log.warning("loaded %s", frame.url))
             visit.page.goto(url + path)
             visit.page.locator(".banner").wait_for()
             graph.start()
             yield visit
         finally:
-            browser.close()
+            visit.page.context.close()  # before what it shows is gone
             served.stop()

@@ -79,6 +79,7 @@ def test_who_looks_at_the_subnet_is_met_on_one_machine(tmp_path: Path, first: st
         meeting.close()
 
 
+@pytest.mark.netns
 def test_another_machine_is_kept_out_and_does_not_keep_us_apart(tmp_path: Path) -> None:
     def met(here: Machine, there: Machine) -> None:
         meeting = Meeting(tmp_path, 3, here.command(), there.command())
@@ -96,6 +97,7 @@ def test_another_machine_is_kept_out_and_does_not_keep_us_apart(tmp_path: Path) 
     on_two_machines(tmp_path, met)
 
 
+@pytest.mark.netns
 def test_on_one_machine_we_go_on_when_the_network_goes(tmp_path: Path) -> None:
     """As a laptop does that leaves its Wi-Fi: our own nodes do not need it."""
 

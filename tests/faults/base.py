@@ -3,7 +3,8 @@
 from handsteer.clock import Clock
 from handsteer.config import RobotConfig
 from handsteer.robots.diff_drive import DriveState, Velocity, integrate, step, wheel_speeds
-from handsteer.robots.protocol import Obstacle, Pose2D, RangeScan, RobotState
+from handsteer.robots.protocol import Obstacle, RangeScan, RobotState
+from handsteer.types import Pose2D
 
 _DT_S = 0.02
 

@@ -37,10 +37,10 @@ from handsteer.robots.protocol import Robot
 from handsteer.robots.remote import RemoteRobot
 from handsteer.signs.drawing import annotate
 from handsteer.signs.opening import open_classifier
-from handsteer.signs.vocabulary import NONE
 from handsteer.testing.fault_transport import FaultTransport
 from handsteer.testing.faulty_camera import SpoiltCamera
 from handsteer.transports.protocol import Call, Received
+from handsteer.types import NONE
 from tests.faults.base import Base
 from tests.faults.domain import Domain
 from tests.faults.painted import PaintedCamera, painted_recognizer

@@ -7,11 +7,11 @@ from numpy.typing import NDArray
 
 from handsteer.cameras.protocol import Frame
 from handsteer.clock import Clock
-from handsteer.config import SignsConfig
+from handsteer.config import Config, SignsConfig
 from handsteer.landmarks.protocol import Hand
 from handsteer.signs.protocol import SignGuess
 from handsteer.signs.recognizer import Recognizer
-from handsteer.signs.vocabulary import NONE
+from handsteer.types import NONE
 from tests.signs.hands import show_sign
 
 SIGNS = ("Forward", "Backward", "Turn Left", "Turn Right", "Go", "Stop")
@@ -76,4 +76,4 @@ class PaintedClassifier:
 
 def painted_recognizer(config: SignsConfig) -> Recognizer:
     """Return the real recogniser, with the real filter, on painted hands."""
-    return Recognizer(PaintedLandmarker(), PaintedClassifier(), config)
+    return Recognizer(Config(signs=config), landmarker=PaintedLandmarker(), classifier=PaintedClassifier())

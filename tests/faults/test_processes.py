@@ -22,6 +22,7 @@ def signs() -> Iterator[Rig]:
         yield made
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 @pytest.mark.parametrize("row", [*CONTROL, *ROBOT], ids=lambda row: row.name)
 def test_the_robot_stands_within_the_limit_and_until_neutral_was_seen(signs: Rig, row: object) -> None:

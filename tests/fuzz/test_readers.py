@@ -48,9 +48,9 @@ from handsteer.signs.model import DEFAULT_MODEL, load_model
 from handsteer.signs.teaching.dataset import load_dataset
 from handsteer.signs.teaching.keypoint_csv import read_class_names, read_keypoints
 from handsteer.signs.teaching.taught import load_taught, save_taught
-from handsteer.signs.vocabulary import SIGNS
 from handsteer.transports.ros2.arguments import parse_arguments
 from handsteer.transports.ros2.encoding import decode, encode
+from handsteer.types import SIGNS
 from tests.fuzz import corpus
 from tests.fuzz.mutants import CASES, hold, mutants
 from tests.signs.teaching.models import model

@@ -10,7 +10,7 @@ from handsteer.config import LandmarksConfig
 from handsteer.landmarks.mediapipe import MediaPipeLandmarker
 from handsteer.signs.model import load_model
 from handsteer.signs.trained import TrainedClassifier
-from handsteer.signs.vocabulary import SIGNS
+from handsteer.types import SIGNS
 from tests.hand.views import random_picture
 
 pytestmark = pytest.mark.slow

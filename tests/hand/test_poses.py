@@ -5,7 +5,7 @@ from handsteer.errors import PoseError
 from handsteer.hand.kinematics import LIMITS, pose_joints
 from handsteer.hand.placement import Pinhole
 from handsteer.hand.poses import sign_pose
-from handsteer.signs.vocabulary import BACKWARD, FORWARD, GO, NONE, SIGNS, STOP, TURN_LEFT, TURN_RIGHT
+from handsteer.types import BACKWARD, FORWARD, GO, NONE, SIGNS, STOP, TURN_LEFT, TURN_RIGHT
 
 CAMERA = Pinhole.webcam(640, 480)
 HANDS = ("Left", "Right")

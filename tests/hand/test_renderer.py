@@ -6,7 +6,7 @@ from handsteer.hand.kinematics import pose_skeleton
 from handsteer.hand.placement import Pinhole
 from handsteer.hand.poses import View, sign_pose
 from handsteer.hand.renderer import Look, render, true_pixels
-from handsteer.signs.vocabulary import SIGNS, STOP
+from handsteer.types import SIGNS, STOP
 
 CAMERA = Pinhole.webcam(320, 240)
 WALL = np.full((240, 320, 3), (210, 40, 40), np.uint8)

@@ -8,7 +8,7 @@ from handsteer.hand.kinematics import LIMITS, pose_joints
 from handsteer.hand.placement import Pinhole
 from handsteer.hand.poses import sign_pose
 from handsteer.hand.script import Motion, Part, parse_script
-from handsteer.signs.vocabulary import NONE, SIGNS
+from handsteer.types import NONE, SIGNS
 
 SCRIPT = "Forward:1 Turn Left:1 Stop:0.5 Backward:1 Turn Right:1 Go:0.7 NONE:1"
 PARTS = st.lists(st.tuples(st.sampled_from([*SIGNS, NONE]), st.floats(0.01, 100)), min_size=1, max_size=8)

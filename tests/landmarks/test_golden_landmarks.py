@@ -26,7 +26,7 @@ class Golden:
 
 
 AS_MEDIAPIPE = LandmarksConfig(
-    model="full", max_hands=1, min_detection_confidence=0.5, second_look=False, wide_search=False
+    model="full", max_hands=1, min_detection_confidence=0.5, refine_new_hands=False, wide_search=False
 )
 
 

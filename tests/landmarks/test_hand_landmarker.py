@@ -141,9 +141,9 @@ def test_only_the_hand_that_is_named_is_followed_on(two_hand_landmarker):
         assert followed.handedness == handedness
 
 
-def test_the_second_look_reads_a_new_hand_as_following_would_nearly():
+def test_refining_reads_a_new_hand_as_following_would_nearly():
     frame = draw(open_right_hand(300, 250))
-    once = MediaPipeLandmarker(LandmarksConfig(second_look=False))
+    once = MediaPipeLandmarker(LandmarksConfig(refine_new_hands=False))
     once.detect(frame)
     (followed,) = once.detect(frame)
     (looked_twice,) = MediaPipeLandmarker(LandmarksConfig()).detect(frame)

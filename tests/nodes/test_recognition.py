@@ -19,7 +19,7 @@ from handsteer.signs.opening import open_classifier
 from handsteer.signs.recognizer import Recognition, Recognizer
 from handsteer.signs.teaching.taught import save_taught
 from handsteer.signs.trained import TrainedClassifier
-from handsteer.signs.vocabulary import FORWARD
+from handsteer.types import FORWARD
 from tests.nodes.stepping import Bench
 from tests.signs.hands import show_fingers, show_sign
 from tests.signs.teaching.models import model
@@ -35,7 +35,7 @@ class RecognitionBench(Bench):
         super().__init__()
         config = config or SignsConfig()
         landmarker = RecordedLandmarker([[hand or show_sign(FORWARD)]] * 100)
-        recognizer = Recognizer(landmarker, TrainedClassifier(load_model()), config)
+        recognizer = Recognizer(Config(signs=config), landmarker=landmarker, classifier=TrainedClassifier(load_model()))
         self.node = HandSignRecognitionNode(
             self.transport, self.clock, recognizer, config, annotate, open_classifier=open_classifier
         )
@@ -305,7 +305,7 @@ def test_none_comes_within_the_timeout_and_a_moment(bench: RecognitionBench) -> 
 
 def test_other_confidences_and_times_count_from_the_next_frame(bench: RecognitionBench) -> None:
     bench.show(frames=6)
-    bench.node.reconfigure(Config.model_validate({"signs": {"min_confidence": 1.0, "keep_confidence": 1.0}}))
+    bench.node.reconfigure(Config.model_validate({"signs": {"min_confidence": 1.0, "release_confidence": 1.0}}))
     bench.show(frames=6)
     assert bench.names[-2:] == ["NONE"] * 2
     bench.node.reconfigure(Config.model_validate({"signs": {"confirm_time": 0.0}}))

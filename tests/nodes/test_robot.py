@@ -21,8 +21,8 @@ from handsteer.nodes.robot import RobotNode
 from handsteer.robots import open_robot
 from handsteer.robots.course import CourseState, read_course
 from handsteer.robots.editing import add, edit, remove
-from handsteer.robots.protocol import Pose2D
 from handsteer.robots.world import load_world
+from handsteer.types import Pose2D
 from tests.nodes.stepping import Bench
 
 START = Pose2D(0.0, 0.0, 0.0)

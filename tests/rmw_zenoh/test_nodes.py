@@ -233,6 +233,7 @@ def test_nodes_of_other_domains_are_not_seen(network: ZenohGraph) -> None:
     assert "/other/hand_sign_control" not in network.nodes()
 
 
+@pytest.mark.exhaustive
 class TestRouter:
     def test_without_one_it_says_so_and_joins_when_it_comes(self, tmp_path: Path) -> None:
         with zenoh_graph(tmp_path) as graph:

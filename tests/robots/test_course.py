@@ -8,9 +8,9 @@ from hypothesis import strategies as st
 
 from handsteer.config import RobotConfig
 from handsteer.robots.course import BUMP_S, LEAP_M, MISS_S, CourseState, Referee, crosses, read_course, stopwatch
-from handsteer.robots.protocol import Pose2D
 from handsteer.robots.simulated import SimulatedRobot
 from handsteer.robots.world import Gate, load_world
+from handsteer.types import Pose2D
 
 PERIOD_S = 0.02
 COURSE = [Gate(name=f"gate {x}", left=(x, 1.0), right=(x, -1.0)) for x in (1.0, 2.0, 3.0, 4.0)]

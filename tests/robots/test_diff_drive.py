@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from handsteer.config import RobotConfig
 from handsteer.robots.diff_drive import DriveState, Velocity, integrate, step, velocity_of, wheel_speeds
-from handsteer.robots.protocol import Pose2D
+from handsteer.types import Pose2D
 
 CONFIG = RobotConfig()
 STILL = Velocity()

@@ -7,9 +7,10 @@ from hypothesis import strategies as st
 from handsteer.config import RobotConfig
 from handsteer.errors import WorldError
 from handsteer.robots.editing import MOST_OBSTACLES, add, edit, footprint_m, free_place, remove
-from handsteer.robots.protocol import Pose2D, Shape
+from handsteer.robots.protocol import Shape
 from handsteer.robots.simulated import SimulatedRobot
 from handsteer.robots.world import Box, World, load_world
+from handsteer.types import Pose2D
 
 START = Pose2D(0.0, 0.0, 0.0)
 SHAPES: tuple[Shape, ...] = ("box", "cylinder", "sphere")

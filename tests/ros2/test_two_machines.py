@@ -12,6 +12,7 @@ from tests.processes import Peer, Process, eventually
 from tests.ros2.graph import PEER, PYTHON
 
 pytestmark = [
+    pytest.mark.netns,
     pytest.mark.ros2,
     pytest.mark.slow,
     pytest.mark.skipif(not PYTHON.exists(), reason="no ROS 2 here: make ros2 installs one for the tests"),

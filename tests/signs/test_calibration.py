@@ -7,7 +7,7 @@ from handsteer.signs.calibration import BINS, THRESHOLDS, calibration, sweep
 from handsteer.signs.calibration_pictures import draw_reliability, draw_sweep
 from handsteer.signs.figures import PhotoResult
 from handsteer.signs.intervals import Share
-from handsteer.signs.vocabulary import FORWARD, GO, MOTION_SIGNS, NONE, SIGNS, STOP
+from handsteer.types import FORWARD, GO, MOTION_SIGNS, NONE, SIGNS, STOP
 
 
 def photo(truth: str, **likelihoods: float) -> PhotoResult:

@@ -11,17 +11,16 @@ from handsteer.cameras.files import video_frames
 from handsteer.cameras.protocol import Frame
 from handsteer.cameras.virtual import VirtualHandCamera
 from handsteer.clock import SteppedClock
-from handsteer.config import Config, VirtualHandConfig
+from handsteer.config import VirtualHandConfig
 from handsteer.errors import CameraUnreadable, LabelError
 from handsteer.signs.calibration import sweep
 from handsteer.signs.evaluate import evaluate_frames, evaluate_photos
 from handsteer.signs.figures import PhotoResult
 from handsteer.signs.labelled import LabelledPhoto, read_video_labels
-from handsteer.signs.opening import open_recognizer
 from handsteer.signs.recognizer import Recognizer
 from handsteer.signs.video_figures import video_report
 from handsteer.signs.views import View
-from handsteer.signs.vocabulary import BACKWARD, FORWARD, MOTION_SIGNS, NONE, SIGNS, STOP, TURN_LEFT, TURN_RIGHT
+from handsteer.types import BACKWARD, FORWARD, MOTION_SIGNS, NONE, SIGNS, STOP, TURN_LEFT, TURN_RIGHT
 
 Picture = NDArray[np.uint8]
 
@@ -37,7 +36,7 @@ def virtual_hand(sign: str) -> Picture:
 
 @pytest.fixture(scope="module")
 def recognizer() -> Recognizer:
-    return open_recognizer(Config())
+    return Recognizer()
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,7 @@ from handsteer.signs.figures import PhotoResult
 from handsteer.signs.sources import PhotoRun, VideoRun
 from handsteer.signs.video_figures import FrameVerdict
 from handsteer.signs.views import View
-from handsteer.signs.vocabulary import FORWARD, GO, MOTION_SIGNS, NONE, SIGNS, STOP
+from handsteer.types import FORWARD, GO, MOTION_SIGNS, NONE, SIGNS, STOP
 
 RAW, TILTED = View(), View(flip=True, rotate_deg=15)
 

@@ -8,7 +8,7 @@ import pytest
 from handsteer.signs.confusion_picture import draw_confusion
 from handsteer.signs.figures import Confusion, PhotoResult, photo_report
 from handsteer.signs.intervals import Share
-from handsteer.signs.vocabulary import FORWARD, GO, MOTION_SIGNS, NONE, SIGNS, STOP, TURN_LEFT
+from handsteer.types import FORWARD, GO, MOTION_SIGNS, NONE, SIGNS, STOP, TURN_LEFT
 
 
 def photo(truth: str, seen: str, kind: str = "", hand_px: float | None = 60.0) -> PhotoResult:

@@ -1,9 +1,11 @@
+from itertools import pairwise
+
 from hypothesis import given
 from hypothesis import strategies as st
 
 from handsteer.config import SignsConfig
 from handsteer.signs.filter import SignFilter
-from handsteer.signs.vocabulary import FORWARD, GO, NONE, SIGNS, STOP, TURN_LEFT
+from handsteer.types import FORWARD, GO, NONE, SIGNS, STOP, TURN_LEFT
 
 DT = 1 / 30
 
@@ -15,6 +17,14 @@ def show(signs: SignFilter, seen: str, frames: int) -> list[str]:
 def test_a_sign_counts_within_100_ms_at_30_frames_a_second() -> None:
     signs = SignFilter(SignsConfig())
     assert show(signs, FORWARD, 5) == [NONE, NONE, NONE, FORWARD, FORWARD]
+
+
+@given(st.floats(0, 1e6), st.sampled_from([10, 30, 60]))
+def test_it_takes_as_many_frames_however_stamps_are_rounded(start_s: float, fps: int) -> None:
+    signs, stamps = SignFilter(SignsConfig()), [start_s + frame / fps for frame in range(10)]
+    intervals = [0.0, *(after - before for before, after in pairwise(stamps))]
+    assert [signs.step(FORWARD, dt_s) for dt_s in intervals].index(FORWARD) == fps // 10
+    assert [signs.step(NONE, 1 / fps) for _ in range(10)].count(FORWARD) == fps // 10
 
 
 def test_stop_counts_at_its_first_frame() -> None:
@@ -30,13 +40,13 @@ def test_another_sign_for_two_frames_is_swallowed() -> None:
 
 
 def test_a_short_loss_is_bridged_and_a_long_one_is_not() -> None:
-    signs = SignFilter(SignsConfig(bridge_time=0.1))
+    signs = SignFilter(SignsConfig(dropout_hold=0.1))
     show(signs, FORWARD, 10)
     assert show(signs, NONE, 5) == [FORWARD, FORWARD, FORWARD, NONE, NONE]
 
 
 def test_from_one_sign_to_another_the_first_holds_until_the_second_counts() -> None:
-    signs = SignFilter(SignsConfig(confirm_time=0.1, bridge_time=0.1))
+    signs = SignFilter(SignsConfig(confirm_time=0.1, dropout_hold=0.1))
     show(signs, GO, 10)
     assert show(signs, FORWARD, 4) == [GO, GO, GO, FORWARD]
 

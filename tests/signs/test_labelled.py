@@ -4,7 +4,7 @@ import pytest
 
 from handsteer.errors import LabelError
 from handsteer.signs.labelled import LabelledPhoto, read_photo_labels, read_video_labels
-from handsteer.signs.vocabulary import FORWARD, NONE, SIGNS, STOP, TURN_RIGHT
+from handsteer.types import FORWARD, NONE, SIGNS, STOP, TURN_RIGHT
 
 
 def put(folder: Path, *names: str) -> None:

@@ -6,9 +6,8 @@ import sys
 
 RECOGNISE_AN_ARRAY = """
 import numpy as np
-from handsteer.config import Config
-from handsteer.signs.opening import open_recognizer
-open_recognizer(Config()).step(np.zeros((480, 640, 3), np.uint8), 0.0)
+from handsteer import Recognizer
+Recognizer().step(np.zeros((480, 640, 3), np.uint8), 0.0)
 """
 LOADED = "import json, sys; print(json.dumps(sorted(sys.modules)))"
 
@@ -25,8 +24,8 @@ def test_a_recogniser_loads_nothing_but_what_recognises() -> None:
     packages = {name.partition(".")[0] for name in modules}
     assert packages >= {"ai_edge_litert", "cv2", "numpy", "platformdirs", "pydantic"}
     assert not packages & {"cyclopts", "fastapi", "mujoco", "nicegui", "rosbags", "starlette", "tqdm", "xacro", "yaml"}
-    rooms = {name.split(".")[1] for name in modules if name.startswith("handsteer.")}
-    assert rooms == {"config", "control", "errors", "landmarks", "presets", "signs", "timeouts"}
+    packages = {name.split(".")[1] for name in modules if name.startswith("handsteer.")}
+    assert packages == {"config", "errors", "landmarks", "presets", "signs", "timeouts", "types"}
 
 
 def test_photos_and_videos_are_recognised_without_messages_or_robots() -> None:

@@ -2,14 +2,14 @@ from handsteer.config import SignsConfig
 from handsteer.landmarks.protocol import Hand
 from handsteer.signs.operator import Operator
 from handsteer.signs.protocol import SignGuess
-from handsteer.signs.vocabulary import FORWARD, GO, NONE, STOP
+from handsteer.types import FORWARD, GO, NONE, STOP
 from tests.signs.hands import moved, show_sign
 
 DT = 1 / 30
 HAND = show_sign(STOP)
 LEFT, RIGHT = moved(HAND, -180), moved(HAND, 180)
 SMALL = moved(HAND, 180, scale=0.4)
-CONFIG = SignsConfig(switch_time=0.5, bridge_time=0.1)
+CONFIG = SignsConfig(switch_time=0.5, dropout_hold=0.1)
 
 
 def look(operator: Operator, *seen: tuple[Hand, str], frames: int = 1) -> Hand | None:

@@ -7,17 +7,15 @@ import cv2
 import numpy as np
 import pytest
 
-from handsteer.config import Config
-from handsteer.signs.opening import open_recognizer
 from handsteer.signs.recognizer import Recognizer
-from handsteer.signs.vocabulary import MOTION_SIGNS, NONE
+from handsteer.types import MOTION_SIGNS, NONE
 
 pytestmark = pytest.mark.slow
 
 
 @pytest.fixture(scope="module")
 def recognizer() -> Recognizer:
-    return open_recognizer(Config())
+    return Recognizer()
 
 
 def test_signs_of_strangers_are_told_and_nothing_else_moves_the_robot(data_dir: Path, recognizer: Recognizer) -> None:

@@ -12,7 +12,7 @@ from handsteer.signs.teaching.dataset import Dataset, Take, save_dataset
 from handsteer.signs.teaching.taught import TaughtClassifier
 from handsteer.signs.trained import TrainedClassifier
 from handsteer.signs.views import View
-from handsteer.signs.vocabulary import NONE
+from handsteer.types import NONE
 from tests.signs.hands import show_sign
 from tests.signs.teaching.models import model
 

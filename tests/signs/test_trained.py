@@ -11,7 +11,7 @@ from handsteer.hand.poses import FIST, HandPose, View
 from handsteer.landmarks.protocol import Hand, Handedness
 from handsteer.signs.model import load_model
 from handsteer.signs.trained import TrainedClassifier
-from handsteer.signs.vocabulary import BACKWARD, FORWARD, GO, MOTION_SIGNS, NONE, SIGNS, STOP, TURN_LEFT, TURN_RIGHT
+from handsteer.types import BACKWARD, FORWARD, GO, MOTION_SIGNS, NONE, SIGNS, STOP, TURN_LEFT, TURN_RIGHT
 from tests.signs.hands import SIZE, hand_of, moved, show_fingers, show_pose, show_sign
 
 CLASSIFIER = TrainedClassifier(load_model())

@@ -81,6 +81,7 @@ def test_training_twice_gives_the_same_bytes_and_a_model_that_tells_shapes(tmp_p
     assert (model.novelty.distances(features, shapes) > model.novelty.limit).mean() < 0.01
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_the_shipped_model_is_what_training_gives(tmp_path: Path) -> None:
     save_model(train_default(lambda _: None), tmp_path / "again.npz")

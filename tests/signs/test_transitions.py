@@ -6,9 +6,9 @@ import pytest
 
 from handsteer.cameras.virtual import VirtualHandCamera
 from handsteer.clock import SteppedClock
-from handsteer.config import Config, VirtualHandConfig
-from handsteer.signs.opening import open_recognizer
-from handsteer.signs.vocabulary import MOTION_SIGNS, NONE, SIGNS
+from handsteer.config import VirtualHandConfig
+from handsteer.signs.recognizer import Recognizer
+from handsteer.types import MOTION_SIGNS, NONE, SIGNS
 
 FPS = 30
 SHOWN_S = 0.7
@@ -36,7 +36,7 @@ def test_no_motion_sign_counts_that_is_not_shown(handedness: str) -> None:
     clock = SteppedClock()
     config = VirtualHandConfig.model_validate({"script": script, "handedness": handedness})
     camera = VirtualHandCamera(config, width=320, height=240, fps=FPS, clock=clock)
-    recognizer = open_recognizer(Config())
+    recognizer = Recognizer()
     shown = [walk[-1]]
     wrong, right, settled = [], 0, 0
     for _ in range(int(len(walk) * SHOWN_S * FPS)):

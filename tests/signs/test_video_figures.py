@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from handsteer.signs.intervals import Share
 from handsteer.signs.video_figures import Event, FrameVerdict, VideoReport, video_report
-from handsteer.signs.vocabulary import FORWARD, GO, MOTION_SIGNS, NONE, SIGNS, STOP
+from handsteer.types import FORWARD, GO, MOTION_SIGNS, NONE, SIGNS, STOP
 
 LETTERS = {"F": FORWARD, "S": STOP, "G": GO, ".": NONE, "?": None}
 FPS = 10

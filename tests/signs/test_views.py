@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from handsteer.signs.views import View
-from handsteer.signs.vocabulary import BACKWARD, FORWARD, GO, NONE, STOP, TURN_LEFT, TURN_RIGHT
+from handsteer.types import BACKWARD, FORWARD, GO, NONE, STOP, TURN_LEFT, TURN_RIGHT
 from tests.signs.hands import show_sign
 
 Truth = tuple[str | None, str]

@@ -11,6 +11,7 @@ from handsteer import __version__, config
 from handsteer.cli import signals
 from handsteer.cli.options import say
 from handsteer.errors import HandsteerError
+from handsteer.parameters import section_model
 
 _EXAMPLES = """Examples:
   handsteer run                                  drive, and open the page
@@ -31,7 +32,7 @@ app = App(
     result_action="return_value",
 )
 # Named, not imported: a verb's module is loaded when it is used.
-for verb in ("run", "recognize", "models", "doctor"):
+for verb in ("run", "recognize", "models", "doctor", "ros"):
     app.command(f"handsteer.cli.{verb}:{verb}", name=verb)
 app.command("handsteer.cli.signs:app", name="signs")
 for verb in ("camera", "recognition", "control", "robot", "steering"):
@@ -47,7 +48,7 @@ def run(words: list[str]) -> int:
     logging.basicConfig(level=logging.INFO, format="handsteer: %(message)s", stream=sys.stderr)
     for noisy in ("uvicorn", "asyncio", "httpx", "watchfiles", "rospy"):
         logging.getLogger(noisy).setLevel(logging.WARNING)
-    words = _ros_words_last(words)
+    words = [_by_new_name(word) for word in _ros_words_last(words)]
     _load_what_help_lists(app, words)
     try:
         verb, given, _ = app.parse_args(words, exit_on_error=False, print_error=False)
@@ -70,6 +71,16 @@ def _load_what_help_lists(group: App, arguments: list[str]) -> None:
             group[verb]
     elif arguments[0] in set(group):
         _load_what_help_lists(group[arguments[0]], arguments[1:])
+
+
+def _by_new_name(word: str) -> str:
+    """Return an option of an old name, as ``--signs.bridge-time=0.2``, under its new one."""
+    option, equals, value = word.partition("=")
+    section, _, name = option.removeprefix("--").partition(".")
+    if not word.startswith("--") or section not in config.Config.model_fields:
+        return word
+    new = section_model(section).new_name(name.replace("-", "_"))
+    return word if new == name.replace("-", "_") else f"--{section}.{new.replace('_', '-')}{equals}{value}"
 
 
 def _ros_words_last(arguments: list[str]) -> list[str]:

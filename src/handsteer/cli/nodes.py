@@ -13,6 +13,7 @@ from handsteer.cli import signals
 from handsteer.cli.options import ConfigFile, Flag, Parameters, keep_what_is_loaded, say, settings, uninterrupted
 from handsteer.clock import Clock
 from handsteer.config import Config
+from handsteer.errors import needing
 from handsteer.nodes.node import Node
 from handsteer.nodes.steering import SteeringNode
 from handsteer.parameters import NodeParameters, from_parameters
@@ -162,7 +163,8 @@ def _alone(_node: Any, _config: Config) -> AbstractContextManager[None]:
 @contextmanager
 def _served(node: SteeringNode, config: Config) -> Iterator[None]:
     # The page's libraries take a second to load, which the other nodes need not wait for.
-    from handsteer.dashboard.server import Dashboard  # noqa: PLC0415
+    with needing("the page", "page", "nicegui"):
+        from handsteer.dashboard.server import Dashboard  # noqa: PLC0415
 
     wires = (node.transport, node.clock, node)
     dashboard = Dashboard(*wires, config.dashboard, cmd_vel=graph.cmd_vel_topic(config), topics=True)

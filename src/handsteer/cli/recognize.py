@@ -6,7 +6,7 @@ from pathlib import Path
 from handsteer.cli.options import ConfigFile, Flag, Parameters, settings
 from handsteer.recognize import FrameResult
 from handsteer.recognize import recognize as results
-from handsteer.signs.opening import open_recognizer
+from handsteer.signs.recognizer import Recognizer
 
 
 def recognize(
@@ -25,7 +25,7 @@ def recognize(
     config_file
         YAML file with parameters; those given here go before it.
     """
-    recognizer = open_recognizer(settings(config_file, parameters))
+    recognizer = Recognizer(settings(config_file, parameters))
     for result in results(source, recognizer):
         print(json_format.dumps(result.as_dict()) if json else _text(result), flush=True)
     return 0

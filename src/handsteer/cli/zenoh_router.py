@@ -5,8 +5,7 @@ import threading
 from typing import Any
 
 from handsteer.cli.options import say
-from handsteer.errors import TransportError
-from handsteer.transports import WITHOUT_ZENOH
+from handsteer.errors import needing
 
 
 def zenoh_router(*, listen: str | None = None) -> int:
@@ -33,11 +32,6 @@ def zenoh_router(*, listen: str | None = None) -> int:
 
 
 def _open(listen: str | None) -> Any:
-    try:
-        # Zenoh is not everywhere, and is loaded only when it is used.
+    with needing("the Zenoh router", "zenoh", "zenoh", "xxhash"):
         from handsteer.transports.zenoh.router import Router  # noqa: PLC0415
-    except ModuleNotFoundError as problem:
-        if (problem.name or "").partition(".")[0] != "zenoh":
-            raise
-        raise TransportError(WITHOUT_ZENOH) from None
     return Router(os.environ, listen)

@@ -4,10 +4,8 @@ import math
 from typing import Literal
 
 from handsteer.config import ControlConfig
-from handsteer.control.actions import action_of
 from handsteer.control.sign_control import SignControl
-from handsteer.control.velocity import ZERO, Velocity
-from handsteer.signs.vocabulary import NONE
+from handsteer.types import NONE, ZERO, Velocity, action_of
 
 Source = Literal["nobody", "signs", "steering"]
 

@@ -5,8 +5,8 @@ from collections.abc import Mapping
 from functools import lru_cache
 
 from handsteer.config import ControlConfig, validate
-from handsteer.control.actions import EFFECTS, Action
 from handsteer.errors import ConfigError
+from handsteer.types import EFFECTS, Action
 
 _TOLD = tuple(sorted(ControlConfig.live))
 

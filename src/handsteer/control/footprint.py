@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handsteer.config import CollisionMonitorConfig
-from handsteer.control.velocity import Velocity
+from handsteer.types import Velocity
 
 Array = NDArray[np.float64]
 

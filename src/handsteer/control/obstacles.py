@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from handsteer.config import CollisionMonitorConfig
 from handsteer.control.footprint import after, braking, fastest_mps, gaps, least_gaps, on_a_circle, reach_m, seen_from
 from handsteer.control.scan_points import Points
-from handsteer.control.velocity import ZERO, Velocity
+from handsteer.types import ZERO, Velocity
 
 _PAD_M = 0.02
 """Nothing is to come nearer to the robot, be it beside it."""

@@ -8,8 +8,6 @@ how fast what is commanded may grow. How long each waits stands in :mod:`handste
 import math
 
 from handsteer.config import ControlConfig
-from handsteer.control.velocity import Velocity
-from handsteer.signs.vocabulary import NONE
 from handsteer.timeouts import (
     ARMING_S,
     FAULT_GAP_S,
@@ -20,6 +18,7 @@ from handsteer.timeouts import (
     STEERING_AT_START_S,
     STOOD_BY_ITSELF_S,
 )
+from handsteer.types import NONE, Velocity
 
 _SLACK_S = 1e-9
 

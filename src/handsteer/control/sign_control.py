@@ -3,9 +3,8 @@
 import math
 
 from handsteer.config import ControlConfig
-from handsteer.control.actions import Action, action_of
 from handsteer.control.safety import Allowance
-from handsteer.control.velocity import ZERO, Velocity
+from handsteer.types import ZERO, Action, Velocity, action_of
 
 _DIGITS = 9
 _TURBO = 2.0

@@ -4,6 +4,7 @@
 """
 
 import contextlib
+import importlib.util
 import logging
 import os
 import subprocess
@@ -17,7 +18,7 @@ from typing import Any, Final
 
 from handsteer.cameras.browser import Source
 from handsteer.config import Config
-from handsteer.errors import DashboardError, FrameError, HandsteerError
+from handsteer.errors import DashboardError, FrameError, HandsteerError, needing
 from handsteer.graph import Graph
 from handsteer.robots.world import World
 from handsteer.transports.piped import Gateway, Pipe
@@ -117,9 +118,15 @@ class PageApart:
     """Serves the page of a graph from a process of its own, which begins to load its libraries at once.
 
     The graph needs no node ``steering``: the page's process has it.
+
+    Raises:
+        PackageMissing: NiceGUI is not installed.
     """
 
     def __init__(self) -> None:
+        with needing("the page (a run with --headless does without)", "page", "nicegui"):
+            if importlib.util.find_spec("nicegui") is None:  # loading it takes a second, which the other process does
+                raise ModuleNotFoundError(name="nicegui")
         path = os.pathsep.join(filter(None, [str(_ROOT), os.environ.get("PYTHONPATH")]))
         self.process = subprocess.Popen(
             [sys.executable, "-P", "-m", "handsteer.dashboard.alone"],

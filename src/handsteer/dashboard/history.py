@@ -4,7 +4,7 @@ import threading
 from collections import deque
 from dataclasses import dataclass
 
-from handsteer.control.velocity import Velocity
+from handsteer.types import Velocity
 
 SPAN_S = 30.0
 PERIOD_S = 0.05

@@ -2,8 +2,8 @@
 
 import math
 
-from handsteer.control.velocity import ZERO, Velocity
 from handsteer.transports.lateness import Lateness
+from handsteer.types import ZERO, Velocity
 
 HOLD_TIMEOUT_S = 0.3
 """Steering ends when the page has not repeated it for this long: the tab was closed, or the network lost."""

@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 from typing import Any, cast
 
 from handsteer.clock import Clock, to_seconds
-from handsteer.control.velocity import Velocity
 from handsteer.dashboard.history import PERIOD_S, Sample, VelocityHistory
 from handsteer.dashboard.manual import HOLD_TIMEOUT_S
 from handsteer.dashboard.scan import scan_points
@@ -48,8 +47,8 @@ from handsteer.messages import (
 from handsteer.nodes.node import Node
 from handsteer.nodes.reporters import split_reporter
 from handsteer.nodes.steering import SteeringNode
-from handsteer.robots.protocol import Pose2D
 from handsteer.transports.protocol import Received, Transport
+from handsteer.types import Pose2D, Velocity
 
 _WATCH_PERIOD_S = 0.05
 _FRAME_COUNTS_KEPT = 6

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from handsteer.messages import LaserScan
-from handsteer.robots.protocol import Pose2D
+from handsteer.types import Pose2D
 
 MOST_POINTS = 180
 """Of a longer scan, only every so many rays are drawn."""

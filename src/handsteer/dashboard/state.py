@@ -8,12 +8,10 @@ from typing import Literal
 
 from handsteer.config import ControlConfig
 from handsteer.control.effects import told
-from handsteer.control.velocity import ZERO, Velocity
 from handsteer.nodes.node import ERROR, OK
 from handsteer.robots.course import CourseState, read_course
-from handsteer.robots.protocol import Pose2D
-from handsteer.signs.vocabulary import NONE, SIGNS
 from handsteer.timeouts import ROBOT_S
+from handsteer.types import NONE, SIGNS, ZERO, Pose2D, Velocity
 
 Mood = Literal["driving", "standing", "trouble", "waiting"]
 

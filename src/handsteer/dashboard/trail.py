@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass, replace
 
-from handsteer.robots.protocol import Pose2D
+from handsteer.types import Pose2D
 
 MOST_POINTS = 1000
 """Older ones are forgotten."""

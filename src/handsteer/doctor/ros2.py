@@ -45,7 +45,7 @@ def _no_engine() -> str:
         )
     if platform.system() == "Linux" and platform.machine() != "x86_64":
         return f"no cyclonedds, which --transport dds needs: there is none for Linux on {platform.machine()}"
-    return "no cyclonedds, which --transport dds needs: pip install 'cyclonedds>=11,<12' beside handsteer"
+    return "no cyclonedds, which --transport dds needs: pip install 'handsteer[dds]'"
 
 
 def _oddities(environment: Mapping[str, str], here: Network) -> list[str]:

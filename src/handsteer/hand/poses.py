@@ -7,8 +7,7 @@ import numpy as np
 from handsteer.errors import PoseError
 from handsteer.hand.kinematics import FINGERS, Array, angles_of
 from handsteer.hand.placement import Placement, orientation
-from handsteer.landmarks.protocol import Handedness
-from handsteer.signs.vocabulary import BACKWARD, FORWARD, GO, NONE, STOP, TURN_LEFT, TURN_RIGHT
+from handsteer.types import BACKWARD, FORWARD, GO, NONE, STOP, TURN_LEFT, TURN_RIGHT, Handedness
 
 
 @dataclass(frozen=True)

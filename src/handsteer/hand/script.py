@@ -9,7 +9,7 @@ import numpy as np
 from handsteer.errors import PoseError
 from handsteer.hand.kinematics import ANGLES, Array, clamp
 from handsteer.hand.poses import HandPose, View, sign_pose
-from handsteer.landmarks.protocol import Handedness
+from handsteer.types import Handedness
 
 _CHANGE_S = 0.30
 _MAX_S = 3600.0

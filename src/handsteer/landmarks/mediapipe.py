@@ -160,7 +160,7 @@ class MediaPipeLandmarker:
         for region in regions:
             estimate = self._landmarks.estimate(image, region)
             is_new = all(region is not followed for followed in self._followed)
-            if is_new and self._config.second_look and self._is_present(estimate):
+            if is_new and self._config.refine_new_hands and self._is_present(estimate):
                 estimate = self._landmarks.estimate(image, from_landmarks(estimate.pixels[:, :2]).grown(_SECOND_LOOK))
             if self._is_present(estimate) and estimate.presence >= min_presence:
                 present.append(estimate)

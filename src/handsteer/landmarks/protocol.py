@@ -2,12 +2,12 @@
 
 from dataclasses import dataclass
 from math import inf
-from typing import Literal, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-Handedness = Literal["Left", "Right"]
+from handsteer.types import Handedness
 
 CONNECTIONS: tuple[tuple[int, int], ...] = (
     *((0, 1), (1, 2), (2, 3), (3, 4)),

@@ -7,11 +7,11 @@ from collections.abc import Callable
 from handsteer.config import CollisionMonitorConfig
 from handsteer.control.obstacles import ObstacleLimiter
 from handsteer.control.scan_points import points_of
-from handsteer.control.velocity import Velocity
 from handsteer.messages import ODOM, SCAN, LaserScan, Odometry
 from handsteer.nodes.node import Node
 from handsteer.nodes.odometry import MeasuredVelocity
 from handsteer.transports.protocol import Received
+from handsteer.types import Velocity
 
 log = logging.getLogger(__name__)
 

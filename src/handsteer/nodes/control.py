@@ -5,12 +5,10 @@ from typing import Any
 
 from handsteer.clock import Clock
 from handsteer.config import CollisionMonitorConfig, Config, ControlConfig
-from handsteer.control.actions import action_of
 from handsteer.control.driver import Driver
 from handsteer.control.effects import tell
 from handsteer.control.fleet import NEXT
 from handsteer.control.safety import Following, Ramp, Safety
-from handsteer.control.velocity import ZERO, Velocity
 from handsteer.messages import (
     CMD_VEL,
     HAND_SIGN,
@@ -31,9 +29,9 @@ from handsteer.nodes.odometry import MeasuredVelocity
 from handsteer.nodes.rivals import Rivals
 from handsteer.nodes.selection import Selection
 from handsteer.nodes.stop_keeper import StopKeeper
-from handsteer.signs.vocabulary import NONE
 from handsteer.transports.commands import Commands
 from handsteer.transports.protocol import Call, Received, Transport
+from handsteer.types import NONE, ZERO, Velocity, action_of
 
 log = logging.getLogger(__name__)
 

@@ -1,7 +1,7 @@
 """How fast a robot moves, by what its odometry says."""
 
-from handsteer.control.velocity import Velocity
 from handsteer.messages import Odometry, Pose
+from handsteer.types import Velocity
 
 
 class MeasuredVelocity:

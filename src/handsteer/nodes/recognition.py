@@ -24,8 +24,8 @@ from handsteer.nodes.recording import Recording
 from handsteer.nodes.stop_keeper import StopKeeper
 from handsteer.signs.protocol import Classifier
 from handsteer.signs.recognizer import Recognition, Recognizer
-from handsteer.signs.vocabulary import NONE
 from handsteer.transports.protocol import Received, Subscription, Transport
+from handsteer.types import NONE
 
 _WATCH_PERIOD_S = 0.02
 # Further apart than FAULT_GAP_S, so that the control takes them for what they are: frames that were not looked at.

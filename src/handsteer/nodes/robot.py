@@ -52,9 +52,10 @@ from handsteer.nodes.world_markers import Touches, gate_strips, world_markers
 from handsteer.robots.course import CourseState, Referee
 from handsteer.robots.diff_drive import Velocity
 from handsteer.robots.editing import Change, InWorld
-from handsteer.robots.protocol import Pose2D, Robot, RobotState
+from handsteer.robots.protocol import Robot, RobotState
 from handsteer.robots.world import World
 from handsteer.transports.protocol import Call, Received, Transport
+from handsteer.types import Pose2D
 
 log = logging.getLogger(__name__)
 

@@ -8,7 +8,6 @@ from typing import Any
 from handsteer.clock import Clock
 from handsteer.config import Config, ControlConfig
 from handsteer.control.safety import Ramp, Safety
-from handsteer.control.velocity import ZERO, Velocity
 from handsteer.errors import TransportError
 from handsteer.messages import CMD_VEL, STEERING_CMD_VEL, STOP, Bool, Topic
 from handsteer.nodes.interruption import Interruption
@@ -17,6 +16,7 @@ from handsteer.nodes.stop_keeper import StopKeeper
 from handsteer.timeouts import STALE_S
 from handsteer.transports.commands import Commands
 from handsteer.transports.protocol import Received, Transport
+from handsteer.types import ZERO, Velocity
 
 _PERIOD_S = 0.1
 _TOPIC_NAME = re.compile(r"/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)

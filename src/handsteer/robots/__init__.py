@@ -3,7 +3,7 @@
 from typing import Any
 
 from handsteer.config import RobotConfig
-from handsteer.errors import ConfigError
+from handsteer.errors import ConfigError, needing
 from handsteer.messages import CMD_VEL, Topic
 from handsteer.robots.protocol import Robot
 from handsteer.transports.protocol import Session
@@ -23,6 +23,7 @@ def open_robot(
     Raises:
         ConfigError: It is a real robot, and there is no link to it.
         WorldError: The world of a simulated robot cannot be used.
+        PackageMissing: The simulator is not installed.
     """
     # Each robot's libraries (xacro, MuJoCo) are loaded only by the process that has it: all nodes come through here.
     if config.kind != "sim":
@@ -31,6 +32,7 @@ def open_robot(
         from handsteer.robots.remote import RemoteRobot  # noqa: PLC0415
 
         return RemoteRobot(config, cmd_vel, frame_id, link)
-    from handsteer.robots.simulated import SimulatedRobot  # noqa: PLC0415
+    with needing("the simulated robot", "sim", "mujoco", "xacro"):
+        from handsteer.robots.simulated import SimulatedRobot  # noqa: PLC0415
 
     return SimulatedRobot(config)

@@ -12,8 +12,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any, Literal
 
-from handsteer.robots.protocol import Pose2D
 from handsteer.robots.world import Gate
+from handsteer.types import Pose2D
 
 BUMP_S = 2.0
 """What each bump costs."""

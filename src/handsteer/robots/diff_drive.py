@@ -8,7 +8,7 @@ import math
 from dataclasses import dataclass
 
 from handsteer.config import RobotConfig
-from handsteer.robots.protocol import Pose2D
+from handsteer.types import Pose2D
 
 
 @dataclass(frozen=True)

@@ -7,8 +7,9 @@ from typing import Any, Protocol, runtime_checkable
 from pydantic import ValidationError
 
 from handsteer.errors import WorldError
-from handsteer.robots.protocol import Pose2D, Robot, Shape
+from handsteer.robots.protocol import Robot, Shape
 from handsteer.robots.world import Thing, World, describe_problem
+from handsteer.types import Pose2D
 
 Change = Callable[[World], World]
 

@@ -6,16 +6,9 @@ from typing import Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from handsteer.types import Pose2D
+
 Shape = Literal["box", "cylinder", "sphere"]
-
-
-@dataclass(frozen=True)
-class Pose2D:
-    """A pose on the floor: x and y in metres, yaw in radians, left positive (REP 103)."""
-
-    x: float
-    y: float
-    yaw: float
 
 
 @dataclass(frozen=True)

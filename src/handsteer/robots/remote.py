@@ -11,10 +11,11 @@ from handsteer.config import RobotConfig
 from handsteer.messages import CMD_VEL, LaserScan, Odometry, Topic, TurtlePose, type_name, yaw_of
 from handsteer.robots.description import robot_description
 from handsteer.robots.diff_drive import Velocity
-from handsteer.robots.protocol import Obstacle, Pose2D, RangeScan, RobotState
+from handsteer.robots.protocol import Obstacle, RangeScan, RobotState
 from handsteer.robots.relay import ZERO, Relay
 from handsteer.transports.commands import Commands
 from handsteer.transports.protocol import Received, Session
+from handsteer.types import Pose2D
 
 log = logging.getLogger(__name__)
 

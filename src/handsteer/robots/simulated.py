@@ -14,8 +14,9 @@ from handsteer.robots.description import robot_description
 from handsteer.robots.diff_drive import DriveState, Velocity
 from handsteer.robots.lidar import Lidar
 from handsteer.robots.physics import ROBOT_JOINT, TIMESTEP_S, WHEEL_JOINTS, compile_model, thing_name
-from handsteer.robots.protocol import Obstacle, Pose2D, RangeScan, RobotState
+from handsteer.robots.protocol import Obstacle, RangeScan, RobotState
 from handsteer.robots.world import World, load_world
+from handsteer.types import Pose2D
 
 _log = logging.getLogger(__name__)
 

@@ -6,7 +6,7 @@ from typing import Any, Final
 
 from handsteer.signs.figures import PhotoResult, Tally, tally
 from handsteer.signs.intervals import Share
-from handsteer.signs.vocabulary import NONE
+from handsteer.types import NONE
 
 BINS: Final = 10
 THRESHOLDS: Final = (*(percent / 100 for percent in range(30, 100, 5)), 0.97, 0.99)

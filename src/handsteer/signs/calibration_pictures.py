@@ -7,7 +7,7 @@ import numpy as np
 from handsteer.signs.calibration import Calibration
 from handsteer.signs.figures import Tally
 from handsteer.signs.plot import BLUE, COLOURS, GRID, INK, Picture, Plot
-from handsteer.signs.vocabulary import NONE
+from handsteer.types import NONE
 
 _TOPS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)
 """Where an axis may end, so that its ticks are round."""

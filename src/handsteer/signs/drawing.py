@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 
 from handsteer.landmarks.protocol import CONNECTIONS, Hand
 from handsteer.signs.recognizer import Recognition
-from handsteer.signs.vocabulary import NONE
+from handsteer.types import NONE
 
 _BONE = (255, 255, 255)
 _JOINT = (60, 160, 255)

@@ -16,7 +16,7 @@ from handsteer.signs.teaching.dataset import Dataset
 from handsteer.signs.teaching.taught import TaughtClassifier
 from handsteer.signs.video_figures import FrameVerdict
 from handsteer.signs.views import View
-from handsteer.signs.vocabulary import NONE
+from handsteer.types import NONE
 
 
 def evaluate_photos(photos: Iterable[LabelledPhoto], recognizer: Recognizer, view: View) -> Iterator[PhotoResult]:

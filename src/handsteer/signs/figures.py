@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from handsteer.signs.intervals import Share
-from handsteer.signs.vocabulary import NONE
+from handsteer.types import NONE
 
 SIZES = ("< 45 px", "45-80 px", "> 80 px", "no hand")
 """The longer side of the hand that was looked at; ``no hand`` where none was found."""

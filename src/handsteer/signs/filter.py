@@ -1,7 +1,10 @@
 """Over time: when a sign that is seen comes to count."""
 
 from handsteer.config import SignsConfig
-from handsteer.signs.vocabulary import NONE, STOP
+from handsteer.types import NONE, STOP
+
+# Frames that come in step have stamps that do not: without it, rounding decides about a whole frame.
+_SLACK_S = 0.001
 
 
 class SignFilter:
@@ -9,7 +12,7 @@ class SignFilter:
 
     - ``Stop`` counts at its first frame.
     - Any other sign counts once a hand that is held still has shown it, frame after frame, for ``confirm_time``.
-    - A sign that counts goes on counting for up to ``bridge_time`` in which it is not seen; then it is ``NONE``.
+    - A sign that counts goes on counting for up to ``dropout_hold`` in which it is not seen; then it is ``NONE``.
     """
 
     def __init__(self, config: SignsConfig) -> None:
@@ -50,9 +53,9 @@ class SignFilter:
         self._candidate_s = self._candidate_s + dt_s if still and seen == self._candidate else 0.0
         self._candidate = seen
         self._unseen_s += dt_s
-        if seen != NONE and self._candidate_s >= self._config.confirm_time:
+        if seen != NONE and self._candidate_s >= self._config.confirm_time - _SLACK_S:
             self._accept(seen)
-        elif self._unseen_s > self._config.bridge_time:
+        elif self._unseen_s > self._config.dropout_hold + _SLACK_S:
             self.sign = NONE
         return self.sign
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from handsteer.cameras.files import PHOTO_SUFFIXES
 from handsteer.errors import LabelError
-from handsteer.signs.vocabulary import NONE, find_sign
+from handsteer.types import NONE, find_sign
 
 INDEX = "index.csv"
 NEGATIVES = "negatives"

@@ -1,25 +1,12 @@
-"""What a configuration describes, opened: what finds hands, what tells signs, and the recogniser of both.
-
-This is all that it takes to recognise signs in pictures. It loads nothing of graphs, messages or robots.
-"""
+"""What a configuration describes, opened: what finds hands, and what tells their signs."""
 
 from handsteer.config import Config, SignsConfig
 from handsteer.landmarks.mediapipe import MediaPipeLandmarker
 from handsteer.landmarks.protocol import Landmarker
 from handsteer.signs.model import load_model
 from handsteer.signs.protocol import Classifier
-from handsteer.signs.recognizer import Recognizer
 from handsteer.signs.teaching.taught import TaughtClassifier, load_taught
 from handsteer.signs.trained import TrainedClassifier
-
-
-def open_recognizer(config: Config) -> Recognizer:
-    """Return the recogniser that ``config`` describes.
-
-    Raises:
-        ModelError: A landmark model or the sign model is missing or broken.
-    """
-    return Recognizer(open_landmarker(config), open_classifier(config.signs), config.signs)
 
 
 def open_landmarker(config: Config) -> Landmarker:

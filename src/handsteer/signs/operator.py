@@ -11,7 +11,7 @@ from handsteer.config import SignsConfig
 from handsteer.landmarks.protocol import Hand
 from handsteer.signs.features import KNUCKLES, WRIST
 from handsteer.signs.protocol import SignGuess
-from handsteer.signs.vocabulary import NONE, STOP
+from handsteer.types import NONE, STOP
 
 _PALM: Final = [WRIST, *KNUCKLES]
 _JUMP: Final = 1.0
@@ -52,7 +52,7 @@ class Operator:
     - While none is followed, it is the hand that shows a sign: the surest and largest of them.
     - Once a sign of it counts, it stays the one while it is in view, until none has counted for ``switch_time`` and
       another hand, which is not much smaller, shows one: a resting hand or a bystander doesn't take over.
-    - A hand that is out of view for ``bridge_time`` is followed no more; while it is, any hand may show ``Stop``.
+    - A hand that is out of view for ``dropout_hold`` is followed no more; while it is, any hand may show ``Stop``.
     """
 
     def __init__(self, config: SignsConfig) -> None:
@@ -116,6 +116,6 @@ class Operator:
             self._unseen_s = 0.0
             return nearest
         self._unseen_s += dt_s
-        if self._unseen_s > self._config.bridge_time:
+        if self._unseen_s > self._config.dropout_hold:
             self.reset()
         return None

@@ -1,18 +1,19 @@
 """From a frame to the sign that counts: landmarks, classifier and filter in a row."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from handsteer.config import SignsConfig
+from handsteer.config import Config, SignsConfig
 from handsteer.landmarks.protocol import Hand, Landmarker
 from handsteer.signs.evidence import Evidence
 from handsteer.signs.filter import SignFilter
+from handsteer.signs.opening import open_classifier, open_landmarker
 from handsteer.signs.operator import Operator, Place
 from handsteer.signs.protocol import Classifier, SignGuess
-from handsteer.signs.vocabulary import NONE
+from handsteer.types import NONE
 
 _NOTHING = SignGuess(NONE, 0.0)
 
@@ -50,20 +51,52 @@ class Recognition:
 
 
 class Recognizer:
-    """Recognises signs in a stream of frames."""
+    """Recognises signs: in a stream of frames by :meth:`step`, in one picture by :meth:`recognize`.
 
-    def __init__(self, landmarker: Landmarker, classifier: Classifier, config: SignsConfig) -> None:
-        self._landmarker = landmarker
-        self._classifier = classifier
-        self._filter = SignFilter(config)
-        self._operator = Operator(config)
+    Args:
+        config: Everything that can be set; the defaults when None.
+        landmarker: Finds the hands; opened as ``config.landmarks`` says when None.
+        classifier: Tells the sign of a hand; opened as ``config.signs`` says when None.
+
+    Raises:
+        ModelError: A landmark model or the sign model is missing or broken.
+    """
+
+    def __init__(
+        self,
+        config: Config | None = None,
+        *,
+        landmarker: Landmarker | None = None,
+        classifier: Classifier | None = None,
+    ) -> None:
+        config = config or Config()
+        self._landmarker = landmarker or open_landmarker(config)
+        self._classifier = classifier or open_classifier(config.signs)
+        self._filter = SignFilter(config.signs)
+        self._operator = Operator(config.signs)
         self._evidence = Evidence()
-        self._config = config
+        self._config = config.signs
 
     @property
     def signs(self) -> tuple[str, ...]:
         """The signs that it can tell, without ``NONE``."""
         return self._classifier.signs
+
+    def recognize(self, image: NDArray[np.uint8]) -> Recognition:
+        """Return what one picture shows by itself; the stream is forgotten, before and after.
+
+        Its ``sign`` is that of the picture, which nothing has to confirm.
+
+        Args:
+            image: (height, width, 3) uint8, BGR, not mirrored.
+
+        Raises:
+            FrameError: The image has another shape or type.
+        """
+        self.reset()
+        recognition = self.step(image, 0.0)
+        self.reset()
+        return replace(recognition, sign=recognition.seen)
 
     def step(self, image: NDArray[np.uint8], dt_s: float) -> Recognition:
         """Take the next frame.
@@ -122,5 +155,5 @@ class Recognizer:
 
     def _seen(self, guess: SignGuess) -> SignGuess:
         """Return ``guess`` if it is sure enough, else ``NONE``; the sign that counts need be less sure to be kept."""
-        least = self._config.keep_confidence if guess.sign == self._filter.sign else self._config.min_confidence
+        least = self._config.release_confidence if guess.sign == self._filter.sign else self._config.min_confidence
         return guess if guess.confidence >= min(least, self._config.min_confidence) else _NOTHING

@@ -15,7 +15,7 @@ from handsteer.signs.recognizer import Recognizer
 from handsteer.signs.teaching.dataset import Dataset, load_dataset
 from handsteer.signs.video_figures import FrameVerdict
 from handsteer.signs.views import View
-from handsteer.signs.vocabulary import NONE
+from handsteer.types import NONE
 
 Watch = Callable[[Iterable[Any], str], Iterable[Any]]
 """Passes on what it is given, a unit of what; and may show how far it is."""

@@ -19,7 +19,7 @@ from handsteer.signs.features import (
 )
 from handsteer.signs.model import SignModel
 from handsteer.signs.protocol import SignGuess
-from handsteer.signs.vocabulary import BACKWARD, FORWARD, GO, NONE, SIGNS, STOP, TURN_LEFT, TURN_RIGHT
+from handsteer.types import BACKWARD, FORWARD, GO, NONE, SIGNS, STOP, TURN_LEFT, TURN_RIGHT
 
 _DOUBT: Final = 1.5
 """Width of the doubt about a limit, degrees."""

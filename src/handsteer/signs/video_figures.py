@@ -8,7 +8,7 @@ from typing import Any
 
 from handsteer.signs.figures import Confusion
 from handsteer.signs.intervals import Rate, Share
-from handsteer.signs.vocabulary import NONE
+from handsteer.types import NONE
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handsteer.landmarks.protocol import Hand
-from handsteer.signs.vocabulary import BACKWARD, FORWARD, NONE, TURN_LEFT, TURN_RIGHT
+from handsteer.types import BACKWARD, FORWARD, NONE, TURN_LEFT, TURN_RIGHT
 
 _SMALL_PX = 400
 _ENLARGED_PX = 480

@@ -5,8 +5,8 @@ from bisect import bisect_right
 
 from handsteer.graph import Graph
 from handsteer.messages import CMD_VEL, ODOM, Odometry, Twist
-from handsteer.robots.protocol import Pose2D
 from handsteer.transports.protocol import Received
+from handsteer.types import Pose2D
 
 
 class Trace:

@@ -2,10 +2,9 @@
 
 import importlib.util
 import sys
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 
-from handsteer.errors import TransportError
+from handsteer.errors import TransportError, needing
 from handsteer.transports.protocol import Session
 
 
@@ -34,29 +33,15 @@ def _ros1(node: str, arguments: Sequence[str]) -> Session:
 
 
 def _dds(node: str, arguments: Sequence[str]) -> Session:
-    with _cyclonedds():
+    # There is no wheel of cyclonedds for Python 3.14 and newer, nor for Linux on ARM.
+    with needing("the transport dds (zenoh works on every system)", "dds", "cyclonedds"):
         from handsteer.transports.dds.session import DdsSession  # noqa: PLC0415
     return DdsSession(node, arguments)
 
 
-@contextmanager
-def _cyclonedds() -> Iterator[None]:
-    try:
-        yield
-    except ModuleNotFoundError as problem:
-        raise _lacking(
-            problem,
-            "the transport dds needs the package cyclonedds: run pip install 'cyclonedds>=11,<12' beside handsteer "
-            "(there is none for Python 3.14 and newer, nor for Linux on ARM; --transport zenoh works there)",
-            "cyclonedds",
-        ) from None
-
-
 def _zenoh(node: str, arguments: Sequence[str]) -> Session:
-    try:
+    with needing("the transport zenoh", "zenoh", "zenoh", "xxhash"):
         from handsteer.transports.zenoh.session import ZenohSession  # noqa: PLC0415
-    except ModuleNotFoundError as problem:
-        raise _lacking(problem, WITHOUT_ZENOH, "zenoh", "xxhash") from None
     return ZenohSession(node, arguments)
 
 
@@ -76,26 +61,15 @@ def _auto(node: str, arguments: Sequence[str]) -> Session:
     if importlib.util.find_spec("cyclonedds") is None:
         raise TransportError(
             f"there is no ROS 2 here, and nothing that speaks its wire: neither rclpy, {_WITHOUT_RCLPY}; "
-            "nor the package cyclonedds (pip install 'cyclonedds>=11,<12')"
+            "nor the package cyclonedds (pip install 'handsteer[dds]')"
         )
     return _dds(node, arguments)
-
-
-def _lacking(problem: ModuleNotFoundError, message: str, *modules: str) -> Exception:
-    """Return ``message`` as an error when what is missing is one of ``modules``, else ``problem`` itself."""
-    return TransportError(message) if (problem.name or "").partition(".")[0] in modules else problem
 
 
 _WITHOUT_RCLPY = (
     f"which this Python ({sys.version_info[0]}.{sys.version_info[1]}) does not find: source ROS 2 "
     "(source /opt/ros/jazzy/setup.bash) and start handsteer with the Python that it is for"
 )
-
-WITHOUT_ZENOH = (
-    "the transport zenoh needs the packages eclipse-zenoh and xxhash: "
-    "run pip install 'eclipse-zenoh>=1.10,<2' xxhash beside handsteer"
-)
-"""What is said where Zenoh is not installed."""
 
 TRANSPORTS: dict[str, Callable[[str, Sequence[str]], Session]] = {
     "ros1": _ros1,

@@ -2,7 +2,6 @@
 
 import logging
 import math
-import time
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -70,7 +69,7 @@ class Commands:
         Returns:
             Whether the type has changed, so that another robot may be the one that listens.
         """
-        now = time.monotonic()
+        now = self._clock.now()
         if self._graph is None or now - self._looked_s < _LOOK_PERIOD_S:
             return False
         self._looked_s = now

@@ -9,7 +9,7 @@ from handsteer.signs.labelled import read_photo_labels
 from handsteer.signs.opening import open_landmarker
 from handsteer.signs.teaching.collect import largest
 from handsteer.signs.views import View
-from handsteer.signs.vocabulary import SIGNS
+from handsteer.types import SIGNS
 
 
 @pytest.fixture(scope="module")

@@ -11,7 +11,7 @@ from handsteer.signs.model import DEFAULT_MODEL, load_model
 from handsteer.signs.protocol import SignGuess
 from handsteer.signs.teaching.taught import TaughtClassifier, load_taught, save_taught
 from handsteer.signs.trained import TrainedClassifier, legibility
-from handsteer.signs.vocabulary import NONE, SIGNS
+from handsteer.types import NONE, SIGNS
 from tests.signs.hands import show_sign
 from tests.signs.teaching.models import COUNT, model
 

@@ -12,7 +12,7 @@ from handsteer.signs.teaching.dataset import Dataset, Take
 from handsteer.signs.teaching.taught import TaughtClassifier, TaughtModel
 from handsteer.signs.teaching.train import TeachingReport, train_signs
 from handsteer.signs.trained import TrainedClassifier
-from handsteer.signs.vocabulary import NONE, SIGNS
+from handsteer.types import NONE, SIGNS
 from tests.signs.teaching.takes import other_hand, shaken, take, takes
 
 SHIPPED = TrainedClassifier(load_model())

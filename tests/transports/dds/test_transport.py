@@ -45,5 +45,5 @@ def test_without_cyclonedds_it_says_what_to_install() -> None:
     command = [sys.executable, "-c", program, "control", "--transport", "dds"]
     done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
     assert done.returncode == 2
-    assert "the transport dds needs the package cyclonedds: run pip install 'cyclonedds>=11,<12'" in done.stderr
+    assert "needs the package cyclonedds: run pip install 'handsteer[dds]'" in done.stderr
     assert "Traceback" not in done.stderr

@@ -13,17 +13,18 @@ from tqdm import tqdm
 from handsteer.cli.options import ConfigFile, Flag, Parameters, settings
 from handsteer.cli.signs.evaluation_tables import evaluation_tables
 from handsteer.config import Config
-from handsteer.control.actions import motion_signs
 from handsteer.errors import EvaluationError
 from handsteer.signs.calibration_pictures import draw_reliability, draw_sweep
 from handsteer.signs.confusion_picture import draw_confusion
 from handsteer.signs.evaluation import Evaluation
 from handsteer.signs.labelled import labels_of
-from handsteer.signs.opening import open_classifier, open_recognizer
+from handsteer.signs.opening import open_classifier
 from handsteer.signs.plot import Picture
 from handsteer.signs.protocol import Classifier
+from handsteer.signs.recognizer import Recognizer
 from handsteer.signs.sources import LabelledFolder, LabelledHands, LabelledVideo, PhotoRun, Source, open_source
 from handsteer.signs.views import View
+from handsteer.types import motion_signs
 
 
 def evaluate(
@@ -129,7 +130,7 @@ def _evaluate(
     hands = [data.run(classifier, least, view, _with_progress) for data in datasets for view in views]
     _check_scored(hands)
     # Hands are found already: no landmark models are needed for those.
-    recognizer = open_recognizer(config) if folders or videos else None
+    recognizer = Recognizer(config) if folders or videos else None
     photos = [folder.run(recognizer, view, _with_progress) for folder in folders for view in views if recognizer]
     _check_scored(photos)
     return Evaluation(

@@ -9,7 +9,7 @@ from handsteer.signs.figures import SIZES, PhotoReport, Tally
 from handsteer.signs.intervals import Rate
 from handsteer.signs.sources import PhotoRun
 from handsteer.signs.video_figures import Event, LabelledFigures, VideoReport
-from handsteer.signs.vocabulary import NONE
+from handsteer.types import NONE
 
 _PHOTOS_AGAIN = (
     "Each is counted once for each view, and is no further person: intervals over several views are too narrow."

@@ -4,10 +4,9 @@ import json as json_format
 
 from handsteer.cli.options import ConfigFile, Flag, Parameters, settings
 from handsteer.cli.signs.tables import table
-from handsteer.control.actions import action_of
 from handsteer.control.effects import effect_of
 from handsteer.signs.opening import open_classifier
-from handsteer.signs.vocabulary import NONE, find_sign
+from handsteer.types import NONE, action_of, find_sign
 
 
 def list_signs(*, json: Flag = False, config_file: ConfigFile = None, parameters: Parameters = None) -> int:

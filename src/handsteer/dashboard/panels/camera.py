@@ -7,7 +7,7 @@ from nicegui import ui
 from handsteer.dashboard.joined import Cameras
 from handsteer.dashboard.panels.elements import box, button, switch, text
 from handsteer.dashboard.state import PageState
-from handsteer.signs.vocabulary import NONE
+from handsteer.types import NONE
 
 _MOST_WORDS = 200
 

@@ -4,9 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from handsteer.config import ControlConfig
-from handsteer.control.actions import EFFECTS, action_of
 from handsteer.control.effects import figures_of
-from handsteer.signs.vocabulary import BACKWARD, FORWARD, GO, STOP, TURN_LEFT, TURN_RIGHT
+from handsteer.types import BACKWARD, EFFECTS, FORWARD, GO, STOP, TURN_LEFT, TURN_RIGHT, action_of
 
 # The user's right hand as a mirror shows it, in a box of 64 x 64: palm, then the fingers as thick lines. The thumb is
 # on the left, where a mirror shows the thumb of a right hand that turns its palm to it.

@@ -4,8 +4,8 @@ from collections.abc import Callable, Sequence
 
 from nicegui import ui
 
-from handsteer.control.velocity import Velocity
 from handsteer.dashboard.history import SPAN_S, Sample
+from handsteer.types import Velocity
 
 Row = tuple[float, float | None, float | None]
 """Seconds, and the velocity commanded and measured, in m/s or rad/s; None where there was none."""

@@ -5,7 +5,7 @@ from nicegui import ui
 from handsteer.dashboard.panels.elements import box, card, switch, text
 from handsteer.dashboard.panels.legend import LegendEntry, legend
 from handsteer.dashboard.state import PageState
-from handsteer.signs.vocabulary import NONE, SIGNS
+from handsteer.types import NONE, SIGNS
 
 
 class SignsPanel:

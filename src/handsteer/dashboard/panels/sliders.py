@@ -5,8 +5,8 @@ from collections.abc import Callable
 
 from nicegui import ui
 
-from handsteer.control.velocity import Velocity
 from handsteer.dashboard.panels.elements import box, button, switch, text
+from handsteer.types import Velocity
 
 _LINEAR_MPS = 0.5
 _ANGULAR_RADPS = 1.0

@@ -4,7 +4,6 @@ from collections.abc import Callable
 
 from nicegui import ui
 
-from handsteer.control.velocity import Velocity
 from handsteer.dashboard.manual import Manual
 from handsteer.dashboard.panels.elements import box, button, card, switch, text
 from handsteer.dashboard.panels.mux import MuxPanel
@@ -12,6 +11,7 @@ from handsteer.dashboard.panels.sliders import Sliders, read_limit
 from handsteer.dashboard.panels.topic import TopicBox
 from handsteer.dashboard.seat import Place
 from handsteer.dashboard.state import PageState
+from handsteer.types import Velocity
 
 _HINTS = {
     "free": "Hold the pad, or its arrow keys. Sliders stay, until you leave this page.",

@@ -7,7 +7,7 @@ from nicegui import ui
 
 from handsteer.dashboard.panels.elements import box, button, text
 from handsteer.signs.teaching.dataset import Dataset, summarise
-from handsteer.signs.vocabulary import NONE
+from handsteer.types import NONE
 
 _LONGEST = 200
 

@@ -5,14 +5,13 @@ from typing import Any
 
 from nicegui import ui
 
-from handsteer.control.actions import EFFECTS, Action
 from handsteer.dashboard.panels.elements import box, button, switch, tag, text
 from handsteer.dashboard.teaching.lesson import View
 from handsteer.dashboard.teaching.teaching import Kept
 from handsteer.signs.recognizer import Recognition
 from handsteer.signs.teaching.train import TeachingReport
 from handsteer.signs.teaching.words import false_hands, how_it_was_tried, mistakes
-from handsteer.signs.vocabulary import NONE
+from handsteer.types import EFFECTS, NONE, Action
 
 
 class ResultPanel:

@@ -15,8 +15,9 @@ from handsteer.dashboard.panels.thing_form import ThingForm
 from handsteer.dashboard.scene import WorldView
 from handsteer.errors import WorldError
 from handsteer.robots.editing import MOST_OBSTACLES, Change, add, edit, remove
-from handsteer.robots.protocol import Pose2D, Shape
+from handsteer.robots.protocol import Shape
 from handsteer.robots.world import Thing, World, load_world, parse_world, shipped_worlds, write_world
+from handsteer.types import Pose2D
 
 LARGEST_FILE_BYTES = 64 * 1024
 """A world file that is opened from a browser has at most so many; 200 things need half of it."""

@@ -9,7 +9,7 @@ from handsteer.landmarks.protocol import Hand
 from handsteer.signs.features import KNUCKLES, WRIST
 from handsteer.signs.protocol import SignGuess
 from handsteer.signs.trained import SURE
-from handsteer.signs.vocabulary import NONE
+from handsteer.types import NONE
 
 _SMALL_PX: Final = 60.0
 _ENOUGH_HANDS: Final = 15

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handsteer.clock import Clock
-from handsteer.config import SignsConfig
+from handsteer.config import Config, SignsConfig
 from handsteer.dashboard.teaching.lesson import Lesson, View
 from handsteer.errors import TrainingError
 from handsteer.images import bgr_image, encode_jpeg
@@ -25,8 +25,8 @@ from handsteer.signs.teaching.apart import TrainingApart
 from handsteer.signs.teaching.collect import largest
 from handsteer.signs.teaching.dataset import Dataset
 from handsteer.signs.teaching.taught import TaughtClassifier, TaughtModel
-from handsteer.signs.vocabulary import NONE
 from handsteer.transports.protocol import Received, Transport
+from handsteer.types import NONE
 
 log = logging.getLogger(__name__)
 
@@ -204,7 +204,8 @@ class LessonNode(Node):
             return
         if self._trying is None or self._trying[0] is not model:
             landmarker.reset()
-            self._trying = model, Recognizer(landmarker, TaughtClassifier(shipped, model), self._eyes.signs())
+            classifier, config = TaughtClassifier(shipped, model), Config(signs=self._eyes.signs())
+            self._trying = model, Recognizer(config, landmarker=landmarker, classifier=classifier)
         seen = self._trying[1].step(image, step_s)
         with self._lock:
             self._lesson.try_out(seen)

@@ -11,7 +11,6 @@ import yaml
 
 from handsteer.clock import Clock
 from handsteer.config import Config, ControlConfig, TeachConfig, validate
-from handsteer.control.actions import ACTIONS, Action, action_of
 from handsteer.dashboard.joined import JoinedGraph
 from handsteer.dashboard.teaching.lesson import Lesson, View
 from handsteer.dashboard.teaching.node import Eyes, LessonNode
@@ -20,8 +19,8 @@ from handsteer.signs.opening import open_classifier, open_landmarker
 from handsteer.signs.teaching.collect import Facts
 from handsteer.signs.teaching.dataset import Dataset, label_for, load_dataset, save_dataset
 from handsteer.signs.teaching.taught import load_taught, save_taught
-from handsteer.signs.vocabulary import NONE, SIGNS, find_sign
 from handsteer.transports.protocol import Transport
+from handsteer.types import ACTIONS, NONE, SIGNS, Action, action_of, find_sign
 
 _LONGEST_PERSON: Final = 40
 

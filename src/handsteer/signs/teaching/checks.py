@@ -10,7 +10,7 @@ from handsteer.signs.intervals import Share
 from handsteer.signs.protocol import Classifier
 from handsteer.signs.teaching.dataset import Dataset, summarise
 from handsteer.signs.trained import SURE
-from handsteer.signs.vocabulary import NONE, SIGNS, find_sign
+from handsteer.types import NONE, SIGNS, find_sign
 
 _LEAST_TAKES: Final = 2
 _LEAST_ROWS: Final = 10

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from handsteer.errors import DatasetError
 from handsteer.landmarks.protocol import Hand
 from handsteer.signs.npz import Arrays, NpzFormat
-from handsteer.signs.vocabulary import NONE, SIGNS, find_sign
+from handsteer.types import NONE, SIGNS, find_sign
 
 FORMAT: Final = 1
 """Version of the file."""

@@ -19,7 +19,7 @@ from handsteer.signs.protocol import Classifier, SignGuess
 from handsteer.signs.teaching.dataset import label_for
 from handsteer.signs.teaching.features import FEATURE_COUNTS, Array, Depth, taught_features
 from handsteer.signs.trained import SURE, legibility
-from handsteer.signs.vocabulary import NONE, SIGNS
+from handsteer.types import NONE, SIGNS
 
 FORMAT: Final = 1
 """Version of the file and of the features."""

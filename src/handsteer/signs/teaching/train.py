@@ -28,7 +28,7 @@ from handsteer.signs.teaching.taught import FORMAT, TaughtModel
 from handsteer.signs.teaching.variation import mirrored, points_sideways, vary
 from handsteer.signs.trained import SURE
 from handsteer.signs.training.hands import Hands, make_hands
-from handsteer.signs.vocabulary import NONE
+from handsteer.types import NONE
 
 SEED: Final = 11
 _HIDDEN: Final = (64, 32)

@@ -1,7 +1,7 @@
 """What a training came to, in sentences for people."""
 
 from handsteer.signs.teaching.train import TeachingReport
-from handsteer.signs.vocabulary import NONE
+from handsteer.types import NONE
 
 
 def how_it_was_tried(report: TeachingReport) -> str:

@@ -38,7 +38,7 @@ from handsteer.signs.training.split import Part, part_of
 from handsteer.signs.training.truth import FIST, OPEN, OTHER, SHAPES, THUMB
 from handsteer.signs.training.truth import INDEX as POINTING
 from handsteer.signs.views import View
-from handsteer.signs.vocabulary import NONE, SIGNS
+from handsteer.types import NONE, SIGNS
 
 _SHAPES: Final = {"Stop": OPEN, "Forward": POINTING, "Go": FIST, "Turn Right": THUMB, "Turn Left": THUMB}
 _KINDS: Final = {

@@ -3,12 +3,25 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from handsteer.config import ControlConfig
-from handsteer.control.actions import ACTIONS, ALWAYS_STOP, EFFECTS, action_of, motion_signs
 from handsteer.control.driver import Driver
 from handsteer.control.sign_control import SignControl
-from handsteer.control.velocity import ZERO, Velocity
 from handsteer.messages import STOPPING_SIGNS
-from handsteer.signs.vocabulary import FORWARD, GO, MOTION_SIGNS, NONE, SIGNS, STOP, TURN_LEFT
+from handsteer.types import (
+    ACTIONS,
+    ALWAYS_STOP,
+    EFFECTS,
+    FORWARD,
+    GO,
+    MOTION_SIGNS,
+    NONE,
+    SIGNS,
+    STOP,
+    TURN_LEFT,
+    ZERO,
+    Velocity,
+    action_of,
+    motion_signs,
+)
 
 DT = 1 / 30
 

@@ -1,0 +1,124 @@
+"""The whole of handsteer without nodes, topics and threads: an image in, a velocity out. Start reading here.
+
+::
+
+    image ─▶ freshness ─▶ recognizer ─▶ sign ─▶ control ─▶ velocity
+
+:class:`Teleop` is what drives a robot in a program of your own. In a ROS graph the same parts run in nodes of their
+own, joined by topics (:mod:`handsteer.graph`): the camera's node reads the images,
+:class:`~handsteer.nodes.recognition.HandSignRecognitionNode` holds freshness and recogniser, and
+:class:`~handsteer.nodes.control.HandSignControlNode` holds the control.
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from handsteer.cameras.freshness import Freshness
+from handsteer.config import Config
+from handsteer.control.control import Control
+from handsteer.signs.recognizer import Recognition, Recognizer
+from handsteer.types import ZERO, Velocity
+
+
+class Teleop:
+    """Drives a robot by the hand signs in a stream of images.
+
+    Nothing moves before neutral was seen: Stop, or half a second without a hand. It is asked for again after a pause
+    or a frozen camera (:doc:`/safety`). Where that is not wanted, as for a simulated robot, set ``control.arming`` to
+    ``off``.
+
+    Args:
+        config: Everything that can be set; the defaults when None.
+        recognizer: Recognises the signs; made of ``config`` when None.
+
+    Attributes:
+        recognition: What was understood of the last image; None when it was no new image.
+
+    Raises:
+        ModelError: A landmark model or the sign model is missing or broken.
+    """
+
+    def __init__(self, config: Config | None = None, recognizer: Recognizer | None = None) -> None:
+        config = config or Config()
+        self.recognition: Recognition | None = None
+        self._recognizer = recognizer or Recognizer(config)
+        self._max_frame_age_s = config.signs.max_frame_age
+        self._freshness = Freshness(self._max_frame_age_s)
+        self._refused: str | None = "no image has come"
+        self._since_image_s = self._since_seen_s = 0.0
+        self._control = Control(config.control, arming=config.control.arming != "off")
+        self._velocity = ZERO
+
+    def step(self, image: NDArray[np.uint8] | None, dt_s: float) -> Velocity:
+        """Take the next image and return the velocity that holds from now on.
+
+        Call it for each image, and without one at least every 0.1 s while none comes.
+
+        Args:
+            image: (height, width, 3) uint8, BGR, as the camera saw it, not mirrored; None when there is no new one.
+            dt_s: Seconds since the last call, >= 0; anything else counts as a fault, and stops the robot.
+
+        Raises:
+            FrameError: The image has another shape or type; the robot is stopped.
+        """
+        if not (math.isfinite(dt_s) and dt_s >= 0):
+            self._refused = f"the time between two images is {dt_s} s"
+            return self._fault(self._refused)
+        self._command(self._control.step(dt_s))  # who has been silent for too long is stopped before the image counts
+        self._since_image_s += dt_s
+        self._since_seen_s += dt_s
+        sign = None if image is None else self._sign_of(image)
+        if sign is not None:
+            self._command(self._control.step(0.0, sign=sign))
+        elif self._since_seen_s > self._max_frame_age_s:
+            self._recognizer.reset()
+            self.recognition = None
+        return self._velocity
+
+    def stop(self) -> None:
+        """Stand until :meth:`reset`, whatever is shown."""
+        self._command(self._control.stop())
+
+    def reset(self) -> None:
+        """End a stop; nothing moves before neutral was seen."""
+        self._control.reset()
+
+    @property
+    def reason(self) -> str:
+        """A sentence on what the robot is told to do, and why it stands when it does."""
+        safety = self._control.safety
+        if safety.is_stopped:
+            return "standing: stopped, until it is reset"
+        if self._refused is not None and self._velocity.is_zero:
+            return f"standing: {self._refused}"
+        if safety.signs_wait is not None:
+            return f"standing: disarmed ({safety.signs_wait or 'reset'}), moves once Stop is shown, or no hand"
+        return self._control.driver.reason
+
+    def _sign_of(self, image: NDArray[np.uint8]) -> str | None:
+        """Return the sign that counts; None where the image is not new, which a frozen camera's are not."""
+        since_image_s, self._since_image_s = self._since_image_s, 0.0
+        self._refused = self._freshness.why_refused(image, since_image_s)
+        if self._refused is not None:
+            return None
+        try:
+            # The time of images that were not looked at counts too: a sign lasts from when it was seen.
+            self.recognition = self._recognizer.step(image, self._since_seen_s)
+        except Exception:
+            self._fault("an image could not be looked at")
+            raise
+        self._since_seen_s = 0.0
+        if self.recognition.hand is not None:
+            self._refused = self._freshness.why_hand_refused(self.recognition.hand.box_px, since_image_s)
+        return self.recognition.sign if self._refused is None else None
+
+    def _fault(self, why: str) -> Velocity:
+        self._control.safety.fault(why)
+        self._command(self._control.halt())
+        return self._velocity
+
+    def _command(self, velocity: Velocity | None) -> None:
+        if velocity is not None:
+            self._velocity = velocity

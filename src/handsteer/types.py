@@ -1,0 +1,128 @@
+"""What the whole project speaks of: signs, what they do, velocities and poses. Imports nothing of handsteer.
+
+Signs are named from the user's own point of view. Axes and units follow REP 103: x forward, y left, a left turn is
+positive; metres, radians, seconds.
+"""
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+Handedness = Literal["Left", "Right"]
+"""Which hand of the person it is."""
+
+STOP = "Stop"
+FORWARD = "Forward"
+BACKWARD = "Backward"
+TURN_RIGHT = "Turn Right"
+TURN_LEFT = "Turn Left"
+GO = "Go"
+NONE = "NONE"
+"""No hand, or a hand that shows none of the signs."""
+
+SIGNS = (STOP, FORWARD, BACKWARD, TURN_RIGHT, TURN_LEFT, GO)
+MOTION_SIGNS = frozenset({FORWARD, BACKWARD, TURN_RIGHT, TURN_LEFT})
+"""The signs that can make a robot move."""
+
+
+def find_sign(name: str, known: Iterable[str]) -> str | None:
+    """Return the sign of ``known`` that ``name`` means, whatever its case, spaces, ``_`` and ``-``; None if none does.
+
+    So ``TurnRight``, ``turn_right`` and ``turn right`` all mean ``Turn Right``.
+    """
+    return next((sign for sign in known if _bare(sign) == _bare(name)), None)
+
+
+def _bare(name: str) -> str:
+    return "".join(letter for letter in name.casefold() if letter not in " _-\t")
+
+
+Action = Literal["forward", "backward", "turn_left", "turn_right", "stop", "go", "turbo", "next_robot"]
+"""Everything that a sign can do to the velocity."""
+
+ACTIONS: tuple[Action, ...] = get_args(Action)
+MOTION_ACTIONS: frozenset[Action] = frozenset({"forward", "backward", "turn_left", "turn_right", "turbo"})
+"""The actions that can make a robot move, or move faster."""
+
+EFFECTS: Mapping[Action, str] = {
+    "forward": "faster forward; turning ends",
+    "backward": "slower, then backward; turning ends",
+    "turn_left": "turns faster to the left; keeps its speed",
+    "turn_right": "turns faster to the right; keeps its speed",
+    "stop": "stops",
+    "go": "goes on as it does",
+    "turbo": "twice as fast while shown, within the limits",
+    "next_robot": "the next robot is driven, once Stop was shown",
+}
+"""What each action makes the robot do, in words."""
+
+BUILT_IN: Mapping[str, Action] = {
+    FORWARD: "forward",
+    BACKWARD: "backward",
+    TURN_LEFT: "turn_left",
+    TURN_RIGHT: "turn_right",
+    GO: "go",
+    STOP: "stop",
+    NONE: "stop",
+}
+"""The rule of the ROS 101 course, chapter 12."""
+
+ALWAYS_STOP = frozenset({STOP, NONE})
+"""What stops the robot whatever the configuration says."""
+
+
+def action_of(sign: str, given: Mapping[str, Action]) -> Action:
+    """Return what ``sign`` does: as ``given`` says, else as built in; an unknown word changes nothing, as ``Go``.
+
+    Names in ``given`` may have any case, and ``_`` or ``-`` for spaces.
+    """
+    name = find_sign(sign, given)
+    return given[name] if name is not None else BUILT_IN.get(sign, "go")
+
+
+def motion_signs(given: Mapping[str, Action], signs: Iterable[str] = ()) -> frozenset[str]:
+    """Return the signs, of ``signs`` and of those that are named, that can make the robot move.
+
+    Args:
+        given: Actions that go before what is built in.
+        signs: Further signs, by their own names.
+    """
+    return frozenset(sign for sign in {*BUILT_IN, *given, *signs} if action_of(sign, given) in MOTION_ACTIONS)
+
+
+@dataclass(frozen=True)
+class Velocity:
+    """Forward velocity in m/s and turning velocity in rad/s, left positive (REP 103)."""
+
+    linear_mps: float = 0.0
+    angular_radps: float = 0.0
+
+    @property
+    def is_zero(self) -> bool:
+        """Whether the robot is to stand still."""
+        return self.linear_mps == 0.0 and self.angular_radps == 0.0
+
+    @property
+    def is_finite(self) -> bool:
+        """Whether both parts are numbers that a robot can follow."""
+        return math.isfinite(self.linear_mps) and math.isfinite(self.angular_radps)
+
+    def clamped(self, max_linear_mps: float, max_angular_radps: float) -> "Velocity":
+        """Return the nearest velocity within the limits."""
+        return Velocity(
+            max(-max_linear_mps, min(self.linear_mps, max_linear_mps)),
+            max(-max_angular_radps, min(self.angular_radps, max_angular_radps)),
+        )
+
+
+ZERO = Velocity()
+
+
+@dataclass(frozen=True)
+class Pose2D:
+    """A pose on the floor: x and y in metres, yaw in radians, left positive (REP 103)."""
+
+    x: float
+    y: float
+    yaw: float

@@ -1,0 +1,37 @@
+"""What is said where a package is not installed."""
+
+import subprocess
+import sys
+
+import pytest
+
+from handsteer.errors import PackageMissing, needing
+
+VIRTUAL = ("--camera", "virtual", "--camera.width", "320", "--camera.height", "240", "--duration", "5")
+
+
+@pytest.mark.parametrize(
+    ("module", "command", "says"),
+    [
+        (
+            "mujoco",
+            ("run", "--headless", *VIRTUAL),
+            "the simulated robot needs the package mujoco: run pip install 'ha",
+        ),
+        ("nicegui", ("run", *VIRTUAL), "the page (a run with --headless does without) needs the package nicegui"),
+        ("zenoh", ("zenoh-router",), "the Zenoh router needs the package zenoh: run pip install 'handsteer[zenoh]'"),
+    ],
+)
+def test_a_verb_says_what_to_install(module: str, command: tuple[str, ...], says: str) -> None:
+    program = f"import sys; sys.modules['{module}'] = None; from handsteer.cli import main; main(sys.argv[1:])"
+    done = subprocess.run([sys.executable, "-c", program, *command], capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert says in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_what_else_is_missing_is_no_matter_of_an_extra() -> None:
+    with pytest.raises(ModuleNotFoundError), needing("the page", "page", "nicegui"):
+        import not_of_an_extra  # type: ignore[import-not-found]  # noqa: PLC0415
+    with pytest.raises(PackageMissing), needing("the page", "page", "not_of_an_extra"):
+        import not_of_an_extra.part  # noqa: F401, PLC0415

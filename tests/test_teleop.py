@@ -1,0 +1,150 @@
+"""The spine without nodes: an image in, a velocity out."""
+
+import math
+from collections.abc import Iterable
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from handsteer import Config, Recognizer, Teleop, Velocity
+from handsteer.cameras.noise import SensorNoise
+from handsteer.clock import SteppedClock
+from handsteer.config import CameraConfig, ControlConfig, VirtualHandConfig
+from handsteer.errors import FrameError
+from handsteer.graph import Graph
+from handsteer.images import bgr_image
+from handsteer.messages import CMD_VEL, IMAGE_RAW
+from handsteer.types import ZERO
+from tests.faults.painted import PaintedCamera, painted_recognizer
+
+DT_S = 1 / 30
+GREY = np.full((48, 64, 3), 100, np.uint8)
+
+
+class Person:
+    """Shows painted signs to a camera, which a teleop looks at."""
+
+    def __init__(self, config: Config | None = None) -> None:
+        config = config or Config()
+        self.clock = SteppedClock()
+        self.camera = PaintedCamera(self.clock)
+        self.teleop = Teleop(config, painted_recognizer(config.signs))
+
+    def image(self, sign: str) -> NDArray[np.uint8]:
+        self.camera.sign = sign
+        return self.camera.read().image
+
+    def shows(self, sign: str, duration_s: float) -> list[Velocity]:
+        return [self.teleop.step(self.image(sign), DT_S) for _ in range(round(duration_s / DT_S))]
+
+    def drives(self) -> None:
+        """Show Stop, then Forward, until it drives."""
+        self.shows("Stop", 1.0)
+        assert self.shows("Forward", 1.0)[-1].linear_mps > 0.1
+
+
+def test_a_hand_that_is_up_at_the_start_moves_nothing_before_neutral_was_seen() -> None:
+    person = Person()
+    assert set(person.shows("Forward", 2.0)) == {ZERO}
+    assert "moves once Stop is shown" in person.teleop.reason
+    person.drives()
+    assert person.teleop.reason == "driving: Forward"
+
+
+def test_without_arming_the_first_sign_drives() -> None:
+    person = Person(Config(control=ControlConfig(arming="off")))
+    assert person.shows("Forward", 1.0)[-1].linear_mps > 0.1
+
+
+@pytest.mark.parametrize("image", [None, GREY], ids=["no image", "a frozen camera"])
+def test_without_new_images_the_robot_stands_and_waits_for_neutral(image: NDArray[np.uint8] | None) -> None:
+    person = Person()
+    person.drives()
+    unseen = [person.teleop.step(image, DT_S) for _ in range(30)]
+    assert unseen[12] == unseen[-1] == ZERO
+    assert person.teleop.reason.startswith("standing: ")
+    assert set(person.shows("Forward", 1.0)) == {ZERO}
+    person.drives()
+
+
+def test_one_long_pause_is_a_fault_though_an_image_comes_at_its_end() -> None:
+    person = Person()
+    person.drives()
+    assert person.teleop.step(person.image("Forward"), 5.0) == ZERO
+    assert set(person.shows("Forward", 1.0)) == {ZERO}
+
+
+@pytest.mark.parametrize("dt_s", [-0.1, math.nan, math.inf])
+def test_a_time_that_cannot_be_stops_the_robot(dt_s: float) -> None:
+    person = Person()
+    person.drives()
+    assert person.teleop.step(person.image("Forward"), dt_s) == ZERO
+    assert set(person.shows("Forward", 1.0)) == {ZERO}
+
+
+def test_a_broken_image_raises_and_leaves_the_robot_standing() -> None:
+    teleop = Teleop(Config(control=ControlConfig(arming="off")))
+    with pytest.raises(FrameError):
+        teleop.step(GREY[:, :, 0], DT_S)
+    assert teleop.step(None, DT_S) == ZERO
+
+
+def test_stop_holds_until_it_is_reset_and_neutral_was_seen() -> None:
+    person = Person()
+    person.drives()
+    person.teleop.stop()
+    assert set(person.shows("Forward", 1.0)) == {ZERO}
+    assert person.teleop.reason == "standing: stopped, until it is reset"
+    person.teleop.reset()
+    assert set(person.shows("Forward", 1.0)) == {ZERO}
+    person.drives()
+
+
+@given(st.lists(st.tuples(st.sampled_from(["NONE", "Forward", "Turn Left", "Go", None]), st.floats(0.01, 1.0))))
+def test_nothing_moves_before_neutral_whatever_comes(shown: list[tuple[str | None, float]]) -> None:
+    """A picture without a hand is neutral too, so none lasts here for as long as that takes."""
+    person = Person()
+    for sign, dt_s in shown:
+        image = None if sign is None else person.image("Forward" if sign == "NONE" else sign)
+        assert person.teleop.step(image, dt_s) == ZERO
+
+
+@pytest.mark.slow
+def test_it_commands_what_the_nodes_command() -> None:
+    """The same images through the graph of nodes, and through the spine."""
+    config = Config(
+        camera=CameraConfig(source="virtual", width=320, height=240),
+        virtual_hand=VirtualHandConfig(script="Stop:1 Forward:1.5 Turn Left:1 NONE:0.5 Stop:1"),
+        control=ControlConfig(arming="on"),
+    )
+    images: list[NDArray[np.uint8]] = []
+    commands: list[Velocity] = []
+    with Graph(config, SteppedClock()) as graph:
+        graph.transport.subscribe("test", IMAGE_RAW, lambda image: images.append(bgr_image(image.message)))
+        graph.transport.subscribe("test", CMD_VEL, lambda twist: commands.append(_velocity(twist.message)))
+        graph.run_stepped(5.0)
+
+    teleop = Teleop(config)
+    assert commands[-1] == ZERO
+    assert max(command.linear_mps for command in commands) > 0.3
+    assert _changes(teleop.step(image, DT_S) for image in images) == _changes(commands)
+
+
+def test_the_doors_are_few_and_open() -> None:
+    picture = SensorNoise().on(np.full((240, 320, 3), 90, np.uint8), 0.0)
+    assert Recognizer().recognize(picture).sign == "NONE"
+
+
+def _velocity(twist: object) -> Velocity:
+    return Velocity(twist.linear.x, twist.angular.z)
+
+
+def _changes(velocities: Iterable[Velocity]) -> list[Velocity]:
+    changes = [ZERO]
+    for velocity in velocities:
+        if velocity != changes[-1]:
+            changes.append(velocity)
+    return changes
