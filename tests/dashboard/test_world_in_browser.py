@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 from playwright.sync_api import Page
 
-from handsteer.dashboard.geometry import about_axis, from_rpy
+from handsteer.dashboard.scene import about_axis, from_rpy
 from handsteer.messages import JOINT_STATES, JointState
 from handsteer.robots.description import joints, robot_description
 from handsteer.robots.world import load_world, read_world
@@ -208,7 +208,7 @@ def test_the_course_counts_gates_and_bumps_and_only_the_driver_edits(tmp_path: P
         page, robot = visit.page, visit.graph.robot
         visit.wait_until(lambda: "gates 0/3" in visit.text(".course"))
         page.get_by_text("Ask to drive").click()
-        page.locator(".seat .role", has_text="you drive").wait_for()
+        page.locator(".lease .role", has_text="you drive").wait_for()
         visit.steer_until(0.5, 0.0, lambda: "gates 2/3" in visit.text(".course"))
         visit.steer_until(0.5, 0.0, lambda: "bumps 1" in visit.text(".course"))
         page.locator(".world .stage.bump-a").wait_for()
@@ -218,7 +218,7 @@ def test_the_course_counts_gates_and_bumps_and_only_the_driver_edits(tmp_path: P
         other = page.context.browser.new_page()
         other.set_default_timeout(PATIENCE_MS)
         other.goto(page.url)
-        other.locator(".seat .role", has_text="you watch").wait_for()
+        other.locator(".lease .role", has_text="you watch").wait_for()
         press(other, "Edit world")
         other.locator(".world .message", has_text="Somebody else drives").wait_for()
         press(other, "Back to start")

@@ -1,19 +1,95 @@
 """What every page has: the head with the way to the others, the sentence with the Stop button, and who drives."""
 
+import re
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import ClassVar
 
 from nicegui import ui
 
 from handsteer.dashboard.joined import Cameras, RobotInWorld
+from handsteer.dashboard.lease import LeaseStatus, Role
 from handsteer.dashboard.node import DashboardNode
-from handsteer.dashboard.panels.banner import Banner
-from handsteer.dashboard.panels.seat import SeatPanel
-from handsteer.dashboard.seat import Place
+from handsteer.dashboard.on_demand import OnDemandNode
+from handsteer.dashboard.panels.elements import box, button, switch, text
 from handsteer.dashboard.settings_store import Settings
 from handsteer.dashboard.state import PageState
 from handsteer.dashboard.teaching.teaching import Teaching
-from handsteer.dashboard.watch import WhileWatched
+
+
+class LeasePanel:
+    """Whether this viewer drives, and the way to the control lease.
+
+    Args:
+        ask: Is called to ask for it.
+        answer: Is called with True to hand it over, with False to keep it.
+    """
+
+    _WORDS: ClassVar[dict[Role, str]] = {"driver": "you drive", "watcher": "you watch", "free": "nobody drives"}
+
+    def __init__(self, ask: Callable[[], None], answer: Callable[[bool], None]) -> None:
+        with box("lease"):
+            self._question = text("question", "")
+            self._words = text("role chip", "")
+            self._ask = button("Ask to drive", "").on("click", ask)
+            self._yes = button("Hand over", "").on("click", lambda: answer(True))
+            self._no = button("Keep", "").on("click", lambda: answer(False))
+
+    def update(self, place: LeaseStatus) -> None:
+        """Show what the lease is for this viewer."""
+        is_driver = place.role == "driver"
+        asks = f"Somebody asks to drive; unanswered, they do in {place.left_s:.0f} s"
+        waits = f"You drive in {place.left_s:.0f} s, or sooner"
+        self._question.set_text((asks if is_driver else waits) if place.asked else "")
+        self._words.set_text(self._WORDS[place.role])
+        switch(self._ask, "hidden", on=is_driver or place.asked)
+        for answer in (self._yes, self._no):
+            switch(answer, "hidden", on=not (is_driver and place.asked))
+
+
+_TIME = re.compile(r" for \d+(\.\d+)? s\b")
+
+
+def spoken(state: PageState) -> str:
+    """Return the sentence for a screen reader, which would read out each tenth of a second of a time that passes."""
+    return ". ".join([f"{state.headline}: {_TIME.sub('', state.reason)}", *state.warnings])
+
+
+class Banner:
+    """The sentence: what the robot does, and why; and the button that stops it.
+
+    Args:
+        halt: Is called to stop the robot.
+        reset: Is called to let it be driven again.
+    """
+
+    def __init__(self, halt: Callable[[], None], reset: Callable[[], None]) -> None:
+        with ui.element("section").classes("card banner") as self._banner:
+            self._spoken = text("spoken", "").props('role="status"')
+            box("lamp")
+            self._headline = text("headline", "Starting")
+            self._reason = text("reason", "waiting for the first report")
+            self._warning = text("warning hidden", "")
+            with box("buttons"):
+                self._reset = button("Reset", 'aria-label="Reset: let the robot be driven again"').on("click", reset)
+                self._stop = button("Stop", 'aria-label="Stop the robot (space key)" aria-keyshortcuts="Space"')
+                self._stop.classes("stop").on("click", halt)
+        ui.on("space", halt)
+        self._mood = ""
+
+    def update(self, state: PageState) -> None:
+        """Show ``state``."""
+        self._headline.set_text(state.headline)
+        self._reason.set_text(state.reason)
+        self._spoken.set_text(spoken(state))
+        self._warning.set_text("; ".join(state.warnings))
+        switch(self._warning, "hidden", on=not state.warnings)
+        switch(self._reset, "hidden", on=not state.stopped)
+        if state.mood != self._mood:
+            self._banner.classes(remove=self._mood, add=state.mood)
+            self._mood = state.mood
+
 
 PICTURE_PATH = "/camera.mjpg"
 WEBCAM_PATH = "/camera"
@@ -37,7 +113,7 @@ _THEME_ICON = (
 
 
 @dataclass(frozen=True)
-class Local:
+class GraphAccess:
     """What pages reach of the graph beside its topics; None is out of their reach.
 
     Attributes:
@@ -54,7 +130,7 @@ class Local:
 
 
 @dataclass(frozen=True)
-class Served:
+class PageContext:
     """What the pages are made of.
 
     Attributes:
@@ -63,8 +139,8 @@ class Served:
         topics: Whether steering by hand may go to other topics than the control's.
     """
 
-    node: WhileWatched[DashboardNode]
-    local: Local
+    node: OnDemandNode[DashboardNode]
+    local: GraphAccess
     topics: bool
 
 
@@ -76,7 +152,7 @@ class Page:
         path: Where the page is, which its link in the head says.
     """
 
-    def __init__(self, served: Served, path: str) -> None:
+    def __init__(self, served: PageContext, path: str) -> None:
         self.client = ui.context.client
         self._served = served
         self.client.on_disconnect(self._leave)
@@ -101,13 +177,13 @@ class Page:
         return self._served.node.join(self.client.id) if self.client.has_socket_connection else None
 
     def drives(self) -> bool:
-        """Return whether this viewer has the driver's seat, which it is given if it is free."""
+        """Return whether this viewer has the control lease, which it is given if it is free."""
         node = self.joined
-        return node is not None and node.seat.take(self.client.id, node.clock.now())
+        return node is not None and node.lease.take(self.client.id, node.clock.now())
 
-    def place(self, node: DashboardNode) -> Place:
-        """Return what the driver's seat is for this viewer."""
-        return node.seat.place_of(self.client.id, node.clock.now())
+    def place(self, node: DashboardNode) -> LeaseStatus:
+        """Return what the control lease is for this viewer."""
+        return node.lease.status_of(self.client.id, node.clock.now())
 
     def use_own_camera(self) -> None:
         """Choose the camera of the machine that handsteer runs on, if this viewer drives."""
@@ -124,7 +200,7 @@ class Page:
                 for target, name in _LINKS:
                     ui.link(name, target).props('aria-current="page"' if target == path else "")
             with ui.element("div").classes("right"):
-                self._driving = SeatPanel(self._ask, self._answer)
+                self._driving = LeasePanel(self._ask, self._answer)
                 self._source = ui.label("").classes("source chip")
                 with ui.element("button").classes("icon-button theme").props('aria-label="Light or dark"'):
                     ui.html(_THEME_ICON, sanitize=False)
@@ -153,11 +229,11 @@ class Page:
 
     def _ask(self) -> None:
         if node := self.joined:
-            node.seat.ask(self.client.id, node.clock.now())
+            node.lease.ask(self.client.id, node.clock.now())
 
     def _answer(self, hand_over: bool) -> None:
         if node := self.joined:
-            node.seat.answer(self.client.id, hand_over=hand_over)
+            node.lease.answer(self.client.id, hand_over=hand_over)
 
     def _leave(self) -> None:
         watched = self._served.node
