@@ -131,7 +131,8 @@ class Topic(Generic[M]):
             namespace of their node.
         depth: How many messages may wait for a subscriber that is busy; older ones are dropped (ROS 2: keep last).
         lifespan_s: A message that has not arrived after so long is not to arrive at all; None for no limit.
-        beneath: The topic whose name it extends; it is renamed with it, as the topics of ROS's image_transport are.
+        beneath: The topic whose name it extends, or whose neighbour it is; it is renamed with it, as ROS's
+            image_transport has it.
         or_type: Another class that its sending end may have instead, as subscribers take it; None where it has one.
         stops: Tells a message that stops the robot, which is to be obeyed however late it comes; None where none does.
     """
@@ -145,6 +146,12 @@ class Topic(Generic[M]):
     beneath: "Topic[Any] | None" = None
     stops: Callable[[Any], bool] | None = None
     or_type: builtins.type[Any] | None = None
+
+    def moved_with(self, beneath: str) -> str:
+        """Return its name where the topic that it is ``beneath`` has this full name, or lies in the same namespace."""
+        assert self.beneath is not None
+        ending = self.name.removeprefix(self.beneath.name)
+        return beneath + ending if ending != self.name else beneath.rpartition("/")[0] + self.name
 
     @property
     def ros_name(self) -> str:
@@ -166,7 +173,7 @@ def is_stopping(sign: String) -> bool:
 # The functions of topics have names, so that a topic can be sent to another process.
 IMAGE_RAW = Topic("/image_raw", Image)
 IMAGE_COMPRESSED = Topic("/image_raw/compressed", CompressedImage, beneath=IMAGE_RAW)
-CAMERA_INFO = Topic("/camera_info", CameraInfo)
+CAMERA_INFO = Topic("/camera_info", CameraInfo, beneath=IMAGE_RAW)
 # Each sign makes the robot a step faster, so none may be lost when several come at once.
 HAND_SIGN = Topic(
     "/gesture/hand_sign",

@@ -252,7 +252,7 @@ def _given(node: Node, topic: Topic[Any]) -> str:
     beneath, name = topic.beneath, topic.ros_name
     if beneath is None or node.resolve_topic_name(name) != node.resolve_topic_name(name, only_expand=True):
         return name
-    return resolved(node, beneath) + topic.name.removeprefix(beneath.name)
+    return topic.moved_with(resolved(node, beneath))
 
 
 def _overriding(node: Node, name: str) -> QoSOverridingOptions | None:
