@@ -5,10 +5,10 @@ from typing import Any
 
 from handsteer.clock import Clock
 from handsteer.config import CollisionMonitorConfig, Config, ControlConfig
-from handsteer.control.driver import Driver
+from handsteer.control.control import Control
 from handsteer.control.effects import tell
 from handsteer.control.fleet import NEXT
-from handsteer.control.safety import Following, Ramp, Safety
+from handsteer.control.safety import Following
 from handsteer.messages import (
     CMD_VEL,
     HAND_SIGN,
@@ -73,15 +73,14 @@ class HandSignControlNode(Node):
         super().__init__("hand_sign_control", transport, clock)
         self.latency = LatencyLog()
         self._config = config
-        self._driver = Driver(config)
-        self._safety = Safety(config, arming=arming)
+        self._control = Control(config, arming=arming)
+        self._safety, self._driver = self._control.safety, self._control.driver
         self._following = Following() if arming and not config.robots else None
         self._arming = arming
-        self._ramp = Ramp(config)
         self._waited = False
         self._measured = MeasuredVelocity()
         self._commanded = ZERO
-        self._ramped_s = self._last_step_s = clock.now()
+        self._last_step_s = clock.now()
         self._monitor = CollisionMonitor(self, collision_monitor or CollisionMonitorConfig(), self._driver.hold_back)
         self._interruption = Interruption(config.sign_timeout, clock.now())
         self._last_sign = NONE
@@ -102,10 +101,8 @@ class HandSignControlNode(Node):
         """Take all of ``control``; a robot that is faster than new limits allow is told so at once."""
         self._config = config.control
         self._interruption.limit_s = config.control.sign_timeout
-        self._safety.reconfigure(config.control)
-        self._ramp.reconfigure(config.control)
         self._monitor.reconfigure(config.collision_monitor)
-        self._publish(self._driver.reconfigure(config.control))
+        self._publish(self._control.reconfigure(config.control))
 
     def services(self) -> dict[str, Call]:
         """Return ``stop`` and ``reset``, which do what true and false on ``/stop`` do."""
@@ -122,20 +119,19 @@ class HandSignControlNode(Node):
 
     def on_stop(self) -> None:
         """Leave the robot standing, and those that it left a moment ago."""
-        self._driver.halt()
+        self._control.halt()
         self._publish(ZERO)
         if self._selection:
             self._selection.beat()
 
     def _on_stop_or_reset(self, is_stopped: bool) -> None:
         if is_stopped:
-            self._safety.stop()
-            self._driver.halt()
+            self._control.stop()
             self._publish(ZERO)
         else:
             if self._safety.is_stopped:
                 log.info("stop is reset by false on %s, which is published by %s", *self._told_by(STOP))
-            self._safety.reset()
+            self._control.reset()
 
     def _told_by(self, topic: Topic[Any]) -> tuple[str, str]:
         publishers = self.transport.publishers_of(topic)
@@ -150,7 +146,8 @@ class HandSignControlNode(Node):
         elapsed_s = self._elapsed()
         sign = None if self._interruption.distrusts(self.clock.now()) else received.message.data
         self._look_after_the_robot(elapsed_s)
-        self._publish(self._driver.step(elapsed_s, sign=self._admitted(sign)), captured_s)
+        self._select_by(sign)
+        self._publish(self._control.step(elapsed_s, sign=sign), captured_s)
         self._calm_down()
 
     def _on_steering(self, received: Received[Twist]) -> None:
@@ -159,14 +156,14 @@ class HandSignControlNode(Node):
             self._obey_late(is_stop=wanted.is_zero)
             return
         elapsed_s = self._elapsed()
-        steering = None if self._interruption.distrusts(self.clock.now()) else self._steered(wanted)
+        steering = None if self._interruption.distrusts(self.clock.now()) else wanted
         self._look_after_the_robot(elapsed_s)
-        self._publish(self._driver.step(elapsed_s, steering=steering))
+        self._publish(self._control.step(elapsed_s, steering=steering))
 
     def _obey_late(self, *, is_stop: bool) -> None:
         """Stop for a Stop that comes late; it tells nothing of what is shown now, so it arms nothing."""
         if is_stop:
-            self._publish(self._driver.halt())
+            self._publish(self._control.halt())
 
     def _on_odometry(self, received: Received[Odometry]) -> None:
         assert self._following is not None
@@ -176,7 +173,7 @@ class HandSignControlNode(Node):
     def _watch(self) -> None:
         elapsed_s = self._elapsed()
         self._look_after_the_robot(elapsed_s)
-        self._publish(self._driver.step(elapsed_s))
+        self._publish(self._control.step(elapsed_s))
         self._log_arming()
         if self._selection:
             self._selection.beat()
@@ -211,36 +208,27 @@ class HandSignControlNode(Node):
             away = "laser scans did not come"
         if away is not None:
             self._safety.robot_is_away(away)
-            self._publish(self._driver.halt())
+            self._publish(self._control.halt())
 
-    def _admitted(self, sign: str | None) -> str | None:
-        """Return the sign to follow: ``NONE`` while the robot is stopped, or waits for neutral."""
+    def _select_by(self, sign: str | None) -> None:
+        """Choose the next robot when a sign that does so begins."""
         if sign is None:
-            return None
-        action = action_of(sign, self._config.actions)
-        if self._selection and action == "next_robot" and sign != self._last_sign:
+            return
+        if self._selection and sign != self._last_sign and action_of(sign, self._config.actions) == "next_robot":
             self._selection.select(NEXT)
         self._last_sign = sign
-        return sign if self._safety.admits_sign(sign, stops=action == "stop") else NONE
-
-    def _steered(self, wanted: Velocity) -> Velocity:
-        """Return the steering to follow: zero while the robot is stopped, or waits for the steering to let go."""
-        return wanted if self._safety.admits_steering(is_zero=wanted.is_zero) else ZERO
 
     def _on_change(self) -> None:
         """Start from standing with another robot."""
         assert self._selection is not None
-        self._driver.halt()
+        self._control.halt()
         self._safety.disarm("it was selected")
         self._cmd_vel = self._selection.commands
 
     def _publish(self, velocity: Velocity | None, captured_s: float | None = None) -> None:
         if velocity is None:
             return
-        now = self.clock.now()
-        since_s, self._ramped_s = now - self._ramped_s, now
-        ramped = self._ramp.step(velocity, min(since_s, self._config.sign_timeout))
-        self._commanded = self._monitor.admit(ramped)
+        self._commanded = self._monitor.admit(velocity)
         self._cmd_vel.send(self._commanded.linear_mps, self._commanded.angular_radps, captured_s)
         if captured_s is not None:
             self.latency.add(self.clock.now() - captured_s)
@@ -253,7 +241,6 @@ class HandSignControlNode(Node):
         elapsed_s, self._last_step_s = now - self._last_step_s, now
         if self._interruption.note(now):
             self._safety.fault("the control was held up")
-        self._safety.step(elapsed_s)
         return elapsed_s
 
     def _report(self) -> None:
