@@ -3,8 +3,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from handsteer.config import ControlConfig
-from handsteer.control.driver import Driver
 from handsteer.control.sign_control import SignControl
+from handsteer.control.twist_mux import Driver
 from handsteer.messages import STOPPING_SIGNS
 from handsteer.types import (
     ACTIONS,

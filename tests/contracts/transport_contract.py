@@ -45,7 +45,7 @@ def eventually(condition: Callable[[], object]) -> bool:
 
 def heard(publisher: Publisher[M]) -> Publisher[M]:
     """Return ``publisher`` once somebody listens."""
-    assert eventually(lambda: publisher.wanted)
+    assert eventually(lambda: publisher.has_subscribers)
     return publisher
 
 
@@ -212,12 +212,12 @@ class TransportContract:
 
     def test_wanted_tells_whether_anybody_listens(self, transport: Transport) -> None:
         publisher = transport.advertise("talker", CMD_VEL)
-        assert not publisher.wanted
+        assert not publisher.has_subscribers
         subscription = transport.subscribe("listener", CMD_VEL, lambda _: None)
-        assert eventually(lambda: publisher.wanted)
+        assert eventually(lambda: publisher.has_subscribers)
         subscription.close()
         subscription.close()
-        assert eventually(lambda: not publisher.wanted)
+        assert eventually(lambda: not publisher.has_subscribers)
 
     def test_a_late_subscriber_gets_the_last_message_of_a_latched_topic(self, transport: Transport) -> None:
         publisher = transport.advertise("robot", ROBOT_DESCRIPTION)

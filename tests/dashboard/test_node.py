@@ -117,7 +117,7 @@ def test_where_a_subscriber_would_pass_for_a_robot_it_shows_what_the_control_say
 ) -> None:
     bench.transport = TellingTransport()
     bench.node = DashboardNode(bench.transport, bench.clock, bench.steering, cmd_vel("auto"))
-    assert not bench.transport.advertise("test", cmd_vel("auto")).wanted
+    assert not bench.transport.advertise("test", cmd_vel("auto")).has_subscribers
     bench.report("hand_sign_control", source="signs", linear_mps="0.500", angular_radps="0.250")
     assert bench.node.state().commanded == Velocity(0.5, 0.25)
     bench.step(1.0)
@@ -254,20 +254,20 @@ def test_a_node_runs_only_while_somebody_watches() -> None:
     transport, clock = InProcessTransport(), SteppedClock()
     reports = transport.advertise("test", DIAGNOSTICS)
     watched = OnDemandNode(lambda: DashboardNode(transport, clock, SteeringNode(transport, clock)))
-    assert not reports.wanted
+    assert not reports.has_subscribers
     first = watched.join("me")
     assert watched.join("you") is first
     assert watched.join("me") is first
     watched.leave("me")
-    assert reports.wanted
+    assert reports.has_subscribers
     watched.leave("you")
-    assert not reports.wanted
+    assert not reports.has_subscribers
     watched.leave("you")
     assert watched.join("me") is not first
     watched.close()
     assert not watched.is_watched_by("me")
     assert watched.join("me") is None  # a page that does not know yet must not start it again
-    assert not reports.wanted
+    assert not reports.has_subscribers
 
 
 def test_nodes_of_processes_are_known_by_their_role_and_those_of_other_namespaces_are_left_out(bench: Bench) -> None:

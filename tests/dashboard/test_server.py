@@ -86,12 +86,12 @@ def test_a_viewer_that_does_not_read_does_not_keep_others_from_it(site: Site) ->
 
 
 def test_costs_nothing_while_nobody_watches(site: Site) -> None:
-    assert not site.pictures.wanted
-    assert not site.reports.wanted
+    assert not site.pictures.has_subscribers
+    assert not site.reports.has_subscribers
     with viewer(site) as response:
         read_jpeg(response)
-        assert site.pictures.wanted
-    wait_until(lambda: not site.pictures.wanted)
+        assert site.pictures.has_subscribers
+    wait_until(lambda: not site.pictures.has_subscribers)
 
 
 def test_notices_that_a_viewer_has_left_even_when_no_picture_comes(site: Site) -> None:
@@ -99,8 +99,8 @@ def test_notices_that_a_viewer_has_left_even_when_no_picture_comes(site: Site) -
     site._camera.join()
     with socket.create_connection(("127.0.0.1", site.port)) as viewer:
         viewer.sendall(b"GET /camera.mjpg HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n")
-        wait_until(lambda: site.pictures.wanted)
-    wait_until(lambda: not site.pictures.wanted)
+        wait_until(lambda: site.pictures.has_subscribers)
+    wait_until(lambda: not site.pictures.has_subscribers)
 
 
 def test_ends_open_streams_when_it_stops() -> None:

@@ -19,8 +19,8 @@ from handsteer.messages import CMD_VEL, IMAGE_RAW, STEERING_CMD_VEL, STOP, Bool,
 from handsteer.nodes.control import HandSignControlNode
 from handsteer.nodes.node import Node
 from handsteer.nodes.recognition import HandSignRecognitionNode
+from handsteer.robots.command_limiter import CommandLimiter
 from handsteer.robots.diff_drive import Velocity
-from handsteer.robots.relay import Relay
 from handsteer.signs.drawing import annotate
 from handsteer.signs.opening import open_classifier
 from handsteer.transports.protocol import Received
@@ -43,7 +43,7 @@ class Graph:
     def __init__(self) -> None:
         self.clock = SteppedClock(_BEGIN_S)
         self.domain = Domain()
-        self.relay = Relay(RobotConfig())
+        self.relay = CommandLimiter(RobotConfig())
         self.linked = True
         self.camera = PaintedCamera(self.clock)
         self.images = self.domain.advertise("camera", IMAGE_RAW)

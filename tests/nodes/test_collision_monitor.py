@@ -80,14 +80,14 @@ class MonitorBench(Bench):
 
 def test_it_is_off_by_default_and_wants_no_scans() -> None:
     bench = MonitorBench(CollisionMonitorConfig())
-    assert not bench.scans.wanted
+    assert not bench.scans.has_subscribers
     bench.show("Forward", 3)
     assert bench.command == (0.03, 0.0)
 
 
 def test_without_scans_the_robot_stands_and_says_why() -> None:
     bench = MonitorBench()
-    assert bench.scans.wanted
+    assert bench.scans.has_subscribers
     bench.show("Forward", 10)
     assert {(twist.linear.x, twist.angular.z) for twist in bench.twists} == {(0.0, 0.0)}
     assert bench.report()[0] == "standing: no laser scan has come, so what is in the way is not known"

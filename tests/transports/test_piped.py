@@ -77,7 +77,7 @@ class TestPiped(TransportContract):
 
     def test_wanted_tells_whether_anybody_listens(self, transport: Transport) -> None:
         # Who does is in the other process, and the nodes that use this transport publish little.
-        assert transport.advertise("talker", CMD_VEL).wanted
+        assert transport.advertise("talker", CMD_VEL).has_subscribers
 
 
 def test_messages_pass_both_ways_with_their_capture_times(both: Both) -> None:
@@ -89,7 +89,7 @@ def test_messages_pass_both_ways_with_their_capture_times(both: Both) -> None:
     both.transport.advertise("steering", STEERING_CMD_VEL).publish(twist(0.5, -1.0))
     assert eventually(lambda: heard_there)
     assert heard_there[0] == Received(twist(0.5, -1.0))
-    assert eventually(lambda: both.graph.advertise("recognition", HAND_SIGN).wanted)
+    assert eventually(lambda: both.graph.advertise("recognition", HAND_SIGN).has_subscribers)
     both.graph.advertise("recognition", HAND_SIGN).publish(String(data="Go"), 12.5)
     assert eventually(lambda: heard_here)
     assert heard_here[0] == Received(String(data="Go"), 12.5)
@@ -117,7 +117,7 @@ def test_a_process_that_stands_still_gets_the_newest_only_and_holds_up_nobody(bo
     both.transport.subscribe("page", IMAGE_RAW, pictures.append)
     both.start()
     publisher, camera = both.graph.advertise("recognition", HAND_SIGN), both.graph.advertise("camera", IMAGE_RAW)
-    assert eventually(lambda: publisher.wanted and camera.wanted)
+    assert eventually(lambda: publisher.has_subscribers and camera.has_subscribers)
     publisher.publish(String(data="first"))
     assert in_callback.wait(10)
     header = Header(stamp=Time(sec=0, nanosec=0), frame_id="camera")

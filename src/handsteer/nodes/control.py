@@ -6,7 +6,7 @@ from typing import Any
 from handsteer.clock import Clock
 from handsteer.config import CollisionMonitorConfig, Config, ControlConfig
 from handsteer.control.control import Control
-from handsteer.control.effects import tell
+from handsteer.control.effects import rule_to_diagnostics
 from handsteer.control.fleet import NEXT
 from handsteer.control.safety import Following
 from handsteer.messages import (
@@ -22,12 +22,12 @@ from handsteer.messages import (
     Twist,
 )
 from handsteer.nodes.collision_monitor import CollisionMonitor
-from handsteer.nodes.interruption import CALM_S, Interruption
 from handsteer.nodes.latency import LatencyLog
 from handsteer.nodes.node import OK, WARN, Node
 from handsteer.nodes.odometry import MeasuredVelocity
 from handsteer.nodes.rivals import Rivals
 from handsteer.nodes.selection import Selection
+from handsteer.nodes.stall_guard import CALM_S, StallGuard
 from handsteer.nodes.stop_keeper import StopKeeper
 from handsteer.transports.commands import Commands
 from handsteer.transports.protocol import Call, Received, Transport
@@ -74,15 +74,15 @@ class HandSignControlNode(Node):
         self.latency = LatencyLog()
         self._config = config
         self._control = Control(config, arming=arming)
-        self._safety, self._driver = self._control.safety, self._control.driver
+        self._safety, self._mux = self._control.safety, self._control.mux
         self._following = Following() if arming and not config.robots else None
         self._arming = arming
         self._waited = False
         self._measured = MeasuredVelocity()
         self._commanded = ZERO
         self._last_step_s = clock.now()
-        self._monitor = CollisionMonitor(self, collision_monitor or CollisionMonitorConfig(), self._driver.hold_back)
-        self._interruption = Interruption(config.sign_timeout, clock.now())
+        self._monitor = CollisionMonitor(self, collision_monitor or CollisionMonitorConfig(), self._mux.hold_back)
+        self._stall_guard = StallGuard(config.sign_timeout, clock.now())
         self._last_sign = NONE
         self._selection = (
             Selection(self, config.robots, cmd_vel, self._commands, self._on_change) if config.robots else None
@@ -100,7 +100,7 @@ class HandSignControlNode(Node):
     def on_reconfigure(self, config: Config) -> None:
         """Take all of ``control``; a robot that is faster than new limits allow is told so at once."""
         self._config = config.control
-        self._interruption.limit_s = config.control.sign_timeout
+        self._stall_guard.limit_s = config.control.sign_timeout
         self._monitor.reconfigure(config.collision_monitor)
         self._publish(self._control.reconfigure(config.control))
 
@@ -144,7 +144,7 @@ class HandSignControlNode(Node):
             self._obey_late(is_stop=action_of(received.message.data, self._config.actions) == "stop")
             return
         elapsed_s = self._elapsed()
-        sign = None if self._interruption.distrusts(self.clock.now()) else received.message.data
+        sign = None if self._stall_guard.distrusts(self.clock.now()) else received.message.data
         self._look_after_the_robot(elapsed_s)
         self._select_by(sign)
         self._publish(self._control.step(elapsed_s, sign=sign), captured_s)
@@ -156,7 +156,7 @@ class HandSignControlNode(Node):
             self._obey_late(is_stop=wanted.is_zero)
             return
         elapsed_s = self._elapsed()
-        steering = None if self._interruption.distrusts(self.clock.now()) else wanted
+        steering = None if self._stall_guard.distrusts(self.clock.now()) else wanted
         self._look_after_the_robot(elapsed_s)
         self._publish(self._control.step(elapsed_s, steering=steering))
 
@@ -177,14 +177,14 @@ class HandSignControlNode(Node):
         self._log_arming()
         if self._selection:
             self._selection.beat()
-        if self._driver.source == "nobody":
+        if self._mux.source == "nobody":
             self._calm_down()
 
     def _calm_down(self) -> None:
         """Let the watchdog sleep for a while: waking up fifty times a second costs more than all signs do."""
         self._log_arming()
         # The beat is that of the selection, too; and steering ends on time also where signs come all the while.
-        if self._selection is None and self._driver.source != "steering":
+        if self._selection is None and self._mux.source != "steering":
             self._watchdog.delay_until(self.clock.now() + CALM_S)
 
     def _log_arming(self) -> None:
@@ -201,7 +201,7 @@ class HandSignControlNode(Node):
         changed = self._selection.follow() if self._selection else self._cmd_vel.follow()
         if not (self._arming or changed):
             return
-        away = "another robot listens" if changed else None if self._cmd_vel.wanted else "no robot listens"
+        away = "another robot listens" if changed else None if self._cmd_vel.has_subscribers else "no robot listens"
         if away is None and self._following is not None:
             away = self._following.step(elapsed_s, self._commanded)
         if self._monitor.why_blind():
@@ -239,22 +239,22 @@ class HandSignControlNode(Node):
     def _elapsed(self) -> float:
         now = self.clock.now()
         elapsed_s, self._last_step_s = now - self._last_step_s, now
-        if self._interruption.note(now):
+        if self._stall_guard.note(now):
             self._safety.fault("the control was held up")
         return elapsed_s
 
     def _report(self) -> None:
-        velocity = self._driver.velocity
+        velocity = self._mux.velocity
         self.diagnose(
             WARN if self._rivals.warning or self._monitor.why_blind() else OK,
             self._reason,
-            source=self._driver.source,
+            source=self._mux.source,
             stopped=self._safety.is_stopped,
             armed=self._safety.signs_wait is None,
             linear_mps=f"{velocity.linear_mps:.3f}",
             angular_radps=f"{velocity.angular_radps:.3f}",
             **({"robot": self._selection.fleet.selected} if self._selection else {}),
-            **tell(self._config),
+            **rule_to_diagnostics(self._config),
             **self._monitor.values(),
             **({"warning": self._rivals.warning} if self._rivals.warning else {}),
             **self._latencies(),
@@ -267,17 +267,17 @@ class HandSignControlNode(Node):
             return "standing: stopped, until it is reset"
         if why_blind := self._monitor.why_blind():
             return f"standing: {why_blind}"
-        source = self._driver.source
+        source = self._mux.source
         if source == "steering":
             waits = safety.steering_waits
             return (
                 f"standing: {self._disarmed}, steers once the steering has been let go"
                 if waits
-                else self._monitor.explain(self._driver.reason)
+                else self._monitor.explain(self._mux.reason)
             )
         why = safety.signs_wait
         if why is None or (source == "nobody" and not why):
-            return self._monitor.explain(self._driver.reason)
+            return self._monitor.explain(self._mux.reason)
         return f"standing: {self._disarmed}{f' ({why})' if why else ''}, moves once Stop is shown, or no hand"
 
     @property

@@ -87,7 +87,7 @@ def test_a_type_that_this_ros2_lacks_is_said_once_and_left_out(joined: Join, cap
     transport.subscribe("listener", TF, lambda _: None)
     publisher.publish(TFMessage(transforms=[]))
     time.sleep(0.2)
-    assert not publisher.wanted
+    assert not publisher.has_subscribers
     said = capfd.readouterr().err
     assert said.count("/tf is left out: this ROS 2 lacks the package tf2_msgs") == 1
     with pytest.raises(TransportError, match="/tf carries tf2_msgs/msg/TFMessage, not std_msgs/msg/String"):
