@@ -68,6 +68,7 @@ def test_the_virtual_hand_drives_a_course(handedness: str) -> None:
     graph, trace = drive(config, 9.0)
     pose = graph.summary().final_pose
     expected = trace.dead_reckoning()
+    assert pose is not None
     assert pose.x > 0.5
     assert pose.yaw > 0.5
     assert _moved(pose, expected) < 0.15

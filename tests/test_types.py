@@ -22,6 +22,7 @@ from handsteer.types import (
     action_of,
     motion_signs,
 )
+from tests.about import about
 
 DT = 1 / 30
 
@@ -74,8 +75,8 @@ def test_turbo_lasts_as_long_as_it_is_shown() -> None:
     for _ in range(10):
         control.step(FORWARD, DT)
     boosted = [control.step("Peace", DT) for _ in range(50)]
-    assert boosted == [Velocity(pytest.approx(0.2), 0.0)] * 50
-    assert control.step(GO, DT) == Velocity(pytest.approx(0.1), 0.0)
+    assert boosted == [Velocity(about(0.2), 0.0)] * 50
+    assert control.step(GO, DT) == Velocity(about(0.1), 0.0)
     assert control.step(NONE, DT) == ZERO
 
 

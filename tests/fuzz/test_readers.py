@@ -8,6 +8,7 @@ import json
 import struct
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -232,7 +233,8 @@ def test_arrays_of_datasets(tmp_path: Path) -> None:
 
     def read_array(data: bytes) -> object:
         name = names[sum(data) % len(names)]
-        return read(corpus.dataset(**{name: data}))
+        arrays: dict[str, Any] = {name: data}
+        return read(corpus.dataset(**arrays))
 
     hold(read_array, mutants([*arrays, corpus.saved('[{"label": "Hi"}]'), corpus.npy((10**9,), "<f8")]))
 
