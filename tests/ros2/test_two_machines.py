@@ -1,6 +1,7 @@
 """``ros2 param`` on one machine asks our node on another, over a link that loses frames."""
 
 import os
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -31,7 +32,7 @@ def test_parameters_are_listed_and_set_from_another_machine(tmp_path: Path) -> N
             for _ in range(10):
                 # ROS 2 loses an answer to a client whom the server has not wholly discovered yet; one asks again.
                 asked = {"node": f"/{NODE}", "call": "list_parameters", "arguments": []}
-                reply = eventually(lambda asked=asked: peer.ask("parameters", **asked), what=control.text)
+                reply = eventually(partial(peer.ask, "parameters", **asked), what=control.text)
                 assert "ramp" in reply["result"]["names"]
             change = {"name": "max_linear", "value": 0.2}
             results = peer.ask("parameters", node=f"/{NODE}", call="set_parameters", arguments=[change])["results"]
