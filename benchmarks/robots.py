@@ -11,6 +11,7 @@ import subprocess
 import sys
 import time
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # for the domains that the tests use
@@ -46,12 +47,12 @@ def measure(count: int, seconds: float) -> tuple[float, float, float]:
     commands = [session.transport.advertise("benchmark", replace(CMD_VEL, name=name + CMD_VEL.name)) for name in names]
     came = dict.fromkeys(names, 0)
 
-    def note(name: str) -> None:
+    def note(name: str, _: object) -> None:
         came[name] += 1
 
     for name in names:
         topic = replace(ODOM, name=name + ODOM.name)
-        session.transport.subscribe("benchmark", topic, lambda _, name=name: note(name))
+        session.transport.subscribe("benchmark", topic, partial(note, name))
     program = [sys.executable, "-m", "handsteer", "robot", "--transport", "dds", "--ros-args", "-r"]
     robots = [subprocess.Popen([*program, f"__ns:={name}"]) for name in names]
     try:
