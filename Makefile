@@ -8,8 +8,6 @@ CASES ?= 100000
 # NumPy's threads would wait for one another: the matrices are small, and tests run side by side.
 export OPENBLAS_NUM_THREADS := 1
 
-# Tests of real processes wait more than they compute.
-WORKERS ?= $(shell echo $$((2 * $$(getconf _NPROCESSORS_ONLN))))
 PLAIN := not (ros1 or ros2 or netns or exhaustive)
 
 .PHONY: help run check test test-all ros1 test-ros1 ros2 test-ros2 lint fuzz format lock bench bench-signs signs-model landmark-model models docs site faults soak screenshots \
@@ -45,10 +43,10 @@ check: lint models
 	@$(BIN)/pytest -n auto -m "not (slow or browser)" $(ARGS)
 
 test: lint models
-	@$(BIN)/pytest -n $(WORKERS) --dist loadfile -m "$(PLAIN)" --durations=10 $(ARGS)
+	@$(BIN)/pytest -n auto --dist loadfile -m "$(PLAIN)" --durations=10 $(ARGS)
 
 test-all: lint models
-	@$(BIN)/pytest -n $(WORKERS) --dist loadfile --durations=30 $(ARGS)
+	@$(BIN)/pytest -n auto --dist loadfile --durations=30 $(ARGS)
 
 lint: $(BIN)/.dev
 	@$(BIN)/ruff format --check .

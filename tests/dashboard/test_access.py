@@ -4,6 +4,7 @@ import socket
 import ssl
 import subprocess
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from urllib.parse import urlsplit
 
@@ -53,7 +54,8 @@ def status_of_websocket(site: Site, **headers: str) -> int:
         except websockets.InvalidStatus as refusal:
             return refusal.response.status_code
 
-    return asyncio.run(knock())
+    with ThreadPoolExecutor(1) as another:  # on this thread, a browser's loop may run
+        return another.submit(asyncio.run, knock()).result()
 
 
 def test_this_machine_alone_is_served_by_default_and_needs_no_token(site: Site) -> None:

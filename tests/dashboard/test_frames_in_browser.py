@@ -5,12 +5,12 @@ import threading
 from collections.abc import Iterator
 
 import pytest
-from playwright.sync_api import Error, Frame, sync_playwright
-from scripts import chromium
+from playwright.sync_api import Error, Frame
 
 from handsteer.config import load
 from handsteer.dashboard.server import Dashboard
 from handsteer.graph import Graph
+from tests.dashboard.browsers import a_browser
 from tests.dashboard.visits import NEEDS_A_BROWSER, PATIENCE_MS, WINDOW
 
 pytestmark = NEEDS_A_BROWSER
@@ -65,8 +65,7 @@ def foreign(url: str) -> Iterator[int]:
 @pytest.mark.parametrize("host", ["127.0.0.1", "localhost"], ids=["another port", "another site"])
 @pytest.mark.parametrize("kind", ["iframe", "embed", "object"])
 def test_a_foreign_page_shows_and_steers_nothing(url: str, foreign: int, host: str, kind: str) -> None:
-    with sync_playwright() as playwright:
-        browser = chromium.launch(playwright)
+    with a_browser() as browser:
         page = browser.new_page(viewport=WINDOW)
         page.set_default_timeout(PATIENCE_MS)
         requests: list[int | None] = []
@@ -79,7 +78,6 @@ def test_a_foreign_page_shows_and_steers_nothing(url: str, foreign: int, host: s
         # To follow a link to the page is all right.
         page.goto(url)
         page.locator(".banner").wait_for()
-        browser.close()
 
 
 def shows_the_page(frame: Frame) -> bool:

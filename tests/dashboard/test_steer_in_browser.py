@@ -5,12 +5,12 @@ from collections.abc import Iterator
 from contextlib import suppress
 
 import pytest
-from playwright.sync_api import Error, Page, sync_playwright
-from scripts import chromium
+from playwright.sync_api import Error, Page
 
 from handsteer.config import load
 from handsteer.dashboard.server import Dashboard
 from handsteer.graph import Graph, cmd_vel_topic
+from tests.dashboard.browsers import a_browser
 from tests.dashboard.visits import NEEDS_A_BROWSER, PATIENCE_MS, Visit, visiting
 
 pytestmark = NEEDS_A_BROWSER
@@ -155,14 +155,13 @@ def test_sliders_of_who_watches_do_nothing(visit: Visit) -> None:
 def test_another_topic_is_steered_past_the_control_and_stops_as_well() -> None:
     sections = {"virtual_hand": {"script": "NONE:600"}, "camera": {"source": "virtual", "width": 320, "height": 240}}
     config = load(None, {**sections, "dashboard": {"port": 0}})
-    with Graph(config) as graph, sync_playwright() as playwright:
+    with Graph(config) as graph, a_browser() as browser:
         topic = cmd_vel_topic(config)
         wires = (graph.transport, graph.clock, graph.steering)
         dashboard = Dashboard(*wires, config.dashboard, cmd_vel=topic, topics=True)
         url = dashboard.start()
-        browser = chromium.launch(playwright)
+        visit = Visit(browser.new_page(), graph)
         try:
-            visit = Visit(browser.new_page(), graph)
             visit.page.set_default_timeout(PATIENCE_MS)
             visit.page.goto(url)
             graph.start()
@@ -177,7 +176,7 @@ def test_another_topic_is_steered_past_the_control_and_stops_as_well() -> None:
             visit.page.keyboard.press("Space")
             visit.wait_until(lambda: visit.text(".banner .headline") == "Stopped" and stands(visit))
         finally:
-            browser.close()
+            visit.page.context.close()
             dashboard.stop()
 
 

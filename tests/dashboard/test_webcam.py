@@ -7,12 +7,12 @@ from pathlib import Path
 
 import cv2
 import pytest
-from playwright.sync_api import Browser, Page, sync_playwright
-from scripts import chromium
+from playwright.sync_api import Browser, Page
 
 from handsteer.config import load
 from handsteer.dashboard.server import Dashboard
 from handsteer.graph import Graph
+from tests.dashboard.browsers import a_browser
 from tests.dashboard.visits import NEEDS_A_BROWSER, PATIENCE_MS, WINDOW
 
 pytestmark = NEEDS_A_BROWSER
@@ -55,10 +55,8 @@ def url(graph: Graph) -> Iterator[str]:
 @pytest.fixture
 def browser(slideshow: Path, tmp_path: Path) -> Iterator[Browser]:
     webcam = recording(slideshow, "Forward", tmp_path / "forward.mjpeg")
-    with sync_playwright() as playwright:
-        browser = chromium.launch(playwright, webcam)
+    with a_browser(webcam) as browser:
         yield browser
-        browser.close()
 
 
 def show(browser: Browser, url: str) -> Page:
@@ -121,12 +119,10 @@ def test_only_who_drives_gives_a_camera(graph: Graph, url: str, browser: Browser
 
 
 def test_a_browser_without_a_webcam_says_so(url: str) -> None:
-    with sync_playwright() as playwright:
-        browser = chromium.launch(playwright)
+    with a_browser() as browser:
         page = show(browser, url)
         page.get_by_text("Use this device's camera").click()
         wait_for_words(page, ".camera .trouble", "this device has no camera")
-        browser.close()
 
 
 STILL_CAMERA = """
@@ -151,8 +147,7 @@ STILL_CAMERA = """
 
 
 def test_a_browser_that_does_not_tell_of_new_pictures_sends_each_once_too(url: str) -> None:
-    with sync_playwright() as playwright:
-        browser = chromium.launch(playwright)
+    with a_browser() as browser:
         page = browser.new_page(viewport=WINDOW)
         page.set_default_timeout(PATIENCE_MS)
         page.add_init_script(STILL_CAMERA)
@@ -168,4 +163,3 @@ def test_a_browser_that_does_not_tell_of_new_pictures_sends_each_once_too(url: s
             assert page.evaluate("window.sent") == before
             page.evaluate("takePicture", colour)
             page.wait_for_function("before => window.sent === before + 1", arg=before)
-        browser.close()

@@ -7,14 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from playwright.sync_api import Page, sync_playwright
-from scripts import chromium
+from playwright.sync_api import Page
 
 from handsteer.dashboard.geometry import about_axis, from_rpy
 from handsteer.messages import JOINT_STATES, JointState
 from handsteer.robots.description import joints, robot_description
 from handsteer.robots.world import load_world, read_world
 from handsteer.transports.protocol import Received
+from tests.dashboard.browsers import a_browser
 from tests.dashboard.served import Site
 from tests.dashboard.visits import NEEDS_A_BROWSER, PATIENCE_MS, Visit, visiting
 
@@ -250,15 +250,13 @@ def red_boxes(page: Page) -> int:
 def test_a_page_without_the_robot_says_where_its_world_is_edited() -> None:
     site = Site()
     try:
-        with sync_playwright() as playwright:
-            browser = chromium.launch(playwright)
+        with a_browser() as browser:
             page = browser.new_page()
             page.set_default_timeout(PATIENCE_MS)
             page.goto(site.url)
             press(page, "Edit world")
             page.locator(".world .message", has_text="runs in another process").wait_for()
             assert not page.locator(".world .editor").is_visible()
-            browser.close()
     finally:
         site.close()
 

@@ -10,12 +10,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from playwright.sync_api import ConsoleMessage, Page, Request, ViewportSize, sync_playwright
+from playwright.sync_api import ConsoleMessage, Page, Request, ViewportSize
 from scripts import chromium
 
 from handsteer.config import load
 from handsteer.dashboard.apart import PageApart
 from handsteer.graph import Graph
+from tests.dashboard.browsers import a_browser
 
 log = logging.getLogger(__name__)
 
@@ -101,12 +102,11 @@ def visiting(
         "virtual_hand": {"script": script},
         "dashboard": {"port": 0},
     }
-    with Graph(load(None, base, sections), steering=steering) as graph, sync_playwright() as playwright:
+    with Graph(load(None, base, sections), steering=steering) as graph, a_browser(webcam) as browser:
         served = PageApart()
         url = served.serve(graph)
-        browser = chromium.launch(playwright, webcam)
+        visit = Visit(browser.new_page(viewport=WINDOW), graph)
         try:
-            visit = Visit(browser.new_page(viewport=WINDOW), graph)
             visit.page.set_default_timeout(PATIENCE_MS)
             visit.page.on("console", visit.note_message)
             visit.page.on("pageerror", lambda error: visit.troubles.append(str(error)))
@@ -118,5 +118,5 @@ def visiting(
             graph.start()
             yield visit
         finally:
-            browser.close()
+            visit.page.context.close()  # before what it shows is gone
             served.stop()

@@ -1,0 +1,47 @@
+"""One Chromium for all tests of a process, with nothing kept from one to the next."""
+
+import atexit
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import cache
+from pathlib import Path
+
+from playwright.sync_api import Browser, Playwright, sync_playwright
+from scripts import chromium
+
+
+@contextmanager
+def a_browser(webcam: Path | None = None) -> Iterator[Browser]:
+    """Give a Chromium whose pages are closed afterwards, and forgotten.
+
+    Args:
+        webcam: The video that it takes for its webcam; such a browser is started for it alone.
+    """
+    if webcam is not None:
+        browser = chromium.launch(_playwright(), webcam)
+        try:
+            yield browser
+        finally:
+            browser.close()
+        return
+    browser = _shared()
+    if not browser.is_connected():  # a test has crashed it
+        _shared.cache_clear()
+        browser = _shared()
+    try:
+        yield browser
+    finally:
+        for context in browser.contexts:
+            context.close()
+
+
+@cache
+def _playwright() -> Playwright:
+    playwright = sync_playwright().start()
+    atexit.register(playwright.stop)
+    return playwright
+
+
+@cache
+def _shared() -> Browser:
+    return chromium.launch(_playwright())
