@@ -1,11 +1,13 @@
 import math
+from typing import TypeVar
 
 import numpy as np
 import pytest
 
 from handsteer.clock import SteppedClock
 from handsteer.config import ControlConfig
-from handsteer.dashboard.node import HOLD_TIMEOUT_S, DashboardNode
+from handsteer.dashboard.manual import HOLD_TIMEOUT_S
+from handsteer.dashboard.node import DashboardNode
 from handsteer.dashboard.watch import WhileWatched
 from handsteer.errors import TransportError
 from handsteer.messages import (
@@ -28,6 +30,7 @@ from handsteer.messages import (
     PoseWithCovariance,
     Quaternion,
     String,
+    Topic,
     Twist,
     TwistWithCovariance,
     twist,
@@ -39,6 +42,9 @@ from handsteer.robots.description import robot_description
 from handsteer.transports.in_process import InProcessTransport
 from handsteer.transports.protocol import Received
 from handsteer.types import Pose2D, Velocity
+from tests.about import about
+
+M = TypeVar("M")
 
 
 class Bench:
@@ -55,7 +61,7 @@ class Bench:
     def _on_steered(self, received: Received[Twist]) -> None:
         self.steered.append((received.message.linear.x, received.message.angular.z))
 
-    def publish(self, topic, message) -> None:
+    def publish(self, topic: Topic[M], message: M) -> None:
         self.transport.advertise("test", topic).publish(message)
         self.node.spin_once()
 
@@ -122,7 +128,7 @@ def test_places_the_robot_by_its_true_pose_and_odometry_since_then(bench: Bench)
     bench.step(0.02)
     bench.odometry(1.5)
     assert bench.node.world.robot == Pose2D(
-        pytest.approx(5.0), pytest.approx(2.5), pytest.approx(math.pi / 2)
+        about(5.0), about(2.5), about(math.pi / 2)
     )  # half a metre on, which is along y there
 
 
@@ -130,9 +136,11 @@ def test_keeps_the_way_until_the_robot_is_put_back(bench: Bench) -> None:
     bench.report("robot", "moves freely", path_length_m="0.00")
     for x in (0.0, 0.1, 0.2, 0.2):
         bench.odometry(x)
-    assert bench.node.world.trail.points == ((0.0, 0.0), (0.1, 0.0), (0.2, 0.0))
+    points = bench.node.world.trail.points
+    assert points == ((0.0, 0.0), (0.1, 0.0), (0.2, 0.0))
     bench.report("robot", "moves freely", path_length_m="0.20")
-    assert len(bench.node.world.trail.points) == 3
+    points = bench.node.world.trail.points
+    assert len(points) == 3
     bench.report("robot", "moves freely", path_length_m="0.00")
     bench.odometry(0.0)
     assert bench.node.world.trail.points == ((0.0, 0.0),)
@@ -231,12 +239,14 @@ def test_a_node_runs_only_while_somebody_watches() -> None:
     transport, clock = InProcessTransport(), SteppedClock()
     reports = transport.advertise("test", DIAGNOSTICS)
     watched = WhileWatched(lambda: DashboardNode(transport, clock, SteeringNode(transport, clock)))
-    assert not reports.wanted
+    wanted = reports.wanted
+    assert not wanted
     first = watched.join("me")
     assert watched.join("you") is first
     assert watched.join("me") is first
     watched.leave("me")
-    assert reports.wanted
+    wanted = reports.wanted
+    assert wanted
     watched.leave("you")
     assert not reports.wanted
     watched.leave("you")

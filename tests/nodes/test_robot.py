@@ -173,10 +173,12 @@ def test_back_at_the_start_everything_counts_anew() -> None:
     bench = RobotBench(world="slalom")
     robot = bench.robot
     bench.drive(6.0)
+    assert robot.course is not None
     assert (robot.course.phase, robot.course.passed) == ("running", 1)
     robot.reset()
     bench.run(0.1)
     assert (robot.state.truth.x, robot.state.truth.y, robot.path_length_m) == pytest.approx((0.0, 0.0, 0.0), abs=1e-3)
+    assert robot.course is not None
     assert (robot.course.phase, robot.course.time_s, robot.state.collisions) == ("ready", 0.0, 0)
     assert bench.newest.twist.twist.linear.x == pytest.approx(0.0, abs=1e-3)
 
