@@ -20,7 +20,7 @@ from handsteer.signs.figures import PhotoResult
 from handsteer.signs.intervals import Share
 from handsteer.signs.labelled import LabelledPhoto, read_photo_labels
 from handsteer.signs.recognizer import Recognizer
-from handsteer.signs.training.split import part_of
+from handsteer.signs.training.fit import part_of
 from handsteer.signs.views import View
 from handsteer.types import FORWARD, MOTION_SIGNS, NONE, SIGNS, TURN_LEFT, TURN_RIGHT
 

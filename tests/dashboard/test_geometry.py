@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from handsteer.dashboard.geometry import about_axis, css_colour, from_quaternion, from_rpy, parents_first
+from handsteer.dashboard.scene import about_axis, css_colour, from_quaternion, from_rpy, parents_first
 from handsteer.messages import Quaternion, yaw_of
 from handsteer.robots.description import Joint, joints, robot_description
 

@@ -3,8 +3,7 @@
 import pytest
 
 from handsteer.config import TeachConfig
-from handsteer.dashboard.teaching.hints import NO_HAND, SMALL, STILL, hint, is_still
-from handsteer.dashboard.teaching.lesson import MOST_TAKES, Lesson
+from handsteer.dashboard.teaching.lesson import MOST_TAKES, NO_HAND, SMALL, STILL, Lesson, hint, is_still
 from handsteer.landmarks.protocol import Hand
 from handsteer.signs.protocol import SignGuess
 from handsteer.signs.recognizer import Recognition

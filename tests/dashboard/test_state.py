@@ -5,10 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from handsteer.dashboard.panels.banner import spoken
-from handsteer.dashboard.panels.mux import entries
+from handsteer.dashboard.page import spoken
 from handsteer.dashboard.panels.sliders import read_limit
-from handsteer.dashboard.panels.steer import read_deflection
+from handsteer.dashboard.panels.steer import entries, read_deflection
 from handsteer.dashboard.state import (
     STALE_S,
     Observed,

@@ -8,8 +8,8 @@ from collections import Counter
 import pytest
 from nicegui import Client
 
+from handsteer.dashboard.doors import MOST_UNJOINED
 from handsteer.dashboard.history import Sample
-from handsteer.dashboard.unjoined import MOST_UNJOINED
 from tests.dashboard.network import client_of, join_query
 from tests.dashboard.served import Site
 from tests.dashboard.sockets import PageSocket
@@ -62,6 +62,7 @@ def test_a_visit_leaves_nothing_behind(site: Site) -> None:
     eventually(lambda: not grown(), what=f"nothing of {VISITS} visits to be left; there is {grown()}")
 
 
+@pytest.mark.slow
 def test_pages_that_nobody_joins_do_not_pile_up(site: Site) -> None:
     html, cookies = site.page()
     with PageSocket(site, html, cookies) as page:

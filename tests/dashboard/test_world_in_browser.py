@@ -11,7 +11,7 @@ import pytest
 from numpy.typing import NDArray
 from playwright.sync_api import Page
 
-from handsteer.dashboard.geometry import about_axis, from_rpy
+from handsteer.dashboard.scene import about_axis, from_rpy
 from handsteer.messages import JOINT_STATES, JointState
 from handsteer.robots.description import joints, robot_description
 from handsteer.robots.world import load_world, read_world

@@ -3,7 +3,7 @@ import sys
 
 import pytest
 
-from handsteer.doctor.network import domains_in_use, places_left, taken_ports
+from handsteer.doctor.ros2 import domains_in_use, places_left, taken_ports
 
 PARTICIPANTS = 33
 

@@ -1,6 +1,6 @@
 import pytest
 
-from handsteer.signs.evidence import Evidence
+from handsteer.signs.filter import Evidence
 from handsteer.signs.operator import Place
 
 DT = 1 / 30

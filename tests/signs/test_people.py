@@ -5,7 +5,7 @@ import pytest
 
 from handsteer.errors import ModelCorrupt
 from handsteer.signs.features import shape_features
-from handsteer.signs.training.fit import fit
+from handsteer.signs.training.fit import fit, part_of
 from handsteer.signs.training.hands import make_hands
 from handsteer.signs.training.people import (
     COORDINATES,
@@ -17,7 +17,6 @@ from handsteer.signs.training.people import (
     save_people,
     to_canonical,
 )
-from handsteer.signs.training.split import part_of
 from handsteer.signs.training.truth import FIST, SHAPES
 
 

@@ -5,12 +5,13 @@ A page of another site that a browser on this machine shows is kept out, whateve
 show this one in a frame either.
 """
 
+import hashlib
 import hmac
 import ipaddress
 import secrets
 from dataclasses import dataclass, field
 from http.cookies import CookieError, SimpleCookie
-from typing import Literal
+from typing import Final, Literal
 from urllib.parse import parse_qsl, urlencode, urlsplit
 
 from starlette.datastructures import Headers, MutableHeaders, State
@@ -18,7 +19,60 @@ from starlette.responses import PlainTextResponse, RedirectResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from handsteer.dashboard.doors import Doors
-from handsteer.dashboard.sessions import Sessions
+
+# NiceGUI's pages have scripts and styles within, and Vue compiles their templates.
+_CONTENT: Final = {
+    "default-src": "'none'",
+    "script-src": "'self' 'unsafe-inline' 'unsafe-eval'",
+    "style-src": "'self' 'unsafe-inline'",
+    "img-src": "'self' data: blob:",
+    "font-src": "'self' data:",
+    "connect-src": "'self'",
+    "worker-src": "'self'",
+    "media-src": "'self' blob:",
+    "form-action": "'none'",
+    "base-uri": "'none'",
+    "frame-ancestors": "'none'",
+}
+
+HEADERS: Final = (
+    ("Content-Security-Policy", "; ".join(f"{name} {sources}" for name, sources in _CONTENT.items())),
+    ("X-Frame-Options", "DENY"),
+    ("X-Content-Type-Options", "nosniff"),
+    # The address has the token until the browser has its cookie.
+    ("Referrer-Policy", "no-referrer"),
+    ("Cross-Origin-Opener-Policy", "same-origin"),
+    ("Cross-Origin-Resource-Policy", "same-origin"),
+    ("Permissions-Policy", "camera=(self)"),
+)
+"""Name and value of each; they go with pages, static files, video and errors alike."""
+
+
+_NAME_BYTES: Final = 18
+_LONGEST: Final = 200
+
+
+class Sessions:
+    """Makes sessions, and knows those that it has made; it keeps none of them, so their number costs nothing."""
+
+    def __init__(self) -> None:
+        self._key = secrets.token_bytes(32)
+
+    def new(self) -> str:
+        """Return a new session."""
+        name = secrets.token_urlsafe(_NAME_BYTES)
+        return f"{name}.{self._signature(name)}"
+
+    def knows(self, session: str | None) -> bool:
+        """Return whether ``session`` was made here."""
+        if session is None or len(session) > _LONGEST or not session.isascii():
+            return False
+        name, _, signature = session.partition(".")
+        return hmac.compare_digest(signature, self._signature(name))
+
+    def _signature(self, name: str) -> str:
+        return hmac.new(self._key, name.encode(), hashlib.sha256).hexdigest()
+
 
 _TOKEN_BYTES = 24
 _LOOPBACK_NAMES = frozenset({"127.0.0.1", "localhost", "::1"})

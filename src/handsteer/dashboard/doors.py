@@ -1,6 +1,6 @@
 """How many connections the page's server keeps, so that a crowd of strangers leaves room for who stops the robot.
 
-A connection is known once a request on it has shown a session (:mod:`handsteer.dashboard.sessions`). The others are
+A connection is known once a request on it has shown a session (:mod:`handsteer.dashboard.access`). The others are
 few: where one more comes, the oldest that does nothing has to go. So whoever looks at a page already keeps it, and may
 load it anew, whatever strangers do.
 """
@@ -13,6 +13,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, Final, cast
 
+from nicegui import Client
 from uvicorn.protocols.http.auto import AutoHTTPProtocol
 
 MOST_STRANGERS: Final = 128
@@ -164,3 +165,33 @@ def _network(host: str) -> str:
     except ValueError:
         return host
     return host if address.version == 4 else str(ipaddress.ip_network((address, 64), strict=False))
+
+
+MOST_UNJOINED: Final = 64
+"""Each takes half a megabyte or more, and NiceGUI keeps it for a minute."""
+
+
+class Unjoined:
+    """Deletes the oldest page that nobody has joined when there are too many; runs on the server's thread.
+
+    A browser whose page is gone before it joins loads it anew by itself. Without this, whatever fetches pages and runs
+    no script, or has no cookies, fills the memory.
+
+    Args:
+        most: How many are kept.
+    """
+
+    def __init__(self, most: int = MOST_UNJOINED) -> None:
+        self._most = most
+        self._pages: dict[str, Client] = {}  # in the order in which they were served
+
+    def add(self, page: Client) -> None:
+        """Take a page that is being served."""
+        self._pages[page.id] = page
+        page.on_connect(lambda: self._forget(page.id))
+        page.on_delete(lambda: self._forget(page.id))
+        if len(self._pages) > self._most:
+            next(iter(self._pages.values())).delete()
+
+    def _forget(self, page: str) -> None:
+        self._pages.pop(page, None)

@@ -1,19 +1,95 @@
 """What every page has: the head with the way to the others, the sentence with the Stop button, and who drives."""
 
+import re
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import ClassVar
 
 from nicegui import ui
 
 from handsteer.dashboard.joined import Cameras, RobotInWorld
 from handsteer.dashboard.node import DashboardNode
-from handsteer.dashboard.panels.banner import Banner
-from handsteer.dashboard.panels.seat import SeatPanel
-from handsteer.dashboard.seat import Place
+from handsteer.dashboard.panels.elements import box, button, switch, text
+from handsteer.dashboard.seat import Place, Role
 from handsteer.dashboard.settings_store import Settings
 from handsteer.dashboard.state import PageState
 from handsteer.dashboard.teaching.teaching import Teaching
 from handsteer.dashboard.watch import WhileWatched
+
+
+class SeatPanel:
+    """Whether this viewer drives, and the way to the driver's seat.
+
+    Args:
+        ask: Is called to ask for it.
+        answer: Is called with True to hand it over, with False to keep it.
+    """
+
+    _WORDS: ClassVar[dict[Role, str]] = {"driver": "you drive", "watcher": "you watch", "free": "nobody drives"}
+
+    def __init__(self, ask: Callable[[], None], answer: Callable[[bool], None]) -> None:
+        with box("seat"):
+            self._question = text("question", "")
+            self._words = text("role chip", "")
+            self._ask = button("Ask to drive", "").on("click", ask)
+            self._yes = button("Hand over", "").on("click", lambda: answer(True))
+            self._no = button("Keep", "").on("click", lambda: answer(False))
+
+    def update(self, place: Place) -> None:
+        """Show what the seat is for this viewer."""
+        is_driver = place.role == "driver"
+        asks = f"Somebody asks to drive; unanswered, they do in {place.left_s:.0f} s"
+        waits = f"You drive in {place.left_s:.0f} s, or sooner"
+        self._question.set_text((asks if is_driver else waits) if place.asked else "")
+        self._words.set_text(self._WORDS[place.role])
+        switch(self._ask, "hidden", on=is_driver or place.asked)
+        for answer in (self._yes, self._no):
+            switch(answer, "hidden", on=not (is_driver and place.asked))
+
+
+_TIME = re.compile(r" for \d+(\.\d+)? s\b")
+
+
+def spoken(state: PageState) -> str:
+    """Return the sentence for a screen reader, which would read out each tenth of a second of a time that passes."""
+    return ". ".join([f"{state.headline}: {_TIME.sub('', state.reason)}", *state.warnings])
+
+
+class Banner:
+    """The sentence: what the robot does, and why; and the button that stops it.
+
+    Args:
+        halt: Is called to stop the robot.
+        reset: Is called to let it be driven again.
+    """
+
+    def __init__(self, halt: Callable[[], None], reset: Callable[[], None]) -> None:
+        with ui.element("section").classes("card banner") as self._banner:
+            self._spoken = text("spoken", "").props('role="status"')
+            box("lamp")
+            self._headline = text("headline", "Starting")
+            self._reason = text("reason", "waiting for the first report")
+            self._warning = text("warning hidden", "")
+            with box("buttons"):
+                self._reset = button("Reset", 'aria-label="Reset: let the robot be driven again"').on("click", reset)
+                self._stop = button("Stop", 'aria-label="Stop the robot (space key)" aria-keyshortcuts="Space"')
+                self._stop.classes("stop").on("click", halt)
+        ui.on("space", halt)
+        self._mood = ""
+
+    def update(self, state: PageState) -> None:
+        """Show ``state``."""
+        self._headline.set_text(state.headline)
+        self._reason.set_text(state.reason)
+        self._spoken.set_text(spoken(state))
+        self._warning.set_text("; ".join(state.warnings))
+        switch(self._warning, "hidden", on=not state.warnings)
+        switch(self._reset, "hidden", on=not state.stopped)
+        if state.mood != self._mood:
+            self._banner.classes(remove=self._mood, add=state.mood)
+            self._mood = state.mood
+
 
 PICTURE_PATH = "/camera.mjpg"
 WEBCAM_PATH = "/camera"

@@ -20,25 +20,22 @@ from starlette.websockets import WebSocket
 from handsteer.cameras.browser import LARGEST_BYTES
 from handsteer.clock import Clock
 from handsteer.config import DashboardConfig
-from handsteer.dashboard.access import Access, AccessMiddleware
-from handsteer.dashboard.doors import Doors
+from handsteer.dashboard.access import HEADERS, Access, AccessMiddleware
+from handsteer.dashboard.doors import Doors, Unjoined
 from handsteer.dashboard.drive import DrivePage
-from handsteer.dashboard.headers import HEADERS
 from handsteer.dashboard.history import VelocityHistory
 from handsteer.dashboard.joined import JoinedGraph
 from handsteer.dashboard.node import DashboardNode
 from handsteer.dashboard.page import ASSETS_PATH, ICON, PICTURE_PATH, WEBCAM_PATH, Local, Served
 from handsteer.dashboard.page_log import keep_short
-from handsteer.dashboard.picture import PictureNode, PictureResponse
+from handsteer.dashboard.picture import FrameSocket, PictureNode, PictureResponse
 from handsteer.dashboard.settings import SettingsPage
 from handsteer.dashboard.settings_file import DEFAULT_FILE, SettingsFile
 from handsteer.dashboard.settings_store import Settings
 from handsteer.dashboard.socket_events import SocketEvents
 from handsteer.dashboard.teach import TeachPage
 from handsteer.dashboard.teaching.teaching import Teaching
-from handsteer.dashboard.unjoined import Unjoined
 from handsteer.dashboard.watch import WhileWatched
-from handsteer.dashboard.webcam import FrameSocket
 from handsteer.errors import DashboardError
 from handsteer.graph import cmd_vel_topic
 from handsteer.messages import CMD_VEL, Topic

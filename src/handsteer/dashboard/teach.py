@@ -10,8 +10,7 @@ from handsteer.dashboard.node import DashboardNode
 from handsteer.dashboard.page import ASSETS_PATH, PICTURE_PATH, Page, Served
 from handsteer.dashboard.panels.camera import CameraPanel
 from handsteer.dashboard.panels.elements import box, card, switch, text
-from handsteer.dashboard.panels.teach_collect import CollectPanel, Countdown, TrainPanel
-from handsteer.dashboard.panels.teach_name import NamePanel
+from handsteer.dashboard.panels.teach_collect import CollectPanel, Countdown, NamePanel, TrainPanel
 from handsteer.dashboard.panels.teach_result import KeptPanel, ResultPanel
 from handsteer.dashboard.state import PageState
 from handsteer.dashboard.teaching.lesson import View

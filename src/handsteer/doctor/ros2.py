@@ -1,14 +1,147 @@
 """Whether this machine can be a part of a ROS 2 graph over DDS, and what keeps it from being one."""
 
+import contextlib
 import importlib.util
+import json
 import platform
+import re
+import socket
+import subprocess
+import sys
 from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
 from handsteer.doctor.finding import Finding
-from handsteer.doctor.look import Sight, look
-from handsteer.doctor.network import domains_in_use, multicast_interfaces, places_left, taken_ports
 from handsteer.errors import TransportError
+from handsteer.transports.dds.interfaces import multicast_addresses
 from handsteer.transports.dds.network import PLACES_BY_MULTICAST, Network, network
+
+# RTPS 2.3, section 9.6.1.1: the ports of a domain, and of a participant in it.
+_BASE, _PER_DOMAIN, _PER_PARTICIPANT, _OWN, _LARGEST_DOMAIN = 7400, 250, 2, 10, 232
+_TABLES = ("/proc/net/udp", "/proc/net/udp6")
+_GROUP = "239.255.0.1"
+_ANSWER_S = 0.3
+
+
+def taken_ports() -> set[int]:
+    """Return the UDP ports that are taken on this machine; empty where the system does not tell (all but Linux)."""
+    taken: set[int] = set()
+    for table in _TABLES:
+        with contextlib.suppress(OSError):
+            lines = Path(table).read_text(encoding="ascii").splitlines()[1:]
+            taken |= {int(line.split()[1].rpartition(":")[2], 16) for line in lines}
+    return taken
+
+
+def domains_in_use(taken: set[int], participants: int) -> list[int]:
+    """Return the DDS domains that have participants on this machine.
+
+    A participant takes two neighbouring ports of its own (unicast), or it shares the two of its domain (multicast).
+
+    Args:
+        taken: UDP ports.
+        participants: How many places are looked at in each domain.
+    """
+    return [
+        domain
+        for domain in range(_LARGEST_DOMAIN + 1)
+        if any({port, port + 1} <= taken for port in (_BASE + _PER_DOMAIN * domain, *_places(domain, participants)))
+    ]
+
+
+def places_left(domain: int, taken: set[int], participants: int) -> int:
+    """Return how many more participants find a port of their own in ``domain`` on this machine."""
+    return sum(not {port, port + 1} & taken for port in _places(domain, participants))
+
+
+def _places(domain: int, participants: int) -> range:
+    first = _BASE + _PER_DOMAIN * domain + _OWN
+    return range(first, first + _PER_PARTICIPANT * participants, _PER_PARTICIPANT)
+
+
+def multicast_interfaces() -> dict[str, bool]:
+    """Return whether each network interface lets a multicast packet through that this machine sends to itself.
+
+    The packet does not leave the machine. Loopback and interfaces that are down or without multicast are left out.
+    """
+    return {name: _hears_itself(address) for name, address in multicast_addresses().items()}
+
+
+def _hears_itself(address: str) -> bool:
+    interface = socket.inet_aton(address)
+    with (
+        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as receiver,
+        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender,
+    ):
+        try:
+            receiver.bind(("", 0))
+            receiver.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, socket.inet_aton(_GROUP) + interface)
+            receiver.settimeout(_ANSWER_S)
+            sender.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_IF, interface)
+            sender.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, 0)
+            sender.sendto(b"handsteer", (_GROUP, receiver.getsockname()[1]))
+            return receiver.recv(16) == b"handsteer"
+        except OSError:
+            return False
+
+
+_TIMEOUT_S = 20.0
+# Cyclone DDS begins its lines with the time, the domain and the program.
+_ENGINE_LINE = re.compile(r"^\d+\.\d+ \[\d+\]\s+\S+: (.*)$", re.MULTILINE)
+
+
+@dataclass(frozen=True)
+class Sight:
+    """What was seen in a domain.
+
+    Attributes:
+        graph: As :meth:`~handsteer.transports.observed.ObservedGraph.as_dict` has it; None when it cannot be joined.
+        problem: Why it cannot be joined: what the engine says, or else what we say.
+    """
+
+    graph: dict[str, Any] | None
+    problem: str = ""
+
+    @property
+    def others(self) -> list[str]:
+        """The nodes in the domain, and topics of those that have no name."""
+        graph = self.graph or {"nodes": [], "topics": []}
+        return [*graph["nodes"]] or [topic["name"] for topic in graph["topics"]]
+
+
+def look(environments: Mapping[int, Mapping[str, str]]) -> dict[int, Sight]:
+    """Return what is seen in each domain, all at the same time.
+
+    Args:
+        environments: The environment variables with which each domain is looked at.
+    """
+    processes = {
+        domain: subprocess.Popen(
+            [sys.executable, "-m", "handsteer.transports.look"],
+            env={**environment, "ROS_DOMAIN_ID": str(domain)},
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        for domain, environment in environments.items()
+    }
+    return {domain: _sight(process) for domain, process in processes.items()}
+
+
+def _sight(process: subprocess.Popen[str]) -> Sight:
+    try:
+        out, words = process.communicate(timeout=_TIMEOUT_S)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.communicate()
+        return Sight(None, f"there was no answer within {_TIMEOUT_S:.0f} s")
+    if process.returncode == 0:
+        return Sight(json.loads(out))
+    said = _ENGINE_LINE.findall(words) or words.strip().splitlines()[-1:] or [f"exit code {process.returncode}"]
+    return Sight(None, "; ".join(said))
+
 
 _NAME = "dds"
 _NEWEST_PYTHON = (3, 13)

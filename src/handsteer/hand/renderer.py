@@ -6,11 +6,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from handsteer.hand.grid import BLOCK, Grid
 from handsteer.hand.kinematics import Array, Skeleton
 from handsteer.hand.placement import Pinhole, Placement
 from handsteer.hand.surface import Cones, Float, Material, hand_cones
-from handsteer.hand.tracing import Field, trace
+from handsteer.hand.tracing import BLOCK, Field, Grid, trace
 
 Image = NDArray[np.uint8]
 

@@ -1,11 +1,15 @@
-"""Small plots, drawn by OpenCV: what a report needs, without another library to install."""
+"""The plots of an evaluation, drawn by OpenCV: what a report needs, without another library to install."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+
+from handsteer.signs.calibration import Calibration
+from handsteer.signs.figures import Confusion, Tally
+from handsteer.types import NONE
 
 Colour = tuple[int, int, int]
 """Blue, green and red, each 0 to 255."""
@@ -115,3 +119,113 @@ class Plot:
         cv2.line(self.picture, (left, up), (left + _SIDE, up), GRID, 1)
         centre(self.picture, f"{100 * x:.3g}%", (across, bottom + 18), 0.42)
         centre(self.picture, f"{100 * y:.3g}%", (left - 32, up), 0.42)
+
+
+_CELL = 76
+_MARGIN = 24
+_LEFT, _TOP = 150, 96
+
+
+def draw_confusion(confusion: Confusion, title: str) -> Picture:
+    """Return a picture of ``confusion``: (height, width, 3) uint8, BGR.
+
+    A row for each true sign that occurs, a column for each sign that was seen. A cell is as dark as its share of its
+    row: blue where that is right, red where it is wrong. Rows without photos are left out.
+
+    Args:
+        confusion: What to draw.
+        title: A line above it.
+    """
+    labels = confusion.labels
+    rows = [(at, label) for at, label in enumerate(labels) if sum(confusion.counts[at])]
+    height = _TOP + _CELL * len(rows) + _MARGIN
+    width = _LEFT + _CELL * len(labels) + _MARGIN
+    picture: Picture = np.full((height, max(width, text_width(title, 0.6) + 2 * _MARGIN), 3), 255, np.uint8)
+    write(picture, title, (_MARGIN, 34), 0.6)
+    write(picture, "shown", (_MARGIN, _TOP - 12), 0.45)
+    for column, label in enumerate(labels):
+        centre(picture, label, (_LEFT + _CELL * column + _CELL // 2, _TOP - 16), 0.42, widest=_CELL - 4)
+    for row, (at, label) in enumerate(rows):
+        y = _TOP + _CELL * row
+        write(picture, label, (_MARGIN, y + _CELL // 2 + 5), 0.5)
+        for column, count in enumerate(confusion.counts[at]):
+            share = count / sum(confusion.counts[at])
+            _draw_cell(picture, (_LEFT + _CELL * column, y), count, share, right=at == column)
+    return picture
+
+
+def _draw_cell(picture: Picture, corner: tuple[int, int], count: int, share: float, *, right: bool) -> None:
+    x, y = corner
+    # The colour at a share of 1; at 0 a cell is white.
+    colour = (255 + share * (np.array(BLUE if right else RED) - 255)).astype(np.uint8)
+    picture[y : y + _CELL, x : x + _CELL] = colour
+    cv2.rectangle(picture, (x, y), (x + _CELL, y + _CELL), GRID, 1)
+    if count:
+        ink = (255, 255, 255) if share > 0.5 else INK
+        centre(picture, str(count), (x + _CELL // 2, y + _CELL // 2), 0.6, ink=ink)
+        percent = f"{share:.0%}" if share >= 0.01 else "< 1%"
+        centre(picture, percent, (x + _CELL // 2, y + _CELL // 2 + 20), 0.4, ink=ink)
+
+
+_TOPS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)
+"""Where an axis may end, so that its ticks are round."""
+
+
+def draw_reliability(figures: Calibration, title: str) -> Picture:
+    """Return a picture of ``figures``: (height, width, 3) uint8, BGR.
+
+    A dot for each bin at its mean likelihood and the share that is right, with its 95 % interval and how many hands are
+    in it. Dots below the diagonal are too sure, dots above it not sure enough.
+
+    Args:
+        figures: What to draw.
+        title: A line above it.
+    """
+    error = figures.expected_error
+    plot = Plot(title, "likelihood of the likeliest sign", "share that shows it; the number of hands")
+    plot.line([(0.0, 0.0), (1.0, 1.0)], GRID, dots=False)
+    points = []
+    for each in figures.bins:
+        interval = each.right.interval
+        if each.confidence is not None and each.right.rate is not None and interval is not None:
+            plot.range(each.confidence, *interval, BLUE)
+            plot.note(str(each.right.of), each.confidence, interval[1])
+            points.append((each.confidence, each.right.rate))
+    plot.line(points, BLUE)
+    plot.legend("-" if error is None else f"ECE {error:.1%}", BLUE)
+    return plot.picture
+
+
+def draw_sweep(rows: Mapping[float, Tally], title: str) -> Picture:
+    """Return a picture of what thresholds do: (height, width, 3) uint8, BGR.
+
+    At the left recall, at the right what it costs: a line for each sign, a dot for each threshold; in black how many of
+    all photos would move the robot as they should not.
+
+    Args:
+        rows: What is counted with each threshold, 0.25 to 1.
+        title: A line above it.
+    """
+    tallies = list(rows.values())
+    shown = [sign for sign in tallies[0].recall if sign != NONE]
+    signs = list(tallies[0].false_alarms)
+    colours = {sign: COLOURS[number % len(COLOURS)] for number, sign in enumerate(signs)}
+    recall = {sign: [tally.recall[sign].rate or 0.0 for tally in tallies] for sign in shown}
+    alarms = {sign: [tally.false_alarms[sign].rate or 0.0 for tally in tallies] for sign in signs}
+    motion = [tally.false_motion.rate or 0.0 for tally in tallies]
+    most = max(motion + [share for line in alarms.values() for share in line])
+    left = Plot(title, "threshold", "recall", x_range=(0.25, 1.0))
+    right = Plot(
+        "",
+        "threshold",
+        "of those that don't show the sign, how many gave it",
+        x_range=(0.25, 1.0),
+        y_range=(0.0, next(top for top in _TOPS if top >= most)),
+    )
+    for plot, lines in ((left, recall), (right, alarms)):
+        for sign, line in lines.items():
+            plot.line(list(zip(rows, line, strict=True)), colours[sign])
+            plot.legend(sign, colours[sign])
+    right.line(list(zip(rows, motion, strict=True)), INK)
+    right.legend("moves wrongly", INK)
+    return np.hstack([left.picture, right.picture])

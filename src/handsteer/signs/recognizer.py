@@ -8,8 +8,7 @@ from numpy.typing import NDArray
 
 from handsteer.config import Config, SignsConfig
 from handsteer.landmarks.protocol import Hand, Landmarker
-from handsteer.signs.evidence import Evidence
-from handsteer.signs.filter import SignFilter
+from handsteer.signs.filter import Evidence, SignFilter
 from handsteer.signs.opening import open_classifier, open_landmarker
 from handsteer.signs.operator import Operator, Place
 from handsteer.signs.protocol import Classifier, SignGuess

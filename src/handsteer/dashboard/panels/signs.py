@@ -1,11 +1,85 @@
-"""The signs and what they do."""
+"""The signs and what they do, with a drawing of each."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
 
 from nicegui import ui
 
+from handsteer.config import ControlConfig
+from handsteer.control.effects import figures_of
 from handsteer.dashboard.panels.elements import box, card, switch, text
-from handsteer.dashboard.panels.legend import LegendEntry, legend
 from handsteer.dashboard.state import PageState
-from handsteer.types import NONE, SIGNS
+from handsteer.types import BACKWARD, EFFECTS, FORWARD, GO, NONE, SIGNS, STOP, TURN_LEFT, TURN_RIGHT, action_of
+
+# The user's right hand as a mirror shows it, in a box of 64 x 64: palm, then the fingers as thick lines. The thumb is
+# on the left, where a mirror shows the thumb of a right hand that turns its palm to it.
+_PALM = '<rect x="20" y="30" width="26" height="26" rx="10" class="palm"/>'
+_FINGER = '<path d="M{x} 34V{top}" class="finger"/>'
+_FIST = _PALM + "".join(_FINGER.format(x=x, top=29) for x in (23, 30, 37, 43))
+_TUCKED_THUMB = '<path d="M20 44L33 47" class="finger thumb"/>'
+_THUMB_LEFT = '<path d="M24 40L6 36" class="finger"/>'
+
+_OPEN_PALM = (
+    _PALM
+    + "".join(_FINGER.format(x=x, top=top) for x, top in ((23, 13), (30, 8), (37, 10), (43, 17)))
+    + '<path d="M22 46L9 34" class="finger"/>'
+)
+_INDEX_UP = _FIST + _FINGER.format(x=23, top=9) + _TUCKED_THUMB
+_TURN_LEFT = _FIST + _THUMB_LEFT
+
+
+@dataclass(frozen=True)
+class LegendEntry:
+    """One sign and what it does.
+
+    Attributes:
+        sign: Its name on ``/gesture/hand_sign``.
+        pose: How to hold the hand.
+        effect: What the robot does.
+        figures: By how much, and up to what; empty where that means nothing.
+        drawing: SVG.
+    """
+
+    sign: str
+    pose: str
+    effect: str
+    figures: str
+    drawing: str
+
+
+def _svg(shapes: str, transform: str = "") -> str:
+    return f'<svg viewBox="0 0 64 64" aria-hidden="true"><g transform="{transform}">{shapes}</g></svg>'
+
+
+_DRAWN: Mapping[str, tuple[str, str]] = {
+    FORWARD: ("index finger up", _svg(_INDEX_UP)),
+    BACKWARD: ("index finger down", _svg(_INDEX_UP, "rotate(180 32 32)")),
+    STOP: ("open palm", _svg(_OPEN_PALM)),
+    TURN_LEFT: ("thumb to your left", _svg(_TURN_LEFT)),
+    TURN_RIGHT: ("thumb to your right", _svg(_TURN_LEFT, "matrix(-1 0 0 1 64 0)")),
+    GO: ("closed fist", _svg(_FIST + _TUCKED_THUMB)),
+}
+# A sign that was taught may have any shape.
+_TAUGHT = ("taught", f'<svg viewBox="0 0 64 64" aria-hidden="true" class="taught">{_OPEN_PALM}</svg>')
+
+
+def legend(signs: tuple[str, ...], rule: ControlConfig | None) -> tuple[LegendEntry, ...]:
+    """Return what there is to know of ``signs``: those that are shipped first, in the page's order.
+
+    Args:
+        signs: Those that the recogniser can tell.
+        rule: What decides what they do; None when that is not known, and what is built in is said, without figures.
+    """
+    order = [*(sign for sign in _DRAWN if sign in signs), *(sign for sign in signs if sign not in _DRAWN)]
+    return tuple(LegendEntry(sign, *_entry(sign, rule)) for sign in order)
+
+
+def _entry(sign: str, rule: ControlConfig | None) -> tuple[str, str, str, str]:
+    pose, drawing = _DRAWN.get(sign, _TAUGHT)
+    action = action_of(sign, rule.actions if rule else {})
+    # What does not change is left out, so that the rest is read.
+    effect = EFFECTS[action].partition(";")[0]
+    return pose, effect, figures_of(action, rule) if rule else "", drawing
 
 
 class SignsPanel:

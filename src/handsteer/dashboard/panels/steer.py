@@ -1,17 +1,117 @@
-"""Steering by hand."""
+"""Steering by hand: pad, sliders, who is followed, and on which topic."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 from nicegui import ui
 
 from handsteer.dashboard.manual import Manual
 from handsteer.dashboard.panels.elements import box, button, card, switch, text
-from handsteer.dashboard.panels.mux import MuxPanel
 from handsteer.dashboard.panels.sliders import Sliders, read_limit
-from handsteer.dashboard.panels.topic import TopicBox
 from handsteer.dashboard.seat import Place
 from handsteer.dashboard.state import PageState
+from handsteer.errors import TransportError
+from handsteer.messages import STEERING_CMD_VEL
 from handsteer.types import Velocity
+
+_LONGEST = 200
+
+
+class TopicBox:
+    """The topic's name, and what it means that it is this one.
+
+    Args:
+        choose: Is called with another name, and raises TransportError when that cannot be; None where there is no
+            choice.
+    """
+
+    def __init__(self, choose: Callable[[str], None] | None) -> None:
+        self._choose = choose
+        self._shown = ""
+        with box("topic"):
+            self._name = ui.input("topic", value=STEERING_CMD_VEL.name).props(f"dense outlined maxlength={_LONGEST}")
+            self._name.props("spellcheck=false autocapitalize=off")
+            if choose is None:
+                self._name.props("readonly")
+            else:
+                self._name.on("keydown.enter", self._use)
+                button("Use", 'aria-label="Steer on this topic"').on("click", self._use)
+        self._words = text("topic-words", "")
+        self._trouble = text("trouble", "").props('role="alert"')
+
+    def update(self, state: PageState) -> None:
+        """Show ``state``."""
+        topic = state.viewers.topic
+        shown = topic or STEERING_CMD_VEL.name
+        if shown == self._shown:
+            return
+        self._shown = shown
+        self._name.set_value(shown)
+        self._words.set_text(
+            f"Past the control: signs may drive meanwhile. Stop holds here too. {STEERING_CMD_VEL.name} goes back."
+            if topic
+            else "Goes through the control, before the signs."
+        )
+        switch(self._words, "direct", on=bool(topic))
+
+    def _use(self) -> None:
+        if self._choose is None:
+            return
+        try:
+            self._choose(str(self._name.value)[:_LONGEST].strip())
+        except TransportError as error:
+            self._trouble.set_text(str(error))
+        else:
+            self._trouble.set_text("")
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One source of commands.
+
+    Attributes:
+        name: What it is called.
+        holds: Whether it has the robot now.
+        whose: Whose it is, when it holds; empty when that is not known.
+    """
+
+    name: str
+    holds: bool
+    whose: str = ""
+
+
+def entries(state: PageState) -> tuple[Entry, ...]:
+    """Return the sources of commands, the first before the second and so on; at most one of them holds."""
+    directly = bool(state.viewers.topic and state.viewers.steers)
+    by_hand = not state.stopped and (directly or state.driver == "steering")
+    by_signs = not state.stopped and not by_hand and state.driver == "signs"
+    return (
+        Entry("Stop", state.stopped, state.viewers.stopped),
+        Entry("By hand", by_hand, state.viewers.steers or "another node"),
+        Entry("Signs", by_signs),
+    )
+
+
+class MuxPanel:
+    """The sources in a row, the one that holds lit."""
+
+    def __init__(self) -> None:
+        self._shown: tuple[Entry, ...] = ()
+        with box("mux").props('role="group" aria-label="Who drives; the first goes before the others"'):
+            text("name", "Who drives")
+            self._chips = [text("source chip", name) for name in ("Stop", "By hand", "Signs")]
+
+    def update(self, state: PageState) -> None:
+        """Show ``state``."""
+        shown = entries(state)
+        if shown == self._shown:
+            return
+        self._shown = shown
+        for chip, entry in zip(self._chips, shown, strict=True):
+            chip.set_text(f"{entry.name}: {entry.whose}" if entry.holds and entry.whose else entry.name)
+            chip.props('aria-current="true"' if entry.holds else "", remove="" if entry.holds else "aria-current")
+            switch(chip, "holds", on=entry.holds)
+
 
 _HINTS = {
     "free": "Hold the pad, or its arrow keys. Sliders stay, until you leave this page.",

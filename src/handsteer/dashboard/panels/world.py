@@ -6,13 +6,77 @@ from nicegui import ui
 
 from handsteer.dashboard.joined import RobotInWorld
 from handsteer.dashboard.node import WorldState
-from handsteer.dashboard.panels.course import CourseLine
-from handsteer.dashboard.panels.elements import box, button, switch, text
-from handsteer.dashboard.panels.robot import RobotFoot
+from handsteer.dashboard.panels.elements import UNKNOWN, box, button, switch, tag, text
 from handsteer.dashboard.panels.world_editor import WorldEditor
 from handsteer.dashboard.scene import WorldView
 from handsteer.dashboard.scene_objects import View
 from handsteer.dashboard.state import PageState
+from handsteer.robots.course import BUMP_S, MISS_S, CourseState, stopwatch
+
+_RULES = f"score: the time, {BUMP_S:.0f} s for each bump, {MISS_S:.0f} s for each missed gate"
+
+
+class CourseLine:
+    """Gates, bumps, stopwatch and score; hidden in a world without gates."""
+
+    def __init__(self) -> None:
+        self._shown: CourseState | None = None
+        with box("course off") as self._box:
+            self._time = tag("b", "time", "")
+            self._gates = _part("gates")
+            self._missed = _part("missed")
+            self._bumps = _part("bumps")
+            self._score = _part("score").props(f'title="{_RULES}"')
+
+    def update(self, course: CourseState | None) -> None:
+        """Show ``course``."""
+        if course == self._shown:
+            return
+        self._shown = course
+        switch(self._box, "off", on=course is None)
+        if course is None:
+            return
+        self._time.set_text(stopwatch(course.time_s))
+        self._gates.set_text(f"gates {course.passed}/{course.gates}")
+        self._missed.set_text(f"missed {len(course.missed)}" if course.missed else "")
+        self._bumps.set_text(f"bumps {course.bumps}")
+        finished = course.phase == "finished"
+        self._score.set_text(f"finished: score {course.score_s:.1f} s" if finished else _hint(course))
+        switch(self._box, "finished", on=finished)
+
+
+def _hint(course: CourseState) -> str:
+    return "drive through the yellow gate" if course.phase == "ready" else ""
+
+
+def _part(name: str) -> ui.label:
+    return tag("span", name, "")
+
+
+_DRIVERS = {"signs": "your signs", "steering": "hand steering", "nobody": "nobody"}
+
+
+class RobotFoot:
+    """How far the robot went, what it bumped into, and who drives it."""
+
+    def __init__(self) -> None:
+        with box("foot"):
+            self._driver = _fact("driven by")
+            self._path = _fact("path")
+            self._bumps = _fact("bumps")
+
+    def update(self, state: PageState) -> None:
+        """Show ``state``."""
+        self._driver.set_text(_DRIVERS.get(state.driver, state.driver))
+        self._path.set_text(UNKNOWN if state.path_length_m is None else f"{state.path_length_m:.1f} m")
+        self._bumps.set_text(UNKNOWN if state.collisions is None else str(state.collisions))
+
+
+def _fact(name: str) -> ui.label:
+    with box("fact"):
+        ui.label(name).style("display: inline")
+        return tag("b", "", UNKNOWN)
+
 
 _VIEWS: tuple[tuple[View, str, str], ...] = (
     ("orbit", "Orbit", "drag to look around"),

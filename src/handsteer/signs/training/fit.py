@@ -1,15 +1,16 @@
 """Fits the statistics of real people's hands to labelled photos: ``python -m handsteer.signs.training.fit FOLDER...``.
 
 Each folder has an ``index.csv`` (docs/signs-evaluate.md). Only photos of the part to tune on are looked at
-(:mod:`handsteer.signs.training.split`). What is written holds means and spreads, no picture and no row of a person.
+(:mod:`handsteer.signs.training.fit`). What is written holds means and spreads, no picture and no row of a person.
 """
 
+import hashlib
 import itertools
 import sys
 from collections import defaultdict
 from collections.abc import Iterator
-from pathlib import Path
-from typing import Final
+from pathlib import Path, PurePath
+from typing import Final, Literal
 
 import cv2
 import numpy as np
@@ -34,11 +35,29 @@ from handsteer.signs.training.people import (
     save_people,
     to_canonical,
 )
-from handsteer.signs.training.split import Part, part_of
 from handsteer.signs.training.truth import FIST, OPEN, OTHER, SHAPES, THUMB
 from handsteer.signs.training.truth import INDEX as POINTING
 from handsteer.signs.views import View
 from handsteer.types import NONE, SIGNS
+
+Part = Literal["tune", "report"]
+
+_WHOLE_SETS: Final[dict[str, Part]] = {"emre": "tune", "sld": "report"}
+"""Sets of few people, or of people who cannot be told apart: all of such a set is in one part."""
+
+
+def part_of(path: PurePath | str, person_set: str = "") -> Part:
+    """Return the part that a photo is in.
+
+    Args:
+        path: The photo; only the name of the file counts, so that folders may be moved.
+        person_set: Whose photo it is, as in the column of that name of an ``index.csv``.
+    """
+    if person_set in _WHOLE_SETS:
+        return _WHOLE_SETS[person_set]
+    digest = hashlib.sha256(PurePath(path).name.encode()).digest()
+    return "report" if digest[0] % 3 == 0 else "tune"
+
 
 _SHAPES: Final = {"Stop": OPEN, "Forward": POINTING, "Go": FIST, "Turn Right": THUMB, "Turn Left": THUMB}
 _KINDS: Final = {
