@@ -16,9 +16,9 @@ from pathlib import Path
 import cv2
 
 from handsteer.signs.evaluate import evaluate_photos
-from handsteer.signs.figures import PhotoResult
 from handsteer.signs.intervals import Share
 from handsteer.signs.labelled import LabelledPhoto, read_photo_labels
+from handsteer.signs.metrics import PhotoResult
 from handsteer.signs.recognizer import Recognizer
 from handsteer.signs.training.fit import part_of
 from handsteer.signs.views import View

@@ -1,7 +1,7 @@
 """What a lesson comes to, without its training."""
 
-from handsteer.signs.figures import Confusion
 from handsteer.signs.intervals import Share
+from handsteer.signs.metrics import Confusion
 from handsteer.signs.teaching.dataset import LabelSummary
 from handsteer.signs.teaching.train import TaughtSign, TeachingReport
 

@@ -114,7 +114,7 @@ def test_the_printed_address_lets_a_browser_in_and_hides_its_token(open_site: Si
     assert status_of_websocket(open_site, Cookie=pair, Origin="https://evil.example") == 403
 
 
-def test_what_follows_the_token_is_a_place_of_this_server(open_site: Site) -> None:
+def test_what_follows_the_token_is_a_status_of_this_server(open_site: Site) -> None:
     for path in ("//evil.example/", "///evil.example/", "/%2Fevil.example/", "/\\evil.example"):
         response = open_site.get(f"{path}?token={token_of(open_site)}&a=b")
         assert response.status == 303

@@ -83,7 +83,7 @@ def test_stop_holds_until_it_is_reset_and_a_reset_alone_moves_nothing(visit: Vis
 def test_whoever_watches_may_stop_but_only_the_driver_resets(visit: Visit) -> None:
     first, second = visit.page, visit.another_page()
     first.get_by_text("Ask to drive").click()
-    first.locator(".seat .role", has_text="you drive").wait_for()
+    first.locator(".lease .role", has_text="you drive").wait_for()
     second.goto(first.url)
     second.get_by_role("button", name="Stop the robot").click()
     for page in (first, second):
@@ -101,10 +101,10 @@ def test_a_second_browser_watches_until_the_first_hands_over(visit: Visit) -> No
     first, second = visit.page, visit.another_page()
     second.goto(first.url)
     for page in (first, second):
-        page.locator(".seat .role", has_text="nobody drives").wait_for()
+        page.locator(".lease .role", has_text="nobody drives").wait_for()
     first.get_by_text("Ask to drive").click()
-    first.locator(".seat .role", has_text="you drive").wait_for()
-    second.locator(".seat .role", has_text="you watch").wait_for()
+    first.locator(".lease .role", has_text="you drive").wait_for()
+    second.locator(".lease .role", has_text="you watch").wait_for()
 
     second.locator(".pad").focus()
     second.keyboard.down("ArrowUp")
@@ -113,9 +113,9 @@ def test_a_second_browser_watches_until_the_first_hands_over(visit: Visit) -> No
     second.keyboard.up("ArrowUp")
 
     second.get_by_text("Ask to drive").click()
-    first.locator(".seat .question", has_text="Somebody asks to drive").wait_for()
+    first.locator(".lease .question", has_text="Somebody asks to drive").wait_for()
     first.get_by_text("Hand over").click()
-    second.locator(".seat .role", has_text="you drive").wait_for()
+    second.locator(".lease .role", has_text="you drive").wait_for()
     second.locator(".pad").focus()
     second.keyboard.down("ArrowUp")
     visit.wait_until(lambda: robot.state.linear_mps > 0.2)

@@ -6,9 +6,9 @@ import pytest
 
 from handsteer.clock import SteppedClock
 from handsteer.config import ControlConfig
-from handsteer.dashboard.manual import HOLD_TIMEOUT_S
 from handsteer.dashboard.node import DashboardNode
-from handsteer.dashboard.watch import WhileWatched
+from handsteer.dashboard.on_demand import OnDemandNode
+from handsteer.dashboard.pad_input import HOLD_TIMEOUT_S
 from handsteer.errors import TransportError
 from handsteer.messages import (
     CMD_VEL,
@@ -212,8 +212,8 @@ def test_who_watches_cannot_steer_until_the_driver_has_left(bench: Bench) -> Non
 
 def test_the_robot_stops_when_another_takes_over(bench: Bench) -> None:
     bench.node.steer("driver", 0.3, 0.0)
-    bench.node.seat.ask("watcher", bench.clock.now())
-    bench.node.seat.answer("driver", hand_over=True)
+    bench.node.lease.ask("watcher", bench.clock.now())
+    bench.node.lease.answer("driver", hand_over=True)
     bench.node.steer("driver", 0.3, 0.0)
     bench.step(0.1)
     assert bench.steered[-1] == (0.0, 0.0)
@@ -238,7 +238,7 @@ def test_understands_what_control_really_says(bench: Bench) -> None:
 def test_a_node_runs_only_while_somebody_watches() -> None:
     transport, clock = InProcessTransport(), SteppedClock()
     reports = transport.advertise("test", DIAGNOSTICS)
-    watched = WhileWatched(lambda: DashboardNode(transport, clock, SteeringNode(transport, clock)))
+    watched = OnDemandNode(lambda: DashboardNode(transport, clock, SteeringNode(transport, clock)))
     wanted = reports.wanted
     assert not wanted
     first = watched.join("me")

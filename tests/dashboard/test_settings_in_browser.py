@@ -48,7 +48,7 @@ def test_the_driver_sets_what_the_robot_does_and_saves_it(tmp_path: Path, monkey
         field.press("Enter")
         visit.wait_until(lambda: graph.config.control.max_linear == 0.4)
         expect(row(page, "control.max_linear")).to_contain_text("changed")
-        expect(page.locator(".seat .role")).to_have_text("you drive")
+        expect(page.locator(".lease .role")).to_have_text("you drive")
 
         of(page, "landmarks.refine_new_hands").click()
         expect(row(page, "landmarks.refine_new_hands")).to_contain_text("waits for the next start")
@@ -92,12 +92,12 @@ def test_who_watches_sees_what_is_set_but_neither_changes_it_nor_sees_passwords(
     with visiting("NONE:600", "/settings", signs={"confirm_time": 0.2}) as visit:
         first, second = visit.page, visit.another_page()
         first.get_by_text("Ask to drive").click()
-        expect(first.locator(".seat .role")).to_have_text("you drive")
+        expect(first.locator(".lease .role")).to_have_text("you drive")
         of(first, "camera.source").fill("rtsp://me:pa55@cam/1")
         of(first, "camera.source").press("Enter")
         expect(of(first, "camera.source")).to_have_value("rtsp://me:•••@cam/1")
         second.goto(first.url)
-        expect(second.locator(".seat .role")).to_have_text("you watch")
+        expect(second.locator(".lease .role")).to_have_text("you watch")
         expect(of(second, "camera.source")).to_have_value("rtsp://me:•••@cam/1")
         expect(of(second, "signs.confirm_time")).to_have_value("0.2")
         expect(of(second, "signs.confirm_time")).not_to_be_editable()

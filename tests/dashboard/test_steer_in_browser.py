@@ -34,7 +34,7 @@ def slider(page: Page) -> float:
 
 
 def take_seat(visit: Visit) -> None:
-    """Ask for the seat, again after a page that was slow to load has loaded itself anew."""
+    """Ask for the lease, again after a page that was slow to load has loaded itself anew."""
     ask = visit.page.get_by_role("button", name="Ask to drive")
 
     def is_taken() -> bool:
@@ -116,7 +116,7 @@ def test_a_slider_drives_until_it_is_at_zero_or_the_page_is_left(visit: Visit) -
 
 def test_letters_drive_wherever_the_focus_is_once_one_drives_and_the_plot_shows_it(visit: Visit) -> None:
     page = visit.page
-    visit.wait_until(lambda: visit.text(".seat .role") == "nobody drives")
+    visit.wait_until(lambda: visit.text(".lease .role") == "nobody drives")
     page.keyboard.down("KeyW")
     page.wait_for_timeout(500)
     assert stands(visit), "who does not drive is not taken at a letter's word"

@@ -11,7 +11,7 @@ import pytest
 from handsteer.clock import RealClock
 from handsteer.config import Config, TeachConfig
 from handsteer.dashboard.teaching.lesson import View
-from handsteer.dashboard.teaching.node import Eyes, thumbnail
+from handsteer.dashboard.teaching.node import LessonVision, thumbnail
 from handsteer.dashboard.teaching.teaching import Teaching, with_sign
 from handsteer.errors import ConfigError, DatasetError, ModelCorrupt
 from handsteer.images import image_message
@@ -41,7 +41,7 @@ class School:
         plan = TeachConfig(
             dataset=folder / "signs.npz", model=folder / "mine.npz", takes=3, take_time=1.0, countdown=0.5
         )
-        eyes = Eyes(
+        eyes = LessonVision(
             open_landmarker=lambda: RecordedLandmarker([[hand] for hand in hands] * 1000),
             open_shipped=lambda: open_classifier(Config().signs),
             signs=lambda: self.config.signs,

@@ -17,7 +17,7 @@ from handsteer.cameras.browser import BrowserCamera
 from handsteer.cameras.files import read_photo
 from handsteer.clock import SteppedClock
 from handsteer.config import Config, ControlConfig, load
-from handsteer.dashboard.manual import Manual
+from handsteer.dashboard.pad_input import PadInput
 from handsteer.dashboard.panels.camera import read_words
 from handsteer.dashboard.panels.sliders import read_limit
 from handsteer.dashboard.panels.steer import read_deflection
@@ -138,7 +138,7 @@ def test_what_a_page_says_of_pad_sliders_and_camera() -> None:
         assert 0 <= read_limit(sent, 0.0, 1.0, 0.5) <= 1
         assert len(read_words(sent)) <= 200
         at = sent.get("at") if isinstance(sent, dict) else sent
-        Manual().keep_on(at, 1.0)
+        PadInput().keep_on(at, 1.0)
 
     hold(read, mutants([*_JSONS, b'{"words": "no camera"}']))
 

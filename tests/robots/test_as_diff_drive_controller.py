@@ -113,7 +113,7 @@ def test_odometry_and_transform_say_the_same_in_the_same_frames() -> None:
     assert transform.transform.rotation == odometry.pose.pose.orientation
 
 
-def test_a_frame_of_another_name_takes_the_place_of_the_usual_one() -> None:
+def test_a_frame_of_another_name_takes_the_status_of_the_usual_one() -> None:
     bot = Diffbot(odom_frame_id="new_odom")
     assert {message.header.frame_id for message in bot.odometry} == {"new_odom"}
     assert {each.header.frame_id for message in bot.transforms for each in message.transforms} == {"new_odom"}

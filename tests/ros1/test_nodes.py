@@ -208,7 +208,7 @@ def test_a_master_that_only_takes_long_is_waited_for(tmp_path: Any) -> None:
         assert driver.process.running
 
 
-def test_another_master_in_the_place_of_the_first_is_not_taken_for_it(tmp_path: Any) -> None:
+def test_another_master_in_the_status_of_the_first_is_not_taken_for_it(tmp_path: Any) -> None:
     with ros1_graph(tmp_path) as graph:
         driver = Ros1Driver(graph, "--control.sign-timeout", "5")
         driver.show("Forward")

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from handsteer.signs.calibration import BINS, THRESHOLDS, calibration, sweep
-from handsteer.signs.figures import PhotoResult
 from handsteer.signs.intervals import Share
+from handsteer.signs.metrics import PhotoResult
 from handsteer.signs.plot import draw_reliability, draw_sweep
 from handsteer.types import FORWARD, GO, MOTION_SIGNS, NONE, SIGNS, STOP
 from tests.about import about

@@ -15,10 +15,10 @@ from handsteer.config import VirtualHandConfig
 from handsteer.errors import CameraUnreadable, LabelError
 from handsteer.signs.calibration import sweep
 from handsteer.signs.evaluate import evaluate_frames, evaluate_photos
-from handsteer.signs.figures import PhotoResult
 from handsteer.signs.labelled import LabelledPhoto, read_video_labels
+from handsteer.signs.metrics import PhotoResult
 from handsteer.signs.recognizer import Recognizer
-from handsteer.signs.video_figures import video_report
+from handsteer.signs.video_metrics import video_report
 from handsteer.signs.views import View
 from handsteer.types import BACKWARD, FORWARD, MOTION_SIGNS, NONE, SIGNS, STOP, TURN_LEFT, TURN_RIGHT
 

@@ -2,9 +2,9 @@ import json
 from typing import Any
 
 from handsteer.signs.evaluation import Evaluation
-from handsteer.signs.figures import PhotoResult
+from handsteer.signs.metrics import PhotoResult
 from handsteer.signs.sources import PhotoRun, VideoRun
-from handsteer.signs.video_figures import FrameVerdict
+from handsteer.signs.video_metrics import FrameVerdict
 from handsteer.signs.views import View
 from handsteer.types import FORWARD, GO, MOTION_SIGNS, NONE, SIGNS, STOP
 

@@ -1,7 +1,7 @@
 import pytest
 
-from handsteer.signs.filter import Evidence
-from handsteer.signs.operator import Place
+from handsteer.signs.debouncer import Evidence
+from handsteer.signs.hand_selector import HandPosition
 
 DT = 1 / 30
 
@@ -9,7 +9,7 @@ DT = 1 / 30
 def seen(*x: float, likelihood: float = 0.9) -> Evidence:
     evidence = Evidence()
     for each in x:
-        evidence.add(Place(each, 200.0, 100.0), {"Forward": likelihood}, DT)
+        evidence.add(HandPosition(each, 200.0, 100.0), {"Forward": likelihood}, DT)
     return evidence
 
 
@@ -31,7 +31,7 @@ def test_a_hand_that_has_just_come_is_judged_by_what_there_is() -> None:
 def test_the_likelihood_is_the_mean_of_the_last_moments() -> None:
     evidence = seen(300, 300, likelihood=0.2)
     for _ in range(3):
-        evidence.add(Place(300.0, 200.0, 100.0), {"Forward": 0.8}, DT)
+        evidence.add(HandPosition(300.0, 200.0, 100.0), {"Forward": 0.8}, DT)
     assert evidence.likelihood("Forward", 2 * DT) == pytest.approx(0.8)
     assert evidence.likelihood("Forward", 1.0) == pytest.approx(0.56)
     assert evidence.likelihood("Go", 1.0) == 0.0
@@ -40,7 +40,7 @@ def test_the_likelihood_is_the_mean_of_the_last_moments() -> None:
 def test_a_hand_out_of_view_forgets_and_a_long_stream_does_not_grow() -> None:
     evidence = seen(*[300.0] * 1000, likelihood=0.1)
     for _ in range(12):
-        evidence.add(Place(300.0, 200.0, 100.0), {"Forward": 1.0}, DT)
+        evidence.add(HandPosition(300.0, 200.0, 100.0), {"Forward": 1.0}, DT)
     assert evidence.likelihood("Forward", 1e9) == pytest.approx(1.0)
     evidence.add(None, {}, DT)
     assert evidence.likelihood("Forward", 1.0) == 0.0

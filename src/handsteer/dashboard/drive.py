@@ -5,7 +5,7 @@ import time
 from nicegui import ui
 
 from handsteer.dashboard.node import DashboardNode
-from handsteer.dashboard.page import ASSETS_PATH, PICTURE_PATH, Page, Served
+from handsteer.dashboard.page import ASSETS_PATH, PICTURE_PATH, Page, PageContext
 from handsteer.dashboard.panels.camera import CameraPanel
 from handsteer.dashboard.panels.elements import UNKNOWN, box, card, text
 from handsteer.dashboard.panels.signs import SignsPanel
@@ -50,7 +50,7 @@ _PLOT_EVERY = 3
 class DrivePage(Page):
     """Drive, and see why the robot does what it does."""
 
-    def __init__(self, served: Served) -> None:
+    def __init__(self, served: PageContext) -> None:
         super().__init__(served, "/")
         ui.add_head_html(
             f'<link rel="stylesheet" href="{ASSETS_PATH}/drive.css">'

@@ -7,9 +7,9 @@ from typing import Any, cast
 
 from handsteer.clock import Clock, to_seconds
 from handsteer.dashboard.history import PERIOD_S, Sample, VelocityHistory
-from handsteer.dashboard.manual import HOLD_TIMEOUT_S
+from handsteer.dashboard.lease import ControlLease
+from handsteer.dashboard.pad_input import HOLD_TIMEOUT_S
 from handsteer.dashboard.scan import scan_points
-from handsteer.dashboard.seat import Seat
 from handsteer.dashboard.state import (
     COMMAND_HOLDS_S,
     Observed,
@@ -94,7 +94,7 @@ class DashboardNode(Node):
 
     Attributes:
         world: What the 3D view shows.
-        seat: Who of the viewers drives.
+        lease: Who of the viewers drives.
         history: The velocities of the last 30 s.
     """
 
@@ -108,7 +108,7 @@ class DashboardNode(Node):
     ) -> None:
         super().__init__("dashboard", transport, clock)
         self.world = WorldState()
-        self.seat = Seat()
+        self.lease = ControlLease()
         self.history = history or VelocityHistory()
         self._observed = Observed()
         self._namespace, _ = split_reporter(transport.full_name(self.name))
@@ -133,7 +133,7 @@ class DashboardNode(Node):
     def state(self, viewer: str = "") -> PageState:
         """Return what the page says now to ``viewer``."""
         now, holder = self.clock.now(), self._holder
-        may_reset = self.seat.place_of(viewer, now).role != "watcher"
+        may_reset = self.lease.status_of(viewer, now).role != "watcher"
         viewers = Viewers(
             steers=_person(holder and holder[0], viewer),
             stopped=_person(self._stopper, viewer),
@@ -144,11 +144,11 @@ class DashboardNode(Node):
         return compose(self._observed, now, viewers)
 
     def steer(self, viewer: str, linear_mps: float, angular_radps: float) -> None:
-        """Drive at this velocity, if ``viewer`` has the driver's seat or nobody has.
+        """Drive at this velocity, if ``viewer`` has the control lease or nobody has.
 
         It lasts while the viewer repeats it within :data:`HOLD_TIMEOUT_S`.
         """
-        if self.seat.take(viewer, self.clock.now()):
+        if self.lease.take(viewer, self.clock.now()):
             self._holder = (viewer, self.clock.now())
             self._steering.steer(linear_mps, angular_radps)
 
@@ -160,12 +160,12 @@ class DashboardNode(Node):
             self._steering.release()
 
     def steer_on(self, viewer: str, topic: str) -> None:
-        """Let steering by hand go to ``topic``, if ``viewer`` has the driver's seat or nobody has.
+        """Let steering by hand go to ``topic``, if ``viewer`` has the control lease or nobody has.
 
         Raises:
             TransportError: It is no such topic, or somebody else drives, or the robot is stopped.
         """
-        if not self.seat.take(viewer, self.clock.now()):
+        if not self.lease.take(viewer, self.clock.now()):
             raise TransportError("only who drives may choose the topic: ask to drive first")
         if self.state().stopped:
             raise TransportError("the robot is stopped: reset it, then choose the topic")
@@ -179,15 +179,15 @@ class DashboardNode(Node):
         self._steering.halt()
 
     def reset(self, viewer: str) -> None:
-        """Let the robot be driven again, if ``viewer`` has the driver's seat or nobody has."""
-        if self.seat.take(viewer, self.clock.now()):
+        """Let the robot be driven again, if ``viewer`` has the control lease or nobody has."""
+        if self.lease.take(viewer, self.clock.now()):
             self._stopper = None
             self._steering.reset()
 
     def leave(self, viewer: str) -> None:
         """Stop if it is ``viewer`` who steers, and let others drive."""
         self.release(viewer)
-        self.seat.leave(viewer)
+        self.lease.leave(viewer)
 
     def on_stop(self) -> None:
         """Leave nothing in motion that was steered from here."""
@@ -195,11 +195,11 @@ class DashboardNode(Node):
             self.release(self._holder[0])
 
     def _watch(self) -> None:
-        self.seat.tick(self.clock.now())
+        self.lease.tick(self.clock.now())
         if self.world.scan and self.clock.now() - self._scan_came_s > _SCAN_HOLDS_S:
             self.world = replace(self.world, scan=())
         holder = self._holder
-        if holder is not None and (self.clock.now() - holder[1] > HOLD_TIMEOUT_S or not self.seat.drives(holder[0])):
+        if holder is not None and (self.clock.now() - holder[1] > HOLD_TIMEOUT_S or not self.lease.drives(holder[0])):
             self.release(holder[0])
 
     def _sample(self) -> None:

@@ -9,17 +9,17 @@ from typing import ClassVar
 from nicegui import ui
 
 from handsteer.dashboard.joined import Cameras, RobotInWorld
+from handsteer.dashboard.lease import LeaseStatus, Role
 from handsteer.dashboard.node import DashboardNode
+from handsteer.dashboard.on_demand import OnDemandNode
 from handsteer.dashboard.panels.elements import box, button, switch, text
-from handsteer.dashboard.seat import Place, Role
 from handsteer.dashboard.settings_store import Settings
 from handsteer.dashboard.state import PageState
 from handsteer.dashboard.teaching.teaching import Teaching
-from handsteer.dashboard.watch import WhileWatched
 
 
-class SeatPanel:
-    """Whether this viewer drives, and the way to the driver's seat.
+class LeasePanel:
+    """Whether this viewer drives, and the way to the control lease.
 
     Args:
         ask: Is called to ask for it.
@@ -29,15 +29,15 @@ class SeatPanel:
     _WORDS: ClassVar[dict[Role, str]] = {"driver": "you drive", "watcher": "you watch", "free": "nobody drives"}
 
     def __init__(self, ask: Callable[[], None], answer: Callable[[bool], None]) -> None:
-        with box("seat"):
+        with box("lease"):
             self._question = text("question", "")
             self._words = text("role chip", "")
             self._ask = button("Ask to drive", "").on("click", ask)
             self._yes = button("Hand over", "").on("click", lambda: answer(True))
             self._no = button("Keep", "").on("click", lambda: answer(False))
 
-    def update(self, place: Place) -> None:
-        """Show what the seat is for this viewer."""
+    def update(self, place: LeaseStatus) -> None:
+        """Show what the lease is for this viewer."""
         is_driver = place.role == "driver"
         asks = f"Somebody asks to drive; unanswered, they do in {place.left_s:.0f} s"
         waits = f"You drive in {place.left_s:.0f} s, or sooner"
@@ -113,7 +113,7 @@ _THEME_ICON = (
 
 
 @dataclass(frozen=True)
-class Local:
+class GraphAccess:
     """What pages reach of the graph beside its topics; None is out of their reach.
 
     Attributes:
@@ -130,7 +130,7 @@ class Local:
 
 
 @dataclass(frozen=True)
-class Served:
+class PageContext:
     """What the pages are made of.
 
     Attributes:
@@ -139,8 +139,8 @@ class Served:
         topics: Whether steering by hand may go to other topics than the control's.
     """
 
-    node: WhileWatched[DashboardNode]
-    local: Local
+    node: OnDemandNode[DashboardNode]
+    local: GraphAccess
     topics: bool
 
 
@@ -152,7 +152,7 @@ class Page:
         path: Where the page is, which its link in the head says.
     """
 
-    def __init__(self, served: Served, path: str) -> None:
+    def __init__(self, served: PageContext, path: str) -> None:
         self.client = ui.context.client
         self._served = served
         self.client.on_disconnect(self._leave)
@@ -177,13 +177,13 @@ class Page:
         return self._served.node.join(self.client.id) if self.client.has_socket_connection else None
 
     def drives(self) -> bool:
-        """Return whether this viewer has the driver's seat, which it is given if it is free."""
+        """Return whether this viewer has the control lease, which it is given if it is free."""
         node = self.joined
-        return node is not None and node.seat.take(self.client.id, node.clock.now())
+        return node is not None and node.lease.take(self.client.id, node.clock.now())
 
-    def place(self, node: DashboardNode) -> Place:
-        """Return what the driver's seat is for this viewer."""
-        return node.seat.place_of(self.client.id, node.clock.now())
+    def place(self, node: DashboardNode) -> LeaseStatus:
+        """Return what the control lease is for this viewer."""
+        return node.lease.status_of(self.client.id, node.clock.now())
 
     def use_own_camera(self) -> None:
         """Choose the camera of the machine that handsteer runs on, if this viewer drives."""
@@ -200,7 +200,7 @@ class Page:
                 for target, name in _LINKS:
                     ui.link(name, target).props('aria-current="page"' if target == path else "")
             with ui.element("div").classes("right"):
-                self._driving = SeatPanel(self._ask, self._answer)
+                self._driving = LeasePanel(self._ask, self._answer)
                 self._source = ui.label("").classes("source chip")
                 with ui.element("button").classes("icon-button theme").props('aria-label="Light or dark"'):
                     ui.html(_THEME_ICON, sanitize=False)
@@ -229,11 +229,11 @@ class Page:
 
     def _ask(self) -> None:
         if node := self.joined:
-            node.seat.ask(self.client.id, node.clock.now())
+            node.lease.ask(self.client.id, node.clock.now())
 
     def _answer(self, hand_over: bool) -> None:
         if node := self.joined:
-            node.seat.answer(self.client.id, hand_over=hand_over)
+            node.lease.answer(self.client.id, hand_over=hand_over)
 
     def _leave(self) -> None:
         watched = self._served.node

@@ -17,8 +17,8 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from handsteer.clock import Clock
 from handsteer.dashboard.joined import Cameras
+from handsteer.dashboard.on_demand import OnDemandNode
 from handsteer.dashboard.socket_events import is_page_of
-from handsteer.dashboard.watch import WhileWatched
 from handsteer.errors import FrameError
 from handsteer.images import bgr_image, encode_jpeg
 from handsteer.messages import IMAGE_ANNOTATED, Image
@@ -39,7 +39,7 @@ class FrameSocket:
 
     Args:
         camera: Takes the frames; None where the camera cannot be reached from here.
-        drives: Tells whether the viewer of this id has the driver's seat, which it is given if it is free.
+        drives: Tells whether the viewer of this id has the control lease, which it is given if it is free.
     """
 
     def __init__(self, camera: Cameras | None, drives: Callable[[str], bool]) -> None:
@@ -126,7 +126,7 @@ class PictureNode(Node):
 class PictureResponse(Response):
     """Streams pictures to one viewer until it leaves; one that reads slowly gets fewer, always the newest."""
 
-    def __init__(self, pictures: WhileWatched[PictureNode]) -> None:
+    def __init__(self, pictures: OnDemandNode[PictureNode]) -> None:
         super().__init__(
             media_type=f"multipart/x-mixed-replace; boundary={_BOUNDARY.decode()}",
             headers={"Cache-Control": "no-store"},

@@ -26,7 +26,8 @@ from handsteer.dashboard.drive import DrivePage
 from handsteer.dashboard.history import VelocityHistory
 from handsteer.dashboard.joined import JoinedGraph
 from handsteer.dashboard.node import DashboardNode
-from handsteer.dashboard.page import ASSETS_PATH, ICON, PICTURE_PATH, WEBCAM_PATH, Local, Served
+from handsteer.dashboard.on_demand import OnDemandNode
+from handsteer.dashboard.page import ASSETS_PATH, ICON, PICTURE_PATH, WEBCAM_PATH, GraphAccess, PageContext
 from handsteer.dashboard.page_log import keep_short
 from handsteer.dashboard.picture import FrameSocket, PictureNode, PictureResponse
 from handsteer.dashboard.settings import SettingsPage
@@ -35,7 +36,6 @@ from handsteer.dashboard.settings_store import Settings
 from handsteer.dashboard.socket_events import SocketEvents
 from handsteer.dashboard.teach import TeachPage
 from handsteer.dashboard.teaching.teaching import Teaching
-from handsteer.dashboard.watch import WhileWatched
 from handsteer.errors import DashboardError
 from handsteer.graph import cmd_vel_topic
 from handsteer.messages import CMD_VEL, Topic
@@ -81,14 +81,14 @@ class Dashboard:
         config: DashboardConfig,
         *,
         cmd_vel: Topic[Any] = CMD_VEL,
-        local: Local | None = None,
+        local: GraphAccess | None = None,
         topics: bool = False,
     ) -> None:
-        local = local or Local()
+        local = local or GraphAccess()
         history = VelocityHistory()  # outlives the node, so that a page that is loaded anew shows it
-        self.node = WhileWatched(lambda: DashboardNode(transport, clock, steering, cmd_vel, history))
-        self.pictures = WhileWatched(lambda: PictureNode(transport, clock))
-        self.served = Served(self.node, local, topics)
+        self.node = OnDemandNode(lambda: DashboardNode(transport, clock, steering, cmd_vel, history))
+        self.pictures = OnDemandNode(lambda: PictureNode(transport, clock))
+        self.served = PageContext(self.node, local, topics)
         self.webcam = FrameSocket(local.cameras, self._drives)
         self._config = config
         self._server: uvicorn.Server | None = None
@@ -110,7 +110,7 @@ class Dashboard:
         settings = Settings(lambda: graph.config, graph.reconfigure, settings_file)
         topic = cmd_vel_topic(graph.config)
         wires = (graph.transport, graph.clock, graph.steering)
-        local = Local(graph.cameras, graph.robot, settings, Teaching.of(graph))
+        local = GraphAccess(graph.cameras, graph.robot, settings, Teaching.of(graph))
         return cls(*wires, graph.config.dashboard, cmd_vel=topic, local=local)
 
     def start(self) -> str:
@@ -158,7 +158,7 @@ class Dashboard:
         if not self.node.is_watched_by(viewer):
             return False
         node = self.node.join(viewer)
-        return node is not None and node.seat.take(viewer, node.clock.now())
+        return node is not None and node.lease.take(viewer, node.clock.now())
 
     def _wait_until_served(self) -> None:
         server, thread = self._server, self._thread
@@ -276,7 +276,7 @@ def _application() -> FastAPI:
         binding_refresh_interval=None,
         gzip_middleware_factory=None,
         show_welcome_message=False,
-        # A browser that is busy drawing answers late; taken for gone, it would load the page anew and lose its seat.
+        # A browser that is busy drawing answers late; taken for gone, it would load the page anew and lose its lease.
         # Who steers is missed much sooner, by what the page repeats.
         reconnect_timeout=10.0,
     )

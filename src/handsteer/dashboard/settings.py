@@ -3,7 +3,7 @@
 from nicegui import ui
 
 from handsteer.dashboard.node import DashboardNode
-from handsteer.dashboard.page import ASSETS_PATH, Page, Served
+from handsteer.dashboard.page import ASSETS_PATH, Page, PageContext
 from handsteer.dashboard.panels.elements import text
 from handsteer.dashboard.panels.settings import SettingsPanel
 from handsteer.dashboard.state import PageState
@@ -17,7 +17,7 @@ _ELSEWHERE = (
 class SettingsPage(Page):
     """Set everything that can be set; who watches sees what is set."""
 
-    def __init__(self, served: Served) -> None:
+    def __init__(self, served: PageContext) -> None:
         super().__init__(served, "/settings")
         ui.add_head_html(f'<link rel="stylesheet" href="{ASSETS_PATH}/settings.css">')
         self._panel: SettingsPanel | None = None

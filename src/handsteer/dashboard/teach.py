@@ -7,7 +7,7 @@ from typing import Final
 from nicegui import ui
 
 from handsteer.dashboard.node import DashboardNode
-from handsteer.dashboard.page import ASSETS_PATH, PICTURE_PATH, Page, Served
+from handsteer.dashboard.page import ASSETS_PATH, PICTURE_PATH, Page, PageContext
 from handsteer.dashboard.panels.camera import CameraPanel
 from handsteer.dashboard.panels.elements import box, card, switch, text
 from handsteer.dashboard.panels.teach_collect import CollectPanel, Countdown, NamePanel, TrainPanel
@@ -29,7 +29,7 @@ _STEPS: Final = {"name": "Name", "collect": "Collect", "train": "Train", "try": 
 class TeachPage(Page):
     """Teach a sign, if the graph is in this process."""
 
-    def __init__(self, served: Served) -> None:
+    def __init__(self, served: PageContext) -> None:
         super().__init__(served, "/teach")
         ui.add_head_html(
             "".join(f'<link rel="stylesheet" href="{ASSETS_PATH}/{name}.css">' for name in ("drive", "teach"))

@@ -4,8 +4,8 @@ from collections.abc import Collection, Iterable, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any, Final
 
-from handsteer.signs.figures import PhotoResult, Tally, tally
 from handsteer.signs.intervals import Share
+from handsteer.signs.metrics import PhotoResult, Tally, tally
 from handsteer.types import NONE
 
 BINS: Final = 10

@@ -8,13 +8,13 @@ from handsteer.cameras.files import read_photo
 from handsteer.cameras.protocol import Frame
 from handsteer.errors import LabelError
 from handsteer.landmarks.protocol import Hand
-from handsteer.signs.figures import PhotoResult
 from handsteer.signs.labelled import LabelledPhoto
+from handsteer.signs.metrics import PhotoResult
 from handsteer.signs.protocol import Classifier
 from handsteer.signs.recognizer import Recognizer
 from handsteer.signs.teaching.dataset import Dataset
 from handsteer.signs.teaching.taught import TaughtClassifier
-from handsteer.signs.video_figures import FrameVerdict
+from handsteer.signs.video_metrics import FrameVerdict
 from handsteer.signs.views import View
 from handsteer.types import NONE
 

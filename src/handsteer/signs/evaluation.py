@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from handsteer.signs.calibration import Calibration, calibration, sweep
-from handsteer.signs.figures import Confusion, PhotoReport, PhotoResult, Tally, photo_report
+from handsteer.signs.metrics import Confusion, PhotoReport, PhotoResult, Tally, photo_report
 from handsteer.signs.sources import PhotoRun, VideoRun
-from handsteer.signs.video_figures import VideoReport, video_report
+from handsteer.signs.video_metrics import VideoReport, video_report
 from handsteer.signs.views import View
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handsteer.signs.calibration import Calibration
-from handsteer.signs.figures import Confusion, Tally
+from handsteer.signs.metrics import Confusion, Tally
 from handsteer.types import NONE
 
 Colour = tuple[int, int, int]

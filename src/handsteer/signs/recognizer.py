@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 
 from handsteer.config import Config, SignsConfig
 from handsteer.landmarks.protocol import Hand, Landmarker
-from handsteer.signs.filter import Evidence, SignFilter
+from handsteer.signs.debouncer import Debouncer, Evidence
+from handsteer.signs.hand_selector import HandPosition, HandSelector
 from handsteer.signs.opening import open_classifier, open_landmarker
-from handsteer.signs.operator import Operator, Place
 from handsteer.signs.protocol import Classifier, SignGuess
 from handsteer.types import NONE
 
@@ -71,8 +71,8 @@ class Recognizer:
         config = config or Config()
         self._landmarker = landmarker or open_landmarker(config)
         self._classifier = classifier or open_classifier(config.signs)
-        self._filter = SignFilter(config.signs)
-        self._operator = Operator(config.signs)
+        self._filter = Debouncer(config.signs)
+        self._selector = HandSelector(config.signs)
         self._evidence = Evidence()
         self._config = config.signs
 
@@ -108,20 +108,20 @@ class Recognizer:
             FrameError: The image has another shape or type.
         """
         # A hand whose sign is about to count is as good as chosen.
-        search = self._operator.wants_search() and self._filter.candidate == NONE
+        search = self._selector.wants_search() and self._filter.candidate == NONE
         hands = self._landmarker.detect(image, search=search, dt_s=dt_s)
         told = [self._classifier.classify(hand) for hand in hands]
         guesses = [self._seen(guess) for guess in told]
-        chosen = self._operator.choose(hands, guesses, dt_s)
+        chosen = self._selector.choose(hands, guesses, dt_s)
         hand, guess = (hands[chosen], guesses[chosen]) if chosen is not None else (None, _NOTHING)
         likelihoods = told[chosen].likelihoods if chosen is not None else {}
-        self._evidence.add(Place.of_palm(hand) if hand else None, likelihoods, dt_s)
+        self._evidence.add(HandPosition.of_palm(hand) if hand else None, likelihoods, dt_s)
         since_s = self._filter.candidate_s + dt_s
         guess = self._bridged(guess, since_s)
         still = self._evidence.is_still(min(since_s, self._config.confirm_time))
         sign = self._filter.step(guess.sign, dt_s, still=still)
         if hand is not None and guess.sign == sign != NONE:
-            self._operator.confirm()
+            self._selector.confirm()
             self._landmarker.follow_only(hand)
         return Recognition(sign, guess.sign, guess.confidence, self._filter.progress, hand, likelihoods)
 
@@ -129,7 +129,7 @@ class Recognizer:
         """Go on with other confidences and times; what is followed and what counts stays."""
         self._config = config
         self._filter.reconfigure(config)
-        self._operator.reconfigure(config)
+        self._selector.reconfigure(config)
 
     def use(self, classifier: Classifier) -> None:
         """Tell the signs by ``classifier`` from the next frame on; no sign counts until it is confirmed anew."""
@@ -140,7 +140,7 @@ class Recognizer:
         """Forget the stream: no hand is followed and no sign counts."""
         self._landmarker.reset()
         self._filter.reset()
-        self._operator.reset()
+        self._selector.reset()
         self._evidence.reset()
 
     def _bridged(self, guess: SignGuess, since_s: float) -> SignGuess:

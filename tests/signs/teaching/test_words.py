@@ -1,5 +1,5 @@
-from handsteer.signs.figures import Confusion
 from handsteer.signs.intervals import Share
+from handsteer.signs.metrics import Confusion
 from handsteer.signs.teaching.checks import Lookalike
 from handsteer.signs.teaching.train import TeachingReport
 from handsteer.signs.teaching.words import false_hands, how_it_was_tried, mistakes

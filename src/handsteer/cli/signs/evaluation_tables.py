@@ -5,10 +5,10 @@ from collections.abc import Iterable, Mapping, Sequence
 from handsteer.cli.signs.tables import cells, confusion_table, rate, table
 from handsteer.signs.calibration import Calibration
 from handsteer.signs.evaluation import Evaluation
-from handsteer.signs.figures import SIZES, PhotoReport, Tally
 from handsteer.signs.intervals import Rate
+from handsteer.signs.metrics import SIZES, PhotoReport, Tally
 from handsteer.signs.sources import PhotoRun
-from handsteer.signs.video_figures import Event, LabelledFigures, VideoReport
+from handsteer.signs.video_metrics import Event, LabelledFigures, VideoReport
 from handsteer.types import NONE
 
 _PHOTOS_AGAIN = (

@@ -2,8 +2,8 @@
 
 from collections.abc import Sequence
 
-from handsteer.signs.figures import Confusion
 from handsteer.signs.intervals import Share
+from handsteer.signs.metrics import Confusion
 from handsteer.signs.teaching.dataset import Dataset, summarise
 from handsteer.signs.teaching.train import TeachingReport
 from handsteer.signs.teaching.words import false_hands, how_it_was_tried, mistakes

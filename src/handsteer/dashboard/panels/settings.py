@@ -151,7 +151,7 @@ class SettingsPanel:
 
     Args:
         settings: What can be set.
-        drives: Returns whether this viewer may change anything; it is given the driver's seat if that is free.
+        drives: Returns whether this viewer may change anything; it is given the control lease if that is free.
     """
 
     def __init__(self, settings: Settings, drives: Callable[[], bool]) -> None:

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 
 from nicegui import ui
 
-from handsteer.dashboard.manual import Manual
+from handsteer.dashboard.lease import LeaseStatus
+from handsteer.dashboard.pad_input import PadInput
 from handsteer.dashboard.panels.elements import box, button, card, switch, text
 from handsteer.dashboard.panels.sliders import Sliders, read_limit
-from handsteer.dashboard.seat import Place
 from handsteer.dashboard.state import PageState
 from handsteer.errors import TransportError
 from handsteer.messages import STEERING_CMD_VEL
@@ -116,7 +116,7 @@ class MuxPanel:
 _HINTS = {
     "free": "Hold the pad, or its arrow keys. Sliders stay, until you leave this page.",
     "driver": "Hold the pad, or W A S D anywhere. Sliders stay, until you leave this page.",
-    "watcher": "You watch: ask for the seat, at the top.",
+    "watcher": "You watch: ask to drive, at the top.",
 }
 _LATE = "What you asked for came too late, and was left out: is the network slow? Else load the page anew."
 
@@ -143,7 +143,7 @@ class SteerPanel:
         self._steer = steer
         self._release = release
         self._now = now
-        self._manual = Manual()
+        self._manual = PadInput()
         with card("Steer by hand", "panel steer") as self._card:
             self._mux = MuxPanel()
             with box("row"):
@@ -168,7 +168,7 @@ class SteerPanel:
         ui.on("sliders_held", lambda event: self._keep_on(event.args))
         ui.on("let_go", self.let_go)
 
-    def update(self, state: PageState, place: Place) -> None:
+    def update(self, state: PageState, place: LeaseStatus) -> None:
         """Show ``state`` to a viewer who has ``place``; sliders of others, and of a robot that is stopped, are at 0."""
         self._mux.update(state)
         self._topic.update(state)

@@ -90,7 +90,7 @@ class WorldPanel:
 
     Args:
         robot: The robot, if its world can be reached from here.
-        may: Returns whether this viewer drives; it is given the seat if that is free.
+        may: Returns whether this viewer drives; it is given the lease if that is free.
         watches: Returns whether somebody else drives.
     """
 

@@ -39,7 +39,7 @@ _NOTHING: Final = SignGuess(NONE, 0.0)
 
 
 @dataclass(frozen=True)
-class Eyes:
+class LessonVision:
     """What a lesson sees with.
 
     Attributes:
@@ -66,7 +66,7 @@ class LessonNode(Node):
         eyes: What it sees with; the models are opened on this node's thread.
     """
 
-    def __init__(self, transport: Transport, clock: Clock, lesson: Lesson, known: Dataset, eyes: Eyes) -> None:
+    def __init__(self, transport: Transport, clock: Clock, lesson: Lesson, known: Dataset, eyes: LessonVision) -> None:
         super().__init__("dashboard_lesson", transport, clock)
         self._lesson = lesson
         self._known = known

@@ -13,7 +13,7 @@ from handsteer.clock import Clock
 from handsteer.config import Config, ControlConfig, TeachConfig, validate
 from handsteer.dashboard.joined import JoinedGraph
 from handsteer.dashboard.teaching.lesson import Lesson, View
-from handsteer.dashboard.teaching.node import Eyes, LessonNode
+from handsteer.dashboard.teaching.node import LessonNode, LessonVision
 from handsteer.errors import ConfigError, DatasetError
 from handsteer.signs.opening import open_classifier, open_landmarker
 from handsteer.signs.teaching.collect import Facts
@@ -80,7 +80,7 @@ class Teaching:
         transport: Transport,
         clock: Clock,
         plan: TeachConfig,
-        eyes: Eyes,
+        eyes: LessonVision,
         *,
         config: Callable[[], Config],
         reconfigure: Callable[[Config], None],
@@ -98,7 +98,7 @@ class Teaching:
     def of(cls, graph: JoinedGraph) -> "Teaching":
         """Return the teaching on a graph."""
         config = graph.config
-        eyes = Eyes(
+        eyes = LessonVision(
             open_landmarker=lambda: open_landmarker(config),
             open_shipped=lambda: open_classifier(config.signs.model_copy(update={"model": None})),
             signs=lambda: graph.config.signs,

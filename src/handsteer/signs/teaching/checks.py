@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from typing import Final
 
 from handsteer.errors import TrainingError
-from handsteer.signs.figures import Confusion
 from handsteer.signs.intervals import Share
+from handsteer.signs.metrics import Confusion
 from handsteer.signs.protocol import Classifier
 from handsteer.signs.teaching.dataset import Dataset, summarise
 from handsteer.signs.trained import SURE

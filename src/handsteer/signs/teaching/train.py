@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handsteer import __version__
-from handsteer.signs.figures import Confusion
 from handsteer.signs.intervals import Share
+from handsteer.signs.metrics import Confusion
 from handsteer.signs.network import train
 from handsteer.signs.novelty import learn_novelty
 from handsteer.signs.protocol import Classifier

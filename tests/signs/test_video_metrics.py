@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from handsteer.signs.intervals import Share
-from handsteer.signs.video_figures import Event, FrameVerdict, VideoReport, video_report
+from handsteer.signs.video_metrics import Event, FrameVerdict, VideoReport, video_report
 from handsteer.types import FORWARD, GO, MOTION_SIGNS, NONE, SIGNS, STOP
 
 LETTERS = {"F": FORWARD, "S": STOP, "G": GO, ".": NONE, "?": None}

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from handsteer.config import SignsConfig
-from handsteer.signs.operator import Place
+from handsteer.signs.hand_selector import HandPosition
 from handsteer.types import NONE, STOP
 
 _FRAMES: Final = 12
@@ -17,7 +17,7 @@ _STILL: Final = 0.25
 @dataclass(frozen=True)
 class _Seen:
     dt_s: float
-    place: Place
+    place: HandPosition
     likelihoods: Mapping[str, float]
 
 
@@ -27,7 +27,7 @@ class Evidence:
     def __init__(self) -> None:
         self._seen: deque[_Seen] = deque(maxlen=_FRAMES)
 
-    def add(self, place: Place | None, likelihoods: Mapping[str, float], dt_s: float) -> None:
+    def add(self, place: HandPosition | None, likelihoods: Mapping[str, float], dt_s: float) -> None:
         """Take the next frame.
 
         Args:
@@ -75,7 +75,7 @@ class Evidence:
 _SLACK_S = 0.001
 
 
-class SignFilter:
+class Debouncer:
     """Confirms signs, and bridges short losses.
 
     - ``Stop`` counts at its first frame.

@@ -9,7 +9,7 @@ from handsteer.nodes.node import Node
 N = TypeVar("N", bound=Node)
 
 
-class WhileWatched(Generic[N]):
+class OnDemandNode(Generic[N]):
     """Makes and starts a node for the first viewer, and stops it after the last; may be used from any thread.
 
     Args:

@@ -5,8 +5,8 @@ import cv2
 import numpy as np
 import pytest
 
-from handsteer.signs.figures import Confusion, PhotoResult, photo_report
 from handsteer.signs.intervals import Share
+from handsteer.signs.metrics import Confusion, PhotoResult, photo_report
 from handsteer.signs.plot import draw_confusion
 from handsteer.types import FORWARD, GO, MOTION_SIGNS, NONE, SIGNS, STOP, TURN_LEFT
 

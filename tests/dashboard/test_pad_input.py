@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from handsteer.dashboard.manual import SLIDERS_TIMEOUT_S, Manual
+from handsteer.dashboard.pad_input import SLIDERS_TIMEOUT_S, PadInput
 from handsteer.types import ZERO, Velocity
 
 SLOW, FAST = Velocity(0.2, 0.1), Velocity(-0.4, 1.0)
@@ -17,13 +17,13 @@ def sent(now_s: float, late_s: float = 0.0) -> float:
 
 
 def test_sliders_keep_on_as_long_as_the_page_says_so() -> None:
-    manual = Manual()
+    manual = PadInput()
     manual.slide(SLOW, 0.0)
     assert [manual.keep_on(sent(0.1 * n), 0.1 * n) for n in range(50)] == [SLOW] * 50
 
 
 def test_sliders_go_to_zero_when_the_page_falls_silent_and_stay_there() -> None:
-    manual = Manual()
+    manual = PadInput()
     manual.slide(SLOW, 0.0)
     manual.keep_on(sent(0.1), 0.1)
     silent_s = 0.1 + SLIDERS_TIMEOUT_S + 0.01
@@ -33,7 +33,7 @@ def test_sliders_go_to_zero_when_the_page_falls_silent_and_stay_there() -> None:
 
 
 def test_a_page_that_never_says_that_it_is_in_front_moves_nothing() -> None:
-    manual = Manual()
+    manual = PadInput()
     manual.slide(SLOW, 0.0)
     manual.slide(FAST, 0.4)
     manual.end_if_silent(0.6)
@@ -41,7 +41,7 @@ def test_a_page_that_never_says_that_it_is_in_front_moves_nothing() -> None:
 
 
 def test_the_newest_of_pad_and_sliders_steers() -> None:
-    manual = Manual()
+    manual = PadInput()
     manual.slide(SLOW, 0.0)
     assert manual.hold_pad(FAST, sent(0.1), 0.1) == FAST
     assert manual.sliders == ZERO
@@ -51,7 +51,7 @@ def test_the_newest_of_pad_and_sliders_steers() -> None:
 
 
 def test_what_was_held_up_on_its_way_moves_nothing() -> None:
-    manual = Manual()
+    manual = PadInput()
     assert manual.hold_pad(SLOW, sent(0.0), 0.0) == SLOW
     assert manual.hold_pad(SLOW, sent(2.0, late_s=1.0), 2.0) is None
     was_late = manual.is_late
@@ -64,7 +64,7 @@ def test_what_was_held_up_on_its_way_moves_nothing() -> None:
 
 
 def test_late_words_do_not_keep_sliders_going() -> None:
-    manual = Manual()
+    manual = PadInput()
     manual.slide(SLOW, 0.0)
     manual.keep_on(sent(0.1), 0.1)
     for n in range(2, 20):
@@ -74,7 +74,7 @@ def test_late_words_do_not_keep_sliders_going() -> None:
 
 @pytest.mark.parametrize("when", [None, "soon", True, math.nan, math.inf, [], {}])
 def test_without_a_time_nothing_moves(when: object) -> None:
-    manual = Manual()
+    manual = PadInput()
     manual.slide(SLOW, 0.0)
     assert manual.keep_on(when, 0.1) is None
     assert manual.hold_pad(FAST, when, 0.1) is None
@@ -87,7 +87,7 @@ def test_without_a_time_nothing_moves(when: object) -> None:
     )
 )
 def test_sliders_never_outlast_the_pages_word(events: list[tuple[str, float, float]]) -> None:
-    manual = Manual()
+    manual = PadInput()
     now_s = heard_s = 0.0
     for kind, pause_s, late_s in events:
         now_s += pause_s

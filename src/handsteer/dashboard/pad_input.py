@@ -17,7 +17,7 @@ _LATE_IN_A_ROW = 5
 _PAGE = b"page"
 
 
-class Manual:
+class PadInput:
     """Tells which velocity a page asks for now; one source at a time, the newest.
 
     The pad asks for a velocity each time it is heard. The sliders keep theirs for as long as the page says, again and

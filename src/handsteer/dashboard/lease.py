@@ -11,8 +11,8 @@ Role = Literal["driver", "watcher", "free"]
 
 
 @dataclass(frozen=True)
-class Place:
-    """What the seat is for one viewer.
+class LeaseStatus:
+    """What the lease is for one viewer.
 
     Attributes:
         role: Whether it drives, watches another one, or nobody drives.
@@ -25,10 +25,10 @@ class Place:
     left_s: float = 0.0
 
 
-class Seat:
-    """The driver's seat; may be used from any thread.
+class ControlLease:
+    """The control lease; may be used from any thread.
 
-    Who drives keeps the seat until it leaves, hands over, or does not answer a request in time. A refused viewer may
+    Who drives keeps the lease until it leaves, hands over, or does not answer a request in time. A refused viewer may
     ask again.
     """
 
@@ -46,11 +46,11 @@ class Seat:
             return self._driver == viewer
 
     def drives(self, viewer: str) -> bool:
-        """Return whether ``viewer`` has the seat."""
+        """Return whether ``viewer`` has the lease."""
         return self._driver == viewer
 
     def ask(self, viewer: str, now_s: float) -> None:
-        """Ask the driver for the seat; the first who asks is answered first."""
+        """Ask the driver for the lease; the first who asks is answered first."""
         with self._lock:
             self._hand_over_if_due(now_s)
             if self._driver is None:
@@ -69,7 +69,7 @@ class Seat:
             return hand_over
 
     def leave(self, viewer: str) -> bool:
-        """Let go of the seat and of a request; return whether ``viewer`` was the driver."""
+        """Let go of the lease and of a request; return whether ``viewer`` was the driver."""
         with self._lock:
             if self._request is not None and self._request[0] == viewer:
                 self._request = None
@@ -85,16 +85,16 @@ class Seat:
         with self._lock:
             return self._hand_over_if_due(now_s)
 
-    def place_of(self, viewer: str, now_s: float) -> Place:
-        """Return what the seat is for ``viewer``."""
+    def status_of(self, viewer: str, now_s: float) -> LeaseStatus:
+        """Return what the lease is for ``viewer``."""
         with self._lock:
             asker, due_s = self._request or (None, now_s)
             left_s = max(0.0, due_s - now_s)
             if self._driver is None:
-                return Place("free")
+                return LeaseStatus("free")
             if self._driver == viewer:
-                return Place("driver", asker is not None, left_s)
-            return Place("watcher", asker == viewer, left_s)
+                return LeaseStatus("driver", asker is not None, left_s)
+            return LeaseStatus("watcher", asker == viewer, left_s)
 
     def _hand_over_if_due(self, now_s: float) -> bool:
         if self._request is None or now_s < self._request[1]:

@@ -21,7 +21,7 @@ _MUCH_SMALLER: Final = 0.6
 
 
 @dataclass(frozen=True)
-class Place:
+class HandPosition:
     """Where a hand is in the image: the centre of its box and the box's longer side, in pixels."""
 
     x: float
@@ -29,24 +29,24 @@ class Place:
     size: float
 
     @classmethod
-    def of(cls, hand: Hand) -> "Place":
+    def of(cls, hand: Hand) -> "HandPosition":
         """Return where ``hand`` is."""
         low, high = hand.pixels[:, :2].min(axis=0), hand.pixels[:, :2].max(axis=0)
         x, y = ((low + high) / 2).tolist()
         return cls(x, y, max(1.0, float(np.max(high - low))))
 
     @classmethod
-    def of_palm(cls, hand: Hand) -> "Place":
+    def of_palm(cls, hand: Hand) -> "HandPosition":
         """Return where the palm of ``hand`` is, which stays when fingers move, and how large the whole hand is."""
         x, y = hand.pixels[_PALM, :2].mean(axis=0).tolist()
         return cls(x, y, max(1.0, hand.longer_side_px))
 
-    def distance(self, other: "Place") -> float:
+    def distance(self, other: "HandPosition") -> float:
         """Return how far ``other`` is from here, in sizes of this one."""
         return float(np.hypot(self.x - other.x, self.y - other.y)) / self.size
 
 
-class Operator:
+class HandSelector:
     """Chooses the hand that gives the signs, and stays with it.
 
     - While none is followed, it is the hand that shows a sign: the surest and largest of them.
@@ -65,7 +65,7 @@ class Operator:
 
     def reset(self) -> None:
         """Forget the hand that is followed."""
-        self._followed: Place | None = None
+        self._followed: HandPosition | None = None
         self._unseen_s = 0.0
         self._idle_s = math.inf
 
@@ -81,7 +81,7 @@ class Operator:
             guesses: What each of them shows; ``NONE`` where it is not sure enough.
             dt_s: Seconds since the last frame, >= 0.
         """
-        places = [Place.of(hand) for hand in hands]
+        places = [HandPosition.of(hand) for hand in hands]
         showing = [index for index, guess in enumerate(guesses) if guess.sign != NONE]
         self._idle_s += dt_s
         followed = self._find(places, dt_s)
@@ -106,7 +106,7 @@ class Operator:
         """Note that the sign of the followed hand counts: from now on it is kept."""
         self._idle_s = 0.0
 
-    def _find(self, places: list[Place], dt_s: float) -> int | None:
+    def _find(self, places: list[HandPosition], dt_s: float) -> int | None:
         """Return the index of the followed hand among ``places``; None when it is not there, or none is followed."""
         before = self._followed
         if before is None:

@@ -6,8 +6,8 @@ from itertools import chain, groupby
 from statistics import median
 from typing import Any
 
-from handsteer.signs.figures import Confusion
 from handsteer.signs.intervals import Rate, Share
+from handsteer.signs.metrics import Confusion
 from handsteer.types import NONE
 
 
