@@ -39,6 +39,7 @@ from handsteer.messages import (
     Image,
     String,
     Time,
+    Topic,
     type_name,
 )
 from handsteer.robots.description import joints, robot_description, visuals
@@ -277,9 +278,9 @@ def test_descriptions_of_robots() -> None:
     [CMD_VEL, DIAGNOSTICS, HAND_SIGN, IMAGE_COMPRESSED, IMAGE_RAW, JOINT_STATES, ODOM, WORLD_MARKERS],
     ids=lambda topic: topic.name,
 )
-def test_messages_of_other_nodes(topic: object) -> None:
+def test_messages_of_other_nodes(topic: Topic[Any]) -> None:
     """What cannot be decoded is left out by the transports, whatever rosbags raises; here it must be soon."""
-    name = type_name(topic.type)  # type: ignore[attr-defined]
+    name = type_name(topic.type)
 
     def read(data: bytes) -> None:
         try:
