@@ -12,6 +12,7 @@ from handsteer.messages import DIAGNOSTICS, HAND_SIGN, DiagnosticArray, String, 
 from handsteer.nodes.node import OK, WARN, Node
 from handsteer.transports.in_process import InProcessTransport
 from handsteer.transports.protocol import Received
+from tests.nodes.stepping import Bench
 from tests.processes import eventually
 
 
@@ -53,6 +54,20 @@ def test_a_delayed_timer_leaves_out_the_beats_before() -> None:
         node.spin_once()
         clock.advance(0.1)
     assert beats == [0.5, 0.6, 0.7]
+
+
+def test_state_is_worked_out_only_while_somebody_listens() -> None:
+    bench = Bench()
+    node = Node("node", bench.transport, bench.clock)
+    bench.nodes.append(node)
+    reports: list[float] = []
+    node.diagnose_every(0.1, lambda: reports.append(bench.clock.now()))
+    bench.run(3.0)
+    assert reports == []
+    bench.record(DIAGNOSTICS)
+    bench.run(1.0)
+    assert 3.0 <= reports[0] <= 3.5
+    assert len(reports) >= 5
 
 
 def test_with_a_key_the_newest_of_each_publisher_is_kept() -> None:

@@ -1,16 +1,11 @@
 """The command line as a whole: its verbs, and what becomes of errors."""
 
-import logging
-import os
-import sys
-
 from cyclopts import App, CycloptsError, ValidationError
 from pydantic import ValidationError as PydanticError
 
 from handsteer import __version__, config
 from handsteer.cli import signals
-from handsteer.cli.options import say
-from handsteer.errors import HandsteerError
+from handsteer.cli.running import exit_code, fail, set_up_logging
 from handsteer.parameters import section_model
 
 _EXAMPLES = """Examples:
@@ -22,6 +17,8 @@ _EXAMPLES = """Examples:
   handsteer camera --transport auto              one node, in a ROS 2 graph; or ros2, dds, zenoh
   handsteer doctor                               what works on this machine
 """
+
+_NODES = ("camera", "recognition", "control", "robot", "steering")
 
 app = App(
     name="handsteer",
@@ -35,7 +32,7 @@ app = App(
 for verb in ("run", "recognize", "models", "doctor", "ros"):
     app.command(f"handsteer.cli.{verb}:{verb}", name=verb)
 app.command("handsteer.cli.signs:app", name="signs")
-for verb in ("camera", "recognition", "control", "robot", "steering"):
+for verb in _NODES:
     app.command(f"handsteer.cli.nodes:{verb}", name=verb, group="One node of a graph of several processes")
 app.command(
     "handsteer.cli.zenoh_router:zenoh_router", name="zenoh-router", group="One node of a graph of several processes"
@@ -45,23 +42,24 @@ app.command("handsteer.cli.robots:robots", name="robots", group="One node of a g
 
 def run(words: list[str]) -> int:
     """Run the verb that ``words`` name; return the exit code, 0 when all went well, 2 when the input was wrong."""
-    logging.basicConfig(level=logging.INFO, format="handsteer: %(message)s", stream=sys.stderr)
-    for noisy in ("uvicorn", "asyncio", "httpx", "watchfiles", "rospy"):
-        logging.getLogger(noisy).setLevel(logging.WARNING)
+    set_up_logging()
     words = [_by_new_name(word) for word in _ros_words_last(words)]
     _load_what_help_lists(app, words)
+    return exit_code(lambda: _run(words))
+
+
+def _run(words: list[str]) -> int:
     try:
         verb, given, _ = app.parse_args(words, exit_on_error=False, print_error=False)
+        if words and words[0] in _NODES:
+            from handsteer.cli.one_node import load  # noqa: PLC0415 - no other verb needs it
+
+            load(words[0])
         # The verb is loaded now. What it begins is to be left in order.
         signals.end_in_order()
-        return verb(*given.args, **given.kwargs) or 0
+        return int(verb(*given.args, **given.kwargs) or 0)
     except CycloptsError as error:
-        return _fail(_problem(error))
-    except HandsteerError as error:
-        return _fail(str(error))
-    except BrokenPipeError:  # the reader of our output has left, as `head` does
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 0
+        return fail(_problem(error))
 
 
 def _load_what_help_lists(group: App, arguments: list[str]) -> None:
@@ -102,8 +100,3 @@ def _problem(error: CycloptsError) -> str:
     if isinstance(error, ValidationError) and isinstance(error.__cause__, PydanticError):
         return config.describe(error.__cause__)
     return f"{str(error).rstrip('.')}; see handsteer --help"
-
-
-def _fail(message: str) -> int:
-    say(" ".join(message.split()))
-    return 2

@@ -3,7 +3,8 @@
 import json as json_format
 from pathlib import Path
 
-from handsteer.cli.options import ConfigFile, Flag, Parameters, settings
+from handsteer.cli.options import ConfigFile, Flag, Parameters
+from handsteer.cli.running import settings
 from handsteer.recognize import FrameResult
 from handsteer.recognize import recognize as results
 from handsteer.signs.recognizer import Recognizer

@@ -6,7 +6,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from handsteer.cli.options import say, uninterrupted
+from handsteer.cli.running import say, uninterrupted
 from handsteer.errors import ConfigError
 from handsteer.transports import TRANSPORTS
 

@@ -4,7 +4,7 @@ import os
 import threading
 from typing import Any
 
-from handsteer.cli.options import say
+from handsteer.cli.running import say
 from handsteer.errors import needing
 
 

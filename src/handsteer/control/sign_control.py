@@ -82,15 +82,17 @@ class SignControl:
     def _next(self, action: Action, interval_s: float) -> Velocity:
         now = self.velocity
         linear, angular = self._growth(interval_s)
-        after = {
-            "forward": Velocity(now.linear_mps + linear, 0.0),
-            "backward": Velocity(now.linear_mps - linear, 0.0),
-            "turn_left": Velocity(now.linear_mps, now.angular_radps + angular),
-            "turn_right": Velocity(now.linear_mps, now.angular_radps - angular),
-            "stop": ZERO,
-        }.get(action, now)
+        match action:
+            case "stop":
+                return ZERO
+            case "forward" | "backward":
+                after = now.linear_mps + (linear if action == "forward" else -linear), 0.0
+            case "turn_left" | "turn_right":
+                after = now.linear_mps, now.angular_radps + (angular if action == "turn_left" else -angular)
+            case _:
+                after = now.linear_mps, now.angular_radps
         # So that a sum of steps is what people make of it: 0.22, not 0.22000000000000006.
-        summed = Velocity(round(after.linear_mps, _DIGITS), round(after.angular_radps, _DIGITS))
+        summed = Velocity(round(after[0], _DIGITS), round(after[1], _DIGITS))
         limited = summed.clamped(self._config.max_linear, self._config.max_angular)
         if not _is_faster(limited, now) or self._config.ramp == "per_second" or self._allowance.take():
             return limited

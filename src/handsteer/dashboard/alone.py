@@ -17,7 +17,7 @@ from handsteer.config import Config
 from handsteer.dashboard.apart import Facts
 from handsteer.dashboard.server import Dashboard
 from handsteer.errors import ConfigError, HandsteerError, TransportError
-from handsteer.graph import make_steering
+from handsteer.making import make_steering
 from handsteer.nodes.steering import SteeringNode
 from handsteer.robots.world import World
 from handsteer.transports.piped import Pipe, PipedTransport

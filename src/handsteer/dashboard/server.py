@@ -37,7 +37,7 @@ from handsteer.dashboard.socket_events import SocketEvents
 from handsteer.dashboard.teach import TeachPage
 from handsteer.dashboard.teaching.teaching import Teaching
 from handsteer.errors import DashboardError
-from handsteer.graph import cmd_vel_topic
+from handsteer.making import cmd_vel_topic
 from handsteer.messages import CMD_VEL, Topic
 from handsteer.nodes.steering import SteeringNode
 from handsteer.transports.protocol import Transport

@@ -65,7 +65,7 @@ class CameraNode(Node):
         self._compressed = self.publisher(IMAGE_COMPRESSED)
         self._info = self.publisher(CAMERA_INFO)
         self._reading = self.every(camera.period_s or 0.0, self._read)
-        self.every(_DIAGNOSE_PERIOD_S, self._report)
+        self.diagnose_every(_DIAGNOSE_PERIOD_S, self._report)
 
     @property
     def is_paced(self) -> bool:

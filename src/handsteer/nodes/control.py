@@ -23,7 +23,7 @@ from handsteer.messages import (
     command,
 )
 from handsteer.nodes.collision_monitor import CollisionMonitor
-from handsteer.nodes.interruption import Interruption
+from handsteer.nodes.interruption import CALM_S, Interruption
 from handsteer.nodes.latency import LatencyLog
 from handsteer.nodes.node import OK, WARN, Node
 from handsteer.nodes.odometry import MeasuredVelocity
@@ -36,9 +36,6 @@ from handsteer.types import NONE, ZERO, Velocity, action_of
 log = logging.getLogger(__name__)
 
 _WATCHDOG_PERIOD_S = 0.02
-# Nothing that the watchdog looks for comes sooner after a message, which does the same work, or while nobody drives.
-# Whole beats after it the timeout of 0.35 s has passed; a hair more, as sums of times are not exact.
-_CALM_S = 0.09 + 1e-7
 _DIAGNOSE_PERIOD_S = 0.1
 
 
@@ -100,7 +97,7 @@ class HandSignControlNode(Node):
         if self._following:
             self.subscribe(ODOM, self._on_odometry)
         self._watchdog = self.every(_WATCHDOG_PERIOD_S, self._watch)
-        self.every(_DIAGNOSE_PERIOD_S, self._report)
+        self.diagnose_every(_DIAGNOSE_PERIOD_S, self._report)
 
     def on_reconfigure(self, config: Config) -> None:
         """Take all of ``control``; a robot that is faster than new limits allow is told so at once."""
@@ -192,7 +189,7 @@ class HandSignControlNode(Node):
         self._log_arming()
         # The beat is that of the selection, too; and steering ends on time also where signs come all the while.
         if self._selection is None and self._driver.source != "steering":
-            self._watchdog.delay_until(self.clock.now() + _CALM_S)
+            self._watchdog.delay_until(self.clock.now() + CALM_S)
 
     def _log_arming(self) -> None:
         """Say when signs begin to wait for neutral, and when they need not any more: who has no page sees the log."""
@@ -262,8 +259,6 @@ class HandSignControlNode(Node):
         return elapsed_s
 
     def _report(self) -> None:
-        if not self.is_diagnosed:
-            return
         velocity = self._driver.velocity
         self.diagnose(
             WARN if self._rivals.warning or self._monitor.why_blind() else OK,

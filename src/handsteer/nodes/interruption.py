@@ -2,6 +2,12 @@
 
 from handsteer.timeouts import BURST_S, HELD_UP_S
 
+CALM_S = 0.09 + 1e-7
+"""How long a node's watchdog may sleep after a message, which does the same work: what it looks for comes no sooner.
+
+Whole beats of 0.02 s later the timeout of 0.35 s has passed; a hair more, as sums of times are not exact.
+"""
+
 
 class Interruption:
     """Notices that a node was held up: its process was stopped, or the machine was too busy.

@@ -24,6 +24,7 @@ FAILURES_SAID_EVERY_S = 10.0
 """A callback that goes on failing is logged no more often; a bad picture comes thirty times a second."""
 
 _LONGEST_REASON = 200
+_LOOK_FOR_LISTENERS_S = 0.5
 
 
 @dataclass
@@ -151,6 +152,20 @@ class Node:
         self._timers.append(timer)
         return timer
 
+    def diagnose_every(self, period_s: float, report: Callable[[], None]) -> None:
+        """Call ``report``, which tells this node's state by :meth:`diagnose`, every ``period_s`` seconds.
+
+        While nobody listens it is left out, and a new listener hears the first one within half a second.
+        """
+
+        def beat() -> None:
+            if self.is_diagnosed:
+                report()
+            else:
+                timer.delay_until(self.clock.now() + _LOOK_FOR_LISTENERS_S)
+
+        timer = self.every(period_s, beat)
+
     def reconfigure(self, config: Config) -> None:
         """Take the parameters that can change while the node runs (``live`` of each section) from ``config``.
 
@@ -189,7 +204,7 @@ class Node:
         """
         with self._wake:
             config, self._new_config = self._new_config, None
-            work = [(inbox, received) for inbox in self._inboxes for received in inbox.take()]
+            work = [(inbox, received) for inbox in self._inboxes if inbox.filled for received in inbox.take()]
         if config is not None:
             self._guard("reconfigure", self.on_reconfigure, config)
         for inbox, received in work:
@@ -254,10 +269,16 @@ class Node:
 
     def _wait(self) -> None:
         with self._wake:
-            idle = self._new_config is None and not any(inbox.filled for inbox in self._inboxes)
-            if self._running and idle:
+            while self._running and not self._has_work:
                 due = self.next_due_s
                 self.clock.wait(self._wake, None if due is None else max(0.0, due - self.clock.now()))
+
+    @property
+    def _has_work(self) -> bool:
+        # A timer may have been delayed meanwhile.
+        due = self.next_due_s
+        is_due = due is not None and due <= self.clock.now()
+        return is_due or self._new_config is not None or any(inbox.filled for inbox in self._inboxes)
 
     def _guard(self, source: str, callback: Callable[..., None], *args: object) -> None:
         try:

@@ -17,7 +17,7 @@ from handsteer.errors import ConfigError, ModelError
 from handsteer.images import bgr_image, image_message, jpeg_picture
 from handsteer.messages import HAND_SIGN, IMAGE_ANNOTATED, IMAGE_COMPRESSED, IMAGE_RAW, CompressedImage, Image, String
 from handsteer.nodes.frame_age import FrameAge
-from handsteer.nodes.interruption import Interruption
+from handsteer.nodes.interruption import CALM_S, Interruption
 from handsteer.nodes.latency import LatencyLog
 from handsteer.nodes.node import OK, WARN, Node
 from handsteer.nodes.recording import Recording
@@ -95,8 +95,8 @@ class HandSignRecognitionNode(Node):
         self._images = self._take_images()
         if wanted == "auto":
             self.every(_CHOOSE_PERIOD_S, self._choose_images)
-        self.every(_WATCH_PERIOD_S, self._watch)
-        self.every(_DIAGNOSE_PERIOD_S, self._report)
+        self._watchdog = self.every(_WATCH_PERIOD_S, self._watch)
+        self.diagnose_every(_DIAGNOSE_PERIOD_S, self._report)
 
     def check(self, config: Config) -> None:
         """Raise ConfigError if the file of ``signs.model`` is another one than before and cannot be used."""
@@ -160,6 +160,7 @@ class HandSignRecognitionNode(Node):
             if self._refused is not None:
                 return
         self._last_frame_s = self._last_sign_s = began_s
+        self._watchdog.delay_until(began_s + min(CALM_S, self._config.max_frame_age))
         self._recognition = recognition
         self.counts[recognition.sign] = self.counts.get(recognition.sign, 0) + 1
         self._sign.publish(String(data=recognition.sign), received.captured_s)

@@ -121,7 +121,7 @@ class RobotNode(Node):
         self.every(_PERIOD_S, self._step)
         self.every(_SCAN_PERIOD_S, self._publish_scan)
         self.every(_MARKERS_PERIOD_S, self._publish_markers)
-        self.every(_DIAGNOSE_PERIOD_S, self._report)
+        self.diagnose_every(_DIAGNOSE_PERIOD_S, self._report)
 
     @property
     def world(self) -> World | None:

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handsteer.cameras.choose import open_camera
-from handsteer.cli.options import ConfigFile, Flag, Parameters, say, settings
+from handsteer.cli.options import ConfigFile, Flag, Parameters
+from handsteer.cli.running import say, settings
 from handsteer.cli.signs.tables import dataset_table
 from handsteer.cli.terminal import Keys, TerminalPicture
 from handsteer.clock import RealClock

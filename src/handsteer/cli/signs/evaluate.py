@@ -10,7 +10,8 @@ import cv2
 from cyclopts import Parameter
 from tqdm import tqdm
 
-from handsteer.cli.options import ConfigFile, Flag, Parameters, settings
+from handsteer.cli.options import ConfigFile, Flag, Parameters
+from handsteer.cli.running import settings
 from handsteer.cli.signs.evaluation_tables import evaluation_tables
 from handsteer.config import Config
 from handsteer.errors import EvaluationError

@@ -8,7 +8,8 @@ from typing import Annotated
 from cyclopts import Parameter
 from tqdm import tqdm
 
-from handsteer.cli.options import Flag, say
+from handsteer.cli.options import Flag
+from handsteer.cli.running import say
 from handsteer.cli.signs.tables import teaching_tables
 from handsteer.config import SignsConfig, TeachConfig
 from handsteer.errors import TrainingError

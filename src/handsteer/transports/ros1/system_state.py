@@ -9,13 +9,13 @@ import rospy
 from handsteer.errors import TransportError
 from handsteer.transports.ros1.master import Master
 
-_PERIOD_S = 2.0
+_PERIOD_S = 4.0
 
 log = logging.getLogger(__name__)
 
 
 class SystemState:
-    """Asks the master every two seconds, on a thread of its own, from the first question on."""
+    """Asks the master every four seconds, on a thread of its own, from the first question on."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()

@@ -14,6 +14,8 @@ from handsteer.messages import Topic, type_name
 from handsteer.transports.channels import Deliver, Fanout, FanoutSubscription, TopicTypes, check_type
 from handsteer.transports.protocol import Received
 from handsteer.transports.ros1.conversion import from_ros1, ros1_type, to_ros1
+from handsteer.transports.ros1.memory import keep_freed_memory
+from handsteer.transports.ros1.prompt import send_promptly
 from handsteer.transports.ros1.system_state import SystemState
 from handsteer.transports.stamps import capture_time
 
@@ -119,6 +121,8 @@ class Ros1Transport:
             send(Received(message, captured_s, by_player=captured_s is not None and _is_player(theirs)))
 
         size = _BUFFER_BYTES.get(kind, _SMALL_BUFFER_BYTES)
+        if size > _SMALL_BUFFER_BYTES:
+            keep_freed_memory()
         subscriber = rospy.Subscriber(
             name, ros1_type(kind), on_message, queue_size=topic.depth, buff_size=size, tcp_nodelay=True
         )
@@ -140,6 +144,8 @@ class Ros1Publisher(Generic[M]):
         self._publisher: Any = rospy.Publisher(
             name, there, queue_size=topic.depth, latch=topic.latched, tcp_nodelay=True
         )
+        if topic.lifespan_s is not None:  # what drives a robot: small, often, and worth nothing when it is late
+            send_promptly(self._publisher, topic.depth)
 
     @property
     def wanted(self) -> bool:

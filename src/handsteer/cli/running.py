@@ -1,0 +1,81 @@
+"""What the verbs share beside their options: how they are told what, how they speak, and how they end."""
+
+import gc
+import logging
+import os
+import signal
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from handsteer import config
+from handsteer.errors import HandsteerError
+
+
+def set_up_logging() -> None:
+    """Let what is logged go to the standard error, without the chatter of libraries."""
+    logging.basicConfig(level=logging.INFO, format="handsteer: %(message)s", stream=sys.stderr)
+    for noisy in ("uvicorn", "asyncio", "httpx", "watchfiles", "rospy"):
+        logging.getLogger(noisy).setLevel(logging.WARNING)
+
+
+def exit_code(call: Callable[[], int | None]) -> int:
+    """Call; return the exit code, 2 when the input was wrong, which is said."""
+    try:
+        return call() or 0
+    except HandsteerError as error:
+        return fail(str(error))
+    except BrokenPipeError:  # the reader of our output has left, as `head` does
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+
+
+def fail(message: str) -> int:
+    """Say what was wrong with the input; return the exit code."""
+    say(" ".join(message.split()))
+    return 2
+
+
+def settings(
+    file: Path | None,
+    given: config.Config | None,
+    shorthand: dict[str, Any] | None = None,
+    base: dict[str, Any] | None = None,
+    service: dict[str, Any] | None = None,
+) -> config.Config:
+    """Return the parameters.
+
+    They come from the defaults, then ``base``, the file, a graph's parameter ``service``, the shorthand options, and
+    the options by full name.
+    """
+    short = {
+        section: {name: value for name, value in values.items() if value is not None}
+        for section, values in (shorthand or {}).items()
+    }
+    full = given.model_dump(exclude_unset=True) if given else {}
+    return config.load(file, base or {}, service or {}, short, full)
+
+
+def say(message: str) -> None:
+    """Tell people something, apart from the output."""
+    print(f"handsteer: {message}", file=sys.stderr, flush=True)
+
+
+def keep_what_is_loaded() -> None:
+    """Let the garbage collector leave alone what was loaded until now; looking at all of it holds up every thread."""
+    # The little garbage that is kept so costs less than looking for it.
+    gc.freeze()
+    gc.enable()
+
+
+@contextmanager
+def uninterrupted() -> Iterator[None]:
+    """Ignore Ctrl-C and SIGTERM in this block: whoever presses Ctrl-C twice must not keep a robot from standing."""
+    handlers = {number: signal.signal(number, signal.SIG_IGN) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield
+    finally:
+        for number, handler in handlers.items():
+            signal.signal(number, handler)

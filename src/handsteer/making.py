@@ -1,0 +1,156 @@
+"""Makes each node of the graph as a configuration describes it.
+
+A process that runs one node is not to wait until all others are loaded: what a node needs is loaded when it is made.
+"""
+# ruff: noqa: PLC0415
+
+import logging
+from typing import TYPE_CHECKING, Any
+
+from handsteer.clock import Clock, SimulatedClock, WallClock
+from handsteer.config import Config, cmd_vel_type
+from handsteer.messages import Topic, cmd_vel
+from handsteer.transports.protocol import Session, Transport
+from handsteer.types import NONE, find_sign
+
+if TYPE_CHECKING:
+    from handsteer.cameras.browser import ChoiceOfCameras
+    from handsteer.cameras.protocol import Camera
+    from handsteer.nodes.camera import CameraNode
+    from handsteer.nodes.control import HandSignControlNode
+    from handsteer.nodes.recognition import HandSignRecognitionNode
+    from handsteer.nodes.robot import RobotNode
+    from handsteer.nodes.steering import SteeringNode
+
+log = logging.getLogger(__name__)
+
+
+def make_camera(config: Config, transport: Transport, clock: Clock, camera: "Camera | None" = None) -> "CameraNode":
+    """Return the node ``my_camera``.
+
+    Args:
+        config: Everything that can be set.
+        transport: Carries the node's messages.
+        clock: The graph's clock.
+        camera: What gives the frames; None opens the one that ``config`` names.
+
+    Raises:
+        CameraError: The camera, or its calibration, cannot be used.
+    """
+    from handsteer.cameras.calibration import read_calibration
+    from handsteer.cameras.choose import open_camera
+    from handsteer.nodes.camera import CameraNode
+    from handsteer.nodes.frames import frame_prefix
+
+    camera = camera or open_camera(config.camera, config.virtual_hand, clock)
+    calibration = (
+        None if config.camera.calibration is None else read_calibration(config.camera.calibration.expanduser())
+    )
+    frame_id = config.camera.frame_id
+    if "frame_id" not in config.camera.model_fields_set:
+        frame_id = frame_prefix(transport, "my_camera") + frame_id
+    return CameraNode(transport, clock, camera, frame_id, calibration)
+
+
+def open_cameras(config: Config, clock: Clock) -> "ChoiceOfCameras":
+    """Return this machine's own camera and that of whoever looks at the page, of which one is chosen at a time.
+
+    Raises:
+        CameraError: The machine's own cannot be used.
+    """
+    from handsteer.cameras.browser import BrowserCamera, ChoiceOfCameras, NoCamera
+    from handsteer.cameras.choose import open_camera
+
+    if config.camera.source == "browser":
+        return ChoiceOfCameras(NoCamera(), BrowserCamera(clock), "browser")
+    return ChoiceOfCameras(open_camera(config.camera, config.virtual_hand, clock), BrowserCamera(clock))
+
+
+def make_recognition(config: Config, transport: Transport, clock: Clock) -> "HandSignRecognitionNode":
+    """Return the node ``hand_sign_recognition``.
+
+    Raises:
+        ModelError: A landmark model or the sign model is missing or broken.
+    """
+    from handsteer.nodes.recognition import HandSignRecognitionNode
+    from handsteer.signs.drawing import annotate
+    from handsteer.signs.opening import open_classifier
+    from handsteer.signs.recognizer import Recognizer
+
+    recognizer = Recognizer(config)
+    _warn_of_unknown_signs(config, recognizer.signs)
+    return HandSignRecognitionNode(
+        transport, clock, recognizer, config.signs, annotate, open_classifier=open_classifier
+    )
+
+
+def cmd_vel_topic(config: Config) -> Topic[Any]:
+    """Return the topic of the commands from control to robot, of Twist or TwistStamped.
+
+    Raises:
+        ConfigError: Control and robot were told different types.
+    """
+    return cmd_vel(cmd_vel_type(config))
+
+
+def make_control(
+    config: Config, transport: Transport, clock: Clock, *, simulated: bool = False
+) -> "HandSignControlNode":
+    """Return the node ``hand_sign_control``.
+
+    Args:
+        config: Everything that can be set.
+        transport: Carries the messages.
+        clock: The graph's clock.
+        simulated: Whether it is known that the robot is simulated; ``control.arming`` is then off if it is ``auto``.
+
+    Raises:
+        ConfigError: Control and robot were told different types of commands.
+    """
+    from handsteer.nodes.control import HandSignControlNode
+
+    arming = config.control.arming == "on" or (config.control.arming == "auto" and not simulated)
+    return HandSignControlNode(
+        transport, clock, config.control, cmd_vel_topic(config), config.collision_monitor, arming=arming
+    )
+
+
+def make_robot(config: Config, transport: Transport, clock: Clock, link: Session | None = None) -> "RobotNode":
+    """Return the node ``robot``; one that publishes ``/clock`` runs on real time, so that it cannot drive itself.
+
+    Args:
+        config: Everything that can be set.
+        transport: Carries the messages.
+        clock: The graph's clock.
+        link: This process in the graph of a real robot.
+
+    Raises:
+        ConfigError: The robot is real, and there is no link to it.
+        WorldError: The world of a simulated robot cannot be used.
+    """
+    from handsteer.nodes.frames import prefixed
+    from handsteer.nodes.robot import RobotNode
+    from handsteer.robots import open_robot
+
+    if config.robot.publish_clock and isinstance(clock, SimulatedClock):
+        clock = WallClock()
+    topic = cmd_vel_topic(config)
+    robot = open_robot(config.robot, link, topic, config.control.cmd_vel_frame_id)
+    return RobotNode(transport, clock, robot, prefixed(config.robot, transport), topic)
+
+
+def make_steering(config: Config, transport: Transport, clock: Clock) -> "SteeringNode":
+    """Return the node ``steering``; people steer by its methods, as the page does.
+
+    Raises:
+        ConfigError: Control and robot were told different types of commands.
+    """
+    from handsteer.nodes.steering import SteeringNode
+
+    return SteeringNode(transport, clock, config.control, cmd_vel_topic(config))
+
+
+def _warn_of_unknown_signs(config: Config, signs: tuple[str, ...]) -> None:
+    for name in config.control.actions:
+        if find_sign(name, (*signs, NONE)) is None:
+            log.warning("control.actions: the sign %s is not known; the signs are %s", name, ", ".join(signs))

@@ -1,0 +1,102 @@
+"""Sending without another thread: rospy wakes one up for each message and subscriber, which costs as much again."""
+
+import socket
+from collections.abc import Callable
+from typing import Any
+
+import rospy
+from rospy.impl.tcpros_pubsub import QueuedConnection
+
+
+def send_promptly(publisher: Any, depth: int) -> None:
+    """Let a ``rospy.Publisher`` send on the thread that publishes whatever a subscriber's socket takes at once.
+
+    Args:
+        publisher: One that nobody has joined yet.
+        depth: How many messages may wait for a subscriber that has fallen behind.
+    """
+    implementation = publisher.impl
+    add = implementation.add_connection
+    implementation.set_queue_size(None)
+    implementation.add_connection = lambda connection: add(PromptConnection(connection, depth))
+
+
+class PromptConnection:
+    """A subscriber's connection, which is never waited for: what its socket does not take at once waits in a queue.
+
+    From then on all goes by the queue, as rospy has it, with a thread that sends.
+
+    Args:
+        connection: rospy's own.
+        depth: How many messages may wait; older ones are dropped.
+    """
+
+    def __init__(self, connection: Any, depth: int) -> None:
+        self._connection = connection
+        self._depth = depth
+        self._queue: QueuedConnection | None = None
+        # Python waits in spite of MSG_DONTWAIT where a socket has a time limit, and rospy gives new ones such.
+        connection.socket.setblocking(True)
+
+    def __getattr__(self, name: str) -> Any:
+        # All else is the connection's, as rospy's own queue has it.
+        if name.startswith("__"):
+            raise AttributeError(name)
+        return getattr(self._connection, name)
+
+    def write_data(self, data: bytes) -> bool:
+        """Send a message, or let it wait; rospy calls this for one message at a time.
+
+        Raises:
+            rospy.exceptions.TransportException: The subscriber has left.
+        """
+        if self._queue is None:
+            sent = self._send(data)
+            if sent == len(data):
+                return True
+            self._queue = QueuedConnection(_Rest(self._connection, data[sent:]), self._depth)
+            data = b""  # lets it send the rest of this message
+        return bool(self._queue.write_data(data))
+
+    def _send(self, data: bytes) -> int:
+        """Return how many bytes the socket has taken."""
+        connection = self._connection
+        if not connection.socket or connection.done:
+            raise rospy.exceptions.TransportTerminated("connection closed")
+        try:
+            sent = int(connection.socket.send(data, socket.MSG_DONTWAIT))
+        except BlockingIOError:
+            return 0
+        except OSError as error:
+            connection.close()
+            raise rospy.exceptions.TransportTerminated(str(error)) from None
+        connection.stat_bytes += sent
+        connection.stat_num_msg += 1
+        return sent
+
+
+class _Rest:
+    """A connection that sends the rest of a message before all else."""
+
+    def __init__(self, connection: Any, rest: bytes) -> None:
+        self._connection = connection
+        self._rest = rest
+
+    @property
+    def done(self) -> bool:
+        return bool(self._connection.done)
+
+    def set_cleanup_callback(self, callback: Callable[[Any], None]) -> None:
+        """Call it when the connection ends, after the topic's own."""
+        before = self._connection.cleanup_cb
+
+        def end(connection: Any) -> None:
+            if before:
+                before(connection)
+            callback(connection)
+
+        self._connection.set_cleanup_callback(end)
+
+    def write_data(self, data: bytes) -> None:
+        rest, self._rest = self._rest, b""
+        self._connection.write_data(rest + data)
