@@ -9,7 +9,8 @@ from playwright.sync_api import Error, Page
 
 from handsteer.config import load
 from handsteer.dashboard.server import Dashboard
-from handsteer.graph import Graph, cmd_vel_topic
+from handsteer.graph import Graph
+from handsteer.making import cmd_vel_topic
 from tests.dashboard.browsers import a_browser
 from tests.dashboard.visits import NEEDS_A_BROWSER, PATIENCE_MS, Visit, visiting
 
