@@ -79,22 +79,15 @@ def test_a_file_that_is_not_there() -> None:
 def test_a_known_robot_sets_its_limits_and_options_go_before_it() -> None:
     config = load(None, {"robot": {"kind": "dds", "preset": "turtlebot4"}, "control": {"max_linear": 0.1}})
     assert (config.robot.max_linear, config.control.max_linear, config.control.max_angular) == (0.306, 0.1, 1.9)
-    assert cmd_vel_type(config) == "twist_stamped"
-
-
-def test_a_robot_of_an_older_distribution_takes_a_bare_twist(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("ROS_DISTRO", "humble")
-    assert cmd_vel_type(load(None, {"robot": {"kind": "dds", "preset": "turtlebot3_burger"}})) == "twist"
-    monkeypatch.setenv("ROS_DISTRO", "jazzy")
-    assert cmd_vel_type(load(None, {"robot": {"kind": "dds", "preset": "turtlebot3_burger"}})) == "twist_stamped"
-    assert cmd_vel_type(load(None, {"robot": {"kind": "ros1", "preset": "turtlebot3_burger"}})) == "twist"
+    assert cmd_vel_type(config) == "auto"
 
 
 def test_both_ends_of_cmd_vel_speak_what_one_was_told() -> None:
     for section in ("control", "robot"):
         assert cmd_vel_type(load(None, {section: {"cmd_vel_type": "twist_stamped"}})) == "twist_stamped"
-    given = {"control": {"cmd_vel_type": "twist"}, "robot": {"kind": "dds", "preset": "turtlebot4"}}
+    given = {"control": {"cmd_vel_type": "twist"}, "robot": {"cmd_vel_type": "auto"}}
     assert cmd_vel_type(load(None, given)) == "twist"
+    assert cmd_vel_type(load()) == "auto"
     both = {"control": {"cmd_vel_type": "twist"}, "robot": {"cmd_vel_type": "twist_stamped"}}
     with pytest.raises(ConfigError, match=r"control\.cmd_vel_type is twist and robot.cmd_vel_type twist_stamped"):
         cmd_vel_type(load(None, both))

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from handsteer.teleop import Teleop
     from handsteer.types import Velocity
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 __all__ = ["Config", "Recognizer", "Teleop", "Velocity"]
 
 _HOMES: Final = {

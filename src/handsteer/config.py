@@ -5,7 +5,6 @@ have them, units are SI (REP 103) and stand in brackets in each description.
 """
 
 import logging
-import os
 import re
 from collections.abc import Mapping
 from pathlib import Path
@@ -247,8 +246,9 @@ class ControlConfig(Section):
         "fault; auto is on unless the robot is simulated in the same process",
     )
     cmd_vel_type: CmdVelType = Field(
-        "twist",
-        description="What commands are sent as: geometry_msgs/Twist or TwistStamped; follows robot.cmd_vel_type",
+        "auto",
+        description="What commands are sent as: geometry_msgs/Twist or TwistStamped; auto follows robot.cmd_vel_type, "
+        "and in ROS 2 the robot's subscriber; twist elsewhere",
     )
     cmd_vel_frame_id: str = Field("base_link", description="Coordinate frame in the header of a TwistStamped")
     robots: tuple[str, ...] = Field(
@@ -335,7 +335,9 @@ class RobotConfig(Section):
         None, description="A robot whose topics, types and limits are known; a real one is generic unless said"
     )
     cmd_vel_type: CmdVelType = Field(
-        "twist", description="What commands it takes: geometry_msgs/Twist or TwistStamped; follows control.cmd_vel_type"
+        "auto",
+        description="What commands it takes: geometry_msgs/Twist or TwistStamped; auto follows control.cmd_vel_type, "
+        "and is what a real robot of ROS 2 takes, twist elsewhere",
     )
     cmd_vel_topic: str = Field("cmd_vel", min_length=1, description="Topic of a real robot's commands")
     odom_topic: str = Field("odom", description="Topic of a real robot's odometry; none when empty")
@@ -460,15 +462,13 @@ def cmd_vel_type(config: Config) -> CmdVelType:
     Raises:
         ConfigError: They were told different things.
     """
-    control, robot = config.control, config.robot
-    if "cmd_vel_type" not in robot.model_fields_set:
-        return control.cmd_vel_type
-    if "cmd_vel_type" in control.model_fields_set and control.cmd_vel_type != robot.cmd_vel_type:
+    control, robot = config.control.cmd_vel_type, config.robot.cmd_vel_type
+    if "auto" not in {control, robot} and control != robot:
         raise ConfigError(
-            f"control.cmd_vel_type is {control.cmd_vel_type} and robot.cmd_vel_type {robot.cmd_vel_type}: "
+            f"control.cmd_vel_type is {control} and robot.cmd_vel_type {robot}: "
             "they should be the same, or the robot would not hear a command"
         )
-    return robot.cmd_vel_type
+    return robot if control == "auto" else control
 
 
 def validate(section: type[S], values: Any, where: str = "") -> S:
@@ -496,14 +496,11 @@ def describe(error: ValidationError) -> str:
 
 def _preset(values: dict[str, Any]) -> dict[str, Any]:
     """Return what is known of the robot that ``values`` name: it goes before the defaults only."""
-    robot, control = (values[name] if isinstance(values.get(name), dict) else {} for name in ("robot", "control"))
+    robot = values["robot"] if isinstance(values.get("robot"), dict) else {}
     name, kind = robot.get("preset"), robot.get("kind", "sim")
     if name is None and kind != "sim":
         name = "generic"
-    known = preset(name, "noetic" if kind == "ros1" else os.environ.get("ROS_DISTRO", ""))
-    if known and "cmd_vel_type" in control:
-        known["robot"].pop("cmd_vel_type", None)
-    return known
+    return preset(name)
 
 
 def _read_yaml(path: Path) -> dict[str, Any]:

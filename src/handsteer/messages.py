@@ -4,6 +4,7 @@ The message classes are the typed dataclasses of ``rosbags``: the same definitio
 They are used as values: once published, a message is not changed any more.
 """
 
+import builtins
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -130,7 +131,9 @@ class Topic(Generic[M]):
             namespace of their node.
         depth: How many messages may wait for a subscriber that is busy; older ones are dropped (ROS 2: keep last).
         lifespan_s: A message that has not arrived after so long is not to arrive at all; None for no limit.
-        beneath: The topic whose name it extends; it is renamed with it, as the topics of ROS's image_transport are.
+        beneath: The topic whose name it extends, or whose neighbour it is; it is renamed with it, as ROS's
+            image_transport has it.
+        or_type: Another class that its sending end may have instead, as subscribers take it; None where it has one.
         stops: Tells a message that stops the robot, which is to be obeyed however late it comes; None where none does.
     """
 
@@ -142,6 +145,13 @@ class Topic(Generic[M]):
     lifespan_s: float | None = None
     beneath: "Topic[Any] | None" = None
     stops: Callable[[Any], bool] | None = None
+    or_type: builtins.type[Any] | None = None
+
+    def moved_with(self, beneath: str) -> str:
+        """Return its name where the topic that it is ``beneath`` has this full name, or lies in the same namespace."""
+        assert self.beneath is not None
+        ending = self.name.removeprefix(self.beneath.name)
+        return beneath + ending if ending != self.name else beneath.rpartition("/")[0] + self.name
 
     @property
     def ros_name(self) -> str:
@@ -163,7 +173,7 @@ def is_stopping(sign: String) -> bool:
 # The functions of topics have names, so that a topic can be sent to another process.
 IMAGE_RAW = Topic("/image_raw", Image)
 IMAGE_COMPRESSED = Topic("/image_raw/compressed", CompressedImage, beneath=IMAGE_RAW)
-CAMERA_INFO = Topic("/camera_info", CameraInfo)
+CAMERA_INFO = Topic("/camera_info", CameraInfo, beneath=IMAGE_RAW)
 # Each sign makes the robot a step faster, so none may be lost when several come at once.
 HAND_SIGN = Topic(
     "/gesture/hand_sign",
@@ -203,7 +213,9 @@ def twist(linear_mps: float, angular_radps: float) -> Twist:
 
 def cmd_vel(kind: CmdVelType, topic: Topic[Any] = CMD_VEL) -> Topic[Any]:
     """Return ``topic``, a topic of velocity commands, with messages of ``kind``."""
-    return replace(topic, type=TwistStamped if kind == "twist_stamped" else Twist)
+    kinds = {"twist": (Twist, None), "twist_stamped": (TwistStamped, None), "auto": (Twist, TwistStamped)}
+    of, instead = kinds[kind]
+    return replace(topic, type=of, or_type=instead)
 
 
 def command(topic: Topic[Any], linear_mps: float, angular_radps: float, stamp: Time, frame_id: str) -> Any:

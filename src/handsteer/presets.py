@@ -13,14 +13,11 @@ Sources, by robot:
 
 from typing import Any, Literal, get_args
 
-CmdVelType = Literal["twist", "twist_stamped"]
-"""How a velocity command is sent: geometry_msgs/Twist, or geometry_msgs/TwistStamped."""
+CmdVelType = Literal["auto", "twist", "twist_stamped"]
+"""How a velocity command is sent: geometry_msgs/Twist, geometry_msgs/TwistStamped, or as the robot takes it."""
 
 Preset = Literal["generic", "turtlebot3_burger", "turtlebot3_waffle", "turtlebot4", "turtlesim"]
 PRESETS: tuple[Preset, ...] = get_args(Preset)
-
-# The distributions before TwistStamped became what these robots listen to.
-_BARE_TWIST = ("noetic", "foxy", "galactic", "humble", "iron")
 
 _BRAKES = 0.7
 
@@ -41,22 +38,17 @@ def _preset(
 _TURTLESIM = {"cmd_vel_topic": "turtle1/cmd_vel", "odom_topic": "turtle1/pose", "odom_type": "turtlesim_pose"}
 _KNOWN: dict[str, dict[str, Any]] = {
     "generic": _preset(0.5, 1.0, 0.5, 2.0),
-    "turtlebot3_burger": _preset(0.22, 2.84, 2.5, 3.2, cmd_vel_type="twist_stamped"),
-    "turtlebot3_waffle": _preset(0.26, 1.82, 2.5, 3.2, cmd_vel_type="twist_stamped"),
-    "turtlebot4": _preset(0.306, 1.9, 0.9, 3.0, cmd_vel_type="twist_stamped"),
+    "turtlebot3_burger": _preset(0.22, 2.84, 2.5, 3.2),
+    "turtlebot3_waffle": _preset(0.26, 1.82, 2.5, 3.2),
+    "turtlebot4": _preset(0.306, 1.9, 0.9, 3.0),
     "turtlesim": _preset(2.0, 2.0, 2.0, 4.0, **_TURTLESIM),
 }
 
 
-def preset(name: object, distribution: str = "") -> dict[str, Any]:
+def preset(name: object) -> dict[str, Any]:
     """Return what is known of the robot of this name, nested as in :class:`~handsteer.config.Config`.
 
     Args:
         name: One of :data:`PRESETS`; anything else gives nothing, and is refused where values are checked.
-        distribution: The ROS distribution, as ``ROS_DISTRO`` names it: up to Iron, and in ROS 1, robots take Twist.
     """
-    known = _KNOWN.get(name, {}) if isinstance(name, str) else {}
-    robot = dict(known.get("robot", {}))
-    if distribution in _BARE_TWIST:
-        robot.pop("cmd_vel_type", None)
-    return {**known, "robot": robot} if known else {}
+    return _KNOWN.get(name, {}) if isinstance(name, str) else {}

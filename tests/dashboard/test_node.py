@@ -1,5 +1,5 @@
 import math
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 import pytest
@@ -33,6 +33,7 @@ from handsteer.messages import (
     Topic,
     Twist,
     TwistWithCovariance,
+    cmd_vel,
     twist,
 )
 from handsteer.nodes.control import HandSignControlNode
@@ -40,7 +41,7 @@ from handsteer.nodes.steering import SteeringNode
 from handsteer.robots.course import CourseState
 from handsteer.robots.description import robot_description
 from handsteer.transports.in_process import InProcessTransport
-from handsteer.transports.protocol import Received
+from handsteer.transports.protocol import Publisher, Received
 from handsteer.types import Pose2D, Velocity
 from tests.about import about
 
@@ -106,6 +107,28 @@ def test_tells_the_cameras_frames_a_second(bench: Bench) -> None:
         bench.report("my_camera", "a clip: delivers frames", frames=str(frames))
         bench.step(0.5)
     assert bench.node.state().fps == pytest.approx(24.0)
+
+
+class TellingTransport(InProcessTransport):
+    """Stands for a graph that tells the types of subscribers."""
+
+    def subscribed_types(self, topic: Topic[Any]) -> set[str]:
+        return set()
+
+    def withdraw(self, publisher: Publisher[Any]) -> None: ...
+
+
+def test_where_a_subscriber_would_pass_for_a_robot_it_shows_what_the_control_says_that_it_commands(
+    bench: Bench,
+) -> None:
+    bench.transport = TellingTransport()
+    bench.node = DashboardNode(bench.transport, bench.clock, bench.steering, cmd_vel("auto"))
+    assert not bench.transport.advertise("test", cmd_vel("auto")).wanted
+    bench.report("hand_sign_control", source="signs", linear_mps="0.500", angular_radps="0.250")
+    assert bench.node.state().commanded == Velocity(0.5, 0.25)
+    bench.step(1.0)
+    bench.report("hand_sign_control", source="nobody", linear_mps="0.500", angular_radps="0.250")
+    assert bench.node.state().commanded == Velocity()
 
 
 def test_shows_commanded_and_measured_velocity(bench: Bench) -> None:

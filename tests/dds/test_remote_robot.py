@@ -107,6 +107,17 @@ def test_a_known_robot_has_its_type_and_limits(robots: Robots) -> None:
     assert summary_of(process)["path_length_m"] > 0
 
 
+def test_a_robot_that_is_left_for_one_that_takes_a_stamp_stands_and_the_other_waits_for_neutral(robots: Robots) -> None:
+    robots.add()
+    process = robots.run("--robot", "dds", "--control.max-linear", "0.1", "--robot.odom-topic", "")
+    robots.expect_speed(0.1)
+    robots.robot.ask("add", name="stamped", cmd_vel="/cmd_vel", odom="/other/odom", stamped=True)
+    eventually(lambda: "commands go out as geometry_msgs/msg/TwistStamped from now on" in process.text)
+    assert robots.told[-1][1] == 0.0
+    eventually(lambda: len(robots.robot.ask("commands", name="stamped")) > 30, what="further commands")
+    assert {speed for _, speed, *_ in robots.robot.ask("commands", name="stamped")} == {0.0}
+
+
 def test_a_turtle_says_where_it_is_in_its_own_words(robots: Robots) -> None:
     robots.add("/turtle1/cmd_vel", "/turtle1/pose", turtle=True)
     process = robots.run("--robot", "turtlesim", "--control.max-linear", "0.3")
@@ -181,7 +192,7 @@ def test_odometry_that_makes_no_sense_breaks_nothing(robots: Robots, mode: str, 
 
 def test_nobody_listens_or_to_another_type(robots: Robots) -> None:
     robots.add("/cmd_vel", "/odom", stamped=True)
-    process = robots.run("--robot", "dds", "--duration", "4")
+    process = robots.run("--robot", "dds", "--robot.cmd-vel-type", "twist", "--duration", "4")
     summary = summary_of(process)
     line = "nobody listens on /cmd_vel for geometry_msgs/msg/Twist; is it on, are topic and type right"
     assert f"handsteer: the robot is not there: {line}" in process.text

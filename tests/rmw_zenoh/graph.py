@@ -41,7 +41,8 @@ class ZenohGraph:
         self.env = {**plain, "ROS_DOMAIN_ID": str(DOMAIN), "PYTHONUNBUFFERED": "1"}
         self.router = self.start_router()
         self.env["ZENOH_CONFIG_OVERRIDE"] = f'mode="{mode}";connect/endpoints=["{self.endpoint}"]'
-        self.peer = self._start_peer(mode)
+        self._mode = mode
+        self.peer = self.start_peer()
 
     def stop(self) -> None:
         """End all processes."""
@@ -55,6 +56,13 @@ class ZenohGraph:
         eventually(lambda: "the Zenoh router listens" in router.text or not router.running)
         assert router.running, router.text
         return router
+
+    def start_peer(self) -> Peer:
+        """Start a plain program; wait until it is ready."""
+        command = [sys.executable, str(PEER), self.endpoint, str(DOMAIN)]
+        peer = Peer(command, {**self.env, "PEER_CONFIG": f'mode="{self._mode}"'}, self._log())
+        self._processes.append(peer)
+        return peer
 
     def handsteer(self, *arguments: str, **env: str) -> Process:
         """Start ``handsteer`` with ``arguments`` in this network."""
@@ -76,12 +84,6 @@ class ZenohGraph:
     def publishes(self, node: str, topic: str) -> bool:
         """Return whether the node publishes on the topic."""
         return topic in self.nodes()[node]["MP"]
-
-    def _start_peer(self, mode: str) -> Peer:
-        command = [sys.executable, str(PEER), self.endpoint, str(DOMAIN)]
-        peer = Peer(command, {**self.env, "PEER_CONFIG": f'mode="{mode}"'}, self._log())
-        self._processes.append(peer)
-        return peer
 
     def _start(self, arguments: list[str], env: dict[str, str]) -> Process:
         process = Process([sys.executable, "-m", "handsteer", *arguments], env, self._log())

@@ -26,6 +26,8 @@ HASHES = {
     "std_msgs::msg::dds_::Bool_": "RIHS01_feb91e995ff9ebd09c0cb3d2aed18b11077585839fb5db80193b62d74528f6c9",
     "std_msgs::msg::dds_::String_": "RIHS01_df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18",
     "geometry_msgs::msg::dds_::Twist_": "RIHS01_9c45bf16fe0983d80e3cfe750d6835843d265a9a6c46bd2e609fcddde6fb8d2a",
+    "geometry_msgs::msg::dds_::TwistStamped_": "RIHS01_"
+    "5f0fcd4f81d5d06ad9b4c4c63e3ea51b82d6ae4d0558f1d475229b1121db6f64",
     "sensor_msgs::msg::dds_::Image_": "RIHS01_d31d41a9a4c4bc8eae9be757b0beed306564f7526c88ea6a4588fb9582527d47",
     "nav_msgs::msg::dds_::Odometry_": "RIHS01_3cc97dc7fb7502f8714462c526d369e35b603cfc34d946e3f2eda2766dfec6e0",
     "rosgraph_msgs::msg::dds_::Clock_": "RIHS01_692f7a66e93a3c83e71765d033b60349ba68023a8c689a79e48078bcb5c58564",
@@ -80,6 +82,12 @@ def read_twist(reader: Reader) -> dict[str, Any]:
     return {"linear.x": values[0], "angular.z": values[5]}
 
 
+def read_twist_stamped(reader: Reader) -> dict[str, Any]:
+    stamp, frame = reader.stamp(), reader.text()
+    values = reader.numbers(6)
+    return {"header.stamp": stamp, "header.frame_id": frame, "twist.linear.x": values[0], "twist.angular.z": values[5]}
+
+
 def read_odometry(reader: Reader) -> dict[str, Any]:
     reader.stamp(), reader.text(), reader.text()
     pose, _, twist = reader.numbers(7), reader.numbers(36), reader.numbers(6)
@@ -100,6 +108,7 @@ def read_image(reader: Reader) -> dict[str, Any]:
 READERS: dict[str, Callable[[Reader], dict[str, Any]]] = {
     "String": read_string,
     "Twist": read_twist,
+    "TwistStamped": read_twist_stamped,
     "Odometry": read_odometry,
     "Image": read_image,
 }

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.contracts.command_type_contract import CommandTypeContract, MakeRobot, Robot
 from tests.contracts.node_contract import (
     CMD_VEL,
     FORWARD,
@@ -54,6 +55,17 @@ class TestControl(ControlContract):
     @pytest.fixture
     def drive(self, network: ZenohGraph) -> MakeDriver:
         return partial(ZenohDriver, network)
+
+
+class TestCommandType(CommandTypeContract):
+    @pytest.fixture
+    def graph(self, tmp_path: Path) -> Iterator[ZenohGraph]:
+        with zenoh_graph(tmp_path) as graph:
+            yield graph
+
+    @pytest.fixture
+    def make_robot(self, graph: ZenohGraph) -> MakeRobot:
+        return lambda kind: Robot(graph.start_peer(), kind, introduce=True)
 
 
 class TestChain(ChainContract):

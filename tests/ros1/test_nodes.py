@@ -115,6 +115,11 @@ def test_compressed_images_are_renamed_with_the_raw_ones_unless_named_themselves
     eventually(lambda: "/named" in ros1.listeners("/jpeg"))
 
 
+def test_camera_info_lies_beside_the_images(ros1: Ros1Graph) -> None:
+    ros1.node("camera", *FORWARD, "__name:=beside", "image_raw:=/front/image", name="/beside")
+    eventually(lambda: "/beside" in ros1.talkers("/front/camera_info"))
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

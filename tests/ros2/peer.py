@@ -264,7 +264,8 @@ def spin() -> None:
         executor.spin()
 
 
-threading.Thread(target=spin, daemon=True).start()
+thread = threading.Thread(target=spin, daemon=True)
+thread.start()
 print("ready", flush=True)
 for line in sys.stdin:
     wanted = json.loads(line)
@@ -273,3 +274,6 @@ for line in sys.stdin:
     except Exception as error:  # a node that leaves meanwhile
         answer = {"error": str(error)}
     print(json.dumps(answer), flush=True)
+rclpy.shutdown()
+thread.join()
+node.destroy_node()

@@ -31,9 +31,9 @@ def common(params_file: Any) -> list[Any]:
         DeclareLaunchArgument("cmd_vel", default_value=CMD_VEL, description="Topic of the commands"),
         DeclareLaunchArgument(
             "cmd_vel_type",
-            default_value="twist",
-            choices=["twist", "twist_stamped"],
-            description="Type of the commands; Jazzy's diff_drive_controller takes twist_stamped",
+            default_value="auto",
+            choices=["auto", "twist", "twist_stamped"],
+            description="Type of the commands; auto is what the robot takes, and for the simulated one twist",
         ),
         DeclareLaunchArgument("respawn", default_value="true", description="Start a node anew that has ended"),
         DeclareLaunchArgument(

@@ -1,6 +1,6 @@
 """Camera, recognition and control: what turns hand signs into velocities.
 
-ros2 launch handsteer_ros2 sign_control.launch.py camera:=/dev/video0 cmd_vel:=/cmd_vel cmd_vel_type:=twist_stamped
+ros2 launch handsteer_ros2 sign_control.launch.py camera:=/dev/video0 cmd_vel:=/cmd_vel
 ros2 launch handsteer_ros2 sign_control.launch.py camera:=none image:=/front/image_raw namespace:=r1
 """
 

@@ -47,7 +47,7 @@ from handsteer.messages import (
 from handsteer.nodes.node import Node
 from handsteer.nodes.reporters import split_reporter
 from handsteer.nodes.steering import SteeringNode
-from handsteer.transports.protocol import Received, Transport
+from handsteer.transports.protocol import Received, TellsTypes, Transport
 from handsteer.types import Pose2D, Velocity
 
 _WATCH_PERIOD_S = 0.05
@@ -89,7 +89,8 @@ class DashboardNode(Node):
         transport: Carries the messages.
         clock: The graph's clock.
         steering: Drives when people steer on the page.
-        cmd_vel: The topic of the commands that are shown.
+        cmd_vel: The topic of the commands that are shown; where its type is open and the graph tells types, those that
+            the control reports are shown instead.
         history: Keeps the velocities, also those from before this node; a new one by default.
 
     Attributes:
@@ -121,7 +122,10 @@ class DashboardNode(Node):
         self._stopper: str | None = None
         self._odometry_came_s = self._scan_came_s = -math.inf
         self.subscribe(DIAGNOSTICS, self._on_diagnostics, key=_reporter)
-        self.subscribe(cmd_vel, self._on_command)
+        # A subscriber would count as a robot that takes a Twist; the control says itself what it commands.
+        self._believes_control = cmd_vel.or_type is not None and isinstance(transport, TellsTypes)
+        if not self._believes_control:
+            self.subscribe(cmd_vel, self._on_command)
         self.subscribe(ODOM, self._on_odometry)
         self.subscribe(JOINT_STATES, self._on_joints)
         self.subscribe(WORLD_MARKERS, self._on_markers)
@@ -219,6 +223,8 @@ class DashboardNode(Node):
             self._observed = replace(self._observed, reports={**self._observed.reports, name: report})
             if name == "my_camera":
                 self._count_frames(report)
+            if name == "hand_sign_control" and self._believes_control:
+                self._take_command(report)
             if name == "robot":
                 self._take_truth(report, stamp_s)
                 self._notice_restart(report)
@@ -246,7 +252,14 @@ class DashboardNode(Node):
 
     def _on_command(self, received: Received[Twist | TwistStamped]) -> None:
         twist = twist_in(received.message)
-        command = Velocity(twist.linear.x, twist.angular.z)
+        self._note_command(Velocity(twist.linear.x, twist.angular.z))
+
+    def _take_command(self, report: Report) -> None:
+        linear_mps, angular_radps = report.number("linear_mps"), report.number("angular_radps")
+        if linear_mps is not None and angular_radps is not None and report.values.get("source") != "nobody":
+            self._note_command(Velocity(linear_mps, angular_radps))
+
+    def _note_command(self, command: Velocity) -> None:
         self._observed = replace(self._observed, command=command, command_came_s=self.clock.now())
 
     def _on_odometry(self, received: Received[Odometry]) -> None:

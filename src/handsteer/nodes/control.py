@@ -20,7 +20,6 @@ from handsteer.messages import (
     String,
     Topic,
     Twist,
-    command,
 )
 from handsteer.nodes.collision_monitor import CollisionMonitor
 from handsteer.nodes.interruption import CALM_S, Interruption
@@ -30,7 +29,8 @@ from handsteer.nodes.odometry import MeasuredVelocity
 from handsteer.nodes.rivals import Rivals
 from handsteer.nodes.selection import Selection
 from handsteer.nodes.stop_keeper import StopKeeper
-from handsteer.transports.protocol import Call, Publisher, Received, Transport
+from handsteer.transports.commands import Commands
+from handsteer.transports.protocol import Call, Received, Transport
 from handsteer.types import NONE, ZERO, Velocity, action_of
 
 log = logging.getLogger(__name__)
@@ -49,7 +49,7 @@ class HandSignControlNode(Node):
         transport: Carries the messages.
         clock: The graph's clock.
         config: Limits, steps and timeouts.
-        cmd_vel: The topic of the commands, of Twist or TwistStamped.
+        cmd_vel: The topic of the commands, of Twist or TwistStamped, or of either.
         collision_monitor: Whether and how commands are slowed before obstacles; not at all by default.
         arming: Whether nothing moves before neutral was seen, and while no robot listens
             (:mod:`handsteer.control.safety`).
@@ -84,12 +84,11 @@ class HandSignControlNode(Node):
         self._ramped_s = self._last_step_s = clock.now()
         self._monitor = CollisionMonitor(self, collision_monitor or CollisionMonitorConfig(), self._driver.hold_back)
         self._interruption = Interruption(config.sign_timeout, clock.now())
-        self._topic = cmd_vel
         self._last_sign = NONE
         self._selection = (
-            Selection(self, config.robots, cmd_vel, self._send, self._on_change) if config.robots else None
+            Selection(self, config.robots, cmd_vel, self._commands, self._on_change) if config.robots else None
         )
-        self._cmd_vel = self._selection.publisher if self._selection else self.publisher(cmd_vel)
+        self._cmd_vel = self._selection.commands if self._selection else self._commands(cmd_vel)
         self._rivals = Rivals(self, [HAND_SIGN, *(self._selection.topics if self._selection else [cmd_vel])])
         StopKeeper(self, self._on_stop_or_reset)
         self.subscribe(STEERING_CMD_VEL, self._on_steering)
@@ -202,9 +201,10 @@ class HandSignControlNode(Node):
         self._waited = waits
 
     def _look_after_the_robot(self, elapsed_s: float) -> None:
-        if not self._arming:
+        changed = self._selection.follow() if self._selection else self._cmd_vel.follow()
+        if not (self._arming or changed):
             return
-        away = None if self._cmd_vel.wanted else "no robot listens"
+        away = "another robot listens" if changed else None if self._cmd_vel.wanted else "no robot listens"
         if away is None and self._following is not None:
             away = self._following.step(elapsed_s, self._commanded)
         if self._monitor.why_blind():
@@ -232,7 +232,7 @@ class HandSignControlNode(Node):
         assert self._selection is not None
         self._driver.halt()
         self._safety.disarm("it was selected")
-        self._cmd_vel = self._selection.publisher
+        self._cmd_vel = self._selection.commands
 
     def _publish(self, velocity: Velocity | None, captured_s: float | None = None) -> None:
         if velocity is None:
@@ -241,14 +241,12 @@ class HandSignControlNode(Node):
         since_s, self._ramped_s = now - self._ramped_s, now
         ramped = self._ramp.step(velocity, min(since_s, self._config.sign_timeout))
         self._commanded = self._monitor.admit(ramped)
-        self._send(self._cmd_vel, self._commanded, captured_s)
+        self._cmd_vel.send(self._commanded.linear_mps, self._commanded.angular_radps, captured_s)
         if captured_s is not None:
             self.latency.add(self.clock.now() - captured_s)
 
-    def _send(self, publisher: Publisher[Any], velocity: Velocity, captured_s: float | None = None) -> None:
-        stamp, frame_id = self.clock.stamp(self.clock.now()), self._config.cmd_vel_frame_id
-        message = command(self._topic, velocity.linear_mps, velocity.angular_radps, stamp, frame_id)
-        publisher.publish(message, captured_s)
+    def _commands(self, topic: Topic[Any]) -> Commands:
+        return Commands(self.transport, self.publisher, topic, self.clock, self._config.cmd_vel_frame_id)
 
     def _elapsed(self) -> float:
         now = self.clock.now()

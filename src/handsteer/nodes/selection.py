@@ -8,14 +8,14 @@ from typing import Any
 from handsteer.control.fleet import Fleet
 from handsteer.messages import SELECT_ROBOT, SELECTED_ROBOT, String, Topic
 from handsteer.nodes.node import Node
-from handsteer.transports.protocol import Publisher, Received
-from handsteer.types import ZERO, Velocity
+from handsteer.transports.commands import Commands
+from handsteer.transports.protocol import Received
 
 log = logging.getLogger(__name__)
 
 _LAST_ZEROS = 10
 
-Send = Callable[[Publisher[Any], Velocity], None]
+Advertise = Callable[[Topic[Any]], Commands]
 
 
 class Selection:
@@ -27,7 +27,7 @@ class Selection:
         node: The control.
         names: The robots' namespaces, in their order.
         cmd_vel: The topic of commands within each.
-        send: Publishes a velocity.
+        advertise: Returns the sending end of a topic of commands.
         on_change: Is called when another robot was selected, before anything is sent to it.
 
     Attributes:
@@ -36,13 +36,17 @@ class Selection:
     """
 
     def __init__(
-        self, node: Node, names: tuple[str, ...], cmd_vel: Topic[Any], send: Send, on_change: Callable[[], None]
+        self,
+        node: Node,
+        names: tuple[str, ...],
+        cmd_vel: Topic[Any],
+        advertise: Advertise,
+        on_change: Callable[[], None],
     ) -> None:
         self.fleet = Fleet(names)
         topics = {name: replace(cmd_vel, name=f"/{name}{cmd_vel.name}") for name in names}
         self.topics = tuple(topics.values())
-        self._publishers: dict[str, Publisher[Any]] = {name: node.publisher(topic) for name, topic in topics.items()}
-        self._send = send
+        self._commands = {name: advertise(topic) for name, topic in topics.items()}
         self._on_change = on_change
         self._left: dict[str, int] = {}
         self._selected = node.publisher(SELECTED_ROBOT)
@@ -50,9 +54,14 @@ class Selection:
         node.subscribe(SELECT_ROBOT, self._on_select)
 
     @property
-    def publisher(self) -> Publisher[Any]:
+    def commands(self) -> Commands:
         """Where commands to the robot that is driven go."""
-        return self._publishers[self.fleet.selected]
+        return self._commands[self.fleet.selected]
+
+    def follow(self) -> bool:
+        """Send each robot what it takes; return whether that has changed for the one that is driven."""
+        changed = [name for name, commands in self._commands.items() if commands.follow()]
+        return self.fleet.selected in changed
 
     def select(self, name: str) -> None:
         """Drive the robot ``name`` (or ``next``); the old one gets a zero first, and some more with the next beats."""
@@ -68,7 +77,7 @@ class Selection:
     def beat(self) -> None:
         """Send a zero to each robot that was left a moment ago."""
         for name in list(self._left):
-            self._send(self._publishers[name], ZERO)
+            self._commands[name].send(0.0, 0.0)
             self._left[name] -= 1
             if not self._left[name]:
                 del self._left[name]

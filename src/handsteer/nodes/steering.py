@@ -2,19 +2,20 @@
 
 import re
 import threading
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from handsteer.clock import Clock
 from handsteer.config import Config, ControlConfig
 from handsteer.control.safety import Ramp, Safety
 from handsteer.errors import TransportError
-from handsteer.messages import CMD_VEL, STEERING_CMD_VEL, STOP, Bool, Topic, command
+from handsteer.messages import CMD_VEL, STEERING_CMD_VEL, STOP, Bool, Topic
 from handsteer.nodes.interruption import Interruption
 from handsteer.nodes.node import Node
 from handsteer.nodes.stop_keeper import StopKeeper
 from handsteer.timeouts import STALE_S
-from handsteer.transports.protocol import Publisher, Received, Transport
+from handsteer.transports.commands import Commands
+from handsteer.transports.protocol import Received, Transport
 from handsteer.types import ZERO, Velocity
 
 _PERIOD_S = 0.1
@@ -27,7 +28,7 @@ _MOST_TOPICS = 8
 class _Target:
     name: str
     topic: Topic[Any]
-    publisher: Publisher[Any]
+    commands: Commands
 
     @property
     def is_direct(self) -> bool:
@@ -48,7 +49,7 @@ class SteeringNode(Node):
         transport: Carries the messages.
         clock: The graph's clock.
         config: Limits on another topic; the defaults of ``control`` when None.
-        cmd_vel: A topic of the type that robots are told, of Twist or TwistStamped, for other topics.
+        cmd_vel: A topic of what robots are told, of Twist or TwistStamped, or of either, for other topics.
     """
 
     def __init__(
@@ -56,7 +57,7 @@ class SteeringNode(Node):
     ) -> None:
         super().__init__("steering", transport, clock)
         self._config = config or ControlConfig()
-        self._type = cmd_vel.type
+        self._cmd_vel = cmd_vel
         self._lock = threading.RLock()
         self._wanted: Velocity | None = None
         self._halted = False
@@ -66,7 +67,7 @@ class SteeringNode(Node):
         self._safety = Safety(self._config, arming=False)
         self._ramp = Ramp(self._config)
         self._last_step_s = self._last_sent_s = clock.now()
-        self._target = _Target(STEERING_CMD_VEL.name, STEERING_CMD_VEL, self.publisher(STEERING_CMD_VEL))
+        self._target = self._to(STEERING_CMD_VEL.name, STEERING_CMD_VEL)
         self._targets = {self._target.name: self._target}
         self._stop = self.publisher(STOP)
         StopKeeper(self)
@@ -154,13 +155,18 @@ class SteeringNode(Node):
         if len(self._targets) > _MOST_TOPICS:
             raise TransportError(f"steering has had {_MOST_TOPICS} topics already: start it again for another")
         is_global = name.startswith("/")
-        topic = Topic(name if is_global else f"/{name}", self._type, is_global=is_global, depth=CMD_VEL.depth)
-        target = _Target(name, topic, self.publisher(topic))
+        topic = Topic(name if is_global else f"/{name}", self._cmd_vel.type, is_global=is_global, depth=CMD_VEL.depth)
+        topic = replace(topic, or_type=self._cmd_vel.or_type)
+        target = self._to(name, topic)
         if self._heard_stop is None:
             self._heard_stop = False
             self.subscribe(STOP, self._on_stop_or_reset)
         self._targets[name] = target
         return target
+
+    def _to(self, name: str, topic: Topic[Any]) -> _Target:
+        commands = Commands(self.transport, self.publisher, topic, self.clock, self._config.cmd_vel_frame_id)
+        return _Target(name, topic, commands)
 
     def _admitted(self, wanted: Velocity) -> Velocity:
         """Return what may be sent; the limits are ``hand_sign_control``'s affair where it is not passed by."""
@@ -199,6 +205,8 @@ class SteeringNode(Node):
             self._stop.publish(Bool(data=True))
         with self._lock:
             self._notice_interruption()
+            if self._target.commands.follow():
+                self._stand()
             if self._wanted is not None:
                 self._publish(self._wanted)
             elif self.is_direct and self.is_stopped:
@@ -209,6 +217,4 @@ class SteeringNode(Node):
         if self.is_direct:  # hand_sign_control sees to it elsewhere
             velocity = self._ramp.step(velocity, min(now - self._last_sent_s, _PERIOD_S))
             self._last_sent_s = now
-        stamp, frame_id = self.clock.stamp(now), self._config.cmd_vel_frame_id
-        message = command(self._target.topic, velocity.linear_mps, velocity.angular_radps, stamp, frame_id)
-        self._target.publisher.publish(message)
+        self._target.commands.send(velocity.linear_mps, velocity.angular_radps)

@@ -3,15 +3,17 @@
 import logging
 import math
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 from handsteer.config import RobotConfig
-from handsteer.messages import CMD_VEL, LaserScan, Odometry, Topic, TurtlePose, command, type_name, yaw_of
+from handsteer.messages import CMD_VEL, LaserScan, Odometry, Topic, TurtlePose, type_name, yaw_of
 from handsteer.robots.description import robot_description
 from handsteer.robots.diff_drive import Velocity
 from handsteer.robots.protocol import Obstacle, RangeScan, RobotState
 from handsteer.robots.relay import ZERO, Relay
+from handsteer.transports.commands import Commands
 from handsteer.transports.protocol import Received, Session
 from handsteer.types import Pose2D
 
@@ -48,7 +50,7 @@ class RemoteRobot:
 
     Args:
         config: Topics, types, limits and timeouts.
-        cmd_vel: Carries what the robot takes, Twist or TwistStamped.
+        cmd_vel: Carries what the robot takes, Twist or TwistStamped, or whichever of them it takes.
         frame_id: Coordinate frame of a TwistStamped.
         session: This process in the robot's graph; the caller closes it, which delivers the last zeros.
 
@@ -59,10 +61,10 @@ class RemoteRobot:
     def __init__(self, config: RobotConfig, cmd_vel: Topic[Any], frame_id: str, session: Session) -> None:
         self.description = robot_description()
         self._config = config
-        self._frame_id = frame_id
         self._session = session
         self._relay = Relay(config)
-        self._topic: Topic[Any] = _topic(config.cmd_vel_topic, cmd_vel.type, CMD_VEL.depth)
+        topic: Topic[Any] = _topic(config.cmd_vel_topic, cmd_vel.type, CMD_VEL.depth)
+        self._topic = replace(topic, or_type=cmd_vel.or_type)
         self._odom_topic = _full_name(session, config.odom_topic)
         self._seen: _Seen | None = None
         self._scanned: tuple[LaserScan, float] | None = None
@@ -72,7 +74,7 @@ class RemoteRobot:
         self._time_s = 0.0
         self._closed = False
         transport = session.transport
-        self._cmd_vel = transport.advertise(_NODE, self._topic)
+        self._cmd_vel = Commands(transport, partial(transport.advertise, _NODE), self._topic, session.clock, frame_id)
         if config.odom_topic:
             kind = TurtlePose if config.odom_type == "turtlesim_pose" else Odometry
             transport.subscribe(_NODE, _topic(config.odom_topic, kind, 1), self._on_odometry)
@@ -85,7 +87,8 @@ class RemoteRobot:
     def step(self, dt_s: float) -> RobotState:
         """Let ``dt_s`` seconds pass, pass on what is due, and return what the robot last said of itself."""
         self._time_s += dt_s
-        listens = self._cmd_vel.wanted
+        changed = self._cmd_vel.follow()
+        listens = self._cmd_vel.wanted and not changed
         self._linked_s = self._linked_s + dt_s if listens else 0.0
         seen = self._seen
         is_silent = seen is not None and self._session.clock.now() - seen.at_s > self._config.odom_timeout
@@ -148,15 +151,14 @@ class RemoteRobot:
     def _look_for_it(self) -> None:
         deadline_s = time.monotonic() + _LOOK_FOR_IT_S
         while not self._cmd_vel.wanted and time.monotonic() < deadline_s:
+            self._cmd_vel.follow()
             time.sleep(_LOOK_AGAIN_S)
         if not self._cmd_vel.wanted:
             log.warning("the robot is not there: %s", self._nobody_listens())
 
     def _send(self, velocity: Velocity | None) -> None:
         if velocity is not None:
-            clock = self._session.clock
-            stamp, (linear, angular) = clock.stamp(clock.now()), _numbers(velocity)
-            self._cmd_vel.publish(command(self._topic, linear, angular, stamp, self._frame_id))
+            self._cmd_vel.send(*_numbers(velocity))
 
     def _on_odometry(self, received: Received[Any]) -> None:
         message = received.message
@@ -183,7 +185,8 @@ class RemoteRobot:
         return "waits until Stop is shown, or no hand" if self._relay.waits else ""
 
     def _nobody_listens(self) -> str:
-        name, kind = _full_name(self._session, self._config.cmd_vel_topic), type_name(self._topic.type)
+        name = _full_name(self._session, self._config.cmd_vel_topic)
+        kind = " or ".join(type_name(kind) for kind in (self._topic.type, self._topic.or_type) if kind)
         advice = _ADVICE.get(self._config.kind, _IN_ROS2)
         return f"nobody listens on {name} for {kind}; is it on, are topic and type right, {advice}"
 

@@ -18,7 +18,7 @@ class TopicTypes:
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._types: dict[str, type] = {}
+        self._holders: dict[str, list[type]] = {}
 
     def claim(self, name: str, topic: Topic[Any]) -> None:
         """Note that the topic whose full name is ``name`` carries the type of ``topic``.
@@ -27,9 +27,21 @@ class TopicTypes:
             TransportError: It carries another.
         """
         with self._lock:
-            known = self._types.setdefault(name, topic.type)
-        if known is not topic.type:
-            raise TransportError(f"{name} carries {type_name(known)}, it cannot carry {type_name(topic.type)} too")
+            holders = self._holders.setdefault(name, [])
+            known = holders[0] if holders else topic.type
+            if known is not topic.type:
+                raise TransportError(f"{name} carries {type_name(known)}, it cannot carry {type_name(topic.type)} too")
+            holders.append(known)
+
+    def release(self, name: str) -> None:
+        """Note that one of those that have claimed the topic is gone."""
+        with self._lock:
+            self._holders[name].pop()
+
+    def is_shared(self, name: str) -> bool:
+        """Return whether several have claimed the topic."""
+        with self._lock:
+            return len(self._holders.get(name, ())) > 1
 
 
 def check_type(topic: Topic[Any], message: object) -> None:

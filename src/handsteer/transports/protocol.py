@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Any, Generic, Protocol, TypeVar, runtime_checkable
 
 from handsteer.clock import Clock
 from handsteer.messages import Topic
@@ -106,6 +106,22 @@ class Transport(Protocol):
 
     def close(self) -> None:
         """End all publishing and receiving; may be called twice."""
+        ...
+
+
+@runtime_checkable
+class TellsTypes(Protocol):
+    """What a transport has, beside the rest, whose graph tells the types of others' subscribers."""
+
+    def subscribed_types(self, topic: Topic[Any]) -> set[str]:
+        """Return the types of other processes' subscribers of ``topic``, as ``geometry_msgs/msg/Twist``, at once.
+
+        There is none that could be followed while something else in this process has the topic, too.
+        """
+        ...
+
+    def withdraw(self, publisher: Any) -> None:
+        """End a sending end of this transport, once what it sent has arrived: its topic may have another type then."""
         ...
 
 

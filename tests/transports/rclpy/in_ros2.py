@@ -14,6 +14,7 @@ from std_msgs.msg import String as TheirString
 from handsteer.clock import Clock, SimulatedClock, WallClock
 from handsteer.errors import TransportError
 from handsteer.messages import (
+    CAMERA_INFO,
     CMD_VEL,
     HAND_SIGN,
     IMAGE_COMPRESSED,
@@ -94,8 +95,9 @@ def test_a_type_that_this_ros2_lacks_is_said_once_and_left_out(joined: Join, cap
         publisher.publish(String(data="no"))  # type: ignore[arg-type]
 
 
-def test_the_compressed_topic_moves_with_the_images(joined: Join) -> None:
+def test_the_compressed_topic_and_camera_info_move_with_the_images(joined: Join) -> None:
     transport = joined("-r", "image_raw:=/eye/picture", "-r", "__ns:=/r1").transport
+    assert transport.topic_name(CAMERA_INFO) == "/eye/camera_info"
     publishers = [transport.advertise("camera", topic) for topic in (IMAGE_RAW, IMAGE_COMPRESSED)]
     other = joined("-r", "image_raw:=/eye/picture", "-r", "image_raw/compressed:=/far").transport
     publishers.append(other.advertise("camera", IMAGE_COMPRESSED))

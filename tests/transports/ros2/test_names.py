@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from handsteer.errors import TransportError
-from handsteer.messages import CLOCK, CMD_VEL, IMAGE_COMPRESSED, IMAGE_RAW, TF
+from handsteer.messages import CAMERA_INFO, CLOCK, CMD_VEL, IMAGE_COMPRESSED, IMAGE_RAW, TF
 from handsteer.transports.ros2.names import NodeName, Remap, identify
 
 TOKENS = st.from_regex(r"[A-Za-z_][A-Za-z0-9_]{0,8}", fullmatch=True)
@@ -38,6 +38,20 @@ def test_compressed_images_are_renamed_with_the_raw_ones_unless_they_have_a_rule
     eye = NodeName("cam", "/r1", (Remap("image_raw", "/x"), Remap("image_raw/compressed", "jpeg")))
     assert (eye.topic(IMAGE_RAW), eye.topic(IMAGE_COMPRESSED)) == ("/x", "/r1/jpeg")
     assert NodeName("cam", "/r1").topic(IMAGE_COMPRESSED) == "/r1/image_raw/compressed"
+
+
+@pytest.mark.parametrize(
+    ("rules", "name"),
+    [
+        ({}, "/r1/camera_info"),
+        ({"image_raw": "/front/image"}, "/front/camera_info"),
+        ({"image_raw": "front/image"}, "/r1/front/camera_info"),
+        ({"image_raw": "/image"}, "/camera_info"),
+        ({"image_raw": "/front/image", "camera_info": "info"}, "/r1/info"),
+    ],
+)
+def test_camera_info_lies_beside_the_images_unless_it_has_a_rule_of_its_own(rules: dict[str, str], name: str) -> None:
+    assert NodeName("cam", "/r1", tuple(Remap(*rule) for rule in rules.items())).topic(CAMERA_INFO) == name
 
 
 @pytest.mark.parametrize("name", ["", "/", "a//b", "a/", "1a", "a/2b", "a b", "~a", "a-b", "é", "{wrong}/a", "a" * 300])

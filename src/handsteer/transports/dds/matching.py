@@ -46,12 +46,14 @@ class Endpoint:
         type: Name of its type in DDS.
         qos: What it offers or requests.
         publishes: Whether it is a publisher.
+        or_type: Another type that it changes to where that is subscribed to.
     """
 
     topic: str
     type: str
     qos: Qos
     publishes: bool
+    or_type: str | None = None
 
     @property
     def kind(self) -> str:
@@ -177,6 +179,8 @@ class Matching:
 
 def reasons(ours: Endpoint, theirs: Endpoint) -> list[str]:
     """Return why a publisher and a subscriber of one topic are not connected, in words; empty when they are."""
+    if theirs.type == ours.or_type:
+        return []
     if ours.type != theirs.type:
         return [f"ours has the type {ros_type_name(ours.type)}, theirs {ros_type_name(theirs.type)}"]
     return misfits(ours.qos, theirs.qos) if ours.publishes else misfits(theirs.qos, ours.qos)

@@ -20,7 +20,7 @@ from handsteer.transports.dds.network import Network
 from handsteer.transports.dds.qos import reader_qos, service_qos, writer_qos
 from handsteer.transports.dds.types import dds_type, opaque_type, service_dds_type
 from handsteer.transports.observed import UNNAMED
-from handsteer.transports.ros2.encoding import dds_type_name
+from handsteer.transports.ros2.encoding import dds_type_name, ros_type_name
 from handsteer.transports.ros2.names import NodeName
 from handsteer.transports.ros2.service_types import Service
 
@@ -55,7 +55,7 @@ class Participant:
                 f"process, are there more than 32 others on this machine, is CYCLONEDDS_URI wrong?"
             ) from None
         self._lock = threading.Lock()
-        self._topics: dict[str, Any] = {}
+        self._topics: dict[tuple[str, type], Any] = {}
         self._service_numbers = itertools.count(1)
         self._graph = RosGraph(self._participant, None if looks_on else name, network.distribution)
         self._matching = Matching(self._participant, self._graph)
@@ -117,6 +117,11 @@ class Participant:
             if end.publishes and end.topic == name
         ]
 
+    def subscribed_types(self, topic: Topic[Any]) -> set[str]:
+        """Return the types of the subscribers of ``topic`` in other processes."""
+        name, others = self._dds_name(topic), self._matching.others().values()
+        return {ros_type_name(end.type) for end in others if not end.publishes and end.topic == name}
+
     def release(self, endpoint: DataWriter[Any] | DataReader[Any]) -> None:
         """Let go of a writer or reader; it is gone when the caller forgets it too."""
         if isinstance(endpoint, DataReader):
@@ -133,14 +138,16 @@ class Participant:
 
     def _topic(self, topic: Topic[Any]) -> DdsTopic[Any]:
         name = self._dds_name(topic)
+        key = name, topic.type
         with self._lock:
-            if name not in self._topics:
-                self._topics[name] = DdsTopic(self._participant, name, dds_type(type_name(topic.type)))
-            known: DdsTopic[Any] = self._topics[name]
+            if key not in self._topics:
+                self._topics[key] = DdsTopic(self._participant, name, dds_type(type_name(topic.type)))
+            known: DdsTopic[Any] = self._topics[key]
         return known
 
     def _endpoint(self, topic: Topic[Any], qos: Qos, *, publishes: bool) -> Endpoint:
-        return Endpoint(self._dds_name(topic), dds_type_name(type_name(topic.type)), qos, publishes)
+        or_type = dds_type_name(type_name(topic.or_type)) if publishes and topic.or_type else None
+        return Endpoint(self._dds_name(topic), dds_type_name(type_name(topic.type)), qos, publishes, or_type)
 
     def _dds_name(self, topic: Topic[Any]) -> str:
         return f"rt{self.name.topic(topic)}"

@@ -20,6 +20,8 @@ from handsteer.transports.ros2.intake import Intake
 
 M = TypeVar("M")
 
+_LAST_S = 0.2
+
 log = logging.getLogger(__name__)
 
 
@@ -68,6 +70,19 @@ class DdsTransport:
         with self._lock:
             ours = [self._participant.name.full for publisher in self._publishers if publisher.name == name]
         return sorted([*ours, *self._participant.publishers_of(topic)])
+
+    def subscribed_types(self, topic: Topic[Any]) -> set[str]:
+        """Return the types of other processes' subscribers of ``topic``; none while it is used twice here."""
+        is_shared = self._types.is_shared(self._participant.name.topic(topic))
+        return set() if is_shared else self._participant.subscribed_types(topic)
+
+    def withdraw(self, publisher: "DdsPublisher[Any]") -> None:
+        """End a sending end, once its readers have what it sent."""
+        publisher.flush(_LAST_S)
+        with self._lock:
+            self._publishers.remove(publisher)
+        publisher.close()
+        self._types.release(publisher.name)
 
     def topic_name(self, topic: Topic[Any]) -> str:
         """Return the topic's full name in the graph, remapped."""

@@ -9,6 +9,7 @@ from functools import partial
 from typing import Any, Generic, TypeVar
 
 from rclpy.duration import Duration
+from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.exceptions import InvalidTopicNameException
 from rclpy.node import Node
 from rclpy.qos_overriding_options import InvalidQosOverridesError, QoSOverridingOptions
@@ -23,6 +24,8 @@ from handsteer.transports.ros2.encoding import encode
 from handsteer.transports.ros2.intake import Intake
 
 M = TypeVar("M")
+
+_LAST_S = 0.2
 
 log = logging.getLogger(__name__)
 
@@ -75,6 +78,20 @@ class RclpyTransport:
             return []
         found = self._node.get_publishers_info_by_topic(_given(self._node, topic))
         return sorted(f"{one.node_namespace.rstrip('/')}/{one.node_name}" for one in found)
+
+    def subscribed_types(self, topic: Topic[Any]) -> set[str]:
+        """Return the types of other processes' subscribers of ``topic``; none while it is used twice here."""
+        if self._types.is_shared(resolved(self._node, topic)):
+            return set()
+        return {one.topic_type for one in self._node.get_subscriptions_info_by_topic(_given(self._node, topic))}
+
+    def withdraw(self, publisher: "RclpyPublisher[Any]") -> None:
+        """End a sending end, once its subscribers have what it sent."""
+        publisher.flush(_LAST_S)
+        with self._lock:
+            self._publishers.remove(publisher)
+        publisher.close()
+        self._types.release(publisher.name)
 
     def topic_name(self, topic: Topic[Any]) -> str:
         """Return the topic's full name in the graph, remapped."""
@@ -130,6 +147,9 @@ class RclpyTransport:
 class RclpyPublisher(Generic[M]):
     """The sending end of a topic.
 
+    Attributes:
+        name: Full name of the topic.
+
     Args:
         node: The node of rclpy.
         topic: The topic.
@@ -138,6 +158,7 @@ class RclpyPublisher(Generic[M]):
     """
 
     def __init__(self, node: Node, topic: Topic[M], name: str, kind: Any | None) -> None:
+        self.name = name
         self._node = node
         self._topic = topic
         self._lock = threading.Lock()
@@ -145,7 +166,12 @@ class RclpyPublisher(Generic[M]):
         if kind is not None:
             with _refusals(name):
                 self._publisher = node.create_publisher(
-                    kind, _given(node, topic), publisher_qos(topic), qos_overriding_options=_overriding(node, name)
+                    kind,
+                    _given(node, topic),
+                    publisher_qos(topic),
+                    # An executor that waits for events keeps the publisher, and with it the type of its topic.
+                    event_callbacks=PublisherEventCallbacks(use_default_callbacks=topic.or_type is None),
+                    qos_overriding_options=_overriding(node, name),
                 )
 
     @property
@@ -163,7 +189,7 @@ class RclpyPublisher(Generic[M]):
         try:
             publisher.publish(encode(message))
         except RuntimeError as error:
-            raise TransportError(f"{self._topic.name} cannot be published: {error}") from None
+            raise TransportError(f"{self.name} cannot be published: {error}") from None
 
     def flush(self, timeout_s: float) -> None:
         """Wait until all reliable subscribers have what was published, for at most ``timeout_s`` seconds."""
@@ -175,7 +201,7 @@ class RclpyPublisher(Generic[M]):
         except RuntimeError:  # not every middleware can tell
             return
         if not confirmed:
-            log.info("%s: not every subscriber has confirmed the last message", self._topic.name)
+            log.info("%s: not every subscriber has confirmed the last message", self.name)
 
     def close(self) -> None:
         """Send no more; may be called twice."""
@@ -226,7 +252,7 @@ def _given(node: Node, topic: Topic[Any]) -> str:
     beneath, name = topic.beneath, topic.ros_name
     if beneath is None or node.resolve_topic_name(name) != node.resolve_topic_name(name, only_expand=True):
         return name
-    return resolved(node, beneath) + topic.name.removeprefix(beneath.name)
+    return topic.moved_with(resolved(node, beneath))
 
 
 def _overriding(node: Node, name: str) -> QoSOverridingOptions | None:

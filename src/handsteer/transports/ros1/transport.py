@@ -110,7 +110,7 @@ class Ros1Transport:
             return str(rospy.resolve_name(self._topics[topic.name]))
         if topic.beneath is None:
             return name
-        return self._full_name(topic.beneath) + topic.name.removeprefix(topic.beneath.name)
+        return topic.moved_with(self._full_name(topic.beneath))
 
     def _receive(self, name: str, topic: Topic[M], send: Deliver[M]) -> Callable[[], None]:
         kind = type_name(topic.type)

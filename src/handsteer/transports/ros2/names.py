@@ -67,9 +67,7 @@ class NodeName:
         for rule in self.remaps:
             if rule.applies_to(self.name) and self.expand(rule.source) == full:
                 return self.expand(rule.target)
-        return (
-            full if topic.beneath is None else self.topic(topic.beneath) + topic.name.removeprefix(topic.beneath.name)
-        )
+        return full if topic.beneath is None else topic.moved_with(self.topic(topic.beneath))
 
     def expand(self, name: str) -> str:
         """Return the full name for one that may be relative (``a``), private (``~/a``) or hold ``{node}``, ``{ns}``.

@@ -70,7 +70,9 @@ class Member:
         """
         return topic_key(self._place.domain, name, type_name)
 
-    def introduce(self, kind: str, name: str, type_name: str, profile: Profile) -> tuple[zenoh.LivelinessToken, str]:
+    def introduce(
+        self, kind: str, name: str, type_name: str, profile: Profile, or_type: str | None = None
+    ) -> tuple[zenoh.LivelinessToken, str]:
         """Tell others what this node has; return the token that keeps it told, and its text.
 
         Args:
@@ -78,6 +80,7 @@ class Member:
             name: Full name of its topic or service.
             type_name: Type of that.
             profile: Its quality of service.
+            or_type: Another type that it changes to where that is subscribed to.
         """
         endpoint = Endpoint(kind, name, type_name, type_hash(type_name))
         with self._lock:
@@ -85,12 +88,16 @@ class Member:
         text = endpoint_token(self._place, number, endpoint, profile)
         token = self.session.liveliness().declare_token(text)
         if self._neighbours is not None:
-            self._neighbours.add(endpoint)
+            self._neighbours.add(endpoint, or_type)
         return token, text
 
     def publishers_of(self, topic: str) -> list[str]:
         """Return the node of each publisher of the topic of this full name in other processes."""
         return [] if self._neighbours is None else self._neighbours.publishers_of(topic)
+
+    def subscribed_types(self, topic: str) -> set[str]:
+        """Return the types of the subscribers of the topic of this full name in other processes."""
+        return set() if self._neighbours is None else self._neighbours.subscribed_types(topic)
 
     def watch_router(self) -> None:
         """Say it when the router has gone, or is there again; does nothing where none is looked for."""

@@ -23,27 +23,34 @@ class Neighbours:
     def __init__(self, session: zenoh.Session, domain: int) -> None:
         self._own = str(session.zid())
         self._lock = threading.Lock()
-        self._ours: dict[tuple[str, str], Endpoint] = {}
+        self._ours: dict[tuple[str, str], tuple[Endpoint, str | None]] = {}
         self._theirs: dict[str, Entity] = {}
         self._watch = session.liveliness().declare_subscriber(all_tokens(domain), self._note, history=True)
 
-    def add(self, endpoint: Endpoint) -> None:
-        """Compare a publisher or subscriber of ours with those of others, now and later."""
+    def add(self, endpoint: Endpoint, or_type: str | None = None) -> None:
+        """Compare a publisher or subscriber of ours, which may change to ``or_type``, with others, now and later."""
         with self._lock:
-            self._ours[endpoint.topic, endpoint.kind] = endpoint
+            self._ours[endpoint.topic, endpoint.kind] = endpoint, or_type
             theirs = list(self._theirs.values())
         for entity in theirs:
             self._compare(entity)
 
     def publishers_of(self, topic: str) -> list[str]:
         """Return the node of each publisher of the topic of this full name in other processes."""
-        with self._lock:
-            theirs = [(entity.node, entity.endpoint) for entity in self._theirs.values()]
-        return [node for node, end in theirs if end and (end.kind, end.topic) == ("publisher", topic)]
+        return [node for node, _ in self._others("publisher", topic)]
+
+    def subscribed_types(self, topic: str) -> set[str]:
+        """Return the types of the subscribers of the topic of this full name in other processes."""
+        return {end.type for _, end in self._others("subscriber", topic)}
 
     def close(self) -> None:
         """Look no more."""
         self._watch.undeclare()
+
+    def _others(self, kind: str, topic: str) -> list[tuple[str, Endpoint]]:
+        with self._lock:
+            theirs = [(entity.node, entity.endpoint) for entity in self._theirs.values()]
+        return [(node, end) for node, end in theirs if end and (end.kind, end.topic) == (kind, topic)]
 
     def _note(self, sample: zenoh.Sample) -> None:
         token = str(sample.key_expr)
@@ -65,8 +72,10 @@ class Neighbours:
         if theirs is None:
             return
         with self._lock:
-            ours = self._ours.get((theirs.topic, _OPPOSITE.get(theirs.kind, "")))
-        if ours is not None and (ours.type, ours.type_hash) != (theirs.type, theirs.type_hash):
+            ours, or_type = self._ours.get((theirs.topic, _OPPOSITE.get(theirs.kind, "")), (None, None))
+        if ours is None or theirs.type == or_type:
+            return
+        if (ours.type, ours.type_hash) != (theirs.type, theirs.type_hash):
             log.warning("%s", explain(ours, theirs, entity.node))
 
 

@@ -77,6 +77,19 @@ class ZenohTransport:
             ours = [self._member.name.full for publisher in self._publishers if publisher.name == name]
         return sorted([*ours, *self._member.publishers_of(name)])
 
+    def subscribed_types(self, topic: Topic[Any]) -> set[str]:
+        """Return the types of other processes' subscribers of ``topic``; none while it is used twice here."""
+        name = self._member.name.topic(topic)
+        return set() if self._types.is_shared(name) else self._member.subscribed_types(name)
+
+    def withdraw(self, publisher: "ZenohPublisher[Any]") -> None:
+        """End a sending end, once what it sent has had the time to leave."""
+        self.flush(_DELIVER_S)
+        with self._lock:
+            self._publishers.remove(publisher)
+        publisher.close()
+        self._types.release(publisher.name)
+
     def topic_name(self, topic: Topic[Any]) -> str:
         """Return the topic's full name in the graph, remapped."""
         return self._member.name.topic(topic)
@@ -125,7 +138,8 @@ class ZenohPublisher(Generic[M]):
         self._publisher = member.session.declare_publisher(key, **_options(topic, profile))
         # It keeps messages for late subscribers, but does not know of any: the plain one beside it does.
         self._keeper = _keeper(member.session, key, topic, profile) if profile.latched else None
-        self._token, text = member.introduce("publisher", name, kind, profile)
+        or_type = type_name(topic.or_type) if topic.or_type else None
+        self._token, text = member.introduce("publisher", name, kind, profile, or_type)
         self._gid = gid(text)
         self._lock = threading.Lock()
         self._number = 0

@@ -1,0 +1,97 @@
+"""The sending end of velocity commands: Twist or TwistStamped, whichever the robot takes."""
+
+import logging
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+from handsteer.clock import Clock
+from handsteer.messages import Topic, command, type_name
+from handsteer.transports.protocol import Publisher, TellsTypes, Transport
+
+_LOOK_PERIOD_S = 0.25
+
+log = logging.getLogger(__name__)
+
+
+class Commands:
+    """The sending end of a topic of velocity commands.
+
+    A topic may leave open which of two types it has (``Topic.or_type``). Where the transport can tell what subscribers
+    take, :meth:`follow` sends the second as soon as anybody takes that, and the first when that is all that is taken.
+    Tools that look on take what they find, which is the first at the start; so who takes the second is a robot.
+
+    Args:
+        transport: Carries the commands.
+        advertise: Returns the sending end of a topic.
+        topic: The topic, of Twist or TwistStamped, or of either.
+        clock: The graph's clock, for stamps.
+        frame_id: Coordinate frame of a TwistStamped.
+    """
+
+    def __init__(
+        self,
+        transport: Transport,
+        advertise: Callable[[Topic[Any]], Publisher[Any]],
+        topic: Topic[Any],
+        clock: Clock,
+        frame_id: str,
+    ) -> None:
+        self._transport = transport
+        self._advertise = advertise
+        self._clock = clock
+        self._frame_id = frame_id
+        self._topic = topic
+        # In the order in which they are chosen.
+        self._types = {type_name(kind): kind for kind in (topic.or_type, topic.type) if kind is not None}
+        self._graph = transport if isinstance(transport, TellsTypes) and topic.or_type else None
+        self._looked_s = -math.inf
+        self._warned = False
+        self._publisher = advertise(topic)
+
+    @property
+    def wanted(self) -> bool:
+        """Whether anybody listens."""
+        return self._publisher.wanted
+
+    def send(self, linear_mps: float, angular_radps: float, captured_s: float | None = None) -> None:
+        """Command a velocity, in m/s forward and rad/s to the left; ``captured_s`` is as a publisher has it."""
+        stamp = self._clock.stamp(self._clock.now())
+        self._publisher.publish(command(self._topic, linear_mps, angular_radps, stamp, self._frame_id), captured_s)
+
+    def follow(self) -> bool:
+        """Send the type that is taken from now on; look for it four times a second, however often this is called.
+
+        Whoever was commanded before a change is told to stand. Returns at once but for a change, which takes a tenth of
+        a second or two.
+
+        Returns:
+            Whether the type has changed, so that another robot may be the one that listens.
+        """
+        now = self._clock.now()
+        if self._graph is None or now - self._looked_s < _LOOK_PERIOD_S:
+            return False
+        self._looked_s = now
+        subscribed = self._graph.subscribed_types(self._topic)
+        taken = [kind for name, kind in self._types.items() if name in subscribed]
+        changes = bool(taken) and taken[0] is not self._topic.type
+        if changes:
+            self._change(self._graph, taken[0])
+        if len(taken) > 1 and not self._warned:
+            log.warning(
+                "%s: subscribers take both %s; commands go out as %s only: end the others, or set cmd_vel_type",
+                self._transport.topic_name(self._topic),
+                " and ".join(self._types),
+                type_name(self._topic.type),
+            )
+        self._warned = len(taken) > 1
+        return changes
+
+    def _change(self, graph: TellsTypes, kind: type[Any]) -> None:
+        self.send(0.0, 0.0)
+        # One at a time: not every middleware lets a process have two types on one topic, and no tool shows such a one.
+        graph.withdraw(self._publisher)
+        self._topic = replace(self._topic, type=kind, or_type=self._topic.type)
+        self._publisher = self._advertise(self._topic)
+        log.info("%s: commands go out as %s from now on", self._transport.topic_name(self._topic), type_name(kind))
