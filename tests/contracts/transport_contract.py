@@ -3,6 +3,7 @@
 import threading
 import time
 from collections.abc import Callable, Iterator
+from functools import partial
 from typing import TypeVar
 
 import numpy as np
@@ -41,6 +42,10 @@ def eventually(condition: Callable[[], object]) -> bool:
             return False
         time.sleep(0.005)
     return True
+
+
+def _set(event: threading.Event, _: object) -> None:
+    event.set()
 
 
 def heard(publisher: Publisher[M]) -> Publisher[M]:
@@ -158,7 +163,7 @@ class TransportContract:
         arrived = [threading.Event() for _ in range(3)]
         for number, event in enumerate(arrived):
             listener = make_node(f"listener_{number}")
-            listener.subscribe(HAND_SIGN, lambda _, event=event: event.set())  # type: ignore[misc]
+            listener.subscribe(HAND_SIGN, partial(_set, event))
             listener.start()
         heard(talker.publisher(HAND_SIGN)).publish(String(data="Stop"))
         assert all(event.wait(WAIT_S) for event in arrived)

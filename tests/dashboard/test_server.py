@@ -72,8 +72,8 @@ def test_shows_all_viewers_the_newest_picture(site: Site) -> None:
     with viewer(site) as first, viewer(site) as second:
         read_jpeg(first)
         site.image = np.full((240, 320, 3), 90, np.uint8)
-        for response in (first, second):
-            wait_until(lambda response=response: read_jpeg(response).shape == (240, 320, 3))
+        wait_until(lambda: read_jpeg(first).shape == (240, 320, 3))
+        wait_until(lambda: read_jpeg(second).shape == (240, 320, 3))
 
 
 def test_a_viewer_that_does_not_read_does_not_keep_others_from_it(site: Site) -> None:
@@ -86,11 +86,12 @@ def test_a_viewer_that_does_not_read_does_not_keep_others_from_it(site: Site) ->
 
 
 def test_costs_nothing_while_nobody_watches(site: Site) -> None:
-    assert not site.pictures.has_subscribers
-    assert not site.reports.has_subscribers
+    is_wanted = site.pictures.has_subscribers or site.reports.has_subscribers
+    assert not is_wanted
     with viewer(site) as response:
         read_jpeg(response)
-        assert site.pictures.has_subscribers
+        is_wanted = site.pictures.has_subscribers
+        assert is_wanted
     wait_until(lambda: not site.pictures.has_subscribers)
 
 

@@ -32,6 +32,7 @@ from handsteer.nodes.steering import SteeringNode
 from handsteer.robots.protocol import RangeScan
 from handsteer.robots.simulated import SimulatedRobot
 from handsteer.robots.world import World
+from tests.about import about
 from tests.nodes.stepping import Bench
 
 RULE = CollisionMonitorConfig(enabled=True)
@@ -112,7 +113,7 @@ def test_it_slows_and_says_what_for() -> None:
     assert bench.command == (0.0, 0.0)
     assert bench.report()[0] == "standing: stopped before an obstacle 0.14 m ahead"
     bench.show("Backward", 5, ahead(0.4))
-    assert bench.command == (pytest.approx(-0.05), 0.0)
+    assert bench.command == (about(-0.05), 0.0)
     assert bench.report()[0] == "driving: Backward"
 
 
@@ -120,7 +121,7 @@ def test_speed_does_not_add_up_before_an_obstacle() -> None:
     bench = MonitorBench()
     bench.show("Forward", 100, ahead(0.4))
     bench.show("Forward", 1, ahead(7.0))
-    assert bench.command == (pytest.approx(0.01), 0.0)
+    assert bench.command == (about(0.01), 0.0)
 
 
 def test_a_slowed_robot_goes_on_as_slowly_until_it_is_told_to_be_faster() -> None:
@@ -128,7 +129,7 @@ def test_a_slowed_robot_goes_on_as_slowly_until_it_is_told_to_be_faster() -> Non
     bench.show("Forward", 60, ahead(0.7))
     slow, _ = bench.command
     bench.show("Go", 5, ahead(7.0))
-    assert bench.command == (pytest.approx(slow, abs=0.01), 0.0)
+    assert bench.command == (about(slow, abs=0.01), 0.0)
 
 
 def test_a_scan_that_stops_coming_stops_the_robot() -> None:

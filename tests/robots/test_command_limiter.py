@@ -70,7 +70,8 @@ def test_after_the_link_was_cut_it_waits_for_a_zero() -> None:
     assert set(drive(relay, AHEAD, 0.2, is_linked=False)[1:]) == {ZERO}
     relay.step(DT_S, linked=True)
     assert set(drive(relay, AHEAD, 1.0)) == {ZERO}
-    assert relay.waits
+    waits = relay.waits
+    assert waits
     drive(relay, ZERO, 0.1)
     assert not relay.waits
     assert drive(relay, AHEAD, 1.0)[-1] == AHEAD

@@ -3,6 +3,7 @@ import pickle
 import threading
 import time
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 import pytest
@@ -71,7 +72,7 @@ class TestPiped(TransportContract):
     settle_s = 0.3
 
     @pytest.fixture
-    def transport(self, both: Both) -> Transport:  # type: ignore[override]
+    def transport(self, both: Both) -> Transport:
         both.start()
         return both.transport
 
@@ -105,7 +106,7 @@ def test_the_graph_counts_publishers_of_the_other_process_until_they_are_gone(bo
 
 def test_a_process_that_stands_still_gets_the_newest_only_and_holds_up_nobody(both: Both) -> None:
     signs: list[str] = []
-    pictures: list[Received[object]] = []
+    pictures: list[Received[Any]] = []
     in_callback, let_go = threading.Event(), threading.Event()
 
     def hang(received: Received[String]) -> None:
@@ -126,7 +127,7 @@ def test_a_process_that_stands_still_gets_the_newest_only_and_holds_up_nobody(bo
         camera.publish(image_message(np.full((480, 640, 3), number % 256, np.uint8), header))
     let_go.set()
     assert eventually(lambda: signs[-1] == "299")
-    assert eventually(lambda: pictures and pictures[-1].message.data[0] == 299 % 256)  # type: ignore[attr-defined]
+    assert eventually(lambda: pictures and pictures[-1].message.data[0] == 299 % 256)
     assert signs == sorted(signs[:1]) + sorted(signs[1:], key=int)  # in order
     # What was on its way, and what may wait.
     assert len(pictures) < 10

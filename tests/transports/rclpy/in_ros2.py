@@ -3,6 +3,7 @@
 import logging
 import time
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -103,7 +104,7 @@ def test_the_compressed_topic_and_camera_info_move_with_the_images(joined: Join)
     looker = joined("-r", "__node:=looker")
     for name in ("/eye/picture", "/eye/picture/compressed", "/far"):
         topic = Topic(name, IMAGE_COMPRESSED.type if name != "/eye/picture" else IMAGE_RAW.type, is_global=True)
-        assert eventually(lambda topic=topic: looker.transport.publishers_of(topic)), name  # type: ignore[misc]
+        assert eventually(partial(looker.transport.publishers_of, topic)), name
     assert len(publishers) == 3
 
 
