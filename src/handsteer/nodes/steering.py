@@ -140,8 +140,9 @@ class SteeringNode(Node):
 
     def reset(self) -> None:
         """Let the robot be driven again; nothing moves before whoever drives has let go and begins anew."""
-        self._halted = False
-        self._stop.publish(Bool(data=False))
+        with self._lock:
+            self._halted = False
+            self._stop.publish(Bool(data=False))
 
     def on_stop(self) -> None:
         """Leave nothing in motion."""
@@ -201,9 +202,9 @@ class SteeringNode(Node):
                 self._publish(ZERO)
 
     def _repeat(self) -> None:
-        if self._halted:
-            self._stop.publish(Bool(data=True))
         with self._lock:
+            if self._halted:
+                self._stop.publish(Bool(data=True))
             self._notice_interruption()
             if self._target.commands.follow():
                 self._stand()
