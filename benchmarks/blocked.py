@@ -15,7 +15,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -109,7 +109,7 @@ def held_interpreter() -> Iterator[None]:
 
 
 def measure(
-    graph: Graph, commands: Commands, disturbance: Callable[[], "contextmanager[None]"], trials: int
+    graph: Graph, commands: Commands, disturbance: Callable[[], AbstractContextManager[None]], trials: int
 ) -> tuple[list[float], list[float], int]:
     """Return milliseconds from each planned Stop to the first zero, and between commands, and undriven trials."""
     stop = graph.transport.advertise("benchmark", STOP)

@@ -167,7 +167,7 @@ def measure(wire: str, topic: Topic[Any], count: int, rate: float) -> Figures:
 
 
 def wait_for(publisher: Publisher[Any]) -> None:
-    while not publisher.wanted:
+    while not publisher.has_subscribers:
         time.sleep(0.01)
     time.sleep(SETTLE_S)  # the other end has to see this one, too
 

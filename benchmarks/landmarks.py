@@ -33,7 +33,7 @@ def main() -> None:
 def read_jpegs(clip: Path, count: int) -> list[np.ndarray]:
     """Return the first frames of a clip, each as a JPEG file of 640x480."""
     capture = cv2.VideoCapture(str(clip))
-    files = []
+    files: list[np.ndarray] = []
     while len(files) < count and (image := capture.read()[1]) is not None:
         files.append(cv2.imencode(".jpg", cv2.resize(image, (640, 480), interpolation=cv2.INTER_AREA))[1])
     if not files:
@@ -65,7 +65,9 @@ def measure(files: list[np.ndarray], model: str) -> np.ndarray:
 
 
 def decode(file: np.ndarray) -> np.ndarray:
-    return cv2.imdecode(file, cv2.IMREAD_COLOR)
+    picture = cv2.imdecode(file, cv2.IMREAD_COLOR)
+    assert picture is not None
+    return picture
 
 
 def load(path: Path) -> Interpreter:

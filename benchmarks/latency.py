@@ -9,6 +9,7 @@ import time
 from pathlib import Path
 
 import numpy as np
+from ai_edge_litert.interpreter import Interpreter
 
 from handsteer.config import CameraConfig, Config
 from handsteer.graph import Graph
@@ -20,7 +21,7 @@ CLIP = Path(__file__).parents[2] / "shared" / "data" / "videos" / "dex-retargeti
 FACTOR, ALLOWANCE_MS = 1.5, 5.0
 
 
-class TimedInterpreter(tflite.Interpreter):  # type: ignore[misc]
+class TimedInterpreter(Interpreter):  # type: ignore[misc]
     """Adds up how long the models take."""
 
     spent_s = 0.0
@@ -33,7 +34,7 @@ class TimedInterpreter(tflite.Interpreter):  # type: ignore[misc]
 
 def measure(source: str, duration_s: float) -> np.ndarray:
     """Return (n, 2) milliseconds: the models' own time, and capture to Twist, of each frame."""
-    tflite.Interpreter = TimedInterpreter
+    tflite.Interpreter = TimedInterpreter  # type: ignore[attr-defined]
     models: dict[float, float] = {}
     twists: dict[float, float] = {}
     with Graph(Config(camera=CameraConfig(source=source))) as graph:

@@ -95,7 +95,7 @@ def drive(seed: int, *, enabled: bool) -> tuple[int, float, float]:
 def main() -> None:
     from handsteer.nodes import collision_monitor  # noqa: PLC0415
 
-    collision_monitor.ObstacleLimiter = TimedLimiter  # type: ignore[misc]
+    collision_monitor.ObstacleLimiter = TimedLimiter  # type: ignore[attr-defined]
     print("| collision_monitor.enabled | touches | drives with any | metres | seconds |\n|---|---|---|---|---|")
     for enabled in (False, True):
         drives = [drive(100 + number, enabled=enabled) for number in range(DRIVES)]

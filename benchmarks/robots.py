@@ -10,15 +10,18 @@ import os
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # for the domains that the tests use
 
 from tests.dds.graph import free_domain
 
-from handsteer.messages import CMD_VEL, ODOM, twist
+from handsteer.messages import CMD_VEL, ODOM, Twist, twist
 from handsteer.transports import join
+from handsteer.transports.protocol import Publisher
 
 _TICKS_PER_S = os.sysconf("SC_CLK_TCK")
 _ODOMETRY_HZ = 50
@@ -46,12 +49,12 @@ def measure(count: int, seconds: float) -> tuple[float, float, float]:
     commands = [session.transport.advertise("benchmark", replace(CMD_VEL, name=name + CMD_VEL.name)) for name in names]
     came = dict.fromkeys(names, 0)
 
-    def note(name: str) -> None:
+    def note(name: str, _: object) -> None:
         came[name] += 1
 
     for name in names:
         topic = replace(ODOM, name=name + ODOM.name)
-        session.transport.subscribe("benchmark", topic, lambda _, name=name: note(name))
+        session.transport.subscribe("benchmark", topic, partial(note, name))
     program = [sys.executable, "-m", "handsteer", "robot", "--transport", "dds", "--ros-args", "-r"]
     robots = [subprocess.Popen([*program, f"__ns:={name}"]) for name in names]
     try:
@@ -70,7 +73,7 @@ def measure(count: int, seconds: float) -> tuple[float, float, float]:
         session.close()
 
 
-def _wait_until(condition) -> None:  # type: ignore[no-untyped-def]
+def _wait_until(condition: Callable[[], bool]) -> None:
     deadline_s = time.monotonic() + _START_TIMEOUT_S
     while not condition():
         if time.monotonic() > deadline_s:
@@ -78,7 +81,7 @@ def _wait_until(condition) -> None:  # type: ignore[no-untyped-def]
         time.sleep(0.05)
 
 
-def _drive(commands: list, seconds: float) -> float:  # type: ignore[type-arg]
+def _drive(commands: list[Publisher[Twist]], seconds: float) -> float:
     """Drive all robots in circles for ``seconds``; return how long it took."""
     began_s = time.monotonic()
     while (passed_s := time.monotonic() - began_s) < seconds:

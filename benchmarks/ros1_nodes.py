@@ -152,7 +152,11 @@ def measure_rounds(chains: list[Chain], films: dict[str, list[np.ndarray]], opti
     nodes = {chain.name: {verb: chain.start(verb) for verb in ("recognition", "control")} for chain in chains}
     first = next(iter(films.values()))
     for chain in chains:
-        until_first(chain.twists_s, lambda number, chain=chain: chain.send(first[number % len(first)]), options.rate)
+
+        def send(number: int, chain: Chain = chain) -> None:
+            chain.send(first[number % len(first)])
+
+        until_first(chain.twists_s, send, options.rate)
     for name, film in films.items():
         figures: dict[str, list[Figures]] = {chain.name: [] for chain in chains}
         for number in range(options.rounds):

@@ -53,7 +53,7 @@ def measure(session: Session, peer: Any, topic: Topic[Any], count: int, rate: fl
     reliable = topic is TWISTS
     peer.ask("record", topic=topic.name, type=kind, fields=FIELDS[topic], reliable=reliable, depth=10)
     publisher = session.transport.advertise("talker", topic)
-    eventually(lambda: publisher.wanted)
+    eventually(lambda: publisher.has_subscribers)
     time.sleep(SETTLE_S)  # the other end has to see this one, too
     send(publisher, topic, count, rate)
     time.sleep(SETTLE_S)

@@ -16,6 +16,7 @@ import time
 import urllib.request
 import uuid
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +30,7 @@ from tests.faults.chain import Chain
 from tests.faults.painted import FPS as CAMERA_FPS
 
 from handsteer.config import RobotConfig
-from handsteer.messages import CMD_VEL, IMAGE_RAW, ODOM
+from handsteer.messages import CMD_VEL, IMAGE_RAW, ODOM, Topic
 from handsteer.robots.protocol import Robot
 from handsteer.robots.simulated import SimulatedRobot
 
@@ -140,8 +141,9 @@ class Driven(Chain):
         super().__init__()
         self.counts = {topic.name: 0 for topic in (IMAGE_RAW, ODOM)}
         self.commands: list[tuple[float, float]] = []
-        for topic in (IMAGE_RAW, ODOM):
-            self.faults.subscribe("soak", topic, lambda _, name=topic.name: self._count(name))
+        topics: tuple[Topic[Any], ...] = (IMAGE_RAW, ODOM)
+        for topic in topics:
+            self.faults.subscribe("soak", topic, partial(self._count, topic.name))
         self.faults.subscribe("soak", CMD_VEL, self._on_command)
 
     def cycle(self) -> list[tuple[float, float]]:
@@ -157,7 +159,7 @@ class Driven(Chain):
         self.robot = SimulatedRobot(RobotConfig(world="empty"))
         return self.robot
 
-    def _count(self, name: str) -> None:
+    def _count(self, name: str, _: object) -> None:
         self.counts[name] += 1
 
     def _on_command(self, received: Any) -> None:

@@ -148,10 +148,10 @@ def make_environment() -> str | None:
         return None
     print(f"making an environment with MediaPipe in {CACHE}", file=sys.stderr)
     shutil.rmtree(CACHE, ignore_errors=True)
-    install = [tutorial_python(), "-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--no-input"]
+    install = [str(tutorial_python()), "-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--no-input"]
     for command in (
-        [sys.executable, "-m", "venv", CACHE],
-        [*install, "--only-binary=:all:", "--require-hashes", "--requirement", REQUIREMENTS],
+        [sys.executable, "-m", "venv", str(CACHE)],
+        [*install, "--only-binary=:all:", "--require-hashes", "--requirement", str(REQUIREMENTS)],
     ):
         done = subprocess.run(command, capture_output=True, text=True, check=False)
         if done.returncode:

@@ -15,7 +15,8 @@ def main() -> None:
         graph.run_stepped(5.0)
     summary = graph.summary()
     print(f"signs: {summary.signs}")
-    print(f"the robot is at x {summary.final_pose.x:.2f} m, y {summary.final_pose.y:.2f} m")
+    if pose := summary.final_pose:
+        print(f"the robot is at x {pose.x:.2f} m, y {pose.y:.2f} m")
 
 
 if __name__ == "__main__":

@@ -3,10 +3,12 @@
 Run ``python examples/04_let_it_fail.py``. Put your own nodes on the same transport to see what they do.
 """
 
+from typing import Any
+
 from handsteer.clock import SteppedClock
 from handsteer.config import load
 from handsteer.graph import Graph
-from handsteer.messages import CMD_VEL, HAND_SIGN, IMAGE_RAW
+from handsteer.messages import CMD_VEL, HAND_SIGN, IMAGE_RAW, Topic
 from handsteer.testing.fault_transport import CUT, FROZEN, FaultTransport, LinkFault
 from handsteer.testing.trace import Trace
 from handsteer.transports.in_process import InProcessTransport
@@ -17,7 +19,7 @@ SETTINGS = {
     "robot": {"world": "empty"},
     "control": {"arming": "on", "linear_step": 0.05, "max_linear": 0.3},
 }
-FAULTS = {
+FAULTS: dict[str, tuple[Topic[Any], LinkFault]] = {
     "pictures are cut off": (IMAGE_RAW, CUT),
     "signs stand still": (HAND_SIGN, FROZEN),
     "a fifth of the commands is lost": (CMD_VEL, LinkFault(drop=0.2)),

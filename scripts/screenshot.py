@@ -123,6 +123,7 @@ def animate(frames: list[tuple[float, bytes]], path: Path) -> None:
 def small(jpeg: bytes) -> np.ndarray:
     """Return a JPEG file's picture at the animation's size, with the alpha that the format wants."""
     picture = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR)
+    assert picture is not None
     height = round(picture.shape[0] * SHOWN_WIDTH / picture.shape[1])
     return cv2.cvtColor(cv2.resize(picture, (SHOWN_WIDTH, height), interpolation=cv2.INTER_AREA), cv2.COLOR_BGR2BGRA)
 

@@ -45,7 +45,7 @@ OTHERS = {
     "OK": shape("middle", "ring", "little", thumb=ROUND, index=BENT),
     "horns": shape("index", "little", thumb=ACROSS),
     "call": shape("little", thumb=OUT),
-    "half open": shape(thumb=ROUND, **dict.fromkeys(FINGERS, HALF)),
+    "half open": shape(thumb=ROUND, index=HALF, middle=HALF, ring=HALF, little=HALF),
     "hanging": shape(*FINGERS, thumb=OUT, roll=180),
 }
 

@@ -34,4 +34,4 @@ def test_what_else_is_missing_is_no_matter_of_an_extra() -> None:
     with pytest.raises(ModuleNotFoundError), needing("the page", "page", "nicegui"):
         import not_of_an_extra  # type: ignore[import-not-found]  # noqa: PLC0415
     with pytest.raises(PackageMissing), needing("the page", "page", "not_of_an_extra"):
-        import not_of_an_extra.part  # noqa: F401, PLC0415
+        import not_of_an_extra.part  # type: ignore[import-not-found]  # noqa: F401, PLC0415

@@ -1,6 +1,8 @@
 import json
 import math
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -8,7 +10,7 @@ from handsteer.clock import SteppedClock
 from handsteer.config import CameraConfig, Config, ControlConfig, RobotConfig, VirtualHandConfig
 from handsteer.errors import ConfigError
 from handsteer.graph import Graph
-from handsteer.messages import CMD_VEL, HAND_SIGN, ODOM, TF
+from handsteer.messages import CMD_VEL, HAND_SIGN, ODOM, TF, Topic
 from handsteer.testing.trace import Trace
 from handsteer.types import Pose2D
 
@@ -68,6 +70,7 @@ def test_the_virtual_hand_drives_a_course(handedness: str) -> None:
     graph, trace = drive(config, 9.0)
     pose = graph.summary().final_pose
     expected = trace.dead_reckoning()
+    assert pose is not None
     assert pose.x > 0.5
     assert pose.yaw > 0.5
     assert _moved(pose, expected) < 0.15
@@ -95,11 +98,12 @@ def test_topics_and_rates() -> None:
     with Graph(Config(camera=CameraConfig(source="virtual", width=160, height=120)), SteppedClock()) as graph:
         counts = {HAND_SIGN.name: 0, CMD_VEL.name: 0, ODOM.name: 0, TF.name: 0}
 
-        def count(name: str) -> None:
+        def count(name: str, _: object) -> None:
             counts[name] += 1
 
-        for topic in (HAND_SIGN, CMD_VEL, ODOM, TF):
-            graph.transport.subscribe("test", topic, lambda _, name=topic.name: count(name))  # type: ignore[misc]
+        topics: tuple[Topic[Any], ...] = (HAND_SIGN, CMD_VEL, ODOM, TF)
+        for topic in topics:
+            graph.transport.subscribe("test", topic, partial(count, topic.name))
         graph.run_stepped(2.0)
     assert counts[HAND_SIGN.name] in (60, 61)
     assert counts[CMD_VEL.name] == counts[HAND_SIGN.name] + 1, "one a sign, and one zero at the end"

@@ -113,7 +113,7 @@ def test_sizes_that_do_not_fit_are_refused(size: int, height: int, width: int, s
 
 
 def test_jpeg() -> None:
-    smooth = cv2.GaussianBlur(BGR, (0, 0), 5)
+    smooth: np.ndarray = cv2.GaussianBlur(BGR, (0, 0), 5)
     compressed = jpeg_message(smooth, HEADER, quality=95)
     decoded = cv2.imdecode(compressed.data, cv2.IMREAD_COLOR)
     assert decoded is not None

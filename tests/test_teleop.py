@@ -16,7 +16,7 @@ from handsteer.config import CameraConfig, ControlConfig, VirtualHandConfig
 from handsteer.errors import FrameError
 from handsteer.graph import Graph
 from handsteer.images import bgr_image
-from handsteer.messages import CMD_VEL, IMAGE_RAW
+from handsteer.messages import CMD_VEL, IMAGE_RAW, Twist
 from handsteer.types import ZERO
 from tests.faults.painted import PaintedCamera, painted_recognizer
 
@@ -138,7 +138,7 @@ def test_the_doors_are_few_and_open() -> None:
     assert Recognizer().recognize(picture).sign == "NONE"
 
 
-def _velocity(twist: object) -> Velocity:
+def _velocity(twist: Twist) -> Velocity:
     return Velocity(twist.linear.x, twist.angular.z)
 
 

@@ -3,8 +3,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from handsteer.config import ControlConfig
-from handsteer.control.driver import Driver
 from handsteer.control.sign_control import SignControl
+from handsteer.control.twist_mux import TwistMux
 from handsteer.messages import STOPPING_SIGNS
 from handsteer.types import (
     ACTIONS,
@@ -22,6 +22,7 @@ from handsteer.types import (
     action_of,
     motion_signs,
 )
+from tests.about import about
 
 DT = 1 / 30
 
@@ -74,8 +75,8 @@ def test_turbo_lasts_as_long_as_it_is_shown() -> None:
     for _ in range(10):
         control.step(FORWARD, DT)
     boosted = [control.step("Peace", DT) for _ in range(50)]
-    assert boosted == [Velocity(pytest.approx(0.2), 0.0)] * 50
-    assert control.step(GO, DT) == Velocity(pytest.approx(0.1), 0.0)
+    assert boosted == [Velocity(about(0.2), 0.0)] * 50
+    assert control.step(GO, DT) == Velocity(about(0.1), 0.0)
     assert control.step(NONE, DT) == ZERO
 
 
@@ -101,7 +102,7 @@ def test_whatever_the_table_limits_hold_and_stop_stops(shown: list[str], actions
 
 
 def test_the_reason_names_a_taught_sign_that_stops() -> None:
-    driver = Driver(config(actions={"Hi": "stop"}))
+    driver = TwistMux(config(actions={"Hi": "stop"}))
     driver.step(DT, sign=FORWARD)
     driver.step(DT, sign="Hi")
     assert driver.reason == "standing: the Hi sign is shown"

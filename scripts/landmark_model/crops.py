@@ -35,7 +35,9 @@ def photos(folders: list[Path], half: Half) -> Iterator[tuple[str, np.ndarray]]:
             odd = hashlib.sha256(row["path"].encode()).digest()[0] % 2
             by_hash: Half = "choose" if odd else "judge"
             if {"emre": "judge", "sld": "choose"}.get(row["person_set"], by_hash) == half:
-                yield row["path"], View().picture(cv2.imread(str(folder / row["path"])))
+                photo = cv2.imread(str(folder / row["path"]))
+                assert photo is not None, row["path"]
+                yield row["path"], View().picture(np.asarray(photo, np.uint8))
 
 
 def crops(folders: list[Path], half: Half) -> Iterator[np.ndarray]:

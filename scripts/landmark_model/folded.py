@@ -51,7 +51,8 @@ def operations(content: bytes) -> list[tuple[str, str, int]]:
 
 def _kind(model: Any, operation: Any) -> str:
     code = model.operatorCodes[operation.opcodeIndex]
-    return _KINDS[max(code.builtinCode, code.deprecatedBuiltinCode)]
+    kind: str = _KINDS[max(code.builtinCode, code.deprecatedBuiltinCode)]
+    return kind
 
 
 def _make_weights_float32(model: Any) -> None:
@@ -113,7 +114,8 @@ class _Array:
 
     @property
     def values(self) -> np.ndarray:
-        return self._buffer.data.view("<f4").reshape(self._tensor.shape)
+        values: np.ndarray = self._buffer.data.view("<f4").reshape(self._tensor.shape)
+        return values
 
     def set(self, values: np.ndarray) -> None:
         self._tensor.shape = np.array(values.shape, np.int32)

@@ -95,7 +95,7 @@ class Teleop:
             return f"standing: {self._refused}"
         if safety.signs_wait is not None:
             return f"standing: disarmed ({safety.signs_wait or 'reset'}), moves once Stop is shown, or no hand"
-        return self._control.driver.reason
+        return self._control.mux.reason
 
     def _sign_of(self, image: NDArray[np.uint8]) -> str | None:
         """Return the sign that counts; None where the image is not new, which a frozen camera's are not."""

@@ -81,7 +81,8 @@ def test_another_browser_starts_with_a_clock_of_its_own() -> None:
     clock = SteppedClock(100.0)
     browser = BrowserCamera(clock)
     browser.offer(sent(50.0))
-    assert browser.is_given
+    given = browser.is_given
+    assert given
     browser.forget()
     assert not browser.is_given
     assert browser.read(0.0) is None

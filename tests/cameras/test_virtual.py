@@ -24,7 +24,7 @@ def test_frames_are_of_the_size_asked_and_carry_the_clocks_time() -> None:
     hand = camera(clock)
     clock.advance(0.5)
     frame = hand.read()
-    assert (frame.image.shape, frame.image.dtype) == ((240, 320, 3), np.uint8)
+    assert (frame.image.shape, frame.image.dtype) == ((240, 320, 3), np.dtype(np.uint8))
     assert frame.captured_s == 100.5
     assert (hand.name, hand.period_s) == ("virtual hand", 0.04)
 

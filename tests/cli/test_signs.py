@@ -10,6 +10,13 @@ from handsteer.types import SIGNS
 from tests.cli.test_cli import fails, prints
 
 
+def shorter_side(png: Path) -> int:
+    """Return how many pixels a picture has in its shorter direction."""
+    picture = cv2.imread(str(png))
+    assert picture is not None, png
+    return int(min(picture.shape[:2]))
+
+
 @pytest.fixture
 def few(data_dir: Path, tmp_path: Path) -> Path:
     """A folder with an index of a few of the real photos."""
@@ -46,7 +53,7 @@ def test_evaluate_prints_tables(capsys: pytest.CaptureFixture[str], few: Path) -
     assert "7 photos, and 0 that are not scored" in text
     for part in ("Recall", "False commands", "thumb_up", "Confusion", "Turn Left"):
         assert part in text
-    assert min(cv2.imread(str(png)).shape[:2]) > 200
+    assert shorter_side(png) > 200
 
 
 def test_evaluate_prints_json_and_flips_and_turns(capsys: pytest.CaptureFixture[str], few: Path) -> None:
@@ -110,7 +117,7 @@ def test_likelihoods_and_thresholds_are_shown(capsys: pytest.CaptureFixture[str]
     text = prints(capsys, "signs", "evaluate", str(few), "--sweep", *pictures)
     for part in ("Expected calibration error: ", "0.9 to 1.0", "Thresholds: recall", "\n0.99 "):
         assert part in text
-    assert all(min(cv2.imread(str(png)).shape[:2]) > 200 for png in (reliability, swept))
+    assert all(shorter_side(png) > 200 for png in (reliability, swept))
     plain = json.loads(prints(capsys, "signs", "evaluate", str(few), "--sweep", "--json"))
     assert plain["sweep"][0]["recall"]["Stop"]["count"] == 3
     assert 0.0 <= plain["calibration"]["expected_calibration_error"] <= 1.0

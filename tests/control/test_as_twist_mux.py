@@ -5,6 +5,8 @@ signs are its input of low priority, steering one of high priority, ``/stop`` a 
 those that we do not share.
 """
 
+from typing import Any
+
 import pytest
 
 from handsteer.config import ControlConfig
@@ -71,8 +73,8 @@ def test_without_any_input_nothing_comes_out(mux: Mux) -> None:
 @pytest.mark.parametrize(
     ("inputs", "wanted"), [({"signs": "Forward"}, SIGNED), ({"steering": STEERED}, STEERED)], ids=["signs", "steering"]
 )
-def test_a_single_input_passes(mux: Mux, inputs: dict[str, object], wanted: tuple[float, float]) -> None:
-    mux.speak(**inputs)  # type: ignore[arg-type]
+def test_a_single_input_passes(mux: Mux, inputs: dict[str, Any], wanted: tuple[float, float]) -> None:
+    mux.speak(**inputs)
     assert mux.take()[-1] == wanted
 
 
@@ -95,8 +97,8 @@ def test_an_input_of_lower_priority_changes_nothing_while_the_higher_one_speaks(
 
 
 @pytest.mark.parametrize("inputs", [{"signs": "Forward"}, {"steering": STEERED}], ids=["signs", "steering"])
-def test_an_input_that_falls_silent_times_out(mux: Mux, inputs: dict[str, object]) -> None:
-    mux.speak(**inputs)  # type: ignore[arg-type]
+def test_an_input_that_falls_silent_times_out(mux: Mux, inputs: dict[str, Any]) -> None:
+    mux.speak(**inputs)
     mux.take()
     mux.run(LONGER_THAN_A_TIMEOUT_S)
     assert mux.take() == [ZERO]
@@ -105,12 +107,12 @@ def test_an_input_that_falls_silent_times_out(mux: Mux, inputs: dict[str, object
 
 
 @pytest.mark.parametrize("inputs", [{"signs": "Forward"}, {"steering": STEERED}], ids=["signs", "steering"])
-def test_a_lock_keeps_every_input_of_lower_priority_out(mux: Mux, inputs: dict[str, object]) -> None:
-    mux.speak(**inputs)  # type: ignore[arg-type]
+def test_a_lock_keeps_every_input_of_lower_priority_out(mux: Mux, inputs: dict[str, Any]) -> None:
+    mux.speak(**inputs)
     mux.take()
     mux.lock(locked=True)
     assert mux.take() == [ZERO]
-    mux.speak(**inputs, seconds=3.0)  # type: ignore[arg-type]
+    mux.speak(**inputs, seconds=3.0)
     assert set(mux.take()) == {ZERO}
 
 

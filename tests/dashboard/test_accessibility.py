@@ -2,7 +2,7 @@
 
 import pytest
 from axe_playwright_python.sync_playwright import Axe
-from playwright.sync_api import Page
+from playwright.sync_api import Page, ViewportSize
 
 from tests.dashboard.visits import NEEDS_A_BROWSER, visiting
 
@@ -12,7 +12,7 @@ pytestmark = NEEDS_A_BROWSER
 RULES = {"runOnly": ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "best-practice"]}
 # Quasar's own bar, which comes while something loads and has no name.
 LEFT_OUT = {"exclude": [["#q-loading-bar"]]}
-SMALLEST_PHONE = {"width": 360, "height": 740}
+SMALLEST_PHONE: ViewportSize = {"width": 360, "height": 740}
 
 
 def faults(page: Page) -> list[str]:

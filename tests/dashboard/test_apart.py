@@ -47,7 +47,8 @@ def served(script: str = "NONE:600", **sections: dict[str, object]) -> Iterator[
 
 def fetch(url: str) -> str:
     with urllib.request.urlopen(url, timeout=30) as answer:
-        return answer.read().decode()
+        text: str = answer.read().decode()
+        return text
 
 
 class Driven:
@@ -214,7 +215,12 @@ def test_a_browsers_camera_is_offered_from_afar(near: Graph, far: FarGraph) -> N
 
 def test_steering_from_afar_drives_and_its_end_stops(near: Graph, far: FarGraph) -> None:
     driven = Driven(near)
-    eventually(lambda: (far.steering.steer(0.2, 0.0), max(driven.speeds, default=0.0) > 0.1)[1])
+
+    def drives() -> bool:
+        far.steering.steer(0.2, 0.0)
+        return max(driven.speeds, default=0.0) > 0.1
+
+    eventually(drives)
     far.steering.stop()
     driven.wait_for(lambda speeds: speeds and speeds[-1] == 0.0)
 

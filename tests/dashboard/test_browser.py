@@ -81,7 +81,7 @@ def test_stop_holds_until_it_is_reset_and_a_reset_alone_moves_nothing(visit: Vis
 
 @pytest.mark.parametrize("visit", ["Forward:600"], indirect=True)
 def test_whoever_watches_may_stop_but_only_the_driver_resets(visit: Visit) -> None:
-    first, second = visit.page, visit.page.context.browser.new_page()
+    first, second = visit.page, visit.another_page()
     first.get_by_text("Ask to drive").click()
     first.locator(".lease .role", has_text="you drive").wait_for()
     second.goto(first.url)
@@ -98,7 +98,7 @@ def test_whoever_watches_may_stop_but_only_the_driver_resets(visit: Visit) -> No
 @pytest.mark.parametrize("visit", ["NONE:600"], indirect=True)
 def test_a_second_browser_watches_until_the_first_hands_over(visit: Visit) -> None:
     robot = visit.graph.robot
-    first, second = visit.page, visit.page.context.browser.new_page()
+    first, second = visit.page, visit.another_page()
     second.goto(first.url)
     for page in (first, second):
         page.locator(".lease .role", has_text="nobody drives").wait_for()
@@ -128,7 +128,9 @@ def test_fits_a_phone_and_turns_dark_and_stays_so(visit: Visit) -> None:
     visit.wait_until(lambda: visit.text(".camera .sign") == "Stop")
     visit.page.set_viewport_size({"width": 360, "height": 740})
     assert visit.page.evaluate("document.documentElement.scrollWidth") <= 360
-    assert visit.page.locator(".banner").bounding_box()["y"] < 740
+    banner = visit.page.locator(".banner").bounding_box()
+    assert banner is not None
+    assert banner["y"] < 740
     light = visit.page.evaluate("getComputedStyle(document.body).backgroundColor")
     visit.page.locator(".theme").click()
     dark = visit.page.evaluate("getComputedStyle(document.body).backgroundColor")
@@ -144,7 +146,7 @@ def path_shown(visit: Visit) -> float:
 
 def drawn_objects(page: Page) -> int:
     """Count the shapes in the 3D view; NiceGUI keeps the scene in a global for tests."""
-    return page.evaluate(
+    count: int = page.evaluate(
         """() => {
             const name = Object.keys(window).find(key => key.startsWith("scene_"));
             let shapes = 0;
@@ -152,3 +154,4 @@ def drawn_objects(page: Page) -> int:
             return document.querySelector(".world canvas") ? shapes : 0;
         }"""
     )
+    return count

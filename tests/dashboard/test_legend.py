@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from handsteer.config import Config, ControlConfig
-from handsteer.control.effects import effect_of, tell, told
+from handsteer.control.effects import effect_of, rule_from_diagnostics, rule_to_diagnostics
 from handsteer.dashboard.panels.signs import legend
 from handsteer.dashboard.state import known_signs
 from handsteer.types import ACTIONS, SIGNS, action_of
@@ -53,7 +53,7 @@ def test_says_what_is_built_in_while_nothing_is_known() -> None:
     )
 )
 def test_what_a_report_tells_is_what_decides(rule: ControlConfig) -> None:
-    heard = told(tell(rule))
+    heard = rule_from_diagnostics(rule_to_diagnostics(rule))
     assert heard is not None
     for sign in (*SIGNS, "Peace", "Hi"):
         assert action_of(sign, heard.actions) == action_of(sign, rule.actions)
@@ -62,7 +62,7 @@ def test_what_a_report_tells_is_what_decides(rule: ControlConfig) -> None:
 
 @pytest.mark.parametrize("wrong", [{}, {"actions": "{"}, {"max_linear": "-1"}, {"actions": '{"Stop": "go"}'}])
 def test_a_report_that_does_not_hold_tells_nothing(wrong: dict[str, str]) -> None:
-    assert told({**tell(Config().control), **wrong} if wrong else {}) is None
+    assert rule_from_diagnostics({**rule_to_diagnostics(Config().control), **wrong} if wrong else {}) is None
 
 
 @pytest.mark.parametrize(

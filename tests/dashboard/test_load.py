@@ -44,13 +44,13 @@ def test_viewers_who_never_read_hold_up_nobody_and_are_let_go(site: Site) -> Non
     deaf_ones = [deaf(site.port, "/camera.mjpg") for _ in range(3)]
     deaf_ones += [page := deaf_page(site.port, *site.page())]
     try:
-        wait_until(lambda: site.reports.wanted)  # the page has been joined
+        wait_until(lambda: site.reports.has_subscribers)  # the page has been joined
         with viewer(site) as response:
             for beat in range(100):
                 report(site, str(beat))
                 read_jpeg(response)
             # A page that does not answer is let go, so that nothing is kept for it.
-            wait_until(lambda: not site.reports.wanted and is_closed(page))
+            wait_until(lambda: not site.reports.has_subscribers and is_closed(page))
             for _ in range(10):
                 read_jpeg(response)
     finally:

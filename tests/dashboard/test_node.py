@@ -1,12 +1,14 @@
 import math
+from typing import Any, TypeVar
 
 import numpy as np
 import pytest
 
 from handsteer.clock import SteppedClock
 from handsteer.config import ControlConfig
-from handsteer.dashboard.node import HOLD_TIMEOUT_S, DashboardNode
+from handsteer.dashboard.node import DashboardNode
 from handsteer.dashboard.on_demand import OnDemandNode
+from handsteer.dashboard.pad_input import HOLD_TIMEOUT_S
 from handsteer.errors import TransportError
 from handsteer.messages import (
     CMD_VEL,
@@ -28,6 +30,7 @@ from handsteer.messages import (
     PoseWithCovariance,
     Quaternion,
     String,
+    Topic,
     Twist,
     TwistWithCovariance,
     cmd_vel,
@@ -38,8 +41,11 @@ from handsteer.nodes.steering import SteeringNode
 from handsteer.robots.course import CourseState
 from handsteer.robots.description import robot_description
 from handsteer.transports.in_process import InProcessTransport
-from handsteer.transports.protocol import Received
+from handsteer.transports.protocol import Publisher, Received
 from handsteer.types import Pose2D, Velocity
+from tests.about import about
+
+M = TypeVar("M")
 
 
 class Bench:
@@ -56,7 +62,7 @@ class Bench:
     def _on_steered(self, received: Received[Twist]) -> None:
         self.steered.append((received.message.linear.x, received.message.angular.z))
 
-    def publish(self, topic, message) -> None:
+    def publish(self, topic: Topic[M], message: M) -> None:
         self.transport.advertise("test", topic).publish(message)
         self.node.spin_once()
 
@@ -106,10 +112,10 @@ def test_tells_the_cameras_frames_a_second(bench: Bench) -> None:
 class TellingTransport(InProcessTransport):
     """Stands for a graph that tells the types of subscribers."""
 
-    def subscribed_types(self, topic) -> set[str]:
+    def subscribed_types(self, topic: Topic[Any]) -> set[str]:
         return set()
 
-    def withdraw(self, publisher) -> None: ...
+    def withdraw(self, publisher: Publisher[Any]) -> None: ...
 
 
 def test_where_a_subscriber_would_pass_for_a_robot_it_shows_what_the_control_says_that_it_commands(
@@ -117,7 +123,7 @@ def test_where_a_subscriber_would_pass_for_a_robot_it_shows_what_the_control_say
 ) -> None:
     bench.transport = TellingTransport()
     bench.node = DashboardNode(bench.transport, bench.clock, bench.steering, cmd_vel("auto"))
-    assert not bench.transport.advertise("test", cmd_vel("auto")).wanted
+    assert not bench.transport.advertise("test", cmd_vel("auto")).has_subscribers
     bench.report("hand_sign_control", source="signs", linear_mps="0.500", angular_radps="0.250")
     assert bench.node.state().commanded == Velocity(0.5, 0.25)
     bench.step(1.0)
@@ -145,7 +151,7 @@ def test_places_the_robot_by_its_true_pose_and_odometry_since_then(bench: Bench)
     bench.step(0.02)
     bench.odometry(1.5)
     assert bench.node.world.robot == Pose2D(
-        pytest.approx(5.0), pytest.approx(2.5), pytest.approx(math.pi / 2)
+        about(5.0), about(2.5), about(math.pi / 2)
     )  # half a metre on, which is along y there
 
 
@@ -153,9 +159,11 @@ def test_keeps_the_way_until_the_robot_is_put_back(bench: Bench) -> None:
     bench.report("robot", "moves freely", path_length_m="0.00")
     for x in (0.0, 0.1, 0.2, 0.2):
         bench.odometry(x)
-    assert bench.node.world.trail.points == ((0.0, 0.0), (0.1, 0.0), (0.2, 0.0))
+    points = bench.node.world.trail.points
+    assert points == ((0.0, 0.0), (0.1, 0.0), (0.2, 0.0))
     bench.report("robot", "moves freely", path_length_m="0.20")
-    assert len(bench.node.world.trail.points) == 3
+    points = bench.node.world.trail.points
+    assert len(points) == 3
     bench.report("robot", "moves freely", path_length_m="0.00")
     bench.odometry(0.0)
     assert bench.node.world.trail.points == ((0.0, 0.0),)
@@ -254,20 +262,22 @@ def test_a_node_runs_only_while_somebody_watches() -> None:
     transport, clock = InProcessTransport(), SteppedClock()
     reports = transport.advertise("test", DIAGNOSTICS)
     watched = OnDemandNode(lambda: DashboardNode(transport, clock, SteeringNode(transport, clock)))
-    assert not reports.wanted
+    wanted = reports.has_subscribers
+    assert not wanted
     first = watched.join("me")
     assert watched.join("you") is first
     assert watched.join("me") is first
     watched.leave("me")
-    assert reports.wanted
+    wanted = reports.has_subscribers
+    assert wanted
     watched.leave("you")
-    assert not reports.wanted
+    assert not reports.has_subscribers
     watched.leave("you")
     assert watched.join("me") is not first
     watched.close()
     assert not watched.is_watched_by("me")
     assert watched.join("me") is None  # a page that does not know yet must not start it again
-    assert not reports.wanted
+    assert not reports.has_subscribers
 
 
 def test_nodes_of_processes_are_known_by_their_role_and_those_of_other_namespaces_are_left_out(bench: Bench) -> None:

@@ -72,8 +72,8 @@ def test_shows_all_viewers_the_newest_picture(site: Site) -> None:
     with viewer(site) as first, viewer(site) as second:
         read_jpeg(first)
         site.image = np.full((240, 320, 3), 90, np.uint8)
-        for response in (first, second):
-            wait_until(lambda response=response: read_jpeg(response).shape == (240, 320, 3))
+        wait_until(lambda: read_jpeg(first).shape == (240, 320, 3))
+        wait_until(lambda: read_jpeg(second).shape == (240, 320, 3))
 
 
 def test_a_viewer_that_does_not_read_does_not_keep_others_from_it(site: Site) -> None:
@@ -86,12 +86,13 @@ def test_a_viewer_that_does_not_read_does_not_keep_others_from_it(site: Site) ->
 
 
 def test_costs_nothing_while_nobody_watches(site: Site) -> None:
-    assert not site.pictures.wanted
-    assert not site.reports.wanted
+    is_wanted = site.pictures.has_subscribers or site.reports.has_subscribers
+    assert not is_wanted
     with viewer(site) as response:
         read_jpeg(response)
-        assert site.pictures.wanted
-    wait_until(lambda: not site.pictures.wanted)
+        is_wanted = site.pictures.has_subscribers
+        assert is_wanted
+    wait_until(lambda: not site.pictures.has_subscribers)
 
 
 def test_notices_that_a_viewer_has_left_even_when_no_picture_comes(site: Site) -> None:
@@ -99,8 +100,8 @@ def test_notices_that_a_viewer_has_left_even_when_no_picture_comes(site: Site) -
     site._camera.join()
     with socket.create_connection(("127.0.0.1", site.port)) as viewer:
         viewer.sendall(b"GET /camera.mjpg HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n")
-        wait_until(lambda: site.pictures.wanted)
-    wait_until(lambda: not site.pictures.wanted)
+        wait_until(lambda: site.pictures.has_subscribers)
+    wait_until(lambda: not site.pictures.has_subscribers)
 
 
 def test_ends_open_streams_when_it_stops() -> None:

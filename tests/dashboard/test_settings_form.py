@@ -15,11 +15,10 @@ FIELDS = {field.path: field for fields in form().values() for field in fields}
 
 
 def test_there_is_a_field_for_every_parameter() -> None:
-    parameters = {
-        f"{section}.{name}"
-        for section, model in Config.model_fields.items()
-        for name in model.annotation.model_fields  # type: ignore[union-attr]
-    }
+    parameters = set()
+    for section, model in Config.model_fields.items():
+        assert model.annotation is not None, section
+        parameters |= {f"{section}.{name}" for name in model.annotation.model_fields}
     assert set(FIELDS) == parameters
 
 

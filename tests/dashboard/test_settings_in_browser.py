@@ -90,7 +90,7 @@ def test_who_watches_sees_what_is_set_but_neither_changes_it_nor_sees_passwords(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     with visiting("NONE:600", "/settings", signs={"confirm_time": 0.2}) as visit:
-        first, second = visit.page, visit.page.context.browser.new_page()
+        first, second = visit.page, visit.another_page()
         first.get_by_text("Ask to drive").click()
         expect(first.locator(".lease .role")).to_have_text("you drive")
         of(first, "camera.source").fill("rtsp://me:pa55@cam/1")

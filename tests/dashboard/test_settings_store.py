@@ -152,10 +152,12 @@ def test_what_differs_from_the_defaults_is_all_that_is_needed(values: dict[str, 
 
 
 def test_saves_what_differs_and_the_next_start_has_it(bench: Bench) -> None:
-    assert bench.settings.is_saved
+    was_saved = bench.settings.is_saved
+    assert was_saved
     bench.set("control.actions", "Peace: turbo")
     bench.set("camera.source", "rtsp://me:pa55@cam/1")
-    assert not bench.settings.is_saved
+    was_saved = bench.settings.is_saved
+    assert not was_saved
     bench.settings.save()
     assert bench.settings.is_saved
     assert load(bench.path) == bench.settings.wanted

@@ -1,6 +1,7 @@
 """What a stranger's script says by a page's websocket: it speaks for its own page only, and harms nothing."""
 
 import logging
+from typing import Any
 
 import pytest
 
@@ -16,7 +17,9 @@ def space(html: str, client: str) -> dict[str, object]:
 
 
 def stopped(site: Site) -> bool:
-    return site.dashboard.served.node.join("test").state().viewers.stands
+    node = site.dashboard.served.node.join("test")
+    assert node is not None
+    return node.state().viewers.stands
 
 
 def test_a_page_speaks_for_itself(site: Site) -> None:
@@ -49,7 +52,7 @@ def test_a_page_is_joined_only_by_the_browser_that_it_was_served_to(site: Site, 
         assert socket.answered("handshake", said) == [False]
 
 
-MALFORMED = (
+MALFORMED: tuple[list[Any], ...] = (
     [],
     [None],
     ["words"],

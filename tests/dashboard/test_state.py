@@ -1,4 +1,5 @@
 import math
+from typing import Any
 
 import pytest
 from hypothesis import given
@@ -300,7 +301,7 @@ def test_at_most_one_source_has_the_robot(stopped: str, source: str, viewers: Vi
         ({}, 0.0),
     ],
 )
-def test_tells_how_far_a_sign_is_confirmed(values: dict[str, str], confirmed: float) -> None:
+def test_tells_how_far_a_sign_is_confirmed(values: dict[str, Any], confirmed: float) -> None:
     assert compose(Observed({"hand_sign_recognition": report("", **values)}), 0.1).confirmed == confirmed
 
 

@@ -9,7 +9,8 @@ from playwright.sync_api import Error, Page
 
 from handsteer.config import load
 from handsteer.dashboard.server import Dashboard
-from handsteer.graph import Graph, cmd_vel_topic
+from handsteer.graph import Graph
+from handsteer.making import cmd_vel_topic
 from tests.dashboard.browsers import a_browser
 from tests.dashboard.visits import NEEDS_A_BROWSER, PATIENCE_MS, Visit, visiting
 
@@ -53,6 +54,12 @@ def set_slider(visit: Visit, linear_mps: float = 0.1) -> None:
         visit.page.wait_for_timeout(20)
 
 
+def steered(visit: Visit) -> bool:
+    """Set the slider, and say that it is."""
+    set_slider(visit)
+    return True
+
+
 def speed(visit: Visit) -> float:
     return visit.graph.robot.state.linear_mps
 
@@ -81,7 +88,7 @@ def test_a_slider_drives_until_it_is_at_zero_or_the_page_is_left(visit: Visit) -
     page = visit.page
     visit.wait_until(lambda: visit.text(".banner .headline") == "Standing")
     visit.wait_until(lambda: is_kept_driving(visit))
-    visit.wait_until(lambda: set_slider(visit) or visit.text(".mux .holds") == "By hand: you")
+    visit.wait_until(lambda: steered(visit) and visit.text(".mux .holds") == "By hand: you")
     press(page, LINEAR_TO_0)
     visit.wait_until(lambda: stands(visit))
 
@@ -127,15 +134,15 @@ def test_letters_drive_wherever_the_focus_is_once_one_drives_and_the_plot_shows_
         path = page.locator(f".axis:has-text('Linear') .plot .{line}").get_attribute("d") or ""
         return max((50 - float(point.split(" ")[1]) for point in path.replace("M", "L").split("L") if point), default=0)
 
-    for line in ("commanded", "measured"):
-        visit.wait_until(lambda line=line: reach(line) > 15)
+    visit.wait_until(lambda: reach("commanded") > 15)
+    visit.wait_until(lambda: reach("measured") > 15)
     page.reload()
     visit.wait_until(lambda: reach("measured") > 15)
     assert visit.troubles == []
 
 
 def test_sliders_of_who_watches_do_nothing(visit: Visit) -> None:
-    first, second = visit.page, visit.page.context.browser.new_page()
+    first, second = visit.page, visit.another_page()
     take_seat(visit)
     second.goto(first.url)
     second.locator(".steer .hint", has_text="You watch").wait_for()
@@ -149,7 +156,7 @@ def test_sliders_of_who_watches_do_nothing(visit: Visit) -> None:
     second.wait_for_timeout(500)
     assert stands(visit)
     holds = second.locator(".mux .holds", has_text="By hand: another viewer")
-    visit.wait_until(lambda: set_slider(visit) or holds.count() > 0)
+    visit.wait_until(lambda: steered(visit) and holds.count() > 0)
 
 
 def test_another_topic_is_steered_past_the_control_and_stops_as_well() -> None:
@@ -171,8 +178,8 @@ def test_another_topic_is_steered_past_the_control_and_stops_as_well() -> None:
             choose(visit, topic.name)
             visit.wait_until(lambda: "Past the control" in visit.text(".topic-words"))
             reason = f"steered by hand, straight on {topic.name}"
-            visit.wait_until(lambda: set_slider(visit) or visit.text(".banner .reason") == reason)
-            visit.wait_until(lambda: set_slider(visit) or speed(visit) > 0.02)
+            visit.wait_until(lambda: steered(visit) and visit.text(".banner .reason") == reason)
+            visit.wait_until(lambda: steered(visit) and speed(visit) > 0.02)
             visit.page.keyboard.press("Space")
             visit.wait_until(lambda: visit.text(".banner .headline") == "Stopped" and stands(visit))
         finally:

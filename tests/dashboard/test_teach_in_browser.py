@@ -61,7 +61,7 @@ def test_a_sign_is_taught_from_the_browsers_webcam_and_drives(
     two_fingers: Path, plan: dict[str, Any], tmp_path: Path
 ) -> None:
     # A machine that draws the world in software, and has little time, is slow to send its camera's frames.
-    patient = {"signs": {"max_frame_age": 2.0, "dropout_hold": 1.0}, "control": {"sign_timeout": 2.0}}
+    patient: dict[str, Any] = {"signs": {"max_frame_age": 2.0, "dropout_hold": 1.0}, "control": {"sign_timeout": 2.0}}
     with visiting("NONE:600", "/teach", webcam=two_fingers, teach=plan, **patient) as visit:
         teach(visit)
         keep(visit)
@@ -127,7 +127,7 @@ def test_one_teaches_at_a_time_while_the_robot_stands(visit: Visit, tmp_path: Pa
     first.locator(".lesson .trouble", has_text="stands until the lesson is over").wait_for()
     assert visit.text(".banner .headline") == "Stopped"
 
-    second = first.context.browser.new_page()
+    second = visit.another_page()
     second.goto(first.url)
     second.locator(".lesson .trouble", has_text="Somebody teaches <b>Peace</b> now").wait_for()
     second.get_by_label("Name of the sign").fill("Mine")

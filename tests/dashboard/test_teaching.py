@@ -10,6 +10,7 @@ import pytest
 
 from handsteer.clock import RealClock
 from handsteer.config import Config, TeachConfig
+from handsteer.dashboard.teaching.lesson import View
 from handsteer.dashboard.teaching.node import LessonVision, thumbnail
 from handsteer.dashboard.teaching.teaching import Teaching, with_sign
 from handsteer.errors import ConfigError, DatasetError, ModelCorrupt
@@ -99,6 +100,12 @@ def school(tmp_path: Path) -> Iterator[School]:
     school.close()
 
 
+def seen_by_ann(teaching: Teaching) -> View:
+    view = teaching.view("ann")
+    assert view is not None
+    return view
+
+
 def collected(school: School) -> int:
     view = school.teaching.view("ann")
     return len(view.takes) if view else -1
@@ -119,13 +126,15 @@ def test_a_sign_is_collected_learnt_kept_and_taken_by_the_graph(school: School) 
     school.wait_until(lambda: collected(school) == 3)
     lesson.delete(1)
     assert school.files == {"signs.npz", "mine.npz"}
-    assert teaching.view("ann").takes[0].picture.startswith(b"\xff\xd8")
+    assert seen_by_ann(teaching).takes[0].picture.startswith(b"\xff\xd8")
 
     lesson.train()
-    school.wait_until(lambda: teaching.view("ann").progress > 0)
-    school.wait_until(lambda: teaching.view("ann").step == "try")
-    school.wait_until(lambda: (seen := teaching.view("ann").seen) is not None and seen.sign == "peace")
-    assert teaching.view("ann").report.confusion.labels == ("Call", "peace", "NONE")
+    school.wait_until(lambda: seen_by_ann(teaching).progress > 0)
+    school.wait_until(lambda: seen_by_ann(teaching).step == "try")
+    school.wait_until(lambda: (seen := seen_by_ann(teaching).seen) is not None and seen.sign == "peace")
+    report = seen_by_ann(teaching).report
+    assert report is not None
+    assert report.confusion.labels == ("Call", "peace", "NONE")
 
     with pytest.raises(ConfigError, match="'fly' is no action: choose one of forward"):
         teaching.keep("ann", "fly")
@@ -148,10 +157,12 @@ def test_a_sign_is_collected_learnt_kept_and_taken_by_the_graph(school: School) 
 def test_what_is_discarded_leaves_nothing(school: School) -> None:
     school.teaching.begin("ann", "Peace")
     lesson = school.teaching.lesson("ann")
+    assert lesson is not None
     lesson.record()
     school.wait_until(lambda: collected(school) == 2)
     school.teaching.end("ben")
-    assert school.teaching.label == "Peace", "another one's lesson goes on"
+    label = school.teaching.label
+    assert label == "Peace", "another one's lesson goes on"
     school.teaching.end("ann")
     assert (school.teaching.label, school.files, school.config) == (None, set(), Config())
 
@@ -159,6 +170,7 @@ def test_what_is_discarded_leaves_nothing(school: School) -> None:
 def test_a_training_is_cancelled_with_the_lesson_or_before(school: School) -> None:
     school.teaching.begin("ann", "Peace")
     lesson = school.teaching.lesson("ann")
+    assert lesson is not None
     lesson.record()
     school.wait_until(lambda: collected(school) == 3)
     lesson.train()
@@ -173,6 +185,7 @@ def test_a_training_is_cancelled_with_the_lesson_or_before(school: School) -> No
 def test_takes_are_collected_only_while_the_page_is_there(school: School) -> None:
     school.teaching.begin("ann", "Peace")
     lesson = school.teaching.lesson("ann")
+    assert lesson is not None
     lesson.record()
     waiting = threading.Event()
     for _ in range(200):

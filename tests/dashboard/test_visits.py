@@ -35,7 +35,7 @@ def others() -> set[str]:
 
 def objects() -> Counter[str]:
     """Return how many there are of each kind, but for what is bounded by its own."""
-    urllib.parse.clear_cache()
+    urllib.parse.clear_cache()  # type: ignore[attr-defined]
     gc.collect()
     kinds = [type(each) for each in gc.get_objects() if not isinstance(each, Sample)]
     return Counter(f"{kind.__module__}.{kind.__qualname__}" for kind in kinds)

@@ -2,7 +2,9 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -49,13 +51,14 @@ def camera(page: Page) -> tuple[float, float, float]:
 
 
 def trail_points(page: Page) -> int:
-    return page.evaluate(
+    count: int = page.evaluate(
         f"""() => {{ {SCENE}
             let points = 0;
             scene.traverse(shape => points += shape.frustumCulled ? 0 : shape.geometry.attributes.position.count / 2);
             return points;
         }}"""
     )
+    return count
 
 
 def turned_links(page: Page) -> list[NDArray[np.float64]]:
@@ -68,6 +71,10 @@ def turned_links(page: Page) -> list[NDArray[np.float64]]:
         }}"""
     )
     return [np.reshape(columns, (4, 4)).T[:3, :3] for columns in found]
+
+
+def is_any_link_turned(page: Page, to: NDArray[np.float64]) -> bool:
+    return any(np.abs(to - link).max() < 0.03 for link in turned_links(page))
 
 
 def on_screen(page: Page, x: float, y: float, z: float = 0.2) -> tuple[float, float]:
@@ -117,7 +124,8 @@ def test_three_views_go_along_with_the_robot_and_its_way_is_drawn() -> None:
 
 def test_the_wheels_turn_as_the_joint_states_say() -> None:
     with looking_at("empty") as visit:
-        robot, angles = visit.graph.robot, {}
+        robot = visit.graph.robot
+        angles: dict[str, float] = {}
 
         def keep(received: Received[JointState]) -> None:
             angles.update(zip(received.message.name, received.message.position.tolist(), strict=True))
@@ -130,9 +138,7 @@ def test_the_wheels_turn_as_the_joint_states_say() -> None:
         assert len({round(angles[wheel.name], 1) for wheel in wheels}) > 1  # each side its own
         for wheel in wheels:
             expected = from_rpy(wheel.rpy) @ about_axis(wheel.axis, angles[wheel.name])
-            visit.wait_until(
-                lambda to=expected: any(np.abs(to - link).max() < 0.03 for link in turned_links(visit.page))
-            )
+            visit.wait_until(partial(is_any_link_turned, visit.page, expected))
         assert visit.troubles == []
 
 
@@ -140,7 +146,7 @@ def test_things_are_added_dragged_changed_deleted_saved_and_loaded(tmp_path: Pat
     with looking_at("empty") as visit:
         page, robot = visit.page, visit.graph.robot
 
-        def things() -> tuple[object, ...]:
+        def things() -> tuple[Any, ...]:
             return robot.world.obstacles if robot.world else ()
 
         press(page, "Edit world")
@@ -192,13 +198,14 @@ def test_things_are_added_dragged_changed_deleted_saved_and_loaded(tmp_path: Pat
 
 
 def drawn_at(page: Page, x: float, y: float) -> bool:
-    return page.evaluate(
+    is_drawn: bool = page.evaluate(
         f"""([x, y]) => {{ {SCENE}
             return scene.children.some(shape => shape.isMesh && shape.geometry.type === "BoxGeometry"
                 && Math.hypot(shape.position.x - x, shape.position.y - y) < 0.01);
         }}""",
         [x, y],
     )
+    return is_drawn
 
 
 def test_the_course_counts_gates_and_bumps_and_only_the_driver_edits(tmp_path: Path) -> None:
@@ -215,7 +222,7 @@ def test_the_course_counts_gates_and_bumps_and_only_the_driver_edits(tmp_path: P
         visit.wait_until(lambda: red_boxes(page) == 1)
         visit.graph.steering.release()
 
-        other = page.context.browser.new_page()
+        other = visit.another_page()
         other.set_default_timeout(PATIENCE_MS)
         other.goto(page.url)
         other.locator(".lease .role", has_text="you watch").wait_for()
@@ -239,12 +246,13 @@ def test_the_course_counts_gates_and_bumps_and_only_the_driver_edits(tmp_path: P
 
 
 def red_boxes(page: Page) -> int:
-    return page.evaluate(
+    count: int = page.evaluate(
         f"""() => {{ {SCENE}
             const isRed = ({{ r, g }}) => r > 0.9 && g < 0.1;
             return scene.children.filter(shape => shape.isMesh && isRed(shape.material.color)).length;
         }}"""
     )
+    return count
 
 
 def test_a_page_without_the_robot_says_where_its_world_is_edited() -> None:

@@ -46,6 +46,12 @@ class Visit:
     def number(self, selector: str) -> float:
         return float(self.text(selector).split()[-1])
 
+    def another_page(self) -> Page:
+        """Open an empty page of another viewer in the same browser."""
+        browser = self.page.context.browser
+        assert browser is not None
+        return browser.new_page()
+
     def wait_until(self, condition: Callable[[], bool]) -> None:
         for _ in range(PATIENCE_MS // 50):
             if condition():

@@ -3,11 +3,10 @@
 import itertools
 import time
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Protocol
 
 from tests.contracts.node_contract import CMD_VEL, FORWARD, ODOM, Driver, Running, Twists, twists
-from tests.dds.graph import DdsGraph
-from tests.processes import Peer, eventually
+from tests.processes import Peer, Process, eventually
 
 NODE = "hand_sign_control"
 SCRIPT = ("-p", "virtual_hand.script:=Forward:60")
@@ -17,8 +16,18 @@ SETTLE_S = 0.3
 _numbers = itertools.count()
 
 
+class PeerGraph(Protocol):
+    """Processes with a plain program among them that looks on, as :class:`tests.dds.graph.DdsGraph` has them."""
+
+    peer: Peer
+
+    def node(self, verb: str, *arguments: str, name: str, ros: tuple[str, ...] = ()) -> Process: ...
+
+    def publishes(self, node: str, topic: str) -> bool: ...
+
+
 class DdsDriver(Driver):
-    def __init__(self, graph: DdsGraph, *options: str, parameters: Mapping[str, Any] | None = None) -> None:
+    def __init__(self, graph: PeerGraph, *options: str, parameters: Mapping[str, Any] | None = None) -> None:
         namespace = f"/n{next(_numbers)}"
         self.signs, self.cmd_vel, self._peer = f"{namespace}/gesture/hand_sign", f"{namespace}{CMD_VEL}", graph.peer
         record_twists(graph.peer, self.cmd_vel)
@@ -55,7 +64,7 @@ def record_twists(peer: Peer, topic: str = CMD_VEL) -> None:
     peer.ask("record", topic=topic, type="Twist", fields=["linear.x", "angular.z"])
 
 
-def driving_chain(graph: DdsGraph) -> Running:
+def driving_chain(graph: PeerGraph) -> Running:
     """Return all nodes, not started yet."""
     record_twists(graph.peer)
     fields = ["twist.twist.linear.x", "pose.pose.position.x"]

@@ -137,7 +137,7 @@ class Robot:
         for message in self.reader.take(100):
             if isinstance(message, InvalidSample):
                 continue
-            twist = getattr(message, "twist", message)
+            twist: Any = getattr(message, "twist", message)
             header = getattr(message, "header", Header())
             self.linear, self.angular, self.heard_s = twist.linear.x, twist.angular.z, now
             stamp_s = header.stamp.sec + header.stamp.nanosec / 1e9

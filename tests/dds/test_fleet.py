@@ -3,6 +3,7 @@
 import signal
 import sys
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -49,7 +50,7 @@ def start(graph: DdsGraph, home: Path, *ros: str, stamped: bool = False) -> Peer
     # A command reaches each of them: both ends have found each other.
     for _ in NAMES:
         told = {name: len(robots.ask("commands", name=name)) for name in NAMES}
-        eventually(lambda told=told: _is_told_more(graph, robots, told), what="a robot that hears the control")
+        eventually(partial(_is_told_more, graph, robots, told), what="a robot that hears the control")
         select(graph, "next")
     return robots
 
@@ -58,6 +59,10 @@ def _is_told_more(graph: DdsGraph, robots: Peer, told: dict[str, int]) -> bool:
     show(graph, "Stop", count=1)
     selected = graph.peer.ask("get", topic="/selected_robot")[-1][1][0]
     return len(robots.ask("commands", name=selected)) > told[selected]
+
+
+def _is_told_zero(robots: Peer, name: str) -> bool:
+    return bool(robots.ask("commands", name=name)[-1][1] == 0.0)
 
 
 def moved_by(graph: DdsGraph, robots: Peer, sign: str) -> list[str]:
@@ -77,7 +82,7 @@ def test_only_the_selected_robot_moves_and_only_after_stop(graph: DdsGraph, tmp_
         show(graph, "Stop", count=2)
         assert moved_by(graph, robots, "Forward") == [name]
         select(graph, "next")
-        eventually(lambda name=name: robots.ask("commands", name=name)[-1][1] == 0.0, what=f"{name} to be told zero")
+        eventually(partial(_is_told_zero, robots, name), what=f"{name} to be told zero")
         assert moved_by(graph, robots, "Forward") == []
         assert [linear for _, linear, *_ in robots.ask("commands", name=name)[-3:]] == [0.0, 0.0, 0.0]
     names = [name for _, (name,) in graph.peer.ask("get", topic="/selected_robot")]

@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from tests.about import about
 from tests.contracts.node_contract import CMD_VEL
 from tests.dds.driver import NODE, DdsDriver, record_twists
 from tests.dds.graph import DdsGraph, dds_graph
@@ -105,7 +106,7 @@ def test_requests_do_not_hold_up_signs(tmp_path: Path) -> None:
         for _ in range(5):
             assert other.ask("call", **order) is not None
         assert time.monotonic() - began_s < 60
-        driver.expect(*((pytest.approx(0.01 * step), 0.0) for step in range(1, 21)))
+        driver.expect(*((about(0.01 * step), 0.0) for step in range(1, 21)))
 
 
 def test_services_can_be_left_out(dds: DdsGraph) -> None:

@@ -186,7 +186,14 @@ class Drive:
 
     def until(self, condition: Callable[[], Any], what: str) -> None:
         """Wait until ``condition`` holds; fail when a process ends meanwhile."""
-        eventually(lambda: condition() or self._check(), what=what)
+
+        def met() -> Any:
+            is_met = condition()
+            if not is_met:
+                self._check()
+            return is_met
+
+        eventually(met, what=what)
 
     def stop_times(self, since_s: float) -> tuple[float, float]:
         """Return how long after ``since_s`` the robot became slower, and how long until it stood, in seconds."""

@@ -61,14 +61,14 @@ class Link:
 
     def __init__(self, robot: Machine, workstation: Machine, log: Path) -> None:
         self._ends = (robot, workstation)
-        self._relay: Peer | None = None
+        self._limiter: Peer | None = None
         self._shape = (0.0, 0.0, 0.0)
         self.kind = "netem" if has_netem(robot) else "relay"
         one, other = ([end.namespace, DEVICE] for end in self._ends)
         if self.kind == "netem":
             run("ip", "link", "add", one[1], "netns", one[0], "type", "veth", "peer", other[1], "netns", other[0])
         else:
-            self._relay = Peer([sys.executable, str(RELAY), *one, *other], dict(os.environ), log)
+            self._limiter = Peer([sys.executable, str(RELAY), *one, *other], dict(os.environ), log)
         for end in self._ends:
             end.run("ip", "address", "add", f"{end.address}/24", "dev", DEVICE)
             end.run("ip", "link", "set", DEVICE, "up")
@@ -94,12 +94,12 @@ class Link:
 
     def close(self) -> None:
         """Remove the link's own process; the rest goes with the namespaces."""
-        if self._relay is not None:
-            self._relay.kill()
+        if self._limiter is not None:
+            self._limiter.kill()
 
     def _apply(self, delay_s: float, jitter_s: float, loss: float) -> float:
-        if self._relay is not None:
-            return float(self._relay.ask("shape", delay_s=delay_s, jitter_s=jitter_s, loss=loss)["at_s"])
+        if self._limiter is not None:
+            return float(self._limiter.ask("shape", delay_s=delay_s, jitter_s=jitter_s, loss=loss)["at_s"])
         began_s = time.time()
         words = ["delay", f"{delay_s * 1000:g}ms", f"{jitter_s * 1000:g}ms", "loss", f"{loss * 100:g}%"]
         for end in self._ends:

@@ -4,6 +4,7 @@ import json
 import statistics
 import sys
 from pathlib import Path
+from random import Random
 
 import pytest
 from hypothesis import given
@@ -46,9 +47,9 @@ print(json.dumps(took_s))
     st.randoms(use_true_random=False),
 )
 def test_every_frame_arrives_at_its_end_within_the_jitter(
-    sent: list[tuple[float, int]], delay_s: float, jitter_s: float, random: object
+    sent: list[tuple[float, int]], delay_s: float, jitter_s: float, random: Random
 ) -> None:
-    wire = Wire(random.random)  # type: ignore[attr-defined]
+    wire = Wire(random.random)
     wire.shape(delay_s, jitter_s)
     for number, (at_s, end) in enumerate(sent):
         wire.put(bytes([number]), end, at_s)

@@ -80,7 +80,7 @@ class _Writer:
         self._domain = domain
 
     @property
-    def wanted(self) -> bool:
+    def has_subscribers(self) -> bool:
         return bool(self._domain.readers(self.topic.name))
 
     def publish(self, message: Any, captured_s: float | None = None) -> None:

@@ -1,6 +1,5 @@
 """``handsteer steering`` without a page, whose stick somebody holds: ``held_stick.py steering --transport dds …``."""
 
-import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -12,7 +11,7 @@ SPEED_MPS = 0.3
 
 
 @contextmanager
-def held(node: Any, _config: Any) -> Iterator[None]:
+def held(node: Any, config: Any) -> Iterator[None]:
     ended = threading.Event()
 
     def hold() -> None:
@@ -26,4 +25,4 @@ def held(node: Any, _config: Any) -> Iterator[None]:
 
 
 nodes._served = held
-sys.exit(main())
+main()

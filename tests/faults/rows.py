@@ -157,10 +157,12 @@ def _real_robots() -> Iterator[Row]:
 
     def senseless(chain: Chain) -> None:
         assert isinstance(chain, RemoteChain)
+        assert chain.real is not None
         chain.real.is_senseless = True
 
     def sensible(chain: Chain) -> None:
         assert isinstance(chain, RemoteChain)
+        assert chain.real is not None
         chain.real.is_senseless = False
 
     yield Row("real robot", "says NaN in its odometry", senseless, sensible, make=RemoteChain)

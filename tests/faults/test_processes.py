@@ -8,7 +8,7 @@ from tests.faults.table import LIMIT_S, written
 
 pytest.importorskip("cyclonedds")
 
-from tests.faults.processes import SIGNALS, Rig, outcome_of, rig, rows
+from tests.faults.processes import SIGNALS, Rig, Row, outcome_of, rig, rows
 
 SEEN_S = 0.05
 """What it takes until the speed has fallen by so much, or until the onlooker looks, that it is seen."""
@@ -25,8 +25,8 @@ def signs() -> Iterator[Rig]:
 @pytest.mark.exhaustive
 @pytest.mark.slow
 @pytest.mark.parametrize("row", [*CONTROL, *ROBOT], ids=lambda row: row.name)
-def test_the_robot_stands_within_the_limit_and_until_neutral_was_seen(signs: Rig, row: object) -> None:
-    outcome = outcome_of(row, signs)  # type: ignore[arg-type]
+def test_the_robot_stands_within_the_limit_and_until_neutral_was_seen(signs: Rig, row: Row) -> None:
+    outcome = outcome_of(row, signs)
     assert outcome.zero_s is None or outcome.zero_s <= LIMIT_S + SEEN_S
     assert not outcome.moves_again
 

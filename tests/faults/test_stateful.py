@@ -19,8 +19,8 @@ from handsteer.messages import CMD_VEL, IMAGE_RAW, STEERING_CMD_VEL, STOP, Bool,
 from handsteer.nodes.control import HandSignControlNode
 from handsteer.nodes.node import Node
 from handsteer.nodes.recognition import HandSignRecognitionNode
+from handsteer.robots.command_limiter import CommandLimiter
 from handsteer.robots.diff_drive import Velocity
-from handsteer.robots.relay import Relay
 from handsteer.signs.drawing import annotate
 from handsteer.signs.opening import open_classifier
 from handsteer.transports.protocol import Received
@@ -43,7 +43,7 @@ class Graph:
     def __init__(self) -> None:
         self.clock = SteppedClock(_BEGIN_S)
         self.domain = Domain()
-        self.relay = Relay(RobotConfig())
+        self.relay = CommandLimiter(RobotConfig())
         self.linked = True
         self.camera = PaintedCamera(self.clock)
         self.images = self.domain.advertise("camera", IMAGE_RAW)
@@ -115,7 +115,7 @@ class Histories(RuleBasedStateMachine):
         super().__init__()
         logging.disable(logging.CRITICAL)
         self.graph = Graph()
-        self.rules = Rules()
+        self.oracle = Rules()
 
     def teardown(self) -> None:
         logging.disable(logging.NOTSET)
@@ -136,18 +136,18 @@ class Histories(RuleBasedStateMachine):
             seconds -= moment
 
     def look(self) -> None:
-        self.rules.now_s = self.graph.clock.now()
+        self.oracle.now_s = self.graph.clock.now()
         if self.graph.is_asked_to_move:
-            why_not = self.rules.why_not()
-            assert why_not is None, f"at {self.rules.now_s:.2f} s the robot is asked to move, though {why_not}"
+            why_not = self.oracle.why_not()
+            assert why_not is None, f"at {self.oracle.now_s:.2f} s the robot is asked to move, though {why_not}"
         else:
-            self.rules.stands()
+            self.oracle.stands()
 
     @rule(sign=st.sampled_from(MOTIONS + NEUTRAL), frames=st.integers(1, 8))
     def show(self, sign: str, frames: int) -> None:
         for _ in range(frames):
-            self.rules.now_s = self.graph.clock.now()
-            self.rules.picture(sign, asks=sign in MOTIONS)
+            self.oracle.now_s = self.graph.clock.now()
+            self.oracle.picture(sign, asks=sign in MOTIONS)
             self.graph.show(sign)
             self.look()
             self.wait(1 / FPS)
@@ -161,7 +161,7 @@ class Histories(RuleBasedStateMachine):
     def hold(self, sign: str, frames: int) -> None:
         self.show(sign, frames)
 
-    @precondition(lambda self: self.rules.is_stopped or not self.graph.linked)
+    @precondition(lambda self: self.oracle.is_stopped or not self.graph.linked)
     @rule()
     def begin_anew(self) -> None:
         self.reset()
@@ -187,8 +187,8 @@ class Histories(RuleBasedStateMachine):
     @rule(speed=st.sampled_from([0.5, -0.5, 0.0, float("nan")]), count=st.integers(1, 5))
     def steer(self, speed: float, count: int) -> None:
         for _ in range(count):
-            self.rules.now_s = self.graph.clock.now()
-            self.rules.stick(asks=speed in (0.5, -0.5))
+            self.oracle.now_s = self.graph.clock.now()
+            self.oracle.stick(asks=speed in (0.5, -0.5))
             self.graph.stick.publish(twist(speed, 0.0))
             self.graph.serve()
             self.look()
@@ -196,13 +196,13 @@ class Histories(RuleBasedStateMachine):
 
     @rule()
     def stop(self) -> None:
-        self.rules.stop()
+        self.oracle.stop()
         self.graph.stop.publish(Bool(data=True))
         self.wait(_TICK_S)
 
     @rule()
     def reset(self) -> None:
-        self.rules.reset()
+        self.oracle.reset()
         self.graph.stop.publish(Bool(data=False))
         self.wait(_TICK_S)
 
@@ -214,14 +214,14 @@ class Histories(RuleBasedStateMachine):
     def the_clock_jumps(self, seconds: float) -> None:
         self.graph.clock.advance(seconds)
         if seconds > 0.5:
-            self.rules.disarm()
+            self.oracle.disarm()
         self.graph.relay.step(seconds, linked=self.graph.linked)
         self.wait(_TICK_S)
 
     @rule(name=st.sampled_from(["control", "recognition"]))
     def restart(self, name: str) -> None:
         if name == "control":
-            self.rules.disarm()
+            self.oracle.disarm()
         self.graph.restart(name)
         self.wait(_TICK_S)
 
@@ -229,7 +229,7 @@ class Histories(RuleBasedStateMachine):
     def freeze(self, name: str, seconds: float) -> None:
         self.graph.frozen.add(name)
         if seconds > 0.6:
-            self.rules.disarm()
+            self.oracle.disarm()
         self.wait(seconds)
         self.graph.frozen.discard(name)
         self.wait(_TICK_S)
@@ -238,14 +238,14 @@ class Histories(RuleBasedStateMachine):
     @rule()
     def the_robot_leaves(self) -> None:
         self.graph.linked = False
-        self.rules.robot_was_away()
+        self.oracle.robot_was_away()
         self.wait(_TICK_S)
 
     @precondition(lambda self: not self.graph.linked)
     @rule()
     def the_robot_comes_back(self) -> None:
         self.graph.linked = True
-        self.rules.robot_was_away()
+        self.oracle.robot_was_away()
         self.wait(_TICK_S)
 
 

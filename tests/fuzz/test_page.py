@@ -17,7 +17,7 @@ from tests.fuzz import corpus
 from tests.fuzz.mutants import CASES, mutants
 from tests.processes import eventually
 
-VALUES = (
+VALUES: tuple[object, ...] = (
     None, True, 0, -1, 0.5, 1e308, 2**63, "", "Stop", "x" * 5000, "\x1b[2J\n", "../../etc/passwd", [], [1, 2], [[[]]],
     {}, {"value": 0}, {"value": 99}, {"value": "x"}, {"x": 1, "y": "1", "at": 1e400}, {"x": 0.1, "y": 0.2, "at": 1},
     {"name": "w.yaml", "text": corpus.ALIASES}, {"name": 1, "text": corpus.MERGES}, {"name": "w", "text": "[" * 9999},

@@ -8,6 +8,7 @@ import json
 import struct
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -38,6 +39,7 @@ from handsteer.messages import (
     Image,
     String,
     Time,
+    Topic,
     type_name,
 )
 from handsteer.robots.description import joints, robot_description, visuals
@@ -232,7 +234,8 @@ def test_arrays_of_datasets(tmp_path: Path) -> None:
 
     def read_array(data: bytes) -> object:
         name = names[sum(data) % len(names)]
-        return read(corpus.dataset(**{name: data}))
+        arrays: dict[str, Any] = {name: data}
+        return read(corpus.dataset(**arrays))
 
     hold(read_array, mutants([*arrays, corpus.saved('[{"label": "Hi"}]'), corpus.npy((10**9,), "<f8")]))
 
@@ -275,9 +278,9 @@ def test_descriptions_of_robots() -> None:
     [CMD_VEL, DIAGNOSTICS, HAND_SIGN, IMAGE_COMPRESSED, IMAGE_RAW, JOINT_STATES, ODOM, WORLD_MARKERS],
     ids=lambda topic: topic.name,
 )
-def test_messages_of_other_nodes(topic: object) -> None:
+def test_messages_of_other_nodes(topic: Topic[Any]) -> None:
     """What cannot be decoded is left out by the transports, whatever rosbags raises; here it must be soon."""
-    name = type_name(topic.type)  # type: ignore[attr-defined]
+    name = type_name(topic.type)
 
     def read(data: bytes) -> None:
         try:

@@ -10,7 +10,7 @@ from handsteer.config import LandmarksConfig
 from handsteer.landmarks.mediapipe import MediaPipeLandmarker
 from handsteer.signs.model import load_model
 from handsteer.signs.trained import TrainedClassifier
-from handsteer.types import SIGNS
+from handsteer.types import SIGNS, Handedness
 from tests.hand.views import random_picture
 
 pytestmark = pytest.mark.slow
@@ -32,7 +32,7 @@ class Outcome:
         return len(self.errors) / self.views
 
 
-def look_at(sign: str, hand: str, views: int, distances_m: tuple[float, float]) -> Outcome:
+def look_at(sign: str, hand: Handedness, views: int, distances_m: tuple[float, float]) -> Outcome:
     """Show random views, each by itself; a hand that is found elsewhere counts as not found."""
     random = np.random.default_rng([SIGNS.index(sign), hand == "Left"])
     landmarker, classifier = MediaPipeLandmarker(LandmarksConfig()), TrainedClassifier(load_model())
@@ -49,7 +49,7 @@ def look_at(sign: str, hand: str, views: int, distances_m: tuple[float, float]) 
     return outcome
 
 
-def report(sign: str, hand: str, outcome: Outcome) -> None:
+def report(sign: str, hand: Handedness, outcome: Outcome) -> None:
     print(  # noqa: T201 - shown with -rP; these are the figures that the documentation quotes
         f"{sign}, {hand} hand: {outcome.found:.0%} of {outcome.views} found, joints off by"
         f" {np.median(outcome.errors):.1%} of the hand's length, {outcome.handed} with the right handedness,"
@@ -59,7 +59,7 @@ def report(sign: str, hand: str, outcome: Outcome) -> None:
 
 @pytest.mark.parametrize("hand", ["Right", "Left"])
 @pytest.mark.parametrize("sign", SIGNS)
-def test_random_views_are_found_where_they_are(sign: str, hand: str) -> None:
+def test_random_views_are_found_where_they_are(sign: str, hand: Handedness) -> None:
     outcome = look_at(sign, hand, VIEWS, NEAR_M)
     report(sign, hand, outcome)
     assert outcome.found >= 0.95
@@ -70,7 +70,7 @@ def test_random_views_are_found_where_they_are(sign: str, hand: str) -> None:
 
 @pytest.mark.parametrize("hand", ["Right", "Left"])
 @pytest.mark.parametrize("sign", SIGNS)
-def test_most_views_are_found_from_further_away(sign: str, hand: str) -> None:
+def test_most_views_are_found_from_further_away(sign: str, hand: Handedness) -> None:
     outcome = look_at(sign, hand, 20, FAR_M)
     report(sign, hand, outcome)
     assert outcome.found >= 0.75

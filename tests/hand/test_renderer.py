@@ -6,25 +6,25 @@ from handsteer.hand.kinematics import pose_skeleton
 from handsteer.hand.placement import Pinhole
 from handsteer.hand.poses import View, sign_pose
 from handsteer.hand.renderer import Look, render, true_pixels
-from handsteer.types import SIGNS, STOP
+from handsteer.types import SIGNS, STOP, Handedness
 
 CAMERA = Pinhole.webcam(320, 240)
 WALL = np.full((240, 320, 3), (210, 40, 40), np.uint8)
 SKELETON = pose_skeleton(sign_pose(STOP).angles)
 
 
-def draw(view: View | None = None, hand: str = "Right", look: Look | None = None) -> np.ndarray:
+def draw(view: View | None = None, hand: Handedness = "Right", look: Look | None = None) -> np.ndarray:
     placement = (view or sign_pose(STOP).view).placement(hand)
     return render(SKELETON, placement, CAMERA, look or Look(), WALL)
 
 
 def drawn(image: np.ndarray) -> np.ndarray:
-    return np.any(image != WALL, axis=-1)
+    return np.asarray(np.any(image != WALL, axis=-1))
 
 
 @pytest.mark.parametrize("hand", ["Left", "Right"])
 @pytest.mark.parametrize("sign", SIGNS)
-def test_the_true_joints_lie_on_the_drawn_hand(sign: str, hand: str) -> None:
+def test_the_true_joints_lie_on_the_drawn_hand(sign: str, hand: Handedness) -> None:
     pose = sign_pose(sign, hand)
     skeleton, placement = pose_skeleton(pose.angles), pose.view.placement(hand)
     mask = drawn(render(skeleton, placement, CAMERA, Look(), WALL))
@@ -81,7 +81,7 @@ def test_light_comes_from_where_it_is_said_to() -> None:
 def test_pictures_of_any_size(size: tuple[int, int]) -> None:
     background = make_background("cluttered", *size)
     image = render(SKELETON, sign_pose(STOP).view.placement("Right"), Pinhole.webcam(*size), Look(), background)
-    assert (image.shape, image.dtype) == ((size[1], size[0], 3), np.uint8)
+    assert (image.shape, image.dtype) == ((size[1], size[0], 3), np.dtype(np.uint8))
     assert np.any(image != background)
 
 

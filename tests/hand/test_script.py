@@ -8,14 +8,14 @@ from handsteer.hand.kinematics import LIMITS, pose_joints
 from handsteer.hand.placement import Pinhole
 from handsteer.hand.poses import sign_pose
 from handsteer.hand.script import Motion, Part, parse_script
-from handsteer.types import NONE, SIGNS
+from handsteer.types import NONE, SIGNS, Handedness
 
 SCRIPT = "Forward:1 Turn Left:1 Stop:0.5 Backward:1 Turn Right:1 Go:0.7 NONE:1"
 PARTS = st.lists(st.tuples(st.sampled_from([*SIGNS, NONE]), st.floats(0.01, 100)), min_size=1, max_size=8)
-HANDS = ("Left", "Right")
+HANDS: tuple[Handedness, ...] = ("Left", "Right")
 
 
-def joints_m(motion: Motion, handedness: str, time_s: float) -> np.ndarray:
+def joints_m(motion: Motion, handedness: Handedness, time_s: float) -> np.ndarray:
     pose = motion.at(time_s).pose
     return pose.view.placement(handedness).apply(pose_joints(pose.angles)[0])
 
@@ -56,7 +56,7 @@ def test_a_wrong_script_is_refused_with_its_place(script: str, complaint: str) -
 
 
 @pytest.mark.parametrize("hand", HANDS)
-def test_the_motion_is_smooth_also_where_the_script_starts_again(hand: str) -> None:
+def test_the_motion_is_smooth_also_where_the_script_starts_again(hand: Handedness) -> None:
     motion = Motion(SCRIPT, hand)
     times = np.arange(0, 2 * motion.duration_s, 1 / 500)
     joints = np.array([joints_m(motion, hand, time) for time in times])
@@ -67,7 +67,7 @@ def test_the_motion_is_smooth_also_where_the_script_starts_again(hand: str) -> N
 
 @pytest.mark.parametrize("hand", HANDS)
 @pytest.mark.parametrize("sign", SIGNS)
-def test_a_sign_is_held_with_a_small_sway(sign: str, hand: str) -> None:
+def test_a_sign_is_held_with_a_small_sway(sign: str, hand: Handedness) -> None:
     motion = Motion(f"{sign}:5", hand)
     held = np.array([joints_m(motion, hand, time) for time in np.arange(0.5, 4.9, 0.1)])
     pose = sign_pose(sign, hand)

@@ -10,7 +10,7 @@ from handsteer.hand.kinematics import pose_skeleton
 from handsteer.hand.placement import Pinhole
 from handsteer.hand.poses import View, sign_pose
 from handsteer.hand.renderer import SKINS, Look, render, true_pixels
-from handsteer.landmarks.protocol import Handedness
+from handsteer.types import Handedness
 
 CAMERA = Pinhole.webcam(640, 480)
 HAND_LENGTH_M = 0.19

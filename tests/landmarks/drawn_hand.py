@@ -17,7 +17,8 @@ def open_right_hand(x: float, y: float, size: float = 90) -> np.ndarray:
     with np.load(FIXTURE) as golden:
         row = next(i for i, path in enumerate(golden["photo_paths"]) if path.startswith("stop/sld"))
         points = golden["photos_pixels"][row, :, :2]
-    return (points - points.mean(axis=0)) * (size / np.linalg.norm(points[9] - points[0])) + (x, y)
+        centred = points - points.mean(axis=0)
+    return np.asarray(centred * (size / np.linalg.norm(points[9] - points[0])) + (x, y))
 
 
 def open_left_hand(x: float, y: float, size: float = 90) -> np.ndarray:
@@ -45,6 +46,8 @@ def _draw_hand(image: np.ndarray, points: np.ndarray) -> None:
         _line(image, points[list(finger)], _SKIN, thick - 2)
 
 
-def _line(image: np.ndarray, points, color: tuple[int, int, int], thickness: int) -> None:
+def _line(
+    image: np.ndarray, points: np.ndarray | list[np.ndarray], color: tuple[int, int, int], thickness: int
+) -> None:
     line = np.array(points).round().astype(np.int32)
     cv2.polylines(image, [line], isClosed=False, color=color, thickness=thickness)

@@ -32,6 +32,7 @@ def photo_paths() -> list[str]:
 def read_photo(path: str) -> np.ndarray:
     """Return a photo as BGR; one below 400 px as a camera would frame it (see the README of the data)."""
     photo = cv2.imread(str(DATA / "photos" / path))
+    assert photo is not None, path
     height, width = photo.shape[:2]
     if max(height, width) >= 400:
         return photo

@@ -9,6 +9,8 @@ pixels; ``world`` (n, 21, 3) in metres; ``right`` (n,) MediaPipe's score for its
 mirrored picture. Rows without a hand are zero. ``photo_paths`` names the photos.
 """
 
+from typing import Any
+
 import cv2
 import mediapipe as mp
 import numpy as np
@@ -41,7 +43,7 @@ def golden(images: list[np.ndarray], *, static: bool) -> dict[str, np.ndarray]:
     return {"found": found, "pixels": pixels, "world": world, "right": right}
 
 
-def _rows(landmarks) -> np.ndarray:
+def _rows(landmarks: Any) -> np.ndarray:
     return np.array([(point.x, point.y, point.z) for point in landmarks.landmark])
 
 
@@ -51,7 +53,9 @@ def main() -> None:
         "photos": golden([read_photo(path) for path in paths], static=True),
         "video": golden(read_video(), static=False),
     }
-    arrays = {f"{group}_{name}": values for group, rows in groups.items() for name, values in rows.items()}
+    arrays: dict[str, Any] = {
+        f"{group}_{name}": values for group, rows in groups.items() for name, values in rows.items()
+    }
     np.savez_compressed(FIXTURE, photo_paths=paths, **arrays)
     print({group: f"{rows['found'].sum()} of {len(rows['found'])} found" for group, rows in groups.items()})  # noqa: T201
 

@@ -1,5 +1,6 @@
 """The shipped 8-bit model against the one that it is made of."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -23,7 +24,7 @@ def landmarkers() -> list[MediaPipeLandmarker]:
     return [MediaPipeLandmarker(LandmarksConfig(model=model)) for model in ("full", "fast")]
 
 
-def hands_of_both(landmarkers, image: np.ndarray) -> list[tuple[Hand, Hand]]:
+def hands_of_both(landmarkers: list[MediaPipeLandmarker], image: np.ndarray) -> list[tuple[Hand, Hand]]:
     """Return the hands that both see; there are as many of each."""
     full, fast = (landmarker.detect(image) for landmarker in landmarkers)
     assert len(full) == len(fast)
@@ -32,13 +33,15 @@ def hands_of_both(landmarkers, image: np.ndarray) -> list[tuple[Hand, Hand]]:
 
 def off(full: Hand, fast: Hand) -> np.ndarray:
     """Return how far each landmark is from the other model's, in pixels of the picture that the models see."""
-    distances = np.linalg.norm((full.pixels - fast.pixels)[:, :2], axis=1)
+    distances: np.ndarray = np.linalg.norm((full.pixels - fast.pixels)[:, :2], axis=1)
     return distances * (HAND_PX / full.longer_side_px)
 
 
 @pytest.mark.parametrize("place", [open_right_hand, open_left_hand])
 @pytest.mark.parametrize("size", [60, 90, 130])
-def test_drawn_hands_are_seen_as_by_the_full_model(landmarkers, place, size):
+def test_drawn_hands_are_seen_as_by_the_full_model(
+    landmarkers: list[MediaPipeLandmarker], place: Callable[..., np.ndarray], size: int
+) -> None:
     for landmarker in landmarkers:
         landmarker.reset()
     for step in range(5):
@@ -50,15 +53,15 @@ def test_drawn_hands_are_seen_as_by_the_full_model(landmarkers, place, size):
         assert fast.presence == pytest.approx(full.presence, abs=0.05)
 
 
-def test_nothing_is_seen_in_an_empty_frame():
+def test_nothing_is_seen_in_an_empty_frame() -> None:
     assert MediaPipeLandmarker(LandmarksConfig(model="fast")).detect(draw()) == []
 
 
 @pytest.mark.skipif(not DATA.is_dir(), reason="the golden frames are not here: ../shared/data is absent")
 @pytest.mark.parametrize("kind", ["photos", "video"])
-def test_people_are_seen_as_by_the_full_model(landmarkers, kind):
+def test_people_are_seen_as_by_the_full_model(landmarkers: list[MediaPipeLandmarker], kind: str) -> None:
     frames = read_video() if kind == "video" else [read_photo(path) for path in photo_paths()]
-    pairs = []
+    pairs: list[tuple[Hand, Hand]] = []
     for frame in frames:
         if kind == "photos":
             for landmarker in landmarkers:
@@ -76,12 +79,12 @@ def test_people_are_seen_as_by_the_full_model(landmarkers, kind):
     assert np.mean([full.handedness == fast.handedness for full, fast in pairs]) > 0.97
 
 
-def test_it_is_part_of_handsteer_and_needs_no_fetching(tmp_path, monkeypatch):
+def test_it_is_part_of_handsteer_and_needs_no_fetching(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("HANDSTEER_MODELS", str(tmp_path))
     assert find_model(NAME).is_file()
 
 
-def test_a_damaged_copy_is_refused(tmp_path: Path):
+def test_a_damaged_copy_is_refused(tmp_path: Path) -> None:
     content = bytearray(find_model(NAME).read_bytes())
     content[len(content) // 2] ^= 1
     (tmp_path / NAME).write_bytes(content)
@@ -89,6 +92,6 @@ def test_a_damaged_copy_is_refused(tmp_path: Path):
         find_model(NAME, tmp_path)
 
 
-def test_a_missing_one_is_named(tmp_path: Path):
+def test_a_missing_one_is_named(tmp_path: Path) -> None:
     with pytest.raises(ModelMissing, match=rf"{NAME} .*install handsteer again"):
         find_model(NAME, tmp_path)

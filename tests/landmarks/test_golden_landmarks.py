@@ -25,6 +25,8 @@ class Golden:
         return np.flatnonzero(self.found)
 
 
+Compared = tuple[list[Hand | None], Golden]
+
 AS_MEDIAPIPE = LandmarksConfig(
     model="full", max_hands=1, min_detection_confidence=0.5, refine_new_hands=False, wide_search=False
 )
@@ -54,56 +56,58 @@ def detect_video() -> list[Hand | None]:
 def distances(hands: list[Hand | None], golden: Golden) -> np.ndarray:
     """Return the distance in pixels of each landmark from the golden one."""
     off = np.concatenate([(hands[i].pixels - golden.pixels[i])[:, :2] for i in golden.rows])
-    return np.hypot(off[:, 0], off[:, 1])
+    away: np.ndarray = np.hypot(off[:, 0], off[:, 1])
+    return away
 
 
 @pytest.fixture(scope="module")
-def photos() -> tuple[list[Hand | None], Golden]:
+def photos() -> Compared:
     return detect_photos(), load("photos")
 
 
 @pytest.fixture(scope="module")
-def video() -> tuple[list[Hand | None], Golden]:
+def video() -> Compared:
     return detect_video(), load("video")
 
 
 @pytest.fixture(params=["photos", "video"])
-def compared(request) -> tuple[list[Hand | None], Golden]:
-    return request.getfixturevalue(request.param)
+def compared(request: pytest.FixtureRequest) -> Compared:
+    compared: Compared = request.getfixturevalue(request.param)
+    return compared
 
 
-def test_hands_are_found_where_mediapipe_finds_them(compared):
+def test_hands_are_found_where_mediapipe_finds_them(compared: Compared) -> None:
     hands, golden = compared
     assert [hand is not None for hand in hands] == golden.found.tolist()
 
 
-def test_landmarks_in_photos_are_mediapipes_to_a_fraction_of_a_pixel(photos):
+def test_landmarks_in_photos_are_mediapipes_to_a_fraction_of_a_pixel(photos: Compared) -> None:
     off = distances(*photos)  # 0.005 px as measured
     assert np.median(off) < 0.05
     assert off.max() < 0.5
 
 
-def test_landmarks_of_a_followed_hand_are_mediapipes_to_a_fraction_of_a_pixel(video):
+def test_landmarks_of_a_followed_hand_are_mediapipes_to_a_fraction_of_a_pixel(video: Compared) -> None:
     # 0.02 px as measured on the same pixels; 0.1 px here, as another release of FFmpeg decodes other pixels.
     off = distances(*video)
     assert np.median(off) < 0.3
     assert off.max() < 1.5
 
 
-def test_depth_is_mediapipes(compared):
+def test_depth_is_mediapipes(compared: Compared) -> None:
     hands, golden = compared
     off = [np.abs(hands[i].pixels[:, 2] - golden.pixels[i, :, 2]) for i in golden.rows]
     assert np.median(off) < 0.2
 
 
-def test_world_landmarks_are_mediapipes(compared):
+def test_world_landmarks_are_mediapipes(compared: Compared) -> None:
     hands, golden = compared
     off = np.stack([np.abs(hands[i].world - golden.world[i]) for i in golden.rows])
     assert np.median(off) < 0.0005
     assert off.max() < 0.005
 
 
-def test_handedness_is_the_opposite_of_mediapipes_which_takes_pictures_for_mirrored(compared):
+def test_handedness_is_the_opposite_of_mediapipes_which_takes_pictures_for_mirrored(compared: Compared) -> None:
     hands, golden = compared
     sure = [i for i in golden.rows if abs(golden.right[i] - 0.5) > 0.1]
     assert len(sure) > 40

@@ -14,11 +14,11 @@ HAND = Hand(
 )
 
 
-def test_gives_the_hands_of_each_frame_in_turn_and_then_none():
+def test_gives_the_hands_of_each_frame_in_turn_and_then_none() -> None:
     landmarker = RecordedLandmarker([[HAND], [], [HAND, HAND]])
     assert [len(landmarker.detect(FRAME)) for _ in range(5)] == [1, 0, 2, 0, 0]
 
 
-def test_points_in_pixels_follow_the_size_of_the_frame():
+def test_points_in_pixels_follow_the_size_of_the_frame() -> None:
     (hand,) = RecordedLandmarker([[HAND]]).detect(FRAME)
     np.testing.assert_array_equal(hand.pixels[0], (32, 24, 32))

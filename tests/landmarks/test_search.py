@@ -13,7 +13,7 @@ from handsteer.hand.placement import Pinhole
 from handsteer.hand.poses import THUMB, View
 from handsteer.hand.renderer import Look, render
 from handsteer.landmarks.mediapipe import MediaPipeLandmarker
-from handsteer.landmarks.palm import Palm
+from handsteer.landmarks.palm import Palm, PalmDetector
 from handsteer.landmarks.roi import Roi
 from handsteer.landmarks.search import Places, Search
 from tests.landmarks.drawn_hand import draw, open_right_hand
@@ -21,7 +21,7 @@ from tests.landmarks.drawn_hand import draw, open_right_hand
 FRAME = np.zeros((480, 640, 3), np.uint8)
 
 
-class Palms:
+class Palms(PalmDetector):
     """Stands in for the palm model; finds the same palms however the frame is widened, and notes how it was."""
 
     def __init__(self, *palms: Palm) -> None:
@@ -49,7 +49,7 @@ def frame_by_frame(search: Search, palms: Palms, frames: int) -> Iterator[tuple[
         yield list(palms.widened), [roi for each in places for roi in each.regions]
 
 
-def test_the_first_frame_is_looked_at_in_all_ways_one_after_another():
+def test_the_first_frame_is_looked_at_in_all_ways_one_after_another() -> None:
     palms = Palms()
     places = Search(palms, 2, wide=True).places(FRAME, beside_a_hand=False)
     assert (next(places), palms.widened) == (Places([]), [1.0, 1.25])
@@ -62,7 +62,7 @@ def test_the_first_frame_is_looked_at_in_all_ways_one_after_another():
     assert all(each.min_presence >= 0.9 for each in middles)
 
 
-def test_later_frames_without_a_hand_take_one_search_of_palms_each_and_all_ways_in_turn():
+def test_later_frames_without_a_hand_take_one_search_of_palms_each_and_all_ways_in_turn() -> None:
     palms = Palms()
     search = Search(palms, 2, wide=True)
     later = list(islice(frame_by_frame(search, palms, 13), 1, None))
@@ -73,7 +73,7 @@ def test_later_frames_without_a_hand_take_one_search_of_palms_each_and_all_ways_
     assert sum(len(middle) for _, middle in later) == 6
 
 
-def test_a_reset_makes_the_next_frame_the_first():
+def test_a_reset_makes_the_next_frame_the_first() -> None:
     palms = Palms()
     search = Search(palms, 2, wide=True)
     ((first, _), (second, _)) = frame_by_frame(search, palms, 2)
@@ -82,7 +82,7 @@ def test_a_reset_makes_the_next_frame_the_first():
     assert first == again != second
 
 
-def test_a_hand_that_has_just_been_lost_is_looked_for_in_the_plain_frame_first():
+def test_a_hand_that_has_just_been_lost_is_looked_for_in_the_plain_frame_first() -> None:
     palms = Palms()
     search = Search(palms, 2, wide=True)
     for frames in (1, 2, 3):
@@ -91,21 +91,21 @@ def test_a_hand_that_has_just_been_lost_is_looked_for_in_the_plain_frame_first()
         assert [widened for widened, _ in frame_by_frame(search, palms, 2)] == [[1.0], [1.25]]
 
 
-def test_enough_sure_palms_in_the_plain_frame_end_the_search():
+def test_enough_sure_palms_in_the_plain_frame_end_the_search() -> None:
     for sure, widened in ((palm(100, 0.9), [1.0]), (palm(100, 0.6), [1.0, 1.25])):
         palms = Palms(sure)
         next(Search(palms, 1, wide=True).places(FRAME, beside_a_hand=False))
         assert palms.widened == widened
 
 
-def test_only_near_hands_are_looked_for_in_a_frame_that_is_much_widened():
+def test_only_near_hands_are_looked_for_in_a_frame_that_is_much_widened() -> None:
     for size, count in ((60, 0), (200, 1)):
         places = Search(Palms(palm(size)), 2, wide=True).places(FRAME, beside_a_hand=False)
         next(places)
         assert len(next(places).regions) == count
 
 
-def test_beside_a_hand_and_without_the_wide_search_only_palms_are_looked_for():
+def test_beside_a_hand_and_without_the_wide_search_only_palms_are_looked_for() -> None:
     for wide, beside_a_hand, ways in ((True, True, {1.0, 1.25}), (False, True, {1.0}), (False, False, {1.0})):
         palms = Palms()
         search = Search(palms, 2, wide=wide)
@@ -115,7 +115,7 @@ def test_beside_a_hand_and_without_the_wide_search_only_palms_are_looked_for():
 
 
 @pytest.mark.parametrize("turned", [0, 1, 2, 3])
-def test_a_hand_in_the_middle_is_found_without_any_palm(turned):
+def test_a_hand_in_the_middle_is_found_without_any_palm(turned: int) -> None:
     frame = np.ascontiguousarray(np.rot90(draw(open_right_hand(320, 220, size=110)), turned))
     no_palms = MediaPipeLandmarker(LandmarksConfig(min_detection_confidence=1))
     (hand,) = no_palms.detect(frame)
@@ -123,7 +123,7 @@ def test_a_hand_in_the_middle_is_found_without_any_palm(turned):
     assert np.abs(hand.pixels - as_with_a_palm.pixels)[:, :2].max() < 0.1 * hand.longer_side_px
 
 
-def test_a_thumb_up_in_the_middle_is_not_read_as_an_index_finger():
+def test_a_thumb_up_in_the_middle_is_not_read_as_an_index_finger() -> None:
     """Upright, the landmark model expects the fingers where the thumb is; turned, it is surer."""
     view = View(yaw=np.radians(20), pitch=np.radians(-20), roll=np.radians(10 - 90), position=(0.0, 0.0, 0.35))
     placement = view.placement("Right")
@@ -136,6 +136,6 @@ def test_a_thumb_up_in_the_middle_is_not_read_as_an_index_finger():
     assert np.abs(hand.pixels - as_with_a_palm.pixels)[:, :2].max() < 0.15 * hand.longer_side_px
 
 
-def test_nothing_is_found_without_any_palm_in_an_empty_frame():
+def test_nothing_is_found_without_any_palm_in_an_empty_frame() -> None:
     no_palms = MediaPipeLandmarker(LandmarksConfig(min_detection_confidence=1))
     assert [no_palms.detect(draw()) for _ in range(13)] == [[]] * 13

@@ -32,6 +32,7 @@ from handsteer.nodes.steering import SteeringNode
 from handsteer.robots.protocol import RangeScan
 from handsteer.robots.simulated import SimulatedRobot
 from handsteer.robots.world import World
+from tests.about import about
 from tests.nodes.stepping import Bench
 
 RULE = CollisionMonitorConfig(enabled=True)
@@ -80,14 +81,14 @@ class MonitorBench(Bench):
 
 def test_it_is_off_by_default_and_wants_no_scans() -> None:
     bench = MonitorBench(CollisionMonitorConfig())
-    assert not bench.scans.wanted
+    assert not bench.scans.has_subscribers
     bench.show("Forward", 3)
     assert bench.command == (0.03, 0.0)
 
 
 def test_without_scans_the_robot_stands_and_says_why() -> None:
     bench = MonitorBench()
-    assert bench.scans.wanted
+    assert bench.scans.has_subscribers
     bench.show("Forward", 10)
     assert {(twist.linear.x, twist.angular.z) for twist in bench.twists} == {(0.0, 0.0)}
     assert bench.report()[0] == "standing: no laser scan has come, so what is in the way is not known"
@@ -112,7 +113,7 @@ def test_it_slows_and_says_what_for() -> None:
     assert bench.command == (0.0, 0.0)
     assert bench.report()[0] == "standing: stopped before an obstacle 0.14 m ahead"
     bench.show("Backward", 5, ahead(0.4))
-    assert bench.command == (pytest.approx(-0.05), 0.0)
+    assert bench.command == (about(-0.05), 0.0)
     assert bench.report()[0] == "driving: Backward"
 
 
@@ -120,7 +121,7 @@ def test_speed_does_not_add_up_before_an_obstacle() -> None:
     bench = MonitorBench()
     bench.show("Forward", 100, ahead(0.4))
     bench.show("Forward", 1, ahead(7.0))
-    assert bench.command == (pytest.approx(0.01), 0.0)
+    assert bench.command == (about(0.01), 0.0)
 
 
 def test_a_slowed_robot_goes_on_as_slowly_until_it_is_told_to_be_faster() -> None:
@@ -128,7 +129,7 @@ def test_a_slowed_robot_goes_on_as_slowly_until_it_is_told_to_be_faster() -> Non
     bench.show("Forward", 60, ahead(0.7))
     slow, _ = bench.command
     bench.show("Go", 5, ahead(7.0))
-    assert bench.command == (pytest.approx(slow, abs=0.01), 0.0)
+    assert bench.command == (about(slow, abs=0.01), 0.0)
 
 
 def test_a_scan_that_stops_coming_stops_the_robot() -> None:

@@ -101,7 +101,7 @@ def test_steering_goes_before_signs_and_is_repeated_until_released(bench: Contro
     assert set(bench.commands) == {(0.5, -1.0)}
     bench.steering.release()
     bench.run(0.1)
-    assert bench.commands[-1] == (0, 0)
+    assert bench.commands[-1] == (0.0, 0.0)
     bench.run(0.5)
     bench.show("Forward")
     assert bench.commands[-1] == (0.01, 0)
@@ -225,7 +225,7 @@ def stop(bench: ControlBench, value: bool) -> None:
 def test_stop_holds_against_signs_and_steering(bench: ControlBench) -> None:
     bench.show(*["Forward"] * 3)
     stop(bench, True)
-    assert bench.commands[-1] == (0, 0)
+    assert bench.commands[-1] == (0.0, 0.0)
     bench.show(*["Forward"] * 3)
     bench.transport.advertise("slider", STEERING_CMD_VEL).publish(twist(0.5, 0.0))
     bench.run(0.0)
@@ -270,7 +270,7 @@ def test_steering_that_was_held_through_a_reset_has_to_let_go(bench: ControlBenc
     steer(0.5)
     stop(bench, False)
     steer(0.5)
-    assert bench.commands[-1] == (0, 0)
+    assert bench.commands[-1] == (0.0, 0.0)
     steer(0.0)
     steer(0.5)
     assert bench.commands[-1] == (0.5, 0)

@@ -2,6 +2,7 @@ import re
 import threading
 import time
 from collections.abc import Iterator
+from functools import partial
 
 import pytest
 
@@ -37,7 +38,7 @@ def test_timers_keep_their_period_and_leave_out_missed_beats() -> None:
 
 def test_a_timer_that_raises_goes_on() -> None:
     node, clock, _ = make()
-    node.every(0.1, lambda: 1 / 0)  # type: ignore[arg-type, return-value]
+    node.every(0.1, lambda: 1 / 0)  # type: ignore[arg-type]
     for _ in range(3):
         node.spin_once()
         clock.advance(0.1)
@@ -212,7 +213,11 @@ def test_a_quick_node_is_served_by_the_thread_that_delivers(quick: tuple[InProce
     talker = transport.advertise("talker", HAND_SIGN)
     for number in range(20):
         talker.publish(String(data="Go"))
-        eventually(lambda number=number: len(threads) > number)
+
+        def is_heard(number: int = number) -> bool:
+            return len(threads) > number
+
+        eventually(is_heard)
     eventually(lambda: len(threads) == 20)
     assert threading.current_thread() in threads
 
@@ -233,7 +238,7 @@ def test_callbacks_of_a_quick_node_never_run_side_by_side_and_none_is_lost(
     transport, node = quick
     inside, most, sums = [0], [0], {name: 0 for name in ("/a", "/b", "/c")}
 
-    def callback(received: Received[String], name: str) -> None:
+    def callback(name: str, received: Received[String]) -> None:
         inside[0] += 1
         most[0] = max(most[0], inside[0])
         time.sleep(0.0002)
@@ -246,7 +251,7 @@ def test_callbacks_of_a_quick_node_never_run_side_by_side_and_none_is_lost(
             talker.publish(String(data=str(number)))
 
     for name in sums:
-        node.subscribe(Topic(name, String), lambda received, name=name: callback(received, name))
+        node.subscribe(Topic(name, String), partial(callback, name))
     node.every(0.001, lambda: None)
     node.start()
     talkers = [threading.Thread(target=talk, args=(name,)) for name in sums]

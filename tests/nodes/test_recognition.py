@@ -292,7 +292,7 @@ def test_compressed_images_instead() -> None:
         bench.run(1 / 30)
     assert bench.names == ["NONE"] * 3 + ["Forward"] * 3
     assert annotated[-1].header == HEADER
-    assert not bench.images.wanted
+    assert not bench.images.has_subscribers
 
 
 def test_none_comes_within_the_timeout_and_a_moment(bench: RecognitionBench) -> None:

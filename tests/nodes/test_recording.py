@@ -2,7 +2,8 @@ import itertools
 
 import pytest
 
-from handsteer.nodes.recording import Recorded, Recording, in_words
+from handsteer.config import Recorded
+from handsteer.nodes.recording import Recording, in_words
 
 LIMIT_S = 0.35
 DAYS_S = 3 * 86_400.0

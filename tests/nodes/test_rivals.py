@@ -67,7 +67,7 @@ def test_a_second_publisher_of_commands_is_said_by_control_and_robot(chain: Chai
         assert status.level == 1
         assert warning.startswith(COMMANDS)
     assert chain.said("robot")[0].message == "is commanded by more than one node"
-    assert intruder.wanted
+    assert intruder.has_subscribers
 
 
 def test_a_second_control_is_two_voices(chain: Chain) -> None:

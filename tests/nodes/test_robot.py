@@ -36,7 +36,8 @@ class RobotBench(Bench):
         self.transforms = self.record(TF)
         config = RobotConfig.model_validate({"world": "empty", **settings})
         topic = cmd_vel(config.cmd_vel_type)
-        self.nodes = [RobotNode(self.transport, self.clock, open_robot(config), config, topic)]
+        self.robot = RobotNode(self.transport, self.clock, open_robot(config), config, topic)
+        self.nodes = [self.robot]
         self.commands = self.transport.advertise("control", topic)
 
     def drive(self, seconds: float) -> None:
@@ -68,8 +69,7 @@ def test_coordinate_frames_are_named_as_configured() -> None:
 def test_its_service_counts_the_odometry_from_where_the_robot_stands() -> None:
     bench = RobotBench()
     bench.drive(2.0)
-    robot = bench.nodes[0]
-    assert isinstance(robot, RobotNode)
+    robot = bench.robot
     before = robot.state.truth
     assert robot.services()["reset_odometry"]() == "the odometry counts from here"
     bench.run(0.1)
@@ -128,8 +128,7 @@ def test_a_zero_is_obeyed_however_old_it_is() -> None:
 
 def test_the_world_changes_while_the_robot_drives_and_it_stands_then() -> None:
     bench = RobotBench()
-    (robot,) = bench.nodes
-    assert isinstance(robot, RobotNode)
+    robot = bench.robot
     markers = bench.record(WORLD_MARKERS)
     bench.drive(1.0)
     where = robot.state.truth
@@ -137,6 +136,7 @@ def test_the_world_changes_while_the_robot_drives_and_it_stands_then() -> None:
     assert not done.done()
     bench.run(0.06)
     assert done.result(0) is None
+    assert robot.world is not None
     assert [thing.name for thing in robot.world.obstacles] == ["box 1"]
     assert abs(robot.state.linear_mps) < 0.02
     assert robot.state.truth.x == pytest.approx(where.x, abs=0.02)
@@ -148,7 +148,7 @@ def test_the_world_changes_while_the_robot_drives_and_it_stands_then() -> None:
 
 def test_a_change_that_is_refused_changes_nothing() -> None:
     bench = RobotBench()
-    (robot,) = bench.nodes
+    robot = bench.robot
     refused = [
         robot.change_world(lambda world: edit(add(world, "box", START), "box 1", {"position": [0, 0]})),
         robot.change_world(lambda world: remove(world, "ghost")),
@@ -163,7 +163,7 @@ def test_a_change_that_is_refused_changes_nothing() -> None:
 
 def test_changes_that_nobody_makes_do_not_pile_up() -> None:
     bench = RobotBench()
-    (robot,) = bench.nodes
+    robot = bench.robot
     last = [robot.change_world(lambda world: world) for _ in range(20)][-1]
     with pytest.raises(WorldError, match="too many changes wait"):
         last.result(0)
@@ -171,22 +171,25 @@ def test_changes_that_nobody_makes_do_not_pile_up() -> None:
 
 def test_back_at_the_start_everything_counts_anew() -> None:
     bench = RobotBench(world="slalom")
-    (robot,) = bench.nodes
+    robot = bench.robot
     bench.drive(6.0)
+    assert robot.course is not None
     assert (robot.course.phase, robot.course.passed) == ("running", 1)
     robot.reset()
     bench.run(0.1)
     assert (robot.state.truth.x, robot.state.truth.y, robot.path_length_m) == pytest.approx((0.0, 0.0, 0.0), abs=1e-3)
+    assert robot.course is not None
     assert (robot.course.phase, robot.course.time_s, robot.state.collisions) == ("ready", 0.0, 0)
     assert bench.newest.twist.twist.linear.x == pytest.approx(0.0, abs=1e-3)
 
 
 def test_another_world_brings_its_course() -> None:
     bench = RobotBench()
-    (robot,) = bench.nodes
+    robot = bench.robot
     reports = bench.record(DIAGNOSTICS)
     bench.drive(1.0)
-    assert robot.course is None
+    before = robot.course
+    assert before is None
     robot.enter_world(load_world("slalom"))
     bench.run(0.3)
     assert robot.world == load_world("slalom")

@@ -1,4 +1,5 @@
 import math
+from typing import Any
 
 import pytest
 
@@ -8,6 +9,7 @@ from handsteer.errors import TransportError
 from handsteer.messages import CMD_VEL, STEERING_CMD_VEL, STOP, Bool, Topic, Twist, TwistStamped, cmd_vel, twist_in
 from handsteer.nodes.steering import SteeringNode
 from handsteer.transports.in_process import InProcessTransport
+from handsteer.transports.protocol import Received
 
 ROBOT = Topic("/cmd_vel", Twist)
 
@@ -15,17 +17,19 @@ ROBOT = Topic("/cmd_vel", Twist)
 class Bench:
     """The steering on a stepped clock, and what is heard of it on two topics."""
 
-    def __init__(self, config: ControlConfig | None = None, robot: Topic = ROBOT, kind: Topic = CMD_VEL) -> None:
+    def __init__(
+        self, config: ControlConfig | None = None, robot: Topic[Any] = ROBOT, kind: Topic[Any] = CMD_VEL
+    ) -> None:
         self.clock = SteppedClock()
         self.transport = InProcessTransport()
         self.node = SteeringNode(self.transport, self.clock, config, kind)
         self.mux = self._record(STEERING_CMD_VEL)
         self.robot = self._record(robot)
 
-    def _record(self, topic: Topic) -> list[tuple[float, float]]:
+    def _record(self, topic: Topic[Any]) -> list[tuple[float, float]]:
         said: list[tuple[float, float]] = []
 
-        def note(received) -> None:
+        def note(received: Received[Any]) -> None:
             twist = twist_in(received.message)
             said.append((twist.linear.x, twist.angular.z))
 

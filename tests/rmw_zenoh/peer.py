@@ -70,7 +70,7 @@ class Reader:
         return self.raw[self.at - length : self.at - 1].decode()
 
     def stamp(self) -> float:
-        return self.number("i") + self.number("I") / 1e9
+        return float(self.number("i") + self.number("I") / 1e9)
 
 
 def read_string(reader: Reader) -> dict[str, Any]:
@@ -116,7 +116,7 @@ READERS: dict[str, Callable[[Reader], dict[str, Any]]] = {
 
 def cdr(kind: str, values: dict[str, Any]) -> bytes:
     if kind == "String":
-        text = values["data"].encode() + b"\0"
+        text: bytes = values["data"].encode() + b"\0"
         return HEADER + struct.pack("<I", len(text)) + text
     if kind == "Bool":
         return HEADER + struct.pack("<?", values["data"])
@@ -172,6 +172,7 @@ def record(order: dict[str, Any]) -> bool:
     def note(sample: zenoh.Sample) -> None:
         values = read(Reader(sample.payload.to_bytes()))
         noted[topic].append([time.monotonic(), [values[field] for field in fields]])
+        assert sample.attachment is not None, topic
         attached[topic].append(sample.attachment.to_bytes().hex())
 
     if order.get("latched"):
@@ -236,8 +237,12 @@ def call(order: dict[str, Any]) -> list[Any]:
         consolidation=zenoh.ConsolidationMode.NONE,
         timeout=10.0,
     )
-    replies = [reply.ok for reply in found]
-    return [[reply.payload.to_bytes().hex(), reply.attachment.to_bytes().hex()] for reply in replies]
+    replies = []
+    for reply in found:
+        assert reply.ok is not None, service
+        assert reply.ok.attachment is not None, service
+        replies.append([reply.ok.payload.to_bytes().hex(), reply.ok.attachment.to_bytes().hex()])
+    return replies
 
 
 def run_clock(order: dict[str, Any]) -> bool:

@@ -1,4 +1,5 @@
 import math
+from collections.abc import Callable
 
 import pytest
 from hypothesis import given
@@ -83,7 +84,7 @@ def test_a_wrong_field_is_refused_by_its_name(fields: dict[str, object], words: 
 
 
 @pytest.mark.parametrize("change", [lambda world: remove(world, "ghost"), lambda world: edit(world, "ghost", {})])
-def test_what_is_not_there_is_refused(change) -> None:
+def test_what_is_not_there_is_refused(change: Callable[[World], object]) -> None:
     with pytest.raises(WorldError, match="nothing called 'ghost'"):
         change(World())
 

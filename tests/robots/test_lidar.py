@@ -26,7 +26,7 @@ def at(scan: RangeScan, degrees: float) -> float:
 
 def test_a_room_is_measured_to_its_walls() -> None:
     """Each ray ends where it leaves the rectangle of the four walls' insides."""
-    walls = [
+    walls: list[dict[str, object]] = [
         {"name": "front", "shape": "box", "size": [0.2, 9, 0.5], "position": [3.1, 0]},
         {"name": "back", "shape": "box", "size": [0.2, 9, 0.5], "position": [-2.1, 0]},
         {"name": "left", "shape": "box", "size": [9, 0.2, 0.5], "position": [0, 4.1]},

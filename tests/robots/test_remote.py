@@ -41,9 +41,9 @@ def join(**config: Any) -> tuple[Link, RemoteRobot]:
 
 def test_its_scanner_is_listened_to_once_somebody_asks() -> None:
     link, robot = join()
-    assert not link.scanner.wanted
+    assert not link.scanner.has_subscribers
     assert robot.scan() is None
-    assert link.scanner.wanted
+    assert link.scanner.has_subscribers
 
 
 def test_each_scan_is_given_once_and_with_its_age() -> None:
@@ -61,7 +61,7 @@ def test_each_scan_is_given_once_and_with_its_age() -> None:
 def test_a_robot_without_a_scanner_has_no_scan() -> None:
     link, robot = join(scan_topic="")
     assert robot.scan() is None
-    assert not link.scanner.wanted
+    assert not link.scanner.has_subscribers
 
 
 def test_it_knows_who_else_commands_it() -> None:
@@ -69,4 +69,4 @@ def test_it_knows_who_else_commands_it() -> None:
     assert robot.commanders() == ["robot"]
     teleop = link.transport.advertise("teleop", Topic("/cmd_vel", Twist, depth=CMD_VEL.depth))
     assert robot.commanders() == ["robot", "teleop"]
-    assert teleop.wanted
+    assert teleop.has_subscribers

@@ -158,7 +158,7 @@ def test_it_pushes_what_is_movable(shape: dict[str, object]) -> None:
     (thing,) = robot.obstacles()
     assert thing.name == "it"
     assert thing.position[0] > 1.5
-    assert state.collisions >= 1
+    assert (state.collisions or 0) >= 1
     assert state.truth.x > 1.4
     robot.step(20.0)
     before = robot.obstacles()[0].position

@@ -89,17 +89,19 @@ class Ros1Graph:
             _, _, state = self.master.getSystemState("/test")
         except OSError:
             return set()
-        return {node for kind in state for _, nodes in kind for node in nodes}  # type: ignore[union-attr]
+        return {node for kind in state for _, nodes in kind for node in nodes}
 
     def listeners(self, topic: str) -> list[str]:
         """Return the full names of the nodes that subscribe to ``topic``."""
         _, _, state = self.master.getSystemState("/test")
-        return dict(state[1]).get(topic, [])  # type: ignore[index]
+        listeners: dict[str, list[str]] = dict(state[1])
+        return listeners.get(topic, [])
 
     def talkers(self, topic: str) -> list[str]:
         """Return the full names of the nodes that publish ``topic``."""
         _, _, state = self.master.getSystemState("/test")
-        return dict(state[0]).get(topic, [])  # type: ignore[index]
+        talkers: dict[str, list[str]] = dict(state[0])
+        return talkers.get(topic, [])
 
     @property
     def master(self) -> Any:

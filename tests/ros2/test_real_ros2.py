@@ -138,7 +138,8 @@ def test_a_robot_follows_the_twists_of_rclpy(ros2: Ros2Graph) -> None:
 
     def turns() -> bool:
         peer.ask("publish", topic="/lone/cmd_vel", values={"angular.z": 0.5}, count=10, period_s=0.05)
-        return max(speed for _, (speed,) in peer.ask("get", topic=f"/lone{ODOM}")) == pytest.approx(0.5, abs=0.05)
+        speeds: list[float] = [speed for _, (speed,) in peer.ask("get", topic=f"/lone{ODOM}")]
+        return max(speeds) == pytest.approx(0.5, abs=0.05)
 
     eventually(turns, 20.0, what="the robot to turn")
     eventually(lambda: abs(peer.ask("get", topic=f"/lone{ODOM}")[-1][1][0]) < 0.01, 5.0, what="the robot to stand")

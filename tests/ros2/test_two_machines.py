@@ -2,7 +2,9 @@
 
 import os
 import sys
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -33,7 +35,7 @@ def test_parameters_are_listed_and_set_from_another_machine(tmp_path: Path) -> N
             for _ in range(10):
                 # ROS 2 loses an answer to a client whom the server has not wholly discovered yet; one asks again.
                 asked = {"node": f"/{NODE}", "call": "list_parameters", "arguments": []}
-                reply = eventually(lambda asked=asked: peer.ask("parameters", **asked), what=control.text)
+                reply = eventually(partial(peer.ask, "parameters", **asked), what=control.text)
                 assert "ramp" in reply["result"]["names"]
             change = {"name": "max_linear", "value": 0.2}
             results = peer.ask("parameters", node=f"/{NODE}", call="set_parameters", arguments=[change])["results"]
@@ -43,6 +45,12 @@ def test_parameters_are_listed_and_set_from_another_machine(tmp_path: Path) -> N
             peer.kill()
     except NoNamespacesError as why:
         pytest.skip(f"network namespaces cannot be made here: {why}")
+
+
+def _many_of(peer: Peer, topic: str) -> list[Any] | None:
+    """Return what the peer has recorded on a topic, once that is much."""
+    found: list[Any] = peer.ask("get", topic=topic)
+    return found if len(found) >= 60 else None
 
 
 @pytest.mark.parametrize("transport", ["ros2", "dds"])
@@ -64,10 +72,7 @@ def test_pictures_reach_reliable_and_best_effort_subscribers_on_another_machine(
                 wanted = {"fields": ["header.stamp", "data"], "reliable": reliable, "depth": 10}
                 peer.ask("record", topic=topic, type="CompressedImage", **wanted)
             for peer in peers:
-                pictures = eventually(
-                    lambda peer=peer: len(found := peer.ask("get", topic=topic)) >= 60 and found,
-                    what=f"pictures; {camera.text}",
-                )
+                pictures = eventually(partial(_many_of, peer, topic), what=f"pictures; {camera.text}")
                 stamps = [stamp for _, (stamp, _) in pictures]
                 assert stamps == sorted(set(stamps))
                 assert all(size > 1000 for _, (_, size) in pictures)

@@ -2,11 +2,12 @@
 
 import numpy as np
 
-from handsteer.hand.kinematics import Array, angles_of, pose_joints, turn_z
+from handsteer.hand.kinematics import angles_of, pose_joints, turn_z
 from handsteer.hand.placement import Pinhole, Placement
 from handsteer.hand.poses import FIST, HandPose, View, sign_pose
-from handsteer.landmarks.protocol import Hand, Handedness
+from handsteer.landmarks.protocol import Hand
 from handsteer.signs.training.hands import BONES_M
+from handsteer.types import Handedness
 
 SIZE = (640, 480)
 _CAMERA = Pinhole.webcam(*SIZE)
@@ -53,7 +54,7 @@ def fist() -> HandPose:
     return HandPose(FIST, View())
 
 
-def hand_of(pixels: Array, world: Array, handedness: Handedness = "Right") -> Hand:
+def hand_of(pixels: np.ndarray, world: np.ndarray, handedness: Handedness = "Right") -> Hand:
     """Return a hand from (21, 2) pixels and (21, 3) metres."""
     points = np.column_stack([pixels / SIZE, np.zeros(21)])
     return Hand(points.astype(np.float32), world.astype(np.float32), handedness, 0.99, 0.99, SIZE)

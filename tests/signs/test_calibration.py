@@ -8,6 +8,7 @@ from handsteer.signs.intervals import Share
 from handsteer.signs.metrics import PhotoResult
 from handsteer.signs.plot import draw_reliability, draw_sweep
 from handsteer.types import FORWARD, GO, MOTION_SIGNS, NONE, SIGNS, STOP
+from tests.about import about
 
 
 def photo(truth: str, **likelihoods: float) -> PhotoResult:
@@ -30,10 +31,10 @@ def test_bins_and_their_error() -> None:
     figures = calibration(RESULTS)
     filled = {each.low: (each.right, each.confidence) for each in figures.bins if each.right.of}
     assert filled == {
-        0.0: (Share(0, 1), pytest.approx(0.05)),
-        0.6: (Share(1, 2), pytest.approx(0.63)),
-        0.8: (Share(1, 1), pytest.approx(0.85)),
-        0.9: (Share(1, 2), pytest.approx(0.975)),
+        0.0: (Share(0, 1), about(0.05)),
+        0.6: (Share(1, 2), about(0.63)),
+        0.8: (Share(1, 1), about(0.85)),
+        0.9: (Share(1, 2), about(0.975)),
     }
     assert figures.expected_error == pytest.approx((0.05 + 2 * 0.13 + 0.15 + 2 * 0.475) / 6)
     assert len(figures.bins) == BINS

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from handsteer.cameras.files import video_frames
+from handsteer.cameras.files import read_photo, video_frames
 from handsteer.cameras.protocol import Frame
 from handsteer.cameras.virtual import VirtualHandCamera
 from handsteer.clock import SteppedClock
@@ -119,7 +119,7 @@ def frames_of(*pictures: Picture, fps: float = 20.0) -> list[Frame]:
 
 
 def test_a_video_is_seen_as_a_camera_gives_it(recognizer: Recognizer, photos: list[LabelledPhoto]) -> None:
-    stop, forward = (cv2.imread(str(photos[at].path)) for at in (0, 1))
+    stop, forward = (read_photo(photos[at].path) for at in (0, 1))
     frames = frames_of(*[stop] * 3, *[forward] * 8)
     truths = {number: STOP if number < 3 else FORWARD for number in range(10)}
     verdicts = list(evaluate_frames(frames, truths, recognizer, View(flip=True)))
@@ -134,7 +134,7 @@ def test_a_video_is_seen_as_a_camera_gives_it(recognizer: Recognizer, photos: li
 
 
 def test_labels_that_belong_to_another_video_are_refused(recognizer: Recognizer, photos: list[LabelledPhoto]) -> None:
-    frames = frames_of(cv2.imread(str(photos[0].path)))
+    frames = frames_of(read_photo(photos[0].path))
     with pytest.raises(LabelError, match="a label for frame 7, but the last frame of the video is 0"):
         list(evaluate_frames(frames, {0: STOP, 7: STOP}, recognizer, View()))
 

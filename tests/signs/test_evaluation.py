@@ -1,4 +1,5 @@
 import json
+from typing import Any
 
 from handsteer.signs.evaluation import Evaluation
 from handsteer.signs.metrics import PhotoResult
@@ -32,8 +33,9 @@ HANDS = (run("c.npz", RAW, (GO, FORWARD)),)
 VIDEOS = (video("d.mp4", RAW, FORWARD), video("e.mp4", RAW, NONE))
 
 
-def plain(evaluation: Evaluation, *, with_sweep: bool = False) -> dict:
-    return json.loads(json.dumps(evaluation.as_dict(with_sweep=with_sweep), allow_nan=False))
+def plain(evaluation: Evaluation, *, with_sweep: bool = False) -> dict[str, Any]:
+    read: dict[str, Any] = json.loads(json.dumps(evaluation.as_dict(with_sweep=with_sweep), allow_nan=False))
+    return read
 
 
 def test_figures_are_together_and_by_view_and_by_source() -> None:

@@ -2,6 +2,7 @@
 
 import zipfile
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -9,6 +10,8 @@ import pytest
 from handsteer.errors import DatasetError
 from handsteer.signs.teaching.dataset import load_dataset
 from tests.fuzz import corpus
+
+MANY: dict[str, Any] = {f"a{n}": corpus.saved(1) for n in range(200)}
 
 
 @pytest.mark.parametrize(
@@ -19,7 +22,7 @@ from tests.fuzz import corpus
         (corpus.dataset(points=corpus.npy((-1, 21, 3))), "not a dataset of signs, or damaged"),
         (corpus.dataset(points=corpus.npy((1,), "|O")), "'points.npy' is neither of numbers nor of text"),
         (corpus.dataset(points=corpus.saved(np.ones((1, 21, 3), complex))), "neither of numbers nor of text"),
-        (corpus.dataset(**{f"a{n}": corpus.saved(1) for n in range(200)}), "it has 210 arrays"),
+        (corpus.dataset(**MANY), "it has 210 arrays"),
         (corpus.dataset(takes=corpus.saved("[" * 100_000)), "damaged .*maximum recursion depth"),
         (corpus.dataset(takes=corpus.saved("9" * 5000)), "damaged"),
         (corpus.dataset(format=corpus.saved("9" * 5000)), "of format 9{160} is not known"),

@@ -1,4 +1,5 @@
 from collections.abc import Iterator
+from typing import Any
 
 import pytest
 
@@ -6,7 +7,7 @@ from handsteer.clock import RealClock
 from handsteer.messages import CMD_VEL, HAND_SIGN, String, Topic, twist
 from handsteer.testing.fault_transport import CUT, FROZEN, FaultTransport, LinkFault
 from handsteer.transports.in_process import InProcessTransport
-from handsteer.transports.protocol import Transport
+from handsteer.transports.protocol import Received, Transport
 from tests.contracts.transport_contract import TransportContract, eventually
 from tests.nodes.stepping import Bench
 
@@ -35,9 +36,9 @@ class Talk(Bench):
         self._number = 0
         self.faults.subscribe("listener", topic, self._on_word)
 
-    def _on_word(self, received: object) -> None:
-        self.heard.append((round(self.clock.now(), 3), int(received.message.data)))  # type: ignore[attr-defined]
-        self.captured.append(received.captured_s)  # type: ignore[attr-defined]
+    def _on_word(self, received: Received[Any]) -> None:
+        self.heard.append((round(self.clock.now(), 3), int(received.message.data)))
+        self.captured.append(received.captured_s)
 
     def say(self, count: int) -> list[int]:
         """Say so many numbers; return those that were heard meanwhile."""

@@ -46,13 +46,13 @@ class Far:
         self.is_open = True
 
     @property
-    def wanted(self) -> bool:
+    def has_subscribers(self) -> bool:
         return self._topic.type.__msgtype__ in self._transport.subscribed_types(self._topic)
 
     def publish(self, message: Any, captured_s: float | None = None) -> None:
         assert self.is_open
         assert isinstance(message, self._topic.type)
-        if self.wanted:
+        if self.has_subscribers:
             self._transport.got.append((message.__msgtype__, twist_in(message).linear.x))
 
 

@@ -1,8 +1,8 @@
 """Signs and steering in, safe velocities out: the part of ``hand_sign_control`` that knows nothing of nodes."""
 
 from handsteer.config import ControlConfig
-from handsteer.control.driver import Driver
 from handsteer.control.safety import Ramp, Safety
+from handsteer.control.twist_mux import TwistMux
 from handsteer.types import NONE, ZERO, Velocity, action_of
 
 
@@ -15,13 +15,13 @@ class Control:
 
     Attributes:
         safety: Says whether signs and steering are followed, and takes Stop, resets and faults.
-        driver: Says who drives, and why the robot stands when it does.
+        mux: Says who drives, and why the robot stands when it does.
     """
 
     def __init__(self, config: ControlConfig, *, arming: bool) -> None:
         self._config = config
         self.safety = Safety(config, arming=arming)
-        self.driver = Driver(config)
+        self.mux = TwistMux(config)
         self._ramp = Ramp(config)
         self._since_command_s = 0.0
 
@@ -43,11 +43,11 @@ class Control:
             sign = sign if self.safety.admits_sign(sign, stops=stops) else NONE
         if steering is not None and not self.safety.admits_steering(is_zero=steering.is_zero):
             steering = ZERO
-        return self._ramped(self.driver.step(dt_s, sign=sign, steering=steering))
+        return self._ramped(self.mux.step(dt_s, sign=sign, steering=steering))
 
     def halt(self) -> Velocity | None:
         """Stop whoever drives; return one zero, or None when nobody does."""
-        return self._ramped(self.driver.halt())
+        return self._ramped(self.mux.halt())
 
     def stop(self) -> Velocity | None:
         """Stop until :meth:`reset`; return one zero, or None when nobody drives."""
@@ -63,7 +63,7 @@ class Control:
         self._config = config
         self.safety.reconfigure(config)
         self._ramp.reconfigure(config)
-        return self._ramped(self.driver.reconfigure(config))
+        return self._ramped(self.mux.reconfigure(config))
 
     def _ramped(self, velocity: Velocity | None) -> Velocity | None:
         if velocity is None:

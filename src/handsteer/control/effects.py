@@ -17,12 +17,12 @@ def effect_of(action: Action, rule: ControlConfig) -> str:
     return f"{EFFECTS[action]} ({figures})" if figures else EFFECTS[action]
 
 
-def tell(rule: ControlConfig) -> dict[str, str]:
+def rule_to_diagnostics(rule: ControlConfig) -> dict[str, str]:
     """Return what decides what signs do, as values of a report on ``/diagnostics``."""
     return {name: json.dumps(getattr(rule, name)) for name in _TOLD}
 
 
-def told(values: Mapping[str, str]) -> ControlConfig | None:
+def rule_from_diagnostics(values: Mapping[str, str]) -> ControlConfig | None:
     """Return what a report of :func:`tell` says, defaults for the rest; None when it says nothing that holds."""
     return _rule_of(tuple(values.get(name, "") for name in _TOLD))
 

@@ -1,6 +1,7 @@
 """The node ``dashboard``: listens to all that the page shows, and steers for the people who look at it."""
 
 import math
+import threading
 from collections import deque
 from dataclasses import dataclass, replace
 from typing import Any, cast
@@ -118,6 +119,7 @@ class DashboardNode(Node):
         self._truth: tuple[Pose2D, Pose2D] | None = None
         self._path_length_m = 0.0
         self._steering = steering
+        self._lock = threading.RLock()  # who steers, and what is steered, change on the server's thread and this node's
         self._holder: tuple[str, float] | None = None
         self._stopper: str | None = None
         self._odometry_came_s = self._scan_came_s = -math.inf
@@ -153,15 +155,16 @@ class DashboardNode(Node):
         It lasts while the viewer repeats it within :data:`HOLD_TIMEOUT_S`.
         """
         if self.lease.take(viewer, self.clock.now()):
-            self._holder = (viewer, self.clock.now())
-            self._steering.steer(linear_mps, angular_radps)
+            with self._lock:
+                self._holder = (viewer, self.clock.now())
+                self._steering.steer(linear_mps, angular_radps)
 
     def release(self, viewer: str) -> None:
         """Stop, if it is ``viewer`` who steers."""
-        holder = self._holder
-        if holder is not None and holder[0] == viewer:
-            self._holder = None
-            self._steering.release()
+        with self._lock:
+            if self._holder is not None and self._holder[0] == viewer:
+                self._holder = None
+                self._steering.release()
 
     def steer_on(self, viewer: str, topic: str) -> None:
         """Let steering by hand go to ``topic``, if ``viewer`` has the control lease or nobody has.
@@ -173,20 +176,23 @@ class DashboardNode(Node):
             raise TransportError("only who drives may choose the topic: ask to drive first")
         if self.state().stopped:
             raise TransportError("the robot is stopped: reset it, then choose the topic")
-        self._holder = None
-        self._steering.send_to(topic)
+        with self._lock:
+            self._holder = None
+            self._steering.send_to(topic)
 
     def halt(self, viewer: str = "") -> None:
         """Stop the robot, whoever drives; ``viewer`` is who asks."""
-        self._holder = None
-        self._stopper = viewer or None
-        self._steering.halt()
+        with self._lock:
+            self._holder = None
+            self._stopper = viewer or None
+            self._steering.halt()
 
     def reset(self, viewer: str) -> None:
         """Let the robot be driven again, if ``viewer`` has the control lease or nobody has."""
         if self.lease.take(viewer, self.clock.now()):
-            self._stopper = None
-            self._steering.reset()
+            with self._lock:
+                self._stopper = None
+                self._steering.reset()
 
     def leave(self, viewer: str) -> None:
         """Stop if it is ``viewer`` who steers, and let others drive."""
@@ -195,16 +201,18 @@ class DashboardNode(Node):
 
     def on_stop(self) -> None:
         """Leave nothing in motion that was steered from here."""
-        if self._holder is not None:
-            self.release(self._holder[0])
+        with self._lock:
+            if self._holder is not None:
+                self.release(self._holder[0])
 
     def _watch(self) -> None:
         self.lease.tick(self.clock.now())
         if self.world.scan and self.clock.now() - self._scan_came_s > _SCAN_HOLDS_S:
             self.world = replace(self.world, scan=())
-        holder = self._holder
-        if holder is not None and (self.clock.now() - holder[1] > HOLD_TIMEOUT_S or not self.lease.drives(holder[0])):
-            self.release(holder[0])
+        with self._lock:
+            holder, now = self._holder, self.clock.now()
+            if holder is not None and (now - holder[1] > HOLD_TIMEOUT_S or not self.lease.drives(holder[0])):
+                self.release(holder[0])
 
     def _sample(self) -> None:
         now, observed = self.clock.now(), self._observed

@@ -2,7 +2,7 @@
 
 import math
 
-from handsteer.transports.lateness import Lateness
+from handsteer.transports.stale_messages import StaleMessageFilter
 from handsteer.types import ZERO, Velocity
 
 HOLD_TIMEOUT_S = 0.3
@@ -30,7 +30,7 @@ class PadInput:
     def __init__(self) -> None:
         self.sliders = ZERO
         self._heard_s = -math.inf
-        self._lateness = Lateness(_LATE_S)
+        self._lateness = StaleMessageFilter(_LATE_S)
         self._late = 0
 
     @property

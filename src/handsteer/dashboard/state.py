@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from handsteer.config import ControlConfig
-from handsteer.control.effects import told
+from handsteer.control.effects import rule_from_diagnostics
 from handsteer.nodes.node import ERROR, OK
 from handsteer.robots.course import CourseState, read_course
 from handsteer.timeouts import ROBOT_S
@@ -171,7 +171,7 @@ def compose(observed: Observed, now_s: float, viewers: Viewers = NOBODY) -> Page
         confidence=seen.number("confidence") or 0.0,
         handedness=seen.values.get("handedness", ""),
         signs=known_signs(observed.reports.get("hand_sign_recognition", _NO_REPORT).values),
-        rule=told(observed.reports.get("hand_sign_control", _NO_REPORT).values),
+        rule=rule_from_diagnostics(observed.reports.get("hand_sign_control", _NO_REPORT).values),
         no_picture="" if "seen" in seen.values else camera.message if camera.level >= ERROR else seen.message,
         camera=camera_name(camera.message),
         driver=control.values.get("source", "nobody"),

@@ -101,10 +101,10 @@ class CameraNode(Node):
         self._state = (OK, f"{self._camera.name}: delivers frames")
         header = Header(stamp=self.clock.stamp(frame.captured_s), frame_id=self._frame_id)
         self._image.publish(image_message(frame.image, header), frame.captured_s)
-        if self._compressed.wanted:
+        if self._compressed.has_subscribers:
             self._compressed.publish(jpeg_message(frame.image, header), frame.captured_s)
 
-        if self._info.wanted:
+        if self._info.has_subscribers:
             self._info.publish(replace(self._info_for(frame), header=header), frame.captured_s)
 
     def _info_for(self, frame: Frame) -> CameraInfo:

@@ -5,10 +5,10 @@ from typing import Any
 
 from handsteer.clock import Clock
 from handsteer.config import CollisionMonitorConfig, Config, ControlConfig
-from handsteer.control.driver import Driver
-from handsteer.control.effects import tell
+from handsteer.control.control import Control
+from handsteer.control.effects import rule_to_diagnostics
 from handsteer.control.fleet import NEXT
-from handsteer.control.safety import Following, Ramp, Safety
+from handsteer.control.safety import Following
 from handsteer.messages import (
     CMD_VEL,
     HAND_SIGN,
@@ -22,12 +22,12 @@ from handsteer.messages import (
     Twist,
 )
 from handsteer.nodes.collision_monitor import CollisionMonitor
-from handsteer.nodes.interruption import CALM_S, Interruption
 from handsteer.nodes.latency import LatencyLog
 from handsteer.nodes.node import OK, WARN, Node
 from handsteer.nodes.odometry import MeasuredVelocity
 from handsteer.nodes.rivals import Rivals
 from handsteer.nodes.selection import Selection
+from handsteer.nodes.stall_guard import CALM_S, StallGuard
 from handsteer.nodes.stop_keeper import StopKeeper
 from handsteer.transports.commands import Commands
 from handsteer.transports.protocol import Call, Received, Transport
@@ -73,17 +73,16 @@ class HandSignControlNode(Node):
         super().__init__("hand_sign_control", transport, clock)
         self.latency = LatencyLog()
         self._config = config
-        self._driver = Driver(config)
-        self._safety = Safety(config, arming=arming)
+        self._control = Control(config, arming=arming)
+        self._safety, self._mux = self._control.safety, self._control.mux
         self._following = Following() if arming and not config.robots else None
         self._arming = arming
-        self._ramp = Ramp(config)
         self._waited = False
         self._measured = MeasuredVelocity()
         self._commanded = ZERO
-        self._ramped_s = self._last_step_s = clock.now()
-        self._monitor = CollisionMonitor(self, collision_monitor or CollisionMonitorConfig(), self._driver.hold_back)
-        self._interruption = Interruption(config.sign_timeout, clock.now())
+        self._last_step_s = clock.now()
+        self._monitor = CollisionMonitor(self, collision_monitor or CollisionMonitorConfig(), self._mux.hold_back)
+        self._stall_guard = StallGuard(config.sign_timeout, clock.now())
         self._last_sign = NONE
         self._selection = (
             Selection(self, config.robots, cmd_vel, self._commands, self._on_change) if config.robots else None
@@ -101,11 +100,9 @@ class HandSignControlNode(Node):
     def on_reconfigure(self, config: Config) -> None:
         """Take all of ``control``; a robot that is faster than new limits allow is told so at once."""
         self._config = config.control
-        self._interruption.limit_s = config.control.sign_timeout
-        self._safety.reconfigure(config.control)
-        self._ramp.reconfigure(config.control)
+        self._stall_guard.limit_s = config.control.sign_timeout
         self._monitor.reconfigure(config.collision_monitor)
-        self._publish(self._driver.reconfigure(config.control))
+        self._publish(self._control.reconfigure(config.control))
 
     def services(self) -> dict[str, Call]:
         """Return ``stop`` and ``reset``, which do what true and false on ``/stop`` do."""
@@ -122,20 +119,19 @@ class HandSignControlNode(Node):
 
     def on_stop(self) -> None:
         """Leave the robot standing, and those that it left a moment ago."""
-        self._driver.halt()
+        self._control.halt()
         self._publish(ZERO)
         if self._selection:
             self._selection.beat()
 
     def _on_stop_or_reset(self, is_stopped: bool) -> None:
         if is_stopped:
-            self._safety.stop()
-            self._driver.halt()
+            self._control.stop()
             self._publish(ZERO)
         else:
             if self._safety.is_stopped:
                 log.info("stop is reset by false on %s, which is published by %s", *self._told_by(STOP))
-            self._safety.reset()
+            self._control.reset()
 
     def _told_by(self, topic: Topic[Any]) -> tuple[str, str]:
         publishers = self.transport.publishers_of(topic)
@@ -148,9 +144,10 @@ class HandSignControlNode(Node):
             self._obey_late(is_stop=action_of(received.message.data, self._config.actions) == "stop")
             return
         elapsed_s = self._elapsed()
-        sign = None if self._interruption.distrusts(self.clock.now()) else received.message.data
+        sign = None if self._stall_guard.distrusts(self.clock.now()) else received.message.data
         self._look_after_the_robot(elapsed_s)
-        self._publish(self._driver.step(elapsed_s, sign=self._admitted(sign)), captured_s)
+        self._select_by(sign)
+        self._publish(self._control.step(elapsed_s, sign=sign), captured_s)
         self._calm_down()
 
     def _on_steering(self, received: Received[Twist]) -> None:
@@ -159,14 +156,14 @@ class HandSignControlNode(Node):
             self._obey_late(is_stop=wanted.is_zero)
             return
         elapsed_s = self._elapsed()
-        steering = None if self._interruption.distrusts(self.clock.now()) else self._steered(wanted)
+        steering = None if self._stall_guard.distrusts(self.clock.now()) else wanted
         self._look_after_the_robot(elapsed_s)
-        self._publish(self._driver.step(elapsed_s, steering=steering))
+        self._publish(self._control.step(elapsed_s, steering=steering))
 
     def _obey_late(self, *, is_stop: bool) -> None:
         """Stop for a Stop that comes late; it tells nothing of what is shown now, so it arms nothing."""
         if is_stop:
-            self._publish(self._driver.halt())
+            self._publish(self._control.halt())
 
     def _on_odometry(self, received: Received[Odometry]) -> None:
         assert self._following is not None
@@ -176,18 +173,18 @@ class HandSignControlNode(Node):
     def _watch(self) -> None:
         elapsed_s = self._elapsed()
         self._look_after_the_robot(elapsed_s)
-        self._publish(self._driver.step(elapsed_s))
+        self._publish(self._control.step(elapsed_s))
         self._log_arming()
         if self._selection:
             self._selection.beat()
-        if self._driver.source == "nobody":
+        if self._mux.source == "nobody":
             self._calm_down()
 
     def _calm_down(self) -> None:
         """Let the watchdog sleep for a while: waking up fifty times a second costs more than all signs do."""
         self._log_arming()
         # The beat is that of the selection, too; and steering ends on time also where signs come all the while.
-        if self._selection is None and self._driver.source != "steering":
+        if self._selection is None and self._mux.source != "steering":
             self._watchdog.delay_until(self.clock.now() + CALM_S)
 
     def _log_arming(self) -> None:
@@ -204,43 +201,34 @@ class HandSignControlNode(Node):
         changed = self._selection.follow() if self._selection else self._cmd_vel.follow()
         if not (self._arming or changed):
             return
-        away = "another robot listens" if changed else None if self._cmd_vel.wanted else "no robot listens"
+        away = "another robot listens" if changed else None if self._cmd_vel.has_subscribers else "no robot listens"
         if away is None and self._following is not None:
             away = self._following.step(elapsed_s, self._commanded)
         if self._monitor.why_blind():
             away = "laser scans did not come"
         if away is not None:
             self._safety.robot_is_away(away)
-            self._publish(self._driver.halt())
+            self._publish(self._control.halt())
 
-    def _admitted(self, sign: str | None) -> str | None:
-        """Return the sign to follow: ``NONE`` while the robot is stopped, or waits for neutral."""
+    def _select_by(self, sign: str | None) -> None:
+        """Choose the next robot when a sign that does so begins."""
         if sign is None:
-            return None
-        action = action_of(sign, self._config.actions)
-        if self._selection and action == "next_robot" and sign != self._last_sign:
+            return
+        if self._selection and sign != self._last_sign and action_of(sign, self._config.actions) == "next_robot":
             self._selection.select(NEXT)
         self._last_sign = sign
-        return sign if self._safety.admits_sign(sign, stops=action == "stop") else NONE
-
-    def _steered(self, wanted: Velocity) -> Velocity:
-        """Return the steering to follow: zero while the robot is stopped, or waits for the steering to let go."""
-        return wanted if self._safety.admits_steering(is_zero=wanted.is_zero) else ZERO
 
     def _on_change(self) -> None:
         """Start from standing with another robot."""
         assert self._selection is not None
-        self._driver.halt()
+        self._control.halt()
         self._safety.disarm("it was selected")
         self._cmd_vel = self._selection.commands
 
     def _publish(self, velocity: Velocity | None, captured_s: float | None = None) -> None:
         if velocity is None:
             return
-        now = self.clock.now()
-        since_s, self._ramped_s = now - self._ramped_s, now
-        ramped = self._ramp.step(velocity, min(since_s, self._config.sign_timeout))
-        self._commanded = self._monitor.admit(ramped)
+        self._commanded = self._monitor.admit(velocity)
         self._cmd_vel.send(self._commanded.linear_mps, self._commanded.angular_radps, captured_s)
         if captured_s is not None:
             self.latency.add(self.clock.now() - captured_s)
@@ -251,23 +239,22 @@ class HandSignControlNode(Node):
     def _elapsed(self) -> float:
         now = self.clock.now()
         elapsed_s, self._last_step_s = now - self._last_step_s, now
-        if self._interruption.note(now):
+        if self._stall_guard.note(now):
             self._safety.fault("the control was held up")
-        self._safety.step(elapsed_s)
         return elapsed_s
 
     def _report(self) -> None:
-        velocity = self._driver.velocity
+        velocity = self._mux.velocity
         self.diagnose(
             WARN if self._rivals.warning or self._monitor.why_blind() else OK,
             self._reason,
-            source=self._driver.source,
+            source=self._mux.source,
             stopped=self._safety.is_stopped,
             armed=self._safety.signs_wait is None,
             linear_mps=f"{velocity.linear_mps:.3f}",
             angular_radps=f"{velocity.angular_radps:.3f}",
             **({"robot": self._selection.fleet.selected} if self._selection else {}),
-            **tell(self._config),
+            **rule_to_diagnostics(self._config),
             **self._monitor.values(),
             **({"warning": self._rivals.warning} if self._rivals.warning else {}),
             **self._latencies(),
@@ -280,17 +267,17 @@ class HandSignControlNode(Node):
             return "standing: stopped, until it is reset"
         if why_blind := self._monitor.why_blind():
             return f"standing: {why_blind}"
-        source = self._driver.source
+        source = self._mux.source
         if source == "steering":
             waits = safety.steering_waits
             return (
                 f"standing: {self._disarmed}, steers once the steering has been let go"
                 if waits
-                else self._monitor.explain(self._driver.reason)
+                else self._monitor.explain(self._mux.reason)
             )
         why = safety.signs_wait
         if why is None or (source == "nobody" and not why):
-            return self._monitor.explain(self._driver.reason)
+            return self._monitor.explain(self._mux.reason)
         return f"standing: {self._disarmed}{f' ({why})' if why else ''}, moves once Stop is shown, or no hand"
 
     @property

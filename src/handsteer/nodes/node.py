@@ -179,7 +179,7 @@ class Node:
     @property
     def is_diagnosed(self) -> bool:
         """Whether anybody hears what :meth:`diagnose` says."""
-        return self._diagnostics.wanted
+        return self._diagnostics.has_subscribers
 
     def diagnose(self, level: int, message: str, **values: object) -> None:
         """Publish this node's state on ``/diagnostics``: a level, a sentence for people, and named values."""

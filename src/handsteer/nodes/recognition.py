@@ -17,10 +17,10 @@ from handsteer.errors import ConfigError, ModelError
 from handsteer.images import bgr_image, image_message, jpeg_picture
 from handsteer.messages import HAND_SIGN, IMAGE_ANNOTATED, IMAGE_COMPRESSED, IMAGE_RAW, CompressedImage, Image, String
 from handsteer.nodes.frame_age import FrameAge
-from handsteer.nodes.interruption import CALM_S, Interruption
 from handsteer.nodes.latency import LatencyLog
 from handsteer.nodes.node import OK, WARN, Node
 from handsteer.nodes.recording import Recording
+from handsteer.nodes.stall_guard import CALM_S, StallGuard
 from handsteer.nodes.stop_keeper import StopKeeper
 from handsteer.signs.protocol import Classifier
 from handsteer.signs.recognizer import Recognition, Recognizer
@@ -82,7 +82,7 @@ class HandSignRecognitionNode(Node):
         self._last_hand_s: float | None = None
         self._age = FrameAge(config.max_frame_age)
         self._freshness = Freshness(config.max_frame_age)
-        self._interruption = Interruption(config.max_frame_age, clock.now())
+        self._stall_guard = StallGuard(config.max_frame_age, clock.now())
         self._recording = Recording(config.recorded, config.max_frame_age)
         self._refused: str | None = None
         self._refused_s = -math.inf
@@ -114,7 +114,7 @@ class HandSignRecognitionNode(Node):
             self._model = version
         self._config = config.signs
         limit_s = config.signs.max_frame_age
-        self._age.limit_s = self._freshness.limit_s = self._recording.limit_s = self._interruption.limit_s = limit_s
+        self._age.limit_s = self._freshness.limit_s = self._recording.limit_s = self._stall_guard.limit_s = limit_s
         self._recognizer.reconfigure(config.signs)
 
     def _has_other_model(self, config: SignsConfig) -> bool:
@@ -126,13 +126,13 @@ class HandSignRecognitionNode(Node):
     def _on_frame(self, received: Received[M], picture_of: Callable[[M], NDArray[np.uint8]]) -> None:
         began_s = self.clock.now()
         captured_s = received.captured_s if received.captured_s is not None else began_s
-        self._interruption.note(began_s)
+        self._stall_guard.note(began_s)
         if self._recording.follows(began_s, captured_s, by_player=received.by_player):
             captured_s = began_s
         self._refused = self._age.why_refused(began_s, captured_s)
         if self._refused is not None:
             self._refused = self._recording.hint(began_s) or self._refused
-        if self._refused is None and self._interruption.distrusts(began_s):
+        if self._refused is None and self._stall_guard.distrusts(began_s):
             self._refused = "this process was held up, and frames may have waited meanwhile"
         image = picture_of(received.message)
         if self._refused is None:
@@ -165,7 +165,7 @@ class HandSignRecognitionNode(Node):
         self.counts[recognition.sign] = self.counts.get(recognition.sign, 0) + 1
         self._sign.publish(String(data=recognition.sign), received.captured_s)
         self.processing.add(self.clock.now() - began_s)
-        if self._annotated.wanted:
+        if self._annotated.has_subscribers:
             header = received.message.header
             self._annotated.publish(image_message(self._annotate(image, recognition), header), received.captured_s)
 
@@ -201,7 +201,7 @@ class HandSignRecognitionNode(Node):
 
     def _watch(self) -> None:
         now = self.clock.now()
-        self._interruption.note(now)
+        self._stall_guard.note(now)
         if now - self._last_frame_s <= self._config.max_frame_age:
             return
         period_s = _SILENCE_PERIOD_S if self._recognition is None else self._config.max_frame_age

@@ -42,10 +42,10 @@ from handsteer.messages import (
     twist,
     twist_in,
 )
-from handsteer.nodes.interruption import Interruption
 from handsteer.nodes.node import ERROR, OK, WARN, Node
 from handsteer.nodes.rivals import Rivals
 from handsteer.nodes.scans import scan_message
+from handsteer.nodes.stall_guard import StallGuard
 from handsteer.nodes.stop_keeper import StopKeeper
 from handsteer.nodes.world_changes import WorldChanges
 from handsteer.nodes.world_markers import Touches, gate_strips, world_markers
@@ -96,7 +96,7 @@ class RobotNode(Node):
         self._robot = robot
         self._config = config
         self._last_step_s = clock.now()
-        self._interruption = Interruption(config.cmd_vel_timeout, clock.now())
+        self._stall_guard = StallGuard(config.cmd_vel_timeout, clock.now())
         self._command = Velocity()
         self._commanded_s = clock.now()
         self.state = robot.step(0.0)
@@ -172,7 +172,7 @@ class RobotNode(Node):
     def _on_command(self, received: Received[Twist | TwistStamped]) -> None:
         now = self.clock.now()
         self._notice_interruption(now)
-        if not is_zero(received.message) and (self._interruption.distrusts(now) or self._is_old(received.message, now)):
+        if not is_zero(received.message) and (self._stall_guard.distrusts(now) or self._is_old(received.message, now)):
             return
         command = twist_in(received.message)
         self._tell(Velocity(command.linear.x, command.angular.z))
@@ -188,7 +188,7 @@ class RobotNode(Node):
         return is_old
 
     def _notice_interruption(self, now: float) -> None:
-        if self._interruption.note(now):
+        if self._stall_guard.note(now):
             self._tell(Velocity())
 
     def _tell(self, velocity: Velocity) -> None:
@@ -237,7 +237,7 @@ class RobotNode(Node):
         self._joint_states.publish(_joint_state(Header(stamp=stamp, frame_id=""), self.state))
 
     def _publish_scan(self) -> None:
-        scan = self._robot.scan() if self._scan.wanted else None
+        scan = self._robot.scan() if self._scan.has_subscribers else None
         if scan is not None:
             measured_s = self.clock.now() - scan.age_s
             header = Header(stamp=self.clock.stamp(measured_s), frame_id=self._config.scan_frame_id)
@@ -246,7 +246,7 @@ class RobotNode(Node):
     def _publish_markers(self) -> None:
         now = self.clock.now()
         self._touches.note(self.state.contacts, now)
-        if self._markers.wanted:
+        if self._markers.has_subscribers:
             header = Header(stamp=self.clock.stamp(now), frame_id=self._config.odom_frame_id)
             strips = gate_strips(self.world.gates, self._referee.state) if self.world else []
             self._markers.publish(

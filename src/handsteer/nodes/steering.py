@@ -10,8 +10,8 @@ from handsteer.config import Config, ControlConfig
 from handsteer.control.safety import Ramp, Safety
 from handsteer.errors import TransportError
 from handsteer.messages import CMD_VEL, STEERING_CMD_VEL, STOP, Bool, Topic
-from handsteer.nodes.interruption import Interruption
 from handsteer.nodes.node import Node
+from handsteer.nodes.stall_guard import StallGuard
 from handsteer.nodes.stop_keeper import StopKeeper
 from handsteer.timeouts import STALE_S
 from handsteer.transports.commands import Commands
@@ -62,7 +62,7 @@ class SteeringNode(Node):
         self._wanted: Velocity | None = None
         self._halted = False
         self._heard_stop: bool | None = None
-        self._interruption = Interruption(STALE_S, clock.now())
+        self._stall_guard = StallGuard(STALE_S, clock.now())
         self._was_held_up = False
         self._safety = Safety(self._config, arming=False)
         self._ramp = Ramp(self._config)
@@ -118,7 +118,7 @@ class SteeringNode(Node):
         with self._lock:
             self._notice_interruption()
             wanted = Velocity(linear_mps, angular_radps)
-            if self._was_held_up and (not wanted.is_zero or self._interruption.distrusts(self.clock.now())):
+            if self._was_held_up and (not wanted.is_zero or self._stall_guard.distrusts(self.clock.now())):
                 return
             self._was_held_up = False
             self._wanted = self._admitted(wanted)
@@ -140,8 +140,9 @@ class SteeringNode(Node):
 
     def reset(self) -> None:
         """Let the robot be driven again; nothing moves before whoever drives has let go and begins anew."""
-        self._halted = False
-        self._stop.publish(Bool(data=False))
+        with self._lock:
+            self._halted = False
+            self._stop.publish(Bool(data=False))
 
     def on_stop(self) -> None:
         """Leave nothing in motion."""
@@ -195,15 +196,15 @@ class SteeringNode(Node):
             self._publish(ZERO)
 
     def _notice_interruption(self) -> None:
-        if self._interruption.note(self.clock.now()) and self._wanted is not None:
+        if self._stall_guard.note(self.clock.now()) and self._wanted is not None:
             self._wanted, self._was_held_up = None, True
             if self.is_direct:  # elsewhere a zero would be taken for letting go
                 self._publish(ZERO)
 
     def _repeat(self) -> None:
-        if self._halted:
-            self._stop.publish(Bool(data=True))
         with self._lock:
+            if self._halted:
+                self._stop.publish(Bool(data=True))
             self._notice_interruption()
             if self._target.commands.follow():
                 self._stand()

@@ -9,10 +9,10 @@ from typing import Any
 
 from handsteer.config import RobotConfig
 from handsteer.messages import CMD_VEL, LaserScan, Odometry, Topic, TurtlePose, type_name, yaw_of
+from handsteer.robots.command_limiter import ZERO, CommandLimiter
 from handsteer.robots.description import robot_description
 from handsteer.robots.diff_drive import Velocity
 from handsteer.robots.protocol import Obstacle, RangeScan, RobotState
-from handsteer.robots.relay import ZERO, Relay
 from handsteer.transports.commands import Commands
 from handsteer.transports.protocol import Received, Session
 from handsteer.types import Pose2D
@@ -45,8 +45,8 @@ class _Seen:
 class RemoteRobot:
     """A :class:`~handsteer.robots.protocol.Robot` that listens to a topic in another process.
 
-    What it is told is worked out by :class:`~handsteer.robots.relay.Relay`. Where it is, it says itself: its odometry
-    counts as the truth, and nothing is known of what it touches.
+    What it is sent is worked out by :class:`~handsteer.robots.command_limiter.CommandLimiter`. Its odometry counts as
+    the truth, and nothing is known of what it touches.
 
     Args:
         config: Topics, types, limits and timeouts.
@@ -62,7 +62,7 @@ class RemoteRobot:
         self.description = robot_description()
         self._config = config
         self._session = session
-        self._relay = Relay(config)
+        self._limiter = CommandLimiter(config)
         topic: Topic[Any] = _topic(config.cmd_vel_topic, cmd_vel.type, CMD_VEL.depth)
         self._topic = replace(topic, or_type=cmd_vel.or_type)
         self._odom_topic = _full_name(session, config.odom_topic)
@@ -82,17 +82,17 @@ class RemoteRobot:
 
     def command(self, linear_mps: float, angular_radps: float) -> None:
         """Ask for a velocity in m/s and rad/s; a slower one is passed on at once, a faster one with the next steps."""
-        self._send(self._relay.command(Velocity(linear_mps, angular_radps)))
+        self._send(self._limiter.command(Velocity(linear_mps, angular_radps)))
 
     def step(self, dt_s: float) -> RobotState:
         """Let ``dt_s`` seconds pass, pass on what is due, and return what the robot last said of itself."""
         self._time_s += dt_s
         changed = self._cmd_vel.follow()
-        listens = self._cmd_vel.wanted and not changed
+        listens = self._cmd_vel.has_subscribers and not changed
         self._linked_s = self._linked_s + dt_s if listens else 0.0
         seen = self._seen
         is_silent = seen is not None and self._session.clock.now() - seen.at_s > self._config.odom_timeout
-        self._send(self._relay.step(dt_s, linked=listens and not is_silent))
+        self._send(self._limiter.step(dt_s, linked=listens and not is_silent))
         pose, velocity = (seen.pose, seen.velocity) if seen else (Pose2D(0.0, 0.0, 0.0), ZERO)
         return RobotState(
             time_s=self._time_s,
@@ -150,10 +150,10 @@ class RemoteRobot:
 
     def _look_for_it(self) -> None:
         deadline_s = time.monotonic() + _LOOK_FOR_IT_S
-        while not self._cmd_vel.wanted and time.monotonic() < deadline_s:
+        while not self._cmd_vel.has_subscribers and time.monotonic() < deadline_s:
             self._cmd_vel.follow()
             time.sleep(_LOOK_AGAIN_S)
-        if not self._cmd_vel.wanted:
+        if not self._cmd_vel.has_subscribers:
             log.warning("the robot is not there: %s", self._nobody_listens())
 
     def _send(self, velocity: Velocity | None) -> None:
@@ -182,7 +182,7 @@ class RemoteRobot:
             return f"is silent: {self._odom_topic} has stopped, and the robot is told to stand"
         if self._seen is None and self._config.odom_topic and self._linked_s > _ODOMETRY_DUE_S:
             return f"does not say where it is: nothing comes on {self._odom_topic} (robot.odom_topic)"
-        return "waits until Stop is shown, or no hand" if self._relay.waits else ""
+        return "waits until Stop is shown, or no hand" if self._limiter.waits else ""
 
     def _nobody_listens(self) -> str:
         name = _full_name(self._session, self._config.cmd_vel_topic)

@@ -12,8 +12,8 @@ from handsteer.clock import Clock
 from handsteer.messages import Topic
 from handsteer.nodes.node import Node
 from handsteer.transports.channels import check_type
-from handsteer.transports.lateness import Lateness
 from handsteer.transports.protocol import Publisher, Received, Subscription, Transport
+from handsteer.transports.stale_messages import StaleMessageFilter
 from handsteer.transports.stamps import capture_time
 
 M = TypeVar("M")
@@ -117,7 +117,7 @@ class FaultTransport:
 
     def advertise(self, node: str, topic: Topic[M]) -> "FaultPublisher[M]":
         """Return the sending end of ``topic`` for the node named ``node``."""
-        lateness = Lateness(topic.lifespan_s) if self._guards and topic.lifespan_s is not None else None
+        lateness = StaleMessageFilter(topic.lifespan_s) if self._guards and topic.lifespan_s is not None else None
         return FaultPublisher(self, node, topic, self._inner.advertise(node, topic), lateness)
 
     def subscribe(self, node: str, topic: Topic[M], deliver: Callable[[Received[M]], None]) -> Subscription:
@@ -172,7 +172,12 @@ class FaultPublisher(Generic[M]):
     """The sending end of a topic that may have a fault."""
 
     def __init__(
-        self, transport: FaultTransport, node: str, topic: Topic[M], inner: Publisher[M], lateness: Lateness | None
+        self,
+        transport: FaultTransport,
+        node: str,
+        topic: Topic[M],
+        inner: Publisher[M],
+        lateness: StaleMessageFilter | None,
     ) -> None:
         self._transport = transport
         self._node = node
@@ -181,9 +186,9 @@ class FaultPublisher(Generic[M]):
         self._lateness = lateness
 
     @property
-    def wanted(self) -> bool:
+    def has_subscribers(self) -> bool:
         """Whether anybody listens."""
-        return self._inner.wanted
+        return self._inner.has_subscribers
 
     def publish(self, message: M, captured_s: float | None = None) -> None:
         """Send ``message`` on its way."""

@@ -69,7 +69,7 @@ class Fanout(Generic[M]):
         self._last: Received[M] | None = None
 
     @property
-    def wanted(self) -> bool:
+    def has_subscribers(self) -> bool:
         """Whether there is a subscriber."""
         return bool(self._subscribers)
 

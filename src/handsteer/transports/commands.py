@@ -51,9 +51,9 @@ class Commands:
         self._publisher = advertise(topic)
 
     @property
-    def wanted(self) -> bool:
+    def has_subscribers(self) -> bool:
         """Whether anybody listens."""
-        return self._publisher.wanted
+        return self._publisher.has_subscribers
 
     def send(self, linear_mps: float, angular_radps: float, captured_s: float | None = None) -> None:
         """Command a velocity, in m/s forward and rad/s to the left; ``captured_s`` is as a publisher has it."""

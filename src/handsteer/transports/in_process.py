@@ -75,9 +75,9 @@ class InProcessPublisher(Generic[M]):
         self._fanout = fanout
 
     @property
-    def wanted(self) -> bool:
+    def has_subscribers(self) -> bool:
         """Whether anybody listens."""
-        return self._fanout.wanted
+        return self._fanout.has_subscribers
 
     def publish(self, message: M, captured_s: float | None = None) -> None:
         """Hand ``message`` to every subscriber's inbox."""

@@ -211,7 +211,7 @@ class PipedPublisher(Generic[M]):
         topic: Name of the topic.
     """
 
-    wanted = True
+    has_subscribers = True
     """Whoever listens is in the other process."""
 
     def __init__(self, pipe: Pipe, number: int, topic: Topic[M], node: str) -> None:

@@ -39,7 +39,7 @@ class Publisher(Protocol[M_contra]):
     """The sending end of a topic."""
 
     @property
-    def wanted(self) -> bool:
+    def has_subscribers(self) -> bool:
         """Whether anybody listens: what is made on demand is made only then."""
         ...
 

@@ -20,7 +20,8 @@ def test_a_process_of_its_own_learns_the_same_and_tells_how_far_it_is() -> None:
     assert (model.labels, report.held_out, report.signs[0].summary.takes) == (("Peace",), "take", 2)
     assert steps == [(step, steps[-1][1]) for step in range(1, steps[-1][1] + 1)]
     hand = shaken("Peace", np.random.default_rng(9))
-    assert model.confidences(hand.pixels[None, :, :2], hand.world[None])[0, 0] > 0.8
+    pixels, world = hand.pixels.astype(np.float64), hand.world.astype(np.float64)
+    assert model.confidences(pixels[None, :, :2], world[None])[0, 0] > 0.8
 
 
 def test_what_cannot_be_learnt_is_told() -> None:

@@ -27,6 +27,9 @@ class Says:
     def classify(self, hand: Hand) -> SignGuess:
         return self._guess
 
+    def confidence(self, sign: str, likelihood: float) -> float:
+        return likelihood
+
 
 HAND = show_sign("Stop")
 
@@ -67,7 +70,7 @@ def test_landmarks_that_are_no_numbers_are_no_sign() -> None:
 
 
 def test_a_hand_of_few_pixels_is_no_sign() -> None:
-    far = Hand(HAND.points / 30, HAND.world, "Right", 0.9, 0.9, HAND.image_size)
+    far = Hand(HAND.points / np.float32(30), HAND.world, "Right", 0.9, 0.9, HAND.image_size)
     assert TaughtClassifier(Says(NONE, 1.0), model()).classify(far).sign == NONE
 
 

@@ -17,7 +17,8 @@ def varied(*, both_hands: bool, flat: bool = False) -> tuple[np.ndarray, np.ndar
 def palm_side(points: np.ndarray) -> np.ndarray:
     """Return the sign of the turn from the wrist's way to the index finger to that to the little finger."""
     one, other = points[:, 5, :2] - points[:, 0, :2], points[:, 17, :2] - points[:, 0, :2]
-    return np.sign(one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0])
+    turn: np.ndarray = np.sign(one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0])
+    return turn
 
 
 @pytest.mark.parametrize("flat", [False, True])

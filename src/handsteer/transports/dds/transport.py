@@ -136,7 +136,7 @@ class DdsPublisher(Generic[M]):
         self._lock = threading.Lock()
 
     @property
-    def wanted(self) -> bool:
+    def has_subscribers(self) -> bool:
         """Whether anybody listens, in this process or another."""
         writer = self._writer
         return writer is not None and writer.get_publication_matched_status().current_count > 0
@@ -145,7 +145,7 @@ class DdsPublisher(Generic[M]):
         """Give ``message`` to the network; a reader that is too slow for it goes without."""
         check_type(self._topic, message)
         writer = self._writer
-        if writer is None or not (self._topic.latched or self.wanted):
+        if writer is None or not (self._topic.latched or self.has_subscribers):
             return
         try:
             writer.write(writer.data_type(encode(message)))

@@ -175,7 +175,7 @@ class RclpyPublisher(Generic[M]):
                 )
 
     @property
-    def wanted(self) -> bool:
+    def has_subscribers(self) -> bool:
         """Whether anybody listens, in this process or another."""
         publisher = self._publisher
         return publisher is not None and publisher.get_subscription_count() > 0
@@ -184,7 +184,7 @@ class RclpyPublisher(Generic[M]):
         """Give ``message`` to rclpy; a subscriber that is too slow for it goes without."""
         check_type(self._topic, message)
         publisher = self._publisher
-        if publisher is None or not (self._topic.latched or self.wanted):
+        if publisher is None or not (self._topic.latched or self.has_subscribers):
             return
         try:
             publisher.publish(encode(message))

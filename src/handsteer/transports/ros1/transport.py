@@ -148,7 +148,7 @@ class Ros1Publisher(Generic[M]):
             send_promptly(self._publisher, topic.depth)
 
     @property
-    def wanted(self) -> bool:
+    def has_subscribers(self) -> bool:
         """Whether anybody listens, in this process or another."""
         publisher = self._publisher
         return publisher is not None and publisher.get_num_connections() > 0
@@ -157,7 +157,7 @@ class Ros1Publisher(Generic[M]):
         """Give ``message`` to rospy's senders, one a subscriber, which drop what a slow one leaves waiting."""
         check_type(self._topic, message)
         publisher = self._publisher
-        if publisher is None or not (self._topic.latched or self.wanted):
+        if publisher is None or not (self._topic.latched or self.has_subscribers):
             return
         try:
             publisher.publish(to_ros1(message))

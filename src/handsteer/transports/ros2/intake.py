@@ -7,9 +7,9 @@ from typing import Generic, TypeVar
 from handsteer.clock import Clock
 from handsteer.messages import Topic, type_name
 from handsteer.transports.channels import Deliver
-from handsteer.transports.lateness import Lateness
 from handsteer.transports.protocol import Received
 from handsteer.transports.ros2.encoding import decode
+from handsteer.transports.stale_messages import StaleMessageFilter
 from handsteer.transports.stamps import capture_time
 
 M = TypeVar("M")
@@ -34,7 +34,7 @@ class Intake(Generic[M]):
         self._name = name
         self._clock = clock
         self._send = send
-        self._lateness = None if topic.lifespan_s is None else Lateness(topic.lifespan_s)
+        self._lateness = None if topic.lifespan_s is None else StaleMessageFilter(topic.lifespan_s)
         self._was_late = self._is_broken = False
 
     def take(self, raw: bytes, sender: bytes = b"", sent_s: float | None = None) -> None:

@@ -146,7 +146,7 @@ class ZenohPublisher(Generic[M]):
         self._is_closed = False
 
     @property
-    def wanted(self) -> bool:
+    def has_subscribers(self) -> bool:
         """Whether anybody listens, in this process or another."""
         with self._lock:
             if self._is_closed:
@@ -157,7 +157,7 @@ class ZenohPublisher(Generic[M]):
     def publish(self, message: M, captured_s: float | None = None) -> None:
         """Give ``message`` to the network; a subscriber that is too slow for it goes without."""
         check_type(self._topic, message)
-        if not (self._topic.latched or self.wanted):
+        if not (self._topic.latched or self.has_subscribers):
             return
         raw = encode(message)
         with self._lock:

@@ -5,14 +5,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from handsteer.config import ControlConfig
-from handsteer.control.driver import Driver
+from handsteer.control.twist_mux import TwistMux
 from handsteer.types import FORWARD, GO, NONE, STOP, ZERO, Velocity
 
 DT = 1 / 30
 
 
 def test_steering_takes_over_at_once_and_signs_are_kept_out() -> None:
-    driver = Driver(ControlConfig())
+    driver = TwistMux(ControlConfig())
     driver.step(DT, sign=FORWARD)
     assert driver.step(DT, steering=Velocity(0.4, 1.0)) == Velocity(0.4, 1.0)
     assert driver.source == "steering"
@@ -21,7 +21,7 @@ def test_steering_takes_over_at_once_and_signs_are_kept_out() -> None:
 
 
 def test_when_steering_ends_one_zero_goes_out_and_signs_start_from_standing() -> None:
-    driver = Driver(ControlConfig(steering_timeout=0.3))
+    driver = TwistMux(ControlConfig(steering_timeout=0.3))
     for _ in range(20):
         driver.step(DT, sign=FORWARD)
     driver.step(DT, steering=Velocity(0.4, 0.0))
@@ -33,24 +33,24 @@ def test_when_steering_ends_one_zero_goes_out_and_signs_start_from_standing() ->
 
 @pytest.mark.parametrize("wanted", [Velocity(math.nan, 0.0), Velocity(0.0, math.inf), Velocity(-math.inf, math.nan)])
 def test_steering_that_is_no_number_means_zero(wanted: Velocity) -> None:
-    assert Driver(ControlConfig()).step(DT, steering=wanted) == ZERO
+    assert TwistMux(ControlConfig()).step(DT, steering=wanted) == ZERO
 
 
 def test_steering_is_clamped() -> None:
-    driver = Driver(ControlConfig(max_linear=0.5, max_angular=1.0))
+    driver = TwistMux(ControlConfig(max_linear=0.5, max_angular=1.0))
     assert driver.step(DT, steering=Velocity(-9.0, 9.0)) == Velocity(-0.5, 1.0)
 
 
 @pytest.mark.parametrize("dt_s", [math.nan, math.inf, -1.0])
 def test_broken_time_stops_whoever_drives(dt_s: float) -> None:
-    driver = Driver(ControlConfig())
+    driver = TwistMux(ControlConfig())
     driver.step(DT, steering=Velocity(0.4, 0.0))
     assert driver.step(dt_s) == ZERO
     assert driver.step(dt_s) is None
 
 
 def test_reasons_say_why_the_robot_stands() -> None:
-    driver = Driver(ControlConfig())
+    driver = TwistMux(ControlConfig())
     assert driver.reason == "standing: no sign has come for 0.35 s"
     reasons = []
     for sign in (NONE, STOP, FORWARD):
@@ -80,7 +80,7 @@ def test_whatever_comes_the_command_is_finite_and_within_limits(
     inputs: list[tuple[float, str | None, Velocity | None]],
 ) -> None:
     config = ControlConfig()
-    driver = Driver(config)
+    driver = TwistMux(config)
     for dt_s, sign, steering in inputs:
         velocity = driver.step(dt_s, sign=sign, steering=steering)
         if velocity is not None:
@@ -90,21 +90,21 @@ def test_whatever_comes_the_command_is_finite_and_within_limits(
 
 
 def test_a_lower_limit_is_commanded_at_once() -> None:
-    driver = Driver(ControlConfig(linear_step=0.5))
+    driver = TwistMux(ControlConfig(linear_step=0.5))
     driver.step(DT, sign=FORWARD)
     assert driver.reconfigure(ControlConfig(max_linear=0.2)) == Velocity(0.2, 0.0)
     assert driver.step(DT, sign=GO) == Velocity(0.2, 0.0)
 
 
 def test_a_higher_limit_says_nothing_and_speeds_up_nothing() -> None:
-    driver = Driver(ControlConfig(linear_step=0.5, max_linear=0.2))
+    driver = TwistMux(ControlConfig(linear_step=0.5, max_linear=0.2))
     driver.step(DT, sign=FORWARD)
     assert driver.reconfigure(ControlConfig(max_linear=10.0)) is None
     assert driver.step(DT, sign=GO) == Velocity(0.2, 0.0)
 
 
 def test_steering_is_clamped_by_a_lower_limit_at_once() -> None:
-    driver = Driver(ControlConfig())
+    driver = TwistMux(ControlConfig())
     driver.step(DT, steering=Velocity(-0.8, 1.0))
     assert driver.reconfigure(ControlConfig(max_linear=0.1, max_angular=0.5)) == Velocity(-0.1, 0.5)
     assert driver.source == "steering"
@@ -124,7 +124,7 @@ SPEEDS = st.floats(0.01, 3.0)
 def test_no_configuration_sets_a_robot_in_motion_or_makes_it_faster(
     before: list[str | None], steering: Velocity | None, limits: tuple[float, float], ramp: str, action: str
 ) -> None:
-    driver = Driver(ControlConfig(linear_step=0.4, angular_step=0.4, actions={"Peace": "turbo"}))
+    driver = TwistMux(ControlConfig(linear_step=0.4, angular_step=0.4, actions={"Peace": "turbo"}))
     for sign in before:
         driver.step(DT, sign=sign)
     if steering is not None:

@@ -9,7 +9,7 @@ Whole beats of 0.02 s later the timeout of 0.35 s has passed; a hair more, as su
 """
 
 
-class Interruption:
+class StallGuard:
     """Notices that a node was held up: its process was stopped, or the machine was too busy.
 
     Commands without a time of their own would be obeyed late otherwise, however old they are.

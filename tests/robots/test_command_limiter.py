@@ -5,8 +5,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from handsteer.config import RobotConfig
+from handsteer.robots.command_limiter import ZERO, CommandLimiter
 from handsteer.robots.diff_drive import Velocity
-from handsteer.robots.relay import ZERO, Relay
 
 CONFIG = RobotConfig(max_linear=1.0, max_linear_acceleration=0.5, max_angular=2.0, max_angular_acceleration=4.0)
 DT_S = 0.02
@@ -19,14 +19,14 @@ EVENTS = st.lists(
 )
 
 
-def linked() -> Relay:
-    relay = Relay(CONFIG)
+def linked() -> CommandLimiter:
+    relay = CommandLimiter(CONFIG)
     relay.step(DT_S, linked=True)
     relay.command(ZERO)
     return relay
 
 
-def drive(relay: Relay, wanted: Velocity, seconds: float, *, is_linked: bool = True) -> list[Velocity]:
+def drive(relay: CommandLimiter, wanted: Velocity, seconds: float, *, is_linked: bool = True) -> list[Velocity]:
     """Command ``wanted`` every 0.04 s; return what was sent."""
     sent = []
     for beat in range(round(seconds / DT_S)):
@@ -35,7 +35,7 @@ def drive(relay: Relay, wanted: Velocity, seconds: float, *, is_linked: bool = T
     return [velocity for velocity in sent if velocity is not None]
 
 
-def coast(relay: Relay, seconds: float) -> list[Velocity | None]:
+def coast(relay: CommandLimiter, seconds: float) -> list[Velocity | None]:
     return [relay.step(DT_S, linked=True) for _ in range(round(seconds / DT_S))]
 
 
@@ -70,14 +70,15 @@ def test_after_the_link_was_cut_it_waits_for_a_zero() -> None:
     assert set(drive(relay, AHEAD, 0.2, is_linked=False)[1:]) == {ZERO}
     relay.step(DT_S, linked=True)
     assert set(drive(relay, AHEAD, 1.0)) == {ZERO}
-    assert relay.waits
+    waits = relay.waits
+    assert waits
     drive(relay, ZERO, 0.1)
     assert not relay.waits
     assert drive(relay, AHEAD, 1.0)[-1] == AHEAD
 
 
 def test_a_zero_that_the_robot_could_not_hear_does_not_count() -> None:
-    relay = Relay(CONFIG)
+    relay = CommandLimiter(CONFIG)
     drive(relay, ZERO, 1.0, is_linked=False)
     relay.step(DT_S, linked=True)
     assert set(drive(relay, AHEAD, 1.0)) == {ZERO}

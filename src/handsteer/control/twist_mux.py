@@ -10,7 +10,7 @@ from handsteer.types import NONE, ZERO, Velocity, action_of
 Source = Literal["nobody", "signs", "steering"]
 
 
-class Driver:
+class TwistMux:
     """Joins signs and steering to one stream of velocities.
 
     A steering command takes over at once and keeps the signs out until ``steering_timeout`` has passed without

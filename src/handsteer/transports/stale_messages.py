@@ -9,7 +9,7 @@ _LEAK = 0.01
 _SENDERS = 32
 
 
-class Lateness:
+class StaleMessageFilter:
     """Tells late messages from others, though clocks may not be in step.
 
     What a sender's clock and ours are apart, with the shortest time on the way, is the least that arrival and sending

@@ -13,7 +13,7 @@ _LAST_ZEROS = 10
 _SLACK_S = 1e-9
 
 
-class Relay:
+class CommandLimiter:
     """Passes commands on to a robot, within its limits, and only as long as they come.
 
     * A command goes out at once, and again ``command_rate`` times a second, so that the robot's own watchdog, which

@@ -1,14 +1,14 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from handsteer.transports.lateness import Lateness
+from handsteer.transports.stale_messages import StaleMessageFilter
 
 APART = st.floats(-1e9, 1e9)
 
 
 @given(APART, st.lists(st.floats(0.0, 0.3), min_size=2, max_size=50))
 def test_clocks_may_be_apart_by_anything(apart_s: float, delays: list[float]) -> None:
-    lateness = Lateness(0.35)
+    lateness = StaleMessageFilter(0.35)
     for step, delay_s in enumerate(delays):
         sent_s = step * 0.03
         assert not lateness.is_late(b"a", sent_s + apart_s, sent_s + delay_s)
@@ -16,7 +16,7 @@ def test_clocks_may_be_apart_by_anything(apart_s: float, delays: list[float]) ->
 
 @given(APART, st.floats(0.01, 0.1), st.floats(0.6, 100.0))
 def test_what_waited_is_late_and_what_comes_after_it_is_not(apart_s: float, delay_s: float, held_s: float) -> None:
-    lateness = Lateness(0.35)
+    lateness = StaleMessageFilter(0.35)
     assert not lateness.is_late(b"a", apart_s, delay_s)
     assert lateness.is_late(b"a", apart_s + 1.0, 1.0 + delay_s + held_s)
     later_s = 1.0 + held_s
@@ -24,7 +24,7 @@ def test_what_waited_is_late_and_what_comes_after_it_is_not(apart_s: float, dela
 
 
 def test_each_sender_has_a_clock_of_its_own() -> None:
-    lateness = Lateness(0.35)
+    lateness = StaleMessageFilter(0.35)
     assert not lateness.is_late(b"a", 100.0, 0.0)
     assert not lateness.is_late(b"b", 0.0, 0.1)
     assert not lateness.is_late(b"a", 100.2, 0.2)
@@ -32,7 +32,7 @@ def test_each_sender_has_a_clock_of_its_own() -> None:
 
 
 def test_a_clock_that_is_set_back_is_trusted_again_after_a_while() -> None:
-    lateness = Lateness(0.35)
+    lateness = StaleMessageFilter(0.35)
     assert not lateness.is_late(b"a", 0.0, 0.0)
     late = [lateness.is_late(b"a", now - 1.0, now) for now in range(1, 120)]
     assert all(late[:30])
@@ -40,7 +40,7 @@ def test_a_clock_that_is_set_back_is_trusted_again_after_a_while() -> None:
 
 
 def test_a_clock_that_is_set_back_by_seconds_while_messages_come_is_followed_after_a_second() -> None:
-    lateness = Lateness(0.35)
+    lateness = StaleMessageFilter(0.35)
     late = []
     for number in range(300):
         now = number / 30
@@ -51,14 +51,14 @@ def test_a_clock_that_is_set_back_by_seconds_while_messages_come_is_followed_aft
 
 
 def test_a_queue_that_stands_is_no_clock_that_was_set() -> None:
-    lateness = Lateness(0.35)
+    lateness = StaleMessageFilter(0.35)
     assert not any(lateness.is_late(b"a", number / 30, number / 30) for number in range(30))
     held = [lateness.is_late(b"a", 1.0 + number / 30, 6.0 + number / 300) for number in range(100)]
     assert all(held), "what waited for five seconds, and comes ten times as fast as it was sent"
 
 
 def test_it_does_not_grow() -> None:
-    lateness = Lateness(0.35)
+    lateness = StaleMessageFilter(0.35)
     for number in range(1000):
         lateness.is_late(number.to_bytes(2, "big"), 0.0, 0.0)
     assert len(lateness._least) <= 32

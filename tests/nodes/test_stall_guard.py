@@ -1,9 +1,9 @@
-from handsteer.nodes.interruption import Interruption
+from handsteer.nodes.stall_guard import StallGuard
 from handsteer.timeouts import BURST_S, HELD_UP_S
 
 
 def test_what_comes_soon_after_an_interruption_is_distrusted() -> None:
-    interruption = Interruption(0.35, 0.0)
+    interruption = StallGuard(0.35, 0.0)
     assert not interruption.note(0.3)
     assert not interruption.distrusts(0.3)
     assert interruption.note(1.0)
@@ -13,7 +13,7 @@ def test_what_comes_soon_after_an_interruption_is_distrusted() -> None:
 
 
 def test_a_burst_is_distrusted_to_its_end_however_long_it_takes() -> None:
-    interruption = Interruption(0.35, 0.0)
+    interruption = StallGuard(0.35, 0.0)
     interruption.note(1.0)
     now_s = 1.0
     while now_s < 1.0 + 5 * HELD_UP_S:
@@ -25,7 +25,7 @@ def test_a_burst_is_distrusted_to_its_end_however_long_it_takes() -> None:
 
 
 def test_what_comes_fast_without_an_interruption_is_trusted() -> None:
-    interruption = Interruption(0.35, 0.0)
+    interruption = StallGuard(0.35, 0.0)
     for number in range(1000):
         interruption.note(number / 1000)
         assert not interruption.distrusts(number / 1000)
