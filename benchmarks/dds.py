@@ -38,7 +38,7 @@ WIDTH, HEIGHT = 640, 480
 SETTLE_S = 0.5
 MODULES = ("handsteer.cli.app", "handsteer.cli.nodes")
 SESSIONS = {
-    "dds": "handsteer.transports.dds.session",
+    "dds": "handsteer.transports.dds.transport",
     "zenoh": "handsteer.transports.zenoh.session",
     "ros2": "handsteer.transports.rclpy.session",
 }

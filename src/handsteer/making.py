@@ -8,8 +8,8 @@ import logging
 from typing import TYPE_CHECKING, Any
 
 from handsteer.clock import Clock, SimulatedClock, WallClock
-from handsteer.config import Config, cmd_vel_type
-from handsteer.messages import Topic, cmd_vel
+from handsteer.config import Config, RobotConfig, cmd_vel_type
+from handsteer.messages import TF, Topic, cmd_vel
 from handsteer.transports.protocol import Session, Transport
 from handsteer.types import NONE, find_sign
 
@@ -40,7 +40,6 @@ def make_camera(config: Config, transport: Transport, clock: Clock, camera: "Cam
     from handsteer.cameras.calibration import read_calibration
     from handsteer.cameras.choose import open_camera
     from handsteer.nodes.camera import CameraNode
-    from handsteer.nodes.frames import frame_prefix
 
     camera = camera or open_camera(config.camera, config.virtual_hand, clock)
     calibration = (
@@ -128,7 +127,6 @@ def make_robot(config: Config, transport: Transport, clock: Clock, link: Session
         ConfigError: The robot is real, and there is no link to it.
         WorldError: The world of a simulated robot cannot be used.
     """
-    from handsteer.nodes.frames import prefixed
     from handsteer.nodes.robot import RobotNode
     from handsteer.robots import open_robot
 
@@ -154,3 +152,21 @@ def _warn_of_unknown_signs(config: Config, signs: tuple[str, ...]) -> None:
     for name in config.control.actions:
         if find_sign(name, (*signs, NONE)) is None:
             log.warning("control.actions: the sign %s is not known; the signs are %s", name, ", ".join(signs))
+
+
+def frame_prefix(transport: Transport, node: str) -> str:
+    """Return what tells the coordinate frames of ``node`` from those of others, as ``r1/``.
+
+    It is empty without a namespace, and where each robot has a tree of its own, as ``/tf`` is remapped.
+    """
+    namespace = transport.full_name(node).partition(":")[0].rpartition("/")[0]
+    return f"{namespace}/" if namespace and transport.topic_name(TF) == TF.name else ""
+
+
+def prefixed(config: RobotConfig, transport: Transport) -> RobotConfig:
+    """Return ``config`` with the names of its frames as they are in the graph: prefixed as ``frame_prefix`` says."""
+    prefix = frame_prefix(transport, "robot") if config.frame_prefix == "auto" else config.frame_prefix
+    frames = {name: getattr(config, name) for name in ("odom_frame_id", "base_frame_id", "scan_frame_id")}
+    return config.model_copy(
+        update={name: frame if frame.startswith(prefix) else prefix + frame for name, frame in frames.items()}
+    )

@@ -35,7 +35,7 @@ def _ros1(node: str, arguments: Sequence[str]) -> Session:
 def _dds(node: str, arguments: Sequence[str]) -> Session:
     # There is no wheel of cyclonedds for Python 3.14 and newer, nor for Linux on ARM.
     with needing("the transport dds (zenoh works on every system)", "dds", "cyclonedds"):
-        from handsteer.transports.dds.session import DdsSession  # noqa: PLC0415
+        from handsteer.transports.dds.transport import DdsSession  # noqa: PLC0415
     return DdsSession(node, arguments)
 
 

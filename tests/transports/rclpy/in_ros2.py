@@ -27,7 +27,7 @@ from handsteer.messages import (
 )
 from handsteer.transports import join
 from handsteer.transports.protocol import Session, Transport
-from handsteer.transports.rclpy.qos import publisher_qos, subscription_qos
+from handsteer.transports.rclpy.transport import publisher_qos, subscription_qos
 from tests.contracts.transport_contract import TransportContract, eventually, heard
 from tests.dds.graph import free_domain
 

@@ -1,6 +1,7 @@
-"""Messages over DDS: one ROS 2 node for all nodes of this process."""
+"""This process as a node of a ROS 2 graph over DDS, which carries the messages of all nodes in it."""
 
 import logging
+import os
 import threading
 import time
 from collections.abc import Callable
@@ -14,9 +15,14 @@ from handsteer.clock import Clock
 from handsteer.errors import TransportError
 from handsteer.messages import Topic
 from handsteer.transports.channels import Deliver, Fanout, FanoutSubscription, TopicTypes, check_type
+from handsteer.transports.dds.network import network
 from handsteer.transports.dds.participant import Participant
+from handsteer.transports.dds.services import ServiceServer
 from handsteer.transports.ros2.encoding import encode
 from handsteer.transports.ros2.intake import Intake
+from handsteer.transports.ros2.names import NodeName
+from handsteer.transports.ros2.service_types import Service
+from handsteer.transports.ros2.session import Ros2Session
 
 M = TypeVar("M")
 
@@ -202,3 +208,19 @@ class _Reception(Generic[M]):
                 # RTPS lets a sender leave its time out.
                 sent_s = info.source_timestamp / 1e9 if info.source_timestamp > 0 else None
                 self._intake.take(sample.raw, info.publication_handle.to_bytes(8, "big"), sent_s)
+
+
+class DdsSession(Ros2Session):
+    """A :class:`~handsteer.transports.protocol.Session` of ROS 2, over DDS."""
+
+    def close(self) -> None:
+        """Deliver what was published, then leave the graph; may be called twice."""
+        super().close()
+        self._participant.close()
+
+    def _connect(self, name: NodeName, clock: Clock) -> DdsTransport:
+        self._participant = Participant(network(os.environ), name)
+        return DdsTransport(self._participant, clock)
+
+    def _answer(self, name: str, service: Service, answer: Callable[[Any], Any]) -> ServiceServer:
+        return ServiceServer(self._participant, name, service, answer)

@@ -19,10 +19,60 @@ from handsteer.clock import Clock, SimulatedClock, WallClock
 from handsteer.errors import HandsteerError, TransportError
 from handsteer.parameters import NodeParameters
 from handsteer.transports.protocol import Call
-from handsteer.transports.rclpy.log import RosLog
 from handsteer.transports.rclpy.parameters import ParameterLink, take_given
 from handsteer.transports.rclpy.transport import RclpyTransport
 from handsteer.transports.rclpy.types import ros_class
+
+_OURS = "handsteer"
+
+
+class RosLog:
+    """Hands what handsteer logs to the logger of a node of rclpy, until it is closed.
+
+    Args:
+        logger: The node's logger; it says how much is logged, as ``--log-level`` has set it.
+    """
+
+    def __init__(self, logger: Any) -> None:
+        ours = logging.getLogger(_OURS)
+        self._before = (ours.handlers, ours.level, ours.propagate)
+        ours.handlers = [_Handler(logger)]
+        ours.setLevel(int(logger.get_effective_level()))
+        # What rclpy has shown on the screen need not be there twice.
+        ours.propagate = False
+
+    def close(self) -> None:
+        """Log as before; may be called twice."""
+        ours = logging.getLogger(_OURS)
+        ours.handlers, level, ours.propagate = self._before
+        ours.setLevel(level)
+
+
+class _Handler(logging.Handler):
+    def __init__(self, logger: Any) -> None:
+        super().__init__()
+        self._logger = logger
+
+    def emit(self, record: logging.LogRecord) -> None:
+        try:
+            _log(self._logger, record.levelno, self.format(record))
+        except Exception:
+            self.handleError(record)
+
+
+def _log(logger: Any, level: int, text: str) -> None:
+    # rclpy takes each line of a program for a statement that has always the same level.
+    if level >= logging.CRITICAL:
+        logger.fatal(text)
+    elif level >= logging.ERROR:
+        logger.error(text)
+    elif level >= logging.WARNING:
+        logger.warning(text)
+    elif level >= logging.INFO:
+        logger.info(text)
+    else:
+        logger.debug(text)
+
 
 _CLOCK_SILENCE_S = 2.0
 _DELIVER_S = 0.2

@@ -12,16 +12,40 @@ from rclpy.duration import Duration
 from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.exceptions import InvalidTopicNameException
 from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.qos_overriding_options import InvalidQosOverridesError, QoSOverridingOptions
 
 from handsteer.clock import Clock
 from handsteer.errors import TransportError
 from handsteer.messages import Topic, type_name
 from handsteer.transports.channels import Deliver, Fanout, FanoutSubscription, TopicTypes, check_type
-from handsteer.transports.rclpy.qos import publisher_qos, subscription_qos
 from handsteer.transports.rclpy.types import ros_class
 from handsteer.transports.ros2.encoding import encode
 from handsteer.transports.ros2.intake import Intake
+from handsteer.transports.ros2.profiles import Profile, offered, requested
+
+
+def publisher_qos(topic: Topic[Any]) -> QoSProfile:
+    """Return what a publisher of ``topic`` offers."""
+    qos = _qos(offered(topic))
+    if topic.lifespan_s is not None:
+        qos.lifespan = Duration(seconds=topic.lifespan_s)
+    return qos
+
+
+def subscription_qos(topic: Topic[Any]) -> QoSProfile:
+    """Return what a subscription to ``topic`` requests."""
+    return _qos(requested(topic))
+
+
+def _qos(profile: Profile) -> QoSProfile:
+    return QoSProfile(
+        history=HistoryPolicy.KEEP_LAST,
+        depth=profile.depth,
+        reliability=ReliabilityPolicy.RELIABLE if profile.reliable else ReliabilityPolicy.BEST_EFFORT,
+        durability=DurabilityPolicy.TRANSIENT_LOCAL if profile.latched else DurabilityPolicy.VOLATILE,
+    )
+
 
 M = TypeVar("M")
 

@@ -14,9 +14,8 @@ from handsteer.messages import Topic, type_name
 from handsteer.transports.channels import Deliver, Fanout, FanoutSubscription, TopicTypes, check_type
 from handsteer.transports.protocol import Received
 from handsteer.transports.ros1.conversion import from_ros1, ros1_type, to_ros1
-from handsteer.transports.ros1.memory import keep_freed_memory
-from handsteer.transports.ros1.prompt import send_promptly
-from handsteer.transports.ros1.system_state import SystemState
+from handsteer.transports.ros1.master import SystemState
+from handsteer.transports.ros1.prompt import keep_freed_memory, send_promptly
 from handsteer.transports.stamps import capture_time
 
 M = TypeVar("M")
