@@ -4,8 +4,8 @@ import pytest
 
 from handsteer.config import TeachConfig
 from handsteer.dashboard.teaching.lesson import MOST_TAKES, NO_HAND, SMALL, STILL, Lesson, hint, is_still
-from handsteer.landmarks.protocol import Hand
-from handsteer.signs.protocol import SignGuess
+from handsteer.landmarks.hand import Hand
+from handsteer.signs.classifier import SignGuess
 from handsteer.signs.recognizer import Recognition
 from handsteer.signs.teaching.collect import Facts
 from handsteer.types import NONE

@@ -15,7 +15,7 @@ from handsteer.dashboard.teaching.node import LessonVision, thumbnail
 from handsteer.dashboard.teaching.teaching import Teaching, with_sign
 from handsteer.errors import ConfigError, DatasetError, ModelCorrupt
 from handsteer.images import image_message
-from handsteer.landmarks.protocol import Hand
+from handsteer.landmarks.hand import Hand
 from handsteer.landmarks.recorded import RecordedLandmarker
 from handsteer.messages import IMAGE_RAW, Header
 from handsteer.signs.opening import open_classifier

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from handsteer.cameras.protocol import Frame
 from handsteer.clock import Clock
 from handsteer.config import Config, SignsConfig
-from handsteer.landmarks.protocol import Hand
-from handsteer.signs.protocol import SignGuess
+from handsteer.landmarks.hand import Hand
+from handsteer.signs.classifier import SignGuess
 from handsteer.signs.recognizer import Recognizer
 from handsteer.types import NONE
 from tests.signs.hands import show_sign

@@ -8,9 +8,9 @@ import pytest
 
 from handsteer.config import LandmarksConfig
 from handsteer.errors import ModelCorrupt, ModelMissing
+from handsteer.landmarks.hand import Hand
 from handsteer.landmarks.mediapipe import MediaPipeLandmarker
 from handsteer.landmarks.models import SHIPPED, find_model
-from handsteer.landmarks.protocol import Hand
 from tests.landmarks.drawn_hand import draw, open_left_hand, open_right_hand
 from tests.landmarks.golden_frames import DATA, photo_paths, read_photo, read_video
 

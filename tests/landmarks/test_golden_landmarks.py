@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from handsteer.config import LandmarksConfig
+from handsteer.landmarks.hand import Hand
 from handsteer.landmarks.mediapipe import MediaPipeLandmarker
-from handsteer.landmarks.protocol import Hand
 from tests.landmarks.golden_frames import DATA, FIXTURE, read_photo, read_video
 
 pytestmark = pytest.mark.skipif(not DATA.is_dir(), reason="the golden frames are not here: ../shared/data is absent")

@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from handsteer.cameras.files import read_photo
 from handsteer.config import LandmarksConfig
 from handsteer.errors import FrameError, ModelMissing
+from handsteer.landmarks.hand import Hand
 from handsteer.landmarks.mediapipe import MediaPipeLandmarker
-from handsteer.landmarks.protocol import Hand
 from handsteer.signs.views import View
 from handsteer.types import Handedness
 from tests.landmarks.drawn_hand import draw, open_left_hand, open_right_hand

@@ -1,6 +1,6 @@
 import numpy as np
 
-from handsteer.landmarks.protocol import Hand
+from handsteer.landmarks.hand import Hand
 from handsteer.landmarks.recorded import RecordedLandmarker
 
 FRAME = np.zeros((48, 64, 3), np.uint8)

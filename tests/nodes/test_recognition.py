@@ -8,7 +8,7 @@ from handsteer.cameras.noise import SensorNoise
 from handsteer.config import Config, SignsConfig
 from handsteer.errors import ConfigError
 from handsteer.images import image_message, jpeg_message
-from handsteer.landmarks.protocol import Hand
+from handsteer.landmarks.hand import Hand
 from handsteer.landmarks.recorded import RecordedLandmarker
 from handsteer.messages import DIAGNOSTICS, HAND_SIGN, IMAGE_ANNOTATED, IMAGE_COMPRESSED, IMAGE_RAW, Header, Image, Time
 from handsteer.nodes.recognition import HandSignRecognitionNode

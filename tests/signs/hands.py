@@ -5,7 +5,7 @@ import numpy as np
 from handsteer.hand.kinematics import angles_of, pose_joints, turn_z
 from handsteer.hand.placement import Pinhole, Placement
 from handsteer.hand.poses import FIST, HandPose, View, sign_pose
-from handsteer.landmarks.protocol import Hand
+from handsteer.landmarks.hand import Hand
 from handsteer.signs.training.hands import BONES_M
 from handsteer.types import Handedness
 

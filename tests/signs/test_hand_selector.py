@@ -1,7 +1,7 @@
 from handsteer.config import SignsConfig
-from handsteer.landmarks.protocol import Hand
+from handsteer.landmarks.hand import Hand
+from handsteer.signs.classifier import SignGuess
 from handsteer.signs.hand_selector import HandSelector
-from handsteer.signs.protocol import SignGuess
 from handsteer.types import FORWARD, GO, NONE, STOP
 from tests.signs.hands import moved, show_sign
 

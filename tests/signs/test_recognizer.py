@@ -3,7 +3,7 @@ import pytest
 
 from handsteer.config import Config, SignsConfig
 from handsteer.errors import FrameError
-from handsteer.landmarks.protocol import Hand
+from handsteer.landmarks.hand import Hand
 from handsteer.landmarks.recorded import RecordedLandmarker
 from handsteer.signs.model import load_model
 from handsteer.signs.recognizer import Recognizer

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from handsteer.errors import CameraUnreadable, DatasetError, EvaluationError, LabelError
-from handsteer.landmarks.protocol import Hand
+from handsteer.landmarks.hand import Hand
 from handsteer.signs.model import load_model
 from handsteer.signs.sources import LabelledHands, PhotoRun, open_source
 from handsteer.signs.teaching.dataset import Dataset, Take, save_dataset

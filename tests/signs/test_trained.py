@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from handsteer.hand.kinematics import angles_of
 from handsteer.hand.poses import FIST, HandPose, View
-from handsteer.landmarks.protocol import Hand
+from handsteer.landmarks.hand import Hand
 from handsteer.signs.model import load_model
 from handsteer.signs.trained import TrainedClassifier
 from handsteer.types import BACKWARD, FORWARD, GO, MOTION_SIGNS, NONE, SIGNS, STOP, TURN_LEFT, TURN_RIGHT, Handedness

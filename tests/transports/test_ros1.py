@@ -40,7 +40,7 @@ class TestRos1(TransportContract):
 
     @pytest.fixture
     def transport(self, session: Session) -> Iterator[Transport]:
-        from handsteer.transports.ros1.transport import Ros1Transport  # noqa: PLC0415 - only where ROS 1 is
+        from handsteer.transports.ros1.topics import Ros1Transport  # noqa: PLC0415 - only where ROS 1 is
 
         transport = Ros1Transport(session.clock)
         yield transport

@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 
 from handsteer.config import LandmarksConfig
 from handsteer.errors import FrameError
+from handsteer.landmarks.hand import Hand
 from handsteer.landmarks.models import find_pair
 from handsteer.landmarks.palm import PalmDetector
-from handsteer.landmarks.protocol import Hand
 from handsteer.landmarks.roi import Roi, from_landmarks
 from handsteer.landmarks.search import Search
 from handsteer.landmarks.stillness import Pace, Stillness, cells_of_frame, cells_of_hands

@@ -6,7 +6,7 @@ from math import inf
 import numpy as np
 from numpy.typing import NDArray
 
-from handsteer.landmarks.protocol import Hand
+from handsteer.landmarks.hand import Hand
 
 
 class RecordedLandmarker:

@@ -47,8 +47,7 @@ from handsteer.nodes.rivals import Rivals
 from handsteer.nodes.scans import scan_message
 from handsteer.nodes.stall_guard import StallGuard
 from handsteer.nodes.stop_keeper import StopKeeper
-from handsteer.nodes.world_changes import WorldChanges
-from handsteer.nodes.world_markers import Touches, gate_strips, world_markers
+from handsteer.nodes.world_markers import Touches, WorldChanges, gate_strips, world_markers
 from handsteer.robots.course import CourseState, Referee
 from handsteer.robots.diff_drive import Velocity
 from handsteer.robots.editing import Change, InWorld

@@ -1,11 +1,15 @@
-"""The obstacles and gates of a world as markers, which RViz and the page can draw."""
+"""The obstacles and gates of a world: as markers, which RViz and the page draw, and how pages change them."""
 
 import math
-from collections.abc import Iterable, Sequence
+import threading
+from collections import deque
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import Future
 from dataclasses import replace
 
 import numpy as np
 
+from handsteer.errors import WorldError
 from handsteer.messages import (
     ColorRGBA,
     CompressedImage,
@@ -22,6 +26,44 @@ from handsteer.messages import (
 from handsteer.robots.course import CourseState
 from handsteer.robots.protocol import Obstacle
 from handsteer.robots.world import Gate
+
+_MOST_WAITING = 16
+
+
+class WorldChanges:
+    """What is asked of a robot's world until the robot has time for it; :meth:`ask` may be called from any thread."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._waiting: deque[tuple[Callable[[], None], Future[None]]] = deque()
+
+    def ask(self, change: Callable[[], None]) -> Future[None]:
+        """Return what becomes of ``change``: done, or the :class:`WorldError` that refuses it."""
+        future: Future[None] = Future()
+        with self._lock:
+            if len(self._waiting) >= _MOST_WAITING:
+                future.set_exception(WorldError("too many changes wait already: the robot is busy or has ended"))
+            else:
+                self._waiting.append((change, future))
+        return future
+
+    def make(self) -> bool:
+        """Make all that wait, in their order, on this thread; return whether there were any."""
+        with self._lock:
+            waiting, self._waiting = self._waiting, deque()
+        for change, future in waiting:
+            if future.set_running_or_notify_cancel():
+                try:
+                    change()
+                except WorldError as error:
+                    future.set_exception(error)
+                except Exception as error:
+                    future.set_exception(error)
+                    raise
+                else:
+                    future.set_result(None)
+        return bool(waiting)
+
 
 OBSTACLES, GATES = "world", "gates"
 """Namespaces of the markers."""

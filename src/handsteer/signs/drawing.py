@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from handsteer.landmarks.protocol import CONNECTIONS, Hand
+from handsteer.landmarks.hand import CONNECTIONS, Hand
 from handsteer.signs.recognizer import Recognition
 from handsteer.types import NONE
 

@@ -7,10 +7,10 @@ import numpy as np
 from handsteer.cameras.files import read_photo
 from handsteer.cameras.protocol import Frame
 from handsteer.errors import LabelError
-from handsteer.landmarks.protocol import Hand
+from handsteer.landmarks.hand import Hand
+from handsteer.signs.classifier import Classifier
 from handsteer.signs.labelled import LabelledPhoto
 from handsteer.signs.metrics import PhotoResult
-from handsteer.signs.protocol import Classifier
 from handsteer.signs.recognizer import Recognizer
 from handsteer.signs.teaching.dataset import Dataset
 from handsteer.signs.teaching.taught import TaughtClassifier

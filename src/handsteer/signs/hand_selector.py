@@ -8,9 +8,9 @@ from typing import Final
 import numpy as np
 
 from handsteer.config import SignsConfig
-from handsteer.landmarks.protocol import Hand
+from handsteer.landmarks.hand import Hand
+from handsteer.signs.classifier import SignGuess
 from handsteer.signs.features import KNUCKLES, WRIST
-from handsteer.signs.protocol import SignGuess
 from handsteer.types import NONE, STOP
 
 _PALM: Final = [WRIST, *KNUCKLES]

@@ -1,10 +1,10 @@
 """What a configuration describes, opened: what finds hands, and what tells their signs."""
 
 from handsteer.config import Config, SignsConfig
+from handsteer.landmarks.hand import Landmarker
 from handsteer.landmarks.mediapipe import MediaPipeLandmarker
-from handsteer.landmarks.protocol import Landmarker
+from handsteer.signs.classifier import Classifier
 from handsteer.signs.model import load_model
-from handsteer.signs.protocol import Classifier
 from handsteer.signs.teaching.taught import TaughtClassifier, load_taught
 from handsteer.signs.trained import TrainedClassifier
 

@@ -7,11 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handsteer.config import Config, SignsConfig
-from handsteer.landmarks.protocol import Hand, Landmarker
+from handsteer.landmarks.hand import Hand, Landmarker
+from handsteer.signs.classifier import Classifier, SignGuess
 from handsteer.signs.debouncer import Debouncer, Evidence
 from handsteer.signs.hand_selector import HandPosition, HandSelector
 from handsteer.signs.opening import open_classifier, open_landmarker
-from handsteer.signs.protocol import Classifier, SignGuess
 from handsteer.types import NONE
 
 _NOTHING = SignGuess(NONE, 0.0)

@@ -7,10 +7,10 @@ from typing import Any
 
 from handsteer.cameras.files import PHOTO_SUFFIXES, video_frames
 from handsteer.errors import EvaluationError
+from handsteer.signs.classifier import Classifier
 from handsteer.signs.evaluate import evaluate_frames, evaluate_photos, evaluate_takes, lacks_depth
 from handsteer.signs.labelled import LabelledPhoto, read_photo_labels, read_video_labels
 from handsteer.signs.metrics import PhotoResult
-from handsteer.signs.protocol import Classifier
 from handsteer.signs.recognizer import Recognizer
 from handsteer.signs.teaching.dataset import Dataset, load_dataset
 from handsteer.signs.video_metrics import FrameVerdict

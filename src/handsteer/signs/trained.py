@@ -6,7 +6,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from handsteer.landmarks.protocol import Hand
+from handsteer.landmarks.hand import Hand
+from handsteer.signs.classifier import SignGuess
 from handsteer.signs.features import (
     INDEX_BASE,
     INDEX_TIP,
@@ -18,7 +19,6 @@ from handsteer.signs.features import (
     shape_features,
 )
 from handsteer.signs.model import SignModel
-from handsteer.signs.protocol import SignGuess
 from handsteer.types import BACKWARD, FORWARD, GO, NONE, SIGNS, STOP, TURN_LEFT, TURN_RIGHT
 
 _DOUBT: Final = 1.5
@@ -60,7 +60,7 @@ SURE: Final = 0.8
 
 
 class TrainedClassifier:
-    """A :class:`~handsteer.signs.protocol.Classifier` that knows the shapes of a model.
+    """A :class:`~handsteer.signs.classifier.Classifier` that knows the shapes of a model.
 
     The network says how likely it is that the hand is open, points with its index finger, stretches out its thumb or
     is a fist; where it points in the image makes a sign of that. A sign's likelihood is that of the shape, times that

@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from handsteer.landmarks.protocol import Hand
+from handsteer.landmarks.hand import Hand
 from handsteer.types import BACKWARD, FORWARD, NONE, TURN_LEFT, TURN_RIGHT
 
 _SMALL_PX = 400

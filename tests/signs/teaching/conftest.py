@@ -4,7 +4,7 @@ import pytest
 
 from handsteer.cameras.files import read_photo
 from handsteer.config import Config
-from handsteer.landmarks.protocol import Hand
+from handsteer.landmarks.hand import Hand
 from handsteer.signs.labelled import read_photo_labels
 from handsteer.signs.opening import open_landmarker
 from handsteer.signs.teaching.collect import largest

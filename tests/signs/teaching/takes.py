@@ -3,7 +3,7 @@
 import numpy as np
 
 from handsteer.hand.poses import HandPose, View, sign_pose
-from handsteer.landmarks.protocol import Hand
+from handsteer.landmarks.hand import Hand
 from handsteer.signs.teaching.dataset import Take
 from tests.signs.hands import hand_of, show_pose
 

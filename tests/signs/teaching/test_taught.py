@@ -6,9 +6,9 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from handsteer.errors import ModelCorrupt, ModelError, ModelMissing
-from handsteer.landmarks.protocol import Hand
+from handsteer.landmarks.hand import Hand
+from handsteer.signs.classifier import SignGuess
 from handsteer.signs.model import DEFAULT_MODEL, load_model
-from handsteer.signs.protocol import SignGuess
 from handsteer.signs.teaching.taught import TaughtClassifier, load_taught, save_taught
 from handsteer.signs.trained import TrainedClassifier, legibility
 from handsteer.types import NONE, SIGNS

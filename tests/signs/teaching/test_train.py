@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from handsteer.errors import TrainingError
-from handsteer.landmarks.protocol import Hand
+from handsteer.landmarks.hand import Hand
 from handsteer.signs.model import load_model
 from handsteer.signs.teaching.dataset import Dataset, Take
 from handsteer.signs.teaching.taught import TaughtClassifier, TaughtModel

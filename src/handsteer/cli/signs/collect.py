@@ -15,7 +15,7 @@ from handsteer.cli.terminal import Keys, TerminalPicture
 from handsteer.clock import RealClock
 from handsteer.config import Config, TeachConfig
 from handsteer.errors import DatasetError
-from handsteer.landmarks.protocol import Hand
+from handsteer.landmarks.hand import Hand
 from handsteer.signs.drawing import draw_hand
 from handsteer.signs.opening import open_landmarker
 from handsteer.signs.teaching.collect import Collector, Facts, Status, collect_live, collect_recorded

@@ -7,9 +7,9 @@ from typing import Final, Literal
 import numpy as np
 
 from handsteer.config import TeachConfig
-from handsteer.landmarks.protocol import Hand
+from handsteer.landmarks.hand import Hand
+from handsteer.signs.classifier import SignGuess
 from handsteer.signs.features import KNUCKLES, WRIST
-from handsteer.signs.protocol import SignGuess
 from handsteer.signs.recognizer import Recognition
 from handsteer.signs.teaching.collect import Collector, Facts, Status
 from handsteer.signs.teaching.dataset import Take

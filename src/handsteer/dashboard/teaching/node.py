@@ -15,11 +15,11 @@ from handsteer.config import Config, SignsConfig
 from handsteer.dashboard.teaching.lesson import Lesson, View
 from handsteer.errors import TrainingError
 from handsteer.images import bgr_image, encode_jpeg
-from handsteer.landmarks.protocol import Hand, Landmarker
+from handsteer.landmarks.hand import Hand, Landmarker
 from handsteer.messages import IMAGE_RAW, Image
 from handsteer.nodes.node import Node
+from handsteer.signs.classifier import Classifier, SignGuess
 from handsteer.signs.drawing import draw_hand
-from handsteer.signs.protocol import Classifier, SignGuess
 from handsteer.signs.recognizer import Recognizer
 from handsteer.signs.teaching.apart import TrainingApart
 from handsteer.signs.teaching.collect import largest

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from typing import Final
 
 from handsteer.errors import TrainingError
+from handsteer.signs.classifier import Classifier
 from handsteer.signs.intervals import Share
 from handsteer.signs.metrics import Confusion
-from handsteer.signs.protocol import Classifier
 from handsteer.signs.teaching.dataset import Dataset, summarise
 from handsteer.signs.trained import SURE
 from handsteer.types import NONE, SIGNS, find_sign

@@ -14,7 +14,7 @@ from handsteer.cameras.files import PHOTO_SUFFIXES, find_photos, read_photo, vid
 from handsteer.cameras.protocol import Camera
 from handsteer.clock import Clock
 from handsteer.errors import DatasetError
-from handsteer.landmarks.protocol import Hand, Landmarker
+from handsteer.landmarks.hand import Hand, Landmarker
 from handsteer.signs.teaching.dataset import Take
 
 Phase = Literal["ready", "countdown", "recording", "done"]

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handsteer.errors import DatasetError
-from handsteer.landmarks.protocol import Hand
+from handsteer.landmarks.hand import Hand
 from handsteer.signs.npz import Arrays, NpzFormat
 from handsteer.types import NONE, SIGNS, find_sign
 

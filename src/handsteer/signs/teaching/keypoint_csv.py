@@ -15,7 +15,7 @@ from typing import Final, TextIO, cast
 import numpy as np
 
 from handsteer.errors import DatasetError
-from handsteer.landmarks.protocol import Hand
+from handsteer.landmarks.hand import Hand
 from handsteer.signs.teaching.dataset import Take
 
 _COLUMNS: Final = 43

@@ -10,12 +10,12 @@ from typing import Any, Final
 import numpy as np
 
 from handsteer.errors import DatasetError, ModelCorrupt, ModelError, ModelMissing
-from handsteer.landmarks.protocol import Hand
+from handsteer.landmarks.hand import Hand
+from handsteer.signs.classifier import Classifier, SignGuess
 from handsteer.signs.network import Network
 from handsteer.signs.network_arrays import from_arrays, to_arrays
 from handsteer.signs.novelty import Novelty
 from handsteer.signs.npz import Arrays, NpzFormat
-from handsteer.signs.protocol import Classifier, SignGuess
 from handsteer.signs.teaching.dataset import label_for
 from handsteer.signs.teaching.features import FEATURE_COUNTS, Array, Depth, taught_features
 from handsteer.signs.trained import SURE, legibility
@@ -72,7 +72,7 @@ class TaughtModel:
 
 
 class TaughtClassifier:
-    """A :class:`~handsteer.signs.protocol.Classifier` for taught signs beside those of another.
+    """A :class:`~handsteer.signs.classifier.Classifier` for taught signs beside those of another.
 
     What the other is sure of stays, so that no taught sign can change how the shipped ones drive.
 

@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handsteer import __version__
+from handsteer.signs.classifier import Classifier
 from handsteer.signs.intervals import Share
 from handsteer.signs.metrics import Confusion
 from handsteer.signs.network import train
 from handsteer.signs.novelty import learn_novelty
-from handsteer.signs.protocol import Classifier
 from handsteer.signs.teaching.checks import (
     Lookalike,
     check_enough,

@@ -23,8 +23,8 @@ from handsteer.hand.backgrounds import make_background
 from handsteer.hand.kinematics import ANGLES, Array, angles_of, clamp, pose_skeleton
 from handsteer.hand.placement import Pinhole, Placement, orientation
 from handsteer.hand.renderer import SKINS, Look, render
+from handsteer.landmarks.hand import Hand
 from handsteer.landmarks.mediapipe import MediaPipeLandmarker
-from handsteer.landmarks.protocol import Hand
 from handsteer.signs.labelled import read_photo_labels
 from handsteer.signs.training.people import (
     COORDINATES,

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from handsteer.errors import TransportError
 from handsteer.transports.dds.interfaces import multicast_addresses
-from handsteer.transports.ros2.domain import domain_id
+from handsteer.transports.ros2.names import domain_id
 
 _RANGES = ("LOCALHOST", "SUBNET", "OFF", "SYSTEM_DEFAULT")
 _ADDRESS = re.compile(r"[A-Za-z0-9_.:%\[\]-]+")

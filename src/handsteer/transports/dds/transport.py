@@ -18,11 +18,11 @@ from handsteer.transports.channels import Deliver, Fanout, FanoutSubscription, T
 from handsteer.transports.dds.network import network
 from handsteer.transports.dds.participant import Participant
 from handsteer.transports.dds.services import ServiceServer
+from handsteer.transports.ros2.base_session import Ros2Session
 from handsteer.transports.ros2.encoding import encode
 from handsteer.transports.ros2.intake import Intake
 from handsteer.transports.ros2.names import NodeName
 from handsteer.transports.ros2.service_types import Service
-from handsteer.transports.ros2.session import Ros2Session
 
 M = TypeVar("M")
 

@@ -24,7 +24,7 @@ except ImportError as problem:
 
 from handsteer.transports.ros1 import course
 from handsteer.transports.ros1.master import Lifeline, Master, MasterGone
-from handsteer.transports.ros1.transport import Ros1Transport
+from handsteer.transports.ros1.topics import Ros1Transport
 
 # Its death is known at once; this finds what closes no connection, and costs as much as a hundred signs a minute.
 _PING_PERIOD_S = 2.0

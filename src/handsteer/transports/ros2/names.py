@@ -4,7 +4,7 @@ Source of the rules: design.ros2.org/articles/topic_and_service_names.html and s
 """
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -105,3 +105,20 @@ def identify(node: str, remaps: Sequence[Remap]) -> NodeName:
         named.expand(rule.source)
         named.expand(rule.target)
     return named
+
+
+_LARGEST = 232  # those above have no UDP ports in DDS
+
+
+def domain_id(environment: Mapping[str, str]) -> int:
+    """Return ``ROS_DOMAIN_ID``, 0 to 232, of ``environment``; 0 when it is not set.
+
+    Raises:
+        TransportError: It has a value that is not allowed.
+    """
+    text = environment.get("ROS_DOMAIN_ID", "")
+    if not text:
+        return 0
+    if not (text.isascii() and text.isdigit() and int(text) <= _LARGEST):
+        raise TransportError(f"ROS_DOMAIN_ID is {text!r}: it should be a whole number from 0 to {_LARGEST}")
+    return int(text)

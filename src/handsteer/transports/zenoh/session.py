@@ -14,11 +14,11 @@ from typing import Any
 import zenoh
 
 from handsteer.clock import Clock
+from handsteer.transports.ros2.base_session import Ros2Session
 from handsteer.transports.ros2.encoding import decode, encode
 from handsteer.transports.ros2.names import NodeName
 from handsteer.transports.ros2.profiles import Profile
 from handsteer.transports.ros2.service_types import Service
-from handsteer.transports.ros2.session import Ros2Session
 from handsteer.transports.zenoh.keys import attachment, read_attachment
 from handsteer.transports.zenoh.member import Member
 from handsteer.transports.zenoh.network import network

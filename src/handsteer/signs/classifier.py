@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Protocol
 
-from handsteer.landmarks.protocol import Hand
+from handsteer.landmarks.hand import Hand
 
 
 @dataclass(frozen=True)

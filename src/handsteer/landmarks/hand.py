@@ -1,4 +1,4 @@
-"""What every landmarker offers."""
+"""One hand as every landmarker reports it, and what every landmarker offers."""
 
 from dataclasses import dataclass
 from math import inf
