@@ -15,7 +15,7 @@ from tests.ros1.launches import ROS, ros_environment
 
 pytestmark = [pytest.mark.exhaustive, pytest.mark.slow]
 
-MOMENTS = 30
+MOMENTS = 12
 LATEST_S = 1.5
 HANDSTEER = (sys.executable, "-m", "handsteer")
 
