@@ -58,6 +58,15 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
         pytest.skip("ROS 1 is not installed: make ros1")
 
 
+@pytest.hookimpl(trylast=True)
+def pytest_runtest_teardown(item: pytest.Item, nextitem: pytest.Item | None) -> None:
+    """Close the browser after the last test that uses it: without pages, too, it takes a good part of a processor."""
+    if item.get_closest_marker("browser") and (nextitem is None or not nextitem.get_closest_marker("browser")):
+        from tests.dashboard.browsers import close_shared  # noqa: PLC0415 - most files need no browser
+
+        close_shared()
+
+
 @pytest.fixture(scope="module")
 def ros1(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Ros1Graph]:
     """A ROS 1 graph with a master of its own; mark the tests that use it ``ros1``."""

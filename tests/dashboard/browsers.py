@@ -35,6 +35,13 @@ def a_browser(webcam: Path | None = None) -> Iterator[Browser]:
             context.close()
 
 
+def close_shared() -> None:
+    """End the browser that all share, if there is one; the next test that needs it starts another."""
+    if _shared.cache_info().currsize:
+        _shared().close()
+        _shared.cache_clear()
+
+
 @cache
 def _playwright() -> Playwright:
     playwright = sync_playwright().start()

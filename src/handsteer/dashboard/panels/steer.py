@@ -116,7 +116,7 @@ class MuxPanel:
 _HINTS = {
     "free": "Hold the pad, or its arrow keys. Sliders stay, until you leave this page.",
     "driver": "Hold the pad, or W A S D anywhere. Sliders stay, until you leave this page.",
-    "watcher": "You watch: ask to drive, at the top.",
+    "watcher": "You watch: request control, at the top.",
 }
 _LATE = "What you asked for came too late, and was left out: is the network slow? Else load the page anew."
 
