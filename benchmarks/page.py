@@ -52,7 +52,7 @@ FILM_S, FILM_FPS = 8, 30
 ACK_PERIOD_S = 3.0  # as NiceGUI's own script does it
 
 
-class PageContext:
+class ServedPage:
     """A graph and its page, and what its nodes were seen to do.
 
     Args:
@@ -99,8 +99,8 @@ class PageContext:
 
 
 @contextmanager
-def served(script: str, camera: str = "virtual") -> Iterator[PageContext]:
-    graph = PageContext(script, camera)
+def served(script: str, camera: str = "virtual") -> Iterator[ServedPage]:
+    graph = ServedPage(script, camera)
     try:
         yield graph
     finally:
@@ -151,7 +151,7 @@ def count_bytes(duration_s: float) -> None:
             print_bytes("a plain viewer", page, relay, duration_s)
 
 
-def print_bytes(who: str, page: PageContext, relay: Relay, duration_s: float) -> None:
+def print_bytes(who: str, page: ServedPage, relay: Relay, duration_s: float) -> None:
     time.sleep(3.0)
     sent, began_s = relay.to_browser, time.monotonic()
     fps, _ = page.recognise(duration_s)
@@ -244,7 +244,7 @@ def count_gone(trials: int) -> None:
         )
 
 
-def stop_ms(graph: PageContext, chrome: Browser, how: str) -> float | None:
+def stop_ms(graph: ServedPage, chrome: Browser, how: str) -> float | None:
     """Return how long after the driver was gone zero was commanded; None if the robot did not drive then."""
     with Relay(graph.port) as relay:
         page = visit(chrome, relay.port)
