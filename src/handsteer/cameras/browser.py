@@ -1,4 +1,4 @@
-"""The camera of whoever looks at the page: its browser sends the frames."""
+"""The camera of a browser that shows the page, which sends its frames."""
 
 import math
 import struct
@@ -14,21 +14,21 @@ from handsteer.picture_files import decode, size_of
 Source = Literal["own", "browser"]
 
 LARGEST_BYTES = 1_000_000
-"""Of one frame as it is sent."""
+"""Limit for one encoded frame."""
 
 _MOST_PIXELS = 1920 * 1080
 _HEADER = struct.Struct("<d")
 _WAIT_S = 0.2
-# How much later the quickest frame is taken to have been, in seconds a second: clocks of two machines drift apart.
+# Assumed clock drift between two machines, in seconds per second.
 _LEAK = 0.001
 
 
 class BrowserCamera:
     """Keeps the newest frame that a browser has sent.
 
-    A frame is :data:`HEADER_BYTES` with the browser's own time of its capture, in milliseconds as a little-endian
-    64-bit number, and a JPEG file. The two clocks have nothing in common. The frame that was quickest tells how
-    they differ, but for that way; a frame that was held up on its way is older by as much as it took longer.
+    A frame is :data:`HEADER_BYTES` with its capture time on the browser's clock, in milliseconds as a little-endian
+    64-bit number, and a JPEG file. The clocks are not synchronized: the frame with the shortest delay gives their
+    offset, except for that delay. The age of a later frame is its additional delay.
 
     Args:
         clock: The graph's clock.
@@ -44,10 +44,10 @@ class BrowserCamera:
         self._heard_s = math.inf
 
     def offer(self, data: bytes) -> None:
-        """Take a frame as it was sent; an older one that nobody has read is dropped.
+        """Store a frame in the format above; an older unread frame is dropped.
 
         Raises:
-            FrameError: It is no such frame, or too large.
+            FrameError: It is not such a frame, or too large.
         """
         now = self._clock.now()
         sent_s = check_frame(data)
@@ -59,17 +59,17 @@ class BrowserCamera:
 
     @property
     def is_given(self) -> bool:
-        """Whether a browser has sent frames, and has not been forgotten since."""
+        """Whether a browser has sent frames since the last :meth:`forget`."""
         return math.isfinite(self._heard_s)
 
     def forget(self) -> None:
-        """Drop the newest frame, and what is known of the browser's clock: another browser may follow."""
+        """Drop the newest frame and the clock offset, because another browser may follow."""
         with self._news:
             self._newest = None
             self._offset_s = self._heard_s = math.inf
 
     def read(self, wait_s: float = _WAIT_S) -> Frame | None:
-        """Return the newest frame, or None when none comes within ``wait_s`` seconds."""
+        """Return the newest frame, or None if none arrives within ``wait_s`` seconds."""
         with self._news:
             self._news.wait_for(lambda: self._newest is not None, wait_s)
             newest, self._newest = self._newest, None
@@ -77,18 +77,18 @@ class BrowserCamera:
             return None
         try:
             return Frame(decode(newest[0], _MOST_PIXELS), newest[1])
-        except FrameError:  # damaged within
+        except FrameError:  # damaged image data
             return None
 
 
 class NoCamera:
-    """A :class:`~handsteer.cameras.protocol.Camera` without frames, for a machine that has only the browser's."""
+    """A :class:`~handsteer.cameras.protocol.Camera` without frames, for a machine without a camera of its own."""
 
     name = "no camera"
     period_s = None
 
     def read(self) -> Frame | None:
-        """Return None, after a while."""
+        """Return None after a short wait."""
         time.sleep(_WAIT_S)
         return None
 
@@ -97,15 +97,16 @@ class NoCamera:
 
 
 class ChoiceOfCameras:
-    """A :class:`~handsteer.cameras.protocol.Camera`: this machine's own, or the browser's while that is chosen.
+    """A :class:`~handsteer.cameras.protocol.Camera` that reads from this machine's camera or from the browser's.
 
-    A browser that leaves does not give the robot back to the machine's own camera, before which anything may happen:
-    there are no frames until somebody chooses again.
+    When a browser leaves, there is no automatic change to the machine's own camera, because anything may be in front of
+    it: there are no frames until a camera is selected again.
 
     Args:
-        own: The machine's own camera; a device is closed while the browser's is chosen, or it would keep old frames.
-        browser: The other one.
-        source: Which one is chosen first.
+        own: The machine's own camera; its device is closed while the browser's is selected, or it would keep old
+            frames.
+        browser: The browser's camera.
+        source: The initial selection.
     """
 
     def __init__(self, own: Camera, browser: BrowserCamera, source: Source = "own") -> None:
@@ -116,36 +117,36 @@ class ChoiceOfCameras:
 
     @property
     def source(self) -> Source:
-        """Which one is chosen."""
+        """The selected source."""
         return self._source
 
     @property
     def name(self) -> str:
-        """Name of the one that is chosen."""
+        """Name of the selected camera."""
         return self.browser.name if self._source == "browser" else self._own.name
 
     @property
     def period_s(self) -> float | None:
-        """The pace of the machine's own camera."""
+        """Frame period of the machine's own camera."""
         return self._own.period_s
 
     def choose(self, source: Source) -> None:
-        """Read from ``source`` from now on; may be called from any thread."""
+        """Select ``source``; may be called from any thread."""
         self.browser.forget()
         self._source = source
 
     def read(self) -> Frame | None:
-        """Return the newest frame of the one that is chosen, or None when there is none now.
+        """Return the newest frame of the selected camera, or None if there is none now.
 
         Raises:
-            CameraLost: The machine's own stopped giving frames.
-            EndOfStream: Its file has ended and shall end the run.
+            CameraLost: The machine's own camera stopped delivering frames.
+            EndOfStream: Its file has ended and ends the run.
         """
         if self._source == "own":
             self._own_is_open = True
             return self._own.read()
         if self._own.period_s is not None:
-            return self.browser.read(0.0)  # a paced reader must not be kept waiting, or it would fall behind its beat
+            return self.browser.read(0.0)  # waiting would delay a reader that paces itself
         if self._own_is_open:
             self._own.close()
             self._own_is_open = False
@@ -160,7 +161,7 @@ HEADER_BYTES = _HEADER.size
 
 
 def check_frame(data: bytes) -> float:
-    """Return when a frame was captured, in seconds of the browser's clock."""
+    """Return the capture time of a frame, in seconds of the browser's clock."""
     if not HEADER_BYTES < len(data) <= LARGEST_BYTES:
         raise FrameError(f"a frame of {len(data)} bytes: it should have at most {LARGEST_BYTES}")
     (sent_ms,) = _HEADER.unpack_from(data)

@@ -1,4 +1,4 @@
-"""What a camera's lens does to its pictures, from a file of ROS's camera_calibration: ``CameraInfo``."""
+"""Reads a camera's lens calibration, as ``CameraInfo``, from a file of ROS's ``camera_calibration``."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -17,15 +17,15 @@ _WHOLE = RegionOfInterest(x_offset=0, y_offset=0, height=0, width=0, do_rectify=
 
 
 def uncalibrated(width: int, height: int) -> CameraInfo:
-    """Return what is to be said of a camera of which nothing is known: its size in pixels, and zeros."""
+    """Return the ``CameraInfo`` of an uncalibrated camera: its size in pixels, and zeros."""
     return _info((width, height), "", np.zeros(0), [np.zeros(count) for count in _MATRICES.values()])
 
 
 def read_calibration(path: Path) -> CameraInfo:
-    """Return what a YAML file says that ``camera_calibration`` has written, as its ``ost.yaml``.
+    """Return the calibration in a YAML file written by ``camera_calibration``, such as ``ost.yaml``.
 
     Raises:
-        CameraError: It cannot be read, or is no such file; the message names the field.
+        CameraError: It cannot be read, or is not such a file; the message names the field.
     """
     values = plain_yaml.read(path, str(path), CameraError, f"cannot read the calibration {path}")
     if not isinstance(values, dict):

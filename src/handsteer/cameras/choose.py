@@ -1,4 +1,4 @@
-"""Which camera a source means."""
+"""Opens the camera that a source names."""
 
 import logging
 from pathlib import Path
@@ -16,10 +16,10 @@ log = logging.getLogger(__name__)
 def open_camera(config: CameraConfig, virtual_hand: VirtualHandConfig, clock: Clock) -> Camera:
     """Return the camera that ``config.source`` names.
 
-    ``auto`` is the first webcam that delivers a frame, else the virtual hand; the log says which.
+    ``auto`` is the first webcam that delivers a frame, else the virtual hand; the log reports which.
 
     Raises:
-        CameraError: It cannot be used; the message says what to do.
+        CameraError: It cannot be used; the message suggests what to do.
     """
     source = config.source
     if source == "auto":
@@ -51,7 +51,7 @@ def _webcam(source: str, config: CameraConfig, clock: Clock) -> Camera:
 
 
 def _virtual(config: CameraConfig, virtual_hand: VirtualHandConfig, clock: Clock) -> Camera:
-    # What draws the hand is loaded only by the process that shows it: all nodes come through here.
+    # All nodes import this module; only the process that shows the virtual hand loads what draws it.
     from handsteer.cameras.virtual import VirtualHandCamera  # noqa: PLC0415
 
     return VirtualHandCamera(virtual_hand, width=config.width, height=config.height, fps=config.fps, clock=clock)

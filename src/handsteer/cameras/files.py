@@ -19,23 +19,23 @@ PHOTO_SUFFIXES = frozenset({".jpg", ".jpeg", ".png"})
 
 LARGEST_PHOTO_BYTES = 100_000_000
 MOST_PHOTO_PIXELS = 8192 * 8192
-"""A photo of a phone with 50 megapixels may be larger than any camera's frame."""
+"""A photo from a phone with 50 megapixels may be larger than any camera's frame."""
 
 _DEFAULT_FPS = 30.0
 _HIGHEST_FPS = 240.0
 
 
 class VideoFile:
-    """Shows a video file at its own pace.
+    """Plays a video file at its own frame rate.
 
     Args:
         path: The file.
         clock: Stamps the frames.
         at_end: What happens after the last frame.
-        noise: Whether frames get a sensor's noise, as files may repeat a picture and no camera does.
+        noise: Whether to add sensor noise: files may repeat a picture exactly, which no camera does.
 
     Attributes:
-        period_s: Time between two frames, as the file says; 1/30 s when it does not.
+        period_s: Time between two frames, from the file, or 1/30 s if it does not contain it.
 
     Raises:
         CameraNotFound: There is no such file.
@@ -64,10 +64,10 @@ class VideoFile:
             raise CameraUnreadable(f"{path} is not a video that can be decoded: try an mp4, avi or webm file")
 
     def read(self) -> Frame | None:
-        """Return the next frame; None after the last one when the end holds.
+        """Return the next frame; None after the last one if the end holds.
 
         Raises:
-            EndOfStream: After the last one, when it ends the run.
+            EndOfStream: After the last frame, if it ends the run.
         """
         if self._next is None:
             if self._at_end == "end":
@@ -92,17 +92,17 @@ class VideoFile:
 
 
 class PhotoFolder:
-    """Shows the photos of a folder, or one photo, each for a while; sorted by name, folders within included.
+    """Shows one photo, or those of a folder and its subfolders sorted by name, each for a fixed time.
 
     Args:
         path: The folder, or a photo.
         clock: Stamps the frames.
         photo_duration_s: How long each photo is shown, in seconds.
-        fps: Frames a second: a photo is repeated, as a camera would see it, with a sensor's noise.
+        fps: Frames per second: a photo is repeated with sensor noise, as a camera would see it.
         at_end: What happens after the last photo.
 
     Raises:
-        CameraNotFound: There is no such folder, or there are no photos in it.
+        CameraNotFound: There is no such folder, or it contains no photos.
         CameraUnreadable: A photo cannot be decoded.
     """
 
@@ -120,11 +120,11 @@ class PhotoFolder:
         self._image = read_photo(self._photos[0])
 
     def read(self) -> Frame | None:
-        """Return the next frame; None after the last one when the end holds.
+        """Return the next frame; None after the last one if the end holds.
 
         Raises:
-            EndOfStream: After the last one, when it ends the run.
-            CameraUnreadable: The next photo cannot be decoded; reading again goes on with the one after it.
+            EndOfStream: After the last frame, if it ends the run.
+            CameraUnreadable: The next photo cannot be decoded; reading again continues with the one after it.
         """
         index, repeat = divmod(self._shown, self._repeats)
         if index == len(self._photos):
@@ -140,7 +140,7 @@ class PhotoFolder:
         return Frame(self._noise.on(self._image, captured_s), captured_s)
 
     def close(self) -> None:
-        """Nothing is held."""
+        """Do nothing: no resource is held."""
 
     def _load(self, index: int) -> None:
         try:
@@ -189,7 +189,7 @@ def read_photo(path: Path) -> NDArray[np.uint8]:
     """Return a photo as (height, width, 3) uint8, BGR.
 
     Raises:
-        CameraUnreadable: The file cannot be read or decoded, is torn, or has more than :data:`MOST_PHOTO_PIXELS`.
+        CameraUnreadable: The file cannot be read or decoded, is truncated, or has more than :data:`MOST_PHOTO_PIXELS`.
     """
     try:
         with path.open("rb") as file:

@@ -1,4 +1,4 @@
-"""The noise of a sensor, for pictures that have none: what stands still must not look like a camera that hangs."""
+"""Sensor noise for pictures without it, so that a still picture does not look like a frozen camera."""
 
 import cv2
 import numpy as np
@@ -9,11 +9,7 @@ _TICKS_PER_S = 10_000
 
 
 class SensorNoise:
-    """Adds 0 to 2 grey levels to each pixel, others at each time; the same seed and time give the same.
-
-    Args:
-        seed: Of the random numbers.
-    """
+    """Adds 0 to 2 grey levels to each pixel; the noise depends on the seed and the time only."""
 
     def __init__(self, seed: int = 0) -> None:
         self._seed = seed

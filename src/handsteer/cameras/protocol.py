@@ -1,4 +1,4 @@
-"""What every camera offers."""
+"""The interface of all cameras."""
 
 from dataclasses import dataclass
 from typing import Protocol
@@ -13,7 +13,7 @@ class Frame:
 
     Attributes:
         image: (height, width, 3) uint8, BGR, as the camera saw it (not mirrored).
-        captured_s: When it was captured, in seconds of the graph's monotonic clock.
+        captured_s: Capture time, in seconds of the graph's monotonic clock.
     """
 
     image: NDArray[np.uint8]
@@ -24,9 +24,9 @@ class Camera(Protocol):
     """A source of frames.
 
     Attributes:
-        name: What it is, for people: ``webcam 0``, ``virtual hand``, a path.
-        period_s: Time between two frames that the reader must keep, or None when :meth:`read` itself waits for
-            the device.
+        name: Name for people: ``webcam 0``, ``virtual hand``, a path.
+        period_s: Time between two frames that the reader must keep, or None if :meth:`read` itself waits for the
+            device.
     """
 
     @property
@@ -36,11 +36,11 @@ class Camera(Protocol):
     def period_s(self) -> float | None: ...  # noqa: D102
 
     def read(self) -> Frame | None:
-        """Return the newest frame, or None when there is none now (a file that ended and holds).
+        """Return the newest frame, or None if there is none now (a file that ended and holds).
 
         Raises:
-            CameraLost: The device stopped giving frames; reading again may bring it back.
-            EndOfStream: A file has ended and shall end the run.
+            CameraLost: The device stopped delivering frames; reading again may reopen it.
+            EndOfStream: A file has ended and ends the run.
         """
         ...
 

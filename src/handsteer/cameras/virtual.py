@@ -1,4 +1,4 @@
-"""The virtual hand as a camera: no webcam needed, and everything about the picture is known."""
+"""The virtual hand as a camera: needs no webcam, and the content of each picture is known."""
 
 from dataclasses import dataclass
 
@@ -15,12 +15,12 @@ from handsteer.hand.script import Motion
 
 @dataclass(frozen=True)
 class Truth:
-    """What the virtual hand does at one moment.
+    """State of the virtual hand at one moment.
 
     Attributes:
-        sign: The sign that is being shown or taken up.
-        settled: Whether the hand has arrived at it.
-        joints_px: (21, 2) pixels, where the joints are in the picture.
+        sign: The sign that is shown or approached.
+        settled: Whether the hand has reached it.
+        joints_px: (21, 2), positions of the joints in the picture, in pixels.
     """
 
     sign: str
@@ -29,17 +29,17 @@ class Truth:
 
 
 class VirtualHandCamera:
-    """A :class:`~handsteer.cameras.protocol.Camera` that draws a hand going through a script of signs.
+    """A :class:`~handsteer.cameras.protocol.Camera` that draws a hand showing a script of signs.
 
     Args:
-        config: The script and the looks.
+        config: Script and appearance.
         width: Pixels.
         height: Pixels.
-        fps: Frames a second.
-        clock: The script starts when the camera is made.
+        fps: Frames per second.
+        clock: The script starts at its time of construction.
 
     Raises:
-        PoseError: The script is wrong.
+        PoseError: The script is invalid.
     """
 
     name = "virtual hand"
@@ -56,7 +56,7 @@ class VirtualHandCamera:
         self._start_s = clock.now()
 
     def read(self) -> Frame:
-        """Return the hand as it is now; drawing stands for the exposure, so it is captured when it is drawn."""
+        """Return the hand as it is now. Drawing takes the place of the exposure, so the capture time is its end."""
         pose = self._motion.at(self._clock.now() - self._start_s).pose
         skeleton, placement = pose_skeleton(pose.angles), pose.view.placement(self._handedness)
         image = render(skeleton, placement, self._camera, self._look, self._background)
@@ -64,10 +64,10 @@ class VirtualHandCamera:
         return Frame(noisy, self._clock.now())
 
     def truth(self, time_s: float) -> Truth:
-        """Return what the hand does at ``time_s`` of the clock."""
+        """Return the state of the hand at ``time_s`` of the clock."""
         moment = self._motion.at(time_s - self._start_s)
         skeleton, placement = pose_skeleton(moment.pose.angles), moment.pose.view.placement(self._handedness)
         return Truth(moment.sign, moment.settled, true_pixels(skeleton, placement, self._camera))
 
     def close(self) -> None:
-        """Hold nothing: there is nothing to release."""
+        """Do nothing: no resource is held."""

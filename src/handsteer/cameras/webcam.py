@@ -20,7 +20,7 @@ _FIRST_FRAME_TRIES = 10
 
 
 class Capture(Protocol):
-    """The part of ``cv2.VideoCapture`` that is used."""
+    """The part of ``cv2.VideoCapture`` in use."""
 
     def isOpened(self) -> bool: ...  # noqa: D102, N802 - OpenCV's name
     def read(self) -> tuple[bool, Any]: ...  # noqa: D102
@@ -37,15 +37,15 @@ class Webcam:
     Args:
         source: Index (``0``), device (``/dev/video0``) or address (``rtsp://…``, ``http://…``).
         clock: Stamps the frames.
-        width: Width to ask the device for, in pixels; it may give another.
-        height: Height to ask the device for, in pixels.
-        fps: Frames a second to ask the device for.
-        open_capture: Opens the device; tests put faults here.
+        width: Requested width in pixels; the device may deliver another.
+        height: Requested height in pixels.
+        fps: Requested frames per second.
+        open_capture: Opens the device; tests inject faults here.
 
     Raises:
-        CameraNotFound: There is no such device, or the address does not answer.
-        CameraInUse: Another program holds the device.
-        CameraUnreadable: The device opens, but gives no picture, or larger ones than any camera should.
+        CameraNotFound: There is no such device, or the address does not respond.
+        CameraInUse: Another program uses the device.
+        CameraUnreadable: The device opens, but delivers no picture, or larger ones than any camera should.
     """
 
     period_s = None
@@ -67,7 +67,7 @@ class Webcam:
             cv2.CAP_PROP_FRAME_WIDTH: width,
             cv2.CAP_PROP_FRAME_HEIGHT: height,
             cv2.CAP_PROP_FPS: fps,
-            # One buffer: a frame that waited in a queue is a stale frame.
+            # One buffer: a frame that waited in a queue is stale.
             cv2.CAP_PROP_BUFFERSIZE: 1,
         }
         self._open_capture = open_capture or _open_capture
@@ -79,7 +79,7 @@ class Webcam:
         """Wait for the next frame and return it.
 
         Raises:
-            CameraLost: The device gives no frames (any more).
+            CameraLost: The device delivers no frames.
         """
         if self._first is not None:
             first, self._first = self._first, None
@@ -115,7 +115,7 @@ class Webcam:
             capture.set(prop, value)
         self._capture = capture
         self._check_size(round(capture.get(cv2.CAP_PROP_FRAME_WIDTH)), round(capture.get(cv2.CAP_PROP_FRAME_HEIGHT)))
-        for _ in range(_FIRST_FRAME_TRIES):  # some webcams give empty frames while they warm up
+        for _ in range(_FIRST_FRAME_TRIES):  # some webcams deliver empty frames while they warm up
             frame = self._grab()
             if frame is not None:
                 return frame
@@ -131,7 +131,7 @@ class Webcam:
             return None
         if not done or image is None or not image.size:
             return None
-        self._check_size(image.shape[1], image.shape[0])  # what comes by a network may change its size
+        self._check_size(image.shape[1], image.shape[0])  # a network stream may change its size
         return Frame(image, self._clock.now())
 
     def _check_size(self, width: int, height: int) -> None:
@@ -173,7 +173,7 @@ def _device_path(source: str) -> Path:
 
 
 def _check_device(source: str) -> None:
-    """Say what can be said about a device before OpenCV is asked, whose own answer is only yes or no."""
+    """Check a device before OpenCV opens it, because OpenCV reports only success or failure."""
     if is_address(source) or platform.system() != "Linux":
         return
     path = _device_path(source)
@@ -196,12 +196,12 @@ def _why_closed(source: str) -> CameraError:
 
 
 def _holder(device: Path) -> str | None:
-    """Return the name of another program that has ``device`` open, where the system tells (Linux)."""
+    """Return the name of another program that has ``device`` open, where the system provides it (Linux)."""
     for link in Path("/proc").glob("[0-9]*/fd/*"):
         process = link.parent.parent
         try:
             if process.name != str(os.getpid()) and link.readlink() == device:
                 return f"{(process / 'comm').read_text().strip()} (process {process.name})"
         except OSError:
-            continue  # the process has ended, or belongs to somebody else
+            continue  # the process has ended, or belongs to another user
     return None

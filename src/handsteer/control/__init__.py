@@ -1,1 +1,1 @@
-"""From signs to safe velocities: pure `step(input, dt)`, no clock, no I/O."""
+"""Sign control and safety as pure functions and ``step(input, dt)`` classes, without clock or I/O."""

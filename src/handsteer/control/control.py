@@ -1,4 +1,4 @@
-"""Signs and steering in, safe velocities out: the part of ``hand_sign_control`` that knows nothing of nodes."""
+"""Converts signs and steering commands to safe velocities: ``hand_sign_control`` without the node."""
 
 from handsteer.config import ControlConfig
 from handsteer.control.safety import Ramp, Safety
@@ -7,15 +7,15 @@ from handsteer.types import NONE, ZERO, Velocity, action_of
 
 
 class Control:
-    """Joins the rule of the signs, the priority of steering, arming, Stop, and the limits of acceleration and jerk.
+    """Combines sign control, twist mux, arming, Stop, and the limits of acceleration and jerk.
 
     Args:
         config: Limits, steps and timeouts.
-        arming: Whether nothing moves before neutral was seen (:mod:`handsteer.control.safety`).
+        arming: Whether neutral is required before the first movement (:mod:`handsteer.control.safety`).
 
     Attributes:
-        safety: Says whether signs and steering are followed, and takes Stop, resets and faults.
-        mux: Says who drives, and why the robot stands when it does.
+        safety: Decides whether signs and steering are followed; receives Stop, resets and faults.
+        mux: Selects the active input, and explains why the robot is stopped.
     """
 
     def __init__(self, config: ControlConfig, *, arming: bool) -> None:
@@ -26,12 +26,12 @@ class Control:
         self._since_command_s = 0.0
 
     def step(self, dt_s: float, *, sign: str | None = None, steering: Velocity | None = None) -> Velocity | None:
-        """Let ``dt_s`` seconds pass, then take what has come.
+        """Advance time by ``dt_s``, then process the inputs.
 
         Args:
-            dt_s: Seconds since the last step, >= 0; anything else counts as a fault and stops the robot.
-            sign: The sign of one frame, if one came.
-            steering: A velocity asked for by hand, if one came.
+            dt_s: Seconds since the last step, >= 0; any other value is a fault and stops the robot.
+            sign: The sign of one frame, if one was received.
+            steering: A steering command, if one was received.
 
         Returns:
             The velocity to command now, or None to command nothing new.
@@ -46,20 +46,20 @@ class Control:
         return self._ramped(self.mux.step(dt_s, sign=sign, steering=steering))
 
     def halt(self) -> Velocity | None:
-        """Stop whoever drives; return one zero, or None when nobody does."""
+        """Stop the active input; return one zero, or None if there is none."""
         return self._ramped(self.mux.halt())
 
     def stop(self) -> Velocity | None:
-        """Stop until :meth:`reset`; return one zero, or None when nobody drives."""
+        """Stop until :meth:`reset`; return one zero, or None if no input is active."""
         self.safety.stop()
         return self.halt()
 
     def reset(self) -> None:
-        """End a Stop; who drives has to show neutral first."""
+        """End a Stop; each input must show neutral before it is followed again."""
         self.safety.reset()
 
     def reconfigure(self, config: ControlConfig) -> Velocity | None:
-        """Go on with other limits, steps and times; return the velocity to command now, if the last is beyond them."""
+        """Change limits, steps and times; return the velocity to command now if the last one exceeds the new limits."""
         self._config = config
         self.safety.reconfigure(config)
         self._ramp.reconfigure(config)

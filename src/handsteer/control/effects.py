@@ -1,4 +1,4 @@
-"""What a sign does in words, with the figures that hold; and these as a node reports them."""
+"""Describes the effect of signs in words, with the configured values, and converts these to and from diagnostics."""
 
 import json
 from collections.abc import Mapping
@@ -12,22 +12,22 @@ _TOLD = tuple(sorted(ControlConfig.live))
 
 
 def effect_of(action: Action, rule: ControlConfig) -> str:
-    """Return what ``action`` makes the robot do under ``rule``, as ``stops``, with its steps and limits."""
+    """Return the effect of ``action`` on the robot under ``rule``, with steps and limits; for example ``stops``."""
     figures = figures_of(action, rule)
     return f"{EFFECTS[action]} ({figures})" if figures else EFFECTS[action]
 
 
 def rule_to_diagnostics(rule: ControlConfig) -> dict[str, str]:
-    """Return what decides what signs do, as values of a report on ``/diagnostics``."""
+    """Return the settings that determine the effect of signs, as values for ``/diagnostics``."""
     return {name: json.dumps(getattr(rule, name)) for name in _TOLD}
 
 
 def rule_from_diagnostics(values: Mapping[str, str]) -> ControlConfig | None:
-    """Return what a report of :func:`tell` says, defaults for the rest; None when it says nothing that holds."""
+    """Return the settings in a report of :func:`rule_to_diagnostics`, defaults for missing ones; None if invalid."""
     return _rule_of(tuple(values.get(name, "") for name in _TOLD))
 
 
-# Reports come ten times a second and nearly always say the same.
+# Reports arrive ten times a second and are nearly always the same.
 @lru_cache(maxsize=8)
 def _rule_of(texts: tuple[str, ...]) -> ControlConfig | None:
     try:
@@ -37,7 +37,7 @@ def _rule_of(texts: tuple[str, ...]) -> ControlConfig | None:
 
 
 def figures_of(action: Action, rule: ControlConfig) -> str:
-    """Return the step and the limit of ``action`` under ``rule``; empty where it has none."""
+    """Return the step and the limit of ``action`` under ``rule``; empty if it has none."""
     is_timed = rule.ramp == "per_second"
     linear = f"{rule.linear_acceleration:g} m/s a second" if is_timed else f"{rule.linear_step:g} m/s a frame"
     angular = f"{rule.angular_acceleration:g} rad/s a second" if is_timed else f"{rule.angular_step:g} rad/s a frame"

@@ -1,16 +1,16 @@
-"""Which of several robots one hand drives."""
+"""Selects which of several robots is driven."""
 
 from collections.abc import Sequence
 
 NEXT = "next"
-"""What may be asked for instead of a name."""
+"""Accepted by :meth:`Fleet.select` instead of a name."""
 
 
 class Fleet:
-    """Robots of which one is driven at a time.
+    """Several robots, one of which is driven at a time.
 
     Args:
-        names: The robots' names, at least one; the first is driven first.
+        names: Names of the robots, at least one; the first is selected initially.
 
     Attributes:
         selected: Name of the robot that is driven.
@@ -22,13 +22,13 @@ class Fleet:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """All robots, in their order."""
+        """Names of all robots, in order."""
         return self._names
 
     def select(self, name: str) -> bool:
-        """Drive the robot ``name``, or the next one for :data:`NEXT`; return whether that is another than before.
+        """Select the robot ``name``, or the next one for :data:`NEXT`; return whether the selection changed.
 
-        A name that is not known changes nothing.
+        An unknown name changes nothing.
         """
         if name == NEXT:
             name = self._names[(self._names.index(self.selected) + 1) % len(self._names)]

@@ -1,4 +1,4 @@
-"""The room that the robot takes up: a rectangle around its base frame, and how it sweeps over the floor."""
+"""The robot's footprint, a rectangle around its base frame, and the poses it passes through while moving."""
 
 import math
 
@@ -14,27 +14,27 @@ _STRAIGHT_RADPS = 1e-9
 
 
 def gaps(x: Array, y: Array, rule: CollisionMonitorConfig) -> Array:
-    """Return how far points at ``x`` and ``y`` in the base frame are from the robot, in metres; within, it is below 0.
+    """Return the distances of points from the footprint, in metres; negative inside it.
 
     Args:
-        x: Forward, in metres, of any shape.
+        x: Forward in the base frame, in metres, of any shape.
         y: To the left, of the same shape.
-        rule: How far the robot reaches.
+        rule: Size of the footprint.
     """
     along, across = _beyond(x, y, rule)
     ahead, aside = np.maximum(along, 0.0), np.maximum(across, 0.0)
-    outside: Array = np.sqrt(ahead * ahead + aside * aside)  # as np.hypot, in a third of the time
+    outside: Array = np.sqrt(ahead * ahead + aside * aside)  # same as np.hypot, in a third of the time
     return outside + np.minimum(np.maximum(along, across), 0.0)
 
 
 def least_gaps(x: Array, y: Array, rule: CollisionMonitorConfig) -> Array:
-    """Return what :func:`gaps` are at least; takes a third of the time."""
+    """Return lower bounds of :func:`gaps`, in a third of the time."""
     along, across = _beyond(x, y, rule)
     return np.maximum(along, across, out=along)
 
 
 def _beyond(x: Array, y: Array, rule: CollisionMonitorConfig) -> tuple[Array, Array]:
-    """Return how far points are beyond front or back, and beyond the sides."""
+    """Return the distances of points beyond the front or back, and beyond the sides."""
     along, across = np.abs(x - (rule.front - rule.back) / 2), np.abs(y)
     along -= (rule.front + rule.back) / 2
     across -= rule.side
@@ -42,18 +42,18 @@ def _beyond(x: Array, y: Array, rule: CollisionMonitorConfig) -> tuple[Array, Ar
 
 
 def reach_m(rule: CollisionMonitorConfig) -> float:
-    """Return how far the robot's farthest corner is from its base frame."""
+    """Return the distance of the farthest corner from the base frame, in metres."""
     return math.hypot(max(rule.front, rule.back), rule.side)
 
 
 def fastest_mps(velocity: Velocity, rule: CollisionMonitorConfig) -> float:
-    """Return the speed of the corner that is the fastest, for a robot that moves at ``velocity``."""
+    """Return the speed of the fastest corner of a robot that moves at ``velocity``, in m/s."""
     v, w = velocity.linear_mps, velocity.angular_radps
     return max(math.hypot(abs(v) + abs(w) * rule.side, w * x) for x in (rule.front, rule.back))
 
 
 def on_a_circle(velocity: Velocity, times_s: Array) -> Array:
-    """Return where a robot that goes on at a steady ``velocity`` is at ``times_s``, (K,): (K, 3) x, y and yaw."""
+    """Return the poses at ``times_s``, (K,), at constant ``velocity``: (K, 3) x, y and yaw."""
     v, w = velocity.linear_mps, velocity.angular_radps
     poses = np.zeros((len(times_s), 3))
     if abs(w) < _STRAIGHT_RADPS:
@@ -69,13 +69,13 @@ def on_a_circle(velocity: Velocity, times_s: Array) -> Array:
 
 
 def braking(moving: Velocity, told: Velocity, rule: CollisionMonitorConfig, delay_s: float, times_s: Array) -> Array:
-    """Return where a robot is that is told ``told``, and to stand after ``delay_s`` seconds: (K, 3) x, y and yaw.
+    """Return the poses of a robot that is commanded ``told``, and zero after ``delay_s`` seconds: (K, 3) x, y and yaw.
 
     Args:
-        moving: How it moves now; it changes that as fast as it brakes.
-        told: What it is told now.
-        rule: Its brakes.
-        delay_s: When it is told to stand.
+        moving: Its current velocity, which changes at the deceleration of ``rule``.
+        told: The velocity commanded now.
+        rule: Decelerations.
+        delay_s: When zero is commanded.
         times_s: (K,), at equal intervals from 0.
     """
     early_s = np.minimum(times_s, delay_s)
@@ -97,7 +97,7 @@ def braking(moving: Velocity, told: Velocity, rule: CollisionMonitorConfig, dela
 
 
 def seen_from(poses: Array, points: Array) -> tuple[Array, Array]:
-    """Return x and y, (K, N) each, of ``points`` (N, 2) as a robot sees them from ``poses`` (K, 3) x, y and yaw."""
+    """Transform ``points`` (N, 2) to the frames of ``poses`` (K, 3) x, y and yaw; return x and y, (K, N) each."""
     x, y, yaw = poses[:, 0], poses[:, 1], poses[:, 2]
     cos, sin = np.cos(yaw), np.sin(yaw)
     turns = np.empty((2 * len(poses), 2))
@@ -111,7 +111,7 @@ def seen_from(poses: Array, points: Array) -> tuple[Array, Array]:
 
 
 def after(velocity: Velocity, seconds: float, points: Array) -> Array:
-    """Return where ``points``, (N, 2), are for a robot that has gone on at a steady ``velocity`` for so long."""
+    """Return ``points``, (N, 2), relative to a robot that has moved at constant ``velocity`` for ``seconds``."""
     if velocity.is_zero or not seconds:
         return points
     x, y, yaw = on_a_circle(velocity, np.array([seconds]))[0].tolist()
@@ -121,7 +121,7 @@ def after(velocity: Velocity, seconds: float, points: Array) -> Array:
 
 
 def _speeds(moving: float, told: float, most: float, early_s: Array, late_s: Array) -> Array:
-    """Return the speeds of what goes over to ``told`` for ``early_s``, and brakes for ``late_s``, by ``most``."""
+    """Return the speeds on the way to ``told`` for ``early_s``, then braking for ``late_s``, both at rate ``most``."""
     gap, sign = abs(told - moving), math.copysign(most, told - moving)
     speeds: Array = moving + np.minimum(early_s, gap / most) * sign if gap else np.full(len(early_s), told)
     brakes = late_s * most

@@ -1,9 +1,9 @@
-"""Slows commands so that the robot can stop before what is in its way: pure functions, and what they remember.
+"""Limits commands so that the robot can stop before obstacles: pure functions, and a class with their state.
 
-A command's way is the circle that it drives the robot along. The robot may be as fast on it as lets it stop in front of
-the first obstacle that its footprint would meet, after its reaction time and by its own braking: the square root of the
-free way, as brakes have it. What gets farther away, or passes beside the footprint, does not count, so that backing out
-and turning away stay free.
+The path of a command is the arc that it drives the robot along. The speed on it is limited so that the robot stops
+before the first obstacle that its footprint would hit, after its reaction time and with its deceleration; the limit
+therefore grows with the square root of the free distance. Obstacles that get farther away, or that the footprint
+passes, are ignored, so that the robot can always back out and turn away.
 """
 
 import math
@@ -18,39 +18,39 @@ from handsteer.control.scan_points import Points
 from handsteer.types import ZERO, Velocity
 
 _PAD_M = 0.02
-"""Nothing is to come nearer to the robot, be it beside it."""
+"""Minimum distance of obstacles from the robot, on all sides."""
 
-# The faster a robot changes how it moves, the less is sure where that leads.
+# The pad grows with speed, because the predicted path becomes less certain.
 _PAD_S = 0.03
 
-# Who is nearer already may come no nearer than by this, which is the noise of a scan.
+# The noise of a scan: something already inside the pad may come nearer by at most this.
 _NOISE_M = 0.01
-# But a robot that turns by more than this, so near to something, is to come no nearer than by this.
+# If the robot turns by more than this, something so near may come nearer only by ``_NEARER_M``.
 _SWING_RAD = 0.03
 _NEARER_M = 0.001
-# Of the robot's own speed: what is near and comes nearer so slowly is passed along.
+# Share of the robot's own speed: something near that approaches more slowly is being passed.
 _GLANCING = 0.05
 _CREEP_M = 0.06
 _STEP_M = 0.03
 _FEWEST_STEPS, _MOST_STEPS = 8, 400
-# Of every third pose, none between is farther away than two steps; a hair more, as the poses are added up.
+# Between every third pose, no pose is farther away than two steps; slightly more for rounding of the summed poses.
 _ROUGHLY = 2.1
 _SLOWEST = 0.005
 _NOTHING_MPS = 1e-6
-# Which shares of a velocity that is too fast are tried, of driving and of turning: those first that turn as they were
-# told, as turning leads away from most things.
+# Shares of linear and angular velocity to try if a velocity is too fast. Those that keep the turn come first, because
+# turning leads away from most obstacles.
 _LESS = ((1.0, 1.0), (0.75, 1.0), (0.5, 1.0), (0.25, 1.0), (0.0, 1.0), (1.0, 0.5), (1.0, 0.0), (0.5, 0.5), (0.0, 0.5))
 
 
 @dataclass(frozen=True)
 class Hit:
-    """What is in the way.
+    """An obstacle in the robot's path.
 
     Attributes:
         x: Forward of the base frame, in metres.
-        y: To the left of it.
-        gap_m: How far it is from the robot now.
-        time_s: When the robot would meet it, in seconds.
+        y: To the left of the base frame, in metres.
+        gap_m: Current distance from the footprint.
+        time_s: Time until the robot would hit it, in seconds.
     """
 
     x: float
@@ -59,7 +59,7 @@ class Hit:
     time_s: float
 
     def describe(self, rule: CollisionMonitorConfig) -> str:
-        """Return where it is, as ``obstacle 0.42 m ahead``."""
+        """Return its position in words, such as ``obstacle 0.42 m ahead``."""
         beside = "to the left" if self.y > 0 else "to the right"
         where = "ahead" if self.x >= rule.front else "behind" if self.x <= -rule.back else beside
         return f"obstacle {max(0.0, self.gap_m):.2f} m {where}"
@@ -71,17 +71,18 @@ def limit(
     rule: CollisionMonitorConfig,
     moving: Velocity = ZERO,
 ) -> tuple[Velocity, Hit | None]:
-    """Return the velocity to command instead of ``wanted``, and what it is slowed for; None where it is not.
+    """Return the velocity to command instead of ``wanted``, and the obstacle that limits it, or None.
 
-    It is never faster, and never turns or drives the other way. A robot that is slowed may turn as fast as it could in
-    place; its way becomes tighter. A robot that has to change how it moves does not go the way of its command at once:
-    what it would meet meanwhile, and while it brakes then, counts too. Where that cannot be avoided, as late as can be.
+    The result is never faster than ``wanted`` and never changes direction. A slowed robot may still turn as fast as it
+    could in place, so its path becomes tighter. While the robot changes its velocity, it does not yet follow the path
+    of the command: obstacles on the path until then, and on the braking path from there, count too. If a collision
+    cannot be avoided, the velocity with the latest one is returned.
 
     Args:
-        wanted: What signs or steering ask for; finite.
-        points: The obstacles, now.
-        rule: Footprint, margin and brakes.
-        moving: How the robot moves now.
+        wanted: Velocity requested by signs or steering; finite.
+        points: Current obstacles.
+        rule: Footprint, margin and decelerations.
+        moving: Current velocity of the robot.
     """
     if wanted.is_zero or not len(points):
         return wanted, None
@@ -106,7 +107,7 @@ def limit(
 
 
 def _within_reach(wanted: Velocity, points: Points, rule: CollisionMonitorConfig, moving: Velocity) -> Points:
-    """Return those of ``points`` that a robot could meet, however it is slowed."""
+    """Return those of ``points`` that the robot could reach, even if it is slowed."""
     v = max(abs(moving.linear_mps), abs(wanted.linear_mps))
     w = max(abs(moving.angular_radps), abs(wanted.angular_radps))
     way_m = v * (rule.reaction_time + max(v / rule.deceleration, w / rule.angular_deceleration))
@@ -124,9 +125,9 @@ def _scaled(velocity: Velocity, linear: float, angular: float) -> Velocity:
 
 
 def _share(velocity: Velocity, points: Points, rule: CollisionMonitorConfig) -> tuple[float, Hit | None]:
-    """Return which share of ``velocity`` lets the robot stop in time, 0 to 1, and what it has to stop for.
+    """Return the share of ``velocity``, 0 to 1, at which the robot can stop in time, and the obstacle that limits it.
 
-    Times are those at the full velocity: a share s takes s * delay + s² * braking / 2 of it.
+    Times are at the full velocity: a share s takes s * delay + s² * braking / 2.
     """
     delay_s = rule.reaction_time
     fastest = fastest_mps(velocity, rule)
@@ -135,7 +136,7 @@ def _share(velocity: Velocity, points: Points, rule: CollisionMonitorConfig) -> 
     braking_s = max(
         abs(velocity.linear_mps) / rule.deceleration, abs(velocity.angular_radps) / rule.angular_deceleration
     )
-    # The margin is for driving; a turn in place may end at the pad, so that a robot before a wall can turn away.
+    # The margin applies to driving only; a turn in place may end at the pad, so that a robot at a wall can turn away.
     margin_s = rule.margin * abs(velocity.linear_mps) / fastest**2
     needed_s = delay_s + braking_s / 2
     hit = first_hit(velocity, points, rule, needed_s + margin_s)
@@ -149,11 +150,11 @@ def _share(velocity: Velocity, points: Points, rule: CollisionMonitorConfig) -> 
 
 
 def first_hit(velocity: Velocity, points: Points, rule: CollisionMonitorConfig, horizon_s: float) -> Hit | None:
-    """Return what a robot that goes on at ``velocity`` meets first within ``horizon_s`` seconds; None for nothing."""
+    """Return the first obstacle hit at constant ``velocity`` within ``horizon_s`` seconds, or None."""
     fastest = fastest_mps(velocity, rule)
     if fastest < _NOTHING_MPS or horizon_s <= 0:
         return None
-    # A creeping robot, too, is to see that it comes nearer to what is near already.
+    # At low speed too, the prediction must reach far enough to show that something near comes nearer.
     seen_s = max(horizon_s, _CREEP_M / fastest)
     times_s = _times(fastest, seen_s)
     poses = on_a_circle(velocity, times_s)
@@ -162,7 +163,7 @@ def first_hit(velocity: Velocity, points: Points, rule: CollisionMonitorConfig, 
 
 
 def _met_while_braking(moving: Velocity, told: Velocity, points: Points, rule: CollisionMonitorConfig) -> Hit | None:
-    """Return what a robot meets first that is told ``told``, and to stand one reaction time later; None for nothing."""
+    """Return the first obstacle hit if ``told`` is commanded now and zero one reaction time later, or None."""
     fastest = fastest_mps(
         Velocity(
             max(abs(moving.linear_mps), abs(told.linear_mps)), max(abs(moving.angular_radps), abs(told.angular_radps))
@@ -171,7 +172,7 @@ def _met_while_braking(moving: Velocity, told: Velocity, points: Points, rule: C
     )
     if fastest < _NOTHING_MPS:
         return None
-    # Who turns round stops on the way, and has to stop again.
+    # A robot that reverses its direction stops on the way, and has to stop again.
     stop_s = max(
         max(abs(moving.linear_mps), abs(told.linear_mps)) / rule.deceleration,
         max(abs(moving.angular_radps), abs(told.angular_radps)) / rule.angular_deceleration,
@@ -189,16 +190,16 @@ def _times(fastest_mps: float, seconds: float) -> Points:
 def _met(
     poses: Points, times_s: Points, points: Points, rule: CollisionMonitorConfig, *, pad_m: float, fastest_mps: float
 ) -> Hit | None:
-    """Return what the footprint meets first on its way by ``poses`` (K, 3) at ``times_s`` (K,); None for nothing."""
-    # Most points stay far away, which a few poses tell.
+    """Return the first obstacle that the footprint hits along ``poses`` (K, 3) at ``times_s`` (K,), or None."""
+    # Most points stay far away, which a few poses are enough to show.
     beyond_m = pad_m + _NOISE_M + _ROUGHLY * fastest_mps * times_s[1]
     near = points[least_gaps(*seen_from(poses[1::3], points), rule).min(axis=0) <= beyond_m]
     if not len(near):
         return None
     gap = gaps(*seen_from(poses, near), rule)
     gap_m = float(gap[0].min())
-    # Where something is within the pad already, the robot may still pass by what gets no nearer. A corner that swings
-    # towards a wall gets nearer by less than a scan's noise each time, but each time again.
+    # If something is inside the pad already, the robot may still pass obstacles that come no nearer. A corner that
+    # swings towards a wall comes nearer by less than a scan's noise, but does so in every step.
     swings = gap_m < _NOISE_M and float(np.abs(poses[:, 2]).max()) > _SWING_RAD
     least_m = min(pad_m, gap_m - (_NEARER_M if swings else _NOISE_M))
     is_met = gap <= least_m
@@ -215,7 +216,7 @@ def _met(
 
 
 def _first(gap: Points, is_met: NDArray[np.bool_], times_s: Points, least_m: float) -> tuple[int, float]:
-    """Return which point is met first, ``is_met`` (K, N), and when, between the steps of ``times_s`` (K,)."""
+    """Return the index of the first point in ``is_met`` (K, N), and when, interpolated between ``times_s`` (K,)."""
     at = max(1, int(is_met.any(axis=1).argmax()))
     met = np.flatnonzero(is_met[: at + 1].any(axis=0))
     before, after = gap[at - 1, met], gap[at, met]
@@ -225,14 +226,14 @@ def _first(gap: Points, is_met: NDArray[np.bool_], times_s: Points, least_m: flo
 
 
 class ObstacleLimiter:
-    """Remembers the newest scan, and how the robot moves as far as commands tell.
+    """Keeps the newest scan, and an estimate of the robot's velocity.
 
     Args:
-        rule: Footprint, margin, brakes and timeout; may be set later, too.
+        rule: Footprint, margin, decelerations and timeout; may be changed later.
 
     Attributes:
         rule: As above.
-        hit: What the last command was slowed for; None where it was not, or where there was no scan.
+        hit: The obstacle that limited the last command; None if it was not limited, or without a scan.
     """
 
     def __init__(self, rule: CollisionMonitorConfig) -> None:
@@ -244,28 +245,29 @@ class ObstacleLimiter:
         self.hit: Hit | None = None
 
     def see(self, points: Points, measured_s: float) -> None:
-        """Take a scan that was measured at ``measured_s``, in seconds of the caller's clock."""
+        """Store a scan measured at ``measured_s``, in seconds of the caller's clock."""
         self._points, self._measured_s = points, measured_s
 
     def feel(self, moving: Velocity, measured_s: float) -> None:
-        """Take how the robot moved at ``measured_s``, as its odometry says; finite.
+        """Store the robot's velocity from odometry, measured at ``measured_s``; finite.
 
-        Without it, the robot is taken to follow commands as hard as it surely brakes: most get faster sooner.
+        Without odometry, the robot is assumed to change its velocity at its guaranteed deceleration; most robots
+        accelerate faster.
         """
         self._moving, self._moving_s = moving, measured_s
 
     def silence_s(self, now_s: float) -> float:
-        """Return how old the newest scan is at ``now_s``; infinity when there is none."""
+        """Return the age of the newest scan at ``now_s``; infinity if there is none."""
         return max(0.0, now_s - self._measured_s)
 
     def is_blind(self, now_s: float) -> bool:
-        """Return whether there is no scan that could be trusted at ``now_s``."""
+        """Return whether there is no scan, or only a stale one, at ``now_s``."""
         return self._points is None or self.silence_s(now_s) > self.rule.source_timeout
 
     def limit(self, wanted: Velocity, now_s: float) -> Velocity:
-        """Return what to command at ``now_s`` instead of ``wanted``: zero without a scan; else as :func:`limit`.
+        """Return the velocity to command at ``now_s``: zero without a valid scan, else as :func:`limit`.
 
-        The robot has gone on since the scan was measured, and so the points are taken to be elsewhere.
+        The points are moved by the robot's estimated motion since the scan.
         """
         self._moving, self._moving_s = self._followed(now_s), now_s
         self.hit, said = None, ZERO
@@ -276,7 +278,7 @@ class ObstacleLimiter:
         return said
 
     def _followed(self, now_s: float) -> Velocity:
-        """Return how a robot with these brakes moves at ``now_s``, after what it did last and was told."""
+        """Return the velocity at ``now_s`` of a robot that follows the last command at the configured decelerations."""
         elapsed_s = max(0.0, now_s - max(self._moving_s, self._told_s))
         if not math.isfinite(elapsed_s):
             return ZERO

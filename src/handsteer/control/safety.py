@@ -1,8 +1,8 @@
-"""When a robot may be set in motion, and how fast it may get faster: pure rules, told what happens and how time passes.
+"""Decides when the robot may move, and how fast it may accelerate: pure rules without a clock.
 
-A robot moves only while there is a live reason for it. :class:`Safety` says whether who drives may be followed,
-:class:`Following` whether the robot does what it is told, :class:`Allowance` how many signs count, and :class:`Ramp`
-how fast what is commanded may grow. How long each waits stands in :mod:`handsteer.timeouts`.
+A robot moves only while there is a current reason. :class:`Safety` decides whether inputs are followed,
+:class:`Following` whether the robot does what is commanded, :class:`Allowance` limits the rate of signs, and
+:class:`Ramp` acceleration and jerk. The times are in :mod:`handsteer.timeouts`.
 """
 
 import math
@@ -24,20 +24,20 @@ _SLACK_S = 1e-9
 
 
 class Safety:
-    """Keeps the robot standing until neutral was seen.
+    """Keeps the robot stopped until neutral was seen.
 
-    Neutral, for signs, is a sign that stops, or an empty picture for :data:`~handsteer.timeouts.NEUTRAL_S`; a ``NONE``
-    that a fault has made is neither. For steering it is a zero, or a pause. After a Stop was reset, or another robot
-    was chosen, each has to show it once. With ``arming`` each has to do so after the start too, and after every fault;
-    a pause of steering that was not at zero is then a fault as well. So a hand that is up already, or a stick that
-    is held, moves nothing.
+    Neutral for signs is a sign that stops, or no hand for :data:`~handsteer.timeouts.NEUTRAL_S`; a ``NONE`` caused by a
+    fault does not count. Neutral for steering is a zero, or a pause. Both inputs must show it after a Stop was reset
+    and after another robot was selected; with ``arming`` also after the start and after each fault. With ``arming``, a
+    pause of steering that was not at zero is a fault too. So a hand that is already up, or a joystick that is held,
+    does not start the robot.
 
     Args:
-        config: How long signs and steering may pause.
-        arming: Whether neutral has to be seen after the start and after faults.
+        config: Timeouts of signs and steering.
+        arming: Whether neutral is required after the start and after faults.
 
     Attributes:
-        is_stopped: Whether somebody has stopped the robot until it is reset.
+        is_stopped: Whether a Stop is active, until :meth:`reset`.
     """
 
     def __init__(self, config: ControlConfig, *, arming: bool) -> None:
@@ -55,16 +55,16 @@ class Safety:
 
     @property
     def signs_wait(self) -> str | None:
-        """Why signs have to show neutral first, as ``no sign came``; empty after a reset, None when they need not."""
+        """Why signs have to show neutral first, as ``no sign came``; empty after a reset, None if they need not."""
         return self._signs_wait
 
     @property
     def steering_waits(self) -> bool:
-        """Whether steering has to let go first."""
+        """Whether steering has to be released first."""
         return self._steering_waits
 
     def step(self, dt_s: float) -> None:
-        """Let ``dt_s`` seconds pass, >= 0; signs that do not come for as long as they may are a fault."""
+        """Advance time by ``dt_s`` seconds, >= 0; a timeout of signs is a fault."""
         self._age_s += dt_s
         self._sign_age_s += dt_s
         self._steering_age_s += dt_s
@@ -76,30 +76,30 @@ class Safety:
         self.is_stopped = True
 
     def reset(self) -> None:
-        """End a Stop; who drives has to show neutral first. Without a Stop it changes nothing."""
+        """End a Stop; each input must show neutral before it is followed again. Without a Stop it changes nothing."""
         if self.is_stopped:
             self.is_stopped = False
             self.disarm()
 
     def disarm(self, why: str = "") -> None:
-        """Let signs and steering show neutral before either is followed again."""
+        """Require neutral of signs and steering before either is followed again."""
         self._signs_wait, self._steering_waits = why, True
         self._neutral_s = 0.0
 
     def fault(self, why: str) -> None:
-        """Note that something failed; with ``arming``, signs have to show neutral again."""
+        """Record a fault; with ``arming``, signs have to show neutral again."""
         self._neutral_s = 0.0
         self._was_fault = True
         if self._arming and not self._signs_wait:
             self._signs_wait = why
 
     def robot_is_away(self, why: str) -> None:
-        """Note that nobody follows what is commanded; with ``arming``, it goes no further than standing."""
+        """Record that no robot follows the commands; with ``arming``, neutral is required when one does again."""
         if self._arming:
             self.disarm(why)
 
     def admits_sign(self, sign: str, *, stops: bool) -> bool:
-        """Note a sign that came, and whether it ``stops``; return whether the robot may follow it."""
+        """Record a sign, and whether it ``stops``; return whether the robot may follow it."""
         gap_s, self._sign_age_s = self._sign_age_s, 0.0
         if sign == NONE:
             self._note_none(gap_s)
@@ -112,9 +112,9 @@ class Safety:
         return self._signs_wait is None and not self.is_stopped
 
     def admits_steering(self, *, is_zero: bool) -> bool:
-        """Note a steering command, zero or not; return whether the robot may follow it."""
+        """Record a steering command; return whether the robot may follow it."""
         age_s, self._steering_age_s = self._steering_age_s, 0.0
-        # What is heard for the first time soon after the start may have been held since before it.
+        # Steering first received soon after the start may have been held since before it.
         is_first_at_start = math.isinf(age_s) and self._arming and self._age_s < STEERING_AT_START_S
         after_pause = age_s >= self._config.steering_timeout and not is_first_at_start
         is_lost = after_pause and self._arming and not self._last_steering_was_zero
@@ -126,7 +126,7 @@ class Safety:
         return not (self._steering_waits or self.is_stopped)
 
     def reconfigure(self, config: ControlConfig) -> None:
-        """Go on with other times."""
+        """Change the timeouts."""
         self._config = config
 
     def _note_none(self, gap_s: float) -> None:
@@ -135,11 +135,11 @@ class Safety:
         elif not self._was_fault:
             self._neutral_s += min(gap_s, MOST_OF_ONE_NONE_S)
         else:
-            self._was_fault = False  # what passed since the fault was not looked at
+            self._was_fault = False  # what happened since the fault was not observed
 
 
 class Following:
-    """Whether a robot whose odometry is heard does what it is told; nothing is known of one that gives none."""
+    """Checks by odometry whether the robot does what is commanded; without odometry, it assumes so."""
 
     def __init__(self) -> None:
         self._measured: Velocity | None = None
@@ -148,13 +148,13 @@ class Following:
         self._follows: Velocity | None = None
 
     def note(self, measured: Velocity) -> None:
-        """Take what odometry says that the robot does; what is not finite says nothing."""
+        """Record a velocity from odometry; values that are not finite are ignored."""
         if measured.is_finite:
             self._measured = measured
             self._age_s = 0.0
 
     def step(self, dt_s: float, commanded: Velocity) -> str | None:
-        """Let ``dt_s`` seconds pass in which ``commanded`` held; return what is wrong with the robot, or None."""
+        """Advance time by ``dt_s`` seconds of ``commanded``; return what is wrong with the robot, or None."""
         if self._measured is None:
             return None
         self._age_s += dt_s
@@ -176,9 +176,9 @@ class Following:
 
 
 class Allowance:
-    """How many signs may make the robot faster, so that it gets no faster by more messages than a camera has frames.
+    """Limits how many signs may accelerate the robot, so that extra messages beyond a camera's rate have no effect.
 
-    Signs may come in bursts; what was not used within :data:`BURST_S` is gone.
+    Signs may come in bursts; allowance beyond :data:`BURST_S` expires.
     """
 
     BURST_S = 0.25
@@ -188,11 +188,11 @@ class Allowance:
         self._left = math.inf
 
     def step(self, dt_s: float) -> None:
-        """Let ``dt_s`` seconds pass."""
+        """Advance time by ``dt_s`` seconds."""
         self._left = min(self._left + self.rate * dt_s, max(1.0, self.rate * self.BURST_S))
 
     def take(self) -> bool:
-        """Return whether one more sign counts."""
+        """Use one sign of the allowance; return whether there was one."""
         if self._left < 1.0:
             return False
         self._left -= 1.0
@@ -200,10 +200,10 @@ class Allowance:
 
 
 class Ramp:
-    """Limits how fast a commanded velocity grows; it falls, and changes sides through zero, as fast as it is asked to.
+    """Limits acceleration and jerk of commands; decelerating, and changing direction at zero, is not limited.
 
     Args:
-        config: Limits of acceleration and jerk; 0 is none.
+        config: Limits of acceleration and jerk; 0 is no limit.
     """
 
     def __init__(self, config: ControlConfig) -> None:
@@ -212,11 +212,11 @@ class Ramp:
         self._angular = _Axis()
 
     def reconfigure(self, config: ControlConfig) -> None:
-        """Go on with other limits."""
+        """Change the limits."""
         self._config = config
 
     def step(self, wanted: Velocity, dt_s: float) -> Velocity:
-        """Return what to command ``dt_s`` seconds after the last step."""
+        """Return the velocity to command ``dt_s`` seconds after the last step."""
         config = self._config
         return Velocity(
             self._linear.step(wanted.linear_mps, dt_s, config.max_linear_acceleration, config.max_linear_jerk),
@@ -244,7 +244,7 @@ class _Axis:
 
 
 def _done(commanded: Velocity, measured: Velocity) -> list[float]:
-    """Return how much of what it is told the robot does, 1 for all, a part for each way that it is told enough of."""
+    """Return measured over commanded velocity, linear and angular, where the command is large enough to compare."""
     parts = ((commanded.linear_mps, measured.linear_mps, 0.1), (commanded.angular_radps, measured.angular_radps, 0.2))
     return [does / wanted for wanted, does, least in parts if abs(wanted) >= least]
 

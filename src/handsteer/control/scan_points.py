@@ -1,4 +1,4 @@
-"""From a laser scan to the obstacles around the robot: points in its own frame."""
+"""Converts a laser scan to obstacle points in the robot's base frame."""
 
 import math
 
@@ -10,24 +10,24 @@ from handsteer.control.footprint import gaps
 from handsteer.messages import LaserScan
 
 Points = NDArray[np.float64]
-"""(N, 2): x forward and y left of the robot's base frame, in metres."""
+"""(N, 2): x forward and y left in the robot's base frame, in metres."""
 
 MOST_POINTS = 1440
-"""Of a longer scan, the nearest of each few neighbouring rays is kept."""
+"""Limit for one scan; of a longer one, the nearest of each few neighbouring rays is kept."""
 
-# What seems to be deeper within the robot is a part of it, as a post that the scanner sees.
+# A reading deeper inside the footprint is a part of the robot, such as a post in view of the scanner.
 _SKIN_M = 0.05
 
 
 def points_of(scan: LaserScan, rule: CollisionMonitorConfig) -> Points | None:
-    """Return where the scanner sees something; None when the scan is broken or says nothing.
+    """Return the points that the scanner measured; None if the scan is invalid or empty.
 
-    Distances mean what REP 117 and ``sensor_msgs/LaserScan`` say: beyond ``range_max`` and +inf is free, -inf is too
-    near to be measured, so the robot touches it; NaN and what is below ``range_min`` is no reading.
+    Ranges follow REP 117 and ``sensor_msgs/LaserScan``: beyond ``range_max`` and +inf is free; -inf is too near to be
+    measured, so it counts as touching the robot; NaN and values below ``range_min`` are no readings.
 
     Args:
         scan: The message, of any size.
-        rule: Where the scanner is on the robot, and how far the robot reaches.
+        rule: Pose of the scanner on the robot, and size of the footprint.
     """
     ranges = np.asarray(scan.ranges, dtype=np.float64).reshape(-1)
     figures = (scan.angle_min, scan.angle_increment, scan.range_min, scan.range_max)
@@ -47,7 +47,7 @@ def points_of(scan: LaserScan, rule: CollisionMonitorConfig) -> Points | None:
 
 
 def _thinned(ranges: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the numbers of the rays that meet something, at most :data:`MOST_POINTS`, and how far it is."""
+    """Return the indices of rays that hit something, at most :data:`MOST_POINTS`, and their ranges."""
     if len(ranges) > MOST_POINTS:
         each = math.ceil(len(ranges) / MOST_POINTS)
         groups = np.pad(ranges, (0, -len(ranges) % each), constant_values=np.inf).reshape(-1, each)
@@ -64,7 +64,7 @@ def _along(angles: NDArray[np.float64], distances: NDArray[np.float64]) -> Point
 
 
 def _on_the_edge(angles: NDArray[np.float64], rule: CollisionMonitorConfig) -> Points:
-    """Return where rays from the base frame leave the robot, a hair inside."""
+    """Return where rays from the base frame leave the footprint, slightly inside."""
     cos, sin = np.cos(angles), np.sin(angles)
     with np.errstate(divide="ignore"):
         ahead = np.where(cos >= 0, rule.front, rule.back) / np.abs(cos)

@@ -1,4 +1,4 @@
-"""From signs to velocities: the tutorial's rule, with limits and a watchdog."""
+"""Converts signs to velocities by the tutorial's rule, with limits and a watchdog."""
 
 import math
 
@@ -11,20 +11,19 @@ _TURBO = 2.0
 
 
 class SignControl:
-    """Keeps the commanded velocity and changes it by one step a sign.
+    """Keeps the commanded velocity and changes it by one step per sign.
 
-    ``Forward`` and ``Backward`` change the linear velocity and end turning; ``Turn Left`` and ``Turn Right`` change
-    the angular velocity and keep the linear one; ``Stop`` and ``NONE`` set both to zero; ``Go`` and unknown words
-    change nothing (the rule of the ROS 101 course, chapter 12). ``config.actions`` says what further signs do. The
-    velocity itself is clamped, so that it does not wind up beyond the limits.
+    ``Forward`` and ``Backward`` change the linear velocity and end turning; ``Turn Left`` and ``Turn Right`` change the
+    angular velocity and keep the linear one; ``Stop`` and ``NONE`` set both to zero; ``Go`` and unknown signs change
+    nothing (the rule of the ROS 101 course, chapter 12). ``config.actions`` defines further signs. The stored velocity
+    itself is clamped, so that it does not wind up beyond the limits.
 
-    While a ``turbo`` sign is shown, twice the linear velocity is commanded, within the limit, and the turning
-    velocity as it is. Nothing of it is kept: with the next sign the robot is back at its own speed. A robot that
-    stands goes on standing.
+    A ``turbo`` sign doubles the linear velocity, within the limit, while it is shown, and keeps the angular one. The
+    next sign continues from the original velocity. A stopped robot remains stopped.
 
     Attributes:
-        velocity: What the signs have added up to; this is commanded, but for ``turbo``.
-        silent: True after a timeout: nothing is commanded until a sign comes.
+        velocity: Sum of the signs so far; it is what is commanded, except for ``turbo``.
+        silent: True after a timeout: nothing is commanded until the next sign.
     """
 
     def __init__(self, config: ControlConfig) -> None:
@@ -35,15 +34,15 @@ class SignControl:
         self.silent = True
 
     def step(self, sign: str | None, dt_s: float) -> Velocity | None:
-        """Let ``dt_s`` pass, then take ``sign``.
+        """Advance time by ``dt_s``, then process ``sign``.
 
         Args:
-            sign: The sign of one message, or None when no message came and only time has passed.
-            dt_s: Seconds since the last step, >= 0; anything else counts as a fault.
+            sign: The sign of one message, or None if only time has passed.
+            dt_s: Seconds since the last step, >= 0; any other value is a fault.
 
         Returns:
-            The velocity to command now; None to command nothing. Exactly one velocity a sign; after
-            ``sign_timeout`` without a sign, or at a fault, one zero and then None.
+            The velocity to command now; None to command nothing. Exactly one velocity per sign; after ``sign_timeout``
+            without a sign, or at a fault, one zero and then None.
         """
         if not (math.isfinite(dt_s) and dt_s >= 0):
             return self.halt()
@@ -52,7 +51,7 @@ class SignControl:
         if sign is None:
             timed_out = not self.silent and self._since_sign_s >= self._config.sign_timeout
             return self.halt() if timed_out else None
-        # How long a sign has lasted is not known when it comes after a silence: it then starts to grow from now.
+        # After silence, it is unknown how long the sign was shown before: its time counts from now.
         interval_s = 0.0 if self.silent else self._since_sign_s
         self._since_sign_s = 0.0
         self.silent = False
@@ -62,17 +61,17 @@ class SignControl:
         return commanded if commanded.is_finite else self.halt()
 
     def reconfigure(self, config: ControlConfig) -> None:
-        """Go on with another configuration; :attr:`velocity` is clamped to its limits."""
+        """Change the configuration; :attr:`velocity` is clamped to the new limits."""
         self._config = config
         self._allowance.rate = config.max_sign_rate
         self.velocity = self.velocity.clamped(config.max_linear, config.max_angular)
 
     def hold_back(self, velocity: Velocity) -> None:
-        """Go on from no faster than ``velocity``, so that nothing has added up when the robot may be faster again."""
+        """Clamp :attr:`velocity` to the magnitudes in ``velocity``, so that steps do not wind up at an active limit."""
         self.velocity = self.velocity.clamped(abs(velocity.linear_mps), abs(velocity.angular_radps))
 
     def halt(self) -> Velocity | None:
-        """Forget the velocity; return one zero, or None when that has been said already."""
+        """Set the velocity to zero; return one zero, or None if already silent."""
         was_silent = self.silent
         self.velocity = ZERO
         self.silent = True
@@ -91,7 +90,7 @@ class SignControl:
                 after = now.linear_mps, now.angular_radps + (angular if action == "turn_left" else -angular)
             case _:
                 after = now.linear_mps, now.angular_radps
-        # So that a sum of steps is what people make of it: 0.22, not 0.22000000000000006.
+        # Sums of steps are to be the expected decimals: 0.22, not 0.22000000000000006.
         summed = Velocity(round(after[0], _DIGITS), round(after[1], _DIGITS))
         limited = summed.clamped(self._config.max_linear, self._config.max_angular)
         if not _is_faster(limited, now) or self._config.ramp == "per_second" or self._allowance.take():

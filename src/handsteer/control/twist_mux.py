@@ -1,4 +1,4 @@
-"""Who drives: steering by hand goes before signs, for as long as it is used."""
+"""Selects the active input: steering overrides signs while it is in use."""
 
 import math
 from typing import Literal
@@ -11,14 +11,14 @@ Source = Literal["nobody", "signs", "steering"]
 
 
 class TwistMux:
-    """Joins signs and steering to one stream of velocities.
+    """Merges signs and steering into one stream of velocities.
 
-    A steering command takes over at once and keeps the signs out until ``steering_timeout`` has passed without
-    another one. Then one zero goes out, and signs start again from standing still (the priorities and timeouts of
-    ROS's ``twist_mux``, in one place, so that the robot hears one voice).
+    A steering command takes over at once and blocks signs until ``steering_timeout`` has passed without another one.
+    Then one zero is commanded, and signs continue from zero. These are the priorities and timeouts of ROS's
+    ``twist_mux``, in one place, so that the robot has one source of commands.
 
     Attributes:
-        source: Who drives now.
+        source: The active input.
     """
 
     def __init__(self, config: ControlConfig) -> None:
@@ -31,16 +31,16 @@ class TwistMux:
 
     @property
     def velocity(self) -> Velocity:
-        """What was commanded last."""
+        """The last commanded velocity."""
         return self._velocity
 
     def step(self, dt_s: float, *, sign: str | None = None, steering: Velocity | None = None) -> Velocity | None:
-        """Let ``dt_s`` seconds pass, then take what has come.
+        """Advance time by ``dt_s``, then process the inputs.
 
         Args:
-            dt_s: Seconds since the last step, >= 0; anything else counts as a fault and stops the robot.
-            sign: The sign of one message, if one came.
-            steering: A velocity asked for by hand, if one came; it is clamped to the limits, and zero if not finite.
+            dt_s: Seconds since the last step, >= 0; any other value is a fault and stops the robot.
+            sign: The sign of one message, if one was received.
+            steering: A steering command, if one was received; clamped to the limits, and zero if not finite.
 
         Returns:
             The velocity to command now, or None to command nothing.
@@ -58,10 +58,10 @@ class TwistMux:
         return self._say(velocity)
 
     def reconfigure(self, config: ControlConfig) -> Velocity | None:
-        """Go on with other limits, steps, times and actions; nothing gets faster by it.
+        """Change limits, steps, times and actions; no change makes the robot faster.
 
         Returns:
-            The velocity to command now, where the one commanded last is beyond the limits; else None.
+            The velocity to command now if the last one exceeds the new limits; else None.
         """
         self._config = config
         self._signs.reconfigure(config)
@@ -69,12 +69,12 @@ class TwistMux:
         return self._say(within if self.source != "nobody" and within != self._velocity else None)
 
     def hold_back(self, velocity: Velocity) -> None:
-        """Go on from ``velocity``, a slower one that was commanded instead of the last."""
+        """Continue from ``velocity``, a slower one that was commanded instead of the last."""
         self._velocity = velocity
         self._signs.hold_back(velocity)
 
     def halt(self) -> Velocity | None:
-        """Stop whoever drives; return one zero, or None when nobody does."""
+        """Stop the active input; return one zero, or None if there is none."""
         was_driving = self.source != "nobody"
         self._signs.halt()
         self.source = "nobody"
@@ -82,7 +82,7 @@ class TwistMux:
 
     @property
     def reason(self) -> str:
-        """A sentence on what the robot is told to do, and why it stands when it does."""
+        """A sentence on what is commanded, and why the robot is stopped if it is."""
         if self.source == "steering":
             return "standing: steered by hand, at zero" if self._velocity.is_zero else "driving: steered by hand"
         if self.source == "nobody":
