@@ -1,4 +1,4 @@
-"""The node ``my_camera``: frames out, whatever the camera does."""
+"""The node ``my_camera``, which publishes frames and recovers from failures of the camera."""
 
 import logging
 from dataclasses import replace
@@ -24,20 +24,20 @@ log = logging.getLogger(__name__)
 
 
 class CameraNode(Node):
-    """Publishes each frame of a camera with its capture time; a camera that is lost is tried again and again.
+    """Publishes each frame of a camera with its capture time, and reopens a camera that is lost.
 
-    A picture that is the same as the last is no frame.
+    A picture that equals the previous one is not published.
 
     Args:
         transport: Carries the messages.
         clock: The graph's clock.
-        camera: Gives the frames.
+        camera: Delivers the frames.
         frame_id: Coordinate frame of the images.
-        calibration: What is known of the lens, for pictures of its size; None when nothing is.
+        calibration: Calibration of the lens, for pictures of its size; None if there is none.
 
     Attributes:
-        ended: Set when a file has ended and shall end the run.
-        frames: How many frames were published.
+        ended: Set when a file has ended and ends the run.
+        frames: Number of frames published.
     """
 
     def __init__(
@@ -69,11 +69,11 @@ class CameraNode(Node):
 
     @property
     def is_paced(self) -> bool:
-        """Whether frames come by the clock, not when a device has them."""
+        """Whether frames are read at a fixed period instead of when a device has them."""
         return self._camera.period_s is not None
 
     def on_stop(self) -> None:
-        """Release the device, unless it is being read: OpenCV does not survive that; the process's end releases it."""
+        """Release the device, unless a read is in progress: OpenCV would crash. The end of the process releases it."""
         if not self.stuck:
             self._camera.close()
 
@@ -108,7 +108,7 @@ class CameraNode(Node):
             self._info.publish(replace(self._info_for(frame), header=header), frame.captured_s)
 
     def _info_for(self, frame: Frame) -> CameraInfo:
-        """Return the calibration; one of another size says nothing of this picture."""
+        """Return the calibration, or that of an uncalibrated camera if its size differs from the picture's."""
         height, width = frame.image.shape[:2]
         known = self._calibration
         fits = known is not None and (known.width, known.height) == (width, height)

@@ -1,4 +1,4 @@
-"""Slows a control's commands before obstacles on ``/scan``, and says so."""
+"""Slows the control's commands before obstacles on ``/scan``, and reports it."""
 
 import logging
 import math
@@ -17,12 +17,12 @@ log = logging.getLogger(__name__)
 
 
 class CollisionMonitor:
-    """Listens to the laser scanner, and to the robot's odometry, once it is enabled, and from then on.
+    """Subscribes to the laser scan and the robot's odometry when first enabled.
 
     Args:
         node: The control.
-        rule: Whether it is enabled, and how.
-        on_slowed: Gets each velocity that is commanded instead of a faster one.
+        rule: Whether it is enabled, and its parameters.
+        on_slowed: Receives each velocity that is commanded instead of a faster one.
     """
 
     def __init__(self, node: Node, rule: CollisionMonitorConfig, on_slowed: Callable[[Velocity], None]) -> None:
@@ -37,7 +37,7 @@ class CollisionMonitor:
         self.reconfigure(rule)
 
     def reconfigure(self, rule: CollisionMonitorConfig) -> None:
-        """Go on by another rule."""
+        """Change the rule."""
         self._limiter.rule = rule
         self._limiter.hit = None
         if rule.enabled and not self._listens:
@@ -46,7 +46,7 @@ class CollisionMonitor:
             self._node.subscribe(ODOM, self._on_odometry)
 
     def admit(self, wanted: Velocity) -> Velocity:
-        """Return what may be commanded instead of ``wanted``."""
+        """Return the velocity to command instead of ``wanted``."""
         self._stands = False
         if not self._limiter.rule.enabled:
             return wanted
@@ -58,7 +58,7 @@ class CollisionMonitor:
         return allowed
 
     def explain(self, reason: str) -> str:
-        """Return the control's ``reason`` with what slows the robot, as ``driving: Forward, slowed: obstacle …``."""
+        """Return the control's ``reason`` and what slows the robot, as ``driving: Forward, slowed: obstacle …``."""
         hit = self._limiter.hit if self._limiter.rule.enabled else None
         if hit is None:
             return reason
@@ -66,7 +66,7 @@ class CollisionMonitor:
         return f"standing: stopped before an {said}" if self._stands else f"{reason}, slowed: {said}"
 
     def why_blind(self) -> str:
-        """Return why nothing may move for want of scans; empty when they come, or are not asked for."""
+        """Return why nothing may move without scans; empty if scans are received or not required."""
         now = self._node.clock.now()
         rule = self._limiter.rule
         if not rule.enabled or not self._limiter.is_blind(now):
@@ -79,7 +79,7 @@ class CollisionMonitor:
         return f"laser scans come {self._limiter.silence_s(now):.1f} s after their stamp: are the clocks in step?"
 
     def values(self) -> dict[str, str]:
-        """Return what there is to report."""
+        """Return the values for diagnostics."""
         hit = self._limiter.hit
         return {} if hit is None else {"obstacle_m": f"{max(0.0, hit.gap_m):.2f}"}
 
@@ -98,7 +98,7 @@ class CollisionMonitor:
 
     def _on_odometry(self, received: Received[Odometry]) -> None:
         moving = self._measured.read(received.message)
-        # Where that is not known, what was commanded tells more.
+        # If the velocity is unknown, the last command is the better estimate.
         if moving is not None and moving.is_finite:
             now = self._node.clock.now()
             captured_s = now if received.captured_s is None else received.captured_s

@@ -1,4 +1,4 @@
-"""The node ``hand_sign_control``: signs in, one velocity command out for each."""
+"""The node ``hand_sign_control``, which publishes one velocity command per sign."""
 
 import logging
 from typing import Any
@@ -40,22 +40,23 @@ _DIAGNOSE_PERIOD_S = 0.1
 
 
 class HandSignControlNode(Node):
-    """Publishes one Twist a sign, one zero when signs stop, and one zero at the end, whatever ends it.
+    """Publishes one Twist per sign, one zero when signs stop, and one zero at the end, however the node ends.
 
-    True on ``/stop`` stops the robot whoever drives, until false comes; then signs and steering have to begin anew.
-    With ``config.robots`` it drives one of them at a time; see :class:`~handsteer.nodes.selection.Selection`.
+    True on ``/stop`` stops the robot whatever its active input, until false is received; then signs and steering must
+    show neutral first. With ``config.robots`` it drives one of them at a time; see
+    :class:`~handsteer.nodes.selection.Selection`.
 
     Args:
         transport: Carries the messages.
         clock: The graph's clock.
         config: Limits, steps and timeouts.
-        cmd_vel: The topic of the commands, of Twist or TwistStamped, or of either.
-        collision_monitor: Whether and how commands are slowed before obstacles; not at all by default.
-        arming: Whether nothing moves before neutral was seen, and while no robot listens
+        cmd_vel: Topic of the commands, with Twist, TwistStamped or either.
+        collision_monitor: Whether and how to slow commands before obstacles; disabled by default.
+        arming: Whether nothing moves before neutral was seen, or while no robot is subscribed
             (:mod:`handsteer.control.safety`).
 
     Attributes:
-        latency: From the capture of a frame to the Twist that it led to.
+        latency: From the capture of a frame to the resulting Twist.
     """
 
     is_quick = True
@@ -98,14 +99,14 @@ class HandSignControlNode(Node):
         self.diagnose_every(_DIAGNOSE_PERIOD_S, self._report)
 
     def on_reconfigure(self, config: Config) -> None:
-        """Take all of ``control``; a robot that is faster than new limits allow is told so at once."""
+        """Apply all of ``control``; a robot that exceeds new limits is slowed at once."""
         self._config = config.control
         self._stall_guard.limit_s = config.control.sign_timeout
         self._monitor.reconfigure(config.collision_monitor)
         self._publish(self._control.reconfigure(config.control))
 
     def services(self) -> dict[str, Call]:
-        """Return ``stop`` and ``reset``, which do what true and false on ``/stop`` do."""
+        """Return ``stop`` and ``reset``, which are equivalent to true and false on ``/stop``."""
         publisher = self.publisher(STOP)
 
         def say(is_stopped: bool, answer: str) -> str:
@@ -118,7 +119,7 @@ class HandSignControlNode(Node):
         }
 
     def on_stop(self) -> None:
-        """Leave the robot standing, and those that it left a moment ago."""
+        """Stop the robot, and those that were selected a moment ago."""
         self._control.halt()
         self._publish(ZERO)
         if self._selection:
@@ -140,7 +141,7 @@ class HandSignControlNode(Node):
     def _on_sign(self, received: Received[String]) -> None:
         captured_s = received.captured_s
         is_stale = captured_s is not None and self.clock.now() - captured_s > self._config.sign_timeout
-        if is_stale or received.is_late:  # a stale frame is no frame: the watchdog goes on counting
+        if is_stale or received.is_late:  # a stale frame does not count, so the watchdog keeps running
             self._obey_late(is_stop=action_of(received.message.data, self._config.actions) == "stop")
             return
         elapsed_s = self._elapsed()
@@ -161,7 +162,7 @@ class HandSignControlNode(Node):
         self._publish(self._control.step(elapsed_s, steering=steering))
 
     def _obey_late(self, *, is_stop: bool) -> None:
-        """Stop for a Stop that comes late; it tells nothing of what is shown now, so it arms nothing."""
+        """Stop for a late sign or command; it does not show what is seen now, so it does not arm."""
         if is_stop:
             self._publish(self._control.halt())
 
@@ -181,14 +182,14 @@ class HandSignControlNode(Node):
             self._calm_down()
 
     def _calm_down(self) -> None:
-        """Let the watchdog sleep for a while: waking up fifty times a second costs more than all signs do."""
+        """Delay the watchdog while nothing moves: waking up fifty times a second costs more than all signs."""
         self._log_arming()
-        # The beat is that of the selection, too; and steering ends on time also where signs come all the while.
+        # The selection uses the same timer, and steering must time out even while signs arrive.
         if self._selection is None and self._mux.source != "steering":
             self._watchdog.delay_until(self.clock.now() + CALM_S)
 
     def _log_arming(self) -> None:
-        """Say when signs begin to wait for neutral, and when they need not any more: who has no page sees the log."""
+        """Log when signs begin and cease to wait for neutral, for users without the page."""
         waits = self._safety.signs_wait is not None
         if waits and not self._waited:
             why = self._safety.signs_wait or "after a reset"
@@ -211,7 +212,7 @@ class HandSignControlNode(Node):
             self._publish(self._control.halt())
 
     def _select_by(self, sign: str | None) -> None:
-        """Choose the next robot when a sign that does so begins."""
+        """Select the next robot when a sign with that action begins."""
         if sign is None:
             return
         if self._selection and sign != self._last_sign and action_of(sign, self._config.actions) == "next_robot":
@@ -219,7 +220,7 @@ class HandSignControlNode(Node):
         self._last_sign = sign
 
     def _on_change(self) -> None:
-        """Start from standing with another robot."""
+        """Start from zero with another robot."""
         assert self._selection is not None
         self._control.halt()
         self._safety.disarm("it was selected")
@@ -285,6 +286,6 @@ class HandSignControlNode(Node):
         return f"{self._selection.fleet.selected} is disarmed" if self._selection else "disarmed"
 
     def _latencies(self) -> dict[str, str]:
-        """Return the latency's figures; none where the transport does not carry the frame's time with a sign."""
+        """Return the latency's percentiles; empty if the transport does not carry capture times with signs."""
         percents = {"latency_median_ms": 50, "latency_p99_ms": 99} if len(self.latency) else {}
         return {name: f"{self.latency.percentile_ms(percent):.1f}" for name, percent in percents.items()}

@@ -1,27 +1,26 @@
-"""How old a frame is, when the clock that stamped it may be another machine's and not in step with ours."""
+"""Estimates the age of frames whose stamps may come from the unsynchronized clock of another machine."""
 
 from handsteer.clock import ClockWatch
 
 _LEAK = 0.001
-"""How much of an offset is forgotten, in seconds a second: far more than clocks drift, far less than a delay lasts."""
+"""Decay of a clock offset, in seconds per second: far more than clocks drift, far less than delays last."""
 
 
 class FrameAge:
-    """Tells old frames from new ones by their stamps.
+    """Distinguishes old frames from new ones by their stamps.
 
-    No frame comes from the future. One that seems to tells that the clock of its camera is ahead of ours, by at least
-    as much; every frame is then taken to be older by that. So a frame is never taken to be older than it is, and
-    younger by no more than the shortest delay that any frame has had. A clock that is behind cannot be told from a
-    delay, and its frames count as old; unless it was set while frames came, which
-    :class:`~handsteer.clock.ClockWatch` notices.
+    A stamp in the future shows that the camera's clock is ahead of ours by at least the difference, which is then added
+    to the age of every frame. So the age is never overestimated, and underestimated by at most the shortest delay of
+    any frame. A clock that is behind cannot be distinguished from a delay, and its frames count as old, unless it was
+    set while frames were received, which :class:`~handsteer.clock.ClockWatch` detects.
 
     Args:
-        limit_s: Greatest age of a frame in seconds; a frame that is ahead of us by more is refused, too.
+        limit_s: Maximum age of a frame in seconds; frames that are further ahead are refused too.
 
     Attributes:
         limit_s: As above; may be changed.
-        age_s: Age of the last frame, at least.
-        ahead_s: By how much the camera's clock is ahead of ours, at least.
+        age_s: Lower bound of the last frame's age.
+        ahead_s: Lower bound of the offset by which the camera's clock is ahead of ours.
     """
 
     def __init__(self, limit_s: float) -> None:
@@ -32,10 +31,10 @@ class FrameAge:
         self.ahead_s = 0.0
 
     def why_refused(self, now_s: float, captured_s: float) -> str | None:
-        """Return why a frame that has come now is not to be used, in words; None when it is fresh.
+        """Return why a frame received now must not be used, in words; None if it is fresh.
 
         Args:
-            now_s: The time now, in seconds of the graph's clock.
+            now_s: Current time, in seconds of the graph's clock.
             captured_s: The frame's stamp, in seconds of the same clock.
         """
         elapsed_s = 0.0 if self._noted_s is None else now_s - self._noted_s
@@ -56,5 +55,5 @@ class FrameAge:
 
 
 def in_words(set_by_s: float) -> str:
-    """Return what became of a clock that was set back by so many seconds, or ahead if negative."""
+    """Return in words that a clock was set back by ``set_by_s`` seconds, or ahead if negative."""
     return f"a clock was set {'back' if set_by_s > 0 else 'ahead'} by {abs(set_by_s):.1f} s"

@@ -1,4 +1,4 @@
-"""How long things took, of late."""
+"""Statistics of recent durations."""
 
 from collections import deque
 
@@ -6,10 +6,10 @@ import numpy as np
 
 
 class LatencyLog:
-    """Keeps the newest durations and gives their percentiles.
+    """Keeps the newest durations and computes their percentiles.
 
     Args:
-        capacity: How many are kept; older ones are forgotten.
+        capacity: How many are kept.
     """
 
     def __init__(self, capacity: int = 10_000) -> None:
@@ -19,9 +19,9 @@ class LatencyLog:
         return len(self._seconds)
 
     def add(self, seconds: float) -> None:
-        """Note one duration in seconds."""
+        """Record one duration in seconds."""
         self._seconds.append(seconds)
 
     def percentile_ms(self, percent: float) -> float:
-        """Return a percentile (0 to 100) in milliseconds; 0 when nothing was noted."""
+        """Return a percentile (0 to 100) in milliseconds; 0 if nothing was recorded."""
         return float(np.percentile(list(self._seconds), percent)) * 1000 if self._seconds else 0.0

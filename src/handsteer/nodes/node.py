@@ -1,4 +1,4 @@
-"""What all nodes share: inboxes that keep the newest message, timers, and one thread that serves both."""
+"""Base class of all nodes: subscriptions, timers, and the thread that runs their callbacks."""
 
 import logging
 import math
@@ -21,7 +21,7 @@ OK, WARN, ERROR = 0, 1, 2
 
 
 FAILURES_SAID_EVERY_S = 10.0
-"""A callback that goes on failing is logged no more often; a bad picture comes thirty times a second."""
+"""Log period of a callback that fails repeatedly; bad pictures may arrive thirty times a second."""
 
 _LONGEST_REASON = 200
 _LOOK_FOR_LISTENERS_S = 0.5
@@ -29,12 +29,12 @@ _LOOK_FOR_LISTENERS_S = 0.5
 
 @dataclass
 class Timer:
-    """A callback that is due again and again.
+    """A periodic callback.
 
     Attributes:
-        period_s: Time from one beat to the next; 0 means at once.
+        period_s: Time between two calls; 0 calls it in every cycle.
         callback: What to call.
-        due_s: When the next beat is due, on the graph's clock.
+        due_s: Time of the next call, on the graph's clock.
     """
 
     period_s: float
@@ -42,36 +42,36 @@ class Timer:
     due_s: float
 
     def schedule_next(self, now_s: float) -> None:
-        """Set the beat after the one of ``now_s``."""
+        """Schedule the call after the one at ``now_s``."""
         self.due_s += self.period_s
         if self.due_s <= now_s:
             self.due_s = now_s + self.period_s
 
     def delay_until(self, time_s: float) -> None:
-        """Leave out all beats before ``time_s``."""
+        """Skip all calls before ``time_s``."""
         self.due_s = max(self.due_s, time_s)
 
 
 class Node:
-    """A named part of the graph; its callbacks and timers run one at a time, never side by side.
+    """A named part of the graph; its callbacks and timers never run concurrently.
 
-    Run it on a thread of its own (:meth:`start`, :meth:`stop`); a node that :attr:`is_quick` also uses the threads that
-    deliver its messages, which saves a message the way to another thread. Or let the caller turn the crank
+    Run it on its own thread (:meth:`start`, :meth:`stop`); a node that :attr:`is_quick` also uses the threads that
+    deliver its messages, which saves a switch of threads. Alternatively, the caller runs it step by step
     (:meth:`spin_once`, :attr:`next_due_s`) on a :class:`~handsteer.clock.SteppedClock`.
 
-    A callback that raises is logged with its topic and counted in :attr:`callback_errors`; the node goes on. What fails
-    again and again is said every :data:`FAILURES_SAID_EVERY_S`.
+    A callback that raises is logged with its topic and counted in :attr:`callback_errors`, and the node continues.
+    Repeated failures are logged every :data:`FAILURES_SAID_EVERY_S`.
 
     Args:
         name: ROS node name.
         transport: Carries the messages.
-        clock: The graph's clock; timers follow it.
+        clock: The graph's clock, which timers follow.
 
     Attributes:
-        is_quick: Whether all callbacks return within a fraction of a millisecond, whatever others do.
-        ended: Set when the node has nothing more to do.
-        callback_errors: Callbacks that have failed.
-        stuck: True when a callback was still under way when :meth:`stop` gave up waiting for it.
+        is_quick: Whether all callbacks always return within a fraction of a millisecond.
+        ended: Set when the node has finished.
+        callback_errors: Number of failed callbacks.
+        stuck: True if a callback was still running when :meth:`stop` timed out.
     """
 
     is_quick = False
@@ -98,11 +98,11 @@ class Node:
 
     @property
     def topics(self) -> str:
-        """What it publishes and listens to, in words, by the names that others know."""
+        """The topics it publishes and subscribes, in words, by their names in the graph."""
         return "; ".join(f"{does} {', '.join(sorted(names)) or 'nothing'}" for does, names in self._topics.items())
 
     def publisher(self, topic: Topic[M]) -> Publisher[M]:
-        """Return the sending end of ``topic``."""
+        """Return a publisher of ``topic``."""
         self._topics["publishes"].add(self.transport.topic_name(topic))
         return self.transport.advertise(self.name, topic)
 
@@ -112,17 +112,17 @@ class Node:
         callback: Callable[[Received[M]], None],
         key: Callable[[M], Hashable] | None = None,
     ) -> Subscription:
-        """Call ``callback`` with the newest message of ``topic``; older ones that were not served are dropped.
+        """Call ``callback`` with the newest message of ``topic``; older unprocessed messages are dropped.
 
-        For a topic of some depth, as many of the newest messages are kept, and served in their order.
+        For a topic with a depth, that many of the newest messages are kept, and processed in order.
 
         Args:
-            topic: What to listen to.
+            topic: What to subscribe to.
             callback: Runs on this node's thread.
-            key: For a topic that several nodes publish to: keeps the newest message for each value of ``key(message)``.
+            key: For a topic with several publishers: keeps the newest message for each value of ``key(message)``.
 
         Returns:
-            What ends it; the node's end does, too.
+            Ends the subscription when closed; so does the end of the node.
         """
         name = self.transport.topic_name(topic)
         self._topics["listens to"].add(name)
@@ -132,7 +132,7 @@ class Node:
         def deliver(received: Received[M]) -> None:
             with self._wake:
                 inbox.put(received)
-            # Where somebody serves already, this thread may be in the midst of a callback.
+            # If callbacks are running already, this thread may be inside one.
             if self.is_quick and self._running and self._serving.acquire(blocking=False):
                 try:
                     self.spin_once()
@@ -147,15 +147,15 @@ class Node:
         return subscription
 
     def every(self, period_s: float, callback: Callable[[], None]) -> "Timer":
-        """Call ``callback`` every ``period_s`` seconds; a beat that is missed is left out, not made up for."""
+        """Call ``callback`` every ``period_s`` seconds; missed calls are skipped, not made up for."""
         timer = Timer(period_s, callback, self.clock.now())
         self._timers.append(timer)
         return timer
 
     def diagnose_every(self, period_s: float, report: Callable[[], None]) -> None:
-        """Call ``report``, which tells this node's state by :meth:`diagnose`, every ``period_s`` seconds.
+        """Call ``report``, which publishes this node's state by :meth:`diagnose`, every ``period_s`` seconds.
 
-        While nobody listens it is left out, and a new listener hears the first one within half a second.
+        Without subscribers it is skipped; a new subscriber receives its first report within half a second.
         """
 
         def beat() -> None:
@@ -167,9 +167,9 @@ class Node:
         timer = self.every(period_s, beat)
 
     def reconfigure(self, config: Config) -> None:
-        """Take the parameters that can change while the node runs (``live`` of each section) from ``config``.
+        """Apply the parameters of ``config`` that can change while the node runs (``live`` of each section).
 
-        Returns at once; the node takes them on its own thread, before whatever comes next. May be called from any
+        Returns at once; the node applies them on its own thread before its next callback. May be called from any
         thread.
         """
         with self._wake:
@@ -178,7 +178,7 @@ class Node:
 
     @property
     def is_diagnosed(self) -> bool:
-        """Whether anybody hears what :meth:`diagnose` says."""
+        """Whether ``/diagnostics`` has subscribers."""
         return self._diagnostics.has_subscribers
 
     def diagnose(self, level: int, message: str, **values: object) -> None:
@@ -193,14 +193,14 @@ class Node:
 
     @property
     def next_due_s(self) -> float | None:
-        """When the next timer is due, on the graph's clock; None when there is no timer."""
+        """When the next timer is due, on the graph's clock; None without timers."""
         return min((timer.due_s for timer in self._timers), default=None)
 
     def spin_once(self) -> bool:
-        """Take a new configuration, run the callbacks whose message has come and the timers that are due.
+        """Apply a new configuration, and run the callbacks of received messages and the timers that are due.
 
         Returns:
-            Whether there were any.
+            Whether anything was done.
         """
         with self._wake:
             config, self._new_config = self._new_config, None
@@ -217,16 +217,16 @@ class Node:
         return bool(work or due or config is not None)
 
     def start(self) -> None:
-        """Serve callbacks and timers on a thread of its own."""
+        """Run callbacks and timers on a thread of its own."""
         self._running = True
         self._thread = threading.Thread(target=self._run, name=self.name, daemon=True)
         self._thread.start()
 
     def stop(self, timeout_s: float = 0.5) -> None:
-        """Receive no more, end the thread, then :meth:`on_stop`; may be called twice.
+        """End all subscriptions and the thread, then call :meth:`on_stop`; may be called twice.
 
         Args:
-            timeout_s: How long to wait for a callback that is under way; after that :attr:`stuck` is True.
+            timeout_s: How long to wait for a running callback; after that :attr:`stuck` is True.
         """
         if self._stopped:
             return
@@ -248,17 +248,17 @@ class Node:
                 self._serving.release()
 
     def check(self, config: Config) -> None:
-        """Raise ConfigError if :meth:`reconfigure` could not take ``config``; may be called from any thread."""
+        """Raise ConfigError if :meth:`reconfigure` could not apply ``config``; may be called from any thread."""
 
     def on_reconfigure(self, config: Config) -> None:
-        """Take the parameters that can change from ``config``; by default there are none."""
+        """Apply the parameters of ``config`` that can change; by default there are none."""
 
     def services(self) -> dict[str, Call]:
-        """Return what others may ask of this node, by name; by default there is nothing."""
+        """Return the services of this node by name; by default there are none."""
         return {}
 
     def on_stop(self) -> None:
-        """Leave things as they should be left; called last, also after an exception."""
+        """Clean up; called last, also after an exception."""
 
     def _run(self) -> None:
         while self._running:
@@ -288,7 +288,7 @@ class Node:
             self._report_failure(source, error)
 
     def _report_failure(self, source: str, error: Exception) -> None:
-        """Say that a callback has failed: at first with its traceback, later how often, and not too often."""
+        """Log a failed callback: the first time with its traceback, later the count at a limited rate."""
         failure = self._failures.setdefault((source, type(error)), _Failure())
         failure.count += 1
         now = self.clock.now()

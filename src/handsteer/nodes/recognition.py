@@ -1,4 +1,4 @@
-"""The node ``hand_sign_recognition``: a frame in, the name of a sign out."""
+"""The node ``hand_sign_recognition``, which publishes a sign for each frame."""
 
 import json
 import logging
@@ -28,7 +28,7 @@ from handsteer.transports.protocol import Received, Subscription, Transport
 from handsteer.types import NONE
 
 _WATCH_PERIOD_S = 0.02
-# Further apart than FAULT_GAP_S, so that the control takes them for what they are: frames that were not looked at.
+# Longer than FAULT_GAP_S, so that the control does not take these ``NONE`` for processed frames.
 _SILENCE_PERIOD_S = 0.5
 _DIAGNOSE_PERIOD_S = 0.1
 _CHOOSE_PERIOD_S = 0.5
@@ -42,19 +42,19 @@ OpenClassifier = Callable[[SignsConfig], Classifier]
 
 
 class HandSignRecognitionNode(Node):
-    """Publishes one sign a frame, and ``NONE`` while no frames come.
+    """Publishes one sign per frame, and ``NONE`` while no frames arrive.
 
     Args:
         transport: Carries the messages.
         clock: The graph's clock.
-        recognizer: Does the work.
-        config: Holds the greatest age of a frame, and which images to take.
-        annotate: Draws what was understood into a copy of the frame, when anybody looks.
-        open_classifier: Opens the classifier of ``signs.model`` when that changes while the node runs.
+        recognizer: Recognises the signs.
+        config: Maximum age of a frame, and which images to subscribe to.
+        annotate: Draws the result into a copy of the frame, if there are subscribers.
+        open_classifier: Opens the classifier of ``signs.model`` when it changes while the node runs.
 
     Attributes:
-        counts: How many frames each sign counted for.
-        processing: How long each frame took.
+        counts: Number of frames per confirmed sign.
+        processing: Processing time of each frame.
     """
 
     def __init__(
@@ -99,7 +99,7 @@ class HandSignRecognitionNode(Node):
         self.diagnose_every(_DIAGNOSE_PERIOD_S, self._report)
 
     def check(self, config: Config) -> None:
-        """Raise ConfigError if the file of ``signs.model`` is another one than before and cannot be used."""
+        """Raise ConfigError if the file of ``signs.model`` has changed and cannot be used."""
         if self._has_other_model(config.signs):
             try:
                 self._open_classifier(config.signs)
@@ -107,7 +107,7 @@ class HandSignRecognitionNode(Node):
                 raise ConfigError(f"signs.model: {error}") from None
 
     def on_reconfigure(self, config: Config) -> None:
-        """Take the confidences and times of ``signs``, and its model if that is another file, or was written anew."""
+        """Apply the confidences and times of ``signs``, and its model if the file was replaced or rewritten."""
         if self._has_other_model(config.signs):
             version = _version_of(config.signs.model)
             self._recognizer.use(self._open_classifier(config.signs))
@@ -120,7 +120,7 @@ class HandSignRecognitionNode(Node):
     def _has_other_model(self, config: SignsConfig) -> bool:
         version, mine = _version_of(config.model), self._model
         if version is not None and mine is not None and version == (mine[0], *_GONE):
-            return False  # what was read before it went stays in use
+            return False  # the model stays loaded after its file is deleted
         return version != mine
 
     def _on_frame(self, received: Received[M], picture_of: Callable[[M], NDArray[np.uint8]]) -> None:
@@ -140,7 +140,7 @@ class HandSignRecognitionNode(Node):
         else:
             self._freshness.pass_over(image)
         if self._refused is not None:
-            self._refused_s = began_s  # a stale frame, or one that is not new, is no frame: the watch publishes NONE
+            self._refused_s = began_s  # a stale or repeated frame does not count: the watchdog publishes NONE
 
     def _look_at(self, image: NDArray[np.uint8], received: Received[M], began_s: float, captured_s: float) -> None:
         dt_s = self._since_last_frame(captured_s)
@@ -148,7 +148,7 @@ class HandSignRecognitionNode(Node):
         self._refused = self._freshness.why_refused(image, dt_s)
         if self._refused is not None:
             return
-        # The time of pictures that were not looked at counts: a sign is bridged from when it was seen last.
+        # The time of skipped pictures counts: a sign is bridged from when it was last seen.
         recognition = self._recognizer.step(image, self._unseen_s)
         self._unseen_s = 0.0
         self._refused = self._why_too_late(began_s)
@@ -170,7 +170,7 @@ class HandSignRecognitionNode(Node):
             self._annotated.publish(image_message(self._annotate(image, recognition), header), received.captured_s)
 
     def _why_too_late(self, began_s: float) -> str | None:
-        """Return why a frame that was fresh has no sign: this process was stopped, or held up, while it was read."""
+        """Return why a fresh frame has no sign: this process was stopped or stalled while it was processed."""
         age_s = max(0.0, self._age.age_s) + self.clock.now() - began_s
         if age_s <= self._config.max_frame_age:
             return None
@@ -183,7 +183,7 @@ class HandSignRecognitionNode(Node):
         return self.subscribe(IMAGE_RAW, lambda received: self._on_frame(received, bgr_image))
 
     def _choose_images(self) -> None:
-        """Take the other kind of images where a camera has only that."""
+        """Subscribe to the other kind of images if a camera has only that."""
         taken, other = (IMAGE_COMPRESSED, IMAGE_RAW) if self._compressed else (IMAGE_RAW, IMAGE_COMPRESSED)
         names = self.transport.publishers_of
         if names(taken) or not names(other):
@@ -237,7 +237,7 @@ class HandSignRecognitionNode(Node):
         if seen.hand is not None or self._last_hand_s is None:
             return seen.reason
         unseen_s = self.clock.now() - self._last_hand_s
-        # Tenths matter for a hand that was lost; nobody reads them of one that has left.
+        # Tenths matter only for a hand that was lost just now.
         return f"no hand seen for {unseen_s:.{1 if unseen_s < _SHORTLY_S else 0}f} s"
 
     def _why_no_frame(self) -> str:
@@ -253,7 +253,7 @@ _GONE = (-1, -1)
 
 
 def _version_of(model: Path | None) -> tuple[Path, int, int] | None:
-    """Return what tells a file, and what was last written to it, from others: path, inode and time in ns."""
+    """Return what identifies a version of a file: path, inode and modification time in ns; None if there is none."""
     if model is None:
         return None
     try:

@@ -1,4 +1,4 @@
-"""Frames of a recording, which are stamped by another day's clock, and frames that only come late."""
+"""Distinguishes frames of a recording, which have old stamps, from frames that arrive late."""
 
 import logging
 
@@ -9,21 +9,20 @@ log = logging.getLogger(__name__)
 
 
 class Recording:
-    """Tells whether frames are a recording's, which count as captured when they come.
+    """Decides whether frames come from a recording; these count as captured on arrival.
 
-    A stamp alone does not tell: frames of a camera whose link is slow are stale, too, and whoever stands before it must
-    not move a robot by what he did before. So by itself this follows what a player of recordings publishes, and nothing
-    else. What is stamped long ago and comes in step it takes for a recording that somebody may want to be followed, and
-    says so.
+    The stamp alone is not enough: frames over a slow camera link are old too, and old gestures must not move a robot.
+    So ``auto`` accepts only what a player of recordings publishes. Frames with old stamps that arrive at a steady rate
+    are reported as a possible recording.
 
     Args:
-        recorded: auto follows what a player publishes; always follows also what is stamped longer ago than any link
-            delays; never follows nothing.
-        limit_s: Frames that are no older, in seconds, are nobody's recording.
+        recorded: auto accepts what a player publishes; always accepts also stamps older than any link delay; never
+            accepts nothing.
+        limit_s: Frames that are no older than this, in seconds, are not a recording's.
 
     Attributes:
         limit_s: As above; may be changed.
-        is_followed: Whether the last frame was a recording's, and is to count.
+        is_followed: Whether the last frame was accepted as a recording's.
     """
 
     def __init__(self, recorded: Recorded, limit_s: float) -> None:
@@ -35,19 +34,19 @@ class Recording:
         self._said = False
 
     def follows(self, now_s: float, captured_s: float, *, by_player: bool) -> bool:
-        """Note a frame; return whether it is a recording's, and is to count as captured now.
+        """Record a frame; return whether it is accepted as a recording's, captured now.
 
         Args:
-            now_s: The time now, in seconds of the graph's clock.
+            now_s: Current time, in seconds of the graph's clock.
             captured_s: The frame's stamp, in seconds of the same clock.
-            by_player: Whether a player of recordings published it, as far as is known.
+            by_player: Whether a player of recordings is known to publish it.
         """
         age_s = now_s - captured_s
         stands, self._captured_s = captured_s == self._captured_s, captured_s
         self._note_step(now_s, age_s)
         meant = by_player if self._recorded == "auto" else self._recorded == "always"
         long_ago = age_s > (self.limit_s if by_player else RECORDED_S)
-        # A stamp that stands still is that of a camera, or of a clock, that has failed.
+        # A stamp that does not advance comes from a camera or clock that has failed.
         self.is_followed = meant and long_ago and not stands
         if self.is_followed:
             self._say(logging.INFO, f"frames are stamped {in_words(age_s)} ago: they are followed, as a recording's")
@@ -78,7 +77,7 @@ class Recording:
 
 
 def in_words(seconds: float) -> str:
-    """Return a duration as people say it, as ``3 days``."""
+    """Return a duration in words, such as ``3 days``."""
     for unit, length_s in (("years", 31_557_600.0), ("days", 86_400.0), ("hours", 3600.0), ("minutes", 60.0)):
         if seconds >= 2 * length_s:
             return f"{seconds / length_s:.0f} {unit}"

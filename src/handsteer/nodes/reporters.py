@@ -1,4 +1,4 @@
-"""Who reports on ``/diagnostics``, which all namespaces share."""
+"""The names of status reports on ``/diagnostics``, which all namespaces share."""
 
 
 def split_reporter(name: str) -> tuple[str, str]:

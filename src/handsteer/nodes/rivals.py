@@ -1,4 +1,4 @@
-"""Notices when more than one node publishes what a robot obeys, and says so."""
+"""Detects and reports that more than one node publishes a command topic."""
 
 import logging
 from collections.abc import Callable, Sequence
@@ -11,22 +11,22 @@ from handsteer.transports.observed import UNNAMED, many_voices
 log = logging.getLogger(__name__)
 
 _PERIOD_S = 1.0
-# A node that starts anew is there twice for a moment, and names come up to three seconds late.
+# A restarting node appears twice for a moment, and names arrive up to three seconds late.
 _LOOKS, _LOOKS_FOR_NAMES = 2, 4
 
 Look = Callable[[], Sequence[str]]
 
 
 class Rivals:
-    """Looks once a second at who publishes to topics that are to have one voice.
+    """Checks the publishers of command topics once a second.
 
     Args:
-        node: On whose thread to look, and whose transport knows.
-        topics: The topics.
-        elsewhere: Further ones by name, of another graph: returns the nodes that publish there.
+        node: The node that runs the check, on its thread and transport.
+        topics: Topics that must have only one publisher.
+        elsewhere: Further topics by name, of another graph; each value returns the nodes that publish there.
 
     Attributes:
-        warning: What is amiss, in one sentence; empty when nothing is.
+        warning: The problem in one sentence; empty if there is none.
     """
 
     def __init__(self, node: Node, topics: Sequence[Topic[Any]], elsewhere: dict[str, Look] | None = None) -> None:

@@ -1,4 +1,4 @@
-"""The node ``robot``: velocity commands in, odometry, transforms and joint states out."""
+"""The node ``robot``, which takes velocity commands and publishes odometry, transforms and joint states."""
 
 import logging
 import math
@@ -62,30 +62,30 @@ _PERIOD_S = 0.02
 _MARKERS_PERIOD_S = 0.05
 _SCAN_PERIOD_S = 0.1
 _DIAGNOSE_PERIOD_S = 0.1
-# A machine that was busy for longer than this lets the simulated robot wait rather than leap.
+# After a longer stall of the machine, the simulated robot pauses instead of jumping.
 _LONGEST_STEP_S = 0.1
-# No robot goes so far within a period: it was put elsewhere, or its odometry was reset.
+# No robot moves so far within a period: it was moved by hand, or its odometry was reset.
 _LEAP_M = 0.5
 _NO_STAMP = Time(sec=0, nanosec=0)
 
-# Variances of x, y, z, roll, pitch and yaw, in m² and rad²: wheels tell of the plane, and of nothing else.
+# Variances of x, y, z, roll, pitch and yaw, in m² and rad²: wheels measure only the motion in the plane.
 _COVARIANCE = np.diag([0.001, 0.001, 1e6, 1e6, 1e6, 0.01]).reshape(-1)
 
 
 class RobotNode(Node):
-    """Drives a robot and publishes where it is, 50 times a second.
+    """Drives a robot and publishes its state 50 times a second.
 
     Args:
         transport: Carries the messages.
         clock: The graph's clock.
-        robot: What is driven.
-        config: Holds the names of the coordinate frames, and whether to publish ``/clock``.
-        cmd_vel: The topic of the commands, of Twist or TwistStamped.
+        robot: The robot to drive.
+        config: Names of the coordinate frames, and whether to publish ``/clock``.
+        cmd_vel: Topic of the commands, with Twist or TwistStamped.
 
     Attributes:
         state: The robot's newest state.
-        path_length_m: How far it has really gone, turns in place left out.
-        was_located: Whether it has ever said where it is.
+        path_length_m: Distance actually driven, without turns in place.
+        was_located: Whether its pose was ever known.
     """
 
     def __init__(
@@ -124,35 +124,35 @@ class RobotNode(Node):
 
     @property
     def world(self) -> World | None:
-        """The world that the robot is in, all things where they were at the start; None for a real one's."""
+        """The robot's world, with all things in their initial places; None for a real robot."""
         return self._in_world.world if self._in_world else None
 
     @property
     def course(self) -> CourseState | None:
-        """How far it is on its world's course; None where there is none."""
+        """The progress on the course of its world; None if there is no course."""
         return self._referee.state if self._referee.state.gates else None
 
     def change_world(self, change: Change) -> Future[None]:
-        """Let the robot stand, and change the world around it; may be called from any thread.
+        """Stop the robot, and change the world around it; may be called from any thread.
 
         Args:
-            change: Takes the world and returns the one that shall be; runs on this node's thread.
+            change: Takes the world and returns the new one; runs on this node's thread.
 
         Returns:
-            What becomes of it: done, or the :class:`~handsteer.errors.WorldError` that says why nothing has changed.
+            Done, or failed with the :class:`~handsteer.errors.WorldError` that explains why nothing has changed.
         """
         return self._changes.ask(lambda: self._change_world(change))
 
     def enter_world(self, world: World) -> Future[None]:
-        """Put the robot to the start of another world; else as :meth:`change_world`."""
+        """Move the robot to the start of another world; see :meth:`change_world`."""
         return self._changes.ask(lambda: self._start_anew(lambda robot: robot.enter(world)))
 
     def reset(self) -> Future[None]:
-        """Put the robot and all things to where they were at the start; else as :meth:`change_world`."""
+        """Reset the robot and all things to their initial places; see :meth:`change_world`."""
         return self._changes.ask(lambda: self._start_anew(lambda robot: robot.reset()))
 
     def services(self) -> dict[str, Call]:
-        """Return ``reset_odometry``, which counts from where the robot stands; a real one has none of ours."""
+        """Return ``reset_odometry``, which sets the odometry to 0 at the current place; none for a real robot."""
         robot = self._in_world
         if robot is None:
             return {}
@@ -164,7 +164,7 @@ class RobotNode(Node):
         return {"reset_odometry": reset}
 
     def on_stop(self) -> None:
-        """Leave it standing."""
+        """Stop the robot."""
         self._robot.command(0.0, 0.0)
         self._robot.close()
 
@@ -177,7 +177,7 @@ class RobotNode(Node):
         self._tell(Velocity(command.linear.x, command.angular.z))
 
     def _is_old(self, message: Twist | TwistStamped, now: float) -> bool:
-        """Return whether a stamped command is too old to be obeyed, as ROS's diff_drive_controller has it."""
+        """Return whether a stamped command is too old to be obeyed, as in ROS's diff_drive_controller."""
         stamp = message.header.stamp if isinstance(message, TwistStamped) else _NO_STAMP
         age_s = 0.0 if stamp == _NO_STAMP else now - self.clock.time_of(stamp)
         is_old = age_s > self._config.cmd_vel_timeout
@@ -251,7 +251,7 @@ class RobotNode(Node):
             self._markers.publish(
                 world_markers(header, self._robot.obstacles(), strips, self._touches.shown(now), self._most_markers)
             )
-            # Whoever draws them keeps each until it is told otherwise.
+            # A subscriber keeps each marker until it is deleted.
             self._most_markers = max(self._most_markers, len(self._robot.obstacles()))
 
     def _report(self) -> None:
@@ -281,7 +281,7 @@ class RobotNode(Node):
 
 
 def _distance_m(before: RobotState, after: RobotState) -> float:
-    """Return how far the robot has gone; 0 where it was not seen, or was put elsewhere."""
+    """Return the distance driven; 0 if the pose was unknown, or if the robot was moved by hand."""
     distance_m = math.hypot(after.truth.x - before.truth.x, after.truth.y - before.truth.y)
     return distance_m if before.located and after.located and distance_m < _LEAP_M else 0.0
 

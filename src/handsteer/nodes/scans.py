@@ -1,4 +1,4 @@
-"""Laser scans between robots and messages."""
+"""Converts laser scans of robots to messages."""
 
 import numpy as np
 
@@ -9,7 +9,7 @@ _PERIOD_S = 0.1
 
 
 def scan_message(header: Header, scan: RangeScan) -> LaserScan:
-    """Return ``scan`` as a message; all rays count as measured at once."""
+    """Return ``scan`` as a message; all rays have the same time."""
     return LaserScan(
         header=header,
         angle_min=scan.angle_min,

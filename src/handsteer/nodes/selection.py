@@ -1,4 +1,4 @@
-"""Sends velocity commands to the one of several robots that is driven, and zeros to those that were."""
+"""Sends velocity commands to the selected one of several robots, and zeros to the ones selected before."""
 
 import logging
 from collections.abc import Callable
@@ -19,20 +19,21 @@ Advertise = Callable[[Topic[Any]], Commands]
 
 
 class Selection:
-    """The robots that one control drives in turn.
+    """The robots that one control drives, one at a time.
 
-    A name on ``/select_robot`` selects one, ``next`` the one after; ``/selected_robot`` tells, to late subscribers too.
+    A name on ``/select_robot`` selects a robot, ``next`` the following one; ``/selected_robot``, latched, has the
+    selected one.
 
     Args:
         node: The control.
-        names: The robots' namespaces, in their order.
-        cmd_vel: The topic of commands within each.
-        advertise: Returns the sending end of a topic of commands.
-        on_change: Is called when another robot was selected, before anything is sent to it.
+        names: Namespaces of the robots, in order.
+        cmd_vel: The topic of commands within each namespace.
+        advertise: Returns the publisher of a topic of commands.
+        on_change: Called when another robot was selected, before anything is sent to it.
 
     Attributes:
-        fleet: Which robots there are, and which is driven.
-        topics: Where each is commanded.
+        fleet: The robots, and which one is selected.
+        topics: The command topic of each robot.
     """
 
     def __init__(
@@ -55,16 +56,16 @@ class Selection:
 
     @property
     def commands(self) -> Commands:
-        """Where commands to the robot that is driven go."""
+        """The publisher of commands to the selected robot."""
         return self._commands[self.fleet.selected]
 
     def follow(self) -> bool:
-        """Send each robot what it takes; return whether that has changed for the one that is driven."""
+        """Use the message type that each robot subscribes to; return whether it has changed for the selected one."""
         changed = [name for name, commands in self._commands.items() if commands.follow()]
         return self.fleet.selected in changed
 
     def select(self, name: str) -> None:
-        """Drive the robot ``name`` (or ``next``); the old one gets a zero first, and some more with the next beats."""
+        """Select the robot ``name`` (or ``next``); the previous one gets a zero first, and more from :meth:`beat`."""
         before = self.fleet.selected
         if not self.fleet.select(name):
             return
@@ -75,7 +76,7 @@ class Selection:
         self._selected.publish(String(data=self.fleet.selected))
 
     def beat(self) -> None:
-        """Send a zero to each robot that was left a moment ago."""
+        """Send a zero to each robot that was selected a moment ago."""
         for name in list(self._left):
             self._commands[name].send(0.0, 0.0)
             self._left[name] -= 1

@@ -1,4 +1,4 @@
-"""The node ``steering``: drives by hand, as ``rqt_robot_steering`` does, and stops the robot whoever drives."""
+"""The node ``steering``, which drives by hand as ``rqt_robot_steering`` does, and stops the robot."""
 
 import re
 import threading
@@ -36,20 +36,20 @@ class _Target:
 
 
 class SteeringNode(Node):
-    """Repeats the velocity asked for by :meth:`steer` until :meth:`release`; silent otherwise.
+    """Repeats the velocity set by :meth:`steer` until :meth:`release`; silent otherwise.
 
-    It speaks to ``hand_sign_control``, which lets steering go before signs, keeps to the limits, and stops both. It can
-    be sent to another topic instead (:meth:`send_to`), where it sees to limits and Stop itself. After :meth:`halt` it
-    stands whatever its topic is, which ROS may have renamed to that of a robot. After it was held up itself, who
-    steers has to let go once: what is heard then may be old, and nobody knows what happened meanwhile.
+    Its commands go to ``hand_sign_control``, where steering overrides signs, and which applies limits and Stop. They
+    can be sent to another topic instead (:meth:`send_to`), for which this node applies limits and Stop itself.
+    :meth:`halt` stops the robot whatever the topic, which ROS may have remapped to that of a robot. After this node
+    stalled, steering must be released once: what is received then may be old, and the situation may have changed.
 
-    All may be called from any thread.
+    All methods may be called from any thread.
 
     Args:
         transport: Carries the messages.
         clock: The graph's clock.
         config: Limits on another topic; the defaults of ``control`` when None.
-        cmd_vel: A topic of what robots are told, of Twist or TwistStamped, or of either, for other topics.
+        cmd_vel: A topic of robot commands, with Twist, TwistStamped or either; the model for other topics.
     """
 
     def __init__(
@@ -75,29 +75,29 @@ class SteeringNode(Node):
 
     @property
     def topic(self) -> str:
-        """The name of the topic that commands go to."""
+        """Name of the topic that commands are sent to."""
         return self._target.name
 
     @property
     def is_direct(self) -> bool:
-        """Whether commands go past ``hand_sign_control``."""
+        """Whether commands bypass ``hand_sign_control``."""
         return self._target.is_direct
 
     @property
     def is_stopped(self) -> bool:
-        """Whether somebody has stopped the robot: here, or on ``/stop`` since commands went to another topic."""
+        """Whether a Stop is active: from here, or on ``/stop`` since commands went to another topic."""
         return self._halted or bool(self._heard_stop)
 
     def send_to(self, name: str) -> None:
-        """Send commands to the topic ``name`` from now on; the one before is told to stand first.
+        """Send commands to the topic ``name`` from now on; a zero is sent to the previous one first.
 
-        Nothing moves on the new one before who steers has let go and begins anew.
+        Nothing moves on the new topic until steering was released once.
 
         Args:
-            name: As ``/cmd_vel``, or relative to the namespace of this node, as ``cmd_vel``.
+            name: Such as ``/cmd_vel``, or relative to the namespace of this node, such as ``cmd_vel``.
 
         Raises:
-            TransportError: It is no name of a topic, or the topic carries something else.
+            TransportError: It is not a topic name, or the topic has another type.
         """
         if name == STEERING_CMD_VEL.ros_name:
             name = STEERING_CMD_VEL.name
@@ -108,7 +108,7 @@ class SteeringNode(Node):
             self._target = target
 
     def on_reconfigure(self, config: Config) -> None:
-        """Take the limits of ``control``."""
+        """Apply the limits of ``control``."""
         self._config = config.control
         self._safety.reconfigure(config.control)
         self._ramp.reconfigure(config.control)
@@ -125,27 +125,27 @@ class SteeringNode(Node):
             self._publish(self._wanted)
 
     def release(self) -> None:
-        """Stop, and let others drive."""
+        """Stop, and release the robot to other inputs."""
         with self._lock:
             if self._wanted is not None or self._was_held_up:
                 self._wanted, self._was_held_up = None, False
                 self._publish(ZERO)
 
     def halt(self) -> None:
-        """Stop the robot, whoever drives, until :meth:`reset`; said again and again, for a control that starts anew."""
+        """Stop the robot whatever its active input, until :meth:`reset`; repeated, for a control that restarts."""
         with self._lock:
             self._halted = True
             self._stand()
             self._stop.publish(Bool(data=True))
 
     def reset(self) -> None:
-        """Let the robot be driven again; nothing moves before whoever drives has let go and begins anew."""
+        """End a Stop; nothing moves until the active input has shown neutral."""
         with self._lock:
             self._halted = False
             self._stop.publish(Bool(data=False))
 
     def on_stop(self) -> None:
-        """Leave nothing in motion."""
+        """Stop the robot."""
         self.release()
 
     def _find(self, name: str) -> _Target:
@@ -170,7 +170,7 @@ class SteeringNode(Node):
         return _Target(name, topic, commands)
 
     def _admitted(self, wanted: Velocity) -> Velocity:
-        """Return what may be sent; the limits are ``hand_sign_control``'s affair where it is not passed by."""
+        """Return the velocity to send; ``hand_sign_control`` applies the limits unless it is bypassed."""
         now = self.clock.now()
         elapsed_s, self._last_step_s = now - self._last_step_s, now
         self._safety.step(elapsed_s)
@@ -189,7 +189,7 @@ class SteeringNode(Node):
                 self._stand()
 
     def _stand(self) -> None:
-        """Ask for nothing any more; a robot that is steered past the control is told to stand here."""
+        """Clear the requested velocity; if the control is bypassed, send a zero."""
         self._wanted = None
         self._safety.disarm()
         if self.is_direct:
@@ -198,7 +198,7 @@ class SteeringNode(Node):
     def _notice_interruption(self) -> None:
         if self._stall_guard.note(self.clock.now()) and self._wanted is not None:
             self._wanted, self._was_held_up = None, True
-            if self.is_direct:  # elsewhere a zero would be taken for letting go
+            if self.is_direct:  # hand_sign_control would take a zero for a release
                 self._publish(ZERO)
 
     def _repeat(self) -> None:
@@ -215,7 +215,7 @@ class SteeringNode(Node):
 
     def _publish(self, velocity: Velocity) -> None:
         now = self.clock.now()
-        if self.is_direct:  # hand_sign_control sees to it elsewhere
+        if self.is_direct:  # otherwise hand_sign_control applies the limits
             velocity = self._ramp.step(velocity, min(now - self._last_sent_s, _PERIOD_S))
             self._last_sent_s = now
         self._target.commands.send(velocity.linear_mps, velocity.angular_radps)

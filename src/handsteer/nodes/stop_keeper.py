@@ -1,4 +1,4 @@
-"""Remembers, for a control that starts anew, that the robot was stopped."""
+"""Keeps the state of Stop for a control that restarts."""
 
 from collections.abc import Callable
 
@@ -8,20 +8,21 @@ from handsteer.transports.protocol import Received
 
 
 class StopKeeper:
-    """What a node knows of ``/stop``; it says so on ``/stopped``, latched, and believes others who were stopped.
+    """A node's record of ``/stop``; it is published on ``/stopped``, latched, and updated from that of other nodes.
 
-    Every node of the graph has one, so that a Stop outlives each of them. Only false on ``/stop`` ends it.
+    Every node of the graph has one, so that a Stop survives the restart of any of them. Only false on ``/stop`` ends
+    it.
 
     Args:
         node: The node.
-        on_stop: Is called with true at a Stop, however it was heard, and with false at a reset.
+        on_stop: Called with true at a Stop, from either topic, and with false at a reset.
     """
 
     def __init__(self, node: Node, on_stop: Callable[[bool], None] | None = None) -> None:
         self._on_stop = on_stop
         self._is_stopped: bool | None = None
         self._stopped = node.publisher(STOPPED)
-        # Several say so at once: that one of them was stopped must not be lost behind another's that was not.
+        # Several nodes publish at once: one's true must not be replaced by another's false.
         node.subscribe(STOPPED, self._on_word_of_others, key=lambda message: bool(message.data))
         node.subscribe(STOP, self._on_stop_or_reset)
 
@@ -29,7 +30,7 @@ class StopKeeper:
         self._take(bool(received.message.data))
 
     def _on_word_of_others(self, received: Received[Bool]) -> None:
-        # A reset that somebody has missed must not undo a Stop; one that we have missed is heard as /stop alone.
+        # A node that missed a reset must not undo a Stop by its false; resets are accepted from /stop only.
         if received.message.data and not self._is_stopped:
             self._take(True)
 

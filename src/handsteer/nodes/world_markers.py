@@ -1,4 +1,4 @@
-"""The obstacles and gates of a world: as markers, which RViz and the page draw, and how pages change them."""
+"""Markers of the obstacles and gates of a world, for RViz and the page, and changes requested by pages."""
 
 import math
 import threading
@@ -31,14 +31,14 @@ _MOST_WAITING = 16
 
 
 class WorldChanges:
-    """What is asked of a robot's world until the robot has time for it; :meth:`ask` may be called from any thread."""
+    """Changes of a robot's world that wait for the robot's thread; :meth:`ask` may be called from any thread."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._waiting: deque[tuple[Callable[[], None], Future[None]]] = deque()
 
     def ask(self, change: Callable[[], None]) -> Future[None]:
-        """Return what becomes of ``change``: done, or the :class:`WorldError` that refuses it."""
+        """Queue ``change``; return a future that is done, or fails with the :class:`WorldError` that refuses it."""
         future: Future[None] = Future()
         with self._lock:
             if len(self._waiting) >= _MOST_WAITING:
@@ -48,7 +48,7 @@ class WorldChanges:
         return future
 
     def make(self) -> bool:
-        """Make all that wait, in their order, on this thread; return whether there were any."""
+        """Make all queued changes in order, on this thread; return whether there were any."""
         with self._lock:
             waiting, self._waiting = self._waiting, deque()
         for change, future in waiting:
@@ -84,17 +84,17 @@ _GONE = Obstacle("", "box", (1.0, 1.0, 1.0), (0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.
 
 
 class Touches:
-    """Remembers for a moment what the robot has touched, so that people see it."""
+    """Remembers briefly what the robot has touched, so that it stays visible."""
 
     def __init__(self) -> None:
         self._until_s: dict[str, float] = {}
 
     def note(self, contacts: Iterable[str], now_s: float) -> None:
-        """Note the names of what the robot touches at ``now_s``."""
+        """Record the names of what the robot touches at ``now_s``."""
         self._until_s.update(dict.fromkeys(contacts, now_s + _FLASH_S))
 
     def shown(self, now_s: float) -> list[str]:
-        """Return the names of what it touches, or did a moment ago."""
+        """Return the names of what it touches, or touched a moment ago."""
         self._until_s = {name: until_s for name, until_s in self._until_s.items() if until_s > now_s}
         return [*self._until_s]
 
@@ -106,14 +106,14 @@ def world_markers(
     touched: Sequence[str] = (),
     most: int = 0,
 ) -> MarkerArray:
-    """Return a world as markers, numbered in their order.
+    """Return a world as markers, numbered in order.
 
     Args:
         header: Of each marker.
         obstacles: Those of the namespace ``world``.
         strips: Those of the namespace ``gates``.
-        touched: Names of obstacles that are red.
-        most: How many obstacles there have ever been: those that are gone are deleted.
+        touched: Names of obstacles to draw red.
+        most: The largest number of obstacles so far: markers of removed ones are deleted.
     """
     markers = [
         _marker(header, OBSTACLES, number, replace(obstacle, rgba=_TOUCHED) if obstacle.name in touched else obstacle)
@@ -121,12 +121,12 @@ def world_markers(
     ]
     markers += [_marker(header, GATES, number, strip) for number, strip in enumerate(strips)]
     markers += [_marker(header, OBSTACLES, number, _GONE, _DELETE) for number in range(len(obstacles), most)]
-    # rosbags shares this one class among releases, annotated with the first one's Marker.
+    # rosbags shares this class among releases, annotated with the first one's Marker.
     return MarkerArray(markers=markers)  # type: ignore[arg-type]
 
 
 def gate_strips(gates: Sequence[Gate], state: CourseState) -> list[Obstacle]:
-    """Return ``gates`` as strips on the floor, in colours that tell the next, the passed and the missed ones."""
+    """Return ``gates`` as strips on the floor, with different colours for the next, passed and missed ones."""
     return [_strip(gate, _gate_colour(index, state)) for index, gate in enumerate(gates)]
 
 
@@ -174,7 +174,7 @@ def _marker(
         texture_resource="",
         texture=CompressedImage(header=header, format="", data=_EMPTY),
         uv_coordinates=[],
-        text="",  # RViz warns of text on any shape but text
+        text="",  # RViz warns of text on any other shape
         mesh_resource="",
         mesh_file=MeshFile(filename="", data=_EMPTY),
         mesh_use_embedded_materials=False,

@@ -1,4 +1,4 @@
-"""What is driven: a simulated robot, or one behind a topic."""
+"""Robots to drive: a simulated one, or one behind a topic."""
 
 from typing import Any
 
@@ -15,9 +15,9 @@ def open_robot(
     """Return the robot that ``config.kind`` names.
 
     Args:
-        config: Says which.
+        config: Names and configures the robot.
         link: This process in the graph of a real robot; not needed by a simulated one.
-        cmd_vel: Carries what a real robot takes, Twist or TwistStamped.
+        cmd_vel: Topic of a real robot's commands, with Twist or TwistStamped.
         frame_id: Coordinate frame of a TwistStamped.
 
     Raises:
@@ -25,7 +25,7 @@ def open_robot(
         WorldError: The world of a simulated robot cannot be used.
         PackageMissing: The simulator is not installed.
     """
-    # Each robot's libraries (xacro, MuJoCo) are loaded only by the process that has it: all nodes come through here.
+    # All nodes import this module; only the process that has a robot loads its libraries (xacro, MuJoCo).
     if config.kind != "sim":
         if link is None:
             raise ConfigError(f"robot.kind is {config.kind}: only `handsteer run` drives a real robot; here it is sim")

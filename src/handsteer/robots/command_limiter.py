@@ -1,4 +1,4 @@
-"""What a robot behind a topic is told, worked out from the commands that come: no topic, no clock."""
+"""Computes the commands sent to a robot behind a topic, without topic or clock."""
 
 import math
 
@@ -14,19 +14,18 @@ _SLACK_S = 1e-9
 
 
 class CommandLimiter:
-    """Passes commands on to a robot, within its limits, and only as long as they come.
+    """Passes commands on to a robot within its limits, and only while they are received.
 
-    * A command goes out at once, and again ``command_rate`` times a second, so that the robot's own watchdog, which
-      stops it when it hears nothing, is content. After ``cmd_vel_timeout`` without a new one come a few zeros, then
-      nothing, so that others can drive.
-    * Speeds are clamped, and grow no faster than the robot's accelerations. Slower, and to zero, it goes at once: how
-      hard to brake, the robot knows best.
-    * Nothing but zeros is passed on after the link to the robot was cut, until the link is there *and* a zero was
-      asked for: no robot drives off because it can hear again.
+    * A command is sent at once, and repeated at ``command_rate`` to satisfy the robot's own watchdog. After
+      ``cmd_vel_timeout`` without a new one, a few zeros are sent, then nothing, so that others can drive.
+    * Speeds are clamped, and increase no faster than the robot's accelerations. A decrease is sent at once, because the
+      robot itself knows best how hard to brake.
+    * After the link to the robot was lost, only zeros are sent until the link is back *and* a zero was commanded, so
+      that no robot starts to move because it is reconnected.
 
     Attributes:
-        velocity: What was passed on last.
-        holds: Whether it waits for a zero before it lets the robot move.
+        velocity: The last velocity sent.
+        holds: Whether it waits for a zero before the robot may move.
     """
 
     def __init__(self, config: RobotConfig) -> None:
@@ -41,7 +40,7 @@ class CommandLimiter:
 
     @property
     def waits(self) -> bool:
-        """Whether it is asked to move, and does not let the robot."""
+        """Whether a movement is commanded but held back."""
         return self._linked and self.holds and self._wanted != ZERO and self._is_fresh
 
     @property
@@ -59,11 +58,11 @@ class CommandLimiter:
         return self._advance(0.0)
 
     def step(self, dt_s: float, *, linked: bool) -> Velocity | None:
-        """Let ``dt_s`` seconds pass; return what to send now, or None.
+        """Advance time by ``dt_s`` seconds; return what to send now, or None.
 
         Args:
             dt_s: Seconds since the last step, >= 0.
-            linked: Whether the robot can hear, as far as can be told.
+            linked: Whether the robot receives commands, as far as is known.
         """
         self._age_s += dt_s
         self._since_sent_s += dt_s
@@ -92,9 +91,9 @@ class CommandLimiter:
 
 
 def _approach(wanted: float, now: float, highest: float, growth: float) -> float:
-    """Return the value nearest to ``wanted`` within ``highest`` whose amount is at most ``growth`` above that of now.
+    """Return the value nearest to ``wanted`` within ``highest``, at most ``growth`` above ``now`` in magnitude.
 
-    What is to turn round stands first.
+    A change of direction goes through zero first.
     """
     same_way = now if now * wanted > 0 else 0.0
     limit = min(highest, abs(same_way) + growth)

@@ -1,10 +1,10 @@
-"""The referee of a course: counts gates, bumps and time as the robot drives. Pure, no clock and no simulator.
+"""The referee of a course, which counts gates, bumps and time; without clock or simulator.
 
-The first gate is the start line, the last one the finish. The stopwatch runs from the one to the other. A gate counts
-when the robot's centre crosses the line between its ends forward, which is with its left end on the left. Gates are
-passed in order: whoever passes a later one has missed those between. Backwards, or a second time, counts nothing.
+The first gate is the start line, the last one the finish, and the time runs between them. A gate counts when the
+robot's centre crosses the line between its ends forward, with its left end on the left. Gates are to be passed in
+order: passing a later one misses those between. Crossing backwards or a second time does not count.
 
-The score is seconds, the fewer the better: the time, :data:`BUMP_S` for each bump, :data:`MISS_S` for each missed gate.
+The score is in seconds, lower is better: the time, :data:`BUMP_S` for each bump, :data:`MISS_S` for each missed gate.
 """
 
 import math
@@ -16,13 +16,13 @@ from handsteer.robots.world import Gate
 from handsteer.types import Pose2D
 
 BUMP_S = 2.0
-"""What each bump costs."""
+"""Penalty for each bump."""
 
 MISS_S = 10.0
-"""What each missed gate costs."""
+"""Penalty for each missed gate."""
 
 LEAP_M = 0.5
-"""No robot goes so far between two looks at it: it was put elsewhere, and has crossed nothing."""
+"""No robot moves so far between two steps: it was moved by hand, and has crossed nothing."""
 
 Phase = Literal["ready", "running", "finished"]
 _PHASES: dict[str, Phase] = {"ready": "ready", "running": "running", "finished": "finished"}
@@ -30,15 +30,15 @@ _PHASES: dict[str, Phase] = {"ready": "ready", "running": "running", "finished":
 
 @dataclass(frozen=True)
 class CourseState:
-    """How far the robot is on a course.
+    """The progress of a robot on a course.
 
     Attributes:
-        gates: How many gates the course has.
+        gates: Number of gates.
         next_gate: Index of the gate to pass next; ``gates`` once the course is finished.
-        missed: Indices of the gates that were left out.
+        missed: Indices of the missed gates.
         bumps: How often it has begun to touch an obstacle since the start.
-        time_s: What the stopwatch shows.
-        phase: ``ready`` before the start gate, then ``running``, ``finished`` behind the last one.
+        time_s: Time since the start gate.
+        phase: ``ready`` before the start gate, then ``running``, ``finished`` after the last one.
     """
 
     gates: int
@@ -50,7 +50,7 @@ class CourseState:
 
     @property
     def passed(self) -> int:
-        """How many gates were passed."""
+        """Number of gates passed."""
         return self.next_gate - len(self.missed)
 
     @property
@@ -59,7 +59,7 @@ class CourseState:
         return self.time_s + BUMP_S * self.bumps + MISS_S * len(self.missed)
 
     def as_dict(self) -> dict[str, Any]:
-        """Return it as plain values, with the score, for JSON."""
+        """Return the fields and the score as plain values, for JSON."""
         return {**asdict(self), "missed": sorted(self.missed), "passed": self.passed, "score_s": self.score_s}
 
     def __str__(self) -> str:
@@ -81,7 +81,7 @@ class CourseState:
 
 
 def read_course(values: Mapping[str, str]) -> CourseState | None:
-    """Return what :meth:`CourseState.as_values` has written; None where that is not there, or is something else."""
+    """Return the course in the values of :meth:`CourseState.as_values`; None if they are missing or invalid."""
     try:
         gates, next_gate, bumps = (int(values[f"course_{name}"]) for name in ("gates", "next", "bumps"))
         missed = frozenset(int(index) for index in values["course_missed"].split())
@@ -93,7 +93,7 @@ def read_course(values: Mapping[str, str]) -> CourseState | None:
 
 
 def stopwatch(time_s: float) -> str:
-    """Return seconds as minutes, seconds and tenths, as ``1:05.3``; what is not a whole tenth is cut off."""
+    """Return seconds as minutes, seconds and tenths, as ``1:05.3``, rounded down."""
     tenths = int(time_s * 10 + 1e-6)
     return f"{tenths // 600}:{tenths // 10 % 60:02d}.{tenths % 10}"
 
@@ -105,7 +105,7 @@ class Referee:
         gates: In the order in which they are to be passed.
 
     Attributes:
-        state: What it has seen so far.
+        state: The progress so far.
     """
 
     def __init__(self, gates: Sequence[Gate]) -> None:
@@ -116,16 +116,16 @@ class Referee:
         self._time_s = 0.0
 
     def restart(self) -> None:
-        """Forget everything: the robot stands before the start again."""
+        """Reset the progress, with the robot before the start."""
         self.state = CourseState(len(self._gates))
         self._pose = None
 
     def step(self, pose: Pose2D, collisions: int, time_s: float) -> CourseState:
-        """Take the robot's next pose and return what has become of the course.
+        """Take the robot's next pose and return the progress.
 
         Args:
-            pose: Where the robot is in the world.
-            collisions: How often it has begun to touch an obstacle, counted from any moment on.
+            pose: Pose of the robot in the world.
+            collisions: How often it has begun to touch an obstacle; only differences count.
             time_s: The robot's own time; it never goes back.
         """
         before, self._pose = self._pose, pose
@@ -150,9 +150,9 @@ class Referee:
 
 
 def crosses(gate: Gate, before: Pose2D, now: Pose2D) -> bool:
-    """Return whether the way from ``before`` to ``now`` crosses ``gate`` forward.
+    """Return whether the path from ``before`` to ``now`` crosses ``gate`` forward.
 
-    A pose on the line counts as behind it, so that a way in several pieces crosses once.
+    A pose on the line counts as behind it, so that a path in several pieces crosses once.
     """
     if math.hypot(now.x - before.x, now.y - before.y) > LEAP_M:
         return False

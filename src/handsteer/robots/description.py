@@ -1,4 +1,4 @@
-"""The robot's description: its URDF, and what a picture of it needs to know from any URDF."""
+"""The robot's URDF, and the shapes and joints to draw any URDF."""
 
 import math
 import threading
@@ -21,15 +21,15 @@ Vector = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class Visual:
-    """One shape that a link is drawn with.
+    """One visual shape of a link.
 
     Attributes:
-        link: The link that it belongs to.
-        shape: A cylinder stands along its own z.
+        link: Name of the link.
+        shape: A cylinder's axis is its own z.
         size: Extent along its own x, y and z in metres: a sphere has its diameter three times.
         xyz: Its centre in the link's frame, in metres.
         rpy: Its roll, pitch and yaw in the link's frame, in radians, about fixed axes (REP 103).
-        rgba: Red, green, blue and opacity, 0 to 1; grey when the description names no colour.
+        rgba: Red, green, blue and opacity, 0 to 1; grey if the description has no colour.
     """
 
     link: str
@@ -42,16 +42,16 @@ class Visual:
 
 @dataclass(frozen=True)
 class Joint:
-    """How a link hangs on another.
+    """A joint between two links.
 
     Attributes:
         name: As in ``/joint_states``.
         type: ``fixed``, ``continuous``, ``revolute``, ``prismatic``, ...
-        parent: The link that it hangs on.
-        child: The link that hangs.
-        xyz: Where the child's frame is in the parent's, at joint position 0, in metres.
-        rpy: How it is turned there, in radians, about fixed axes.
-        axis: The axis that it turns about or slides along, in the child's frame.
+        parent: Name of the parent link.
+        child: Name of the child link.
+        xyz: Origin of the child's frame in the parent's, at joint position 0, in metres.
+        rpy: Its rotation there, in radians, about fixed axes.
+        axis: The axis of rotation or translation, in the child's frame.
     """
 
     name: str
@@ -71,12 +71,12 @@ def robot_description() -> str:
     """Return the URDF of the handsteer robot."""
     with _xacro_lock:  # xacro keeps its state in globals
         document = xacro.process_file(str(_XACRO))
-    # The element alone: xacro puts the path of its source into a comment above it.
+    # The element alone: xacro writes the path of its source into a comment above it.
     return str(document.documentElement.toxml())
 
 
 def visuals(urdf: str) -> list[Visual]:
-    """Return the boxes, cylinders and spheres of a robot description; meshes are left out.
+    """Return the boxes, cylinders and spheres of a robot description, without meshes.
 
     Raises:
         WorldError: It is not a robot description, or a number in it is missing or wrong.
@@ -93,7 +93,7 @@ def visuals(urdf: str) -> list[Visual]:
 
 
 def joints(urdf: str) -> list[Joint]:
-    """Return the joints of a robot description; together they are the tree of its links.
+    """Return the joints of a robot description, which form the tree of its links.
 
     Raises:
         WorldError: It is not a robot description, or a part of a joint is missing or wrong.
@@ -104,7 +104,7 @@ def joints(urdf: str) -> list[Joint]:
 def _parse(urdf: str) -> ET.Element:
     if len(urdf) > _LONGEST:
         raise WorldError(f"robot description: has {len(urdf)} characters, and should have at most {_LONGEST}")
-    if "<!DOCTYPE" in urdf:  # its entities may stand for gigabytes
+    if "<!DOCTYPE" in urdf:  # its entities may expand to gigabytes
         raise WorldError("robot description: a document type is not read here: leave <!DOCTYPE out")
     try:
         robot = ET.fromstring(urdf)

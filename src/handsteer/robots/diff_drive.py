@@ -21,12 +21,12 @@ class Velocity:
 
 @dataclass(frozen=True)
 class DriveState:
-    """What the controller remembers from one step to the next.
+    """The controller's state between two steps.
 
     Attributes:
         target: The last command; zero if it was not finite.
-        target_age_s: How long ago it came, in the robot's own seconds.
-        velocity: What the wheels are told now, within all limits.
+        target_age_s: Age of the last command, in the robot's own seconds.
+        velocity: The velocity commanded to the wheels now, within all limits.
     """
 
     target: Velocity = Velocity()
@@ -38,10 +38,10 @@ def step(state: DriveState, command: Velocity | None, dt_s: float, config: Robot
     """Return the state ``dt_s`` later.
 
     Args:
-        state: The state before.
-        command: A command that has just come, or None. One with NaN or infinity in it counts as zero velocity:
-            whatever is not understood must not move the robot.
-        dt_s: Time that passes, in seconds, >= 0.
+        state: The previous state.
+        command: A new command, or None. One with NaN or infinity counts as zero, because an invalid command must not
+            move the robot.
+        dt_s: Elapsed time in seconds, >= 0.
         config: Limits and timeout.
     """
     if command is None:
@@ -101,6 +101,6 @@ def _is_finite(velocity: Velocity) -> bool:
 
 
 def _limit(wanted: float, now: float, highest: float, largest_change: float) -> float:
-    """Return the value nearest to ``wanted`` within ``highest`` that ``largest_change`` lets us reach."""
+    """Return the value nearest to ``wanted`` within ``highest`` and within ``largest_change`` of ``now``."""
     wanted = max(-highest, min(highest, wanted))
     return max(now - largest_change, min(now + largest_change, wanted))

@@ -1,4 +1,4 @@
-"""Changes of a world, one thing at a time: pure functions from a world to a world."""
+"""Changes of single things in a world: pure functions from a world to a world."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -14,7 +14,7 @@ from handsteer.types import Pose2D
 Change = Callable[[World], World]
 
 MOST_OBSTACLES = 200
-"""So many can be put into a world by hand: a browser has to draw each."""
+"""Limit for things added by hand, because a browser has to draw each."""
 
 _NEW: dict[Shape, dict[str, Any]] = {
     "box": {"size": (0.4, 0.4, 0.4), "colour": "#b5793f"},
@@ -28,40 +28,40 @@ _RING_M = 0.5
 
 @runtime_checkable
 class InWorld(Robot, Protocol):
-    """A robot in a world that can be changed, as a simulated one is.
+    """A robot in a world that can be changed, such as a simulated one.
 
     Attributes:
-        world: The world that it is in, with all things where they were at the start.
+        world: Its world, with all things in their initial places.
     """
 
     @property
     def world(self) -> World: ...  # noqa: D102
 
     def enter(self, world: World) -> None:
-        """Stand at the start of another world; odometry and collisions are 0 again.
+        """Move the robot to the start of another world; odometry and collisions are reset to 0.
 
         Raises:
-            WorldError: The world cannot be used; all is as before.
+            WorldError: The world cannot be used; nothing has changed.
         """
         ...
 
     def change(self, world: World) -> None:
-        """Stand still where it is, with ``world`` around it instead.
+        """Stop the robot where it is, and replace the world around it by ``world``.
 
         Things that are the same in both worlds stay where they are.
 
         Raises:
-            WorldError: Something that is new would overlap the robot, or the place where it starts; all is as before.
+            WorldError: Something new would overlap the robot or its start; nothing has changed.
         """
         ...
 
     def reset_odometry(self) -> None:
-        """Let the odometry be 0 where the robot is, without moving it."""
+        """Set the odometry to 0 without moving the robot."""
         ...
 
 
 def add(world: World, shape: Shape, robot: Pose2D) -> World:
-    """Return ``world`` with one thing more, at the first free place in front of ``robot``, under a name of its own.
+    """Return ``world`` with one more thing, uniquely named, at the first free place in front of ``robot``.
 
     Raises:
         WorldError: There are too many already.
@@ -74,7 +74,7 @@ def add(world: World, shape: Shape, robot: Pose2D) -> World:
 
 
 def edit(world: World, name: str, fields: Mapping[str, Any]) -> World:
-    """Return ``world`` with other ``fields`` of the thing called ``name``, as they stand in a world file.
+    """Return ``world`` with the thing called ``name`` changed by ``fields``, as in a world file.
 
     Raises:
         WorldError: There is no such thing, or a field is wrong; the message names it.
@@ -96,7 +96,7 @@ def remove(world: World, name: str) -> World:
 
 
 def unique_name(world: World, word: str) -> str:
-    """Return ``word`` with the first number that makes it the name of nothing in ``world``."""
+    """Return ``word`` with the first number that makes it unique in ``world``."""
     taken = {thing.name for thing in world.obstacles}
     number = 1
     while f"{word} {number}" in taken:
@@ -105,15 +105,15 @@ def unique_name(world: World, word: str) -> str:
 
 
 def footprint_m(thing: Thing) -> float:
-    """Return the radius of the circle about ``thing`` on the floor, in metres."""
+    """Return the radius of the circumscribed circle of ``thing`` on the floor, in metres."""
     x, y, _ = thing.extent
     return math.hypot(x, y) / 2 if thing.shape == "box" else x / 2
 
 
 def free_place(world: World, robot: Pose2D, radius_m: float) -> tuple[float, float]:
-    """Return x and y of a place for a thing of ``radius_m`` near the robot, in front of it if there is one.
+    """Return x and y of a free place for a thing of ``radius_m`` near the robot, in front of it if possible.
 
-    The places are looked at in rings about the robot, each from its front to both sides. Circles stand for the things.
+    Places are searched in rings around the robot, each from its front to both sides. Things are represented by circles.
     """
     kept_free = [(robot.x, robot.y, _ROBOT_RADIUS_M), (0.0, 0.0, _ROBOT_RADIUS_M)]
     kept_free += [(*thing.position, footprint_m(thing)) for thing in world.obstacles]

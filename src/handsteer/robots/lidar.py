@@ -17,18 +17,18 @@ RANGE_MIN_M = 0.05
 RANGE_MAX_M = 8.0
 
 _INCREMENT = math.tau / RAYS
-# MuJoCo 3.5 and newer can also tell the normals.
+# MuJoCo 3.5 and newer can also return the normals.
 _EXTRAS = {"normal": None} if "normal" in (mujoco.mj_multiRay.__doc__ or "") else {}
 
 
 class Lidar:
-    """Measures how far the obstacles around are: one ray a degree, the first straight back, then to the left.
+    """Measures the distances of obstacles: one ray per degree, the first straight back, then counterclockwise.
 
-    It sees obstacles that reach up to its own height, and neither the robot nor the floor. Nothing is left to chance.
+    It sees obstacles that reach up to its own height, but neither the robot nor the floor. There is no noise.
 
     Args:
-        model: Of the robot in its world.
-        urdf: Says where the scanner is on the robot.
+        model: Model of the robot in its world.
+        urdf: Contains the pose of the scanner on the robot.
     """
 
     def __init__(self, model: mujoco.MjModel, urdf: str) -> None:
@@ -44,7 +44,7 @@ class Lidar:
         self._distances = np.zeros(RAYS)
 
     def scan(self, data: mujoco.MjData) -> RangeScan:
-        """Return what is seen in ``data``."""
+        """Return a scan of the state ``data``."""
         turn = data.xmat[self._body].reshape(3, 3)
         mujoco.mj_multiRay(
             m=self._model,
@@ -61,6 +61,6 @@ class Lidar:
             **_EXTRAS,
         )
         found = self._distances
-        # As REP 117 has it. MuJoCo says -1 where a ray meets nothing.
+        # As in REP 117. MuJoCo returns -1 for a ray that hits nothing.
         ranges = np.where((found < 0) | (found > RANGE_MAX_M), np.inf, np.where(found < RANGE_MIN_M, -np.inf, found))
         return RangeScan(-math.pi, _INCREMENT, RANGE_MIN_M, RANGE_MAX_M, ranges.astype(np.float32))

@@ -1,22 +1,22 @@
-"""The MuJoCo model of the robot in its world, and how its wheels meet the floor.
+"""The MuJoCo model of the robot in its world, and the contact of its wheels with the floor.
 
 A robot with four fixed wheels can turn only by scrubbing: when it turns in place at w, each wheel slides sideways at
-0.2 m * w. What that does to the turn depends on the contact:
+0.2 m * w. The effect on the turn depends on the contact:
 
 * With the same friction in all directions, the sliding takes grip from the wheels: this robot then turns by 30 to 56 %
-  of what it was told. Real skid-steered robots are like that, and their drivers enlarge ``wheel_separation`` for it;
-  with the figures of this one it would never go where its odometry says.
+  of the command. Real skid-steered robots behave like that, and their drivers enlarge ``wheel_separation`` for it; with
+  this robot's dimensions, its path would never match its odometry.
 * A sliding contact in MuJoCo also lifts off (its friction cone is convex), so that the robot rattles.
 
-Therefore the two directions are kept apart. Each wheel has a *tread*, a narrow capsule that touches only the floor.
-MuJoCo lines the friction axes of a capsule on a plane up with the capsule, so the tread grips along (1.0) and hardly
+Therefore the two directions are separate. Each wheel has a *tread*, a narrow capsule that touches only the floor.
+MuJoCo aligns the friction axes of a capsule on a plane with the capsule, so the tread grips along (1.0) and hardly
 across (0.01). Across, one force on the whole robot opposes its sideways speed, up to 0.6 of its weight: it keeps the
-robot on its curve without hindering the turn. It acts also on a robot that has left the floor, which none should.
+robot on its curve without hindering the turn. It also acts on a robot that has left the floor, which should not happen.
 
-A turn in place then reaches 98.8 to 99.5 % of what was told and a straight drive 99.9 %; a circle of 6 m at 1 m/s and
-1 rad/s ends 6 cm from its odometry. Above v * w = 6 m/s² the robot skids outwards.
+A turn in place then reaches 98.8 to 99.5 % of the command and a straight drive 99.9 %; a circle of 6 m at 1 m/s and 1
+rad/s ends 6 cm from its odometry. Above v * w = 6 m/s² the robot skids outwards.
 
-The wheels as the URDF has them, cylinders, touch only obstacles.
+The cylindrical wheels of the URDF touch only obstacles.
 """
 
 import logging
@@ -31,7 +31,7 @@ from handsteer.robots.world import Thing, World
 _log = logging.getLogger(__name__)
 
 WHEEL_JOINTS = ("front_left_wheel_joint", "front_right_wheel_joint", "rear_left_wheel_joint", "rear_right_wheel_joint")
-"""The actuators of the model have the same order; that of the scrub force follows."""
+"""The order of the model's actuators, before that of the scrub force."""
 
 ROBOT_JOINT = "robot"
 """The free joint of the robot's ``base_link``."""
@@ -45,7 +45,7 @@ _GRAVITY_MPS2 = 9.81
 THINGS_GROUP = 1
 """The group of the geoms of obstacles; all others are in group 0."""
 
-# Narrow: at two points further apart, MuJoCo would let each tread resist the turn.
+# Narrow, because with two points further apart, MuJoCo would let each tread resist the turn.
 _TREAD_HALF_WIDTH_M = 0.002
 _GRIP_ALONG = 1.0
 _GRIP_ACROSS = 0.01
@@ -61,10 +61,10 @@ _ROTOR_INERTIA_KGM2 = 0.0015
 # Less than the grip of a wheel (0.33 N m), so that a wall stalls the wheels: wheels that spin make the robot hop.
 _MOTOR_TORQUE_NM = 0.2
 
-# N s/m and N m s/rad for each kg: a ball of 0.2 m radius loses half of its speed in a second.
+# N s/m and N m s/rad per kg: a ball of 0.2 m radius loses half of its speed in a second.
 _ROLLING_DAMPING_PER_S = 0.03
 
-# Who touches whom: a pair touches if one's contype shares a bit with the other's conaffinity.
+# Contact masks: two geoms touch if the contype of one shares a bit with the conaffinity of the other.
 _FLOOR, _THINGS, _ALL, _NOBODY = 1, 2, 3, 0
 
 _SHAPES: dict[Shape, mujoco.mjtGeom] = {
@@ -75,7 +75,7 @@ _SHAPES: dict[Shape, mujoco.mjtGeom] = {
 
 
 def thing_name(index: int) -> str:
-    """Return the name that obstacle number ``index`` of the world has in the model: of its geom, and of its joint."""
+    """Return the name of the geom, and of the joint, of obstacle number ``index`` of the world in the model."""
     return f"obstacle {index}"
 
 
@@ -85,7 +85,7 @@ def compile_model(urdf: str, world: World) -> mujoco.MjModel:
     Raises:
         WorldError: MuJoCo refuses the robot description or the world.
     """
-    # Left alone, MuJoCo prints its warnings and writes them into a file in the working directory.
+    # By default, MuJoCo prints its warnings and writes them into a file in the working directory.
     mujoco.set_mju_user_warning(_log.warning)
     try:
         spec = mujoco.MjSpec.from_string(urdf)
@@ -109,9 +109,9 @@ def _set_options(spec: mujoco.MjSpec) -> None:
     spec.option.gravity = [0.0, 0.0, -_GRAVITY_MPS2]
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     spec.option.cone = mujoco.mjtCone.mjCONE_PYRAMIDAL
-    # A state that blows up must be seen by the caller, not replaced by the initial one.
+    # The caller must see a state that diverges, instead of a reset to the initial one.
     spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
-    # Things at rest cost nothing until they are touched; older versions of MuJoCo do without.
+    # Things at rest cost nothing until they are touched; older versions of MuJoCo lack this.
     spec.option.enableflags |= getattr(mujoco.mjtEnableBit, "mjENBL_SLEEP", 0)
 
 
@@ -193,7 +193,7 @@ def _add_thing(spec: mujoco.MjSpec, name: str, thing: Thing) -> None:
 
 
 def _let_things_rest(model: mujoco.MjModel, world: World) -> None:
-    """Slow whatever rolls, in a way that costs no contact of its own."""
+    """Damp rolling things without additional contacts."""
     for index, thing in enumerate(world.obstacles):
         if thing.movable:
             start = int(model.joint(thing_name(index)).dofadr[0])

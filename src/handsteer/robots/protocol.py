@@ -1,4 +1,4 @@
-"""What every robot offers."""
+"""The interface of all robots."""
 
 from dataclasses import dataclass
 from typing import Literal, Protocol
@@ -17,16 +17,16 @@ class RobotState:
 
     Attributes:
         time_s: Time since the start, in the robot's own seconds.
-        odometry: Where the wheels say that it is, in frame ``odom``.
-        linear_mps: Forward velocity that the wheels say, in m/s.
-        angular_radps: Turning velocity that the wheels say, in rad/s.
+        odometry: Pose from odometry, in frame ``odom``.
+        linear_mps: Forward velocity from odometry, in m/s.
+        angular_radps: Angular velocity from odometry, in rad/s.
         joint_positions: Wheel angles in rad, by joint name.
         joint_velocities: Wheel speeds in rad/s, by joint name.
-        truth: Where it really is, in the world.
+        truth: The actual pose in the world.
         contacts: Names of the obstacles that it touches now.
-        collisions: How many times it has begun to touch an obstacle since the start; None where nobody can tell.
-        located: Whether ``odometry`` and ``truth`` are those of now; otherwise they are the last that were known.
-        trouble: What is wrong, as ``is not there: …``, to be read after "the robot"; empty when nothing is.
+        collisions: How many times it has begun to touch an obstacle since the start; None if unknown.
+        located: Whether ``odometry`` and ``truth`` are current; otherwise they are the last known ones.
+        trouble: What is wrong, as ``is not there: …``, to be read after "the robot"; empty if nothing is.
     """
 
     time_s: float
@@ -44,11 +44,11 @@ class RobotState:
 
 @dataclass(frozen=True)
 class Obstacle:
-    """A thing in the robot's world, where it is now.
+    """A thing in the robot's world, at its current place.
 
     Attributes:
-        name: What it is called; no other has this name.
-        shape: A cylinder stands along its own z.
+        name: Unique name.
+        shape: A cylinder's axis is its own z.
         size: Extent along its own x, y and z in metres: a sphere has its diameter three times.
         rgba: Red, green, blue and opacity, 0 to 1.
         position: Its centre in the world, in metres.
@@ -65,16 +65,16 @@ class Obstacle:
 
 @dataclass(frozen=True, eq=False)
 class RangeScan:
-    """What a laser scanner has measured: one turn, or a part of one.
+    """A laser scan: one turn, or a part of one.
 
     Attributes:
         angle_min: Direction of the first ray in the scanner's frame, in rad, left positive.
-        angle_increment: From one ray to the next, in rad.
-        range_min: The shortest distance that it measures, in metres.
-        range_max: The longest, in metres.
-        ranges: (N,), in metres by ray; REP 117: +inf where nothing is, -inf where something is too near, NaN where
-            nothing is known.
-        age_s: How long ago it was measured, in seconds.
+        angle_increment: Angle between two rays, in rad.
+        range_min: Minimum measurable distance, in metres.
+        range_max: Maximum measurable distance, in metres.
+        ranges: (N,), in metres by ray; REP 117: +inf for no obstacle, -inf for one that is too near, NaN for no
+            reading.
+        age_s: Time since the measurement, in seconds.
     """
 
     angle_min: float
@@ -96,29 +96,29 @@ class Robot(Protocol):
     def description(self) -> str: ...  # noqa: D102
 
     def command(self, linear_mps: float, angular_radps: float) -> None:
-        """Ask for a velocity; the robot's own limits apply, and it brakes when no new one comes in time."""
+        """Command a velocity; the robot's own limits apply, and it brakes if no new one arrives in time."""
         ...
 
     def step(self, dt_s: float) -> RobotState:
-        """Let ``dt_s`` seconds pass and return the state after them."""
+        """Advance time by ``dt_s`` seconds and return the new state."""
         ...
 
     def obstacles(self) -> list[Obstacle]:
-        """Return the things around it, where they are now; an empty list if it knows of none."""
+        """Return the things around it at their current places; empty if unknown."""
         ...
 
     def scan(self) -> RangeScan | None:
-        """Return what its laser scanner sees; None when nothing new has come, or there is no scanner."""
+        """Return the scan of its laser scanner; None if there is no new one, or no scanner."""
         ...
 
     def commanders(self) -> list[str]:
-        """Return the nodes that command it in a graph of its own, this one among them; none where it has none."""
+        """Return the nodes that command it in a graph of its own, this one included; empty without such a graph."""
         ...
 
     def reset(self) -> None:
-        """Stand still at the start again, obstacles too."""
+        """Reset the robot and the obstacles to the start."""
         ...
 
     def close(self) -> None:
-        """Stop and release what is held; may be called twice."""
+        """Stop and release all resources; may be called twice."""
         ...

@@ -1,4 +1,4 @@
-"""A robot behind a topic: commands go out, its odometry comes back."""
+"""A robot behind a topic: publishes its commands, and subscribes to its odometry."""
 
 import logging
 import math
@@ -35,7 +35,7 @@ _ADVICE = {
 
 @dataclass(frozen=True)
 class _Seen:
-    """What the robot last said of itself, and when, in seconds of its graph's clock."""
+    """The robot's last odometry, and when it was received, in seconds of its graph's clock."""
 
     pose: Pose2D
     velocity: Velocity
@@ -43,19 +43,19 @@ class _Seen:
 
 
 class RemoteRobot:
-    """A :class:`~handsteer.robots.protocol.Robot` that listens to a topic in another process.
+    """A :class:`~handsteer.robots.protocol.Robot` in another process, reached by topics.
 
-    What it is sent is worked out by :class:`~handsteer.robots.command_limiter.CommandLimiter`. Its odometry counts as
-    the truth, and nothing is known of what it touches.
+    :class:`~handsteer.robots.command_limiter.CommandLimiter` computes what is sent. Its odometry counts as the truth,
+    and contacts are unknown.
 
     Args:
         config: Topics, types, limits and timeouts.
-        cmd_vel: Carries what the robot takes, Twist or TwistStamped, or whichever of them it takes.
+        cmd_vel: Topic of its commands, with Twist, TwistStamped or the one that it subscribes to.
         frame_id: Coordinate frame of a TwistStamped.
         session: This process in the robot's graph; the caller closes it, which delivers the last zeros.
 
     Attributes:
-        description: The URDF of the robot that stands for it in pictures.
+        description: URDF of the robot that represents it in pictures.
     """
 
     def __init__(self, config: RobotConfig, cmd_vel: Topic[Any], frame_id: str, session: Session) -> None:
@@ -81,11 +81,11 @@ class RemoteRobot:
         self._look_for_it()
 
     def command(self, linear_mps: float, angular_radps: float) -> None:
-        """Ask for a velocity in m/s and rad/s; a slower one is passed on at once, a faster one with the next steps."""
+        """Command a velocity in m/s and rad/s; a slower one is sent at once, a faster one with the next steps."""
         self._send(self._limiter.command(Velocity(linear_mps, angular_radps)))
 
     def step(self, dt_s: float) -> RobotState:
-        """Let ``dt_s`` seconds pass, pass on what is due, and return what the robot last said of itself."""
+        """Advance time by ``dt_s`` seconds, send what is due, and return the last known state."""
         self._time_s += dt_s
         changed = self._cmd_vel.follow()
         listens = self._cmd_vel.has_subscribers and not changed
@@ -109,11 +109,11 @@ class RemoteRobot:
         )
 
     def obstacles(self) -> list[Obstacle]:
-        """Return an empty list: nothing is known of them."""
+        """Return an empty list: obstacles are unknown."""
         return []
 
     def scan(self) -> RangeScan | None:
-        """Return what its laser scanner has seen since the last call; the first one begins to listen."""
+        """Return a scan received since the last call; the first call subscribes."""
         if self._config.scan_topic and not self._listens_to_scans:
             self._listens_to_scans = True
             topic = _topic(self._config.scan_topic, LaserScan, 1)
@@ -132,15 +132,15 @@ class RemoteRobot:
         )
 
     def commanders(self) -> list[str]:
-        """Return the nodes that publish on the topic of its commands."""
+        """Return the nodes that publish on its command topic."""
         return self._session.transport.publishers_of(self._topic)
 
     def reset(self) -> None:
-        """Let it stand where it is; a real robot cannot be put back."""
+        """Stop it where it is; a real robot cannot be moved back."""
         self.command(0.0, 0.0)
 
     def close(self) -> None:
-        """Tell it to stand, several times; may be called twice."""
+        """Send several zeros; may be called twice."""
         if self._closed:
             return
         self._closed = True
@@ -192,7 +192,7 @@ class RemoteRobot:
 
 
 def _topic(name: str, kind: type[Any], depth: int) -> Topic[Any]:
-    """Return the topic of this ROS name: with a slash in front it stays as it is, whatever the node's namespace."""
+    """Return the topic of this ROS name; a leading slash makes it independent of the node's namespace."""
     return Topic(f"/{name.removeprefix('/')}", kind, is_global=name.startswith("/"), depth=depth)
 
 

@@ -1,4 +1,4 @@
-"""The simulated robot: its controller, its physics, and what it touches."""
+"""The simulated robot: its controller, physics and contacts."""
 
 import logging
 
@@ -19,16 +19,16 @@ from handsteer.types import Pose2D
 
 
 class Contacts:
-    """Tells the obstacles that the robot touches.
+    """Finds the obstacles that the robot touches.
 
     Args:
-        model: Of the robot in ``world``.
-        world: Gives the obstacles their names.
+        model: Model of the robot in ``world``.
+        world: Provides the names of the obstacles.
     """
 
     def __init__(self, model: mujoco.MjModel, world: World) -> None:
         self._names = [thing.name for thing in world.obstacles]
-        # For each geom the index of the obstacle that it is, or -1; and whether it is a part of the robot.
+        # For each geom the index of its obstacle, or -1; and whether it is a part of the robot.
         self._thing_of_geom = np.full(model.ngeom, -1)
         for index in range(len(self._names)):
             self._thing_of_geom[model.geom(thing_name(index)).id] = index
@@ -44,20 +44,20 @@ class Contacts:
 
 _log = logging.getLogger(__name__)
 
-# A touch lasts this long after the last contact: what is pushed, or pushes back, loses contact now and then.
+# A touch lasts this long after the last contact, because pushing loses contact now and then.
 _TOUCH_S = 0.2
 
-# Nothing in a sound simulation gets near it: a wheel at the limits of the configuration's defaults turns at 63 rad/s.
+# No valid simulation comes near it: a wheel at the limits of the configuration's defaults turns at 63 rad/s.
 _WILD_SPEED = 1e5
 
 
 class SimulatedRobot:
     """The diff-drive robot of the URDF in a world, simulated by MuJoCo.
 
-    The same commands in the same steps give the same path, bit for bit. Not safe to use from two threads at once.
+    The same commands in the same steps give the same path, bit for bit. Not thread-safe.
 
     Attributes:
-        world: The world that it is in.
+        world: Its world.
         description: Its URDF.
         model: The MuJoCo model, for experiments.
         data: The MuJoCo state, for experiments.
@@ -66,7 +66,7 @@ class SimulatedRobot:
     def __init__(self, config: RobotConfig, world: World | None = None) -> None:
         """Put the robot at the origin of ``world``, by default the one that ``config`` names.
 
-        ``config`` sets what the controller believes of the wheels; the wheels themselves are those of the URDF.
+        ``config`` sets the wheel dimensions that the controller assumes; the wheels themselves are those of the URDF.
 
         Raises:
             WorldError: The world cannot be read, or an obstacle in it overlaps the robot.
@@ -83,11 +83,11 @@ class SimulatedRobot:
             raise WorldError(f"world {config.world}: {_at_start(touched[0])}")
 
     def command(self, linear_mps: float, angular_radps: float) -> None:
-        """Ask for a velocity in m/s and rad/s; see :func:`handsteer.robots.diff_drive.step` for what becomes of it."""
+        """Command a velocity in m/s and rad/s, processed by :func:`handsteer.robots.diff_drive.step`."""
         self._command = Velocity(linear_mps, angular_radps)
 
     def step(self, dt_s: float) -> RobotState:
-        """Let ``dt_s`` seconds pass, in whole steps of 0.01 s; what is left is carried to the next call."""
+        """Advance time by ``dt_s`` seconds, in whole steps of 0.01 s; the remainder is carried to the next call."""
         self._asked_s += dt_s
         while (self._steps + 1) * TIMESTEP_S <= self._asked_s + 1e-9:
             self._steps += 1
@@ -95,14 +95,14 @@ class SimulatedRobot:
         return self._state()
 
     def obstacles(self) -> list[Obstacle]:
-        """Return the obstacles where they are now."""
+        """Return the obstacles at their current places."""
         return [
             Obstacle(thing.name, thing.shape, thing.extent, thing.rgba, *self._thing_pose(index))
             for index, thing in enumerate(self.world.obstacles)
         ]
 
     def scan(self) -> RangeScan:
-        """Return what its laser scanner sees now."""
+        """Return a scan of the current state."""
         return self._lidar.scan(self.data)
 
     def commanders(self) -> list[str]:
@@ -110,10 +110,10 @@ class SimulatedRobot:
         return []
 
     def enter(self, world: World) -> None:
-        """Stand at the start of another world; as :meth:`reset`.
+        """Move the robot to the start of another world, as :meth:`reset`.
 
         Raises:
-            WorldError: MuJoCo refuses it, or an obstacle in it overlaps the robot at the start; all is as before.
+            WorldError: MuJoCo refuses it, or an obstacle in it overlaps the robot at the start; nothing has changed.
         """
         model = compile_model(self.description, world)
         if touched := _touched_at_start(model, world):
@@ -122,14 +122,13 @@ class SimulatedRobot:
         self.reset()
 
     def change(self, world: World) -> None:
-        """Stand still where it is, with ``world`` around it instead.
+        """Stop the robot where it is, and replace the world around it by ``world``.
 
-        Odometry, wheel angles and collisions go on. Things that are the same in both worlds stay where they are, also
-        those that were pushed.
+        Odometry, wheel angles and collisions continue. Things that are the same in both worlds stay where they are,
+        even if they were pushed.
 
         Raises:
-            WorldError: MuJoCo refuses it, or something that is new in it overlaps the robot or the place where it
-                starts; all is as before.
+            WorldError: MuJoCo refuses it, or something new in it overlaps the robot or its start; nothing has changed.
         """
         model = compile_model(self.description, world)
         before = {thing.name: (index, thing) for index, thing in enumerate(self.world.obstacles)}
@@ -150,7 +149,7 @@ class SimulatedRobot:
         self._stop()
 
     def reset(self) -> None:
-        """Stand still at the start again, obstacles too; odometry and collisions are 0 again, the time goes on."""
+        """Reset the robot, the obstacles, odometry and collisions; the time continues."""
         mujoco.mj_resetData(self.model, self.data)
         mujoco.mj_forward(self.model, self.data)
         self._command = None
@@ -160,11 +159,11 @@ class SimulatedRobot:
         self._touched_until: dict[str, int] = {}
 
     def reset_odometry(self) -> None:
-        """Let the odometry be 0 where the robot is, without moving it."""
+        """Set the odometry to 0 without moving the robot."""
         self._odometry = Pose2D(0.0, 0.0, 0.0)
 
     def close(self) -> None:
-        """Forget the last command, so that it stands at once; may be called twice."""
+        """Forget the last command, so that the robot stops at once; may be called twice."""
         self._command = None
         self._stop()
 
@@ -180,11 +179,11 @@ class SimulatedRobot:
         self._pose_at = int(model.joint(ROBOT_JOINT).qposadr[0])
 
     def _carried_over(self, model: mujoco.MjModel, same: dict[int, int]) -> mujoco.MjData:
-        """Return the state of ``model`` at rest, with the robot where it is now.
+        """Return a state of ``model`` at rest, with the robot at its current place.
 
         Args:
             model: The new one.
-            same: What also stays where it is: index in the new world to index in the present one; movable.
+            same: Movable things that also keep their places: index in the new world to index in the current one.
         """
         data = mujoco.MjData(model)
         joints = {name: name for name in (ROBOT_JOINT, *WHEEL_JOINTS)}
@@ -200,7 +199,7 @@ class SimulatedRobot:
         self.data.ctrl[: len(WHEEL_JOINTS)] = 2 * diff_drive.wheel_speeds(self._drive.velocity, self._config)
         before = self.data.qpos.copy()
         mujoco.mj_step(self.model, self.data)
-        if not np.abs(self.data.qvel).max() < _WILD_SPEED:  # NaN is not below either
+        if not np.abs(self.data.qvel).max() < _WILD_SPEED:  # also true for NaN
             _log.warning("the simulation has become unstable at %.2f s; everything stops", self._steps * TIMESTEP_S)
             self.data.qpos[:] = before
             self._stop()

@@ -1,4 +1,4 @@
-"""The world that the simulated robot drives in, as a YAML file: a floor, things on it, and the gates of a course.
+"""The world of the simulated robot as a YAML file: a floor, things on it, and the gates of a course.
 
 ::
 
@@ -35,14 +35,14 @@ Colour = Annotated[str, Field(pattern=r"^#[0-9a-fA-F]{6}$")]
 
 
 class Floor(Section):
-    """The floor as it is drawn; the robot can drive on beyond its edge."""
+    """The floor to draw; the robot can drive beyond its edge."""
 
     size: tuple[Metres, Metres] = Field((12.0, 12.0), description="Extent along x and y, the origin in its middle [m]")
     colour: Colour = Field("#c8ccd4", description="As on web pages: #rrggbb")
 
 
 class _Thing(Section):
-    """What all obstacles have; each stands on the floor."""
+    """Fields of all obstacles, which stand on the floor."""
 
     name: str = Field(min_length=1, max_length=60, description="What it is called when the robot touches it")
     position: tuple[Coordinate, Coordinate] = Field(description="x and y of its centre [m]")
@@ -99,7 +99,7 @@ Thing = Annotated[Box | Cylinder | Sphere, Field(discriminator="shape")]
 
 
 class Gate(Section):
-    """A line on the floor to drive across, forward as its ends say; the posts beside it, if any, are obstacles."""
+    """A line on the floor to cross, in the direction given by its ends; posts at its ends, if any, are obstacles."""
 
     name: str = Field(min_length=1, max_length=60, description="What it is called")
     left: tuple[Coordinate, Coordinate] = Field(description="x and y of the end that the robot has on its left [m]")
@@ -113,7 +113,7 @@ class Gate(Section):
 
 
 class World(Section):
-    """A floor, what stands on it, and the gates of a course in the order in which they are to be passed."""
+    """A floor, the things on it, and the gates of a course in order."""
 
     floor: Floor = Floor()
     obstacles: tuple[Thing, ...] = ()
@@ -161,14 +161,14 @@ def read_world(path: Path) -> World:
 
 
 def parse_world(text: str, source: str) -> World:
-    """Return the world that is written in ``text``.
+    """Return the world in ``text``.
 
     Args:
         text: YAML.
-        source: What errors call it, such as the name of a file.
+        source: Name in error messages, such as that of a file.
 
     Raises:
-        WorldError: It is no YAML, or a field in it is wrong; the message names ``source`` and the field.
+        WorldError: It is not valid YAML, or a field in it is wrong; the message names ``source`` and the field.
     """
     return _world(plain_yaml.parse(text, source, WorldError), source)
 
@@ -181,7 +181,7 @@ def _world(values: Any, source: str) -> World:
 
 
 def write_world(world: World) -> str:
-    """Return ``world`` as YAML that :func:`parse_world` turns into the same world: one line a thing."""
+    """Return ``world`` as YAML, one line per thing, for :func:`parse_world`."""
     parts = world.model_dump(exclude_defaults=True)
     lines = [f"floor: {_one_line(world.floor.model_dump())}"]
     for section in ("obstacles", "gates"):
@@ -191,7 +191,7 @@ def write_world(world: World) -> str:
 
 
 def _one_line(values: dict[str, Any]) -> str:
-    # What is not printable is escaped: some such characters break lines, and would come back as a space.
+    # Unprintable characters are escaped: some break lines, and would be read back as a space.
     readable = all(value.isprintable() for value in values.values() if isinstance(value, str))
     return yaml.safe_dump(
         values, default_flow_style=True, sort_keys=False, allow_unicode=readable, width=math.inf
