@@ -4,9 +4,9 @@
 >>> Recognizer().recognize(image).sign
 'Forward'
 
-:class:`Recognizer` tells the signs in pictures, :class:`Teleop` turns a stream of images into velocities,
-:class:`Config` holds everything that can be set, :class:`Velocity` is what a robot is told. Start reading at
-:mod:`handsteer.teleop`, then :mod:`handsteer.graph`, which has the same in nodes that topics join.
+:class:`Recognizer` recognises the signs in pictures, :class:`Teleop` converts a stream of images to velocities,
+:class:`Config` has all parameters, and :class:`Velocity` is a command to a robot. Start reading at
+:mod:`handsteer.teleop`, then :mod:`handsteer.graph`, which has the same parts as nodes joined by topics.
 """
 
 import importlib
@@ -30,7 +30,7 @@ _HOMES: Final = {
 
 
 def __getattr__(name: str) -> Any:
-    """Load a public name when it is asked for first: the command line and each node load no more than they need."""
+    """Load public names on first use, so that the command line and each node load only what they need."""
     if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return getattr(importlib.import_module(_HOMES[name]), name)

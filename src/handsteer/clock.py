@@ -1,7 +1,7 @@
-"""The time that a graph runs on: real, stepped by hand, or a simulator's.
+"""The clock of a graph: real, stepped manually, or a simulator's.
 
-Everything timed uses :meth:`Clock.now`, which is monotonic. :meth:`Clock.stamp` turns such a time into the
-``builtin_interfaces/Time`` that message headers carry, :meth:`Clock.time_of` turns it back.
+All timing uses :meth:`Clock.now`, which is monotonic. :meth:`Clock.stamp` converts its time to the
+``builtin_interfaces/Time`` of message headers, and :meth:`Clock.time_of` converts it back.
 """
 
 import math
@@ -17,9 +17,9 @@ if TYPE_CHECKING:
 
 _NS_PER_S = 1_000_000_000
 _LOOK_AGAIN_S = 0.005
-# Simulators tell their time 10 to 1000 times a second.
+# Simulators publish their time 10 to 1000 times a second.
 _STANDS_AFTER_S = 0.15
-# What a clock was set by, at least; less may be a delay.
+# Minimum change that counts as a set clock; less may be a delay.
 _LEAST_SET_S = 1.0
 
 
@@ -31,17 +31,17 @@ class Clock(Protocol):
         ...
 
     def stamp(self, time_s: float) -> "Time":
-        """Return the header stamp for ``time_s``, a time that :meth:`now` returned."""
+        """Return the header stamp of ``time_s``, a time that :meth:`now` returned."""
         ...
 
     def time_of(self, stamp: "Time") -> float:
-        """Return the time in seconds, as :meth:`now` tells it, that a header stamp stands for."""
+        """Return the time of a header stamp, in seconds of :meth:`now`."""
         ...
 
     def wait(self, wake: threading.Condition, timeout_s: float | None) -> None:
         """Wait until ``wake``, which the caller holds, is notified, or ``timeout_s`` of this clock have passed.
 
-        It may return early: the caller looks again at what it waits for. None waits for the notification alone.
+        It may return early, so the caller must check its condition again. None waits for the notification alone.
         """
         ...
 
@@ -49,7 +49,7 @@ class Clock(Protocol):
 class RealClock:
     """The machine's monotonic clock; stamps are Unix time.
 
-    The distance between the two is taken once, so that stamps never jump when the wall clock is set.
+    The offset between the two is measured once, so that stamps do not jump when the wall clock is set.
     """
 
     def __init__(self) -> None:
@@ -76,9 +76,9 @@ class RealClock:
 
 
 class WallClock(RealClock):
-    """The machine's monotonic clock; stamps are Unix time as it is now, for graphs that share stamps among processes.
+    """The machine's monotonic clock; stamps are current Unix time, for graphs that share stamps among processes.
 
-    When the wall clock is set, the stamps of all processes must jump alike, or a frame of one is stale to the other.
+    When the wall clock is set, the stamps of all processes must jump alike, or frames of one are stale in another.
     """
 
     def _offset_s(self) -> float:
@@ -86,7 +86,7 @@ class WallClock(RealClock):
 
 
 class SteppedClock:
-    """A clock that moves only when told to; stamps start at 0, as simulated time does in ROS."""
+    """A clock that moves only on request; stamps start at 0, as simulated time does in ROS."""
 
     def __init__(self, start_s: float = 0.0) -> None:
         self._now_s = start_s
@@ -104,11 +104,11 @@ class SteppedClock:
         return to_seconds(stamp)
 
     def wait(self, wake: threading.Condition, timeout_s: float | None) -> None:
-        """Wait for a moment: only others can move this clock, so the caller has to look again."""
+        """Wait briefly: only others can advance this clock, so the caller has to check again."""
         wake.wait(_LOOK_AGAIN_S)
 
     def advance_to(self, time_s: float) -> None:
-        """Move to ``time_s`` seconds; a time in the past leaves the clock where it is."""
+        """Move to ``time_s`` seconds; a time in the past is ignored."""
         self._now_s = max(self._now_s, time_s)
 
     def advance(self, seconds: float) -> None:
@@ -117,14 +117,14 @@ class SteppedClock:
 
 
 class SimulatedClock:
-    """Follows a simulator's time, as the topic ``/clock`` tells it; may be used from any thread.
+    """Follows a simulator's time from the topic ``/clock``; may be used from any thread.
 
-    When the simulator's time stands still, so do the stamps, but this clock goes on in real seconds: a watchdog must
-    bark even then, and a frame that was stamped by a clock that stands must grow old. When the simulator's time goes
-    on, or starts again from an earlier one, this clock goes on from where it is; it never goes back.
+    When the simulator's time stops, the stamps stop too, but this clock continues in real seconds: watchdogs must still
+    expire, and frames stamped with the stopped time must become stale. When the simulator's time continues, or restarts
+    at an earlier time, this clock continues from where it is; it never goes back.
 
     Args:
-        real: Tells real, monotonic seconds.
+        real: Returns real, monotonic seconds.
     """
 
     def __init__(self, real: Callable[[], float] = time.monotonic) -> None:
@@ -134,19 +134,19 @@ class SimulatedClock:
         self._told_at_s = real() - _STANDS_AFTER_S
         self._offset_s = 0.0
         self._newest_s = 0.0
-        # Stamps up to this one are older than the last interruption, and have the offset of before.
+        # Stamps up to this time are from before the last interruption, and have the offset from before it.
         self._old_until_s, self._old_offset_s = -math.inf, 0.0
 
     @property
     def silence_s(self) -> float:
-        """How long ago the simulator's time was told last, in real seconds."""
+        """Time since the simulator's time was last received, in real seconds."""
         return self._real() - self._told_at_s
 
     def tell(self, time_s: float) -> None:
-        """Note that the simulator's time is ``time_s`` seconds now."""
+        """Set the simulator's current time to ``time_s`` seconds."""
         with self._lock:
             if time_s == self._told_s:
-                return  # a simulator that is paused
+                return  # the simulator is paused
             now = self._now()
             if time_s + self._offset_s < now:
                 self._old_until_s, self._old_offset_s = min(self._told_s, time_s), self._offset_s
@@ -154,41 +154,41 @@ class SimulatedClock:
             self._told_s, self._told_at_s = time_s, self._real()
 
     def now(self) -> float:
-        """Return the time in seconds since the simulator's start, interruptions included."""
+        """Return the time in seconds since the simulator's start, including interruptions."""
         with self._lock:
             return self._now()
 
     def stamp(self, time_s: float) -> "Time":
-        """Return the simulator's time for ``time_s``; never one that the simulator has not reached yet."""
+        """Return the simulator's time for ``time_s``, at most the latest one received."""
         with self._lock:
             return to_stamp(max(0.0, min(time_s - self._offset_s, self._told_s)))
 
     def time_of(self, stamp: "Time") -> float:
-        """Return the time in seconds that the simulator's time ``stamp`` stands for."""
+        """Return the time in seconds of the simulator's time ``stamp``."""
         seconds = to_seconds(stamp)
         with self._lock:
             return seconds + (self._old_offset_s if seconds <= self._old_until_s else self._offset_s)
 
     def wait(self, wake: threading.Condition, timeout_s: float | None) -> None:
-        """Wait for a moment: how long a second takes here is not known before it is over."""
+        """Wait briefly: the real duration of a simulated second is not known in advance."""
         wake.wait(_LOOK_AGAIN_S if timeout_s is None or timeout_s > 0 else 0)
 
     def _now(self) -> float:
         stood_s = max(0.0, self._real() - self._told_at_s - _STANDS_AFTER_S)
-        # The greatest of all, because sums of the same seconds in another order differ in their last digit.
+        # The maximum, because sums of the same seconds in another order differ in their last digit.
         self._newest_s = max(self._newest_s, self._told_s + self._offset_s + stood_s)
         return self._newest_s
 
 
 class ClockWatch:
-    """Notices that the clock which stamps messages, or ours, was set while they came.
+    """Detects that our clock, or the one that stamps messages, was set while messages were received.
 
-    By their stamps, messages that come in order cannot get older faster than time passes; where the clocks are in step,
-    none is from the future. Where they do, or one is, by a second or more, a clock was set. Messages are then watched
-    for :data:`~handsteer.timeouts.RESYNC_S`; if all of them agree, their ages are corrected by as much.
+    By their stamps, messages that arrive in order cannot age faster than time passes, and if the clocks are
+    synchronized, none is from the future. A deviation of a second or more shows that a clock was set. Messages are then
+    observed for :data:`~handsteer.timeouts.RESYNC_S`; if all of them agree, their ages are corrected by the deviation.
 
     Args:
-        in_step: Whether the two clocks are meant to tell the same time.
+        in_step: Whether the two clocks are expected to be synchronized.
 
     Attributes:
         set_by_s: By how much the clock was set, in seconds, back if positive.
@@ -202,10 +202,10 @@ class ClockWatch:
         self._watched: tuple[float, float] | None = None
 
     def corrected(self, age_s: float, now_s: float) -> float | None:
-        """Return the age of a message without what a clock was set by; None while that is being found out.
+        """Return the corrected age of a message; None while a change of the clock is being measured.
 
         Args:
-            age_s: Time of arrival less that of the stamp, in seconds, of whatever two clocks.
+            age_s: Time of arrival minus that of the stamp, in seconds, on any two clocks.
             now_s: Time of arrival, in seconds of a monotonic clock.
         """
         last, self._last = self._last, (age_s, now_s)
@@ -213,7 +213,7 @@ class ClockWatch:
             self._watched, self.set_by_s = (age_s, now_s), age_s - last[0]
         if self._watched is not None:
             first_age_s, since_s = self._watched
-            if abs(age_s - first_age_s) > STALE_S:  # one message that was late, no clock
+            if abs(age_s - first_age_s) > STALE_S:  # a single late message, not the clock
                 self._watched = None
             elif now_s - since_s >= RESYNC_S:
                 self._correction_s += self.set_by_s
@@ -228,7 +228,7 @@ class ClockWatch:
 
 def to_stamp(seconds: float) -> "Time":
     """Return ``seconds`` (>= 0) as a ROS time, rounded to a nanosecond."""
-    # Whoever reads a video needs a clock and no messages, which take longer to load than all of OpenCV.
+    # Reading a video needs a clock but no messages, which take longer to load than all of OpenCV.
     from handsteer.messages import Time  # noqa: PLC0415
 
     nanoseconds = round(seconds * _NS_PER_S)

@@ -1,7 +1,7 @@
-"""Every parameter of handsteer: type, unit, range, default and a line of why.
+"""Every parameter of handsteer: type, unit, range, default and a line of explanation.
 
-The YAML file, the command line and the settings of the page all come from these models. Names are as ROS nodes
-have them, units are SI (REP 103) and stand in brackets in each description.
+The YAML file, the command line and the settings of the page are generated from these models. Names are as in ROS nodes,
+units are SI (REP 103) and in brackets in each description.
 """
 
 import logging
@@ -23,7 +23,7 @@ S = TypeVar("S", bound="Section")
 
 RobotKind = Literal["sim", "auto", "ros2", "dds", "zenoh", "ros1"]
 Recorded = Literal["auto", "always", "never"]
-# The parameters of ROS have no null.
+# ROS parameters have no null.
 OptionalPath = Annotated[Path | None, BeforeValidator(lambda path: None if path == "" else path)]
 _LONGEST_SHOWN = 200
 _OLD_NAMES_SEEN: set[str] = set()
@@ -44,7 +44,7 @@ class Section(BaseModel):
 
     @classmethod
     def new_name(cls, name: str) -> str:
-        """Return what the parameter ``name`` is called now; an old name is warned of once."""
+        """Return the current name of the parameter ``name``, and warn once of an old name."""
         new = cls.renamed.get(name, name)
         if new != name and name not in _OLD_NAMES_SEEN:
             _OLD_NAMES_SEEN.add(name)
@@ -54,7 +54,7 @@ class Section(BaseModel):
     @model_validator(mode="before")
     @classmethod
     def by_new_names(cls, values: Any) -> Any:
-        """Return ``values`` with the parameters that have an old name under their new one, unless that is there too."""
+        """Return ``values`` with old names of parameters replaced by new ones, unless the new one is given too."""
         if not (isinstance(values, dict) and cls.renamed.keys() & values.keys()):
             return values
         renamed = {name: value for name, value in values.items() if name not in cls.renamed}
@@ -260,7 +260,7 @@ class ControlConfig(Section):
     @field_validator("arming", mode="before")
     @classmethod
     def _as_yaml_reads_it(cls, arming: object) -> object:
-        # To YAML, and so to ROS, on and off are other words for true and false.
+        # YAML, and so ROS, converts on and off to true and false.
         return {True: "on", False: "off"}[arming] if isinstance(arming, bool) else arming
 
     @field_validator("robots")
@@ -415,7 +415,7 @@ class DashboardConfig(Section):
 
     @property
     def opens_browser(self) -> bool:
-        """Whether the page is opened in a browser: its command line, with the token, is to be read by everybody."""
+        """Whether the page is opened in a browser: other users could read the token in its command line."""
         return self.open_browser and self.token == "auto"
 
 
@@ -440,12 +440,12 @@ class Config(Section):
 
 
 def load(path: Path | None = None, base: dict[str, Any] | None = None, *overrides: dict[str, Any]) -> Config:
-    """Return the parameters: each source goes before those to its left.
+    """Return the parameters: each source overrides those to its left.
 
     Args:
-        path: A YAML file with some of the fields of :class:`Config`, or None; it goes before ``base``.
-        base: Nested dictionary of fields, as ``{"control": {"linear_step": 0.02}}``; goes before the defaults.
-        overrides: Further ones; they go before the file.
+        path: A YAML file with some of the fields of :class:`Config`, or None; it overrides ``base``.
+        base: Nested dictionary of fields, such as ``{"control": {"linear_step": 0.02}}``; overrides the defaults.
+        overrides: Further dictionaries; they override the file.
 
     Raises:
         ConfigError: The file cannot be read, or a field is unknown or out of range; the message names it.
@@ -457,10 +457,10 @@ def load(path: Path | None = None, base: dict[str, Any] | None = None, *override
 
 
 def cmd_vel_type(config: Config) -> CmdVelType:
-    """Return what both ends of ``cmd_vel`` speak: what one of them was told, the other does too.
+    """Return the message type for both ends of ``cmd_vel``: if only one has it configured, it applies to the other too.
 
     Raises:
-        ConfigError: They were told different things.
+        ConfigError: They are configured differently.
     """
     control, robot = config.control.cmd_vel_type, config.robot.cmd_vel_type
     if "auto" not in {control, robot} and control != robot:
@@ -495,7 +495,7 @@ def describe(error: ValidationError) -> str:
 
 
 def _preset(values: dict[str, Any]) -> dict[str, Any]:
-    """Return what is known of the robot that ``values`` name: it goes before the defaults only."""
+    """Return the preset of the robot that ``values`` name; it overrides only the defaults."""
     robot = values["robot"] if isinstance(values.get("robot"), dict) else {}
     name, kind = robot.get("preset"), robot.get("kind", "sim")
     if name is None and kind != "sim":
@@ -504,7 +504,7 @@ def _preset(values: dict[str, Any]) -> dict[str, Any]:
 
 
 def _read_yaml(path: Path) -> dict[str, Any]:
-    # Whoever has no file, such as a program that only recognises signs, need not load it.
+    # Programs without a file, such as those that only recognise signs, need not load it.
     from handsteer import plain_yaml  # noqa: PLC0415
 
     values = plain_yaml.read(path, str(path), ConfigError, f"cannot read the configuration {path}")
@@ -516,7 +516,7 @@ def _read_yaml(path: Path) -> dict[str, Any]:
 
 
 def _with_new_names(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the sections of ``values`` with new names only, so that an old one in a later source still counts."""
+    """Return the sections of ``values`` with new names only, so that an old name in a later source takes effect."""
     models = {name: field.annotation for name, field in Config.model_fields.items()}
     return {
         name: models[name].by_new_names(of) if name in models else of  # type: ignore[union-attr]

@@ -6,25 +6,25 @@
     ├── ConfigError            a configuration value or file is wrong
     ├── CameraError            a camera cannot be used
     │   ├── CameraNotFound     there is no such device, file, folder or address
-    │   ├── CameraInUse        the device exists, but another program holds it
-    │   ├── CameraUnreadable   it opens, but gives no picture
-    │   └── CameraLost         it gave pictures and stopped; worth trying again
+    │   ├── CameraInUse        the device exists, but another program uses it
+    │   ├── CameraUnreadable   it opens, but delivers no picture
+    │   └── CameraLost         it stopped delivering pictures; worth trying again
     ├── FrameError             an image has a shape or type that cannot be used
     ├── ModelError             a model file (landmarks or signs) cannot be used
     │   ├── ModelMissing       the file is not on this machine
-    │   └── ModelCorrupt       the file is not the one that was expected
-    ├── EvaluationError        signs cannot be evaluated: no such photos or video, or no place for the report
+    │   └── ModelCorrupt       the file is damaged or not the expected one
+    ├── EvaluationError        signs cannot be evaluated: no such photos or video, or the report cannot be written
     │   └── LabelError         the labels of photos or of a video are missing or wrong
-    ├── DatasetError           a dataset of signs, or what shall become one, cannot be used
+    ├── DatasetError           a dataset of signs, or its sources, cannot be used
     ├── TrainingError          signs cannot be learnt from a dataset
     ├── PoseError              a hand pose or a script of signs is wrong
     ├── WorldError             a world file or robot description is wrong
     ├── TransportError         a topic cannot be published or subscribed to
     ├── DashboardError         the web page cannot be served
-    └── PackageMissing         what was asked for needs a Python package that is not installed
+    └── PackageMissing         a Python package that is needed is not installed
 
-A message is one line that says what was wrong, where, and what would be right.
-Only :mod:`handsteer.cli` prints one and exits (with code 2).
+A message is one line that reports what was wrong, where, and what would be right. Only :mod:`handsteer.cli` prints one
+and exits (with code 2).
 """
 
 from collections.abc import Iterator
@@ -48,15 +48,15 @@ class CameraNotFound(CameraError):  # noqa: N818 - reads as the tree above
 
 
 class CameraInUse(CameraError):  # noqa: N818
-    """The device exists, but another program holds it."""
+    """The device exists, but another program uses it."""
 
 
 class CameraUnreadable(CameraError):  # noqa: N818
-    """The source opens, but gives no picture."""
+    """The source opens, but delivers no picture."""
 
 
 class CameraLost(CameraError):  # noqa: N818
-    """The camera gave pictures and stopped; trying again may help."""
+    """The camera stopped delivering pictures; trying again may help."""
 
 
 class FrameError(HandsteerError):
@@ -72,11 +72,11 @@ class ModelMissing(ModelError):  # noqa: N818
 
 
 class ModelCorrupt(ModelError):  # noqa: N818
-    """A model file is damaged, or not the one that was expected."""
+    """A model file is damaged, or not the expected one."""
 
 
 class EvaluationError(HandsteerError):
-    """Signs cannot be evaluated: there are no such photos or video, or there is no place for the report."""
+    """Signs cannot be evaluated: there are no such photos or video, or the report cannot be written."""
 
 
 class LabelError(EvaluationError):
@@ -84,7 +84,7 @@ class LabelError(EvaluationError):
 
 
 class DatasetError(HandsteerError):
-    """A dataset of signs, or what shall become one, cannot be used."""
+    """A dataset of signs, or its sources, cannot be used."""
 
 
 class TrainingError(HandsteerError):
@@ -108,20 +108,20 @@ class DashboardError(HandsteerError):
 
 
 class PackageMissing(HandsteerError):  # noqa: N818
-    """What was asked for needs a Python package that is not installed."""
+    """A Python package that is needed is not installed."""
 
 
 @contextmanager
 def needing(what: str, extra: str, *modules: str) -> Iterator[None]:
-    """Say how to install what an import within the block lacks.
+    """Report how to install a package that an import within the block lacks.
 
     Args:
-        what: What needs it, for people, as ``the simulated robot``.
-        extra: The extra of handsteer that installs it, as ``sim``.
-        modules: The modules that the extra installs; what else is missing is raised as it is.
+        what: The feature that needs it, for people, such as ``the simulated robot``.
+        extra: The extra of handsteer that installs it, such as ``sim``.
+        modules: The modules that the extra installs; other import errors are raised unchanged.
 
     Raises:
-        PackageMissing: One of ``modules`` is not there.
+        PackageMissing: One of ``modules`` is missing.
     """
     try:
         yield

@@ -1,14 +1,14 @@
-"""The whole flow on one page: a hand sign drives a robot.
+"""The graph in which a hand sign drives a robot.
 
 ::
 
     my_camera ──/image_raw──▶ hand_sign_recognition ──/gesture/hand_sign──▶ hand_sign_control ──cmd_vel──▶ robot
                                                                  steering ──/steering/cmd_vel──▲
 
-Each box is a node (:mod:`handsteer.nodes`), each arrow a topic (:mod:`handsteer.messages`). What a node does is
-decided elsewhere, in parts that know nothing of nodes: :mod:`handsteer.cameras` give frames,
-:mod:`handsteer.landmarks` finds the hand, :mod:`handsteer.signs` tells the sign, :mod:`handsteer.control` turns it
-into a velocity, and :mod:`handsteer.robots` follow it. A transport (:mod:`handsteer.transports`) carries the messages.
+Each box is a node (:mod:`handsteer.nodes`), each arrow a topic (:mod:`handsteer.messages`). The work is done in
+packages that do not depend on nodes: :mod:`handsteer.cameras` deliver frames, :mod:`handsteer.landmarks` finds the
+hand, :mod:`handsteer.signs` recognises the sign, :mod:`handsteer.control` converts it to a velocity, and
+:mod:`handsteer.robots` follow it. A transport (:mod:`handsteer.transports`) carries the messages.
 """
 
 import logging
@@ -36,18 +36,18 @@ _LOOK_PERIOD_S = 0.2
 class Graph:
     """The five nodes, joined by one transport and one clock.
 
-    Use it as a context manager: whatever ends the block, the robot is told to stand.
+    Use it as a context manager: however the block ends, the robot is stopped.
 
     Args:
-        config: Everything that can be set; :meth:`reconfigure` sets another.
+        config: All parameters; :meth:`reconfigure` changes them.
         clock: Real time by default; a :class:`~handsteer.clock.SteppedClock` for :meth:`run_stepped`.
         transport: Within this process by default.
         link: This process in the graph of a real robot, for ``robot.kind`` other than ``sim``; the caller closes it
             after this graph.
-        steering: Whether the node ``steering`` is among them; the page of another process has its own.
+        steering: Whether to include the node ``steering``; the page of another process has its own.
 
     Raises:
-        HandsteerError: A part cannot be used (camera, model, world); the message says what to do.
+        HandsteerError: A part cannot be used (camera, model, world); the message suggests what to do.
     """
 
     def __init__(
@@ -78,7 +78,7 @@ class Graph:
         """The node ``steering``.
 
         Raises:
-            ConfigError: The graph was made without it.
+            ConfigError: The graph was constructed without it.
         """
         if self._steering is None:
             raise ConfigError("this graph was made without the node steering")
@@ -86,12 +86,12 @@ class Graph:
 
     @property
     def nodes(self) -> tuple[Node, ...]:
-        """The nodes in the order in which they are stopped: first the one that says zero, last the one that obeys."""
+        """The nodes in the order in which they are stopped: the control sends its zero first, the robot ends last."""
         steering = () if self._steering is None else (self._steering,)
         return (self.control, *steering, self.camera, self.recognition, *self._added, self.robot)
 
     def add(self, node: Node) -> None:
-        """Let ``node``, on this graph's transport and clock, run and stop with the others."""
+        """Run and stop ``node``, on this graph's transport and clock, with the others."""
         self._added = (*self._added, node)
 
     def __enter__(self) -> "Graph":
@@ -110,8 +110,8 @@ class Graph:
         """Wait until ``duration_s`` seconds have passed, or the camera's file or a real robot's graph ends the run.
 
         Args:
-            duration_s: How long to wait at most; for ever by default.
-            until: Asked five times a second; true ends the wait.
+            duration_s: Maximum time to wait; unlimited by default.
+            until: Called five times a second; true ends the wait.
 
         Raises:
             TransportError: The graph of a real robot is gone.
@@ -122,18 +122,19 @@ class Graph:
                 return
 
     def stop(self) -> None:
-        """Stop all nodes and leave the robot standing; may be called twice."""
+        """Stop all nodes and the robot; may be called twice."""
         for node in self.nodes:
             node.stop()
         self.transport.close()
 
     def reconfigure(self, config: Config) -> None:
-        """Let the nodes take what can change while they run (``live`` of each section) from ``config``.
+        """Apply the parameters of ``config`` that can change while nodes run (``live`` of each section).
 
         Returns at once; may be called from any thread.
 
         Raises:
-            ConfigError: A node cannot take it, as a file that it names is broken; nothing has changed.
+            ConfigError: A node cannot apply it, for example because a file that it names is broken; nothing has
+                changed.
         """
         for node in self.nodes:
             node.check(config)
@@ -142,9 +143,9 @@ class Graph:
             node.reconfigure(config)
 
     def run_stepped(self, duration_s: float = math.inf) -> None:
-        """Run all nodes in turn on this thread, as fast as they go, on the graph's stepped clock.
+        """Run all nodes in turn on this thread, as fast as possible, on the graph's stepped clock.
 
-        No frame is left out and nothing depends on the speed of the machine: the same input gives the same commands.
+        No frame is skipped and nothing depends on the speed of the machine: the same input gives the same commands.
 
         Args:
             duration_s: How much of the graph's time to run, in seconds; a file that ends may end the run before.
@@ -166,7 +167,7 @@ class Graph:
                 pass
 
     def summary(self) -> "Summary":
-        """Return the figures of the run so far."""
+        """Return the statistics of the run so far."""
         duration_s = self.clock.now() - self._began_s
         measured = isinstance(self.clock, RealClock) and len(self.control.latency) > 0
         return Summary(
@@ -188,22 +189,22 @@ class Graph:
 
 @dataclass(frozen=True)
 class Summary:
-    """The figures of a run.
+    """Statistics of a run.
 
     Attributes:
-        duration_s: How long it ran.
-        frames: Frames that the camera gave.
-        fps: Frames a second.
-        latency_median_ms: From the capture of a frame to the Twist that it led to; None when the clock was stepped.
-        latency_p99_ms: Likewise, 99 of 100 were faster.
-        signs: For how many frames each sign counted, ``NONE`` among them.
-        final_pose: Where the robot really is, in the world; a real one's odometry. None when it has not said.
-        odometry: Where its wheels say that it is; None when it has not said.
-        path_length_m: How far it has gone.
+        duration_s: Length of the run.
+        frames: Frames from the camera.
+        fps: Frames per second.
+        latency_median_ms: From the capture of a frame to the resulting Twist; None if the clock was stepped.
+        latency_p99_ms: The 99th percentile of the same.
+        signs: Number of frames per confirmed sign, including ``NONE``.
+        final_pose: The robot's actual pose in the world; a real one's odometry. None if unknown.
+        odometry: The robot's pose from odometry; None if unknown.
+        path_length_m: Distance driven.
         contacts: How often it has begun to touch an obstacle; None for a real one.
-        course: Gates, bumps and time on its world's course, with the score in seconds; None where there is no course.
-        trouble: What was wrong with it at the end, as ``is not there: …``; empty when nothing was.
-        callback_errors: Callbacks that failed.
+        course: Gates, bumps and time on its world's course, with the score in seconds; None if there is no course.
+        trouble: What was wrong with the robot at the end, as ``is not there: …``; empty if nothing was.
+        callback_errors: Number of failed callbacks.
     """
 
     duration_s: float
@@ -221,5 +222,5 @@ class Summary:
     callback_errors: int
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the figures as plain values, for JSON."""
+        """Return the fields as plain values, for JSON."""
         return {**asdict(self), "course": self.course and self.course.as_dict()}

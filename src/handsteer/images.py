@@ -1,4 +1,4 @@
-"""Between numpy pictures and ROS image messages, without cv_bridge."""
+"""Conversions between numpy pictures and ROS image messages, without cv_bridge."""
 
 from collections.abc import Mapping
 from typing import Any, Final
@@ -11,8 +11,8 @@ from handsteer.errors import FrameError
 from handsteer.messages import CompressedImage, Header, Image
 from handsteer.picture_files import MOST_PIXELS, decode
 
-# Encodings of ROS's sensor_msgs/image_encodings.h: bytes a pixel, and what makes them BGR. ROS 1 names the byte order
-# of yuv422 after OpenCV (UYVY), or yuv422_yuy2; ROS 2 has the names of the byte orders besides.
+# Encodings of ROS's sensor_msgs/image_encodings.h: bytes per pixel, and the OpenCV conversion to BGR. ROS 1 names the
+# byte order of yuv422 after OpenCV (UYVY), or yuv422_yuy2; ROS 2 also has the names of the byte orders.
 _ENCODINGS: Final[Mapping[str, tuple[int, int | None]]] = {
     "bgr8": (3, None),
     "rgb8": (3, cv2.COLOR_RGB2BGR),
@@ -29,17 +29,17 @@ _ENCODINGS: Final[Mapping[str, tuple[int, int | None]]] = {
 
 
 def image_message(bgr: NDArray[np.uint8], header: Header) -> Image:
-    """Return ``bgr``, (height, width, 3) uint8, as a ``bgr8`` message; the data is shared when it is contiguous."""
+    """Return ``bgr``, (height, width, 3) uint8, as a ``bgr8`` message; contiguous data is shared."""
     height, width = bgr.shape[:2]
     data = np.ascontiguousarray(bgr).reshape(-1)
     return Image(header=header, height=height, width=width, encoding="bgr8", is_bigendian=0, step=3 * width, data=data)
 
 
 def bgr_image(message: Image) -> NDArray[np.uint8]:
-    """Return the picture of ``message`` as (height, width, 3) uint8, BGR; a view of the message where it can be.
+    """Return the picture of ``message`` as (height, width, 3) uint8, BGR; a view of the message if possible.
 
     Raises:
-        FrameError: The encoding is none of 8 bits that are known here, or the data does not fit the size.
+        FrameError: The encoding is not a supported one of 8 bits, or the data does not fit the size.
     """
     if message.encoding not in _ENCODINGS:
         deep = "16" in message.encoding or "32" in message.encoding or "64" in message.encoding
@@ -55,7 +55,7 @@ def bgr_image(message: Image) -> NDArray[np.uint8]:
 
 
 def _pixels(message: Image, pixel_bytes: int) -> NDArray[np.uint8]:
-    """Return a view of ``message`` as (height, width, pixel_bytes), the padding at the end of each row left out."""
+    """Return a view of ``message`` as (height, width, pixel_bytes), without the padding at the end of each row."""
     height, width, step = message.height, message.width, message.step
     row = width * pixel_bytes
     if not (height > 0 and width > 0):
@@ -81,7 +81,7 @@ def jpeg_picture(message: CompressedImage) -> NDArray[np.uint8]:
     """Return the picture of ``message``, a JPEG or PNG file, as (height, width, 3) uint8, BGR.
 
     Raises:
-        FrameError: The data is no such picture, is torn, or has more than :data:`MOST_PIXELS`.
+        FrameError: The data is not such a picture, is truncated, or has more than :data:`MOST_PIXELS`.
     """
     try:
         return decode(message.data.tobytes())

@@ -1,6 +1,6 @@
-"""Makes each node of the graph as a configuration describes it.
+"""Constructs each node of the graph from a configuration.
 
-A process that runs one node is not to wait until all others are loaded: what a node needs is loaded when it is made.
+The imports are in the functions, so that a process with one node does not load what others need.
 """
 # ruff: noqa: PLC0415
 
@@ -29,10 +29,10 @@ def make_camera(config: Config, transport: Transport, clock: Clock, camera: "Cam
     """Return the node ``my_camera``.
 
     Args:
-        config: Everything that can be set.
+        config: All parameters.
         transport: Carries the node's messages.
         clock: The graph's clock.
-        camera: What gives the frames; None opens the one that ``config`` names.
+        camera: Delivers the frames; None opens the one that ``config`` names.
 
     Raises:
         CameraError: The camera, or its calibration, cannot be used.
@@ -52,10 +52,10 @@ def make_camera(config: Config, transport: Transport, clock: Clock, camera: "Cam
 
 
 def open_cameras(config: Config, clock: Clock) -> "ChoiceOfCameras":
-    """Return this machine's own camera and that of whoever looks at the page, of which one is chosen at a time.
+    """Return this machine's own camera and the browser's, one of which is selected at a time.
 
     Raises:
-        CameraError: The machine's own cannot be used.
+        CameraError: The machine's own camera cannot be used.
     """
     from handsteer.cameras.browser import BrowserCamera, ChoiceOfCameras, NoCamera
     from handsteer.cameras.choose import open_camera
@@ -84,10 +84,10 @@ def make_recognition(config: Config, transport: Transport, clock: Clock) -> "Han
 
 
 def cmd_vel_topic(config: Config) -> Topic[Any]:
-    """Return the topic of the commands from control to robot, of Twist or TwistStamped.
+    """Return the topic of the commands from control to robot, with Twist or TwistStamped.
 
     Raises:
-        ConfigError: Control and robot were told different types.
+        ConfigError: Control and robot are configured with different types.
     """
     return cmd_vel(cmd_vel_type(config))
 
@@ -98,13 +98,13 @@ def make_control(
     """Return the node ``hand_sign_control``.
 
     Args:
-        config: Everything that can be set.
+        config: All parameters.
         transport: Carries the messages.
         clock: The graph's clock.
-        simulated: Whether it is known that the robot is simulated; ``control.arming`` is then off if it is ``auto``.
+        simulated: Whether the robot is known to be simulated; ``control.arming`` is then off if it is ``auto``.
 
     Raises:
-        ConfigError: Control and robot were told different types of commands.
+        ConfigError: Control and robot are configured with different types of commands.
     """
     from handsteer.nodes.control import HandSignControlNode
 
@@ -115,10 +115,10 @@ def make_control(
 
 
 def make_robot(config: Config, transport: Transport, clock: Clock, link: Session | None = None) -> "RobotNode":
-    """Return the node ``robot``; one that publishes ``/clock`` runs on real time, so that it cannot drive itself.
+    """Return the node ``robot``; one that publishes ``/clock`` runs on real time, not on its own ``/clock``.
 
     Args:
-        config: Everything that can be set.
+        config: All parameters.
         transport: Carries the messages.
         clock: The graph's clock.
         link: This process in the graph of a real robot.
@@ -138,10 +138,10 @@ def make_robot(config: Config, transport: Transport, clock: Clock, link: Session
 
 
 def make_steering(config: Config, transport: Transport, clock: Clock) -> "SteeringNode":
-    """Return the node ``steering``; people steer by its methods, as the page does.
+    """Return the node ``steering``, whose methods are called to steer by hand, as the page does.
 
     Raises:
-        ConfigError: Control and robot were told different types of commands.
+        ConfigError: Control and robot are configured with different types of commands.
     """
     from handsteer.nodes.steering import SteeringNode
 
@@ -155,16 +155,16 @@ def _warn_of_unknown_signs(config: Config, signs: tuple[str, ...]) -> None:
 
 
 def frame_prefix(transport: Transport, node: str) -> str:
-    """Return what tells the coordinate frames of ``node`` from those of others, as ``r1/``.
+    """Return the prefix that distinguishes the coordinate frames of ``node`` from those of others, such as ``r1/``.
 
-    It is empty without a namespace, and where each robot has a tree of its own, as ``/tf`` is remapped.
+    It is empty without a namespace, and if ``/tf`` is remapped so that each robot has its own tree.
     """
     namespace = transport.full_name(node).partition(":")[0].rpartition("/")[0]
     return f"{namespace}/" if namespace and transport.topic_name(TF) == TF.name else ""
 
 
 def prefixed(config: RobotConfig, transport: Transport) -> RobotConfig:
-    """Return ``config`` with the names of its frames as they are in the graph: prefixed as ``frame_prefix`` says."""
+    """Return ``config`` with the prefix of :func:`frame_prefix` added to its coordinate frames."""
     prefix = frame_prefix(transport, "robot") if config.frame_prefix == "auto" else config.frame_prefix
     frames = {name: getattr(config, name) for name in ("odom_frame_id", "base_frame_id", "scan_frame_id")}
     return config.model_copy(

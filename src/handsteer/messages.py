@@ -1,7 +1,7 @@
-"""The ROS messages that the graph speaks, and its topics.
+"""The ROS messages and topics of the graph.
 
-The message classes are the typed dataclasses of ``rosbags``: the same definitions as ROS 2's own, no ROS needed.
-They are used as values: once published, a message is not changed any more.
+The message classes are the typed dataclasses of ``rosbags``: the same definitions as ROS 2's own, without ROS. A
+message must not be changed once it is published.
 """
 
 import builtins
@@ -95,16 +95,16 @@ __all__ = [
 M = TypeVar("M")
 
 STOPPING_SIGNS = frozenset({"Stop", "NONE"})
-"""What stops the robot whatever is configured, as handsteer.types has it."""
+"""Signs that stop the robot in every configuration, as in handsteer.types."""
 
 
 @dataclass
 class TurtlePose:
-    """``turtlesim/msg/Pose``, which rosbags does not have: where the turtle is, in its own metres, and its velocity.
+    """``turtlesim/msg/Pose``, which rosbags does not have: pose and velocity of the turtle, in its own metres.
 
     Attributes:
         x: Metres to the right of the lower left corner.
-        y: Metres above it.
+        y: Metres above the lower left corner.
         theta: Yaw in rad, left positive.
         linear_velocity: Forward, in m/s.
         angular_velocity: To the left, in rad/s.
@@ -127,14 +127,14 @@ class Topic(Generic[M]):
         name: Full ROS name in the root namespace, such as ``/image_raw``.
         type: The message class.
         latched: A late subscriber gets the last message at once (ROS 2: transient local).
-        is_global: All namespaces share it, as ROS has it for transforms, time and diagnostics; others move with the
+        is_global: All namespaces share it, as ROS has it for transforms, time and diagnostics; other topics are in the
             namespace of their node.
-        depth: How many messages may wait for a subscriber that is busy; older ones are dropped (ROS 2: keep last).
-        lifespan_s: A message that has not arrived after so long is not to arrive at all; None for no limit.
-        beneath: The topic whose name it extends, or whose neighbour it is; it is renamed with it, as ROS's
-            image_transport has it.
-        or_type: Another class that its sending end may have instead, as subscribers take it; None where it has one.
-        stops: Tells a message that stops the robot, which is to be obeyed however late it comes; None where none does.
+        depth: How many messages may wait for a busy subscriber; older ones are dropped (ROS 2: keep last).
+        lifespan_s: Messages that arrive later than this are dropped; None for no limit.
+        beneath: The topic whose name it extends, or whose namespace it shares; it is renamed with it, as in ROS's
+            image_transport.
+        or_type: Another message class that its publisher may use instead, depending on subscribers; None if it has one.
+        stops: Returns whether a message stops the robot, and is therefore obeyed however late; None if none does.
     """
 
     name: str
@@ -148,33 +148,33 @@ class Topic(Generic[M]):
     or_type: builtins.type[Any] | None = None
 
     def moved_with(self, beneath: str) -> str:
-        """Return its name where the topic that it is ``beneath`` has this full name, or lies in the same namespace."""
+        """Return its full name if the topic that it is ``beneath`` has the full name ``beneath``."""
         assert self.beneath is not None
         ending = self.name.removeprefix(self.beneath.name)
         return beneath + ending if ending != self.name else beneath.rpartition("/")[0] + self.name
 
     @property
     def ros_name(self) -> str:
-        """The name to give to ROS: relative to the node's namespace (``image_raw``), or global (``/tf``)."""
+        """The name for ROS: relative to the node's namespace (``image_raw``), or global (``/tf``)."""
         return self.name if self.is_global else self.name.removeprefix("/")
 
 
 def is_zero(message: "Twist | TwistStamped") -> bool:
-    """Return whether a velocity command tells to stand."""
+    """Return whether a velocity command is zero."""
     command = twist_in(message)
     return command.linear.x == 0.0 and command.angular.z == 0.0
 
 
 def is_stopping(sign: String) -> bool:
-    """Return whether a sign stops the robot whatever is configured."""
+    """Return whether a sign stops the robot in every configuration."""
     return sign.data in STOPPING_SIGNS
 
 
-# The functions of topics have names, so that a topic can be sent to another process.
+# The functions of topics are no lambdas, so that a topic can be pickled for another process.
 IMAGE_RAW = Topic("/image_raw", Image)
 IMAGE_COMPRESSED = Topic("/image_raw/compressed", CompressedImage, beneath=IMAGE_RAW)
 CAMERA_INFO = Topic("/camera_info", CameraInfo, beneath=IMAGE_RAW)
-# Each sign makes the robot a step faster, so none may be lost when several come at once.
+# Each sign changes the speed by one step, so none may be lost when several arrive at once.
 HAND_SIGN = Topic(
     "/gesture/hand_sign",
     String,
@@ -186,9 +186,9 @@ IMAGE_ANNOTATED = Topic("/gesture/image_annotated", Image)
 CMD_VEL = Topic("/robot_diff_drive_controller/cmd_vel", Twist, depth=10, lifespan_s=STALE_S, stops=is_zero)
 SELECT_ROBOT = Topic("/select_robot", String, depth=10)
 SELECTED_ROBOT = Topic("/selected_robot", String, latched=True)
-# True stops the robot, whoever drives; false lets it drive again. No stop may get lost.
+# True stops the robot whatever its active input; false ends the Stop. No message may be lost.
 STOP = Topic("/stop", Bool, depth=10)
-# What the nodes remember of it, for one that starts anew: each that runs says so.
+# The state of /stop that each node remembers and publishes, for nodes that restart.
 STOPPED = Topic("/stopped", Bool, latched=True)
 STEERING_CMD_VEL = Topic("/steering/cmd_vel", Twist, lifespan_s=STALE_S, stops=is_zero)
 ODOM = Topic("/robot_diff_drive_controller/odom", Odometry)
@@ -222,10 +222,10 @@ def command(topic: Topic[Any], linear_mps: float, angular_radps: float, stamp: T
     """Return a velocity command for ``topic``: forward in m/s, left turn in rad/s (REP 103).
 
     Args:
-        topic: Carries Twist or TwistStamped.
+        topic: Topic with Twist or TwistStamped.
         linear_mps: Forward velocity.
-        angular_radps: Turning velocity, left positive.
-        stamp: When it is commanded, not when a frame was captured; for a TwistStamped.
+        angular_radps: Angular velocity, left positive.
+        stamp: Time of the command, not of a frame's capture; for a TwistStamped.
         frame_id: Coordinate frame; for a TwistStamped.
     """
     bare = twist(linear_mps, angular_radps)
@@ -235,7 +235,7 @@ def command(topic: Topic[Any], linear_mps: float, angular_radps: float, stamp: T
 
 
 def twist_in(message: Twist | TwistStamped) -> Twist:
-    """Return the twist that a velocity command carries."""
+    """Return the twist in a velocity command."""
     return message.twist if isinstance(message, TwistStamped) else message
 
 

@@ -1,7 +1,7 @@
-"""A node's parameters by name: as a graph's parameter service gives them at the start, and as others see and set them.
+"""A node's parameters by name, as a parameter service provides them at the start, and as others get and set them.
 
-A node's own section stands flat, others are nested by name: of ``hand_sign_recognition``, ``min_confidence`` is
-``signs.min_confidence`` and ``landmarks.model`` is itself.
+A node's own section is flat, others are nested by name: for ``hand_sign_recognition``, ``min_confidence`` is
+``signs.min_confidence``, but ``landmarks.model`` keeps its name.
 """
 
 import difflib
@@ -52,12 +52,12 @@ log = logging.getLogger(__name__)
 def from_parameters(parameters: Mapping[str, Any], section: str, node: str) -> dict[str, Any]:
     """Return ``parameters`` nested as in :class:`~handsteer.config.Config`.
 
+    Unknown parameters are ignored, as in all of ROS, but logged with the nearest known name.
+
     Args:
         parameters: The node's private parameters, by name.
         section: The node's own section of the configuration.
         node: Full name of the node, for messages.
-
-    As in all of ROS, a parameter that the node does not know does nothing. It is logged, with the nearest known.
 
     Raises:
         ConfigError: A value is not allowed; the message has the parameter's full name.
@@ -80,7 +80,7 @@ def from_parameters(parameters: Mapping[str, Any], section: str, node: str) -> d
 
 
 def _names(section: str) -> dict[str, str]:
-    """Return what may be meant by a name, of a section or of those used with it, and what that is called in full."""
+    """Return the accepted names, of a section and of those used with it, and the full name of each."""
     others = {f"{used}/{name}": f"{used}/{name}" for used in _USED_TOGETHER.get(section, ()) for name in _fields(used)}
     nested = {full.rpartition("/")[2]: full for full in others}
     return others | nested | {name: name for name in _fields(section)}
@@ -103,17 +103,17 @@ def _checked(section: str, name: str, value: Any, full_name: str) -> Any:
 
 @dataclass(frozen=True)
 class Description:
-    """What there is to know of a parameter.
+    """Description of a parameter.
 
     Attributes:
-        kind: The type of its values.
-        text: A line for people, with the unit.
-        minimum: The lowest value, or the bound that it must be above; None when there is none.
-        maximum: The highest value; None when there is none.
-        constraint: What else is asked of its values, in words; empty when nothing is.
-        choices: What there is to choose from; empty when that is not all that is allowed.
-        why_fixed: Why it cannot be set while the node runs; None when it can.
-        removable: Whether it is an entry of a table, which can be taken away.
+        kind: Type of the values.
+        text: One line for people, with the unit.
+        minimum: The lowest value, or an exclusive lower bound; None if there is none.
+        maximum: The highest value; None if there is none.
+        constraint: Further constraints of the values, in words; empty if there are none.
+        choices: The allowed values; empty if others are allowed too.
+        why_fixed: Why it cannot be set while the node runs; None if it can.
+        removable: Whether it is an entry of a table that can be removed.
     """
 
     kind: Kind
@@ -127,16 +127,17 @@ class Description:
 
 
 class NodeParameters:
-    """The parameters of a running node, which others may read, and set as far as they can change while it runs.
+    """The parameters of a running node, which others may get, and set if they can change while it runs.
 
-    They are those of the node's own section and of the sections that it uses with it. A parameter that is itself a
-    table, as ``actions``, has one name for each entry: ``actions.Peace``. May be used from any thread.
+    They are those of the node's own section and of the sections used with it. A parameter that is itself a table, such
+    as ``actions``, has one name for each entry: ``actions.Peace``. May be used from any thread.
 
     Args:
-        config: What the node was started with.
+        config: The node's initial configuration.
         section: The node's own section of the configuration.
-        apply: Gets each new configuration, all of it, once it has been checked; returns at once.
-        check: Raises ConfigError for what only the node can tell of a new configuration, as of a file that it names.
+        apply: Receives each new, valid configuration as a whole; returns at once.
+        check: Raises ConfigError for problems of a new configuration that only the node can find, such as in a file
+            that it names.
     """
 
     def __init__(
@@ -155,7 +156,7 @@ class NodeParameters:
         self._lock = threading.RLock()
 
     def add_fixed(self, name: str, value: bool, text: str) -> None:
-        """Add a parameter that is none of the configuration, and was read at the start."""
+        """Add a parameter that is not in the configuration, and was read at the start."""
         self._fixed[name] = (value, Description("bool", text, why_fixed=_AT_START))
 
     def values(self) -> dict[str, Value]:
@@ -166,7 +167,7 @@ class NodeParameters:
         return found | {name: value for name, (value, _) in self._fixed.items()}
 
     def describe(self, name: str) -> Description | None:
-        """Return what there is to know of the parameter of this name; None when there is none."""
+        """Return the description of the parameter of this name; None if there is none."""
         if name in self._fixed:
             return self._fixed[name][1]
         place = self._place(name)
@@ -175,9 +176,9 @@ class NodeParameters:
         return replace(describe(place.model, place.field), removable=place.entry is not None)
 
     def set(self, changes: Mapping[str, Value | None]) -> None:
-        """Set parameters, all of them or none; None takes an entry out of a table.
+        """Set parameters, all of them or none; None removes an entry of a table.
 
-        A value that is the one it has already is taken for any parameter. A file that is named again is read again.
+        Setting any parameter to its current value is accepted. A file that is named again is read again.
 
         Raises:
             ConfigError: A name is unknown, a value is not allowed, or a parameter cannot change while the node runs;
@@ -200,7 +201,7 @@ class NodeParameters:
             self._apply(config)
 
     def _is_already(self, name: str, value: Value | None, now: Mapping[str, Value]) -> bool:
-        """Return whether a parameter has this value, also as tools give it that read texts as YAML: false for "off"."""
+        """Return whether a parameter has this value, also as converted by tools that read YAML: false for "off"."""
         place = self._place(name)
         if name not in now or now[name] == value or place is None or place.entry is not None or value is None:
             return name in now and now[name] == value
@@ -262,7 +263,7 @@ class NodeParameters:
 
 @dataclass(frozen=True)
 class _Place:
-    """Where a parameter stands in the configuration; ``entry`` is its key when the field is a table."""
+    """Place of a parameter in the configuration; ``entry`` is its key if the field is a table."""
 
     section: str
     model: type[Section]
@@ -287,12 +288,12 @@ def _is_table(model: type[Section], field: str) -> bool:
 
 
 def plain(value: Any) -> Any:
-    """Return ``value`` as YAML and parameter services have it: a path as its text, a tuple as a list."""
+    """Return ``value`` as in YAML and parameter services: a path as its text, a tuple as a list."""
     return str(value) if isinstance(value, Path) else list(value) if isinstance(value, tuple) else value
 
 
 def describe(model: type[Section], name: str) -> Description:
-    """Return what there is to know of the parameter ``name`` of a section; of a table, what its values are."""
+    """Return the description of the parameter ``name`` of a section; of a table, that of its values."""
     field = model.model_fields[name]
     of = _without_none(get_args(field.annotation)[1] if _is_table(model, name) else field.annotation)
     choices = get_args(of) if get_origin(of) is Literal else ()
@@ -305,7 +306,7 @@ def describe(model: type[Section], name: str) -> Description:
 
 
 def _without_none(annotation: Any) -> Any:
-    """Return what an optional ``annotation`` is when it is set."""
+    """Return the type in an optional ``annotation``."""
     parts = [part for part in get_args(annotation) if part is not NoneType]
     return parts[0] if NoneType in get_args(annotation) else annotation
 

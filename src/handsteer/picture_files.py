@@ -1,7 +1,7 @@
-"""Decodes JPEG and PNG files that came from anywhere, after a look at their size and their end.
+"""Decodes JPEG and PNG files from untrusted sources, after checking their size and their end.
 
-A PNG file of 12 kB can stand for 10000x10000 pixels, so a file says how large its picture is before it is decoded. The
-end is looked for because a decoder fills up with grey, or with the picture before, what a torn file lacks.
+A PNG file of 12 kB can expand to 10000x10000 pixels, so the size in its header is checked before decoding. The end is
+checked because a decoder fills the missing part of a truncated file with grey or with the previous picture.
 """
 
 from typing import Final, Literal, NamedTuple
@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 from handsteer.errors import FrameError
 
 MOST_PIXELS: Final = 4096 * 4096
-"""Of a camera's picture; a camera of ours has at most 4096 pixels a side."""
+"""Limit for a camera's picture; handsteer's cameras have at most 4096 pixels a side."""
 
 _JPEG, _PNG = b"\xff\xd8", b"\x89PNG\r\n\x1a\n"
 _START_OF_SCAN, _END_OF_IMAGE = b"\xff\xda", b"\xff\xd9"
 _START_OF_FRAME = frozenset({*range(0xC0, 0xC4), *range(0xC5, 0xC8), *range(0xC9, 0xCC), *range(0xCD, 0xD0)})
 _SEGMENTS = frozenset({*_START_OF_FRAME, 0xC4, 0xCC, *range(0xDA, 0xE0), *range(0xE0, 0xF0), 0xFE})
-# Each makes the decoder go through the whole picture; the finest of progressive files have a dozen.
+# The decoder processes the whole picture for each scan; the finest progressive files have a dozen.
 _MOST_SCANS = 32
 _MOST_SEGMENTS = 2000
 _IMAGE_HEADER = b"\x00\x00\x00\rIHDR"
@@ -29,7 +29,7 @@ _MOST_CHUNKS = 50_000
 
 
 class FileSize(NamedTuple):
-    """What a file says of its picture: the kind of file, width and height in pixels."""
+    """What a file's header contains: the kind of file, width and height in pixels."""
 
     kind: Literal["JPEG", "PNG"]
     width: int
@@ -37,10 +37,10 @@ class FileSize(NamedTuple):
 
 
 def size_of(data: bytes) -> FileSize:
-    """Return how large the picture in a JPEG or PNG file is, without decoding it.
+    """Return the size of the picture in a JPEG or PNG file, without decoding it.
 
     Raises:
-        FrameError: It is neither, or lacks its end.
+        FrameError: It is neither, or is truncated.
     """
     if data.startswith(_JPEG):
         return _jpeg_size(data)
@@ -50,14 +50,14 @@ def size_of(data: bytes) -> FileSize:
 
 
 def decode(data: bytes, most_pixels: int = MOST_PIXELS) -> NDArray[np.uint8]:
-    """Return the picture in a JPEG or PNG file as (height, width, 3) uint8, BGR, turned as its EXIF says.
+    """Return the picture in a JPEG or PNG file as (height, width, 3) uint8, BGR, rotated by its EXIF orientation.
 
     Args:
         data: The file.
-        most_pixels: How many pixels the picture may have.
+        most_pixels: Maximum number of pixels.
 
     Raises:
-        FrameError: It is neither, is torn or damaged, or has more pixels.
+        FrameError: It is neither, is truncated or damaged, or has more pixels.
     """
     kind, width, height = size_of(data)
     if not 0 < width * height <= most_pixels:
@@ -72,11 +72,11 @@ def decode(data: bytes, most_pixels: int = MOST_PIXELS) -> NDArray[np.uint8]:
 
 
 def _jpeg_size(data: bytes) -> FileSize:
-    """Return what the frame header says (ITU-T T.81, annex B)."""
+    """Return the size in the frame header (ITU-T T.81, annex B)."""
     size, at = None, 2
     for _ in range(_MOST_SEGMENTS):
         marker, length = data[at : at + 2], int.from_bytes(data[at + 2 : at + 4], "big")
-        # What has no length would be skipped by it here, and read by the decoder: a file that is two files.
+        # This parser would skip a segment without a length that the decoder reads: one file with two meanings.
         if marker[:1] != b"\xff" or marker[1:] == b"" or marker[1] not in _SEGMENTS or length < 2:
             break
         if marker == _START_OF_SCAN:
@@ -94,7 +94,7 @@ def _jpeg_size(data: bytes) -> FileSize:
 
 
 def _check_scans(data: bytes, begin: int) -> None:
-    end = data.find(_END_OF_IMAGE, begin)  # cannot be within the pixels, where FF is followed by 00
+    end = data.find(_END_OF_IMAGE, begin)  # not part of pixel data, where FF is followed by 00
     if end < 0:
         raise FrameError(f"a torn JPEG picture: {len(data)} bytes without its end")
     if data.count(_START_OF_SCAN, begin, end) > _MOST_SCANS:
@@ -102,7 +102,7 @@ def _check_scans(data: bytes, begin: int) -> None:
 
 
 def _png_size(data: bytes) -> FileSize:
-    """Return what the first chunk says (PNG, third edition, 11.2.1)."""
+    """Return the size in the first chunk (PNG, third edition, 11.2.1)."""
     begin = len(_PNG) + len(_IMAGE_HEADER)
     if data[len(_PNG) : begin] != _IMAGE_HEADER:
         raise FrameError(f"a torn PNG picture: {len(data)} bytes without its header")
@@ -112,7 +112,7 @@ def _png_size(data: bytes) -> FileSize:
 
 
 def _check_chunks(data: bytes) -> None:
-    """Look at each chunk's length: a decoder makes room for what it says, were it gigabytes."""
+    """Check each chunk's length, because a decoder allocates that much, even gigabytes."""
     at = len(_PNG)
     for _ in range(_MOST_CHUNKS):
         length, name = int.from_bytes(data[at : at + 4], "big"), data[at + 4 : at + 8]

@@ -1,7 +1,7 @@
-"""Reads YAML that came from anywhere: plain values only, within limits that no file of ours comes near.
+"""Reads YAML from untrusted sources: plain values only, within limits far above those of handsteer's files.
 
-A few hundred bytes of YAML can stand for gigabytes (aliases of aliases, merge keys), nest as deep as a stack goes, or
-hold a number that takes minutes to read. So a text is looked through, event by event, before anything is built of it.
+A few hundred bytes of YAML can expand to gigabytes (aliases of aliases, merge keys), nest as deep as the stack, or
+contain a number that takes minutes to read. So the events of a text are checked before anything is constructed from it.
 """
 
 from collections.abc import Iterator
@@ -13,16 +13,16 @@ import yaml
 from handsteer.errors import HandsteerError
 
 LARGEST_BYTES: Final = 1_000_000
-"""Of a text; the largest that is shipped has 4 kB."""
+"""Size of a text; the largest that is shipped has 4 kB."""
 
 MOST_VALUES: Final = 20_000
 """Keys, values, lists and tables together; a thing of a world has some 20."""
 
 DEEPEST: Final = 32
-"""Lists and tables within one another."""
+"""Depth of nested lists and tables."""
 
 LONGEST_NUMBER: Final = 64
-"""Characters; Python takes minutes for some of millions."""
+"""Characters; Python takes minutes for numbers of millions."""
 
 _TAG = "tag:yaml.org,2002:"
 _COLLECTIONS = frozenset({f"{_TAG}seq", f"{_TAG}map"})
@@ -30,9 +30,9 @@ _NUMBERS = frozenset({f"{_TAG}int", f"{_TAG}float"})
 _SCALARS = _NUMBERS | {f"{_TAG}str", f"{_TAG}bool", f"{_TAG}null"}
 
 
-# Without libyaml, which all wheels have, the other reads the same, more slowly.
+# Without libyaml, which all wheels have, the other loader reads the same, more slowly.
 class _Loader(getattr(yaml, "CSafeLoader", yaml.SafeLoader)):  # type: ignore[misc]
-    """Knows texts, numbers, truth values and null; a date is a text, as in JSON and in ROS 2's parameter files."""
+    """Constructs texts, numbers, booleans and null; a date is a text, as in JSON and in ROS 2's parameter files."""
 
 
 _Loader.yaml_implicit_resolvers = {
@@ -48,16 +48,16 @@ class _ProblemError(Exception):
 
 
 def parse(text: str | bytes, source: str, error: type[HandsteerError]) -> Any:
-    """Return the value that ``text`` stands for: None, truth values, numbers, texts, lists and dicts of such.
+    """Return the value of ``text``: None, booleans, numbers, texts, and lists and dicts of these.
 
     Args:
-        text: YAML of at most :data:`LARGEST_BYTES`, without anchors, aliases, merge keys (``<<``) and tags but those of
-            plain values.
-        source: What errors call it, such as the name of a file.
-        error: What is raised.
+        text: YAML of at most :data:`LARGEST_BYTES`, without anchors, aliases, merge keys (``<<``), and tags except
+            those of plain values.
+        source: Name in error messages, such as that of a file.
+        error: Type of the error raised.
 
     Raises:
-        HandsteerError: It is no such text; of the type given. One line names the source, the line and the reason.
+        HandsteerError: The text is invalid; of the given type. One line names the source, the line and the reason.
     """
     try:
         if len(text) > LARGEST_BYTES:
@@ -68,7 +68,7 @@ def parse(text: str | bytes, source: str, error: type[HandsteerError]) -> Any:
         reason, line = str(problem), problem.line
     except yaml.YAMLError as problem:
         reason, line = "not valid YAML", getattr(getattr(problem, "problem_mark", None), "line", None)
-    except ValueError:  # what is no text in UTF-8
+    except ValueError:  # not valid UTF-8
         reason, line = "not valid YAML", None
     raise error(f"{source}{_at(line, text)}: {reason}") from None
 
@@ -77,10 +77,10 @@ def read(path: Path, source: str, error: type[HandsteerError], unreadable: str) 
     """Return the value in the file ``path``, as :func:`parse` does.
 
     Args:
-        path: The file; no more of it is read than may be.
-        source: What errors call it.
-        error: What is raised.
-        unreadable: What the error says when it cannot be read; the system's reason is put behind it.
+        path: The file; reading stops at the size limit.
+        source: Name in error messages.
+        error: Type of the error raised.
+        unreadable: Message if it cannot be read; the system's reason is appended.
 
     Raises:
         HandsteerError: As :func:`parse`, or the file cannot be read.
@@ -101,7 +101,7 @@ def _at(line: int | None, text: str | bytes) -> str:
     if line is None:
         return ""
     last = (text if isinstance(text, bytes) else text.encode(errors="replace")).rstrip().count(b"\n")
-    return f", line {min(line, last) + 1}"  # libyaml finds the end on a line after the last
+    return f", line {min(line, last) + 1}"  # libyaml reports the end on the line after the last
 
 
 def _look_through(text: str | bytes) -> None:
@@ -122,7 +122,7 @@ def _look_through(text: str | bytes) -> None:
 
 
 def _events(text: str | bytes) -> Iterator[Any]:
-    """Yield what begins and ends in ``text``, and its scalars."""
+    """Yield the beginnings and ends of values in ``text``, and its scalars."""
     for event in yaml.parse(text, _Loader):
         if isinstance(event, yaml.AliasEvent) or getattr(event, "anchor", None) is not None:
             raise _ProblemError("anchors (&) and aliases (*) are not read here: write the value out", event.start_mark)

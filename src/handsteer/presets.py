@@ -1,4 +1,4 @@
-"""What is known of real robots: topics, types, limits. Each preset goes before the defaults, and after all else.
+"""Topics, types and limits of known robots. A preset overrides the defaults, and everything else overrides it.
 
 Sources, by robot:
 
@@ -6,15 +6,15 @@ Sources, by robot:
   from Jazzy on), ``turtlebot3_navigation2`` (accelerations of 2.5 m/s² and 3.2 rad/s²).
 * TurtleBot 4: the documentation of Create 3, its base (0.306 m/s and 0.9 m/s² while its safety features are on), and
   ``turtlebot4_navigation`` (1.9 rad/s; stamped from Jazzy on).
-* turtlesim: ``turtlesim/src/turtle.cpp`` (it stops a second after the last command), ``turtle_teleop_key`` (2 m/s and
-  2 rad/s). Its field is 11 of its metres wide.
+* turtlesim: ``turtlesim/src/turtle.cpp`` (it stops a second after the last command), ``turtle_teleop_key`` (2 m/s and 2
+  rad/s). Its field is 11 of its metres wide.
 * generic: the speeds of ``teleop_twist_keyboard``.
 """
 
 from typing import Any, Literal, get_args
 
 CmdVelType = Literal["auto", "twist", "twist_stamped"]
-"""How a velocity command is sent: geometry_msgs/Twist, geometry_msgs/TwistStamped, or as the robot takes it."""
+"""Type of velocity commands: geometry_msgs/Twist, geometry_msgs/TwistStamped, or the one the robot subscribes to."""
 
 Preset = Literal["generic", "turtlebot3_burger", "turtlebot3_waffle", "turtlebot4", "turtlesim"]
 PRESETS: tuple[Preset, ...] = get_args(Preset)
@@ -25,9 +25,9 @@ _BRAKES = 0.7
 def _preset(
     linear_mps: float, angular_radps: float, linear_mps2: float, angular_radps2: float, **robot: Any
 ) -> dict[str, Any]:
-    """Return a preset: the highest speeds of control and robot, the robot's highest accelerations, and its brakes.
+    """Return a preset: maximum speeds of control and robot, maximum accelerations and deceleration of the robot.
 
-    Nobody says how hard these robots surely brake; a part of their acceleration is taken for it.
+    The guaranteed deceleration of these robots is not documented; a part of their acceleration is used instead.
     """
     speeds = {"max_linear": linear_mps, "max_angular": angular_radps}
     accelerations = {"max_linear_acceleration": linear_mps2, "max_angular_acceleration": angular_radps2}
@@ -46,9 +46,9 @@ _KNOWN: dict[str, dict[str, Any]] = {
 
 
 def preset(name: object) -> dict[str, Any]:
-    """Return what is known of the robot of this name, nested as in :class:`~handsteer.config.Config`.
+    """Return the preset of this name, nested as in :class:`~handsteer.config.Config`.
 
     Args:
-        name: One of :data:`PRESETS`; anything else gives nothing, and is refused where values are checked.
+        name: One of :data:`PRESETS`; for any other value the result is empty, and validation reports it later.
     """
     return _KNOWN.get(name, {}) if isinstance(name, str) else {}

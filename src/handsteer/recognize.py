@@ -1,4 +1,4 @@
-"""What the signs in photos and videos are, frame by frame, with no robot in sight."""
+"""Recognises the signs in photos and videos, frame by frame, without a robot."""
 
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
@@ -12,15 +12,15 @@ from handsteer.signs.recognizer import Recognition, Recognizer
 
 @dataclass(frozen=True)
 class FrameResult:
-    """What one frame shows.
+    """The result for one frame.
 
     Attributes:
-        source: The photo's path, or the video's.
-        frame: Number of the frame in its source, from 0.
-        time_s: When it is in the video, in seconds; 0 for a photo.
-        sign: The sign that counts: in a video confirmed over time, in a photo the one seen.
+        source: Path of the photo or video.
+        frame: Index of the frame in its source, from 0.
+        time_s: Time in the video, in seconds; 0 for a photo.
+        sign: The confirmed sign: in a video over time, in a photo the one seen.
         seen: The sign that this frame alone shows.
-        confidence: 0 to 1, how sure ``seen`` is.
+        confidence: Confidence of ``seen``, 0 to 1.
         handedness: ``Left`` or ``Right``, the person's own; None without a hand.
         landmarks: The 21 landmarks, image-normalised x, y and z; None without a hand.
     """
@@ -40,12 +40,12 @@ class FrameResult:
 
 
 def recognize(source: Path, recognizer: Recognizer) -> Iterator[FrameResult]:
-    """Yield what each frame of a photo, a folder of photos or a video shows.
+    """Yield the result of each frame of a photo, a folder of photos or a video.
 
-    Photos are looked at one by one, with nothing kept from one to the next; a video as a camera would give it.
+    Photos are processed independently; a video as a camera's stream.
 
     Raises:
-        CameraNotFound: There is no such file or folder, or there are no photos in it.
+        CameraNotFound: There is no such file or folder, or it contains no photos.
         CameraUnreadable: A file cannot be decoded.
     """
     if not source.exists():

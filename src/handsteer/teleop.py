@@ -1,13 +1,13 @@
-"""The whole of handsteer without nodes, topics and threads: an image in, a velocity out. Start reading here.
+"""Handsteer without nodes, topics and threads: an image in, a velocity out. Start reading here.
 
 ::
 
     image ─▶ freshness ─▶ recognizer ─▶ sign ─▶ control ─▶ velocity
 
-:class:`Teleop` is what drives a robot in a program of your own. In a ROS graph the same parts run in nodes of their
-own, joined by topics (:mod:`handsteer.graph`): the camera's node reads the images,
-:class:`~handsteer.nodes.recognition.HandSignRecognitionNode` holds freshness and recogniser, and
-:class:`~handsteer.nodes.control.HandSignControlNode` holds the control.
+:class:`Teleop` drives a robot in a program of your own. In a ROS graph the same parts run in nodes joined by topics
+(:mod:`handsteer.graph`): the camera's node reads the images,
+:class:`~handsteer.nodes.recognition.HandSignRecognitionNode` contains freshness and recogniser, and
+:class:`~handsteer.nodes.control.HandSignControlNode` contains the control.
 """
 
 import math
@@ -25,16 +25,16 @@ from handsteer.types import ZERO, Velocity
 class Teleop:
     """Drives a robot by the hand signs in a stream of images.
 
-    Nothing moves before neutral was seen: Stop, or half a second without a hand. It is asked for again after a pause
-    or a frozen camera (:doc:`/safety`). Where that is not wanted, as for a simulated robot, set ``control.arming`` to
+    Nothing moves before neutral was seen: Stop, or half a second without a hand. It is required again after a pause or
+    a frozen camera (:doc:`/safety`). To disable this, for example for a simulated robot, set ``control.arming`` to
     ``off``.
 
     Args:
-        config: Everything that can be set; the defaults when None.
-        recognizer: Recognises the signs; made of ``config`` when None.
+        config: All parameters; the defaults when None.
+        recognizer: Recognises the signs; constructed from ``config`` when None.
 
     Attributes:
-        recognition: What was understood of the last image; None when it was no new image.
+        recognition: Result for the last image; None if it was not a new image.
 
     Raises:
         ModelError: A landmark model or the sign model is missing or broken.
@@ -52,13 +52,13 @@ class Teleop:
         self._velocity = ZERO
 
     def step(self, image: NDArray[np.uint8] | None, dt_s: float) -> Velocity:
-        """Take the next image and return the velocity that holds from now on.
+        """Process the next image and return the velocity from now on.
 
-        Call it for each image, and without one at least every 0.1 s while none comes.
+        Call it for each image, and without one at least every 0.1 s while none arrives.
 
         Args:
-            image: (height, width, 3) uint8, BGR, as the camera saw it, not mirrored; None when there is no new one.
-            dt_s: Seconds since the last call, >= 0; anything else counts as a fault, and stops the robot.
+            image: (height, width, 3) uint8, BGR, as the camera saw it, not mirrored; None if there is no new one.
+            dt_s: Seconds since the last call, >= 0; any other value is a fault and stops the robot.
 
         Raises:
             FrameError: The image has another shape or type; the robot is stopped.
@@ -66,7 +66,7 @@ class Teleop:
         if not (math.isfinite(dt_s) and dt_s >= 0):
             self._refused = f"the time between two images is {dt_s} s"
             return self._fault(self._refused)
-        self._command(self._control.step(dt_s))  # who has been silent for too long is stopped before the image counts
+        self._command(self._control.step(dt_s))  # the sign timeout applies before the new image counts
         self._since_image_s += dt_s
         self._since_seen_s += dt_s
         sign = None if image is None else self._sign_of(image)
@@ -78,16 +78,16 @@ class Teleop:
         return self._velocity
 
     def stop(self) -> None:
-        """Stand until :meth:`reset`, whatever is shown."""
+        """Stop until :meth:`reset`, whatever sign is shown."""
         self._command(self._control.stop())
 
     def reset(self) -> None:
-        """End a stop; nothing moves before neutral was seen."""
+        """End a Stop; nothing moves before neutral was seen."""
         self._control.reset()
 
     @property
     def reason(self) -> str:
-        """A sentence on what the robot is told to do, and why it stands when it does."""
+        """A sentence on what is commanded, and why the robot is stopped if it is."""
         safety = self._control.safety
         if safety.is_stopped:
             return "standing: stopped, until it is reset"
@@ -98,13 +98,13 @@ class Teleop:
         return self._control.mux.reason
 
     def _sign_of(self, image: NDArray[np.uint8]) -> str | None:
-        """Return the sign that counts; None where the image is not new, which a frozen camera's are not."""
+        """Return the confirmed sign; None if the image is not new, as from a frozen camera."""
         since_image_s, self._since_image_s = self._since_image_s, 0.0
         self._refused = self._freshness.why_refused(image, since_image_s)
         if self._refused is not None:
             return None
         try:
-            # The time of images that were not looked at counts too: a sign lasts from when it was seen.
+            # The time of skipped images counts too: a sign is timed from when it was last seen.
             self.recognition = self._recognizer.step(image, self._since_seen_s)
         except Exception:
             self._fault("an image could not be looked at")

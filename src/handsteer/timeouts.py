@@ -1,52 +1,52 @@
-"""How long each part waits before it stops the robot: the one table, from which the defaults of parameters follow.
+"""How long each part waits before it stops the robot, in one table; the defaults of parameters are derived from it.
 
-The sum along the chain is what counts: from whatever fails to a zero velocity it takes at most 0.5 s.
+The sum along the chain matters: from any failure to a zero velocity it is at most 0.5 s.
 """
 
 from typing import Final
 
 STALE_S: Final = 0.35
-"""A frame, a sign or a steering command that is older than this counts as none, and is not obeyed. In seconds, as all
-that follow."""
+"""Older frames, signs and steering commands are ignored. In seconds, as all that follow."""
 
 ROBOT_S: Final = 0.4
-"""A robot that hears no command for so long brakes by itself; longer than :data:`STALE_S`, so that it is told first."""
+"""A robot without commands for this long brakes on its own; longer than :data:`STALE_S`, so that it gets a zero first.
+"""
 
 ODOMETRY_S: Final = 0.45
-"""Odometry that comes no more for so long tells that the robot is not there."""
+"""Without odometry for this long, the robot is considered absent."""
 
 FAULT_GAP_S: Final = 0.3
-"""A ``NONE`` that comes so long after the sign before it was made by a fault: no frame was looked at. Recognition keeps
-this distance between those that it makes by itself; those that were seen come with every frame."""
+"""A ``NONE`` this long after the previous sign was caused by a fault: no frame was processed. Recognition keeps this
+interval between those that it publishes without frames; those for frames come with every frame."""
 
 NEUTRAL_S: Final = 0.5
-"""An empty picture is neutral when it has been seen for so long: more than a hand that is missed for a few frames, or a
-sign that is not confirmed yet."""
+"""A picture without a hand is neutral after this time: longer than a hand is missed for a few frames, or a sign takes
+to be confirmed."""
 
 MOST_OF_ONE_NONE_S: Final = 0.1
-"""What one ``NONE`` counts of that, however long after the sign before it comes."""
+"""Maximum share of one ``NONE`` in that time, however long after the previous sign it arrives."""
 
 ARMING_S: Final = 1.0
-"""After its start the control arms no earlier, so that it has heard from others whether the robot was stopped."""
+"""The control does not arm earlier after its start, so that other nodes can report a Stop."""
 
 STEERING_AT_START_S: Final = 2.0
-"""Steering that is first heard later than this after the start was not held before it."""
+"""Steering first received later than this after the start was not held before it."""
 
 HELD_UP_S: Final = 0.1
-"""How long after a process was held up messages may still come out of sockets and queues, and are not obeyed."""
+"""For this long after a stall of the process, messages may still come from sockets and queues, and are ignored."""
 
 RECORDED_S: Final = 5.0
-"""No link delays frames by so much: what is older is a recording, or was stamped by a clock that is not in step."""
+"""No link delays frames by so much: older ones are from a recording, or from an unsynchronized clock."""
 
 BURST_S: Final = 0.01
-"""Messages that follow one another faster than this, from the moment at which a process went on, have waited, however
-long a busy machine takes to bring them; no camera and no node sends so fast."""
+"""Messages at shorter intervals, from the moment a process continues, have been waiting, however long a busy machine
+takes to deliver them; no camera and no node sends so fast."""
 
 RESYNC_S: Final = 1.0
-"""How long frames are watched after their clock was set, before they are timed by it anew."""
+"""How long frames are observed after their clock was set, before its new offset is used."""
 
 NOT_FOLLOWING_S: Final = 1.0
-"""A robot that stands for so long after it was told to move does not follow."""
+"""A robot that does not move for this long after a command does not follow."""
 
 STOOD_BY_ITSELF_S: Final = 0.1
-"""A robot that has followed, and then stands for so long though it is told to move, does not hear what it is told."""
+"""A robot that was following, and stops for this long in spite of commands, does not receive them."""

@@ -1,4 +1,4 @@
-"""What the whole project speaks of: signs, what they do, velocities and poses. Imports nothing of handsteer.
+"""Basic types of the whole project: signs, their actions, velocities and poses. Imports nothing of handsteer.
 
 Signs are named from the user's own point of view. Axes and units follow REP 103: x forward, y left, a left turn is
 positive; metres, radians, seconds.
@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 Handedness = Literal["Left", "Right"]
-"""Which hand of the person it is."""
+"""The person's hand."""
 
 STOP = "Stop"
 FORWARD = "Forward"
@@ -27,7 +27,7 @@ MOTION_SIGNS = frozenset({FORWARD, BACKWARD, TURN_RIGHT, TURN_LEFT})
 
 
 def find_sign(name: str, known: Iterable[str]) -> str | None:
-    """Return the sign of ``known`` that ``name`` means, whatever its case, spaces, ``_`` and ``-``; None if none does.
+    """Return the sign of ``known`` that ``name`` means, ignoring case, spaces, ``_`` and ``-``; None if there is none.
 
     So ``TurnRight``, ``turn_right`` and ``turn right`` all mean ``Turn Right``.
     """
@@ -39,7 +39,7 @@ def _bare(name: str) -> str:
 
 
 Action = Literal["forward", "backward", "turn_left", "turn_right", "stop", "go", "turbo", "next_robot"]
-"""Everything that a sign can do to the velocity."""
+"""All effects of a sign on the velocity."""
 
 ACTIONS: tuple[Action, ...] = get_args(Action)
 MOTION_ACTIONS: frozenset[Action] = frozenset({"forward", "backward", "turn_left", "turn_right", "turbo"})
@@ -55,7 +55,7 @@ EFFECTS: Mapping[Action, str] = {
     "turbo": "twice as fast while shown, within the limits",
     "next_robot": "the next robot is driven, once Stop was shown",
 }
-"""What each action makes the robot do, in words."""
+"""The effect of each action on the robot, in words."""
 
 BUILT_IN: Mapping[str, Action] = {
     FORWARD: "forward",
@@ -69,11 +69,11 @@ BUILT_IN: Mapping[str, Action] = {
 """The rule of the ROS 101 course, chapter 12."""
 
 ALWAYS_STOP = frozenset({STOP, NONE})
-"""What stops the robot whatever the configuration says."""
+"""Signs that stop the robot in every configuration."""
 
 
 def action_of(sign: str, given: Mapping[str, Action]) -> Action:
-    """Return what ``sign`` does: as ``given`` says, else as built in; an unknown word changes nothing, as ``Go``.
+    """Return the action of ``sign``: from ``given``, else the built-in one; an unknown sign changes nothing, as ``Go``.
 
     Names in ``given`` may have any case, and ``_`` or ``-`` for spaces.
     """
@@ -82,10 +82,10 @@ def action_of(sign: str, given: Mapping[str, Action]) -> Action:
 
 
 def motion_signs(given: Mapping[str, Action], signs: Iterable[str] = ()) -> frozenset[str]:
-    """Return the signs, of ``signs`` and of those that are named, that can make the robot move.
+    """Return the signs, built in or from ``given`` or ``signs``, that can make the robot move.
 
     Args:
-        given: Actions that go before what is built in.
+        given: Actions that override the built-in ones.
         signs: Further signs, by their own names.
     """
     return frozenset(sign for sign in {*BUILT_IN, *given, *signs} if action_of(sign, given) in MOTION_ACTIONS)
@@ -100,12 +100,12 @@ class Velocity:
 
     @property
     def is_zero(self) -> bool:
-        """Whether the robot is to stand still."""
+        """Whether the robot is to stop."""
         return self.linear_mps == 0.0 and self.angular_radps == 0.0
 
     @property
     def is_finite(self) -> bool:
-        """Whether both parts are numbers that a robot can follow."""
+        """Whether both parts are finite."""
         return math.isfinite(self.linear_mps) and math.isfinite(self.angular_radps)
 
     def clamped(self, max_linear_mps: float, max_angular_radps: float) -> "Velocity":

@@ -1,1 +1,1 @@
-"""Fakes for tests: cameras with faults, and helpers to run a graph step by step."""
+"""Helpers for tests: cameras and a transport that fail on request, and a record of a graph's commands."""

@@ -1,4 +1,4 @@
-"""A transport that loses, delays, doubles, mixes up and holds messages, when told to."""
+"""A transport that drops, delays, duplicates, reorders and holds messages on request."""
 
 import heapq
 import math
@@ -23,16 +23,16 @@ _Link = tuple[str, str]
 
 @dataclass(frozen=True)
 class LinkFault:
-    """What becomes of the messages of a topic.
+    """A fault of a topic's messages.
 
     Attributes:
-        drop: How likely each is lost, 0 to 1.
-        delay_s: How long each is under way, in seconds.
-        jitter_s: By how much longer at most, by chance. As over DDS, Zenoh and TCP, none overtakes another.
-        duplicate: How likely each comes twice, 0 to 1.
-        reorder: How likely each comes after the next one, 0 to 1; the last one, for which no next one comes, stays
-            under way.
-        frozen: Nothing comes. What was sent meanwhile comes at once when the fault ends, in its order.
+        drop: Probability that a message is lost, 0 to 1.
+        delay_s: Delay of each message, in seconds.
+        jitter_s: Maximum of the random additional delay, in seconds. The order is kept, as over DDS, Zenoh and TCP.
+        duplicate: Probability that a message arrives twice, 0 to 1.
+        reorder: Probability that a message arrives after the next one, 0 to 1; the last one, without a next one, is not
+            delivered.
+        frozen: Messages are held, and delivered at once and in order when the fault ends.
     """
 
     drop: float = 0.0
@@ -44,9 +44,9 @@ class LinkFault:
 
 
 CUT = LinkFault(drop=1.0)
-"""Nothing comes, and nothing of it ever will."""
+"""All messages are lost."""
 FROZEN = LinkFault(frozen=True)
-"""Nothing comes until the fault ends; then all at once."""
+"""Messages are held until the fault ends, then delivered at once."""
 
 
 class FaultTransport:
@@ -61,21 +61,21 @@ class FaultTransport:
         graph.run_stepped(10.0)
         transport.heal(CMD_VEL)
 
-    The same seed and the same messages give the same faults. Messages that are under way are delivered by the node
-    :attr:`wire`, in time of the graph's clock, stepped or real: it has to run with the others.
+    The same seed and the same messages give the same faults. The node :attr:`wire` delivers delayed messages in time of
+    the graph's clock, stepped or real; it must run with the other nodes.
 
     Args:
         inner: Carries the messages.
         clock: The graph's clock.
-        seed: Of all that happens by chance.
-        guards: Whether late messages are dealt with as handsteer does over DDS and Zenoh: of topics with a
-            ``lifespan_s``, none is delivered that comes by so much later than the quickest one of its sender did. A
-            transport within one process does without, and ROS 1 cannot.
-        carries_capture_times: Whether the time of a frame travels with the sign that it led to. Over ROS it does not:
-            only what has a header has a time then.
+        seed: Seed of the random numbers.
+        guards: Whether late messages are handled as over DDS and Zenoh: of topics with a ``lifespan_s``, messages are
+            dropped whose delay exceeds the sender's shortest one by more than it. A transport within one process does
+            not need this, and ROS 1 cannot do it.
+        carries_capture_times: Whether a sign carries the capture time of its frame. Over ROS, only messages with a
+            header carry a time.
 
     Attributes:
-        wire: Delivers what is under way.
+        wire: Delivers delayed messages.
     """
 
     def __init__(
@@ -94,55 +94,55 @@ class FaultTransport:
         self._carries_capture_times = carries_capture_times
         self._random = random.Random(seed)
         self._faults: dict[tuple[str, str | None], LinkFault] = {}
-        # When the last message of each link comes, of those that keep their order.
+        # Delivery time of each link's last message whose order is kept.
         self._due_s: dict[_Link, float] = {}
         self.wire = _Wire(inner, clock)
 
     def spoil(self, topic: Topic[Any] | str, fault: LinkFault, *, sender: str | None = None) -> None:
-        """Let ``fault`` befall the messages of ``topic`` that are sent from now on, in place of the one before.
+        """Apply ``fault`` to messages of ``topic`` from now on, in place of its previous fault.
 
         Args:
-            topic: The topic, or its name, as ``/image_raw``.
-            fault: What becomes of them.
-            sender: Only those of the node of this name, which goes before what is said of all.
+            topic: The topic, or its name, such as ``/image_raw``.
+            fault: The fault.
+            sender: Only for messages of this node; overrides a fault for all senders.
         """
         self._faults[_name(topic), sender] = fault
         if not fault.frozen:
             self.wire.thaw(_name(topic), sender)
 
     def heal(self, topic: Topic[Any] | str, *, sender: str | None = None) -> None:
-        """End the fault; what was frozen comes now, what is delayed in its time."""
+        """End the fault; held messages are delivered now, delayed ones when they are due."""
         self._faults.pop((_name(topic), sender), None)
         self.wire.thaw(_name(topic), sender)
 
     def advertise(self, node: str, topic: Topic[M]) -> "FaultPublisher[M]":
-        """Return the sending end of ``topic`` for the node named ``node``."""
+        """Return a publisher of ``topic`` for the node named ``node``."""
         lateness = StaleMessageFilter(topic.lifespan_s) if self._guards and topic.lifespan_s is not None else None
         return FaultPublisher(self, node, topic, self._inner.advertise(node, topic), lateness)
 
     def subscribe(self, node: str, topic: Topic[M], deliver: Callable[[Received[M]], None]) -> Subscription:
-        """Call ``deliver`` for each message on ``topic`` that comes through."""
+        """Call ``deliver`` for each message on ``topic`` that is delivered."""
         return self._inner.subscribe(node, topic, deliver)
 
     def publishers_of(self, topic: Topic[Any]) -> list[str]:
-        """Return what the transport within knows: faults befall messages, not who is there."""
+        """Return the publishers that the inner transport knows: faults affect messages only."""
         return self._inner.publishers_of(topic)
 
     def topic_name(self, topic: Topic[Any]) -> str:
-        """Return what the transport within calls ``topic``."""
+        """Return the name of ``topic`` in the inner transport."""
         return self._inner.topic_name(topic)
 
     def full_name(self, node: str) -> str:
-        """Return what the transport within calls ``node``."""
+        """Return the name of ``node`` in the inner transport."""
         return self._inner.full_name(node)
 
     def close(self) -> None:
-        """End all publishing and receiving; what is under way is lost."""
+        """End all publishing and receiving; delayed messages are lost."""
         self.wire.clear()
         self._inner.close()
 
     def send(self, node: str, topic: Topic[Any], deliver: Callable[[], None]) -> None:
-        """Call ``deliver`` when a message that ``node`` sends now comes, as often as it does."""
+        """Schedule ``deliver`` for a message that ``node`` sends now, once per copy that arrives."""
         fault = self._faults.get((topic.name, node)) or self._faults.get((topic.name, None))
         if fault is None:
             deliver()
@@ -160,7 +160,7 @@ class FaultTransport:
                 self.wire.follow(link, due_s)
 
     def captured(self, message: object, captured_s: float | None) -> float | None:
-        """Return the capture time that arrives with a ``message`` that was sent with ``captured_s``."""
+        """Return the capture time received with a ``message`` that was sent with ``captured_s``."""
         return captured_s if self._carries_capture_times else capture_time(message, self._clock)
 
     def now(self) -> float:
@@ -169,7 +169,7 @@ class FaultTransport:
 
 
 class FaultPublisher(Generic[M]):
-    """The sending end of a topic that may have a fault."""
+    """Publisher of a topic that may have a fault."""
 
     def __init__(
         self,
@@ -187,11 +187,11 @@ class FaultPublisher(Generic[M]):
 
     @property
     def has_subscribers(self) -> bool:
-        """Whether anybody listens."""
+        """Whether there are subscribers."""
         return self._inner.has_subscribers
 
     def publish(self, message: M, captured_s: float | None = None) -> None:
-        """Send ``message`` on its way."""
+        """Send ``message`` as the current fault has it."""
         check_type(self._topic, message)
         deliver = partial(self._arrive, message, captured_s, self._transport.now())
         self._transport.send(self._node, self._topic, deliver)
@@ -211,7 +211,7 @@ class _Message:
 
 
 class _Wire(Node):
-    """Holds messages until they are due, and delivers them on its own thread or by the crank of a stepped run."""
+    """Holds messages until they are due, and delivers them on its own thread or in a stepped run."""
 
     def __init__(self, transport: Transport, clock: Clock) -> None:
         super().__init__("wire", transport, clock)
@@ -221,12 +221,12 @@ class _Wire(Node):
 
     @property
     def next_due_s(self) -> float | None:
-        """When the next message comes; None when none is under way."""
+        """When the next message is due; None without one."""
         with self._wake:
             return self._under_way[0].due_s if self._under_way else None
 
     def spin_once(self) -> bool:
-        """Deliver what has come; return whether there was anything."""
+        """Deliver the messages that are due; return whether there were any."""
         with self._wake:
             due: list[_Message] = []
             while self._under_way and self._under_way[0].due_s <= self.clock.now():
@@ -236,7 +236,7 @@ class _Wire(Node):
         return bool(due)
 
     def hold(self, link: _Link, due_s: float, deliver: Callable[[], None]) -> None:
-        """Call ``deliver`` at ``due_s``; where that is infinite, after another message of ``link``, or once thawed."""
+        """Call ``deliver`` at ``due_s``; if that is infinite, after another message of ``link``, or once thawed."""
         with self._wake:
             self._number += 1
             message = _Message(due_s, self._number, link, deliver)
@@ -247,15 +247,15 @@ class _Wire(Node):
             self._wake.notify()
 
     def follow(self, link: _Link, due_s: float) -> None:
-        """Let what waits for the message of ``link`` that is due at ``due_s`` come after it."""
+        """Schedule messages that wait for the one of ``link`` due at ``due_s`` right after it."""
         self._release(lambda waiting: waiting == link, due_s)
 
     def thaw(self, topic: str, sender: str | None) -> None:
-        """Let all that was held of ``topic``, by ``sender`` or all, come now."""
+        """Deliver all held messages of ``topic`` now; those of ``sender`` only, unless it is None."""
         self._release(lambda link: link[0] == topic and sender in (None, link[1]), self.clock.now())
 
     def clear(self) -> None:
-        """Lose all that is under way."""
+        """Drop all waiting messages."""
         with self._wake:
             self._under_way, self._waiting = [], []
 

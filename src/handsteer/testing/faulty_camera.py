@@ -1,4 +1,4 @@
-"""Cameras that fail when told to: one gives a list of events, the other spoils the frames of a camera that works."""
+"""Cameras that fail on request: one plays a list of events, the other adds faults to a working camera."""
 
 from collections.abc import Callable, Iterable, Mapping
 from typing import Literal, get_args
@@ -14,19 +14,19 @@ Event = NDArray[np.uint8] | CameraError | None
 CameraFault = Literal["black", "frozen", "torn", "slow", "stuttering", "silent", "vanishing", "in_the_future", "late"]
 
 CAMERA_FAULTS: tuple[CameraFault, ...] = get_args(CameraFault)
-"""Everything that a :class:`SpoiltCamera` can suffer from."""
+"""All faults of a :class:`SpoiltCamera`."""
 
 _GREY = 128
 
 
 class FaultyCamera:
-    """Gives, at each reading, the next of a list of events; after the last one its stream ends.
+    """Plays a list of events, one per read; after the last one its stream ends.
 
     Args:
         events: An image (height, width, 3) uint8 is a frame, None is no frame, an error is raised.
         clock: Stamps the frames.
         period_s: Time between two frames.
-        age_s: How old each frame is when it comes, in seconds.
+        age_s: Age of each frame when it is read, in seconds.
     """
 
     name = "faulty camera"
@@ -47,42 +47,42 @@ class FaultyCamera:
         raise EndOfStream
 
     def close(self) -> None:
-        """Note that it was closed."""
+        """Record that it was closed."""
         self.closed = True
 
 
 class SpoiltCamera:
-    """A :class:`~handsteer.cameras.protocol.Camera` that works until it is told to fail, and again after that.
+    """A :class:`~handsteer.cameras.protocol.Camera` around another one, with a fault on request.
 
     ::
 
         camera = SpoiltCamera(VirtualHandCamera(...), clock)
         graph = ...                      # with CameraNode(transport, clock, camera)
-        camera.fail("frozen")            # from the next reading on
-        ...                              # does the robot stand?
+        camera.fail("frozen")            # from the next read on
+        ...                              # is the robot stopped?
         camera.recover()
 
     =================  =======================================================================================
     ``black``          every pixel is 0, as behind a lens cap
-    ``frozen``         the last picture, again and again, each time as if it were new
-    ``torn``           grey below some line, as decoders leave a JPEG that was cut short; the line moves
+    ``frozen``         the last picture repeatedly, each time as if it were new
+    ``torn``           grey below a moving line, as decoders leave a truncated JPEG
     ``slow``           a frame every ``slow_s`` seconds
-    ``stuttering``     frames for ``slow_s`` seconds, none for as long, over and over
+    ``stuttering``     frames for ``slow_s`` seconds, none for as long, repeatedly
     ``silent``         no frames, and no error
-    ``vanishing``      :class:`~handsteer.errors.CameraLost` at every reading
-    ``in_the_future``  stamps are ``apart_s`` seconds ahead, as by a clock that is not in step
-    ``late``           frames are ``apart_s`` seconds old when they come
+    ``vanishing``      :class:`~handsteer.errors.CameraLost` at every read
+    ``in_the_future``  stamps are ``apart_s`` seconds ahead, as from an unsynchronized clock
+    ``late``           frames are ``apart_s`` seconds old when they are read
     =================  =======================================================================================
 
     Args:
-        camera: Gives the frames.
-        clock: The clock that stamps them.
+        camera: Delivers the frames.
+        clock: Stamps the frames.
         slow_s: As above.
         apart_s: As above.
-        seed: Where the picture is torn.
+        seed: Determines where the picture is torn.
 
     Attributes:
-        fault: What it suffers from now; None when it works.
+        fault: The current fault; None if there is none.
     """
 
     def __init__(
@@ -110,30 +110,30 @@ class SpoiltCamera:
 
     @property
     def name(self) -> str:
-        """The name of the camera within."""
+        """Name of the inner camera."""
         return self._camera.name
 
     @property
     def period_s(self) -> float | None:
-        """The period of the camera within."""
+        """Frame period of the inner camera."""
         return self._camera.period_s
 
     def fail(self, fault: CameraFault) -> None:
-        """Suffer from ``fault`` from the next reading on; it takes the place of the one before."""
+        """Apply ``fault`` from the next read on, in place of the previous one."""
         if fault not in CAMERA_FAULTS:
             raise ValueError(f"there is no fault {fault!r} of a camera: use {', '.join(CAMERA_FAULTS)}")
         self.fault = fault
         self._began_s = self._given_s = self._clock.now()
 
     def recover(self) -> None:
-        """Work again from the next reading on."""
+        """End the fault from the next read on."""
         self.fault = None
 
     def read(self) -> Frame | None:
-        """Return the next frame as the fault leaves it, or None where it leaves none.
+        """Return the next frame with the fault applied, or None if there is none.
 
         Raises:
-            CameraLost: It is ``vanishing``.
+            CameraLost: The fault is ``vanishing``.
         """
         frame = self._camera.read()
         if self.fault == "vanishing":
@@ -144,7 +144,7 @@ class SpoiltCamera:
         return self._spoil[self.fault](frame)
 
     def close(self) -> None:
-        """Close the camera within."""
+        """Close the inner camera."""
         self._camera.close()
 
     def _again(self, frame: Frame) -> Frame:

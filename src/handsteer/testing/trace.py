@@ -1,4 +1,4 @@
-"""What a graph has commanded and where the robot was, for tests that look back at a drive."""
+"""Records a graph's commands and the robot's poses, for tests that examine a drive afterwards."""
 
 import math
 from bisect import bisect_right
@@ -10,10 +10,10 @@ from handsteer.types import Pose2D
 
 
 class Trace:
-    """Records from now on.
+    """Records from its construction on.
 
     Args:
-        graph: The graph to watch.
+        graph: The graph to record.
 
     Attributes:
         commands: Linear and angular velocity of each Twist, in m/s and rad/s.
@@ -30,11 +30,11 @@ class Trace:
         graph.transport.subscribe("trace", ODOM, self._on_odometry)
 
     def pose_at(self, time_s: float) -> Pose2D:
-        """Return where the robot really was, ``time_s`` seconds after the trace began."""
+        """Return the robot's actual pose ``time_s`` seconds after the start of the trace."""
         return self._poses[max(0, bisect_right(self._times_s, time_s) - 1)]
 
     def dead_reckoning(self) -> Pose2D:
-        """Return where the commands lead, if a robot could follow them at once and without slip."""
+        """Return the pose of an ideal robot that follows the commands at once and without slip."""
         x = y = yaw = 0.0
         ends = [*self._command_times_s[1:], self._now()]
         for (linear, angular), begin_s, end_s in zip(self.commands, self._command_times_s, ends, strict=True):
