@@ -1,4 +1,4 @@
-"""How messages travel between nodes."""
+"""Transports, which carry messages between nodes."""
 
 import importlib.util
 import sys
@@ -12,10 +12,10 @@ def join(transport: str, node: str, arguments: Sequence[str]) -> Session:
     """Make this process a node of a graph of several processes.
 
     Args:
-        transport: Which kind of graph, one of :data:`TRANSPORTS`.
+        transport: Kind of graph, one of :data:`TRANSPORTS`.
         node: Name of the node, unless ``arguments`` rename it.
-        arguments: In the words of the transport itself, as ROS 1 has ``image_raw:=/camera/image``, and ROS 2
-            ``--ros-args -r image_raw:=/camera/image``.
+        arguments: In the syntax of the transport, such as ``image_raw:=/camera/image`` for ROS 1, and ``--ros-args -r
+            image_raw:=/camera/image`` for ROS 2.
 
     Raises:
         TransportError: There is no such transport or graph, or an argument is wrong.
@@ -26,7 +26,7 @@ def join(transport: str, node: str, arguments: Sequence[str]) -> Session:
 
 
 def _ros1(node: str, arguments: Sequence[str]) -> Session:
-    # rospy is not everywhere, and is loaded only when it is used.
+    # rospy is not installed everywhere, so it is imported only when it is used.
     from handsteer.transports.ros1.session import Ros1Session  # noqa: PLC0415
 
     return Ros1Session(node, arguments)
@@ -78,4 +78,4 @@ TRANSPORTS: dict[str, Callable[[str, Sequence[str]], Session]] = {
     "zenoh": _zenoh,
     "auto": _auto,
 }
-"""What joins a graph of several processes, by name."""
+"""Functions that join a graph of several processes, by name of the transport."""

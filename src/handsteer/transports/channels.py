@@ -1,4 +1,4 @@
-"""What every transport does on this side of its wire: one type a topic, and one message to many subscribers."""
+"""What all transports have in common within a process: one type per topic, and several subscribers per message."""
 
 import threading
 from collections.abc import Callable
@@ -14,17 +14,17 @@ Receive = Callable[[Deliver[M]], Callable[[], None]]
 
 
 class TopicTypes:
-    """Which type each topic of this process carries."""
+    """The type of each topic in this process."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._holders: dict[str, list[type]] = {}
 
     def claim(self, name: str, topic: Topic[Any]) -> None:
-        """Note that the topic whose full name is ``name`` carries the type of ``topic``.
+        """Record that the topic whose full name is ``name`` has the type of ``topic``.
 
         Raises:
-            TransportError: It carries another.
+            TransportError: It has another type already.
         """
         with self._lock:
             holders = self._holders.setdefault(name, [])
@@ -34,29 +34,29 @@ class TopicTypes:
             holders.append(known)
 
     def release(self, name: str) -> None:
-        """Note that one of those that have claimed the topic is gone."""
+        """Release one claim of the topic."""
         with self._lock:
             self._holders[name].pop()
 
     def is_shared(self, name: str) -> bool:
-        """Return whether several have claimed the topic."""
+        """Return whether the topic was claimed more than once."""
         with self._lock:
             return len(self._holders.get(name, ())) > 1
 
 
 def check_type(topic: Topic[Any], message: object) -> None:
-    """Raise TransportError unless ``message`` is of the type that ``topic`` carries."""
+    """Raise TransportError unless ``message`` is of the type of ``topic``."""
     if not isinstance(message, topic.type):
         raise TransportError(f"{topic.name} carries {type_name(topic.type)}, not {type_name(type(message))}")
 
 
 class Fanout(Generic[M]):
-    """One topic's subscribers in this process; each message is received and decoded once for all of them.
+    """The subscribers of a topic in this process; each message is received and decoded once for all of them.
 
     Args:
         latched: Whether a late subscriber gets the last message at once.
-        receive: Begins to receive from the wire, gives each message to the function that it gets, and returns what
-            ends that. Called when a first subscriber comes. None where messages come from this process.
+        receive: Called with a function for received messages when the first subscriber is added; starts receiving, and
+            returns a function that ends it. None if messages come from this process.
     """
 
     def __init__(self, *, latched: bool, receive: Receive[M] | None = None) -> None:
@@ -84,7 +84,7 @@ class Fanout(Generic[M]):
         return FanoutSubscription(self, deliver)
 
     def remove(self, deliver: Deliver[M]) -> None:
-        """Call ``deliver`` no more; does nothing where it has been removed already."""
+        """Stop calling ``deliver``; does nothing if it was removed already."""
         with self._lock:
             self._subscribers = tuple(known for known in self._subscribers if known is not deliver)
             is_last = not self._subscribers and self._receive is not None
@@ -92,7 +92,7 @@ class Fanout(Generic[M]):
             self.close()
 
     def send(self, received: Received[M]) -> None:
-        """Give ``received`` to all subscribers, on this thread."""
+        """Deliver ``received`` to all subscribers, on this thread."""
         with self._lock:
             if self._latched:
                 self._last = received
@@ -101,22 +101,22 @@ class Fanout(Generic[M]):
             deliver(received)
 
     def close(self) -> None:
-        """Remove all subscribers and receive no more; may be called twice."""
+        """Remove all subscribers and stop receiving; may be called twice."""
         with self._lock:
             end, self._end = self._end, None
             self._subscribers, self._last = (), None
-        # Without the lock, which a message that is under way may wait for.
+        # Outside the lock, because a message that is being delivered may wait for it.
         if end is not None:
             end()
 
 
 class FanoutSubscription(Generic[M]):
-    """The receiving end of a topic."""
+    """A subscription to a topic."""
 
     def __init__(self, fanout: Fanout[M], deliver: Deliver[M]) -> None:
         self._fanout = fanout
         self._deliver = deliver
 
     def close(self) -> None:
-        """Receive no more; may be called twice."""
+        """End the subscription; may be called twice."""
         self._fanout.remove(self._deliver)

@@ -1,4 +1,4 @@
-"""The sending end of velocity commands: Twist or TwistStamped, whichever the robot takes."""
+"""A publisher of velocity commands as Twist or TwistStamped, depending on the robot's subscription."""
 
 import logging
 import math
@@ -16,16 +16,17 @@ log = logging.getLogger(__name__)
 
 
 class Commands:
-    """The sending end of a topic of velocity commands.
+    """A publisher of velocity commands.
 
-    A topic may leave open which of two types it has (``Topic.or_type``). Where the transport can tell what subscribers
-    take, :meth:`follow` sends the second as soon as anybody takes that, and the first when that is all that is taken.
-    Tools that look on take what they find, which is the first at the start; so who takes the second is a robot.
+    A topic may allow two types (``Topic.or_type``). If the transport knows the types of subscribers, :meth:`follow`
+    changes to the second type as soon as there is a subscriber of it, and to the first if there are only subscribers of
+    that. Observing tools subscribe to the type that they find, which is initially the first, so a subscriber of the
+    second is a robot.
 
     Args:
         transport: Carries the commands.
-        advertise: Returns the sending end of a topic.
-        topic: The topic, of Twist or TwistStamped, or of either.
+        advertise: Returns the publisher of a topic.
+        topic: The topic, with Twist, TwistStamped or either.
         clock: The graph's clock, for stamps.
         frame_id: Coordinate frame of a TwistStamped.
     """
@@ -43,7 +44,7 @@ class Commands:
         self._clock = clock
         self._frame_id = frame_id
         self._topic = topic
-        # In the order in which they are chosen.
+        # In order of preference.
         self._types = {type_name(kind): kind for kind in (topic.or_type, topic.type) if kind is not None}
         self._graph = transport if isinstance(transport, TellsTypes) and topic.or_type else None
         self._looked_s = -math.inf
@@ -52,22 +53,21 @@ class Commands:
 
     @property
     def has_subscribers(self) -> bool:
-        """Whether anybody listens."""
+        """Whether there are subscribers."""
         return self._publisher.has_subscribers
 
     def send(self, linear_mps: float, angular_radps: float, captured_s: float | None = None) -> None:
-        """Command a velocity, in m/s forward and rad/s to the left; ``captured_s`` is as a publisher has it."""
+        """Command a velocity, in m/s forward and rad/s to the left; ``captured_s`` is as in :class:`Publisher`."""
         stamp = self._clock.stamp(self._clock.now())
         self._publisher.publish(command(self._topic, linear_mps, angular_radps, stamp, self._frame_id), captured_s)
 
     def follow(self) -> bool:
-        """Send the type that is taken from now on; look for it four times a second, however often this is called.
+        """Change to the type of the subscribers; checks at most four times a second, however often it is called.
 
-        Whoever was commanded before a change is told to stand. Returns at once but for a change, which takes a tenth of
-        a second or two.
+        A zero is sent before a change. Returns at once, except for a change, which takes a tenth of a second or two.
 
         Returns:
-            Whether the type has changed, so that another robot may be the one that listens.
+            Whether the type has changed, so that another robot may be the subscriber.
         """
         now = self._clock.now()
         if self._graph is None or now - self._looked_s < _LOOK_PERIOD_S:
@@ -90,7 +90,8 @@ class Commands:
 
     def _change(self, graph: TellsTypes, kind: type[Any]) -> None:
         self.send(0.0, 0.0)
-        # One at a time: not every middleware lets a process have two types on one topic, and no tool shows such a one.
+        # Only one publisher at a time: not every middleware lets a process have two types on one topic, and no tool
+        # displays it.
         graph.withdraw(self._publisher)
         self._topic = replace(self._topic, type=kind, or_type=self._topic.type)
         self._publisher = self._advertise(self._topic)

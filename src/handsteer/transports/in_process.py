@@ -1,4 +1,4 @@
-"""Messages within one process: handed over by reference, no copy, no thread of its own."""
+"""Messages within one process, passed by reference on the publisher's thread."""
 
 import threading
 import weakref
@@ -23,7 +23,7 @@ class InProcessTransport:
         self._publishers: weakref.WeakSet[InProcessPublisher[Any]] = weakref.WeakSet()
 
     def advertise(self, node: str, topic: Topic[M]) -> "InProcessPublisher[M]":
-        """Return the sending end of ``topic`` for the node named ``node``."""
+        """Return a publisher of ``topic`` for the node named ``node``."""
         publisher = InProcessPublisher(topic, self._fanout(topic), node)
         with self._lock:
             self._publishers.add(publisher)
@@ -34,7 +34,7 @@ class InProcessTransport:
         return self._fanout(topic).add(deliver)
 
     def publishers_of(self, topic: Topic[Any]) -> list[str]:
-        """Return the names of the nodes that hold a sending end of ``topic``."""
+        """Return the names of the nodes that have a publisher of ``topic``."""
         with self._lock:
             return sorted(publisher.node for publisher in self._publishers if publisher.topic == topic.name)
 
@@ -61,10 +61,10 @@ class InProcessTransport:
 
 
 class InProcessPublisher(Generic[M]):
-    """The sending end of a topic.
+    """Publisher of a topic.
 
     Attributes:
-        node: Name of the node that has it.
+        node: Name of its node.
         topic: Name of the topic.
     """
 
@@ -76,10 +76,10 @@ class InProcessPublisher(Generic[M]):
 
     @property
     def has_subscribers(self) -> bool:
-        """Whether anybody listens."""
+        """Whether there are subscribers."""
         return self._fanout.has_subscribers
 
     def publish(self, message: M, captured_s: float | None = None) -> None:
-        """Hand ``message`` to every subscriber's inbox."""
+        """Deliver ``message`` to every subscriber's inbox."""
         check_type(self._topic, message)
         self._fanout.send(Received(message, captured_s))

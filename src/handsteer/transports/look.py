@@ -1,4 +1,4 @@
-"""``python -m handsteer.transports.look``: prints the ROS 2 domain that the environment names, as JSON."""
+"""``python -m handsteer.transports.look``: prints the ROS 2 graph in the environment's domain, as JSON."""
 
 import json
 import os
@@ -15,12 +15,12 @@ from handsteer.transports.observed import UNNAMED, ObservedGraph, ObservedTopic,
 from handsteer.transports.ros2.encoding import ros_type_name
 from handsteer.transports.ros2.names import NodeName
 
-# ROS 2's own tools leave out nodes whose names begin so.
+# ROS 2's own tools hide nodes whose names begin with it.
 _HIDDEN = "_"
 _TOPIC = "rt/"
 _LOOK_S = 0.02
 _AT_LEAST_S, _QUIET_S, _AT_MOST_S = 0.6, 0.4, 3.0
-# Fast DDS tells the names of nodes up to three seconds after their publishers and subscribers; most come sooner.
+# Fast DDS announces the names of nodes up to three seconds after their publishers and subscribers, most sooner.
 _NAMES_S = 2.0
 
 Ends = list[tuple[Endpoint, str | None]]
@@ -51,7 +51,7 @@ def _wait(condition: Callable[[], bool], deadline_s: float) -> None:
 
 
 def _wait_until_quiet(participant: Participant) -> None:
-    """Wait until nobody more is found."""
+    """Wait until no further node is found."""
     began_s = changed_s = time.monotonic()
     known = -1
 
@@ -83,7 +83,7 @@ def _topic(name: str, ends: list[tuple[Endpoint, str]]) -> ObservedTopic:
 
 
 def _misfits(ends: list[tuple[Endpoint, str]]) -> list[str]:
-    """Return a sentence for each publisher and subscriber that are not connected, once for those that are alike."""
+    """Return a sentence for each mismatch of a publisher and a subscriber, once for identical ones."""
     lines = [
         f"{_ros_topic(writer.topic)}: nothing passes from {publisher} to {subscriber}: {'; '.join(reasons)} "
         f"(offered: {describe(writer.qos)}; requested: {describe(reader.qos)})"
@@ -105,13 +105,13 @@ def _is_hidden(node: str) -> bool:
 
 
 def main() -> None:
-    """Print nodes, topics and what is amiss; exit code 2 when the domain cannot be joined."""
+    """Print nodes, topics and problems; exit code 2 if the domain cannot be joined."""
     try:
         seen = observe_domain(network(os.environ)).as_dict()
     except TransportError as error:
         sys.stderr.write(f"{error}\n")
         sys.stderr.flush()
-        os._exit(2)  # an engine that is half started is not waited for
+        os._exit(2)  # do not wait for a partially started middleware
     sys.stdout.write(json.dumps(seen))
 
 

@@ -1,4 +1,4 @@
-"""A graph of several processes as somebody sees who looks on: its nodes, its topics, and what is amiss."""
+"""A graph of several processes as seen by an observer: its nodes, topics and problems."""
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
@@ -6,18 +6,18 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 UNNAMED = "a node without a name"
-"""Whoever publishes or subscribes, but has not told which node it is."""
+"""Name of a node that was not announced, for its publishers and subscribers."""
 _VELOCITIES = {"geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped", "geometry_msgs/Twist"}
 
 
 @dataclass(frozen=True)
 class ObservedTopic:
-    """A topic, and who publishes it.
+    """A topic and its publishers.
 
     Attributes:
-        name: Full name, as ``/r1/image_raw``.
-        types: Its types, as ``sensor_msgs/msg/Image``; more than one is a fault.
-        publishers: The node of each publisher; a node that has two is there twice.
+        name: Full name, such as ``/r1/image_raw``.
+        types: Its types, such as ``sensor_msgs/msg/Image``; more than one is a fault.
+        publishers: The node of each publisher; a node with two publishers is listed twice.
     """
 
     name: str
@@ -27,13 +27,13 @@ class ObservedTopic:
 
 @dataclass(frozen=True)
 class ObservedGraph:
-    """What was seen of a graph.
+    """An observed graph.
 
     Attributes:
-        place: Where was looked, in words: ``domain 0, this machine``.
-        nodes: Full names; two nodes of one name are there twice.
+        place: Where it was observed, in words: ``domain 0, this machine``.
+        nodes: Full names; two nodes of one name are listed twice.
         topics: By name.
-        warnings: What is amiss, a sentence each.
+        warnings: Problems, one sentence each.
     """
 
     place: str
@@ -42,12 +42,12 @@ class ObservedGraph:
     warnings: tuple[str, ...]
 
     def as_dict(self) -> dict[str, Any]:
-        """Return all of it as plain values, for JSON."""
+        """Return the fields as plain values, for JSON."""
         return asdict(self)
 
 
 def amiss(nodes: Iterable[str], topics: Iterable[ObservedTopic]) -> list[str]:
-    """Return what is amiss whatever carries the messages: two that drive one robot, two of one name, two types."""
+    """Return problems common to all transports: several commanders or types of a topic, duplicate node names."""
     said = [
         f"{count} nodes have the name {name}: end one of them, or rename it (-r __node:=other)"
         for name, count in Counter(nodes).items()
@@ -62,7 +62,7 @@ def amiss(nodes: Iterable[str], topics: Iterable[ObservedTopic]) -> list[str]:
 
 
 def many_voices(topic: str, publishers: Sequence[str]) -> str:
-    """Return what is to be said of a topic that a robot obeys and that has several ``publishers``."""
+    """Return a warning about a command topic that has several ``publishers``."""
     return (
         f"{topic} has {len(publishers)} publishers ({', '.join(publishers)}), and a robot "
         "obeys all of them in turn: end all but one, or give each a topic of its own by remapping"

@@ -1,8 +1,8 @@
-"""Nodes of a process of its own, in a graph of another one: both ends of a pipe between a program and its child.
+"""Connects nodes in a child process to the graph of its parent by a pipe.
 
 The child's nodes use a :class:`PipedTransport`; a :class:`Gateway` in the parent publishes and subscribes for them on
-the graph's own transport. Both sit on a :class:`Pipe`, which others may use beside them. Either process may stand still
-for as long as it likes: the other one goes on, keeps the newest messages for it, and drops the rest.
+the graph's own transport. Both use a :class:`Pipe`, which may have other users too. If one process stalls, the other
+continues, keeps the newest messages for it, and drops the rest.
 """
 
 import contextlib
@@ -25,18 +25,18 @@ M = TypeVar("M")
 log = logging.getLogger(__name__)
 
 _KEPT = 16
-"""Messages of a topic that wait for a process that stands still; more than any topic's depth."""
+"""How many messages of a topic wait for a stalled process; more than any topic's depth."""
 
 _MOST_WAITING = 1000
-"""Things said that must not be dropped: a process that takes none of so many does not answer."""
+"""How many undroppable messages may wait: a process that reads none of them is stuck."""
 
 
 class Pipe:
-    """One end of a pipe to another process of this program, which is trusted: what comes is unpickled.
+    """One end of a pipe to another process of this program, which is trusted: received data is unpickled.
 
     Args:
-        source: What the other process writes.
-        sink: What it reads.
+        source: Written by the other process.
+        sink: Read by the other process.
 
     Attributes:
         ended: Set when either end is closed, or the other process has ended.
@@ -53,24 +53,24 @@ class Pipe:
         self.ended = threading.Event()
 
     def on(self, kind: str, handler: Callable[..., object]) -> None:
-        """Call ``handler`` with what the other end says of this ``kind``, on the thread that reads.
+        """Call ``handler`` for messages of this ``kind`` from the other end, on the reading thread.
 
-        All handlers must be there before the start.
+        All handlers must be added before the start.
         """
         self._handlers[kind] = handler
 
     def start(self) -> None:
-        """Begin to read and to write, on threads of their own."""
+        """Start the threads that read and write."""
         self._writer.start()
         threading.Thread(target=self._read, name="pipe_read", daemon=True).start()
 
     def say(self, kind: str, *what: object, key: Hashable = None, keep: int = _MOST_WAITING) -> None:
-        """Have the other end's handler of ``kind`` called with ``what``, in the order of all that is said.
+        """Send a message to the other end's handler of ``kind``, which is called with ``what``; the order is kept.
 
-        Returns at once. Of what was said with the same ``key``, the newest ``keep`` wait for an end that does not read.
+        Returns at once. For each ``key``, the newest ``keep`` messages wait while the other end does not read.
 
         Raises:
-            TransportError: Without a key: too much waits already.
+            TransportError: Without a key: too many messages are waiting.
         """
         with self._news:
             if self.ended.is_set():
@@ -84,10 +84,10 @@ class Pipe:
             self._news.notify()
 
     def close(self, timeout_s: float = 0.0) -> None:
-        """Say no more, and let the other end see the end; may be called twice.
+        """Stop sending and close the pipe; may be called twice.
 
         Args:
-            timeout_s: How long to wait for the other end to take what was said before.
+            timeout_s: How long to wait for the other end to read pending messages.
         """
         with self._news:
             self.ended.set()
@@ -118,7 +118,7 @@ class Pipe:
             pass  # the other end is closed
         except Exception:
             log.exception("what another process was to hear cannot be told")
-        # Nothing can be said any more, whatever it was: the other end had better know.
+        # Nothing can be sent any more, so the other end must be informed.
         self.ended.set()
         with contextlib.suppress(OSError):
             self._sink.close()
@@ -154,7 +154,7 @@ class PipedTransport:
         pipe.on("message", self._on_message)
 
     def advertise(self, node: str, topic: Topic[M]) -> "PipedPublisher[M]":
-        """Return the sending end of ``topic`` for the node named ``node``."""
+        """Return a publisher of ``topic`` for the node named ``node``."""
         self._types.claim(topic.name, topic)
         publisher = PipedPublisher(self._pipe, next(self._numbers), topic, node)
         with self._lock:
@@ -162,7 +162,7 @@ class PipedTransport:
         return publisher
 
     def subscribe(self, node: str, topic: Topic[M], deliver: Deliver[M]) -> FanoutSubscription[M]:
-        """Call ``deliver`` for each message on ``topic`` from now on, on the thread that reads."""
+        """Call ``deliver`` for each message on ``topic`` from now on, on the reading thread."""
         self._types.claim(topic.name, topic)
 
         def receive(_send: Deliver[M]) -> Callable[[], None]:
@@ -174,16 +174,16 @@ class PipedTransport:
         return fanout.add(deliver)
 
     def publishers_of(self, topic: Topic[Any]) -> list[str]:
-        """Return the names of the nodes of this process that hold a sending end of ``topic``."""
+        """Return the names of the nodes of this process that have a publisher of ``topic``."""
         with self._lock:
             return sorted(publisher.node for publisher in self._publishers if publisher.topic == topic.name)
 
     def topic_name(self, topic: Topic[Any]) -> str:
-        """Return its name, as the other process's graph has it."""
+        """Return its name in the graph of the other process."""
         return topic.name
 
     def full_name(self, node: str) -> str:
-        """Return ``node``: it is one of the other process's graph."""
+        """Return ``node``, which belongs to the graph of the other process."""
         return node
 
     def close(self) -> None:
@@ -204,15 +204,15 @@ class PipedTransport:
 
 
 class PipedPublisher(Generic[M]):
-    """The sending end of a topic.
+    """Publisher of a topic.
 
     Attributes:
-        node: Name of the node that has it.
+        node: Name of its node.
         topic: Name of the topic.
     """
 
     has_subscribers = True
-    """Whoever listens is in the other process."""
+    """The subscribers are in the other process."""
 
     def __init__(self, pipe: Pipe, number: int, topic: Topic[M], node: str) -> None:
         self.node = node
@@ -227,12 +227,12 @@ class PipedPublisher(Generic[M]):
         """Send ``message`` to the other process."""
         check_type(self._topic, message)
         if self._end.alive:
-            # Both processes have the same monotonic clock, since their machine was started.
+            # All processes of a machine share one monotonic clock.
             sent = (self._number, Received(message, captured_s), time.monotonic())
             self._pipe.say("publish", *sent, key=self._number, keep=_kept(self._topic))
 
     def close(self) -> None:
-        """Publish no more; may be called twice."""
+        """Stop publishing; may be called twice."""
         self._end()
 
 
@@ -285,5 +285,5 @@ class Gateway:
 
 
 def _kept(topic: Topic[Any]) -> int:
-    """Return how many messages of ``topic`` may wait; of pictures the newest, as they are large."""
+    """Return how many messages of ``topic`` may wait; only the newest for pictures, which are large."""
     return 1 if topic.type in (Image, CompressedImage) else _KEPT

@@ -1,4 +1,4 @@
-"""What every transport offers: topics to publish to and to subscribe to."""
+"""The interface of all transports: publishing and subscribing to topics."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -17,12 +17,12 @@ class Received(Generic[M]):
     """A message as a subscriber gets it.
 
     Attributes:
-        message: The message; it is shared with other subscribers, so it is not to be changed.
-        captured_s: When the frame that led to this message was captured, in seconds of the graph's clock; None when
-            there was no frame, or when the transport cannot carry it.
-        is_late: Whether it was held up on its way for longer than messages of its topic live: of these only those
-            come that stop the robot (``Topic.stops``), and they show nothing of what is wanted now.
-        by_player: Whether a player of recordings sent it; False when the transport cannot tell.
+        message: The message; it is shared with other subscribers and must not be changed.
+        captured_s: Capture time of the frame that led to this message, in seconds of the graph's clock; None if there
+            was no frame, or if the transport cannot carry it.
+        is_late: Whether it was delayed by more than its topic's lifespan. Only late messages that stop the robot
+            (``Topic.stops``) are delivered, and they do not show what is commanded now.
+        by_player: Whether a player of recordings sent it; False if the transport does not know.
     """
 
     message: M
@@ -32,19 +32,19 @@ class Received(Generic[M]):
 
 
 Call = Callable[[], str]
-"""What a service does, at once, on any thread: it returns a sentence, or raises a HandsteerError that says why not."""
+"""A service call: returns a sentence at once, on any thread, or raises a HandsteerError with the reason."""
 
 
 class Publisher(Protocol[M_contra]):
-    """The sending end of a topic."""
+    """Publisher of a topic."""
 
     @property
     def has_subscribers(self) -> bool:
-        """Whether anybody listens: what is made on demand is made only then."""
+        """Whether there are subscribers; messages on demand are computed only then."""
         ...
 
     def publish(self, message: M_contra, captured_s: float | None = None) -> None:
-        """Send ``message`` to whoever listens; returns at once, whatever they do.
+        """Send ``message`` to all subscribers; returns at once, whatever they do.
 
         Raises:
             TransportError: The message is of another type than the topic.
@@ -53,27 +53,27 @@ class Publisher(Protocol[M_contra]):
 
 
 class Subscription(Protocol):
-    """The receiving end of a topic."""
+    """A subscription to a topic."""
 
     def close(self) -> None:
-        """Receive no more; may be called twice."""
+        """End the subscription; may be called twice."""
         ...
 
 
 class Transport(Protocol):
     """Carries messages between nodes.
 
-    ``deliver`` is called on a thread of the transport's choice and must return at once: nodes put the message into
-    an inbox that keeps the newest only (:class:`handsteer.nodes.node.Node`).
+    ``deliver`` is called on a thread of the transport's choice and must return at once: nodes put the message into an
+    inbox that keeps the newest only (:class:`handsteer.nodes.node.Node`).
     """
 
     @property
     def crosses_network(self) -> bool:
-        """Whether it may carry messages to other machines, so that large ones had better be small."""
+        """Whether it may carry messages to other machines, so that compressed images are preferable."""
         ...
 
     def advertise(self, node: str, topic: Topic[M]) -> Publisher[M]:
-        """Return the sending end of ``topic`` for the node named ``node``.
+        """Return a publisher of ``topic`` for the node named ``node``.
 
         Raises:
             TransportError: The topic is in use with another type.
@@ -81,7 +81,7 @@ class Transport(Protocol):
         ...
 
     def subscribe(self, node: str, topic: Topic[M], deliver: Callable[[Received[M]], None]) -> Subscription:
-        """Call ``deliver`` for each message on ``topic`` from now on; a latched topic gives its last one at once.
+        """Call ``deliver`` for each message on ``topic`` from now on; a latched topic delivers its last one at once.
 
         Raises:
             TransportError: The topic is in use with another type.
@@ -91,17 +91,17 @@ class Transport(Protocol):
     def publishers_of(self, topic: Topic[Any]) -> list[str]:
         """Return the names of the nodes that publish ``topic`` now, as far as they are known; returns at once.
 
-        Each publisher counts: a node that has two is there twice, and so are two nodes of one name. Those of other
-        processes may be known late, and are missed for some seconds when they were killed.
+        A node is listed once per publisher, and two nodes of one name are listed twice. Nodes of other processes may
+        appear late, and may remain for some seconds after they were killed.
         """
         ...
 
     def topic_name(self, topic: Topic[Any]) -> str:
-        """Return what others know ``topic`` by: its full name, with namespace and remapping."""
+        """Return the full name of ``topic`` in the graph, with namespace and remapping."""
         ...
 
     def full_name(self, node: str) -> str:
-        """Return what others know the node named ``node`` by: ``process: node`` where it has a process of its own."""
+        """Return the full name of the node ``node`` in the graph: ``process: node`` if it has a process of its own."""
         ...
 
     def close(self) -> None:
@@ -111,17 +111,17 @@ class Transport(Protocol):
 
 @runtime_checkable
 class TellsTypes(Protocol):
-    """What a transport has, beside the rest, whose graph tells the types of others' subscribers."""
+    """Additional methods of a transport that knows the types of other processes' subscribers."""
 
     def subscribed_types(self, topic: Topic[Any]) -> set[str]:
         """Return the types of other processes' subscribers of ``topic``, as ``geometry_msgs/msg/Twist``, at once.
 
-        There is none that could be followed while something else in this process has the topic, too.
+        Empty while this process uses the topic elsewhere too, so that its type cannot change.
         """
         ...
 
     def withdraw(self, publisher: Any) -> None:
-        """End a sending end of this transport, once what it sent has arrived: its topic may have another type then."""
+        """Close a publisher of this transport once its messages have arrived; the topic may then have another type."""
         ...
 
 
@@ -129,8 +129,8 @@ class Session(Protocol):
     """A process's membership in a graph of several processes.
 
     Attributes:
-        name: Full name of the process in the graph, namespaces included, as ``/r1/my_camera``.
-        parameters: What the graph's own parameter service has set for this process, as it was at the start.
+        name: Full name of the process in the graph, with namespace, such as ``/r1/my_camera``.
+        parameters: Parameters of this process from the graph's own parameter service, as of the start.
         clock: The graph's time.
         transport: Carries the graph's messages.
     """
@@ -148,14 +148,14 @@ class Session(Protocol):
     def transport(self) -> Transport: ...  # noqa: D102
 
     def serve(self, parameters: NodeParameters) -> None:
-        """Let others see and set the parameters of this process's node, where the graph has a way to do so."""
+        """Let others get and set the parameters of this process's node, if the graph supports it."""
         ...
 
     def offer(self, services: Callable[[], Mapping[str, Call]]) -> None:
-        """Let others call the services ``~/name`` of this process's node, where the graph can have them so.
+        """Offer the services ``~/name`` of this process's node, if the graph supports it.
 
         Args:
-            services: Returns the services by name; not asked where the graph has none.
+            services: Returns the services by name; not called if the graph does not support services.
         """
         ...
 

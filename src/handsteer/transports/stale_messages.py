@@ -1,23 +1,23 @@
-"""Which messages were held up on their way: a link that stood still brings old ones when it goes on."""
+"""Detects messages that were delayed: a link that was interrupted delivers old ones when it recovers."""
 
 from collections import OrderedDict
 
 from handsteer.clock import ClockWatch
 
-# A sender's clock that is set back by a second is trusted again after a minute and a half; a delay lasts less.
+# A sender's clock that is set back by a second is trusted again after a minute and a half; delays are shorter.
 _LEAK = 0.01
 _SENDERS = 32
 
 
 class StaleMessageFilter:
-    """Tells late messages from others, though clocks may not be in step.
+    """Detects late messages from clocks that may not be synchronized.
 
-    What a sender's clock and ours are apart, with the shortest time on the way, is the least that arrival and sending
-    were ever apart; whatever comes later than that allows is late. A clock that was set while messages came is followed
-    after a second (:class:`~handsteer.clock.ClockWatch`). It knows the last 32 senders.
+    The smallest difference of arrival and sending times so far is the offset of the clocks plus the shortest delay; a
+    message that exceeds it by more than the limit is late. If a clock was set, the new offset is used after a second
+    (:class:`~handsteer.clock.ClockWatch`). It remembers the last 32 senders.
 
     Args:
-        limit_s: How late a message may come, in seconds.
+        limit_s: Maximum additional delay of a message, in seconds.
     """
 
     def __init__(self, limit_s: float) -> None:
@@ -25,12 +25,12 @@ class StaleMessageFilter:
         self._least: OrderedDict[bytes, tuple[float, float, ClockWatch]] = OrderedDict()
 
     def is_late(self, sender: bytes, sent_s: float, arrived_s: float) -> bool:
-        """Return whether a message has been on its way for too long; a sender's first one has not.
+        """Return whether a message was delayed for too long; a sender's first one never was.
 
         Args:
-            sender: Who sent it.
-            sent_s: When, in seconds of any clock of the sender's.
-            arrived_s: When it came, in seconds of a monotonic clock of ours.
+            sender: Identifies the sender.
+            sent_s: Time of sending, in seconds of any clock of the sender.
+            arrived_s: Time of arrival, in seconds of a local monotonic clock.
         """
         by_stamp_s = arrived_s - sent_s
         least_s, noted_s, watch = self._least.pop(sender, (by_stamp_s, arrived_s, ClockWatch(in_step=False)))

@@ -1,4 +1,4 @@
-"""When the frame behind a message was captured, as far as its header tells."""
+"""The capture time of the frame behind a message, from its header."""
 
 from typing import Any
 
@@ -9,9 +9,9 @@ _NO_STAMP = Time(sec=0, nanosec=0)
 
 
 def capture_time(message: Any, clock: Clock) -> float | None:
-    """Return when ``message`` was stamped, in seconds of ``clock``; None when it has no header or no stamp.
+    """Return the stamp of ``message``, in seconds of ``clock``; None if it has no header or no stamp.
 
-    It lies in the future where another machine's clock is ahead of ours.
+    It is in the future if another machine's clock is ahead of ours.
     """
     header = getattr(message, "header", None)
     if header is None or header.stamp == _NO_STAMP:

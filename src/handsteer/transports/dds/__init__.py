@@ -1,1 +1,1 @@
-"""The graph over DDS, as ROS 2 has it; needs the package cyclonedds."""
+"""The transport over DDS, compatible with ROS 2; needs the package cyclonedds."""

@@ -1,4 +1,4 @@
-"""What ROS 2's tools know of nodes: the topic ``ros_discovery_info``, which DDS itself has no word for."""
+"""Discovery of ROS 2 nodes by the topic ``ros_discovery_info``, because DDS itself has no concept of nodes."""
 
 import threading
 import uuid
@@ -25,12 +25,12 @@ _PREFIX_BYTES = 12
 
 
 class RosGraph:
-    """Tells others which publishers and subscribers belong to our node, and learns it of theirs.
+    """Announces which publishers and subscribers belong to our node, and learns those of other nodes.
 
     Args:
         participant: The participant of this process.
-        name: The name of this process's node; None when it only looks on, and tells nothing.
-        distribution: The ROS 2 distribution that is spoken to: identifiers have 24 bytes in ``humble``, 16 since.
+        name: Name of this process's node; None to observe without announcing anything.
+        distribution: The ROS 2 distribution of the other nodes: identifiers have 24 bytes in ``humble``, 16 since.
     """
 
     def __init__(self, participant: DomainParticipant, name: NodeName | None, distribution: str) -> None:
@@ -49,29 +49,29 @@ class RosGraph:
         self._tell()
 
     def add(self, endpoint: DataWriter[Any] | DataReader[Any]) -> None:
-        """Tell others that ``endpoint`` belongs to our node."""
+        """Announce that ``endpoint`` belongs to our node."""
         with self._lock:
             self._list_of(endpoint).append(endpoint.guid)
             self._tell()
 
     def remove(self, endpoint: DataWriter[Any] | DataReader[Any]) -> None:
-        """Tell others that ``endpoint`` is gone."""
+        """Announce that ``endpoint`` is gone."""
         with self._lock:
             self._list_of(endpoint).remove(endpoint.guid)
             self._tell()
 
     def node_of(self, endpoint: uuid.UUID) -> str | None:
-        """Return the full name of the node that has the publisher or subscriber; None when it has not been told."""
+        """Return the full name of the node of a publisher or subscriber; None if it was not announced yet."""
         with self._lock:
             return next((nodes[endpoint.bytes] for nodes in self._names.values() if endpoint.bytes in nodes), None)
 
     def nodes(self) -> list[str]:
-        """Return the full names of the nodes of others; two nodes of one name are there twice."""
+        """Return the full names of other nodes; two nodes of one name are listed twice."""
         with self._lock:
             return [name for names in self._nodes.values() for name in names]
 
     def serve(self) -> None:
-        """Learn what others have told."""
+        """Read announcements of other nodes."""
         for sample in self.reader.take(_AT_ONCE):
             if isinstance(sample, InvalidSample):
                 continue

@@ -1,4 +1,4 @@
-"""The one thread on which everything that comes over DDS is served."""
+"""The thread that processes everything received over DDS."""
 
 import logging
 import threading
@@ -19,16 +19,16 @@ _ANY = SampleState.Any | ViewState.Any | InstanceState.Any
 
 
 class Dispatcher:
-    """Calls what serves a reader when there is something to take from it.
+    """Calls a function for each reader that has messages.
 
     Listeners would run on the threads of Cyclone DDS, which hold its locks while they wait for Python's.
 
     Args:
-        participant: Whose readers are served.
+        participant: The participant of the readers.
     """
 
     def __init__(self, participant: DomainParticipant) -> None:
-        # Kept while its thread serves: a start that a signal breaks off forgets the participant without closing it.
+        # Referenced while the thread runs: a start interrupted by a signal drops the participant without closing it.
         self._participant: DomainParticipant | None = participant
         self._waitset = WaitSet(participant)
         self._guard = GuardCondition(participant)
@@ -40,23 +40,23 @@ class Dispatcher:
         self._thread = threading.Thread(target=self._run, name="dds", daemon=True)
 
     def start(self) -> None:
-        """Serve from now on."""
+        """Start the thread."""
         self._thread.start()
 
     def add(self, reader: DataReader[Any], serve: Callable[[], None]) -> None:
-        """Call ``serve``, which has to take all that there is, whenever ``reader`` has something."""
+        """Call ``serve``, which must take all messages, whenever ``reader`` has some."""
         condition = ReadCondition(reader, _ANY)
         with self._lock:
             self._served[reader] = (condition, serve)
             self._waitset.attach(condition)
 
     def tick(self, call: Callable[[], None]) -> None:
-        """Call ``call`` four times a second, and whenever something has come."""
+        """Call ``call`` four times a second, and whenever something was received."""
         with self._lock:
             self._ticks = (*self._ticks, call)
 
     def remove(self, reader: DataReader[Any]) -> None:
-        """Serve ``reader`` no more; one call may still be under way."""
+        """Stop calling for ``reader``; one call may still be running."""
         with self._lock:
             condition, _ = self._served.pop(reader)
             self._waitset.detach(condition)
@@ -86,7 +86,7 @@ class Dispatcher:
         with self._lock:
             served = list(self._served.values())
         for condition, serve in served:
-            # Asking is cheaper than taking nothing, which most have when a message has come for one.
+            # Checking is cheaper than an empty take, and usually only one reader has messages.
             if condition.triggered:
                 self._guarded(serve)
 
@@ -96,4 +96,4 @@ class Dispatcher:
         except Exception:
             if not self._closing.is_set():
                 log.exception("DDS: a message could not be served")
-                self._closing.wait(_AFTER_FAILURE_S)  # what fails again and again must not take the whole machine
+                self._closing.wait(_AFTER_FAILURE_S)  # repeated failures must not use up the processor

@@ -1,4 +1,4 @@
-"""The network cards of this machine."""
+"""The network interfaces of this machine."""
 
 import contextlib
 import socket
@@ -16,7 +16,7 @@ _GET_FLAGS, _GET_ADDRESS = 0x8913, 0x8915
 def multicast_addresses() -> dict[str, str]:
     """Return the IPv4 address of each network interface that is up and has multicast, without loopback and tunnels.
 
-    Empty where the system does not tell (Windows).
+    Empty where the system does not provide them (Windows).
     """
     found = {}
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as asking:

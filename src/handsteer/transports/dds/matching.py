@@ -1,6 +1,6 @@
-"""Says in words why a publisher and a subscriber of one topic are not connected; DDS itself keeps silent.
+"""Explains in words why a publisher and a subscriber of one topic are not connected; DDS does not report it.
 
-It also says when raw images go to where many of them are lost, though they could go as JPEG.
+It also reports raw images to a subscriber that will lose many of them, though they could be sent as JPEG.
 """
 
 import logging
@@ -27,11 +27,11 @@ from handsteer.transports.ros2.encoding import dds_type_name, ros_type_name
 log = logging.getLogger(__name__)
 
 _AT_ONCE = 64
-# A node tells its name after its publishers and subscribers: Cyclone DDS at once, Fast DDS up to three seconds later.
+# Nodes announce their names after their publishers and subscribers: Cyclone DDS at once, Fast DDS within three seconds.
 _NAME_DUE_S = 4.0
 _IMAGE = dds_type_name(type_name(Image))
 _COMPRESSED = "/compressed"
-# Identifiers begin with the number of the vendor, and with twelve bytes that all of a participant have (RTPS 2.5, 9.3).
+# Identifiers begin with the number of the vendor, and with twelve bytes common to a participant (RTPS 2.5, 9.3).
 _FAST_DDS = b"\x01\x0f"
 _PREFIX_BYTES = 12
 _PARTICIPANTS = 1000
@@ -42,11 +42,11 @@ class Endpoint:
     """A publisher or subscriber.
 
     Attributes:
-        topic: Its name in DDS, as ``rt/image_raw``.
+        topic: Its name in DDS, such as ``rt/image_raw``.
         type: Name of its type in DDS.
-        qos: What it offers or requests.
+        qos: The QoS offered or requested.
         publishes: Whether it is a publisher.
-        or_type: Another type that it changes to where that is subscribed to.
+        or_type: Another type that it changes to if there is a subscriber of it.
     """
 
     topic: str
@@ -57,7 +57,7 @@ class Endpoint:
 
     @property
     def kind(self) -> str:
-        """What it is, in words."""
+        """``publisher`` or ``subscriber``, for messages."""
         return "publisher" if self.publishes else "subscriber"
 
 
@@ -65,8 +65,8 @@ class Matching:
     """Compares our publishers and subscribers with those of others.
 
     Args:
-        participant: The participant of this process; its own are taken to fit.
-        graph: Knows the names of nodes, as far as they have been told.
+        participant: The participant of this process; its own endpoints are assumed to match.
+        graph: Provides the names of nodes, as far as they were announced.
     """
 
     def __init__(self, participant: DomainParticipant, graph: RosGraph) -> None:
@@ -83,18 +83,18 @@ class Matching:
         self.subscriptions: Any = BuiltinDataReader(participant, BuiltinTopicDcpsSubscription)
 
     def add(self, endpoint: Endpoint) -> None:
-        """Compare a publisher or subscriber of ours with those of others, now and later."""
+        """Compare our publisher or subscriber with those of others, now and later."""
         with self._lock:
             self._ours[endpoint.topic, endpoint.publishes] = endpoint
             for key in self._theirs:
                 self._compare(key)
 
     def serve_publications(self) -> None:
-        """Note publishers that have come or gone."""
+        """Process new and removed publishers."""
         self._serve(self.publications, publishes=True)
 
     def serve_subscriptions(self) -> None:
-        """Note subscribers that have come or gone."""
+        """Process new and removed subscribers."""
         self._serve(self.subscriptions, publishes=False)
 
     def others(self) -> dict[uuid.UUID, Endpoint]:
@@ -103,7 +103,7 @@ class Matching:
             return dict(self._theirs)
 
     def tick(self) -> None:
-        """Report what does not fit, once the other's name is known, or after a while without it."""
+        """Report mismatches, once the other node's name is known, or after a while without it."""
         now = time.monotonic()
         with self._lock:
             due = [key for key, due_s in self._pending.items() if due_s <= now or self._graph.node_of(key)]
@@ -114,7 +114,7 @@ class Matching:
             log.warning("%s", line)
 
     def close(self) -> None:
-        """Look no more; may be called twice."""
+        """Stop comparing; may be called twice."""
         self.publications = self.subscriptions = self._participants = None
 
     def _serve(self, reader: Any, *, publishes: bool) -> None:
@@ -129,7 +129,7 @@ class Matching:
                     self._forget(seen.key)
 
     def _ours_for(self, key: uuid.UUID) -> Endpoint | None:
-        """Return our end of the topic of another's publisher or subscriber."""
+        """Return our endpoint on the topic of another's publisher or subscriber."""
         theirs = self._theirs[key]
         return self._ours.get((theirs.topic, not theirs.publishes))
 
@@ -178,7 +178,7 @@ class Matching:
 
 
 def reasons(ours: Endpoint, theirs: Endpoint) -> list[str]:
-    """Return why a publisher and a subscriber of one topic are not connected, in words; empty when they are."""
+    """Return why a publisher and a subscriber of one topic are not connected, in words; empty if they are."""
     if theirs.type == ours.or_type:
         return []
     if ours.type != theirs.type:
@@ -187,7 +187,7 @@ def reasons(ours: Endpoint, theirs: Endpoint) -> list[str]:
 
 
 def explain(ours: Endpoint, theirs: Endpoint, node: str | None) -> str:
-    """Return one line that says which ends are not connected, why, and both profiles."""
+    """Return one line with the two endpoints that are not connected, the reasons, and both profiles."""
     who = node or "a node without a name"
     return (
         f"{ours.topic.removeprefix('rt')}: nothing passes between our {ours.kind} and the {theirs.kind} of {who}: "

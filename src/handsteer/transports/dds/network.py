@@ -1,4 +1,4 @@
-"""Which DDS domain to join and over which network, as ROS 2's environment variables say."""
+"""Selects the DDS domain and the network from ROS 2's environment variables."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -10,20 +10,20 @@ from handsteer.transports.ros2.names import domain_id
 
 _RANGES = ("LOCALHOST", "SUBNET", "OFF", "SYSTEM_DEFAULT")
 _ADDRESS = re.compile(r"[A-Za-z0-9_.:%\[\]-]+")
-# How soon others find us whose own words do not reach us, or again after a cut that was so long that they gave us up:
+# How soon others find us if they cannot reach us by their own announcements, or again after a loss of connection;
 # Cyclone's default is half a minute.
 _ANNOUNCE_S = 2
-# To each address go as many packets as there are places. Who looks at the subnet by Cyclone DDS listens on one network
-# card only, the first good one.
+# A packet per port is sent to each address. Participants of Cyclone DDS with range subnet use only one network card,
+# the first suitable one.
 _OWN_ADDRESSES = 3
-# Every process of a machine has the two UDP ports of its index: known to firewalls, and to others by address alone.
-# Where others are looked for by address, all their ports are tried, so that there are fewer.
+# Every process uses the two UDP ports of its index, which firewalls and static peers rely on. If others are found by
+# address, all ports are tried, so there are fewer.
 PLACES, PLACES_BY_MULTICAST = 33, 120
-# Four raw images: with the engine's own 1 MB, a process that is held up for a frame or two loses one. The system gives
-# what it allows (Linux: net.core.rmem_max), and nothing is said where that is less.
+# Four raw images: with the default of 1 MB, a process that stalls for a frame or two loses one. The system may give
+# less (Linux: net.core.rmem_max), without any report.
 _RECEIVE_BUFFER = "4MiB"
 # No writer waits for a slow reader, however large its messages are: each keeps a few, and drops older ones for newer.
-# With the engine's own 500 kB, one raw image that is not confirmed yet would keep the next from being sent.
+# With the default of 500 kB, one unconfirmed raw image would delay the next.
 _UNCONFIRMED = "1GiB"
 _PLACES = {
     "LOCALHOST": "this machine",
@@ -42,10 +42,9 @@ class Network:
     Attributes:
         domain: Number of the DDS domain, 0 to 232.
         config: Configuration of Cyclone DDS, as XML; None leaves it to the user's ``CYCLONEDDS_URI`` or its defaults.
-        distribution: The ROS 2 distribution whose discovery is spoken: ``humble``, or ``jazzy`` for all newer ones.
+        distribution: The ROS 2 distribution for discovery: ``humble``, or ``jazzy`` for all newer ones.
         reach: One of ROS 2's ranges, ``PEERS`` for this machine and static peers, or ``CYCLONEDDS_URI``.
-        places: How many participants of the domain find ports of their own on this machine; None when it is not ours
-            to say.
+        places: How many participants of the domain can have ports of their own on this machine; None if unknown.
     """
 
     domain: int
@@ -56,24 +55,24 @@ class Network:
 
     @property
     def is_local(self) -> bool:
-        """Whether only this machine is looked at, for sure."""
+        """Whether it is certainly restricted to this machine."""
         return self.reach in {"LOCALHOST", "OFF"}
 
     @property
     def place(self) -> str:
-        """Where is looked, in words."""
+        """Domain and range, in words."""
         return f"domain {self.domain}, {_PLACES[self.reach]}"
 
 
 def network(environment: Mapping[str, str], addresses: Sequence[str] | None = None) -> Network:
-    """Return what ``environment`` says; without a word of it, only this machine is looked at.
+    """Return the network configured by ``environment``; by default, only this machine.
 
     ``ROS_DOMAIN_ID``, ``ROS_LOCALHOST_ONLY``, ``ROS_AUTOMATIC_DISCOVERY_RANGE``, ``ROS_STATIC_PEERS`` and
-    ``ROS_DISTRO`` count as in ROS 2; the user's ``CYCLONEDDS_URI`` goes before all but the domain.
+    ``ROS_DISTRO`` have their meanings in ROS 2; the user's ``CYCLONEDDS_URI`` overrides all but the domain.
 
     Args:
         environment: Environment variables.
-        addresses: Those of this machine's network cards, where who looks at the subnet listens; None asks the system.
+        addresses: Those of this machine's network cards, used by nodes with range subnet; None asks the system.
 
     Raises:
         TransportError: A variable has a value that is not allowed.
@@ -136,10 +135,11 @@ def _config(reach: str, peers: Sequence[str], places: int, own: Sequence[str]) -
 
 
 def _interfaces(own: Sequence[str]) -> str:
-    """Return the network cards that are used by who stays within this machine.
+    """Return the network interfaces of a participant that is restricted to this machine.
 
-    Who looks at the subnet by Cyclone DDS is not on loopback, so it is met on the card that both choose. Without
-    multicast no other machine is told of us, nor heard. Our own nodes stay on loopback, whatever becomes of the card.
+    Participants of Cyclone DDS with range subnet do not use loopback, so they are reached on the card that both select.
+    Without multicast, other machines are neither sent nor received from. Our own nodes use loopback, which does not
+    depend on the card.
     """
     card = '<NetworkInterface autodetermine="true"/>' if own else ""
     return f'<Interfaces>{card}<NetworkInterface address="127.0.0.1"/></Interfaces>'

@@ -1,4 +1,4 @@
-"""This process as a participant of a DDS domain and a node of ROS 2: what it publishes and subscribes to."""
+"""This process as a participant of a DDS domain and a node of ROS 2, with its publishers and subscribers."""
 
 import itertools
 import threading
@@ -32,12 +32,12 @@ class Participant:
 
     Attributes:
         name: The node's name.
-        is_local: Whether all others are on this machine, for sure.
+        is_local: Whether all others are certainly on this machine.
 
     Args:
         network: The domain, and where to look for others.
         name: The node's name.
-        looks_on: Whether it is no node for others, and only looks.
+        looks_on: Whether it only observes, and announces no node.
 
     Raises:
         TransportError: The domain cannot be joined.
@@ -83,11 +83,11 @@ class Participant:
         return reader
 
     def service(self, name: str, service: Service) -> tuple[DataReader[Any], DataWriter[Any]]:
-        """Return a new reader of the requests and a new writer of the replies of the service of this full name."""
-        # As ROS 2 makes them: the participant's part of an identifier, and a number.
+        """Return a reader of the requests and a writer of the replies of the service of this full name."""
+        # As in ROS 2: the participant's part of an identifier, and a number.
         number = next(self._service_numbers).to_bytes(4, "big")
         identity = ".".join(f"{byte:x}" for byte in self._participant.guid.bytes[:12] + number)
-        # Cyclone DDS checks what comes, and complains on the terminal of each request that a client on Fast DDS sends.
+        # Cyclone DDS checks received messages, and prints a warning for each request of a client on Fast DDS.
         requests = DdsTopic(self._participant, f"rq{name}Request", opaque_type(dds_type_name(service.request)))
         replies = DdsTopic(self._participant, f"rr{name}Reply", service_dds_type(service.reply))
         reader: DataReader[Any] = DataReader(self._participant, requests, qos=service_qos(service.request, identity))
@@ -97,19 +97,19 @@ class Participant:
         return reader, writer
 
     def tick(self, call: Callable[[], None]) -> None:
-        """Call ``call`` on the DDS thread, four times a second and whenever something has come."""
+        """Call ``call`` on the DDS thread, four times a second and whenever something was received."""
         self._dispatcher.tick(call)
 
     def serve(self, reader: DataReader[Any], serve: Callable[[], None]) -> None:
-        """Call ``serve`` on the DDS thread whenever ``reader`` has something, until it is released."""
+        """Call ``serve`` on the DDS thread whenever ``reader`` has messages, until it is released."""
         self._dispatcher.add(reader, serve)
 
     def others(self) -> tuple[list[str], list[tuple[Endpoint, str | None]]]:
-        """Return the nodes of other processes, and their publishers and subscribers with the node of each, if told."""
+        """Return the nodes of other processes, and their publishers and subscribers with the node of each, if known."""
         return self._graph.nodes(), [(end, self._graph.node_of(key)) for key, end in self._matching.others().items()]
 
     def publishers_of(self, topic: Topic[Any]) -> list[str]:
-        """Return the node of each publisher of ``topic`` in other processes, as far as it has told its name."""
+        """Return the node of each publisher of ``topic`` in other processes, as far as names are known."""
         name = self._dds_name(topic)
         return [
             self._graph.node_of(key) or UNNAMED
@@ -123,7 +123,7 @@ class Participant:
         return {ros_type_name(end.type) for end in others if not end.publishes and end.topic == name}
 
     def release(self, endpoint: DataWriter[Any] | DataReader[Any]) -> None:
-        """Let go of a writer or reader; it is gone when the caller forgets it too."""
+        """Release a writer or reader; it is deleted when the caller drops its reference too."""
         if isinstance(endpoint, DataReader):
             self._dispatcher.remove(endpoint)
         self._graph.remove(endpoint)

@@ -1,7 +1,7 @@
-"""Quality of service in DDS: our profiles in its terms, and why two ends do not fit.
+"""Quality of service in DDS: conversion of our profiles, and the reasons why two endpoints do not match.
 
-A writer never waits for a slow reader. Commands and signs have a lifespan, so that a link that comes back does not
-bring old ones; the log has one, so that who comes late gets what is new.
+A writer never waits for a slow reader. Commands and signs have a lifespan, so that old ones are not delivered after a
+loss of connection; the log has one, so that a late subscriber gets recent records only.
 """
 
 from typing import Any
@@ -28,9 +28,9 @@ _REQUESTS = 1000
 
 
 def writer_qos(topic: Topic[Any]) -> Qos:
-    """Return what a publisher of ``topic`` offers."""
+    """Return the QoS offered by a publisher of ``topic``."""
     policies = list(_qos(topic, offered(topic)))
-    if topic.latched:  # late subscribers get as many as are kept
+    if topic.latched:  # late subscribers get all kept messages
         policies.append(Policy.DurabilityService(0, Policy.History.KeepLast(topic.depth), -1, -1, -1))
     if topic.lifespan_s is not None:
         policies.append(Policy.Lifespan(round(topic.lifespan_s * _NS_PER_S)))
@@ -38,12 +38,12 @@ def writer_qos(topic: Topic[Any]) -> Qos:
 
 
 def reader_qos(topic: Topic[Any]) -> Qos:
-    """Return what a subscriber of ``topic`` requests."""
+    """Return the QoS requested by a subscriber of ``topic``."""
     return _qos(topic, requested(topic))
 
 
 def discovery_qos(name: str, depth: int) -> Qos:
-    """Return what ROS 2 has for ``ros_discovery_info``, of which a writer keeps one and a reader one of each writer.
+    """Return ROS 2's QoS for ``ros_discovery_info``; a writer keeps one message, a reader one per writer.
 
     Args:
         name: The message type.
@@ -54,7 +54,7 @@ def discovery_qos(name: str, depth: int) -> Qos:
 
 
 def service_qos(name: str, service: str) -> Qos:
-    """Return what ROS 2 has for both ends of a parameter service.
+    """Return ROS 2's QoS for both endpoints of a parameter service.
 
     Args:
         name: Type of the request or the reply.
@@ -65,20 +65,20 @@ def service_qos(name: str, service: str) -> Qos:
 
 
 def user_data(qos: Qos) -> dict[str, str]:
-    """Return what ROS 2 has put into the user data: ``typehash``, ``clientid`` and others."""
+    """Return ROS 2's entries in the user data: ``typehash``, ``clientid`` and others."""
     data = _find(qos, "Userdata")
     text = data.data.decode("utf-8", "replace") if data is not None else ""
     return {name: value for name, equals, value in (part.partition("=") for part in text.split(";")) if equals}
 
 
 def host(qos: Qos) -> str | None:
-    """Return the name of the machine that a participant of Cyclone DDS is on; None when it does not say."""
+    """Return the host name in the announcement of a participant of Cyclone DDS; None if it has none."""
     found = _find(qos, "Property<__Hostname>")
     return found.value if found is not None else None
 
 
 def describe(qos: Qos) -> str:
-    """Return the profile in words, as ``reliable, volatile, keep last 1``; the depth of others is not known."""
+    """Return the profile in words, as ``reliable, volatile, keep last 1``; the depth of others is unknown."""
     words = [_reliability(qos), _durability(qos)]
     history = _find(qos, "History")
     if isinstance(history, Policy.History.KeepLast):
@@ -87,7 +87,7 @@ def describe(qos: Qos) -> str:
 
 
 def misfits(offered: Qos, requested: Qos) -> list[str]:
-    """Return what a publisher lacks for a subscriber, in words; empty when they fit (DDS 1.4, section 2.2.3)."""
+    """Return why an offer does not satisfy a request, in words; empty if it does (DDS 1.4, section 2.2.3)."""
     found = []
     if _reliability(requested) == "reliable" and _reliability(offered) != "reliable":
         found.append("the publisher is best effort, the subscriber wants reliable")
@@ -106,7 +106,7 @@ def misfits(offered: Qos, requested: Qos) -> list[str]:
     return found
 
 
-# ROS 2's nodes speak the first version of CDR, and newer Cyclone DDS might choose the second.
+# ROS 2's nodes use the first version of CDR, but newer Cyclone DDS might select the second.
 _CDR = Policy.DataRepresentation(use_cdrv0_representation=True)
 
 

@@ -1,10 +1,9 @@
-"""Services over DDS as rmw_cyclonedds_cpp has them: one topic for requests, one for replies.
+"""Services over DDS as in rmw_cyclonedds_cpp: one topic for requests, one for replies.
 
-Before the body of both stand 16 bytes that tell which request a reply is for: eight that name the client, and a number,
-int64, that counts its requests. They are no part of ROS 2's type, and its own nodes send no definition in which they
-would be missed. A client's reader and writer have the same ``clientid=``
-in their user data, a server's the same ``serviceid=``. A client of Fast DDS says in the headers of RTPS instead who
-asks, which Cyclone DDS shows to nobody: it is left alone here, and needs nodes by rclpy.
+The body of both follows a header of 16 bytes that identifies the request: eight bytes for the client, and its request
+number, int64. The header is not in ROS 2's type definitions. A client's reader and writer have the same ``clientid=``
+in their user data, a server's the same ``serviceid=``. A client of Fast DDS identifies itself in the headers of RTPS
+instead, which Cyclone DDS does not expose: such requests are ignored here, and need nodes by rclpy.
 """
 
 import logging
@@ -37,13 +36,13 @@ class _Reply:
 
 
 class ServiceServer:
-    """Answers the requests of a service, on the DDS thread.
+    """Replies to the requests of a service, on the DDS thread.
 
     Args:
         participant: This process in its DDS domain.
-        name: Full name of the service, as ``/my_camera/list_parameters``.
+        name: Full name of the service, such as ``/my_camera/list_parameters``.
         service: Its type.
-        answer: Turns a request into a reply; returns at once.
+        answer: Converts a request to a reply; returns at once.
     """
 
     def __init__(self, participant: Participant, name: str, service: Service, answer: Callable[[Any], Any]) -> None:
@@ -51,7 +50,7 @@ class ServiceServer:
         self._name = name
         self._service = service
         self._answer = answer
-        # A client may be heard before its reader is known here, and would never get a reply that is sent at once.
+        # A request may arrive before the client's reader is discovered, which would miss an immediate reply.
         self._waiting: list[_Reply] = []
         self._reader: Any
         self._writer: Any
@@ -60,7 +59,7 @@ class ServiceServer:
         participant.tick(self._send_waiting)
 
     def close(self) -> None:
-        """Answer no more; may be called twice."""
+        """Stop replying; may be called twice."""
         reader, writer, self._reader, self._writer = self._reader, self._writer, None, None
         if reader is not None:
             self._participant.release(reader)
@@ -76,7 +75,7 @@ class ServiceServer:
     def _take(self, reader: Any, sample: Any) -> None:
         asker = reader.get_matched_publication_data(sample.sample_info.publication_handle)
         if asker is None:
-            return  # it has gone already
+            return  # it has left already
         client = user_data(asker.qos).get("clientid")
         if client is None:
             return
@@ -84,7 +83,7 @@ class ServiceServer:
             header, request = _open(sample.raw, self._service.request)
             reply = _close(header, self._answer(request))
         except Exception as error:
-            # Whatever the network brings must not end the answering.
+            # Invalid requests must not end the service.
             log.warning("%s: a request of %d bytes cannot be answered: %s", self._name, len(sample.raw), error)
             return
         self._waiting.append(_Reply(client, reply, time.monotonic() + _WAIT_FOR_READER_S))
@@ -114,7 +113,7 @@ def _open(raw: bytes, kind: str) -> tuple[tuple[int, int], Any]:
     little = raw[1] & 1
     start = _CDR_HEADER + _REQUEST_HEADER
     client, number = struct.unpack("<Qq" if little else ">Qq", raw[_CDR_HEADER:start])
-    # The body begins at a multiple of eight bytes, so that it is as it would be without the header.
+    # The body begins at a multiple of eight bytes, so its alignment is the same without the header.
     return (client, number), decode(raw[:_CDR_HEADER] + raw[start:], kind)
 
 

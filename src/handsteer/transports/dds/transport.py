@@ -1,4 +1,4 @@
-"""This process as a node of a ROS 2 graph over DDS, which carries the messages of all nodes in it."""
+"""This process as a node of a ROS 2 graph over DDS, which carries the messages of all its nodes."""
 
 import logging
 import os
@@ -32,9 +32,9 @@ log = logging.getLogger(__name__)
 
 
 class DdsTransport:
-    """A :class:`~handsteer.transports.protocol.Transport` over DDS, as ROS 2 has it.
+    """A :class:`~handsteer.transports.protocol.Transport` over DDS, compatible with ROS 2.
 
-    Capture times travel in the stamps of message headers; messages without a header come without one.
+    Capture times are the stamps of message headers; messages without a header have none.
 
     Args:
         participant: This process in its DDS domain.
@@ -55,7 +55,7 @@ class DdsTransport:
         return not self._participant.is_local
 
     def advertise(self, node: str, topic: Topic[M]) -> "DdsPublisher[M]":
-        """Return the sending end of ``topic`` for the node named ``node``."""
+        """Return a publisher of ``topic`` for the node named ``node``."""
         publisher = DdsPublisher(self._participant, topic, self._claim(topic))
         with self._lock:
             self._publishers.append(publisher)
@@ -78,12 +78,12 @@ class DdsTransport:
         return sorted([*ours, *self._participant.publishers_of(topic)])
 
     def subscribed_types(self, topic: Topic[Any]) -> set[str]:
-        """Return the types of other processes' subscribers of ``topic``; none while it is used twice here."""
+        """Return the types of other processes' subscribers of ``topic``; none while this process uses it twice."""
         is_shared = self._types.is_shared(self._participant.name.topic(topic))
         return set() if is_shared else self._participant.subscribed_types(topic)
 
     def withdraw(self, publisher: "DdsPublisher[Any]") -> None:
-        """End a sending end, once its readers have what it sent."""
+        """Close a publisher once its readers have what it sent."""
         publisher.flush(_LAST_S)
         with self._lock:
             self._publishers.remove(publisher)
@@ -95,7 +95,7 @@ class DdsTransport:
         return self._participant.name.topic(topic)
 
     def full_name(self, node: str) -> str:
-        """Return the ROS 2 node's name and ``node``, as ROS's own diagnostics do: ``r1/my_camera: my_camera``."""
+        """Return the ROS 2 node's name and ``node``, as in ROS's own diagnostics: ``r1/my_camera: my_camera``."""
         return f"{self._participant.name.full.removeprefix('/')}: {node}"
 
     def flush(self, timeout_s: float) -> None:
@@ -127,7 +127,7 @@ class DdsTransport:
 
 
 class DdsPublisher(Generic[M]):
-    """The sending end of a topic.
+    """Publisher of a topic.
 
     Attributes:
         name: Full name of the topic.
@@ -143,12 +143,12 @@ class DdsPublisher(Generic[M]):
 
     @property
     def has_subscribers(self) -> bool:
-        """Whether anybody listens, in this process or another."""
+        """Whether there are subscribers, in this process or another."""
         writer = self._writer
         return writer is not None and writer.get_publication_matched_status().current_count > 0
 
     def publish(self, message: M, captured_s: float | None = None) -> None:
-        """Give ``message`` to the network; a reader that is too slow for it goes without."""
+        """Send ``message``; readers that are too slow miss it."""
         check_type(self._topic, message)
         writer = self._writer
         if writer is None or not (self._topic.latched or self.has_subscribers):
@@ -171,11 +171,12 @@ class DdsPublisher(Generic[M]):
             try:
                 writer.wait_for_acks(round(timeout_s * 1e9))
             except (DDSException, AttributeError):
-                # cyclonedds 11.0.1 stumbles over its own name of the time-out; whoever has not answered is given up.
+                # At a timeout, cyclonedds 11.0.1 raises AttributeError for a wrong name of its own. Readers that have
+                # not confirmed by then are given up.
                 log.info("%s: not every subscriber has confirmed the last message", self.name)
 
     def close(self) -> None:
-        """Send no more; may be called twice."""
+        """Stop publishing; may be called twice."""
         with self._lock:
             writer, self._writer = self._writer, None
         if writer is not None:
@@ -193,7 +194,7 @@ class _Reception(Generic[M]):
         participant.serve(self._reader, self._serve)
 
     def close(self) -> None:
-        """Receive no more."""
+        """Stop receiving."""
         reader, self._reader = self._reader, None
         self._participant.release(reader)
 
@@ -202,10 +203,10 @@ class _Reception(Generic[M]):
         if reader is None:
             return
         for sample in reader.take(self._depth):
-            # A writer that leaves sends one without a message.
+            # A writer that leaves sends a sample without a message.
             if not isinstance(sample, InvalidSample):
                 info = sample.sample_info
-                # RTPS lets a sender leave its time out.
+                # RTPS allows a sender to omit its time.
                 sent_s = info.source_timestamp / 1e9 if info.source_timestamp > 0 else None
                 self._intake.take(sample.raw, info.publication_handle.to_bytes(8, "big"), sent_s)
 

@@ -1,7 +1,7 @@
-"""DDS types for ROS 2's messages, made from the field definitions of rosbags.
+"""DDS types for ROS 2's messages, generated from the field definitions of rosbags.
 
-DDS needs the definition to match topics; the messages themselves pass through as the bytes that they are on the wire,
-which is much faster than cyclonedds's own encoder for large ones.
+DDS needs the definition to match topics; the messages themselves are passed in encoded form, which is much faster than
+cyclonedds's own encoder for large ones.
 """
 
 import functools
@@ -34,9 +34,9 @@ def dds_type(name: str, distribution: str = "jazzy") -> Any:
 
 @functools.cache
 def service_dds_type(name: str) -> Any:
-    """Return the DDS type for ``name``, a request or a reply, with the 16 bytes before it by which they are told apart.
+    """Return the DDS type for ``name``, a request or a reply, including the 16 bytes of its header.
 
-    Cyclone DDS looks at what it sends and gets, and lets nothing pass that is not of the type.
+    Cyclone DDS checks sent and received data, and rejects what does not fit the type.
     """
     return _struct(name, "jazzy", {"client": idl.uint64, "number": idl.int64})
 
@@ -49,7 +49,7 @@ def _struct(name: str, distribution: str, before: dict[str, Any]) -> Any:
 
 
 def opaque_type(name: str) -> Any:
-    """Return a DDS type that lets the bytes of any message pass; ``name`` is as ``std_msgs::msg::dds_::String_``."""
+    """Return a DDS type that accepts the bytes of any message; ``name`` is as ``std_msgs::msg::dds_::String_``."""
     return _passing(make_idl_struct("Opaque", name, {"raw": idl.uint8}, dataclassify=False))
 
 

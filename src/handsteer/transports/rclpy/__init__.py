@@ -1,1 +1,1 @@
-"""ROS 2 by its own library, rclpy, wherever that can be imported."""
+"""The transport of ROS 2's own library, rclpy, if it can be imported."""

@@ -1,4 +1,4 @@
-"""The parameters of our nodes as rclpy's: it answers ``ros2 param``, and asks us whether a change is allowed."""
+"""The parameters of our nodes in rclpy, which serves ``ros2 param`` and calls back to validate changes."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -27,9 +27,9 @@ _ARRAYS = tuple(kind for kind in Parameter.Type if kind.name.endswith("_ARRAY"))
 
 
 def take_given(node: Node) -> dict[str, Any]:
-    """Return the parameters that a node was given at its start, those with dots nested, but for ROS 2's own.
+    """Return the parameters given to a node at its start, nested at dots, without ROS 2's own.
 
-    The node does not have them any more: it is yet to tell which there are.
+    They are removed from the node, which declares its parameters later.
     """
     found = {name: given for name, given in node.get_parameters_by_prefix("").items() if not _is_of_ros(name)}
     for name in found:
@@ -38,11 +38,11 @@ def take_given(node: Node) -> dict[str, Any]:
 
 
 class ParameterLink:
-    """Declares parameters to rclpy, and takes what others set.
+    """Declares parameters to rclpy, and applies changes by others.
 
     Args:
         node: The node, without parameters of its own.
-        parameters: What it has.
+        parameters: The parameters to declare.
     """
 
     def __init__(self, node: Node, parameters: NodeParameters) -> None:
@@ -52,7 +52,7 @@ class ParameterLink:
             self._declare(name, value)
         node.add_pre_set_parameters_callback(self._as_meant)
         node.add_on_set_parameters_callback(self._set)
-        # Not before: rclpy would take values for what nobody has declared yet.
+        # Only now, because rclpy would accept values for parameters that are not declared yet.
         self._services = ParameterService(node)
 
     def _declare(self, name: str, value: Value) -> None:
@@ -60,7 +60,7 @@ class ParameterLink:
         assert description is not None
         descriptor = _descriptor(description)
         kind = _TYPES[description.kind]
-        if description.removable:  # as rclpy lets no parameter go that has a type for good
+        if description.removable:  # rclpy does not undeclare parameters of a static type
             descriptor.dynamic_typing = True
             self._node.declare_parameter(name, value, descriptor, ignore_override=True)
             return
@@ -69,7 +69,7 @@ class ParameterLink:
         self._node.set_parameters([Parameter(name, kind, typed)])
 
     def _as_meant(self, wanted: list[Parameter]) -> list[Parameter]:
-        """Return ``wanted`` as what it is for: YAML tells no type of an empty list, and takes ``off`` for no text."""
+        """Return ``wanted`` with declared types: an empty list in YAML has no type, and ``off`` is not a text."""
         return [self._as_declared(one) for one in wanted]
 
     def _as_declared(self, one: Parameter) -> Parameter:
@@ -109,7 +109,7 @@ def _plain(parameter: Parameter) -> Any:
 
 def _descriptor(description: Description) -> ParameterDescriptor:
     low, high = description.minimum, description.maximum
-    # Not read-only for rclpy, which would refuse even the value that it has, as `ros2 param load` sets it.
+    # Not read-only for rclpy, which would refuse even the current value, which `ros2 param load` sets.
     constraints = [text for text in (description.constraint, description.why_fixed) if text]
     descriptor = ParameterDescriptor(description=description.text, additional_constraints="; ".join(constraints))
     if description.kind == "double" and low is not None and high is not None:

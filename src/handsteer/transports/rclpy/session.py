@@ -1,4 +1,4 @@
-"""This process as a node of rclpy: name, parameters, time, and the one thread that serves what comes."""
+"""This process as a node of rclpy: name, parameters, time, and the thread that spins it."""
 
 import logging
 import threading
@@ -27,10 +27,10 @@ _OURS = "handsteer"
 
 
 class RosLog:
-    """Hands what handsteer logs to the logger of a node of rclpy, until it is closed.
+    """Forwards log records of handsteer to the logger of an rclpy node, until it is closed.
 
     Args:
-        logger: The node's logger; it says how much is logged, as ``--log-level`` has set it.
+        logger: The node's logger; its level is set by ``--log-level``.
     """
 
     def __init__(self, logger: Any) -> None:
@@ -38,11 +38,11 @@ class RosLog:
         self._before = (ours.handlers, ours.level, ours.propagate)
         ours.handlers = [_Handler(logger)]
         ours.setLevel(int(logger.get_effective_level()))
-        # What rclpy has shown on the screen need not be there twice.
+        # rclpy shows them on the screen already.
         ours.propagate = False
 
     def close(self) -> None:
-        """Log as before; may be called twice."""
+        """Restore the previous logging; may be called twice."""
         ours = logging.getLogger(_OURS)
         ours.handlers, level, ours.propagate = self._before
         ours.setLevel(level)
@@ -61,7 +61,7 @@ class _Handler(logging.Handler):
 
 
 def _log(logger: Any, level: int, text: str) -> None:
-    # rclpy takes each line of a program for a statement that has always the same level.
+    # One call per level, because rclpy requires that a line of code always logs at the same level.
     if level >= logging.CRITICAL:
         logger.fatal(text)
     elif level >= logging.ERROR:
@@ -87,7 +87,7 @@ log = logging.getLogger(__name__)
 class RclpySession:
     """A :class:`~handsteer.transports.protocol.Session` of ROS 2, by a node of rclpy.
 
-    What ROS 2 has for every node is rclpy's own here: arguments and remapping, parameters and ``qos_overrides``,
+    rclpy itself provides ROS 2's common features of nodes: arguments and remapping, parameters and ``qos_overrides``,
     ``use_sim_time``, the log, ``get_type_description``.
 
     Args:
@@ -115,16 +115,16 @@ class RclpySession:
             self._executor.add_node(self._node)
             self._thread = threading.Thread(target=self._spin, name="rclpy", daemon=True)
             self._thread.start()
-        except BaseException:  # an interrupt too: what stays open keeps the process from ending
+        except BaseException:  # including interrupts: open resources would keep the process from ending
             self.close()
             raise
 
     def serve(self, parameters: NodeParameters) -> None:
-        """Let rclpy answer ``ros2 param``."""
+        """Let rclpy serve ``ros2 param``."""
         self._parameters = ParameterLink(self._node, parameters)
 
     def offer(self, services: Callable[[], Mapping[str, Call]]) -> None:
-        """Let others call the node's services, of std_srvs/Trigger, if this ROS 2 has that package."""
+        """Offer the node's services, as std_srvs/Trigger, if this ROS 2 has that package."""
         trigger = ros_class(_TRIGGER)
         if trigger is None:
             log.info("the node's services are left out: this ROS 2 lacks the package std_srvs")
@@ -160,7 +160,7 @@ class RclpySession:
         if not self._node.get_parameter("use_sim_time").value:
             return WallClock()
         simulated, theirs = SimulatedClock(), self._node.get_clock()
-        # Kept, or rclpy would forget it.
+        # Referenced, because rclpy does not keep it.
         self._jumps = theirs.create_jump_callback(
             _ANY_JUMP, post_callback=lambda _: simulated.tell(theirs.now().nanoseconds / 1e9)
         )
@@ -177,7 +177,7 @@ class RclpySession:
             except Exception:
                 if not self._left.is_set():
                     log.exception("ROS 2: what has come could not be served")
-                    self._left.wait(_AFTER_FAILURE_S)  # what fails again and again must not take the whole machine
+                    self._left.wait(_AFTER_FAILURE_S)  # repeated failures must not use up the processor
 
 
 def _answer(call: Call, _request: Any, reply: Any) -> Any:
@@ -190,7 +190,7 @@ def _answer(call: Call, _request: Any, reply: Any) -> Any:
 
 def _make_node(context: Any, node: str, arguments: Sequence[str]) -> Node:
     try:
-        # Ours handle the signals: a robot is to be told to stand before the middleware goes.
+        # Our handlers process the signals: the robot must be stopped before the middleware shuts down.
         rclpy.init(args=list(arguments), context=context, signal_handler_options=SignalHandlerOptions.NO)
         left_over = remove_ros_args(list(arguments))
         if left_over:

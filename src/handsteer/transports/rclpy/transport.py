@@ -1,4 +1,4 @@
-"""Messages by rclpy: one ROS 2 node for all nodes of this process, and serialised messages in and out."""
+"""Messages by rclpy: one ROS 2 node for all nodes of this process, with serialised messages."""
 
 import logging
 import threading
@@ -26,7 +26,7 @@ from handsteer.transports.ros2.profiles import Profile, offered, requested
 
 
 def publisher_qos(topic: Topic[Any]) -> QoSProfile:
-    """Return what a publisher of ``topic`` offers."""
+    """Return the QoS offered by a publisher of ``topic``."""
     qos = _qos(offered(topic))
     if topic.lifespan_s is not None:
         qos.lifespan = Duration(seconds=topic.lifespan_s)
@@ -34,7 +34,7 @@ def publisher_qos(topic: Topic[Any]) -> QoSProfile:
 
 
 def subscription_qos(topic: Topic[Any]) -> QoSProfile:
-    """Return what a subscription to ``topic`` requests."""
+    """Return the QoS requested by a subscription to ``topic``."""
     return _qos(requested(topic))
 
 
@@ -55,10 +55,10 @@ log = logging.getLogger(__name__)
 
 
 class RclpyTransport:
-    """A :class:`~handsteer.transports.protocol.Transport` by a node of rclpy, which somebody else spins.
+    """A :class:`~handsteer.transports.protocol.Transport` by a node of rclpy, which the caller spins.
 
-    Capture times travel in the stamps of message headers; messages without a header come without one. A topic whose
-    message type this ROS 2 lacks is said once, and left out.
+    Capture times are the stamps of message headers; messages without a header have none. A topic whose message type is
+    missing in this ROS 2 is logged once and ignored.
 
     Args:
         node: The node.
@@ -79,7 +79,7 @@ class RclpyTransport:
         self._is_open = True
 
     def advertise(self, node: str, topic: Topic[M]) -> "RclpyPublisher[M]":
-        """Return the sending end of ``topic`` for the node named ``node``."""
+        """Return a publisher of ``topic`` for the node named ``node``."""
         name = self._claim(topic)
         publisher = RclpyPublisher(self._node, topic, name, self._class_of(topic))
         with self._lock:
@@ -97,20 +97,20 @@ class RclpyTransport:
         return fanout.add(deliver)
 
     def publishers_of(self, topic: Topic[Any]) -> list[str]:
-        """Return the full names of the ROS 2 nodes that publish ``topic``; those that were killed stay for a while."""
+        """Return the full names of the ROS 2 nodes that publish ``topic``; killed ones remain for a while."""
         if not self._is_open:
             return []
         found = self._node.get_publishers_info_by_topic(_given(self._node, topic))
         return sorted(f"{one.node_namespace.rstrip('/')}/{one.node_name}" for one in found)
 
     def subscribed_types(self, topic: Topic[Any]) -> set[str]:
-        """Return the types of other processes' subscribers of ``topic``; none while it is used twice here."""
+        """Return the types of other processes' subscribers of ``topic``; none while this process uses it twice."""
         if self._types.is_shared(resolved(self._node, topic)):
             return set()
         return {one.topic_type for one in self._node.get_subscriptions_info_by_topic(_given(self._node, topic))}
 
     def withdraw(self, publisher: "RclpyPublisher[Any]") -> None:
-        """End a sending end, once its subscribers have what it sent."""
+        """Close a publisher once its subscribers have what it sent."""
         publisher.flush(_LAST_S)
         with self._lock:
             self._publishers.remove(publisher)
@@ -122,7 +122,7 @@ class RclpyTransport:
         return resolved(self._node, topic)
 
     def full_name(self, node: str) -> str:
-        """Return the ROS 2 node's name and ``node``, as ROS's own diagnostics do: ``r1/my_camera: my_camera``."""
+        """Return the ROS 2 node's name and ``node``, as in ROS's own diagnostics: ``r1/my_camera: my_camera``."""
         return f"{self._node.get_fully_qualified_name().removeprefix('/')}: {node}"
 
     def flush(self, timeout_s: float) -> None:
@@ -169,7 +169,7 @@ class RclpyTransport:
 
 
 class RclpyPublisher(Generic[M]):
-    """The sending end of a topic.
+    """Publisher of a topic.
 
     Attributes:
         name: Full name of the topic.
@@ -178,7 +178,7 @@ class RclpyPublisher(Generic[M]):
         node: The node of rclpy.
         topic: The topic.
         name: Its full name.
-        kind: ROS 2's class for its messages; None where there is none, so that nobody ever listens.
+        kind: ROS 2's class for its messages; None if it is missing, so that there are never subscribers.
     """
 
     def __init__(self, node: Node, topic: Topic[M], name: str, kind: Any | None) -> None:
@@ -193,19 +193,20 @@ class RclpyPublisher(Generic[M]):
                     kind,
                     _given(node, topic),
                     publisher_qos(topic),
-                    # An executor that waits for events keeps the publisher, and with it the type of its topic.
+                    # Event callbacks would keep a reference in the executor, and with it the publisher and the type of
+                    # its topic.
                     event_callbacks=PublisherEventCallbacks(use_default_callbacks=topic.or_type is None),
                     qos_overriding_options=_overriding(node, name),
                 )
 
     @property
     def has_subscribers(self) -> bool:
-        """Whether anybody listens, in this process or another."""
+        """Whether there are subscribers, in this process or another."""
         publisher = self._publisher
         return publisher is not None and publisher.get_subscription_count() > 0
 
     def publish(self, message: M, captured_s: float | None = None) -> None:
-        """Give ``message`` to rclpy; a subscriber that is too slow for it goes without."""
+        """Send ``message`` by rclpy; subscribers that are too slow miss it."""
         check_type(self._topic, message)
         publisher = self._publisher
         if publisher is None or not (self._topic.latched or self.has_subscribers):
@@ -222,13 +223,13 @@ class RclpyPublisher(Generic[M]):
             return
         try:
             confirmed = publisher.wait_for_all_acked(Duration(seconds=timeout_s))
-        except RuntimeError:  # not every middleware can tell
+        except RuntimeError:  # not supported by every middleware
             return
         if not confirmed:
             log.info("%s: not every subscriber has confirmed the last message", self.name)
 
     def close(self) -> None:
-        """Send no more; may be called twice."""
+        """Stop publishing; may be called twice."""
         with self._lock:
             publisher, self._publisher = self._publisher, None
         if publisher is not None:
@@ -253,11 +254,11 @@ class _Reception(Generic[M]):
             )
 
     def close(self) -> None:
-        """Receive no more."""
+        """Stop receiving."""
         self._node.destroy_subscription(self._subscription)
 
     def _on_message(self, raw: bytes, info: Mapping[str, int]) -> None:
-        sent_ns = info.get("source_timestamp", 0)  # not every middleware tells
+        sent_ns = info.get("source_timestamp", 0)  # not provided by every middleware
         self._intake.take(raw, sent_s=sent_ns / 1e9 if sent_ns > 0 else None)
 
 
@@ -265,14 +266,14 @@ def resolved(node: Node, topic: Topic[Any]) -> str:
     """Return the full name of ``topic``, remapped.
 
     Raises:
-        TransportError: It is given a name that is not allowed.
+        TransportError: Remapping results in a name that is not allowed.
     """
     with _refusals(topic.name):
         return str(node.resolve_topic_name(_given(node, topic)))
 
 
 def _given(node: Node, topic: Topic[Any]) -> str:
-    """Return the name to give to rclpy, which expands and remaps it; one that is beneath a topic moves with that."""
+    """Return the name for rclpy, which expands and remaps it; a topic beneath another is renamed with that."""
     beneath, name = topic.beneath, topic.ros_name
     if beneath is None or node.resolve_topic_name(name) != node.resolve_topic_name(name, only_expand=True):
         return name
@@ -280,14 +281,14 @@ def _given(node: Node, topic: Topic[Any]) -> str:
 
 
 def _overriding(node: Node, name: str) -> QoSOverridingOptions | None:
-    """Let ``qos_overrides`` change the profile of the topic of this full name, where any are given."""
+    """Apply ``qos_overrides`` to the topic of this full name, if any are given."""
     given = node.get_parameters_by_prefix(f"qos_overrides.{name}")
     return QoSOverridingOptions.with_default_policies() if given else None
 
 
 @contextmanager
 def _refusals(name: str) -> Iterator[None]:
-    """Say what rclpy raises of the topic of this name as an error of ours."""
+    """Convert rclpy's exceptions about the topic of this name to our errors."""
     try:
         yield
     except (InvalidTopicNameException, InvalidQosOverridesError, RuntimeError, ValueError) as error:

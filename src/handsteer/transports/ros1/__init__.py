@@ -1,1 +1,1 @@
-"""The graph over ROS 1: rospy, imported only when this package is."""
+"""The transport over ROS 1; rospy is imported only with this package."""

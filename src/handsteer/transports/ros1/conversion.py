@@ -1,6 +1,6 @@
-"""Between the message classes of this project (ROS 2 Jazzy) and those of rospy (ROS 1 Noetic), field by field.
+"""Converts between our message classes (ROS 2 Jazzy) and those of rospy (ROS 1 Noetic), field by field.
 
-Fields that only one side has are left at their defaults: the header's ``seq`` there, textures of markers here.
+Fields that only one of them has keep their defaults: the header's ``seq`` in ROS 1, textures of markers in ours.
 """
 
 import dataclasses
@@ -42,12 +42,12 @@ def ros1_type(name: str) -> Any:
 
 
 def to_ros1(message: Any) -> Any:
-    """Return rospy's message for one of ours."""
+    """Return one of our messages as rospy's."""
     return _writer(message.__msgtype__)(message)
 
 
 def from_ros1(message: Any, name: str) -> Any:
-    """Return our message of the type ``name`` for one of rospy's; an array of bytes is shared, and read-only."""
+    """Return rospy's message as our type ``name``; an array of bytes is shared, and read-only."""
     return _reader(name)(message)
 
 
@@ -57,7 +57,7 @@ def _writer(name: str) -> Convert:
     steps = [(field, named, _write_as(kind)) for field, kind in _fields(name) if (named := _there(field, there))]
 
     def write(ours: Any) -> Any:
-        # With values for all that it has, it makes no defaults, which for nested messages takes longer than the rest.
+        # With values for all fields it constructs no defaults, which take most of the time for nested messages.
         return there(**{named: convert(getattr(ours, field)) for field, named, convert in steps})
 
     return write
@@ -77,7 +77,7 @@ def _reader(name: str) -> Convert:
 
 
 def _there(field: str, kind: Any) -> str:
-    """Return the name of our ``field`` in rospy's class; empty where it has none. A calibration's K is large there."""
+    """Return the name of our ``field`` in rospy's class, where calibrations have upper case; empty if none."""
     return next((name for name in (field, field.upper()) if name in kind.__slots__), "")
 
 

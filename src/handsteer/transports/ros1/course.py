@@ -1,7 +1,7 @@
-"""The names that the course's packages have for what their nodes are told, in handsteer's own words.
+"""Translates the parameters of the course's packages to handsteer's names.
 
 The course's launch files set them as private parameters. Its recognition reads them under a fixed name,
-``hand_sign_recognition/…``, and so does its control, which follows whatever topic the recognition was given.
+``hand_sign_recognition/…``, and so does its control, which subscribes to the topic that the recognition was given.
 """
 
 import logging
@@ -28,11 +28,11 @@ log = logging.getLogger(__name__)
 
 @dataclass
 class Told:
-    """What a node was told.
+    """The translated parameters of a node.
 
     Attributes:
         parameters: By handsteer's names.
-        topics: What topics are called, by the full names that they have otherwise.
+        topics: New names of topics, by their full default names.
     """
 
     parameters: dict[str, Any]
@@ -40,16 +40,16 @@ class Told:
 
 
 def translate(kind: str, node: str, parameters: Mapping[str, Any], read: Callable[[str], Any]) -> Told:
-    """Return what ``parameters`` tell; what of it cannot be followed is logged, each in a line.
+    """Return the translation of ``parameters``; each one that has no equivalent is logged.
 
     Args:
-        kind: What the node is called unless it is renamed, as ``hand_sign_control``.
+        kind: Default name of the node, such as ``hand_sign_control``.
         node: Its full name, for messages.
         parameters: Its private parameters.
-        read: Returns a parameter of the node's namespace by its relative name, or None where there is none.
+        read: Returns a parameter of the node's namespace by its relative name, or None if there is none.
 
     Raises:
-        ConfigError: What should name a topic or a file does not.
+        ConfigError: A name of a topic or a file is invalid.
     """
     told = Told(dict(parameters))
     for name, topic in _TOPICS.get(kind, {}).items():

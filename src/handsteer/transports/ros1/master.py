@@ -1,4 +1,4 @@
-"""The ROS 1 master: asked with little patience, held by a connection that ends with it, and what it knows of topics."""
+"""The ROS 1 master: requests with short timeouts, a connection that detects its end, and its topics."""
 
 import errno
 import http.client
@@ -20,11 +20,11 @@ _LISTENS_OR_IS_BUSY = (0, errno.EAGAIN, errno.EINPROGRESS, errno.ETIMEDOUT)
 
 
 class MasterGone(TransportError):  # noqa: N818 - reads as the other ends of a connection do
-    """There is no master at the address: the machine itself refuses to connect."""
+    """There is no master at the address: the connection was refused."""
 
 
 class Master:
-    """The ROS master at an address; knows whether it answers. Not for two threads at once."""
+    """The ROS master at an address. Not thread-safe."""
 
     def __init__(self, uri: str) -> None:
         self._uri = uri
@@ -34,11 +34,11 @@ class Master:
             raise TransportError(f"ROS_MASTER_URI is {uri!r}: it should be as http://localhost:11311") from None
 
     def ping(self) -> int:
-        """Return the number of its process.
+        """Return its process ID.
 
         Raises:
-            MasterGone: Nobody listens at its address.
-            TransportError: It does not answer in time; it may be busy.
+            MasterGone: The connection was refused.
+            TransportError: It does not reply in time; it may be busy.
         """
         return int(self._ask("getPid", "/handsteer")[2])
 
@@ -46,10 +46,10 @@ class Master:
         """Return the nodes that publish each topic, by full names.
 
         Args:
-            caller: Full name of the node that asks.
+            caller: Full name of the requesting node.
 
         Raises:
-            TransportError: It does not answer.
+            TransportError: It does not reply.
         """
         _, _, (publishers, _, _) = self._ask("getSystemState", caller)
         return {topic: list(nodes) for topic, nodes in publishers}
@@ -67,10 +67,10 @@ class Master:
 
 
 class Lifeline:
-    """An idle connection to the master: the system closes it when the master dies, however that dies.
+    """An idle connection to the master, which the system closes when the master ends for any reason.
 
-    So its death is known at once, and nothing is asked of a master that is busy. A machine that is cut off or loses
-    its power closes nothing.
+    So its end is detected at once, without requests to a busy master. A machine that is disconnected or loses its power
+    closes nothing.
 
     Args:
         uri: Address of the master.
@@ -81,16 +81,16 @@ class Lifeline:
         self._socket: socket.socket | None = None
 
     def wait(self, timeout_s: float) -> bool:
-        """Wait for ``timeout_s`` seconds while the connection holds; return whether it does.
+        """Wait for ``timeout_s`` seconds while the connection is open; return whether it still is.
 
-        It is made where there is none; that it cannot be made is said as late as that it breaks at once.
+        Connects if necessary; a failure to connect is reported like a connection that breaks at once.
         """
         try:
             if self._socket is None:
                 self._socket = socket.create_connection(self._address, _TIMEOUT_S)
-            poll = select.poll()  # select() cannot take the sockets of a process that has many files open
+            poll = select.poll()  # select() fails for sockets of a process with many open files
             poll.register(self._socket, select.POLLIN)
-            # The master says nothing unasked, so what can be read is the end.
+            # The master sends nothing unrequested, so a readable socket means the end.
             broken = bool(poll.poll(timeout_s * 1000))
         except OSError:
             broken = True
@@ -99,7 +99,7 @@ class Lifeline:
         return not broken
 
     def close(self) -> None:
-        """Let go; may be called twice."""
+        """Close the connection; may be called twice."""
         if self._socket is not None:
             self._socket.close()
             self._socket = None
@@ -111,7 +111,7 @@ def _address(uri: str) -> tuple[str, int]:
 
 
 def _nobody_listens(uri: str) -> bool:
-    """Return whether each address of the master refuses at once: localhost has two, and one may only be busy."""
+    """Return whether all addresses of the master refuse: localhost has two, and one may only be busy."""
     try:
         found = socket.getaddrinfo(*_address(uri), type=socket.SOCK_STREAM)
         return not any(_may_listen(family, address) for family, *_, address in found)
@@ -138,7 +138,7 @@ log = logging.getLogger(__name__)
 
 
 class SystemState:
-    """Asks the master every four seconds, on a thread of its own, from the first question on."""
+    """Polls the master every four seconds, on a thread that starts at the first query."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -147,7 +147,7 @@ class SystemState:
         self._publishers: dict[str, list[str]] = {}
 
     def publishers_of(self, topic: str) -> list[str]:
-        """Return the nodes that publish the topic of this full name; none before the master has answered."""
+        """Return the nodes that publish the topic of this full name; empty until the master has replied."""
         with self._lock:
             if self._thread is None and not self._closed.is_set():
                 self._thread = threading.Thread(target=self._run, name="ros1_system_state", daemon=True)
@@ -155,7 +155,7 @@ class SystemState:
             return sorted(self._publishers.get(topic, []))
 
     def close(self) -> None:
-        """Ask no more; may be called twice."""
+        """Stop polling; may be called twice."""
         self._closed.set()
         with self._lock:
             self._publishers = {}
@@ -166,7 +166,7 @@ class SystemState:
             try:
                 publishers = master.publishers(rospy.get_name())
             except TransportError as error:
-                log.debug("%s", error)  # the session says it, and ends the node
+                log.debug("%s", error)  # the session reports it, and ends the node
             else:
                 with self._lock:
                     self._publishers = {} if self._closed.is_set() else publishers

@@ -1,4 +1,4 @@
-"""What rospy does at great cost, done at less: sending, which wakes up a thread a message, and receiving images."""
+"""Cheaper replacements for two operations of rospy: sending, which wakes a thread per message, and receiving images."""
 
 import ctypes
 import functools
@@ -9,17 +9,17 @@ from typing import Any
 import rospy
 from rospy.impl.tcpros_pubsub import QueuedConnection
 
-# Names and numbers of malloc.h; GNU's library takes no larger threshold than this.
+# Names and numbers of malloc.h; glibc accepts no larger threshold than this.
 _M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD = -1, -3
 _LARGEST_KEPT_BYTES = 2**25
 
 
 @functools.cache
 def keep_freed_memory() -> None:
-    """Let what is freed, up to 32 MB at once, be given out again; does nothing where there is no ``mallopt``.
+    """Let the allocator keep freed memory, up to 32 MB at once; does nothing where there is no ``mallopt``.
 
-    rospy makes a buffer of 16 MB for each read of an image. By itself the library gives each back to the system and
-    gets the next one from there, page by page, which takes as long as all else that receiving an image does.
+    rospy allocates a buffer of 16 MB for each read of an image. By default the library returns each to the system and
+    gets the next one from there, page by page, which takes as long as everything else in receiving an image.
     """
     try:
         mallopt = ctypes.CDLL(None).mallopt
@@ -30,11 +30,11 @@ def keep_freed_memory() -> None:
 
 
 def send_promptly(publisher: Any, depth: int) -> None:
-    """Let a ``rospy.Publisher`` send on the thread that publishes whatever a subscriber's socket takes at once.
+    """Let a ``rospy.Publisher`` send on the publishing thread what a subscriber's socket accepts at once.
 
     Args:
-        publisher: One that nobody has joined yet.
-        depth: How many messages may wait for a subscriber that has fallen behind.
+        publisher: One without subscribers yet.
+        depth: How many messages may wait for a slow subscriber.
     """
     implementation = publisher.impl
     add = implementation.add_connection
@@ -43,9 +43,9 @@ def send_promptly(publisher: Any, depth: int) -> None:
 
 
 class PromptConnection:
-    """A subscriber's connection, which is never waited for: what its socket does not take at once waits in a queue.
+    """A subscriber's connection that never blocks: what its socket does not accept at once waits in a queue.
 
-    From then on all goes by the queue, as rospy has it, with a thread that sends.
+    From then on, all messages go through rospy's queue, with its sending thread.
 
     Args:
         connection: rospy's own.
@@ -56,17 +56,17 @@ class PromptConnection:
         self._connection = connection
         self._depth = depth
         self._queue: QueuedConnection | None = None
-        # Python waits in spite of MSG_DONTWAIT where a socket has a time limit, and rospy gives new ones such.
+        # Python waits despite MSG_DONTWAIT if a socket has a timeout, which rospy sets for new ones.
         connection.socket.setblocking(True)
 
     def __getattr__(self, name: str) -> Any:
-        # All else is the connection's, as rospy's own queue has it.
+        # Other attributes are the connection's, as in rospy's own queue.
         if name.startswith("__"):
             raise AttributeError(name)
         return getattr(self._connection, name)
 
     def write_data(self, data: bytes) -> bool:
-        """Send a message, or let it wait; rospy calls this for one message at a time.
+        """Send or queue a message; rospy never calls this concurrently.
 
         Raises:
             rospy.exceptions.TransportException: The subscriber has left.
@@ -76,11 +76,11 @@ class PromptConnection:
             if sent == len(data):
                 return True
             self._queue = QueuedConnection(_Rest(self._connection, data[sent:]), self._depth)
-            data = b""  # lets it send the rest of this message
+            data = b""  # sends the rest of this message
         return bool(self._queue.write_data(data))
 
     def _send(self, data: bytes) -> int:
-        """Return how many bytes the socket has taken."""
+        """Return how many bytes the socket has accepted."""
         connection = self._connection
         if not connection.socket or connection.done:
             raise rospy.exceptions.TransportTerminated("connection closed")
@@ -97,7 +97,7 @@ class PromptConnection:
 
 
 class _Rest:
-    """A connection that sends the rest of a message before all else."""
+    """A connection that sends the rest of a message first."""
 
     def __init__(self, connection: Any, rest: bytes) -> None:
         self._connection = connection
@@ -108,7 +108,7 @@ class _Rest:
         return bool(self._connection.done)
 
     def set_cleanup_callback(self, callback: Callable[[Any], None]) -> None:
-        """Call it when the connection ends, after the topic's own."""
+        """Call it when the connection ends, after the topic's own callback."""
         before = self._connection.cleanup_cb
 
         def end(connection: Any) -> None:

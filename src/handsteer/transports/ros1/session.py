@@ -1,4 +1,4 @@
-"""This process as a node of a ROS 1 graph: name, parameters, time, and what becomes of it when the master is gone."""
+"""This process as a node of a ROS 1 graph: name, parameters, time, and detection of a lost master."""
 
 import logging
 import math
@@ -26,15 +26,15 @@ from handsteer.transports.ros1 import course
 from handsteer.transports.ros1.master import Lifeline, Master, MasterGone
 from handsteer.transports.ros1.topics import Ros1Transport
 
-# Its death is known at once; this finds what closes no connection, and costs as much as a hundred signs a minute.
+# The end of the master is detected at once; this finds a lost machine, and costs as much as a hundred signs a minute.
 _PING_PERIOD_S = 2.0
 _PING_IN_DOUBT_S = 0.5
 _PING_AGAIN_S = 0.02
-# A master that is slow to answer is busy, and none to stop a robot for.
+# A master that replies slowly is busy, which is no reason to stop a robot.
 _PINGS_UNTIL_LOST = 3
 _SILENT_UNTIL_LOST_S = 1.5
 _CLOCK_SILENCE_S = 2.0
-# rospy sends on threads of its own and does not tell when they are done.
+# rospy sends on its own threads and does not report when they are done.
 _DELIVER_S = 0.1
 _LEAVE_TIMEOUT_S = 2.0
 
@@ -42,15 +42,15 @@ log = logging.getLogger(__name__)
 
 
 class Ros1Session:
-    """A :class:`~handsteer.transports.protocol.Session` of ROS 1. rospy allows one name a process.
+    """A :class:`~handsteer.transports.protocol.Session` of ROS 1. rospy allows one name per process.
 
     Args:
         node: Name of the node, unless ``arguments`` rename it.
         arguments: rospy's own: ``topic:=other``, ``__name:=``, ``__ns:=``, ``_parameter:=value``, ``__log:=``. rospy
-            looks for ``__ns:=`` in the arguments of the program itself.
+            takes ``__ns:=`` from the arguments of the program itself.
 
     Raises:
-        TransportError: No master answers, an argument is none of rospy's, or this process has another name already.
+        TransportError: No master replies, an argument is not one of rospy's, or this process has another name already.
         ConfigError: One of the course's parameters has a wrong value.
     """
 
@@ -75,7 +75,7 @@ class Ros1Session:
         self._watcher.start()
 
     def serve(self, parameters: NodeParameters) -> None:
-        """Do nothing: ROS 1 has its parameters on the master, and nodes read them when they start."""
+        """Do nothing: in ROS 1 the master has the parameters, and nodes read them at the start."""
 
     def offer(self, services: Callable[[], Mapping[str, Call]]) -> None:
         """Do nothing: the nodes of the course have no services."""
@@ -84,7 +84,7 @@ class Ros1Session:
         """Wait for at most ``timeout_s`` seconds; return whether ROS has asked this process to end (`rosnode kill`).
 
         Raises:
-            TransportError: The master does not answer any more.
+            TransportError: The master no longer replies.
         """
         ended = self._asked_to_end.wait(timeout_s)
         if self._lost:
@@ -111,7 +111,7 @@ class Ros1Session:
         was_silent = False
         while not self._left.is_set():
             if not self._lifeline.wait(_PING_IN_DOUBT_S if self._failures else _PING_PERIOD_S):
-                self._left.wait(_PING_AGAIN_S)  # a master that holds no line is not asked without a pause
+                self._left.wait(_PING_AGAIN_S)  # no continuous requests if the master drops the connection
             self._lost = self._why_lost()
             if self._lost is not None:
                 self._asked_to_end.set()
@@ -122,7 +122,7 @@ class Ros1Session:
             was_silent = silent
 
     def _why_lost(self) -> str | None:
-        """Return why there is no master any more; None while it answers, or may only be busy."""
+        """Return why the master is lost; None while it replies, or may only be busy."""
         try:
             if self._master.ping() == self._master_pid:
                 self._failures, self._failing_since_s = 0, math.inf
@@ -137,7 +137,7 @@ class Ros1Session:
         return "another ROS master has taken the place of the one that this node joined, and does not know it: it ends"
 
     def _on_shutdown(self) -> None:
-        """Hold rospy's shutdown up until the nodes have said their last: `rosnode kill`, or another of this name."""
+        """Delay rospy's shutdown, by `rosnode kill` or a node of this name, until the nodes have sent their last."""
         self._asked_to_end.set()
         self._left.wait(_LEAVE_TIMEOUT_S)
 
@@ -158,6 +158,6 @@ def _initialise(node: str, arguments: Sequence[str]) -> None:
         rospy.init_node(node, [sys.argv[0], *arguments], disable_signals=True)
     except (rospy.ROSException, ValueError, OSError) as error:
         raise TransportError(f"cannot join ROS 1 as {node}: {error}") from None
-    # As with any ROS node: what is logged goes to the screen, to the log file and to /rosout.
+    # As with any ROS node, the log goes to the screen, to the log file and to /rosout.
     ours = logging.getLogger("handsteer")
     ours.handlers = list(logging.getLogger("rosout").handlers)

@@ -1,4 +1,4 @@
-"""Messages over ROS 1: one ROS node for all nodes of this process, as rospy has it."""
+"""Messages over ROS 1: one ROS node for all nodes of this process."""
 
 import re
 import threading
@@ -20,8 +20,8 @@ from handsteer.transports.stamps import capture_time
 
 M = TypeVar("M")
 
-# With rospy's default of 64 kB, images wait in the socket for a callback that is slower than the camera. It costs
-# something to have that much ready for every message.
+# With rospy's default of 64 kB, images wait in the socket for a callback that is slower than the camera. Only for
+# images, because allocating the buffer has a cost per message.
 _BUFFER_BYTES = {"sensor_msgs/msg/Image": 2**24, "sensor_msgs/msg/CompressedImage": 2**22}
 _SMALL_BUFFER_BYTES = 2**16
 _PLAYER = re.compile(r"(/\w+)*/play_\d{6,}", re.ASCII)
@@ -30,11 +30,11 @@ _PLAYER = re.compile(r"(/\w+)*/play_\d{6,}", re.ASCII)
 class Ros1Transport:
     """A :class:`~handsteer.transports.protocol.Transport` over rospy, which must have been initialised.
 
-    Capture times travel in the stamps of message headers; messages without a header come without one.
+    Capture times are the stamps of message headers; messages without a header have none.
 
     Args:
         clock: The graph's clock.
-        topics: What topics are called, by the full names that they have otherwise. Remapping goes before it.
+        topics: New names of topics, by their full default names. Remapping overrides it.
     """
 
     # TCP loses no part of a large image, and the course's cameras publish raw ones only.
@@ -50,7 +50,7 @@ class Ros1Transport:
         self._state = SystemState()
 
     def advertise(self, node: str, topic: Topic[M]) -> "Ros1Publisher[M]":
-        """Return the sending end of ``topic`` for the node named ``node``."""
+        """Return a publisher of ``topic`` for the node named ``node``."""
         name = self._claim(topic)
         with self._lock:
             if name not in self._outgoing:
@@ -58,7 +58,7 @@ class Ros1Transport:
             return self._outgoing[name]
 
     def subscribe(self, node: str, topic: Topic[M], deliver: Deliver[M]) -> FanoutSubscription[M]:
-        """Call ``deliver`` for each message on ``topic`` from now on, on the thread of the connection it came by."""
+        """Call ``deliver`` for each message on ``topic`` from now on, on the thread of its connection."""
         name = self._claim(topic)
         with self._lock:
             if name not in self._incoming:
@@ -67,9 +67,9 @@ class Ros1Transport:
         return fanout.add(deliver)
 
     def publishers_of(self, topic: Topic[Any]) -> list[str]:
-        """Return the full names of the ROS nodes that publish ``topic``, as the master said a moment ago.
+        """Return the full names of the ROS nodes that publish ``topic``, as last reported by the master.
 
-        A node that was killed stays known to the master for good (``rosnode cleanup``).
+        A killed node stays registered at the master (``rosnode cleanup``).
         """
         return self._state.publishers_of(self._full_name(topic))
 
@@ -78,7 +78,7 @@ class Ros1Transport:
         return self._full_name(topic)
 
     def full_name(self, node: str) -> str:
-        """Return the ROS node's name and ``node``, as ROS's own diagnostics do: ``r1/my_camera: my_camera``."""
+        """Return the ROS node's name and ``node``, as in ROS's own diagnostics: ``r1/my_camera: my_camera``."""
         return f"{rospy.get_name().removeprefix('/')}: {node}"
 
     def close(self) -> None:
@@ -94,13 +94,13 @@ class Ros1Transport:
             channel.close()
 
     def _claim(self, topic: Topic[Any]) -> str:
-        """Return the full name of ``topic``, namespace and remappings included, unless it is in use otherwise."""
+        """Claim ``topic`` and return its full name, with namespace and remapping."""
         name = self._full_name(topic)
         self._types.claim(name, topic)
         return name
 
     def _full_name(self, topic: Topic[Any]) -> str:
-        """Return the name after namespace and remappings, which rospy leaves as it is when it is given."""
+        """Return the name with namespace and remapping, which rospy does not change again."""
         name = str(rospy.resolve_name(topic.ros_name))
         is_remapped = name != rosgraph.names.resolve_name(topic.ros_name, rospy.get_name())
         if is_remapped:
@@ -129,13 +129,13 @@ class Ros1Transport:
 
 
 def _is_player(theirs: Any) -> bool:
-    """Return whether ``rosbag play`` sent a message: rosbag has no other name for its nodes than play and the time."""
+    """Return whether ``rosbag play`` sent a message: its nodes are always called play and the time."""
     header = getattr(theirs, "_connection_header", None) or {}
     return _PLAYER.fullmatch(header.get("callerid", "")) is not None
 
 
 class Ros1Publisher(Generic[M]):
-    """The sending end of a topic."""
+    """Publisher of a topic."""
 
     def __init__(self, topic: Topic[M], name: str) -> None:
         self._topic = topic
@@ -143,17 +143,17 @@ class Ros1Publisher(Generic[M]):
         self._publisher: Any = rospy.Publisher(
             name, there, queue_size=topic.depth, latch=topic.latched, tcp_nodelay=True
         )
-        if topic.lifespan_s is not None:  # what drives a robot: small, often, and worth nothing when it is late
+        if topic.lifespan_s is not None:  # commands and signs are small and frequent, and useless when late
             send_promptly(self._publisher, topic.depth)
 
     @property
     def has_subscribers(self) -> bool:
-        """Whether anybody listens, in this process or another."""
+        """Whether there are subscribers, in this process or another."""
         publisher = self._publisher
         return publisher is not None and publisher.get_num_connections() > 0
 
     def publish(self, message: M, captured_s: float | None = None) -> None:
-        """Give ``message`` to rospy's senders, one a subscriber, which drop what a slow one leaves waiting."""
+        """Pass ``message`` to rospy, whose senders, one per subscriber, drop messages for slow ones."""
         check_type(self._topic, message)
         publisher = self._publisher
         if publisher is None or not (self._topic.latched or self.has_subscribers):
@@ -165,7 +165,7 @@ class Ros1Publisher(Generic[M]):
                 raise
 
     def close(self) -> None:
-        """Send no more; may be called twice."""
+        """Stop publishing; may be called twice."""
         publisher, self._publisher = self._publisher, None
         if publisher is not None:
             publisher.unregister()

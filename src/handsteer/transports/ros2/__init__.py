@@ -1,1 +1,1 @@
-"""What ROS 2 has whatever carries its messages: names, arguments, and how messages are encoded."""
+"""Features of ROS 2 that are independent of the middleware: names, arguments, and encoding of messages."""

@@ -1,7 +1,7 @@
-"""The arguments that ``ros2 run`` and ``ros2 launch`` give to a node: ``--ros-args -r a:=b -p name:=value``.
+"""Node arguments of ``ros2 run`` and ``ros2 launch``: ``--ros-args -r a:=b -p name:=value``.
 
-Source of the rules: design.ros2.org/articles/ros_command_line_arguments.html; in parameter files, ``/*`` stands for one
-part of a name and ``/**`` for any number of them.
+Source of the rules: design.ros2.org/articles/ros_command_line_arguments.html; in parameter files, ``/*`` matches one
+part of a name and ``/**`` any number of them.
 """
 
 import re
@@ -36,18 +36,18 @@ _LEVELS = ("debug", "info", "warn", "error", "fatal")
 
 @dataclass(frozen=True)
 class ParameterRule:
-    """Parameters for the nodes whose name fits.
+    """Parameters for the nodes whose name matches.
 
     Attributes:
-        pattern: Full name of a node; ``/*`` and ``/**`` may stand for parts of it.
-        values: Parameters by name; those of sections have dots, as ``virtual_hand.script``.
+        pattern: Full name of a node, in which ``/*`` and ``/**`` are wildcards.
+        values: Parameters by name; those of sections have dots, such as ``virtual_hand.script``.
     """
 
     pattern: str
     values: Mapping[str, Any]
 
     def fits(self, node: str) -> bool:
-        """Return whether the node of this full name gets the parameters."""
+        """Return whether the full name ``node`` matches."""
         parts = re.split(r"(/\*\*|/\*)", self.pattern)
         wildcards = {"/**": r"(/\w+)*", "/*": r"/\w+"}
         return re.fullmatch("".join(wildcards.get(part) or re.escape(part) for part in parts), node) is not None
@@ -55,13 +55,13 @@ class ParameterRule:
 
 @dataclass
 class Arguments:
-    """What the arguments say.
+    """Parsed arguments.
 
     Attributes:
-        remaps: Rules for names, in their order.
-        rules: Parameters, in their order; later ones win.
-        log_level: How much is logged: debug, info, warn, error or fatal; None when it was not said.
-        rosout: Whether what is logged is published on ``/rosout``, too.
+        remaps: Rules for names, in order.
+        rules: Parameters, in order; later ones win.
+        log_level: Log level: debug, info, warn, error or fatal; None if not given.
+        rosout: Whether to publish the log on ``/rosout``.
     """
 
     remaps: list[Remap] = field(default_factory=list)
@@ -70,7 +70,7 @@ class Arguments:
     rosout: bool = True
 
     def parameters(self, node: str) -> dict[str, Any]:
-        """Return the parameters of the node of this full name; those with dots are nested."""
+        """Return the parameters of the node of this full name, nested at dots."""
         flat: dict[str, Any] = {}
         for rule in self.rules:
             if rule.fits(node):
@@ -79,10 +79,10 @@ class Arguments:
 
 
 def nested(flat: Mapping[str, Any]) -> dict[str, Any]:
-    """Return parameters by name, ``virtual_hand.script``, as tables within tables.
+    """Return parameters by name, such as ``virtual_hand.script``, as nested tables.
 
     Raises:
-        TransportError: A name stands for a value and for a table.
+        TransportError: A name is both a value and a table.
     """
     found: dict[str, Any] = {}
     for name, value in flat.items():
@@ -98,10 +98,10 @@ def nested(flat: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def parse_arguments(words: Sequence[str]) -> Arguments:
-    """Return what ``words`` say; each ``--ros-args`` opens a list of arguments, ``--`` or the end closes it.
+    """Parse ``words``; each ``--ros-args`` begins a list of arguments, ``--`` or the end closes it.
 
     Raises:
-        TransportError: A word is none of ROS 2's, or a parameter file cannot be read.
+        TransportError: A word is not one of ROS 2's, or a parameter file cannot be read.
     """
     found = Arguments()
     for flag, value in _pairs(words):

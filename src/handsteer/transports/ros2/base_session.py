@@ -1,4 +1,4 @@
-"""This process as a node of a ROS 2 graph, whatever carries its messages: name, parameters and time."""
+"""This process as a node of a ROS 2 graph on any middleware: name, parameters and time."""
 
 import logging
 import threading
@@ -25,7 +25,7 @@ log = logging.getLogger(__name__)
 
 
 class Ros2Transport(Transport, Protocol):
-    """A transport that can be asked to deliver what is under way."""
+    """A transport that can be flushed."""
 
     def flush(self, timeout_s: float) -> None:
         """Wait until what was published is sent, for at most ``timeout_s`` seconds."""
@@ -33,15 +33,15 @@ class Ros2Transport(Transport, Protocol):
 
 
 class ServiceServer(Protocol):
-    """Answers the requests of a service."""
+    """Replies to the requests of a service."""
 
     def close(self) -> None:
-        """Answer no more; may be called twice."""
+        """Stop replying; may be called twice."""
         ...
 
 
 class Ros2Session(ABC):
-    """A :class:`~handsteer.transports.protocol.Session` of ROS 2; what carries its messages adds the abstract methods.
+    """A :class:`~handsteer.transports.protocol.Session` of ROS 2; each middleware adds the abstract methods.
 
     Args:
         node: Name of the node, unless ``arguments`` rename it.
@@ -72,12 +72,12 @@ class Ros2Session(ABC):
             self._logs = self._publish_logs() if said.rosout else None
             if isinstance(self.clock, SimulatedClock):
                 self._follow(self.clock)
-        except BaseException:  # an interrupt too: what stays open keeps the process from ending
+        except BaseException:  # including interrupts: open resources would keep the process from ending
             self.close()
             raise
 
     def serve(self, parameters: NodeParameters) -> None:
-        """Answer ``ros2 param``, unless the parameter ``start_parameter_services`` is false."""
+        """Serve ``ros2 param``, unless the parameter ``start_parameter_services`` is false."""
         if not self._answers:
             return
         simulated = isinstance(self.clock, SimulatedClock)
@@ -93,7 +93,7 @@ class Ros2Session(ABC):
     def wait(self, timeout_s: float) -> bool:
         """Wait for at most ``timeout_s`` seconds; return whether this session has been closed.
 
-        ROS 2 itself asks no node to end.
+        ROS 2 has no request to end a node.
         """
         silent = isinstance(self.clock, SimulatedClock) and self.clock.silence_s > _CLOCK_SILENCE_S
         if silent and not self._was_silent:
@@ -120,7 +120,7 @@ class Ros2Session(ABC):
 
     @abstractmethod
     def _answer(self, name: str, service: Service, answer: Callable[[Any], Any]) -> ServiceServer:
-        """Answer the requests of the service of this full name by what ``answer`` makes of them."""
+        """Serve the service of this full name; ``answer`` converts a request to a reply."""
 
     def _switch(self, name: str, *, default: bool) -> bool:
         value = self.parameters.pop(name, default)

@@ -1,4 +1,4 @@
-"""Messages as ROS 2 has them on the wire: CDR with its header of four bytes, and the names and hashes of types."""
+"""The encoding of ROS 2 messages: CDR with its header of four bytes, and the names and hashes of types."""
 
 import dataclasses
 import functools
@@ -13,15 +13,15 @@ from handsteer.transports.ros2.service_types import register_services
 
 _FLOAT32: Any = (Nodetype.BASE, ("float32", 0))
 _DISCOVERY = "rmw_dds_common/msg/ParticipantEntitiesInfo"
-# The hash leaves out what rosbags cannot tell: that ROS 2 makes a uint8 of a char.
+# It cannot be computed, because rosbags does not know that ROS 2 converts a char to uint8.
 _KNOWN_HASHES = {_DISCOVERY: "RIHS01_91a0593bacdcc50ea9bdcf849a938b128412cc1ea821245c663bcd26f83c295e"}
 
 
 @functools.cache
 def types(distribution: str = "jazzy") -> Typestore:
-    """Return the message types of a ROS 2 distribution: ``humble`` or newer ones, which are alike, ``jazzy``.
+    """Return the message types of a ROS 2 distribution: ``humble``, or ``jazzy`` for all newer ones.
 
-    The types of the parameter services are with ``jazzy``, and are the same in both.
+    The types of the parameter services are in ``jazzy``, and are the same in both.
     """
     store = get_typestore(Stores.ROS2_HUMBLE if distribution == "humble" else Stores.ROS2_JAZZY)
     store.register({TurtlePose.__msgtype__: ([], [(part.name, _FLOAT32) for part in dataclasses.fields(TurtlePose)])})
@@ -36,10 +36,10 @@ def encode(message: Any) -> bytes:
 
 
 def decode(raw: bytes, name: str) -> Any:
-    """Return the message of the type ``name`` (``std_msgs/msg/String``); its arrays are read-only views of ``raw``.
+    """Decode a message of the type ``name`` (``std_msgs/msg/String``); its arrays are read-only views of ``raw``.
 
     Raises:
-        Exception: ``raw`` is no such message; rosbags raises whatever it stumbles over.
+        Exception: ``raw`` is not such a message; the type depends on where rosbags fails.
     """
     return types().deserialize_cdr(raw, name)
 

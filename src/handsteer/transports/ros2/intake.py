@@ -1,4 +1,4 @@
-"""What becomes of a serialised message that has come, whatever has carried it."""
+"""Processing of serialised messages, common to all ROS 2 middlewares."""
 
 import logging
 import time
@@ -18,15 +18,15 @@ log = logging.getLogger(__name__)
 
 
 class Intake(Generic[M]):
-    """Decodes the messages of a topic and passes them on, but for late ones that do not stop the robot.
+    """Decodes the messages of a topic and passes them on, except late ones that do not stop the robot.
 
-    What cannot be read, and what comes late, is logged once, as long as it goes on.
+    Invalid and late messages are logged once, until they cease.
 
     Args:
-        topic: What comes.
-        name: The topic's name as others know it.
+        topic: The topic.
+        name: The topic's full name in the graph.
         clock: The graph's clock.
-        send: Gets the messages.
+        send: Receives the messages.
     """
 
     def __init__(self, topic: Topic[M], name: str, clock: Clock, send: Deliver[M]) -> None:
@@ -38,18 +38,18 @@ class Intake(Generic[M]):
         self._was_late = self._is_broken = False
 
     def take(self, raw: bytes, sender: bytes = b"", sent_s: float | None = None) -> None:
-        """Take one message.
+        """Process one message.
 
         Args:
-            raw: The message.
-            sender: Who sent it; empty where that is not known.
-            sent_s: When, in seconds of the sender's clock; None where that is not known.
+            raw: The encoded message.
+            sender: Identifies the sender; empty if unknown.
+            sent_s: Time of sending, in seconds of the sender's clock; None if unknown.
         """
         is_late = self._is_late(sender, sent_s)
         try:
             message = decode(raw, type_name(self._topic.type))
         except Exception as error:
-            # Whatever the network brings must not end the receiving.
+            # Invalid messages must not end the subscription.
             if not self._is_broken:
                 log.warning("%s: a message of %d bytes cannot be read: %s", self._name, len(raw), error)
             self._is_broken = True

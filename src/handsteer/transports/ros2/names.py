@@ -1,4 +1,4 @@
-"""Names of nodes and topics by the rules of ROS 2: expansion, remapping, and what is allowed.
+"""Names of nodes and topics by the rules of ROS 2: expansion, remapping and validation.
 
 Source of the rules: design.ros2.org/articles/topic_and_service_names.html and static_remapping.html.
 """
@@ -22,9 +22,9 @@ class Remap:
     """One ``-r from:=to``.
 
     Attributes:
-        source: What is renamed: a topic's name, ``__node`` or ``__ns``.
-        target: The name that it gets.
-        node: The node for which the rule holds; None for all.
+        source: Name to replace: that of a topic, ``__node`` or ``__ns``.
+        target: The new name.
+        node: The node to which the rule applies; None for all.
     """
 
     source: str
@@ -32,18 +32,18 @@ class Remap:
     node: str | None = None
 
     def applies_to(self, node: str) -> bool:
-        """Return whether the rule holds for the node of this name."""
+        """Return whether the rule applies to the node of this name."""
         return self.node in {None, node}
 
 
 @dataclass(frozen=True)
 class NodeName:
-    """A node's name and namespace, and the names of topics as that node sees them.
+    """A node's name and namespace, and the resolution of topic names for that node.
 
     Attributes:
-        name: As ``my_camera``.
-        namespace: As ``/`` or ``/r1``.
-        remaps: Rules for topics; the first that fits counts.
+        name: Such as ``my_camera``.
+        namespace: Such as ``/`` or ``/r1``.
+        remaps: Rules for topics; the first match applies.
     """
 
     name: str
@@ -52,16 +52,16 @@ class NodeName:
 
     @property
     def full(self) -> str:
-        """The full name, as ``/r1/my_camera``."""
+        """The full name, such as ``/r1/my_camera``."""
         return f"{self.namespace.rstrip('/')}/{self.name}"
 
     def topic(self, topic: Topic[Any]) -> str:
-        """Return the full name of ``topic``, as ``/r1/image_raw``, remapped.
+        """Return the full name of ``topic``, such as ``/r1/image_raw``, remapped.
 
-        One that extends another's is renamed with it, unless it has a rule of its own.
+        A topic that is beneath another is renamed with it, unless it has a rule of its own.
 
         Raises:
-            TransportError: A rule gives it a name that is not allowed.
+            TransportError: A rule results in a name that is not allowed.
         """
         full = self.expand(topic.ros_name)
         for rule in self.remaps:
@@ -70,10 +70,10 @@ class NodeName:
         return full if topic.beneath is None else topic.moved_with(self.topic(topic.beneath))
 
     def expand(self, name: str) -> str:
-        """Return the full name for one that may be relative (``a``), private (``~/a``) or hold ``{node}``, ``{ns}``.
+        """Return the full name of one that may be relative (``a``), private (``~/a``) or contain ``{node}``, ``{ns}``.
 
         Raises:
-            TransportError: That is no name of a topic.
+            TransportError: It is not a valid topic name.
         """
         base = self.namespace.rstrip("/")
         full = name.replace("{node}", self.name).replace("{namespace}", base).replace("{ns}", base)
@@ -89,7 +89,7 @@ class NodeName:
 
 
 def identify(node: str, remaps: Sequence[Remap]) -> NodeName:
-    """Return the name of the node that would be called ``node`` but for ``remaps``.
+    """Return the name of the node whose default name is ``node``, with ``remaps`` applied.
 
     Raises:
         TransportError: A rule has a name that is not allowed.
@@ -107,11 +107,11 @@ def identify(node: str, remaps: Sequence[Remap]) -> NodeName:
     return named
 
 
-_LARGEST = 232  # those above have no UDP ports in DDS
+_LARGEST = 232  # higher ones have no UDP ports in DDS
 
 
 def domain_id(environment: Mapping[str, str]) -> int:
-    """Return ``ROS_DOMAIN_ID``, 0 to 232, of ``environment``; 0 when it is not set.
+    """Return ``ROS_DOMAIN_ID``, 0 to 232, of ``environment``; 0 if it is not set.
 
     Raises:
         TransportError: It has a value that is not allowed.

@@ -1,8 +1,8 @@
-"""What a ROS 2 node answers when others ask for its parameters, as ``ros2 param`` does: a request in, a reply out.
+"""The parameter services of a ROS 2 node, for ``ros2 param``: functions from a request to a reply.
 
-The rules are those of rclcpp's and rclpy's own parameter services: who asks for several values of which one is unknown
+The rules are those of rclcpp's and rclpy's own parameter services: a request for several values with an unknown one
 gets an empty list; ``set_parameters`` sets one at a time, ``set_parameters_atomically`` all or none. Types are strict,
-but a whole number does for a double, as on the command line.
+but an integer is accepted for a double, as on the command line.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -25,7 +25,7 @@ from handsteer.transports.ros2.service_types import (
 )
 
 PARAMETER_EVENTS = Topic("/parameter_events", ParameterEvent, is_global=True, depth=1000)
-"""Which parameters of which node have changed."""
+"""Changes of all nodes' parameters."""
 
 NOT_SET = 0
 _TYPES = {"bool": 1, "integer": 2, "double": 3, "string": 4, "strings": 9}
@@ -36,13 +36,13 @@ _INTERFACES = "rcl_interfaces/msg"
 
 
 class ParameterServices:
-    """Answers for one node.
+    """The services of one node.
 
     Args:
-        node: Full name of the node, as ``/r1/hand_sign_control``.
+        node: Full name of the node, such as ``/r1/hand_sign_control``.
         parameters: Its parameters.
-        now: Returns the time as ROS has it.
-        tell: Publishes an event on :data:`PARAMETER_EVENTS`, after each change.
+        now: Returns the current ROS time.
+        tell: Publishes an event on :data:`PARAMETER_EVENTS` after each change.
     """
 
     def __init__(
@@ -59,7 +59,7 @@ class ParameterServices:
 
     @property
     def services(self) -> list[tuple[str, Service, Callable[[Any], Any]]]:
-        """Full name, type, and what turns a request into a reply, of each service."""
+        """Full name, type, and the function from a request to a reply, of each service."""
         return [
             (f"{self._node}/list_parameters", LIST_PARAMETERS, self._list),
             (f"{self._node}/get_parameters", GET_PARAMETERS, self._get),
@@ -130,12 +130,12 @@ class ParameterServices:
 
 
 def list_names(names: Iterable[str], prefixes: Sequence[str], depth: int) -> tuple[list[str], list[str]]:
-    """Return the names that ``list_parameters`` gives, and the prefixes that they have.
+    """Return the names for a ``list_parameters`` request, and their prefixes.
 
     Args:
-        names: All names; their parts have dots between them.
-        prefixes: Only names below these, or equal to one, are wanted; none means all.
-        depth: How many parts a name may have, counted below its prefix; 0 means any number.
+        names: All names, in parts separated by dots.
+        prefixes: Return only names below these, or equal to one; empty for all.
+        depth: Maximum number of parts of a name below its prefix; 0 for no limit.
     """
 
     def shallow(name: str) -> bool:
@@ -149,16 +149,16 @@ def list_names(names: Iterable[str], prefixes: Sequence[str], depth: int) -> tup
 
 
 def _read(parameter: Any) -> Any:
-    """Return the value of a ``Parameter``; None when it is not set.
+    """Return the value of a ``Parameter``; None if it is not set.
 
     Raises:
-        ConfigError: It is an array of numbers, of which the nodes have none.
+        ConfigError: It is an array of numbers, which no parameter has.
     """
     kind = parameter.value.type
     if kind == NOT_SET:
         return None
     if kind in _EMPTY and not len(getattr(parameter.value, _EMPTY[kind])):
-        return []  # who reads a file cannot tell of what an empty list is
+        return []  # an empty list in a file has no known element type
     if kind not in _FIELDS:
         raise ConfigError(f"{parameter.name}: a list of numbers should be a single value")
     value = getattr(parameter.value, _FIELDS[kind])

@@ -1,4 +1,4 @@
-"""What this process logs, as ROS 2's ``/rosout`` has it, so that rqt_console and ``ros2 topic echo`` show it."""
+"""Publishes this process's log on ROS 2's ``/rosout``, for rqt_console and ``ros2 topic echo``."""
 
 import logging
 import threading
@@ -9,18 +9,18 @@ from handsteer.errors import HandsteerError
 from handsteer.messages import Log, Time, Topic
 
 ROSOUT = Topic("/rosout", Log, latched=True, is_global=True, depth=1000, lifespan_s=10.0)
-"""What all nodes log; ``Log.level`` is 10, 20, 30, 40 or 50, as in Python."""
+"""The log of all nodes; ``Log.level`` is 10, 20, 30, 40 or 50, as in Python."""
 
 _WAITING = 100
 _LEVELS = (10, 20, 30, 40, 50)
 
 
 class RosoutHandler(logging.Handler):
-    """Keeps what is logged, the newest hundred records, until it is sent: logging never waits for the network.
+    """Keeps the newest hundred log records until they are sent, so that logging never waits for the network.
 
     Args:
-        node: Full name of the node, as ``/r1/my_camera``; its logger is called ``r1.my_camera``.
-        now: Returns the time as ROS has it.
+        node: Full name of the node, such as ``/r1/my_camera``; its logger is called ``r1.my_camera``.
+        now: Returns the current ROS time.
     """
 
     def __init__(self, node: str, now: Callable[[], Time]) -> None:
@@ -40,7 +40,7 @@ class RosoutHandler(logging.Handler):
             self.handleError(record)
 
     def send(self, publish: Callable[[Log], None]) -> None:
-        """Give ``publish`` what was kept; what it refuses is dropped. To be called on one thread only."""
+        """Call ``publish`` for each record, and drop those it refuses. Must be called on one thread only."""
         self._sending = threading.get_ident()
         try:
             while self._messages:

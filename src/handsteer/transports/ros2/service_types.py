@@ -1,7 +1,7 @@
-"""The types of ROS 2's parameter services, which rosbags does not have: requests, replies, and hashes.
+"""The types of ROS 2's parameter services, which rosbags does not have: requests, replies and hashes.
 
-Source of the definitions: package rcl_interfaces, ``srv/*.srv``. As ROS 2 has it since Iron, the hash of a service is
-that of a message with its request, its reply and the event of its introspection (REP 2016).
+Source of the definitions: package rcl_interfaces, ``srv/*.srv``. Since Iron, the hash of a service is that of a message
+with its request, its reply and its introspection event (REP 2016).
 """
 
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ class Service:
     """The type of a service.
 
     Attributes:
-        name: As ``rcl_interfaces/srv/ListParameters``.
+        name: Such as ``rcl_interfaces/srv/ListParameters``.
         request_definition: Fields of the request, as in a ``.msg`` file.
         reply_definition: Fields of the reply.
     """
@@ -64,12 +64,12 @@ SERVICES = (
     SET_PARAMETERS,
     SET_PARAMETERS_ATOMICALLY,
 )
-"""All of them."""
+"""All parameter services."""
 
 
 def register_services(store: Typestore) -> None:
-    """Add the services' requests and replies to the message types of ``store``, and what their hashes need."""
-    # A char of ROS 2 is a uint8, which the type's hash must say.
+    """Add the services' requests and replies, and the types their hashes depend on, to ``store``."""
+    # A char of ROS 2 is a uint8, which the type's hash depends on.
     constants, fields = store.fielddefs[_EVENT_INFO]
     patched = [
         (name, (Nodetype.ARRAY, ((Nodetype.BASE, ("uint8", 0)), 16)) if name == "client_gid" else kind)

@@ -17,7 +17,7 @@ _ROOT = "@ros2_lv"
 _NODE = "NN"
 _KINDS = {"MP": "publisher", "MS": "subscriber", "SS": "service", "SC": "client"}
 _LETTERS = {words: letters for letters, words in _KINDS.items()}
-# What a profile has by default is left out of its text; rmw_zenoh's default depth is 42.
+# Default values of a profile are omitted from its text; rmw_zenoh's default depth is 42.
 _DEFAULT_DEPTH = 42
 _ATTACHMENT = struct.Struct("<qqB16s")
 _GID_BYTES = 16
@@ -30,9 +30,9 @@ class Endpoint:
 
     Attributes:
         kind: ``publisher``, ``subscriber``, ``service`` or ``client``.
-        topic: Full name of the topic or service, as ``/r1/image_raw``.
-        type: Name of its type, as ``sensor_msgs/msg/Image``.
-        type_hash: Hash of its type, as ``RIHS01_df66…``.
+        topic: Full name of the topic or service, such as ``/r1/image_raw``.
+        type: Name of its type, such as ``sensor_msgs/msg/Image``.
+        type_hash: Hash of its type, such as ``RIHS01_df66…``.
     """
 
     kind: str
@@ -43,7 +43,7 @@ class Endpoint:
 
 @dataclass(frozen=True)
 class Place:
-    """Where the one node of this process is in the graph.
+    """This process's node in the graph.
 
     Attributes:
         domain: The ROS 2 domain.
@@ -58,12 +58,12 @@ class Place:
 
 @dataclass(frozen=True)
 class Entity:
-    """What a liveliness token tells: a node, or an endpoint of one.
+    """A node, or an endpoint of one, announced by a liveliness token.
 
     Attributes:
         zid: Identifier of the Zenoh session.
         node: Full name of the node.
-        endpoint: None when the token is that of the node itself.
+        endpoint: None if the token announces the node itself.
     """
 
     zid: str
@@ -72,18 +72,18 @@ class Entity:
 
 
 def topic_key(domain: int, name: str, type_name: str) -> str:
-    """Return the key expression on which messages or requests pass.
+    """Return the key expression of messages or requests.
 
     Args:
         domain: The ROS 2 domain.
         name: Full name of the topic or service.
-        type_name: Its type, as ``std_msgs/msg/String``.
+        type_name: Its type, such as ``std_msgs/msg/String``.
     """
     return f"{domain}{name}/{dds_type_name(type_name)}/{type_hash(type_name)}"
 
 
 def all_tokens(domain: int) -> str:
-    """Return the key expression that takes in every liveliness token of a domain."""
+    """Return the key expression that matches all liveliness tokens of a domain."""
     return f"{_ROOT}/{domain}/**"
 
 
@@ -97,8 +97,8 @@ def endpoint_token(place: Place, number: int, endpoint: Endpoint, profile: Profi
 
     Args:
         place: The node that has the endpoint.
-        number: Tells the endpoints of a session apart; from 1.
-        endpoint: What it is.
+        number: Identifies the endpoint within its session; from 1.
+        endpoint: The endpoint.
         profile: Its quality of service.
     """
     who = f"{_ROOT}/{place.domain}/{place.zid}/0/{number}/{_LETTERS[endpoint.kind]}/{_name(place.node)}"
@@ -107,7 +107,7 @@ def endpoint_token(place: Place, number: int, endpoint: Endpoint, profile: Profi
 
 
 def read_token(token: str) -> Entity | None:
-    """Return what a liveliness token tells; None when it is none of rmw_zenoh's."""
+    """Return the entity that a liveliness token announces; None if the token is not one of rmw_zenoh's."""
     parts = token.split("/")
     if len(parts) < _NODE_PARTS or parts[0] != _ROOT:
         return None
@@ -122,26 +122,26 @@ def read_token(token: str) -> Entity | None:
 
 
 def gid(token: str) -> bytes:
-    """Return the 16 bytes that name an endpoint in ROS 2: the XXH3 hash of its liveliness token."""
+    """Return an endpoint's identifier in ROS 2, 16 bytes: the XXH3 hash of its liveliness token."""
     return xxhash.xxh3_128_intdigest(token.encode()).to_bytes(_GID_BYTES, "little")
 
 
 def attachment(number: int, time_ns: int, source: bytes) -> bytes:
-    """Return what goes with each message, request and reply.
+    """Return the attachment of a message, request or reply.
 
     Args:
-        number: Of the message, from 1.
-        time_ns: When it was sent, in nanoseconds of Unix time.
-        source: The identifier of its sender, 16 bytes.
+        number: Sequence number, from 1.
+        time_ns: Time of sending, in nanoseconds of Unix time.
+        source: Identifier of the sender, 16 bytes.
     """
     return _ATTACHMENT.pack(number, time_ns, _GID_BYTES, source)
 
 
 def read_attachment(raw: bytes) -> tuple[int, int, bytes]:
-    """Return number, time in nanoseconds and sender of an attachment.
+    """Return sequence number, time in nanoseconds and sender of an attachment.
 
     Raises:
-        ValueError: It is none.
+        ValueError: It is not an attachment.
     """
     try:
         number, time_ns, length, source = _ATTACHMENT.unpack(raw)

@@ -1,4 +1,4 @@
-"""This process as a session of Zenoh and a node of ROS 2: what it publishes and subscribes to, and its router."""
+"""This process as a Zenoh session and a node of ROS 2, with its publishers, subscribers and router."""
 
 import itertools
 import logging
@@ -25,7 +25,7 @@ class Member:
 
     Attributes:
         name: The node's name.
-        is_local: Whether this process reaches this machine only, as far as it knows.
+        is_local: Whether this process connects to this machine only, as far as is known.
 
     Args:
         network: How to join.
@@ -57,7 +57,7 @@ class Member:
             self._look_for_router()
             self._neighbours = Neighbours(self.session, network.domain)
             self._token = self.session.liveliness().declare_token(node_token(self._place))
-        except BaseException:  # an interrupt too: a session that stays open keeps the process from ending
+        except BaseException:  # including interrupts: an open session would keep the process from ending
             self.close()
             raise
 
@@ -65,22 +65,22 @@ class Member:
         """Return the key expression of a topic or service.
 
         Args:
-            name: Its full name, as ``/r1/image_raw``.
-            type_name: Its type, as ``sensor_msgs/msg/Image``.
+            name: Its full name, such as ``/r1/image_raw``.
+            type_name: Its type, such as ``sensor_msgs/msg/Image``.
         """
         return topic_key(self._place.domain, name, type_name)
 
     def introduce(
         self, kind: str, name: str, type_name: str, profile: Profile, or_type: str | None = None
     ) -> tuple[zenoh.LivelinessToken, str]:
-        """Tell others what this node has; return the token that keeps it told, and its text.
+        """Announce an endpoint of this node; return the liveliness token, which must be kept, and its text.
 
         Args:
             kind: ``publisher``, ``subscriber`` or ``service``.
             name: Full name of its topic or service.
-            type_name: Type of that.
+            type_name: Type of the topic or service.
             profile: Its quality of service.
-            or_type: Another type that it changes to where that is subscribed to.
+            or_type: Another type that it changes to if there is a subscriber of it.
         """
         endpoint = Endpoint(kind, name, type_name, type_hash(type_name))
         with self._lock:
@@ -100,7 +100,7 @@ class Member:
         return set() if self._neighbours is None else self._neighbours.subscribed_types(topic)
 
     def watch_router(self) -> None:
-        """Say it when the router has gone, or is there again; does nothing where none is looked for."""
+        """Log when the router is lost or found again; does nothing if none is used."""
         if self._network.attempts is None:
             return
         has_router = self._has_router()

@@ -1,4 +1,4 @@
-"""Who else is in the graph, as their liveliness tokens tell; and why nothing passes where types differ."""
+"""The other nodes of the graph, from their liveliness tokens, and warnings about mismatched types."""
 
 import logging
 import threading
@@ -13,7 +13,7 @@ _OPPOSITE = {"publisher": "subscriber", "subscriber": "publisher"}
 
 
 class Neighbours:
-    """Compares our publishers and subscribers with those of others: Zenoh itself keeps silent about types.
+    """Compares our publishers and subscribers with those of others, because Zenoh does not report mismatched types.
 
     Args:
         session: The Zenoh session of this process.
@@ -28,7 +28,7 @@ class Neighbours:
         self._watch = session.liveliness().declare_subscriber(all_tokens(domain), self._note, history=True)
 
     def add(self, endpoint: Endpoint, or_type: str | None = None) -> None:
-        """Compare a publisher or subscriber of ours, which may change to ``or_type``, with others, now and later."""
+        """Compare our publisher or subscriber, which may change to ``or_type``, with others, now and later."""
         with self._lock:
             self._ours[endpoint.topic, endpoint.kind] = endpoint, or_type
             theirs = list(self._theirs.values())
@@ -44,7 +44,7 @@ class Neighbours:
         return {end.type for _, end in self._others("subscriber", topic)}
 
     def close(self) -> None:
-        """Look no more."""
+        """Stop comparing."""
         self._watch.undeclare()
 
     def _others(self, kind: str, topic: str) -> list[tuple[str, Endpoint]]:
@@ -80,7 +80,7 @@ class Neighbours:
 
 
 def explain(ours: Endpoint, theirs: Endpoint, node: str) -> str:
-    """Return one line that says why nothing passes between two ends of a topic."""
+    """Return one line on why two endpoints of a topic exchange no messages."""
     if ours.type != theirs.type:
         why = f"ours has the type {ours.type}, theirs {theirs.type}"
     else:

@@ -1,4 +1,4 @@
-"""How to reach a Zenoh network, as rmw_zenoh's environment variables say.
+"""Configures the connection to a Zenoh network from rmw_zenoh's environment variables.
 
 Source: ros2/rmw_zenoh, README.md and its default configurations of sessions and routers.
 """
@@ -15,7 +15,7 @@ from handsteer.errors import TransportError
 from handsteer.transports.ros2.names import domain_id
 
 ROUTER = "tcp/localhost:7447"
-"""Where a router listens, unless another place is said."""
+"""Default address of the router."""
 
 _LOOPBACK = re.compile(r"[^/]+/(localhost|127\.\d+\.\d+\.\d+|\[::1\])(:|$)|unixsock|unixpipe")
 _ATTEMPTS = "ZENOH_ROUTER_CHECK_ATTEMPTS"
@@ -23,11 +23,11 @@ _OVERRIDE = "ZENOH_CONFIG_OVERRIDE"
 _COMMON: dict[str, Any] = {
     "scouting/multicast/enabled": False,
     "scouting/gossip/enabled": True,
-    # Peers learn of each other by the router; then they connect directly, and each pair only once.
+    # Peers discover each other by the router; then they connect directly, and each pair only once.
     "scouting/gossip/target": {"router": ["router", "peer"], "peer": ["router"]},
     "scouting/gossip/autoconnect": {"router": [], "peer": ["router", "peer"]},
     "scouting/gossip/autoconnect_strategy": {"peer": {"to_router": "always", "to_peer": "greater-zid"}},
-    # What is kept for late subscribers is ordered by time.
+    # Messages kept for late subscribers are ordered by time.
     "timestamping/enabled": {"router": True, "peer": True, "client": True},
     "transport/shared_memory/enabled": False,
 }
@@ -40,7 +40,7 @@ _SESSION: dict[str, Any] = {
     "queries_default_timeout": 60000,
     **_COMMON,
 }
-# A router that comes back is found within a second, whatever it took until now.
+# A router that restarts is found within a second, however long it was away.
 _RETRY = {"period_init_ms": 200, "period_max_ms": 1000, "period_increase_factor": 2}
 
 
@@ -51,9 +51,9 @@ class Network:
     Attributes:
         domain: The ROS 2 domain, 0 to 232.
         config: Configuration of the Zenoh session.
-        attempts: How often to look for a router before going on without one, once a second; 0 waits for one, None
+        attempts: How often to look for a router, once a second, before continuing without one; 0 waits for one, None
             does not look.
-        is_local: Whether this process connects and listens within this machine only; a router may lead further.
+        is_local: Whether this process connects and listens on this machine only; a router may forward further.
     """
 
     domain: int
@@ -63,10 +63,10 @@ class Network:
 
 
 def network(environment: Mapping[str, str]) -> Network:
-    """Return what ``environment`` says; without a word of it, only this machine is listened to.
+    """Return the network configured by ``environment``; by default, it listens on this machine only.
 
-    ``ROS_DOMAIN_ID``, ``ZENOH_SESSION_CONFIG_URI``, ``ZENOH_CONFIG_OVERRIDE`` and ``ZENOH_ROUTER_CHECK_ATTEMPTS`` count
-    as in rmw_zenoh.
+    ``ROS_DOMAIN_ID``, ``ZENOH_SESSION_CONFIG_URI``, ``ZENOH_CONFIG_OVERRIDE`` and ``ZENOH_ROUTER_CHECK_ATTEMPTS`` have
+    their meanings in rmw_zenoh.
 
     Raises:
         TransportError: A variable has a value that is not allowed.
@@ -82,8 +82,8 @@ def router_config(environment: Mapping[str, str], endpoint: str | None = None) -
     """Return the configuration of a router.
 
     Args:
-        environment: ``ZENOH_ROUTER_CONFIG_URI`` and ``ZENOH_CONFIG_OVERRIDE`` of it count as in rmw_zenoh.
-        endpoint: Where it listens, as ``tcp/[::]:7447``; what a variable says unless given.
+        environment: ``ZENOH_ROUTER_CONFIG_URI`` and ``ZENOH_CONFIG_OVERRIDE`` have their meanings in rmw_zenoh.
+        endpoint: Address to listen on, such as ``tcp/[::]:7447``; that of a variable if not given.
 
     Raises:
         TransportError: A variable or ``endpoint`` has a value that is not allowed.
@@ -97,12 +97,12 @@ def router_config(environment: Mapping[str, str], endpoint: str | None = None) -
 
 
 def routers(config: zenoh.Config) -> str:
-    """Return where a session looks for routers, in words."""
+    """Return the addresses at which a session looks for routers, in words."""
     return " or ".join(_endpoints(config, "connect")) or "any address"
 
 
 def _endpoints(config: zenoh.Config, what: str) -> list[str]:
-    """Return where a session is to ``connect`` or ``listen``; they may be given by mode."""
+    """Return the addresses to ``connect`` to or ``listen`` on, which may be configured by mode."""
     endpoints: Any = json.loads(config.get_json(f"{what}/endpoints"))
     if isinstance(endpoints, dict):
         endpoints = endpoints.get(json.loads(config.get_json("mode")) or "peer", [])
@@ -110,7 +110,7 @@ def _endpoints(config: zenoh.Config, what: str) -> list[str]:
 
 
 def reason(error: zenoh.ZError) -> str:
-    """Return what Zenoh says, without the places in its source."""
+    """Return Zenoh's error message without the locations in its source."""
     said = re.search(r'msg: "(.*?)"[,}]', str(error))
     return re.sub(r" at /[^\s\]]+", "", said[1] if said else str(error)).replace(".]", "]").rstrip(". ")
 

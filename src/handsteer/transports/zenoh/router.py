@@ -1,4 +1,4 @@
-"""A router of our own, by which nodes find each other where no ROS 2 with its ``rmw_zenohd`` is installed."""
+"""A Zenoh router, by which nodes find each other if no ROS 2 with ``rmw_zenohd`` is installed."""
 
 import json
 from collections.abc import Mapping
@@ -13,8 +13,9 @@ class Router:
     """A Zenoh router in this process, until it is closed.
 
     Args:
-        environment: ``ZENOH_ROUTER_CONFIG_URI`` and ``ZENOH_CONFIG_OVERRIDE`` of it count as for ``rmw_zenohd``.
-        endpoint: Where it listens, as ``tcp/[::]:7447``; what the variables say unless given, else this machine only.
+        environment: ``ZENOH_ROUTER_CONFIG_URI`` and ``ZENOH_CONFIG_OVERRIDE`` have their meanings in ``rmw_zenohd``.
+        endpoint: Address to listen on, such as ``tcp/[::]:7447``; by default that of the variables, else this machine
+            only.
 
     Raises:
         TransportError: It cannot listen there, or a variable is wrong.
@@ -27,7 +28,7 @@ class Router:
         if isinstance(endpoints, dict):
             endpoints = endpoints.get("router", [])
         self.endpoints: list[str] = endpoints
-        """Where it listens."""
+        """Addresses it listens on."""
         try:
             self._session = zenoh.open(config)
         except zenoh.ZError as error:
@@ -37,6 +38,6 @@ class Router:
             ) from None
 
     def close(self) -> None:
-        """Leave; may be called twice."""
+        """Stop the router; may be called twice."""
         if not self._session.is_closed():
             self._session.close()

@@ -1,7 +1,7 @@
 """This process as a node of a ROS 2 graph over Zenoh, and its services.
 
-A service is a queryable that takes CDR and an attachment, and replies with both, as rmw_zenoh has it. The attachment of
-a reply has the number and the sender of its request, by which the client finds it again.
+As in rmw_zenoh, a service is a queryable that receives CDR and an attachment, and replies with both. The attachment of
+a reply has the number and the sender of its request, by which the client identifies it.
 """
 
 import logging
@@ -27,17 +27,17 @@ from handsteer.transports.zenoh.transport import ZenohTransport
 log = logging.getLogger(__name__)
 
 _PROFILE = Profile(reliable=True, latched=False, depth=1000)
-"""As ROS 2 has it for parameter services."""
+"""The profile of ROS 2's parameter services."""
 
 
 class ServiceServer:
-    """Answers the requests of a service, on a thread of its own.
+    """Replies to the requests of a service, on a thread of its own.
 
     Args:
         member: This process in its Zenoh network.
-        name: Full name of the service, as ``/my_camera/list_parameters``.
+        name: Full name of the service, such as ``/my_camera/list_parameters``.
         service: Its type.
-        answer: Turns a request into a reply; returns at once.
+        answer: Converts a request to a reply; returns at once.
     """
 
     def __init__(self, member: Member, name: str, service: Service, answer: Callable[[Any], Any]) -> None:
@@ -51,7 +51,7 @@ class ServiceServer:
         self._token, _ = member.introduce("service", name, service.name, _PROFILE)
 
     def close(self) -> None:
-        """Answer no more; may be called twice."""
+        """Stop replying; may be called twice."""
         with self._lock:
             if self._is_closed:
                 return
@@ -67,7 +67,7 @@ class ServiceServer:
                 reply = encode(self._answer(decode(raw, self._service.request)))
                 query.reply(self._key, reply, attachment=attachment(number, time.time_ns(), client))
             except Exception as error:
-                # Whatever the network brings must not end the answering.
+                # Invalid requests must not end the service.
                 log.warning("%s: a request of %d bytes cannot be answered: %s", self._name, len(raw), error)
 
 

@@ -23,7 +23,7 @@ from handsteer.transports.zenoh.member import Member
 
 M = TypeVar("M")
 
-# Zenoh sends on threads of its own and does not tell when they are done.
+# Zenoh sends on its own threads and does not report when they are done.
 _DELIVER_S = 0.1
 _HEARTBEAT_S = 0.5
 
@@ -31,9 +31,9 @@ log = logging.getLogger(__name__)
 
 
 class ZenohTransport:
-    """A :class:`~handsteer.transports.protocol.Transport` over Zenoh, as ROS 2 has it under rmw_zenoh.
+    """A :class:`~handsteer.transports.protocol.Transport` over Zenoh, compatible with ROS 2 under rmw_zenoh.
 
-    Capture times travel in the stamps of message headers; messages without a header come without one.
+    Capture times are the stamps of message headers; messages without a header have none.
 
     Args:
         member: This process in its Zenoh network.
@@ -50,11 +50,11 @@ class ZenohTransport:
 
     @property
     def crosses_network(self) -> bool:
-        """Whether others may be on other machines; what a router leads to is not known."""
+        """Whether others may be on other machines; forwarding by a router is unknown."""
         return not self._member.is_local
 
     def advertise(self, node: str, topic: Topic[M]) -> "ZenohPublisher[M]":
-        """Return the sending end of ``topic`` for the node named ``node``."""
+        """Return a publisher of ``topic`` for the node named ``node``."""
         self._claim(topic)
         publisher = ZenohPublisher(self._member, topic)
         with self._lock:
@@ -71,19 +71,19 @@ class ZenohTransport:
         return fanout.add(deliver)
 
     def publishers_of(self, topic: Topic[Any]) -> list[str]:
-        """Return the full names of the ROS 2 nodes that publish ``topic``, as their liveliness tokens tell."""
+        """Return the full names of the ROS 2 nodes that publish ``topic``, from their liveliness tokens."""
         name = self._member.name.topic(topic)
         with self._lock:
             ours = [self._member.name.full for publisher in self._publishers if publisher.name == name]
         return sorted([*ours, *self._member.publishers_of(name)])
 
     def subscribed_types(self, topic: Topic[Any]) -> set[str]:
-        """Return the types of other processes' subscribers of ``topic``; none while it is used twice here."""
+        """Return the types of other processes' subscribers of ``topic``; none while this process uses it twice."""
         name = self._member.name.topic(topic)
         return set() if self._types.is_shared(name) else self._member.subscribed_types(name)
 
     def withdraw(self, publisher: "ZenohPublisher[Any]") -> None:
-        """End a sending end, once what it sent has had the time to leave."""
+        """Close a publisher, after a delay for what it sent."""
         self.flush(_DELIVER_S)
         with self._lock:
             self._publishers.remove(publisher)
@@ -95,11 +95,11 @@ class ZenohTransport:
         return self._member.name.topic(topic)
 
     def full_name(self, node: str) -> str:
-        """Return the ROS 2 node's name and ``node``, as ROS's own diagnostics do: ``r1/my_camera: my_camera``."""
+        """Return the ROS 2 node's name and ``node``, as in ROS's own diagnostics: ``r1/my_camera: my_camera``."""
         return f"{self._member.name.full.removeprefix('/')}: {node}"
 
     def flush(self, timeout_s: float) -> None:
-        """Give what was published the time to leave, at most ``timeout_s`` seconds."""
+        """Wait for what was published to be sent, at most ``timeout_s`` seconds."""
         time.sleep(min(timeout_s, _DELIVER_S))
 
     def close(self) -> None:
@@ -123,7 +123,7 @@ class ZenohTransport:
 
 
 class ZenohPublisher(Generic[M]):
-    """The sending end of a topic.
+    """Publisher of a topic.
 
     Attributes:
         name: Full name of the topic.
@@ -136,7 +136,7 @@ class ZenohPublisher(Generic[M]):
         self.name = name
         key = member.key(name, kind)
         self._publisher = member.session.declare_publisher(key, **_options(topic, profile))
-        # It keeps messages for late subscribers, but does not know of any: the plain one beside it does.
+        # It keeps messages for late subscribers but does not report subscribers, which the plain publisher does.
         self._keeper = _keeper(member.session, key, topic, profile) if profile.latched else None
         or_type = type_name(topic.or_type) if topic.or_type else None
         self._token, text = member.introduce("publisher", name, kind, profile, or_type)
@@ -147,15 +147,15 @@ class ZenohPublisher(Generic[M]):
 
     @property
     def has_subscribers(self) -> bool:
-        """Whether anybody listens, in this process or another."""
+        """Whether there are subscribers, in this process or another."""
         with self._lock:
             if self._is_closed:
                 return False
-            status: Any = self._publisher.matching_status  # no bool, whatever its type hint says
+            status: Any = self._publisher.matching_status  # not a bool, despite its type hint
         return bool(status.matching)
 
     def publish(self, message: M, captured_s: float | None = None) -> None:
-        """Give ``message`` to the network; a subscriber that is too slow for it goes without."""
+        """Send ``message``; subscribers that are too slow miss it."""
         check_type(self._topic, message)
         if not (self._topic.latched or self.has_subscribers):
             return
@@ -171,7 +171,7 @@ class ZenohPublisher(Generic[M]):
                 raise TransportError(f"{self.name} cannot be published: {error}") from None
 
     def close(self) -> None:
-        """Send no more; may be called twice."""
+        """Stop publishing; may be called twice."""
         with self._lock:
             if self._is_closed:
                 return
@@ -188,10 +188,10 @@ def _named(member: Member, topic: Topic[Any]) -> tuple[str, str]:
 
 
 def _options(topic: Topic[Any], profile: Profile) -> dict[str, Any]:
-    """Return how messages travel.
+    """Return the publisher's options.
 
-    As in rmw_zenoh, no publisher waits for a subscriber that hangs: its messages are dropped. Signs and commands
-    overtake images that go the same way, and are not held back to be sent together with others.
+    As in rmw_zenoh, no publisher waits for a stalled subscriber: messages are dropped. Signs and commands have priority
+    over images on the same link, and are not delayed for batching.
     """
     is_urgent = profile.reliable and topic.type not in IMAGES
     return {
@@ -214,9 +214,9 @@ def _keeper(session: zenoh.Session, key: str, topic: Topic[Any], profile: Profil
 
 
 class _Reception(Generic[M]):
-    """A subscriber, whose messages are decoded and passed on by a thread of its own.
+    """A subscriber, whose messages are decoded and passed on by its own thread.
 
-    Zenoh puts them into a ring that keeps the newest, so that neither a queue grows nor others are held up.
+    Zenoh puts them into a ring that keeps the newest, so that no queue grows and no other subscriber is delayed.
     """
 
     def __init__(self, member: Member, topic: Topic[M], clock: Clock, send: Deliver[M]) -> None:
@@ -231,7 +231,7 @@ class _Reception(Generic[M]):
         self._thread.start()
 
     def close(self) -> None:
-        """Receive no more."""
+        """Stop receiving."""
         self._is_closed = True
         self._token.undeclare()
         self._subscriber.undeclare()
@@ -252,7 +252,7 @@ class _Reception(Generic[M]):
 
 
 def _sending(attached: zenoh.ZBytes | None) -> tuple[bytes, float | None]:
-    """Return who has sent a message and when; nobody and None of one that is not ROS 2, or of an older one."""
+    """Return sender and time of a message; empty and None if it is not from ROS 2, or from an older one."""
     if attached is None:
         return b"", None
     try:
