@@ -440,7 +440,7 @@ class Config(Section):
 
 
 def load(path: Path | None = None, base: dict[str, Any] | None = None, *overrides: dict[str, Any]) -> Config:
-    """Return the parameters: each source overrides those to its left.
+    """Return the parameters from the defaults, ``base``, ``path`` and ``overrides``, each overriding the ones before.
 
     Args:
         path: A YAML file with some of the fields of :class:`Config`, or None; it overrides ``base``.

@@ -26,13 +26,7 @@ log = logging.getLogger(__name__)
 
 
 def make_camera(config: Config, transport: Transport, clock: Clock, camera: "Camera | None" = None) -> "CameraNode":
-    """Return the node ``my_camera``.
-
-    Args:
-        config: All parameters.
-        transport: Carries the node's messages.
-        clock: The graph's clock.
-        camera: Delivers the frames; None opens the one that ``config`` names.
+    """Return the node ``my_camera``; without a ``camera``, it opens the one that ``config`` names.
 
     Raises:
         CameraError: The camera, or its calibration, cannot be used.
@@ -97,11 +91,7 @@ def make_control(
 ) -> "HandSignControlNode":
     """Return the node ``hand_sign_control``.
 
-    Args:
-        config: All parameters.
-        transport: Carries the messages.
-        clock: The graph's clock.
-        simulated: Whether the robot is known to be simulated; ``control.arming`` is then off if it is ``auto``.
+    ``simulated`` is whether the robot is known to be simulated; ``control.arming`` is then off if it is ``auto``.
 
     Raises:
         ConfigError: Control and robot are configured with different types of commands.
@@ -117,11 +107,7 @@ def make_control(
 def make_robot(config: Config, transport: Transport, clock: Clock, link: Session | None = None) -> "RobotNode":
     """Return the node ``robot``; one that publishes ``/clock`` runs on real time, not on its own ``/clock``.
 
-    Args:
-        config: All parameters.
-        transport: Carries the messages.
-        clock: The graph's clock.
-        link: This process in the graph of a real robot.
+    ``link`` is this process in the graph of a real robot.
 
     Raises:
         ConfigError: The robot is real, and there is no link to it.

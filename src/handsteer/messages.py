@@ -186,7 +186,7 @@ IMAGE_ANNOTATED = Topic("/gesture/image_annotated", Image)
 CMD_VEL = Topic("/robot_diff_drive_controller/cmd_vel", Twist, depth=10, lifespan_s=STALE_S, stops=is_zero)
 SELECT_ROBOT = Topic("/select_robot", String, depth=10)
 SELECTED_ROBOT = Topic("/selected_robot", String, latched=True)
-# True stops the robot whatever its active input; false ends the Stop. No message may be lost.
+# True stops the robot and overrides all inputs; false ends the Stop. No message may be lost.
 STOP = Topic("/stop", Bool, depth=10)
 # The state of /stop that each node remembers and publishes, for nodes that restart.
 STOPPED = Topic("/stopped", Bool, latched=True)

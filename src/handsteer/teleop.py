@@ -78,7 +78,7 @@ class Teleop:
         return self._velocity
 
     def stop(self) -> None:
-        """Stop until :meth:`reset`, whatever sign is shown."""
+        """Stop until :meth:`reset`; signs are ignored."""
         self._command(self._control.stop())
 
     def reset(self) -> None:

@@ -29,9 +29,6 @@ class BrowserCamera:
     A frame is :data:`HEADER_BYTES` with its capture time on the browser's clock, in milliseconds as a little-endian
     64-bit number, and a JPEG file. The clocks are not synchronized: the frame with the shortest delay gives their
     offset, except for that delay. The age of a later frame is its additional delay.
-
-    Args:
-        clock: The graph's clock.
     """
 
     name = "browser's camera"

@@ -29,7 +29,6 @@ class VideoFile:
     """Plays a video file at its own frame rate.
 
     Args:
-        path: The file.
         clock: Stamps the frames.
         at_end: What happens after the last frame.
         noise: Whether to add sensor noise: files may repeat a picture exactly, which no camera does.

@@ -33,7 +33,8 @@ _GLANCING = 0.05
 _CREEP_M = 0.06
 _STEP_M = 0.03
 _FEWEST_STEPS, _MOST_STEPS = 8, 400
-# Between every third pose, no pose is farther away than two steps; slightly more for rounding of the summed poses.
+# Only every third pose is checked: the others are within two steps of one, slightly more by rounding of the summed
+# poses.
 _ROUGHLY = 2.1
 _SLOWEST = 0.005
 _NOTHING_MPS = 1e-6

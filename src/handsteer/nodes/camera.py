@@ -29,8 +29,6 @@ class CameraNode(Node):
     A picture that equals the previous one is not published.
 
     Args:
-        transport: Carries the messages.
-        clock: The graph's clock.
         camera: Delivers the frames.
         frame_id: Coordinate frame of the images.
         calibration: Calibration of the lens, for pictures of its size; None if there is none.

@@ -42,13 +42,11 @@ _DIAGNOSE_PERIOD_S = 0.1
 class HandSignControlNode(Node):
     """Publishes one Twist per sign, one zero when signs stop, and one zero at the end, however the node ends.
 
-    True on ``/stop`` stops the robot whatever its active input, until false is received; then signs and steering must
+    True on ``/stop`` stops the robot and overrides all inputs, until false is received; then signs and steering must
     show neutral first. With ``config.robots`` it drives one of them at a time; see
     :class:`~handsteer.nodes.selection.Selection`.
 
     Args:
-        transport: Carries the messages.
-        clock: The graph's clock.
         config: Limits, steps and timeouts.
         cmd_vel: Topic of the commands, with Twist, TwistStamped or either.
         collision_monitor: Whether and how to slow commands before obstacles; disabled by default.

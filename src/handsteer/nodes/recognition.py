@@ -45,8 +45,6 @@ class HandSignRecognitionNode(Node):
     """Publishes one sign per frame, and ``NONE`` while no frames arrive.
 
     Args:
-        transport: Carries the messages.
-        clock: The graph's clock.
         recognizer: Recognises the signs.
         config: Maximum age of a frame, and which images to subscribe to.
         annotate: Draws the result into a copy of the frame, if there are subscribers.

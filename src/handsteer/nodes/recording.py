@@ -12,8 +12,8 @@ class Recording:
     """Decides whether frames come from a recording; these count as captured on arrival.
 
     The stamp alone is not enough: frames over a slow camera link are old too, and old gestures must not move a robot.
-    So ``auto`` accepts only what a player of recordings publishes. Frames with old stamps that arrive at a steady rate
-    are reported as a possible recording.
+    So ``auto`` accepts only what a player of recordings publishes. Frames with old stamps that advance in step with
+    time are reported as a possible recording.
 
     Args:
         recorded: auto accepts what a player publishes; always accepts also stamps older than any link delay; never

@@ -76,8 +76,6 @@ class RobotNode(Node):
     """Drives a robot and publishes its state 50 times a second.
 
     Args:
-        transport: Carries the messages.
-        clock: The graph's clock.
         robot: The robot to drive.
         config: Names of the coordinate frames, and whether to publish ``/clock``.
         cmd_vel: Topic of the commands, with Twist or TwistStamped.

@@ -5,7 +5,8 @@ from handsteer.timeouts import BURST_S, HELD_UP_S
 CALM_S = 0.09 + 1e-7
 """How long a node may delay its watchdog after a message, which does the same checks, without missing a timeout.
 
-The next multiple of 0.02 s is the timeout of 0.35 s; the small addition is for rounding of summed times.
+The timeout of 0.35 s then follows after whole periods of 0.02 s of the watchdog; slightly more for rounding of summed
+times.
 """
 
 

@@ -39,15 +39,13 @@ class SteeringNode(Node):
     """Repeats the velocity set by :meth:`steer` until :meth:`release`; silent otherwise.
 
     Its commands go to ``hand_sign_control``, where steering overrides signs, and which applies limits and Stop. They
-    can be sent to another topic instead (:meth:`send_to`), for which this node applies limits and Stop itself.
-    :meth:`halt` stops the robot whatever the topic, which ROS may have remapped to that of a robot. After this node
-    stalled, steering must be released once: what is received then may be old, and the situation may have changed.
+    can be sent to another topic instead (:meth:`send_to`), for which this node applies limits and Stop itself. After
+    :meth:`halt` it commands no movement on any topic, because ROS may have remapped it to that of a robot. After this
+    node stalled, steering must be released once: what is received then may be old, and the situation may have changed.
 
     All methods may be called from any thread.
 
     Args:
-        transport: Carries the messages.
-        clock: The graph's clock.
         config: Limits on another topic; the defaults of ``control`` when None.
         cmd_vel: A topic of robot commands, with Twist, TwistStamped or either; the model for other topics.
     """
@@ -132,7 +130,7 @@ class SteeringNode(Node):
                 self._publish(ZERO)
 
     def halt(self) -> None:
-        """Stop the robot whatever its active input, until :meth:`reset`; repeated, for a control that restarts."""
+        """Stop the robot, overriding all inputs, until :meth:`reset`; repeated, for a control that restarts."""
         with self._lock:
             self._halted = True
             self._stand()

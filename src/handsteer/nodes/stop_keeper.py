@@ -14,7 +14,6 @@ class StopKeeper:
     it.
 
     Args:
-        node: The node.
         on_stop: Called with true at a Stop, from either topic, and with false at a reset.
     """
 

@@ -12,9 +12,6 @@ from handsteer.types import Pose2D
 class Trace:
     """Records from its construction on.
 
-    Args:
-        graph: The graph to record.
-
     Attributes:
         commands: Linear and angular velocity of each Twist, in m/s and rad/s.
     """

@@ -24,7 +24,6 @@ class Commands:
     second is a robot.
 
     Args:
-        transport: Carries the commands.
         advertise: Returns the publisher of a topic.
         topic: The topic, with Twist, TwistStamped or either.
         clock: The graph's clock, for stamps.

@@ -29,9 +29,6 @@ Ends = list[tuple[Endpoint, str | None]]
 def observe_domain(network: Network) -> ObservedGraph:
     """Return the graph in a domain.
 
-    Args:
-        network: The domain, and where to look for others.
-
     Raises:
         TransportError: The domain cannot be joined.
     """

@@ -44,7 +44,7 @@ class Publisher(Protocol[M_contra]):
         ...
 
     def publish(self, message: M_contra, captured_s: float | None = None) -> None:
-        """Send ``message`` to all subscribers; returns at once, whatever they do.
+        """Send ``message`` to all subscribers; never waits for them.
 
         Raises:
             TransportError: The message is of another type than the topic.

@@ -22,9 +22,6 @@ class Dispatcher:
     """Calls a function for each reader that has messages.
 
     Listeners would run on the threads of Cyclone DDS, which hold its locks while they wait for Python's.
-
-    Args:
-        participant: The participant of the readers.
     """
 
     def __init__(self, participant: DomainParticipant) -> None:

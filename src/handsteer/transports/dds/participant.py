@@ -35,8 +35,6 @@ class Participant:
         is_local: Whether all others are certainly on this machine.
 
     Args:
-        network: The domain, and where to look for others.
-        name: The node's name.
         looks_on: Whether it only observes, and announces no node.
 
     Raises:

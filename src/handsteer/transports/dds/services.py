@@ -39,9 +39,7 @@ class ServiceServer:
     """Replies to the requests of a service, on the DDS thread.
 
     Args:
-        participant: This process in its DDS domain.
         name: Full name of the service, such as ``/my_camera/list_parameters``.
-        service: Its type.
         answer: Converts a request to a reply; returns at once.
     """
 

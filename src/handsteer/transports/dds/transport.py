@@ -35,10 +35,6 @@ class DdsTransport:
     """A :class:`~handsteer.transports.protocol.Transport` over DDS, compatible with ROS 2.
 
     Capture times are the stamps of message headers; messages without a header have none.
-
-    Args:
-        participant: This process in its DDS domain.
-        clock: The graph's clock.
     """
 
     def __init__(self, participant: Participant, clock: Clock) -> None:

@@ -42,7 +42,6 @@ class ParameterLink:
 
     Args:
         node: The node, without parameters of its own.
-        parameters: The parameters to declare.
     """
 
     def __init__(self, node: Node, parameters: NodeParameters) -> None:

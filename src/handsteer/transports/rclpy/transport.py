@@ -59,10 +59,6 @@ class RclpyTransport:
 
     Capture times are the stamps of message headers; messages without a header have none. A topic whose message type is
     missing in this ROS 2 is logged once and ignored.
-
-    Args:
-        node: The node.
-        clock: The graph's clock.
     """
 
     # Fast DDS loses most raw images even on one machine.
@@ -175,9 +171,6 @@ class RclpyPublisher(Generic[M]):
         name: Full name of the topic.
 
     Args:
-        node: The node of rclpy.
-        topic: The topic.
-        name: Its full name.
         kind: ROS 2's class for its messages; None if it is missing, so that there are never subscribers.
     """
 

@@ -71,9 +71,6 @@ class Lifeline:
 
     So its end is detected at once, without requests to a busy master. A machine that is disconnected or loses its power
     closes nothing.
-
-    Args:
-        uri: Address of the master.
     """
 
     def __init__(self, uri: str) -> None:

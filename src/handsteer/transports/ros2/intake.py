@@ -23,9 +23,7 @@ class Intake(Generic[M]):
     Invalid and late messages are logged once, until they cease.
 
     Args:
-        topic: The topic.
         name: The topic's full name in the graph.
-        clock: The graph's clock.
         send: Receives the messages.
     """
 

@@ -27,10 +27,6 @@ class Member:
         name: The node's name.
         is_local: Whether this process connects to this machine only, as far as is known.
 
-    Args:
-        network: How to join.
-        name: The node's name.
-
     Raises:
         TransportError: The network cannot be joined.
     """

@@ -13,12 +13,7 @@ _OPPOSITE = {"publisher": "subscriber", "subscriber": "publisher"}
 
 
 class Neighbours:
-    """Compares our publishers and subscribers with those of others, because Zenoh does not report mismatched types.
-
-    Args:
-        session: The Zenoh session of this process.
-        domain: The ROS 2 domain.
-    """
+    """Compares our publishers and subscribers with those of others, because Zenoh does not report mismatched types."""
 
     def __init__(self, session: zenoh.Session, domain: int) -> None:
         self._own = str(session.zid())

@@ -34,9 +34,7 @@ class ServiceServer:
     """Replies to the requests of a service, on a thread of its own.
 
     Args:
-        member: This process in its Zenoh network.
         name: Full name of the service, such as ``/my_camera/list_parameters``.
-        service: Its type.
         answer: Converts a request to a reply; returns at once.
     """
 

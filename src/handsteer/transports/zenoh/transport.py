@@ -34,10 +34,6 @@ class ZenohTransport:
     """A :class:`~handsteer.transports.protocol.Transport` over Zenoh, compatible with ROS 2 under rmw_zenoh.
 
     Capture times are the stamps of message headers; messages without a header have none.
-
-    Args:
-        member: This process in its Zenoh network.
-        clock: The graph's clock.
     """
 
     def __init__(self, member: Member, clock: Clock) -> None:
