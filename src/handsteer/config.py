@@ -415,7 +415,7 @@ class DashboardConfig(Section):
 
     @property
     def opens_browser(self) -> bool:
-        """Whether the page is opened in a browser: other users could read the token in its command line."""
+        """Whether to open the page in a browser; not with a given token, because all users can read command lines."""
         return self.open_browser and self.token == "auto"
 
 

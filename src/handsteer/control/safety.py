@@ -200,7 +200,7 @@ class Allowance:
 
 
 class Ramp:
-    """Limits acceleration and jerk of commands; decelerating, and changing direction at zero, is not limited.
+    """Limits acceleration and jerk of commands; deceleration, also for a change of direction, is not limited.
 
     Args:
         config: Limits of acceleration and jerk; 0 is no limit.

@@ -65,6 +65,8 @@ class FaultTransport:
     the graph's clock, stepped or real; it must run with the other nodes.
 
     Args:
+        inner: Carries the messages.
+        clock: The graph's clock, in whose time messages are delayed.
         seed: Seed of the random numbers.
         guards: Whether late messages are handled as over DDS and Zenoh: of topics with a ``lifespan_s``, messages are
             dropped whose delay exceeds the sender's shortest one by more than it. A transport within one process does
