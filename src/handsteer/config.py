@@ -415,7 +415,7 @@ class DashboardConfig(Section):
 
     @property
     def opens_browser(self) -> bool:
-        """Whether to open the page in a browser; not with a given token, because all users can read command lines."""
+        """Whether to open the page in a browser; not with ``token: always``, because command lines are public."""
         return self.open_browser and self.token == "auto"
 
 
