@@ -1,1 +1,1 @@
-"""The web page: it imports the graph, never the reverse."""
+"""The web page. It imports the graph, never the reverse."""

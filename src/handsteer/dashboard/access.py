@@ -1,8 +1,8 @@
-"""Who may use the page: everybody on this machine, and elsewhere, or if so wished here too, whoever has the token.
+"""Access to the page: free on this machine by default, elsewhere only with the token.
 
-A page of another site that a browser on this machine shows is kept out, whatever it asks for: by the ``Origin`` and
-``Sec-Fetch-`` headers, which it cannot forge, and by the name that it has for this machine (DNS rebinding). It cannot
-show this one in a frame either.
+Requests of other sites' pages in a browser on this machine are rejected by the ``Origin`` and ``Sec-Fetch-`` headers,
+which a page cannot forge, and by the host name they use for this machine (DNS rebinding). Other sites cannot show this
+page in a frame either.
 """
 
 import hashlib
@@ -20,7 +20,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from handsteer.dashboard.doors import Doors
 
-# NiceGUI's pages have scripts and styles within, and Vue compiles their templates.
+# NiceGUI's pages contain inline scripts and styles, and Vue compiles their templates.
 _CONTENT: Final = {
     "default-src": "'none'",
     "script-src": "'self' 'unsafe-inline' 'unsafe-eval'",
@@ -39,13 +39,13 @@ HEADERS: Final = (
     ("Content-Security-Policy", "; ".join(f"{name} {sources}" for name, sources in _CONTENT.items())),
     ("X-Frame-Options", "DENY"),
     ("X-Content-Type-Options", "nosniff"),
-    # The address has the token until the browser has its cookie.
+    # The address contains the token until the browser has its cookie.
     ("Referrer-Policy", "no-referrer"),
     ("Cross-Origin-Opener-Policy", "same-origin"),
     ("Cross-Origin-Resource-Policy", "same-origin"),
     ("Permissions-Policy", "camera=(self)"),
 )
-"""Name and value of each; they go with pages, static files, video and errors alike."""
+"""Name and value of each header; sent with pages, static files, video and errors."""
 
 
 _NAME_BYTES: Final = 18
@@ -53,7 +53,7 @@ _LONGEST: Final = 200
 
 
 class Sessions:
-    """Makes sessions, and knows those that it has made; it keeps none of them, so their number costs nothing."""
+    """Creates and verifies sessions; it stores none of them, so their number costs nothing."""
 
     def __init__(self) -> None:
         self._key = secrets.token_bytes(32)
@@ -64,7 +64,7 @@ class Sessions:
         return f"{name}.{self._signature(name)}"
 
     def knows(self, session: str | None) -> bool:
-        """Return whether ``session`` was made here."""
+        """Return whether ``session`` was created here."""
         if session is None or len(session) > _LONGEST or not session.isascii():
             return False
         name, _, signature = session.partition(".")
@@ -81,18 +81,18 @@ _FRAMES = frozenset({"iframe", "frame", "fencedframe", "embed", "object"})
 _LONGEST_COOKIES = 8192
 
 SESSION = "handsteer_session"
-"""Where the session of a request is in the ``state`` of its scope."""
+"""Key of a request's session in the ``state`` of its scope."""
 
 
 @dataclass(frozen=True)
 class Access:
-    """What a request needs.
+    """Access rules of the page.
 
     Attributes:
-        token: Has to be in the address, in the cookie that follows from it, or in an ``Authorization`` header; None
-            when the page is served to this machine only, and needs none.
+        token: Required in the address, in the cookie set from it, or in an ``Authorization`` header; None when the page
+            is served to this machine only and needs none.
         is_local: Whether the page is served to this machine only.
-        sessions: Tells browsers apart.
+        sessions: Distinguishes browsers.
     """
 
     token: str | None = None
@@ -101,29 +101,29 @@ class Access:
 
     @classmethod
     def to(cls, host: str, token: Literal["auto", "always"] = "auto") -> "Access":
-        """Return what is needed where the page is served on ``host``.
+        """Return the rules for a page served on ``host``.
 
         Args:
             host: A name or an address.
-            token: Whether there is a fresh token unless only this machine can reach the page, or always.
+            token: ``auto`` creates a token unless only this machine can reach the page, ``always`` in any case.
         """
         is_local = is_loopback(host)
         is_free = is_local and token == "auto"
         return cls(None if is_free else secrets.token_urlsafe(_TOKEN_BYTES), is_local)
 
     def admits(self, given: str | None) -> bool:
-        """Return whether ``given`` is the token; takes as long for a wrong one as for the right one."""
+        """Return whether ``given`` is the token, in constant time."""
         return self.token is None or hmac.compare_digest((given or "").encode(), self.token.encode())
 
 
 class AccessMiddleware:
-    """Answers those who may not come in: 400 and 403 to pages of other sites, 401 to those without the token.
+    """Rejects requests without access: 400 and 403 for pages of other sites, 401 without the token.
 
-    Gives a session to who comes in without one.
+    A request without a session is given a new one.
 
     Args:
-        app: What the others get.
-        state: Has the :class:`Access` that holds now, as ``access``, and the :class:`Doors`, as ``doors``.
+        app: Handles all other requests.
+        state: Has the current :class:`Access` as ``access``, and the :class:`Doors` as ``doors``.
     """
 
     def __init__(self, app: ASGIApp, state: State) -> None:
@@ -131,7 +131,7 @@ class AccessMiddleware:
         self._state = state
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Pass the request on, or answer it."""
+        """Pass the request on, or reject it."""
         if scope["type"] not in _KINDS:
             await self._app(scope, receive, send)
             return
@@ -153,7 +153,7 @@ class AccessMiddleware:
 
 
 def is_loopback(host: str) -> bool:
-    """Return whether ``host``, a name or an address, is this machine and nobody else can reach it."""
+    """Return whether ``host``, a name or an address, is this machine's loopback, which no other machine can reach."""
     try:
         return ipaddress.ip_address(host).is_loopback
     except ValueError:
@@ -189,9 +189,9 @@ def _ask_for_token(access: Access, scope: Scope, headers: Headers) -> Response |
         )
     if scope["type"] != "http" or scope["method"] not in {"GET", "HEAD"}:
         return None
-    # The token leaves the address, which stands in the browser's history and over its user's shoulder.
+    # Remove the token from the address, which appears in the browser's history and on its screen.
     rest = f"?{urlencode(query)}" if query else ""
-    # One slash: behind two, a browser takes what follows for another site.
+    # One slash: a browser takes what follows two slashes for another site.
     answer = RedirectResponse(f"/{scope['path'].lstrip('/')}{rest}", 303)
     is_secure = scope.get("scheme") == "https"
     answer.set_cookie(cookie, access.token or "", httponly=True, samesite="lax", secure=is_secure)
@@ -199,7 +199,7 @@ def _ask_for_token(access: Access, scope: Scope, headers: Headers) -> Response |
 
 
 def _drop_token(scope: Scope) -> None:
-    """Take the token out of the address of a request, which others may log."""
+    """Remove the token from the address of a request, which others may log."""
     query: bytes = scope.get("query_string", b"")
     if b"token" in query:
         rest = [(name, value) for name, value in parse_qsl(query.decode("latin-1")) if name != "token"]
@@ -207,7 +207,7 @@ def _drop_token(scope: Scope) -> None:
 
 
 def _with_session(send: Send, scope: Scope, session: str) -> Send:
-    """Return ``send`` that gives ``session`` to the browser as a cookie."""
+    """Return a ``send`` that sets ``session`` as a cookie in the browser."""
     cookie = Response()
     is_secure = scope.get("scheme") == "https"
     cookie.set_cookie(session_cookie_name(scope), session, httponly=True, samesite="lax", secure=is_secure)
@@ -221,13 +221,13 @@ def _with_session(send: Send, scope: Scope, session: str) -> Send:
 
 
 def cookie_name(scope: Scope) -> str:
-    """Return the name of the cookie: browsers keep apart the cookies of two machines, but not those of two ports."""
+    """Return the name of the cookie; it includes the port, because browsers share cookies between ports of a host."""
     _, port = scope.get("server") or ("", 0)
     return f"handsteer_{port}"
 
 
 def session_cookie_name(scope: Scope) -> str:
-    """Return the name of the cookie with the session, as :func:`cookie_name`."""
+    """Return the name of the session's cookie, see :func:`cookie_name`."""
     return f"{cookie_name(scope)}_session"
 
 
@@ -237,8 +237,8 @@ def _is_of_another_site(headers: Headers) -> bool:
         return True
     if headers.get("sec-fetch-dest") in _FRAMES:  # none of our pages has frames
         return True
-    # Without an Origin: pictures and the like; another port of this machine counts as the same site, and is another's.
-    # To follow a link from elsewhere is all right.
+    # Requests for pictures and the like have no Origin. Another port of this machine counts as the same site, but is
+    # not ours. Following a link from elsewhere is allowed.
     is_ours = headers.get("sec-fetch-site", "none") in {"same-origin", "none"}
     return not is_ours and headers.get("sec-fetch-mode") != "navigate"
 

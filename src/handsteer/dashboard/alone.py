@@ -1,4 +1,4 @@
-"""The process that serves the page of another process's graph; :mod:`handsteer.dashboard.apart` starts it."""
+"""The process that serves the page of another process's graph; started by :mod:`handsteer.dashboard.apart`."""
 
 import gc
 import itertools
@@ -30,17 +30,17 @@ _LOOK_PERIOD_S = 0.2
 class FarGraph:
     """A :class:`~handsteer.dashboard.joined.JoinedGraph` that runs in the process at the other end of a pipe.
 
-    Use it once :meth:`join` has returned.
+    Use it only after :meth:`join` has returned.
 
     Args:
-        pipe: Not started yet; a :class:`~handsteer.dashboard.apart.NearGraph` is at its other end.
+        pipe: Not started yet; connected to a :class:`~handsteer.dashboard.apart.NearGraph`.
 
     Attributes:
         transport: Carries the graph's messages.
         clock: The graph's clock.
-        cameras: Chooses there.
-        robot: Its world.
-        steering: Runs here; not started.
+        cameras: Selects the camera in the other process.
+        robot: The robot's world.
+        steering: Runs in this process; not started.
     """
 
     clock: Clock
@@ -60,10 +60,10 @@ class FarGraph:
         pipe.on("answer", self._take_answer)
 
     def join(self) -> Path | None:
-        """Wait until the other process tells of its graph; return the file that settings are saved to.
+        """Wait until the other process describes its graph; return the file that settings are saved to.
 
         Raises:
-            TransportError: The other process has ended before.
+            TransportError: The other process has ended first.
         """
         while not self._pipe.ended.is_set():
             try:
@@ -76,14 +76,14 @@ class FarGraph:
 
     @property
     def config(self) -> Config:
-        """What the nodes run with."""
+        """The nodes' configuration."""
         return self._facts.config
 
     def reconfigure(self, config: Config) -> None:
-        """Let the nodes take what can change while they run, here and there.
+        """Apply the live parameters of ``config`` to the nodes, in both processes.
 
         Raises:
-            ConfigError: A node cannot take it, or the other process does not answer; nothing has changed.
+            ConfigError: A node rejects them, or the other process does not answer; nothing has changed.
         """
         try:
             self._ask("reconfigure", config).result(_PATIENCE_S)
@@ -92,7 +92,7 @@ class FarGraph:
         self.steering.reconfigure(config)
 
     def _ask(self, what: str, *with_what: object) -> Future[None]:
-        """Have something done there; return what becomes of it."""
+        """Request an action of the other process; return a future of its result."""
         number, future = next(self._numbers), Future[None]()
         self._asked[number] = future
         self._pipe.say("ask", number, what, *with_what)
@@ -104,7 +104,7 @@ class FarGraph:
     def _take_answer(self, number: int, error: BaseException | None) -> None:
         future = self._asked.pop(number)
         if not future.set_running_or_notify_cancel():
-            return  # nobody waits any more
+            return  # nothing waits for it any more
         if error is None:
             future.set_result(None)
         else:
@@ -162,10 +162,7 @@ class _FarRobot:
 
 
 def serve(pipe: Pipe) -> None:
-    """Serve the page of the graph at the other end until that says so, or is gone.
-
-    Args:
-        pipe: Not started yet.
+    """Serve the page of the graph at the other end of ``pipe``, not started yet, until it asks to end or is gone.
 
     Raises:
         HandsteerError: The page cannot be served.
@@ -176,8 +173,8 @@ def serve(pipe: Pipe) -> None:
     dashboard = Dashboard.of(graph, graph.join())
     pipe.say("served", dashboard.start())
     graph.steering.start()
-    # What is there now stays. Where collections need not look through it they are quick, and come as soon as a few
-    # pages were left, of which each takes a megabyte.
+    # Objects loaded so far stay. Frozen, they do not slow down collections, which can then run as soon as a few pages
+    # have been closed; each takes a megabyte.
     gc.collect()
     gc.freeze()
     while not (end.wait(_LOOK_PERIOD_S) or pipe.ended.is_set()):
@@ -187,7 +184,7 @@ def serve(pipe: Pipe) -> None:
 
 
 class _Records:
-    """What :class:`logging.handlers.QueueHandler` takes for a queue: the other process's log."""
+    """The queue of a :class:`logging.handlers.QueueHandler`: forwards records to the other process's log."""
 
     def __init__(self, pipe: Pipe) -> None:
         self._pipe = pipe
@@ -197,8 +194,8 @@ class _Records:
 
 
 def main() -> None:
-    """Speak with the other process by standard input and output."""
-    # Whatever else is printed must not get between.
+    """Communicate with the other process by standard input and output."""
+    # Other output must not mix with the messages.
     sink = os.fdopen(os.dup(sys.stdout.fileno()), "wb")
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
     pipe = Pipe(sys.stdin.buffer, sink)

@@ -1,4 +1,4 @@
-"""The page in a process of its own, as the graph sees it: whatever holds that process up, the robot's nodes go on.
+"""The page in its own process, seen from the graph: a stalled page does not delay the robot's nodes.
 
 :mod:`handsteer.dashboard.alone` is the other end.
 """
@@ -31,13 +31,13 @@ _ROOT: Final = Path(__file__).parents[2]
 
 @dataclass(frozen=True)
 class Facts:
-    """What the page's process knows of the graph beside its topics.
+    """What the page's process receives from the graph in addition to topics.
 
     Attributes:
-        config: What the nodes run with.
-        world: The world of the robot; None for a real one's.
-        source: Which camera is chosen.
-        browser_is_given: Whether a browser gives its camera.
+        config: The nodes' configuration.
+        world: The robot's world; None for a real robot.
+        source: The selected camera.
+        browser_is_given: Whether a browser provides its camera.
     """
 
     config: Config
@@ -47,10 +47,10 @@ class Facts:
 
 
 class NearGraph:
-    """Lets the page in another process do with a graph of this one what :class:`JoinedGraph` has beside the topics.
+    """Offers a graph of this process to the page in another process, as :class:`JoinedGraph` beyond the topics.
 
     Args:
-        pipe: To the page's process, not started yet: to a :class:`~handsteer.dashboard.alone.FarGraph`.
+        pipe: Not started yet; connected to a :class:`~handsteer.dashboard.alone.FarGraph`.
         graph: The graph.
         file: The YAML file that its parameters were read from, which settings are saved to.
     """
@@ -65,7 +65,7 @@ class NearGraph:
         pipe.say("begin", self._told, graph.clock, file)
 
     def close(self) -> None:
-        """End what was published and subscribed for the page."""
+        """Close the page's publishers and subscriptions."""
         self._gateway.close()
 
     def _facts(self) -> Facts:
@@ -81,7 +81,7 @@ class NearGraph:
     def _use_camera(self, what: str, with_what: Any) -> None:
         cameras = self._graph.cameras
         if what == "offer":
-            with contextlib.suppress(FrameError):  # which was looked at already
+            with contextlib.suppress(FrameError):  # checked before
                 cameras.browser.offer(with_what)
         elif what == "forget":
             cameras.browser.forget()
@@ -90,7 +90,7 @@ class NearGraph:
         self._tell()
 
     def _answer(self, number: int, what: str, *with_what: Any) -> None:
-        """Do what the page asks of the graph; it hears what came of it."""
+        """Execute a request of the page and send it the result."""
         asked: dict[str, Callable[..., Future[None]]] = {
             "reconfigure": self._reconfigure,
             "change_world": self._graph.robot.change_world,
@@ -115,9 +115,9 @@ class NearGraph:
 
 
 class PageApart:
-    """Serves the page of a graph from a process of its own, which begins to load its libraries at once.
+    """Serves the page of a graph from a separate process, which starts to load its libraries immediately.
 
-    The graph needs no node ``steering``: the page's process has it.
+    The graph needs no node ``steering``: it runs in the page's process.
 
     Raises:
         PackageMissing: NiceGUI is not installed.
@@ -125,7 +125,7 @@ class PageApart:
 
     def __init__(self) -> None:
         with needing("the page (a run with --headless does without)", "page", "nicegui"):
-            if importlib.util.find_spec("nicegui") is None:  # loading it takes a second, which the other process does
+            if importlib.util.find_spec("nicegui") is None:  # importing takes a second; the other process does it
                 raise ModuleNotFoundError(name="nicegui")
         path = os.pathsep.join(filter(None, [str(_ROOT), os.environ.get("PYTHONPATH")]))
         self.process = subprocess.Popen(
@@ -133,7 +133,7 @@ class PageApart:
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             env={**os.environ, "PYTHONPATH": path},
-            # What the terminal sends is for this process, which sees to it that the robot stands before all ends.
+            # Signals of the terminal go to this process only, which stops the robot before everything ends.
             start_new_session=True,
         )
         assert self.process.stdout is not None
@@ -144,26 +144,24 @@ class PageApart:
 
     @property
     def is_gone(self) -> bool:
-        """Whether the process has ended, or its end of the pipe has."""
+        """Whether the process, or its end of the pipe, has ended."""
         return self._pipe.ended.is_set()
 
     def serve(self, graph: Graph, file: Path | None = None) -> str:
-        """Serve the page of ``graph`` and return its address once it answers; it holds the token where one is needed.
+        """Serve the page of ``graph`` and return its address once it answers; it contains the token if one is needed.
 
-        Args:
-            graph: What the page is of.
-            file: The YAML file that its parameters were read from, which settings are saved to.
+        Settings are saved to ``file``, the YAML file that the graph's parameters were read from.
 
         Raises:
             DashboardError: The address, the port or the certificate cannot be used, or the process has ended.
-            ConfigError: The file cannot be read any more.
+            ConfigError: The file can no longer be read.
         """
         self._pipe.on("served", self._served.set_result)
         self._pipe.on("refused", self._served.set_exception)
         self._pipe.on("log", _log)
         self._near = NearGraph(self._pipe, graph, file)
         self._pipe.start()
-        # The process may end without a word.
+        # The process may end without a message.
         threading.Thread(target=self._give_up, name="page_end", daemon=True).start()
         try:
             return self._served.result(START_TIMEOUT_S)
@@ -171,11 +169,11 @@ class PageApart:
             raise DashboardError(f"the page's process did not serve the page within {START_TIMEOUT_S:g} s") from None
 
     def stop(self) -> None:
-        """End the page and its process; may be called twice."""
+        """End the page and its process; may be called more than once."""
         with contextlib.suppress(HandsteerError):
             self._pipe.say("end")
         self._pipe.close()
-        if self._near is None:  # it serves nothing yet
+        if self._near is None:  # not serving yet
             self.process.kill()
         else:
             self._near.close()
@@ -186,7 +184,7 @@ class PageApart:
             self.process.wait()
 
     def why_gone(self) -> DashboardError:
-        """Return what to say when the process has ended by itself."""
+        """Return the error for a process that has ended unexpectedly."""
         with contextlib.suppress(subprocess.TimeoutExpired):
             self.process.wait(_FAREWELL_S)
         code = self.process.poll()
@@ -194,7 +192,7 @@ class PageApart:
 
     def _give_up(self) -> None:
         self._pipe.ended.wait()
-        with contextlib.suppress(InvalidStateError):  # it was served, or refused
+        with contextlib.suppress(InvalidStateError):  # served or rejected already
             self._served.set_exception(self.why_gone())
 
 

@@ -1,8 +1,8 @@
-"""How many connections the page's server keeps, so that a crowd of strangers leaves room for who stops the robot.
+"""Limits the connections of the page's server, so that strangers cannot lock out the user who stops the robot.
 
-A connection is known once a request on it has shown a session (:mod:`handsteer.dashboard.access`). The others are
-few: where one more comes, the oldest that does nothing has to go. So whoever looks at a page already keeps it, and may
-load it anew, whatever strangers do.
+A connection is known once a request on it has shown a session (:mod:`handsteer.dashboard.access`). Few unknown
+connections are kept: a new one replaces the oldest idle one. So viewers keep their page, and can reload it, regardless
+of what strangers do.
 """
 
 import asyncio
@@ -21,22 +21,22 @@ MOST_OF_ONE_ADDRESS: Final = 32
 """A browser opens six connections until it has its session."""
 
 MOST_KNOWN: Final = 256
-"""Beyond these, who shows a session is a stranger as well."""
+"""Beyond this number, connections with a session count as unknown too."""
 
 FIRST_REQUEST_S: Final = 5.0
-"""A connection on which there is no whole request within so many seconds is closed."""
+"""A connection without a complete request within this time is closed."""
 
 
 @dataclass(eq=False)
 class Connection:
-    """One that is open.
+    """An open connection.
 
     Attributes:
-        transport: Carries it.
-        address: Who it is from: an address, of IPv6 the network.
-        heard: Whether there was a whole request on it.
-        is_known: Whether one of them has shown a session.
-        served: How many requests are being answered.
+        transport: The connection's transport.
+        address: Of the other end; for IPv6, its network.
+        heard: Whether it has sent a complete request.
+        is_known: Whether a request on it has shown a session.
+        served: Number of requests being answered.
     """
 
     transport: asyncio.Transport
@@ -47,29 +47,29 @@ class Connection:
 
 
 class Doors:
-    """Lets connections in; all of it runs on the server's thread.
+    """Accepts and limits connections; runs on the server's thread only.
 
     Args:
-        certificate: Makes the connections secure; None for plain ones.
-        first_request_s: How long a connection may say nothing.
+        certificate: For secure connections; None for plain ones.
+        first_request_s: Seconds until the first complete request, see :data:`FIRST_REQUEST_S`.
     """
 
     def __init__(self, certificate: ssl.SSLContext | None = None, first_request_s: float = FIRST_REQUEST_S) -> None:
         self._certificate = certificate
         self._first_request_s = first_request_s
-        self._open: dict[object, Connection] = {}  # by the address and port of the other end, in order of their coming
+        self._open: dict[object, Connection] = {}  # by address and port of the other end, in order of arrival
 
     @property
     def is_secure(self) -> bool:
-        """Whether the connections are secure; only asyncio's own loop can serve them then."""
+        """Whether connections are secure; only asyncio's own loop can serve them then."""
         return self._certificate is not None
 
     def protocol(self, **uvicorns: Any) -> asyncio.Protocol:
-        """Return what serves a new connection; takes what uvicorn gives to its own protocols."""
+        """Return the protocol for a new connection; takes the arguments of uvicorn's own protocols."""
         return _Lobby(self, lambda: AutoHTTPProtocol(**uvicorns), self._certificate)
 
     def enter(self, transport: asyncio.Transport) -> None:
-        """Take in a connection; one of too many strangers has to go for it."""
+        """Register a connection; closes another one if there are too many unknown ones."""
         peer = _peer(transport)
         self._open = {key: each for key, each in self._open.items() if not each.transport.is_closing()}
         newcomer = Connection(transport, _network(peer[0]))
@@ -80,13 +80,13 @@ class Doors:
         ):
             present = [each for each in crowd if not each.transport.is_closing()]
             if len(present) >= most:
-                min(present, key=_is_busy).transport.abort()  # of those that are alike, the first is the oldest
+                min(present, key=_is_busy).transport.abort()  # min returns the oldest of equals
         self._open[peer] = newcomer
         asyncio.get_running_loop().call_later(self._first_request_s, _close_if_silent, newcomer)
 
     @contextmanager
     def serving(self, peer: Sequence[object] | None, *, is_known: bool) -> Iterator[None]:
-        """Note that a request of ``peer``, as ASGI calls it, is being answered, and whether it showed a session."""
+        """Mark a request of ``peer`` (as in ASGI) as being answered, and whether it showed a session."""
         connection = self._open.get(tuple(peer)) if peer is not None else None
         if connection is None:
             yield
@@ -102,7 +102,7 @@ class Doors:
 
 
 class _Lobby(asyncio.Protocol):
-    """Hands a connection over to uvicorn's protocol; a secure one after the handshake, which has to come soon."""
+    """Hands a connection over to uvicorn's protocol; a secure one after its handshake, which has a time limit."""
 
     def __init__(
         self, doors: Doors, protocol: Callable[[], asyncio.Protocol], certificate: ssl.SSLContext | None
@@ -114,7 +114,7 @@ class _Lobby(asyncio.Protocol):
         self._early: list[bytes] = []
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        stream = cast(asyncio.Transport, transport)  # uvloop's is none by its type
+        stream = cast(asyncio.Transport, transport)  # uvloop's has another type
         self._doors.enter(stream)
         if self._certificate is None:
             self._hand_over(stream)
@@ -123,7 +123,7 @@ class _Lobby(asyncio.Protocol):
             self._task = asyncio.create_task(self._secure(stream, self._certificate))
 
     def data_received(self, data: bytes) -> None:
-        self._early.append(data)  # what came with the end of the handshake
+        self._early.append(data)  # data received together with the end of the handshake
 
     def _hand_over(self, transport: asyncio.Transport) -> None:
         protocol = self._protocol()
@@ -140,7 +140,7 @@ class _Lobby(asyncio.Protocol):
             )
             if secure is not None and not secure.is_closing():
                 self._hand_over(secure)
-        except (OSError, TimeoutError):  # ssl's own errors are of this kind, too
+        except (OSError, TimeoutError):  # includes ssl's own errors
             transport.abort()
 
 
@@ -159,7 +159,7 @@ def _peer(transport: asyncio.Transport) -> tuple[str, int]:
 
 
 def _network(host: str) -> str:
-    """Return the address ``host``; of IPv6, where everybody has many, the network of 64 bits."""
+    """Return the address ``host``; for IPv6, where each user has many, its 64-bit network."""
     try:
         address = ipaddress.ip_address(host.partition("%")[0])
     except ValueError:
@@ -168,17 +168,14 @@ def _network(host: str) -> str:
 
 
 MOST_UNJOINED: Final = 64
-"""Each takes half a megabyte or more, and NiceGUI keeps it for a minute."""
+"""Each takes half a megabyte or more; NiceGUI keeps it for a minute."""
 
 
 class Unjoined:
-    """Deletes the oldest page that nobody has joined when there are too many; runs on the server's thread.
+    """Deletes the oldest page without a websocket beyond ``most`` of them; runs on the server's thread.
 
-    A browser whose page is gone before it joins loads it anew by itself. Without this, whatever fetches pages and runs
-    no script, or has no cookies, fills the memory.
-
-    Args:
-        most: How many are kept.
+    A browser whose page is deleted before its websocket connects reloads it. Without this limit, clients that fetch
+    pages but run no scripts or keep no cookies would fill the memory.
     """
 
     def __init__(self, most: int = MOST_UNJOINED) -> None:
@@ -186,7 +183,7 @@ class Unjoined:
         self._pages: dict[str, Client] = {}  # in the order in which they were served
 
     def add(self, page: Client) -> None:
-        """Take a page that is being served."""
+        """Register a page that is being served."""
         self._pages[page.id] = page
         page.on_connect(lambda: self._forget(page.id))
         page.on_delete(lambda: self._forget(page.id))

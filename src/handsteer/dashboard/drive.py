@@ -1,4 +1,4 @@
-"""The page ``/``: what the camera sees, what was understood, what the robot does, its world, and steering by hand."""
+"""The page ``/``: camera, recognised sign, robot state, world, and manual steering."""
 
 import time
 
@@ -16,7 +16,7 @@ from handsteer.dashboard.state import PageState
 
 
 class TimingPanel:
-    """How quick it is."""
+    """Latency and frame rate."""
 
     def __init__(self) -> None:
         with card("Camera to command", "panel timing"), box("figures"):
@@ -44,11 +44,11 @@ def _figure(unit: str, name: str) -> ui.label:
 
 
 _PLOT_EVERY = 3
-"""The plots are sent what is new every third time that the page is: a sample can wait."""
+"""The plots are updated every third time the page is: samples are not urgent."""
 
 
 class DrivePage(Page):
-    """Drive, and see why the robot does what it does."""
+    """Drives the robot, and explains its behaviour."""
 
     def __init__(self, served: PageContext) -> None:
         super().__init__(served, "/")
@@ -70,7 +70,7 @@ class DrivePage(Page):
         self._shown = 0
 
     def show(self, node: DashboardNode, state: PageState) -> None:
-        """Show what is new."""
+        """Show changes."""
         super().show(node, state)
         self._world.update(state, node.world)
         for panel in (self._camera, self._velocity, self._timing, self._signs):

@@ -1,4 +1,4 @@
-"""The velocities of the last 30 s, as the plot shows them."""
+"""The velocities of the last 30 s, for the plot."""
 
 import threading
 from collections import deque
@@ -8,7 +8,7 @@ from handsteer.types import Velocity
 
 SPAN_S = 30.0
 PERIOD_S = 0.05
-"""How often a sample is taken."""
+"""Time between samples."""
 
 
 @dataclass(frozen=True)
@@ -16,9 +16,9 @@ class Sample:
     """Both velocities at one moment.
 
     Attributes:
-        at_s: When, in seconds of the graph's clock.
-        commanded: What the robot was told; None while it was told nothing.
-        measured: What odometry said; None while it said nothing.
+        at_s: Seconds of the graph's clock.
+        commanded: The commanded velocity; None without a command.
+        measured: The velocity from odometry; None without odometry.
     """
 
     at_s: float
@@ -27,7 +27,7 @@ class Sample:
 
 
 class VelocityHistory:
-    """Keeps the samples of the last :data:`SPAN_S` seconds; may be used from any thread."""
+    """Keeps the samples of the last :data:`SPAN_S` seconds; thread-safe."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -35,14 +35,14 @@ class VelocityHistory:
         self._count = 0
 
     def add(self, sample: Sample) -> None:
-        """Keep ``sample`` as the newest, unless the last one is younger than half of :data:`PERIOD_S`."""
+        """Append ``sample``, unless the last one is younger than half of :data:`PERIOD_S`."""
         with self._lock:
             if not self._samples or sample.at_s - self._samples[-1].at_s >= PERIOD_S / 2:
                 self._samples.append(sample)
                 self._count += 1
 
     def since(self, count: int, now_s: float) -> tuple[int, list[Sample]]:
-        """Return how many samples there have ever been, and those after the first ``count`` that are young enough."""
+        """Return the total number of samples so far, and the recent ones after the first ``count``."""
         with self._lock:
             fresh = min(self._count - count, len(self._samples))
             samples = list(self._samples)[len(self._samples) - fresh :] if fresh > 0 else []

@@ -1,4 +1,4 @@
-"""What the page does with a graph beside publishing and subscribing, wherever that graph runs."""
+"""What the page uses of a graph in addition to topics, in whichever process that graph runs."""
 
 from collections.abc import Callable
 from concurrent.futures import Future
@@ -13,37 +13,37 @@ from handsteer.transports.protocol import Transport
 
 
 class BrowserFrames(Protocol):
-    """Takes the frames of a browser's camera, as :class:`~handsteer.cameras.browser.BrowserCamera` does."""
+    """Receives the frames of a browser's camera, like :class:`~handsteer.cameras.browser.BrowserCamera`."""
 
     @property
     def is_given(self) -> bool:
-        """Whether a browser has sent frames, and has not been forgotten since."""
+        """Whether a browser has sent frames since the last :meth:`forget`."""
         ...
 
     def offer(self, data: bytes) -> None:
-        """Take a frame as it was sent.
+        """Accept an encoded frame.
 
         Raises:
-            FrameError: It is no such frame, or too large.
+            FrameError: It cannot be decoded, or is too large.
         """
         ...
 
     def forget(self) -> None:
-        """Drop what is known of the browser: another may follow."""
+        """Forget the current browser; another may follow."""
         ...
 
 
 class Cameras(Protocol):
-    """The graph's camera, which a browser's may stand in for."""
+    """The graph's camera, which a browser's camera can replace."""
 
     @property
     def source(self) -> Source:
-        """Which one is chosen."""
+        """The selected camera."""
         ...
 
     @property
     def browser(self) -> BrowserFrames:
-        """Takes the frames of the browser's."""
+        """Receives the frames of the browser's camera."""
         ...
 
     def choose(self, source: Source) -> None:
@@ -52,28 +52,28 @@ class Cameras(Protocol):
 
 
 class RobotInWorld(Protocol):
-    """A robot whose world people edit; the methods are those of :class:`~handsteer.nodes.robot.RobotNode`."""
+    """A robot with an editable world; the methods are those of :class:`~handsteer.nodes.robot.RobotNode`."""
 
     @property
     def world(self) -> World | None:
-        """The world that the robot is in, all things where they were at the start; None for a real one's."""
+        """The robot's world with all things at their start positions; None for a real robot."""
         ...
 
     def change_world(self, change: Callable[[World], World]) -> Future[None]:
-        """Change the world around the robot; ``change`` can be pickled, as it may run in another process."""
+        """Change the robot's world; ``change`` must be picklable, because it may run in another process."""
         ...
 
     def enter_world(self, world: World) -> Future[None]:
-        """Put the robot to the start of another world."""
+        """Move the robot to the start of another world."""
         ...
 
     def reset(self) -> Future[None]:
-        """Put the robot and all things to where they were at the start."""
+        """Move the robot and all things to their start positions."""
         ...
 
 
 class JoinedGraph(Protocol):
-    """The graph that a page is of: one in this process, or another process's seen from here."""
+    """The graph of a page, in this process or another one."""
 
     @property
     def config(self) -> Config: ...  # noqa: D102
@@ -94,9 +94,9 @@ class JoinedGraph(Protocol):
     def robot(self) -> RobotInWorld: ...  # noqa: D102
 
     def reconfigure(self, config: Config) -> None:
-        """Let the nodes take what can change while they run.
+        """Apply the live parameters of ``config`` to the nodes.
 
         Raises:
-            ConfigError: A node cannot take it; nothing has changed.
+            ConfigError: A node rejects them; nothing has changed.
         """
         ...

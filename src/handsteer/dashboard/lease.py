@@ -1,22 +1,22 @@
-"""Who of those who look at the page may drive: one at a time, the others watch and may ask."""
+"""The control lease: one viewer at a time drives, the others watch and may request it."""
 
 import threading
 from dataclasses import dataclass
 from typing import Literal
 
 ANSWER_S = 10.0
-"""A driver who does not answer for so long hands over."""
+"""A request that the driver does not answer within this time is granted."""
 
 Role = Literal["driver", "watcher", "free"]
 
 
 @dataclass(frozen=True)
 class LeaseStatus:
-    """What the lease is for one viewer.
+    """The lease as one viewer sees it.
 
     Attributes:
-        role: Whether it drives, watches another one, or nobody drives.
-        asked: For the driver: somebody asks to drive. For a watcher: it has asked itself.
+        role: Whether the viewer drives, watches another one, or the lease is free.
+        asked: For the driver: there is a request. For a watcher: it has requested the lease.
         left_s: Seconds until an unanswered request is granted.
     """
 
@@ -26,9 +26,9 @@ class LeaseStatus:
 
 
 class ControlLease:
-    """The control lease; may be used from any thread.
+    """The control lease; thread-safe.
 
-    Who drives keeps the lease until it leaves, hands over, or does not answer a request in time. A refused viewer may
+    The driver keeps the lease until it leaves, hands over, or does not answer a request in time. A refused viewer may
     ask again.
     """
 
@@ -38,7 +38,7 @@ class ControlLease:
         self._request: tuple[str, float] | None = None
 
     def take(self, viewer: str, now_s: float) -> bool:
-        """Return whether ``viewer`` drives; it sits down if nobody else does."""
+        """Return whether ``viewer`` drives; a free lease is given to it."""
         with self._lock:
             self._hand_over_if_due(now_s)
             if self._driver is None:
@@ -50,7 +50,7 @@ class ControlLease:
         return self._driver == viewer
 
     def ask(self, viewer: str, now_s: float) -> None:
-        """Ask the driver for the lease; the first who asks is answered first."""
+        """Request the lease; ignored while another request is pending."""
         with self._lock:
             self._hand_over_if_due(now_s)
             if self._driver is None:
@@ -69,13 +69,13 @@ class ControlLease:
             return hand_over
 
     def leave(self, viewer: str) -> bool:
-        """Let go of the lease and of a request; return whether ``viewer`` was the driver."""
+        """Release the lease or withdraw a request; return whether ``viewer`` was the driver."""
         with self._lock:
             if self._request is not None and self._request[0] == viewer:
                 self._request = None
             if self._driver != viewer:
                 return False
-            # Whoever has asked has been waiting for it.
+            # A pending request is granted.
             self._driver = self._request[0] if self._request else None
             self._request = None
             return True
@@ -86,7 +86,7 @@ class ControlLease:
             return self._hand_over_if_due(now_s)
 
     def status_of(self, viewer: str, now_s: float) -> LeaseStatus:
-        """Return what the lease is for ``viewer``."""
+        """Return the lease as ``viewer`` sees it."""
         with self._lock:
             asker, due_s = self._request or (None, now_s)
             left_s = max(0.0, due_s - now_s)

@@ -1,4 +1,4 @@
-"""The node ``dashboard``: listens to all that the page shows, and steers for the people who look at it."""
+"""The node ``dashboard``: subscribes to everything the page shows, and steers for its viewers."""
 
 import math
 import threading
@@ -64,15 +64,15 @@ _NO_TRAIL = Trail()
 
 @dataclass(frozen=True)
 class WorldState:
-    """What the 3D view shows.
+    """The contents of the 3D view.
 
     Attributes:
-        robot: Where the robot is in the world.
+        robot: Pose of the robot in the world.
         joints: Joint angles in rad by name.
         markers: The obstacles by namespace and id.
-        description: The robot's URDF; empty as long as it is not known.
-        trail: Where the robot has gone while the page was looked at.
-        scan: What its laser scanner sees: x and y in the world, in metres.
+        description: The robot's URDF; empty until it is known.
+        trail: The robot's path while the page was viewed.
+        scan: Points of the laser scan: x and y in the world, in metres.
     """
 
     robot: Pose2D = _START
@@ -84,19 +84,19 @@ class WorldState:
 
 
 class DashboardNode(Node):
-    """Keeps the newest of every topic for the page.
+    """Keeps the newest message of each topic for the page.
 
     Args:
         transport: Carries the messages.
         clock: The graph's clock.
-        steering: Drives when people steer on the page.
-        cmd_vel: The topic of the commands that are shown; where its type is open and the graph tells types, those that
-            the control reports are shown instead.
-        history: Keeps the velocities, also those from before this node; a new one by default.
+        steering: Drives when a viewer steers on the page.
+        cmd_vel: The topic of the displayed commands. If its type is open and the transport reports types, the commands
+            that the control reports are shown instead.
+        history: Stores the velocities, including earlier ones; a new one by default.
 
     Attributes:
-        world: What the 3D view shows.
-        lease: Who of the viewers drives.
+        world: The contents of the 3D view.
+        lease: The control lease.
         history: The velocities of the last 30 s.
     """
 
@@ -119,12 +119,12 @@ class DashboardNode(Node):
         self._truth: tuple[Pose2D, Pose2D] | None = None
         self._path_length_m = 0.0
         self._steering = steering
-        self._lock = threading.RLock()  # who steers, and what is steered, change on the server's thread and this node's
+        self._lock = threading.RLock()  # guards the steering viewer and its topic; the server's thread uses them too
         self._holder: tuple[str, float] | None = None
         self._stopper: str | None = None
         self._odometry_came_s = self._scan_came_s = -math.inf
         self.subscribe(DIAGNOSTICS, self._on_diagnostics, key=_reporter)
-        # A subscriber would count as a robot that takes a Twist; the control says itself what it commands.
+        # A subscriber would count as a robot that takes a Twist, so the control's report is used.
         self._believes_control = cmd_vel.or_type is not None and isinstance(transport, TellsTypes)
         if not self._believes_control:
             self.subscribe(cmd_vel, self._on_command)
@@ -137,7 +137,7 @@ class DashboardNode(Node):
         self.every(PERIOD_S, self._sample)
 
     def state(self, viewer: str = "") -> PageState:
-        """Return what the page says now to ``viewer``."""
+        """Return the state to show to ``viewer``."""
         now, holder = self.clock.now(), self._holder
         may_reset = self.lease.status_of(viewer, now).role != "watcher"
         viewers = Viewers(
@@ -150,9 +150,9 @@ class DashboardNode(Node):
         return compose(self._observed, now, viewers)
 
     def steer(self, viewer: str, linear_mps: float, angular_radps: float) -> None:
-        """Drive at this velocity, if ``viewer`` has the control lease or nobody has.
+        """Drive at this velocity if ``viewer`` has the control lease or the lease is free.
 
-        It lasts while the viewer repeats it within :data:`HOLD_TIMEOUT_S`.
+        The command holds while the viewer repeats it within :data:`HOLD_TIMEOUT_S`.
         """
         if self.lease.take(viewer, self.clock.now()):
             with self._lock:
@@ -160,17 +160,17 @@ class DashboardNode(Node):
                 self._steering.steer(linear_mps, angular_radps)
 
     def release(self, viewer: str) -> None:
-        """Stop, if it is ``viewer`` who steers."""
+        """Stop if ``viewer`` is steering."""
         with self._lock:
             if self._holder is not None and self._holder[0] == viewer:
                 self._holder = None
                 self._steering.release()
 
     def steer_on(self, viewer: str, topic: str) -> None:
-        """Let steering by hand go to ``topic``, if ``viewer`` has the control lease or nobody has.
+        """Steer on ``topic`` if ``viewer`` has the control lease or the lease is free.
 
         Raises:
-            TransportError: It is no such topic, or somebody else drives, or the robot is stopped.
+            TransportError: The topic is not valid, another viewer drives, or the robot is stopped.
         """
         if not self.lease.take(viewer, self.clock.now()):
             raise TransportError("only who drives may choose the topic: ask to drive first")
@@ -181,26 +181,26 @@ class DashboardNode(Node):
             self._steering.send_to(topic)
 
     def halt(self, viewer: str = "") -> None:
-        """Stop the robot, whoever drives; ``viewer`` is who asks."""
+        """Stop the robot, whether or not ``viewer`` drives."""
         with self._lock:
             self._holder = None
             self._stopper = viewer or None
             self._steering.halt()
 
     def reset(self, viewer: str) -> None:
-        """Let the robot be driven again, if ``viewer`` has the control lease or nobody has."""
+        """Reset Stop if ``viewer`` has the control lease or the lease is free."""
         if self.lease.take(viewer, self.clock.now()):
             with self._lock:
                 self._stopper = None
                 self._steering.reset()
 
     def leave(self, viewer: str) -> None:
-        """Stop if it is ``viewer`` who steers, and let others drive."""
+        """Stop if ``viewer`` is steering, and release its lease."""
         self.release(viewer)
         self.lease.leave(viewer)
 
     def on_stop(self) -> None:
-        """Leave nothing in motion that was steered from here."""
+        """End any motion that was steered from this node."""
         with self._lock:
             if self._holder is not None:
                 self.release(self._holder[0])
@@ -226,7 +226,7 @@ class DashboardNode(Node):
         for status in received.message.status:
             namespace, name = split_reporter(status.name)
             if namespace != self._namespace:
-                continue  # another robot's
+                continue  # of another robot
             report = _report(status, now)
             self._observed = replace(self._observed, reports={**self._observed.reports, name: report})
             if name == "my_camera":
@@ -285,9 +285,9 @@ class DashboardNode(Node):
         self.world = replace(self.world, joints=tuple(zip(names, positions, strict=True)))
 
     def _on_markers(self, received: Received[MarkerArray]) -> None:
-        # rosbags types this list by the Marker of an older ROS.
+        # rosbags types this list with the Marker of an older ROS.
         markers = tuple(cast("list[Marker]", received.message.markers))
-        # They are repeated for those who come late, with other stamps; who draws them need not look at each again.
+        # Markers are repeated with new stamps for late subscribers; views need not compare them again.
         if _drawn(markers) != _drawn(self.world.markers):
             self.world = replace(self.world, markers=markers)
 
@@ -319,7 +319,7 @@ def _report(status: DiagnosticStatus, came_s: float) -> Report:
 
 
 def _pose(text: str) -> Pose2D | None:
-    """Return the pose of ``text``, as in "x y yaw"; None when it is not that."""
+    """Return the pose in ``text``, as "x y yaw"; None if it is invalid."""
     try:
         x, y, yaw = (float(part) for part in text.split())
     except ValueError:

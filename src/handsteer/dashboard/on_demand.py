@@ -1,4 +1,4 @@
-"""Nodes that run only while somebody watches: no viewer, no cost."""
+"""Nodes that run only while a page has viewers."""
 
 import threading
 from collections.abc import Callable, Hashable
@@ -10,11 +10,7 @@ N = TypeVar("N", bound=Node)
 
 
 class OnDemandNode(Generic[N]):
-    """Makes and starts a node for the first viewer, and stops it after the last; may be used from any thread.
-
-    Args:
-        make: Returns a new node, not started.
-    """
+    """Starts a new node from ``make`` for the first viewer, and stops it after the last; thread-safe."""
 
     def __init__(self, make: Callable[[], N]) -> None:
         self._make = make
@@ -24,7 +20,7 @@ class OnDemandNode(Generic[N]):
         self._closed = False
 
     def join(self, viewer: Hashable) -> N | None:
-        """Return the running node, or None after :meth:`close`; ``viewer`` counts once, however often it joins."""
+        """Return the running node, or None after :meth:`close`; joining twice counts once."""
         with self._lock:
             if self._closed:
                 return None
@@ -35,18 +31,18 @@ class OnDemandNode(Generic[N]):
             return self._node
 
     def is_watched_by(self, viewer: Hashable) -> bool:
-        """Return whether ``viewer`` has joined, and neither left nor been sent away by :meth:`close`."""
+        """Return whether ``viewer`` has joined, and has neither left nor been disconnected by :meth:`close`."""
         return viewer in self._viewers
 
     def leave(self, viewer: Hashable) -> None:
-        """Do without the node; one that has not joined may leave."""
+        """Remove ``viewer``; has no effect if it has not joined."""
         with self._lock:
             self._viewers.discard(viewer)
             if not self._viewers:
                 self._stop()
 
     def close(self) -> None:
-        """Stop the node, whoever watches, for good."""
+        """Stop the node permanently, with or without viewers."""
         with self._lock:
             self._closed = True
             self._viewers.clear()

@@ -1,4 +1,4 @@
-"""What one page asks for by hand, and for how long: the pad while it is held, the sliders as long as the page lives."""
+"""The velocity one page commands, and for how long: the pad while held, the sliders while the page is open."""
 
 import math
 
@@ -9,7 +9,7 @@ HOLD_TIMEOUT_S = 0.3
 """Steering ends when the page has not repeated it for this long: the tab was closed, or the network lost."""
 
 SLIDERS_TIMEOUT_S = 0.5
-"""Sliders go to zero when the page has not been heard of for this long."""
+"""Sliders return to zero when the page has not reported for this long."""
 
 _LATE_S = 0.2
 _LATEST_MS = 1e15  # far in the future; an integer may be too large for any float
@@ -18,13 +18,13 @@ _PAGE = b"page"
 
 
 class PadInput:
-    """Tells which velocity a page asks for now; one source at a time, the newest.
+    """Computes the velocity that a page commands now, from the most recently used source.
 
-    The pad asks for a velocity each time it is heard. The sliders keep theirs for as long as the page says, again and
-    again, that it is open and in front. What a page said late, because its network stood still, is left out.
+    The pad commands a velocity with each message. The sliders hold theirs while the page keeps reporting that it is
+    open and in front. Messages delayed by a stalled network are ignored.
 
     Attributes:
-        sliders: Where the sliders are.
+        sliders: The velocity set by the sliders.
     """
 
     def __init__(self) -> None:
@@ -35,31 +35,31 @@ class PadInput:
 
     @property
     def is_late(self) -> bool:
-        """Whether what the page says comes late again and again."""
+        """Whether the page's messages arrive late repeatedly."""
         return self._late >= _LATE_IN_A_ROW
 
     def hold_pad(self, wanted: Velocity, sent: object, now_s: float) -> Velocity | None:
-        """Take the pad, which sets the sliders to zero; return the velocity to steer at, None when it came late.
+        """Handle a pad message, which sets the sliders to zero; return the velocity to steer at, None if it is late.
 
         Args:
-            wanted: What the pad asks for.
-            sent: When the page said so, in ms of its own clock, as it came from the browser.
+            wanted: The pad's velocity.
+            sent: Time of the message in ms of the page's clock, as the browser sent it.
             now_s: Seconds of our monotonic clock.
         """
         self.sliders = ZERO
         return wanted if self._is_timely(sent, now_s) else None
 
     def slide(self, wanted: Velocity, now_s: float) -> None:
-        """Set the sliders; the robot follows once the page says that it is in front."""
+        """Set the sliders; the robot follows once the page reports that it is in front."""
         if self.sliders.is_zero:
             self._heard_s = now_s
         self.sliders = wanted
 
     def keep_on(self, sent: object, now_s: float) -> Velocity | None:
-        """Take the page's word that it is in front; return the velocity to steer at, None for none.
+        """Handle a report that the page is in front; return the velocity to steer at, None for none.
 
         Args:
-            sent: When the page said so, in ms of its own clock, as it came from the browser.
+            sent: Time of the message in ms of the page's clock, as the browser sent it.
             now_s: Seconds of our monotonic clock.
         """
         self.end_if_silent(now_s)
@@ -69,7 +69,7 @@ class PadInput:
         return None if self.sliders.is_zero else self.sliders
 
     def end_if_silent(self, now_s: float) -> None:
-        """Set the sliders to zero if the page has not been heard of for :data:`SLIDERS_TIMEOUT_S`."""
+        """Set the sliders to zero if the page has not reported for :data:`SLIDERS_TIMEOUT_S`."""
         if now_s - self._heard_s > SLIDERS_TIMEOUT_S:
             self.sliders = ZERO
 

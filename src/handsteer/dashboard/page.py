@@ -1,4 +1,4 @@
-"""What every page has: the head with the way to the others, the sentence with the Stop button, and who drives."""
+"""Common parts of all pages: the head with links to the others, the banner with the Stop button, and the lease."""
 
 import re
 import time
@@ -19,11 +19,11 @@ from handsteer.dashboard.teaching.teaching import Teaching
 
 
 class LeasePanel:
-    """Whether this viewer drives, and the way to the control lease.
+    """Whether this viewer drives, and buttons to request or hand over the control lease.
 
     Args:
-        ask: Is called to ask for it.
-        answer: Is called with True to hand it over, with False to keep it.
+        ask: Called to request the lease.
+        answer: Called with True to hand it over, with False to keep it.
     """
 
     _WORDS: ClassVar[dict[Role, str]] = {"driver": "you drive", "watcher": "you watch", "free": "nobody drives"}
@@ -37,7 +37,7 @@ class LeasePanel:
             self._no = button("Keep", "").on("click", lambda: answer(False))
 
     def update(self, place: LeaseStatus) -> None:
-        """Show what the lease is for this viewer."""
+        """Show the lease as this viewer sees it."""
         is_driver = place.role == "driver"
         asks = f"Somebody asks to drive; unanswered, they do in {place.left_s:.0f} s"
         waits = f"You drive in {place.left_s:.0f} s, or sooner"
@@ -52,17 +52,12 @@ _TIME = re.compile(r" for \d+(\.\d+)? s\b")
 
 
 def spoken(state: PageState) -> str:
-    """Return the sentence for a screen reader, which would read out each tenth of a second of a time that passes."""
+    """Return the banner's sentence for a screen reader, without times, which would be read out at each change."""
     return ". ".join([f"{state.headline}: {_TIME.sub('', state.reason)}", *state.warnings])
 
 
 class Banner:
-    """The sentence: what the robot does, and why; and the button that stops it.
-
-    Args:
-        halt: Is called to stop the robot.
-        reset: Is called to let it be driven again.
-    """
+    """A sentence that reports what the robot does, and why, and buttons that call ``halt`` and ``reset``."""
 
     def __init__(self, halt: Callable[[], None], reset: Callable[[], None]) -> None:
         with ui.element("section").classes("card banner") as self._banner:
@@ -98,7 +93,7 @@ ASSETS_PATH = "/assets"
 _LINKS = (("/", "Drive"), ("/teach", "Teach"), ("/settings", "Settings"))
 _PERIOD_S = 0.1
 _ACK_PATIENCE_S = 5.0
-"""A browser acknowledges every 3 s what it has got; one that has not for so long is sent no more until it does."""
+"""A browser acknowledges received messages every 3 s; after this time without one, sending pauses until the next."""
 
 ICON = (
     '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 64 64"><rect width="64" height="64" rx="16" fill="#2457d6"/>'
@@ -114,13 +109,13 @@ _THEME_ICON = (
 
 @dataclass(frozen=True)
 class GraphAccess:
-    """What pages reach of the graph beside its topics; None is out of their reach.
+    """What pages can access of the graph in addition to topics; None if not accessible.
 
     Attributes:
-        cameras: The graph's camera, which a browser's may stand in for.
-        robot: The robot whose world people edit.
+        cameras: The graph's camera, which a browser's camera can replace.
+        robot: The robot with an editable world.
         settings: The graph's parameters.
-        teaching: Gives lessons.
+        teaching: Runs lessons.
     """
 
     cameras: Cameras | None = None
@@ -131,12 +126,12 @@ class GraphAccess:
 
 @dataclass(frozen=True)
 class PageContext:
-    """What the pages are made of.
+    """What all pages share.
 
     Attributes:
-        node: Is joined for as long as a browser shows a page.
-        local: What pages reach of the graph beside its topics.
-        topics: Whether steering by hand may go to other topics than the control's.
+        node: Joined while a browser shows a page.
+        local: What pages can access of the graph in addition to topics.
+        topics: Whether manual steering may use topics other than the control's.
     """
 
     node: OnDemandNode[DashboardNode]
@@ -148,8 +143,8 @@ class Page:
     """One browser's view; its timers run while the browser is connected.
 
     Args:
-        served: What the page is made of.
-        path: Where the page is, which its link in the head says.
+        served: What all pages share.
+        path: The page's URL path, which its link in the head shows.
     """
 
     def __init__(self, served: PageContext, path: str) -> None:
@@ -166,7 +161,7 @@ class Page:
         ui.timer(_PERIOD_S, self._update)
 
     def show(self, node: DashboardNode, state: PageState) -> None:
-        """Show what is new, ten times a second; a page adds its own to it."""
+        """Show changes, ten times a second; pages extend this."""
         self._driving.update(self.place(node))
         self._source.set_text(state.camera)
         self._banner.update(state)
@@ -177,16 +172,16 @@ class Page:
         return self._served.node.join(self.client.id) if self.client.has_socket_connection else None
 
     def drives(self) -> bool:
-        """Return whether this viewer has the control lease, which it is given if it is free."""
+        """Return whether this viewer has the control lease; a free lease is given to it."""
         node = self.joined
         return node is not None and node.lease.take(self.client.id, node.clock.now())
 
     def place(self, node: DashboardNode) -> LeaseStatus:
-        """Return what the control lease is for this viewer."""
+        """Return the control lease as this viewer sees it."""
         return node.lease.status_of(self.client.id, node.clock.now())
 
     def use_own_camera(self) -> None:
-        """Choose the camera of the machine that handsteer runs on, if this viewer drives."""
+        """Select the camera of the machine that handsteer runs on, if this viewer drives."""
         if self._served.local.cameras and self.drives():
             self._served.local.cameras.choose("own")
 
@@ -211,8 +206,8 @@ class Page:
             self.show(node, node.state(self.client.id))
 
     def _reads(self) -> bool:
-        """Return whether the browser takes what it is sent; what it does not take would only pile up."""
-        sent = self.client.outbox.message_history  # what was sent and not acknowledged yet, oldest first
+        """Return whether the browser acknowledges messages; otherwise they would accumulate."""
+        sent = self.client.outbox.message_history  # messages sent but not acknowledged, oldest first
         oldest = sent[0][0] if sent else None
         now_s = time.monotonic()
         if oldest != self._unread[0]:

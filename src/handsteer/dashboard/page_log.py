@@ -1,4 +1,4 @@
-"""Keeps what strangers say to the page's server from filling the terminal: one line a kind, and not too often."""
+"""Limits the log output of the page's server: one line per kind of message, and not too often."""
 
 import functools
 import logging
@@ -9,7 +9,7 @@ SAID_EVERY_S: Final = 10.0
 
 _LONGEST: Final = 300
 _THREAD: Final = "dashboard"
-# What the libraries of the server log on; a filter works for its own logger only.
+# Loggers of the server's libraries; a filter applies to its own logger only.
 _LOGGERS: Final = (
     "asyncio",
     "engineio.server",
@@ -22,9 +22,9 @@ _LOGGERS: Final = (
 
 
 class OneLineAKind(logging.Filter):
-    """Lets one record a kind pass every :data:`SAID_EVERY_S`, as one line, on which later ones are counted.
+    """Passes one record per kind every :data:`SAID_EVERY_S`, as one line, with the number of suppressed ones.
 
-    Of an exception its last line is said; with ``logging.DEBUG``, all of it.
+    An exception is reduced to its last line. With ``logging.DEBUG``, all records pass unchanged.
     """
 
     def __init__(self) -> None:
@@ -32,7 +32,7 @@ class OneLineAKind(logging.Filter):
         self._said: dict[tuple[object, ...], tuple[float, int]] = {}
 
     def filter(self, record: logging.LogRecord) -> bool:
-        """Return whether ``record`` is to be said; shortens it."""
+        """Return whether to log ``record``; shortens it."""
         if record.threadName != _THREAD or logging.getLogger(record.name).isEnabledFor(logging.DEBUG):
             return True
         error = record.exc_info[1] if record.exc_info else None
@@ -59,7 +59,7 @@ def _shorten(record: logging.LogRecord, error: BaseException | None, left_out: i
 
 @functools.cache
 def keep_short() -> None:
-    """Keep the logs of the server's libraries short, as far as they come from the page's thread."""
+    """Shorten the logs of the server's libraries that come from the page's thread."""
     one_line = OneLineAKind()
     for name in _LOGGERS:
         logging.getLogger(name).addFilter(one_line)

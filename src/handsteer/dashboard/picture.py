@@ -1,4 +1,4 @@
-"""Pictures both ways: the camera's for browsers, as MJPEG that a plain ``<img>`` shows, and a browser's own webcam."""
+"""Pictures for browsers, as MJPEG in a plain ``<img>``, and pictures of a browser's own webcam."""
 
 import asyncio
 import math
@@ -26,20 +26,20 @@ from handsteer.nodes.node import Node
 from handsteer.transports.protocol import Received, Transport
 
 FRAMES_PER_S = 30.0
-"""No browser may send more."""
+"""Maximum frame rate of a browser."""
 
 NEXT = "next"
-"""What the browser hears when it may send another frame: there is never more than one on its way."""
+"""Sent to the browser to request another frame; at most one is in transit."""
 
 _NOT_A_FRAME, _NOT_THE_DRIVER, _NO_CAMERA_HERE, _BUSY = 4400, 4403, 4404, 4409
 
 
 class FrameSocket:
-    """The websocket by which the browser of who drives gives its webcam; one at a time.
+    """The websocket by which the driver's browser sends its webcam's frames; one at a time.
 
     Args:
-        camera: Takes the frames; None where the camera cannot be reached from here.
-        drives: Tells whether the viewer of this id has the control lease, which it is given if it is free.
+        camera: Receives the frames; None if the camera cannot be accessed.
+        drives: Returns whether the viewer with this id has the control lease; a free lease is given to it.
     """
 
     def __init__(self, camera: Cameras | None, drives: Callable[[str], bool]) -> None:
@@ -48,7 +48,7 @@ class FrameSocket:
         self._in_use = threading.Lock()
 
     async def serve(self, socket: WebSocket) -> None:
-        """Take frames until the browser leaves; close with a reason when it cannot be served."""
+        """Receive frames until the browser leaves; close with a reason if it cannot be served."""
         await socket.accept()
         viewer = socket.query_params.get("viewer", "")
         if self._camera is None:
@@ -76,12 +76,12 @@ class FrameSocket:
             await socket.close(_NOT_THE_DRIVER, "somebody else drives now")
         except FrameError as error:
             await socket.close(_NOT_A_FRAME, str(error))
-        except (WebSocketDisconnect, KeyError):  # it has left, or sent words instead of a frame
+        except (WebSocketDisconnect, KeyError):  # it has left, or sent text instead of a frame
             pass
 
 
 BYTES_PER_S = 2_000_000
-"""No viewer is sent more than this."""
+"""Maximum data rate to one viewer."""
 
 _MAX_PIXELS = 640 * 480
 _BEST_QUALITY, _WORST_QUALITY = 80, 40
@@ -89,12 +89,12 @@ _BEST_QUALITY, _WORST_QUALITY = 80, 40
 _TOO_LARGE, _SMALL = 60_000, 45_000
 
 _BOUNDARY = b"frame"
-# How soon a viewer learns that there will be no more pictures.
+# Maximum delay until a viewer learns that the pictures have ended.
 _END_PERIOD_S = 0.1
 
 
 class PictureNode(Node):
-    """Encodes the newest picture once for all viewers who wait for one; pictures that nobody waits for are dropped."""
+    """Encodes the newest picture once for all waiting viewers; drops pictures without waiting viewers."""
 
     def __init__(self, transport: Transport, clock: Clock) -> None:
         super().__init__("dashboard_picture", transport, clock)
@@ -116,7 +116,7 @@ class PictureNode(Node):
         jpeg = encode_jpeg(shrink(bgr_image(received.message)), self._quality).tobytes()
         self._quality = next_quality(self._quality, len(jpeg))
         self._not_before_s = now + len(jpeg) / BYTES_PER_S
-        # A deque, because the server's thread adds to it meanwhile.
+        # A deque, because the server's thread appends concurrently.
         while self._waiting:
             future = self._waiting.popleft()
             with suppress(RuntimeError):  # the server has stopped
@@ -124,14 +124,14 @@ class PictureNode(Node):
 
 
 class PictureResponse(Response):
-    """Streams pictures to one viewer until it leaves; one that reads slowly gets fewer, always the newest."""
+    """Streams pictures to one viewer until it leaves; a slow reader gets fewer pictures, always the newest."""
 
     def __init__(self, pictures: OnDemandNode[PictureNode]) -> None:
         super().__init__(
             media_type=f"multipart/x-mixed-replace; boundary={_BOUNDARY.decode()}",
             headers={"Cache-Control": "no-store"},
         )
-        # The length is not known: there is no end.
+        # The stream has no end, so its length is unknown.
         del self.headers["content-length"]
         self._pictures = pictures
 
@@ -152,7 +152,7 @@ class PictureResponse(Response):
             for task in (sending, leaving):
                 task.cancel()
             await asyncio.gather(sending, leaving, return_exceptions=True)
-        with suppress(TimeoutError, OSError):  # the viewer does not read any more
+        with suppress(TimeoutError, OSError):  # the viewer no longer reads
             await asyncio.wait_for(_send_body(send, b"", more=False), _END_PERIOD_S)
 
     async def _send_pictures(self, node: PictureNode, send: Send) -> None:
@@ -163,7 +163,7 @@ class PictureResponse(Response):
 
 
 def shrink(bgr: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Return ``bgr``, (height, width, 3) uint8, with at most as many pixels as 640x480 has, in the same proportions."""
+    """Return ``bgr``, (height, width, 3) uint8, scaled down to at most as many pixels as 640x480."""
     height, width = bgr.shape[:2]
     scale = math.sqrt(_MAX_PIXELS / (height * width))
     if scale >= 1:
@@ -180,7 +180,7 @@ def next_quality(quality: int, size: int) -> int:
 
 
 def _part(jpeg: bytes) -> bytes:
-    # The boundary goes right after the picture: browsers show a picture only when they see its end.
+    # The boundary directly follows the picture: browsers show a picture only when they see its end.
     header = b"Content-Type: image/jpeg\r\nContent-Length: %d\r\n\r\n" % len(jpeg)
     return header + jpeg + b"\r\n--" + _BOUNDARY + b"\r\n"
 

@@ -1,4 +1,4 @@
-"""What a laser scanner sees, as the 3D view draws it."""
+"""The points of a laser scan for the 3D view."""
 
 import math
 
@@ -8,17 +8,14 @@ from handsteer.messages import LaserScan
 from handsteer.types import Pose2D
 
 MOST_POINTS = 180
-"""Of a longer scan, only every so many rays are drawn."""
+"""Longer scans are subsampled."""
 
 
 def scan_points(scan: LaserScan, robot: Pose2D) -> tuple[tuple[float, float], ...]:
-    """Return x and y in the world, in metres, of what ``scan`` sees; rays that meet nothing are left out.
+    """Return x and y in the world, in metres, of the points of ``scan``; rays without a return are left out.
 
-    The scanner counts as being in the middle of the robot and as looking ahead, as the simulated robot's does.
-
-    Args:
-        scan: The message.
-        robot: Where the robot was when it was measured.
+    ``robot`` is the robot's pose at the time of the scan. The scanner is assumed at its centre, facing forward, as on
+    the simulated robot.
     """
     ranges = np.asarray(scan.ranges, dtype=np.float64)
     step = max(1, math.ceil(len(ranges) / MOST_POINTS))

@@ -1,7 +1,7 @@
-"""The 3D view: a world that stands still, the robot that drives in it, and a camera that goes along.
+"""The 3D view: a fixed world, the robot that drives in it, and a camera that follows the robot.
 
-The world does not move, so that people can drag what is in it; the camera moves in the browser, so that they can also
-turn and zoom it as they like (:mod:`handsteer.dashboard.scene_objects`).
+The world is fixed so that its things can be dragged. The camera moves in the browser, so that viewers can also turn and
+zoom it (:mod:`handsteer.dashboard.scene_objects`).
 """
 
 import logging
@@ -24,11 +24,11 @@ from handsteer.nodes.world_markers import OBSTACLES
 from handsteer.robots.description import Joint, Vector, Visual, joints, visuals
 
 Rotation = NDArray[np.float64]
-"""(3, 3)."""
+"""A rotation matrix, (3, 3)."""
 
 
 def about_axis(axis: Vector, angle: float) -> Rotation:
-    """Return the rotation by ``angle`` in rad about ``axis``, of any length (Rodrigues' formula); none for axis 0."""
+    """Return the rotation by ``angle`` in rad about ``axis`` of any length (Rodrigues' formula); none for axis 0."""
     length = math.hypot(*axis)
     if not length:
         return np.eye(3)
@@ -45,18 +45,18 @@ def from_rpy(rpy: Vector) -> Rotation:
 
 
 def from_quaternion(quaternion: Quaternion) -> Rotation:
-    """Return the rotation of ``quaternion``, of any length; none for the all-zero one that some senders leave."""
+    """Return the rotation of ``quaternion``, of any length; identity for all zeros, which some nodes publish."""
     axis = (quaternion.x, quaternion.y, quaternion.z)
     return about_axis(axis, 2 * math.atan2(math.hypot(*axis), quaternion.w))
 
 
 def css_colour(rgb: Iterable[float]) -> str:
-    """Return a CSS colour for red, green and blue of 0 to 1; what is beyond is cut off."""
+    """Return a CSS colour for red, green and blue, clamped to 0 to 1."""
     return "#" + "".join(f"{round(255 * max(0.0, min(part, 1.0))):02x}" for part in rgb)
 
 
 def parents_first(joints: Iterable[Joint]) -> Iterator[Joint]:
-    """Yield each joint after the one that holds its parent link; joints in a circle are left out."""
+    """Yield each joint after the one that holds its parent link; joints in a loop are left out."""
     waiting = list(joints)
     while waiting:
         held = {joint.child for joint in waiting}
@@ -87,22 +87,22 @@ _RING_SPARE = 1.35
 _SMALLEST_RING_M = 0.3
 _RING_HEIGHT_M = 0.02
 
-# Shapes of visualization_msgs/Marker. Each is made with unit size, and its size is a scale.
+# Shapes of visualization_msgs/Marker, created with unit size and scaled.
 _CUBE, _SPHERE, _CYLINDER = 1, 2, 3
 _ADD = 0
 
 _TURNING = {"continuous", "revolute"}
 
-# three.js has the axis of a cylinder along y, ROS along z.
+# A cylinder's axis is y in three.js, and z in ROS.
 _Z_TO_Y: Rotation = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 
 
 class WorldView:
-    """Shows a :class:`~handsteer.dashboard.node.WorldState`, and then moves only what has moved.
+    """Shows a :class:`~handsteer.dashboard.node.WorldState`; updates only what has moved.
 
     Args:
-        on_pick: Is called with the index of an obstacle that is taken hold of, while the view is editable.
-        on_drop: Is called with its index, and x and y in metres, when it is let go elsewhere.
+        on_pick: Called with the index of an obstacle when a drag of it starts, while the view is editable.
+        on_drop: Called with its index, and x and y in metres, when it is dropped elsewhere.
     """
 
     def __init__(
@@ -127,7 +127,7 @@ class WorldView:
             self._scan = ScanDots(_SCAN_DOT_M, _SCAN_HEIGHT_M).material(_SCAN)
             self._ring = scene.ring(_RING_INNER, 0.5, 48).material(_RING, 1.0, "both").visible(False)
             self._robot = RobotRig(scene)
-        # After the scene's own, which puts the camera elsewhere.
+        # After the scene's own handler, which would move the camera.
         scene.on("init", lambda: self._robot.look(self._view))
 
     def update(self, world: WorldState) -> None:
@@ -147,19 +147,19 @@ class WorldView:
             self._show_ring()
 
     def look(self, view: View) -> None:
-        """Look at the robot from where ``view`` begins."""
+        """Move the camera to the start of ``view``."""
         self._view = view
         self._robot.look(view)
 
     def edit(self, *, on: bool) -> None:
-        """Let obstacles be dragged, or no longer."""
+        """Enable or disable dragging of obstacles."""
         self._editable = on
         for (namespace, _), (_, shape) in self._obstacles.items():
             shape.draggable(on and namespace == OBSTACLES)
         self.choose(None)
 
     def choose(self, index: int | None) -> None:
-        """Put a ring around an obstacle, or around none."""
+        """Mark an obstacle with a ring, or none."""
         self._chosen = index
         self._show_ring()
 
@@ -199,7 +199,7 @@ class WorldView:
         except WorldError as error:
             log.warning("the page cannot show the robot: %s", error)
             return
-        # A link that no joint holds is the root, which is the robot itself.
+        # A link without a parent joint is the root, which is the robot itself.
         links: defaultdict[str, Object3D] = defaultdict(lambda: self._robot)
         turning: list[tuple[Joint, Object3D]] = []
         with self._scene:

@@ -1,4 +1,4 @@
-"""The web server of the page: beside the graph, on a thread of its own."""
+"""The web server of the page, on its own thread next to the graph."""
 
 import errno
 import functools
@@ -44,9 +44,9 @@ from handsteer.transports.protocol import Transport
 
 _START_TIMEOUT_S = 20.0
 _STOP_TIMEOUT_S = 3.0
-# For browsers to say goodbye.
+# For browsers to disconnect.
 _GRACE_S = 0.4
-# What the system may hold back for a viewer that reads slowly; more would only be older pictures.
+# Limits what the system buffers for a slow viewer; more would only be older pictures.
 _SEND_BUFFER_BYTES = 256 * 1024
 
 _one_at_a_time = threading.Lock()
@@ -55,22 +55,22 @@ _one_at_a_time = threading.Lock()
 class Dashboard:
     """Serves the page of a graph.
 
-    NiceGUI keeps its state per process, so one page can be served at a time; another may follow it.
+    NiceGUI keeps its state per process, so a process serves one page at a time.
 
     Args:
         transport: Carries the graph's messages.
         clock: The graph's clock.
-        steering: Drives when people steer on the page.
-        config: Where the page is served, and how.
-        cmd_vel: The topic of the commands that are shown.
-        local: What pages reach of the graph beside its topics; nothing by default.
-        topics: Whether steering by hand may go to other topics than the control's, where other robots may be.
+        steering: Drives when a viewer steers on the page.
+        config: Address and options of the page.
+        cmd_vel: The topic of the displayed commands.
+        local: What pages can access of the graph in addition to topics; nothing by default.
+        topics: Whether manual steering may use topics other than the control's, for other robots.
 
     Attributes:
-        node: Listens and steers for the browsers that show the page.
+        node: Subscribes and steers for the browsers that show the page.
         pictures: Encodes the camera's picture for the browsers that show it.
-        served: What the pages are made of.
-        webcam: Takes the frames of a browser's own camera.
+        served: What all pages share.
+        webcam: Receives the frames of a browser's own camera.
     """
 
     def __init__(
@@ -85,7 +85,7 @@ class Dashboard:
         topics: bool = False,
     ) -> None:
         local = local or GraphAccess()
-        history = VelocityHistory()  # outlives the node, so that a page that is loaded anew shows it
+        history = VelocityHistory()  # outlives the node, so that a reloaded page shows it
         self.node = OnDemandNode(lambda: DashboardNode(transport, clock, steering, cmd_vel, history))
         self.pictures = OnDemandNode(lambda: PictureNode(transport, clock))
         self.served = PageContext(self.node, local, topics)
@@ -96,15 +96,13 @@ class Dashboard:
 
     @classmethod
     def of(cls, graph: JoinedGraph, file: Path | None = None) -> "Dashboard":
-        """Return the page of a graph that this process has a part in.
+        """Return the page of a graph that this process can access.
 
-        Args:
-            graph: What the page is of.
-            file: The YAML file that its parameters were read from, which settings are saved to; without one,
-                :data:`~handsteer.dashboard.settings_file.DEFAULT_FILE`.
+        Settings are saved to ``file``, the YAML file that the graph's parameters were read from; by default
+        :data:`~handsteer.dashboard.settings_file.DEFAULT_FILE`.
 
         Raises:
-            ConfigError: The file cannot be read any more.
+            ConfigError: The file can no longer be read.
         """
         settings_file = SettingsFile(file or DEFAULT_FILE, is_read=file is not None)
         settings = Settings(lambda: graph.config, graph.reconfigure, settings_file)
@@ -114,7 +112,7 @@ class Dashboard:
         return cls(*wires, graph.config.dashboard, cmd_vel=topic, local=local)
 
     def start(self) -> str:
-        """Serve the page and return its address once it answers; it holds the token where one is needed.
+        """Serve the page and return its address once it answers; it contains the token if one is needed.
 
         Raises:
             DashboardError: The address, the port or the certificate cannot be used, or this process serves another
@@ -143,7 +141,7 @@ class Dashboard:
         return f"{address}/?token={access.token}" if access.token else address
 
     def stop(self) -> None:
-        """End the page, open connections too; may be called twice."""
+        """Close the page and all connections; may be called more than once."""
         self.node.close()
         self.pictures.close()
         if self.served.local.teaching is not None:
@@ -176,7 +174,7 @@ def _listen(host: str, port: int) -> socket.socket:
     except OSError as error:
         raise DashboardError(f"--host {host} is no address of this machine: {error.strerror}") from None
     listener = socket.socket(family, socket.SOCK_STREAM)
-    if os.name == "posix":  # elsewhere this option would let two programs have the same port
+    if os.name == "posix":  # on other systems, this option lets two programs use the same port
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BUFFER_BYTES)
     try:
@@ -194,11 +192,11 @@ def _listen(host: str, port: int) -> socket.socket:
 
 
 def _shown(host: str) -> str:
-    """Return what others find this machine by when it serves the page on ``host``."""
+    """Return the address of this machine for others when the page is served on ``host``."""
     if host in {"0.0.0.0", "::", ""}:
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
             try:
-                probe.connect(("203.0.113.1", 9))  # sends nothing: only asks which way it would go
+                probe.connect(("203.0.113.1", 9))  # sends nothing; only determines the route
                 host = str(probe.getsockname()[0])
             except OSError:  # no network
                 host = socket.gethostname()
@@ -207,20 +205,20 @@ def _shown(host: str) -> str:
 
 def _settings(application: FastAPI) -> uvicorn.Config:
     settings = uvicorn.Config(
-        # Around all of it, so that nothing, errors included, goes past.
+        # Outermost, so that it covers everything, errors included.
         AccessMiddleware(application, application.state),
         http=application.state.doors.protocol,
         headers=list(HEADERS),
         server_header=False,
-        proxy_headers=False,  # whoever is on this machine could say that he is another
-        # uvloop reads on behind a protocol that has paused it before TLS begins.
+        proxy_headers=False,  # other users of this machine could forge the header
+        # uvloop keeps reading for a protocol that has paused it before TLS begins.
         loop="asyncio" if application.state.doors.is_secure else "auto",
         log_config=None,
         access_log=False,
         lifespan="on",
         ws_max_size=2 * LARGEST_BYTES,
     )
-    settings.timeout_graceful_shutdown = _GRACE_S  # type: ignore[assignment] # fractions work as well
+    settings.timeout_graceful_shutdown = _GRACE_S  # type: ignore[assignment]  # fractions work as well
     return settings
 
 
@@ -232,7 +230,7 @@ def _certificate(config: DashboardConfig) -> ssl.SSLContext | None:
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
     try:
         context.load_cert_chain(config.certificate, config.private_key)
-    except OSError as error:  # ssl's own errors are of this kind, too
+    except OSError as error:  # includes ssl's own errors
         reason = error.strerror or error
         raise DashboardError(f"the certificate {config.certificate} cannot be used for https: {reason}") from None
     return context
@@ -240,7 +238,7 @@ def _certificate(config: DashboardConfig) -> ssl.SSLContext | None:
 
 @functools.cache
 def _application() -> FastAPI:
-    """Return the web application, made once per process, as NiceGUI wants it; ``state.dashboard`` is what it serves."""
+    """Return the web application, one per process, as NiceGUI requires; it serves ``state.dashboard``."""
     application = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
     application.mount(ASSETS_PATH, StaticFiles(directory=Path(__file__).parent / "static"))
 
@@ -276,11 +274,11 @@ def _application() -> FastAPI:
         binding_refresh_interval=None,
         gzip_middleware_factory=None,
         show_welcome_message=False,
-        # A browser that is busy drawing answers late; taken for gone, it would load the page anew and lose its lease.
-        # Who steers is missed much sooner, by what the page repeats.
+        # A browser busy with drawing answers late. If it counted as gone, it would reload the page and lose its lease.
+        # A missing driver is detected much sooner, because the page repeats its commands.
         reconnect_timeout=10.0,
     )
-    # Else something of each tab that ever looked is kept for 30 days; no page here keeps anything in it.
+    # Otherwise state of each tab is kept for 30 days; no page here stores anything in it.
     app.storage.max_tab_storage_age = 0.0
     SocketEvents(core.sio)
     keep_short()

@@ -1,4 +1,4 @@
-"""The page ``/settings``: every parameter, what it means, and what it is."""
+"""The page ``/settings``: every parameter, its meaning, and its value."""
 
 from nicegui import ui
 
@@ -15,7 +15,7 @@ _ELSEWHERE = (
 
 
 class SettingsPage(Page):
-    """Set everything that can be set; who watches sees what is set."""
+    """Sets all parameters; viewers who do not drive can read them."""
 
     def __init__(self, served: PageContext) -> None:
         super().__init__(served, "/settings")
@@ -28,7 +28,7 @@ class SettingsPage(Page):
             self._panel = SettingsPanel(served.local.settings, self.drives)
 
     def show(self, node: DashboardNode, state: PageState) -> None:
-        """Show what is new."""
+        """Show changes."""
         super().show(node, state)
         if self._panel is not None:
             role = self.place(node).role

@@ -1,4 +1,4 @@
-"""The YAML file that settings are saved to: as a whole or not at all, and never over what somebody else wrote."""
+"""The YAML file that settings are saved to, atomically and without overwriting changes of others."""
 
 import os
 import re
@@ -14,18 +14,18 @@ from handsteer.config import Config, load
 from handsteer.errors import ConfigError
 
 DEFAULT_FILE = Path("handsteer.yaml")
-"""Where settings are saved when no file was given: in the working directory."""
+"""Default file for settings, in the working directory."""
 
 _COMMENT = re.compile(r"(^|\s)#", re.MULTILINE)
 
 
 class SettingsFile:
-    """A file with parameters, as ``--config`` takes it.
+    """A file with parameters, as for ``--config``.
 
     Args:
-        path: Where it is.
-        is_read: Whether its parameters are those that are in use; else it must not exist, or be loaded, before it is
-            saved to.
+        path: The file.
+        is_read: Whether the parameters in use were read from it. Otherwise it must not exist, or be loaded, before it
+            is saved to.
     """
 
     def __init__(self, path: Path, *, is_read: bool) -> None:
@@ -34,11 +34,11 @@ class SettingsFile:
 
     @property
     def is_read(self) -> bool:
-        """Whether its parameters were read, or it was saved to."""
+        """Whether its parameters were read or saved."""
         return self._known is not None
 
     def load(self) -> Config:
-        """Return what the file says, defaults for the rest.
+        """Return the parameters in the file, with defaults for the rest.
 
         Raises:
             ConfigError: It cannot be read, or a field is unknown or out of range.
@@ -49,12 +49,12 @@ class SettingsFile:
         return config
 
     def save(self, values: Mapping[str, Any]) -> str:
-        """Write ``values``, nested as in :class:`~handsteer.config.Config`, and return in words what was done.
+        """Write ``values``, nested as in :class:`~handsteer.config.Config`, and return a sentence on what was done.
 
-        Comments are not kept; the old file is then left beside the new one, with ``.bak`` behind its name.
+        Comments are lost; in that case the old file is kept with the suffix ``.bak``.
 
         Raises:
-            ConfigError: The file was changed by somebody else since it was read, or cannot be written.
+            ConfigError: The file has changed since it was read, or cannot be written.
         """
         old = self._content()
         if old != self._known:
@@ -82,8 +82,8 @@ class SettingsFile:
             raise ConfigError(f"cannot read {self.path}: {error.strerror}") from None
 
     def _write(self, path: Path, content: bytes) -> None:
-        path = path.resolve()  # a link goes on being one
-        # Its address may hold the password of a camera: a new file is for its owner only.
+        path = path.resolve()  # keeps a symbolic link
+        # Camera addresses may contain passwords: only the owner may read a new file.
         handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
         try:
             with os.fdopen(handle, "wb") as file:
@@ -100,7 +100,7 @@ class SettingsFile:
 
 
 def _in_order(values: Mapping[str, Any], old: bytes | None) -> dict[str, Any]:
-    """Return ``values`` with sections and fields in the order that the old file has them, new ones last."""
+    """Return ``values`` with sections and fields in the order of the old file, new ones last."""
     try:
         order = plain_yaml.parse(old or b"", "", ConfigError)
     except ConfigError:

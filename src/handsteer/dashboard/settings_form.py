@@ -1,4 +1,4 @@
-"""The fields that the page's settings are made of, worked out of the configuration's models: no page, no files."""
+"""The fields of the settings page, derived from the configuration's models, without page or files."""
 
 import re
 from dataclasses import dataclass
@@ -13,13 +13,13 @@ from handsteer.errors import ConfigError
 from handsteer.parameters import Description, describe, section_model
 
 FieldKind = Literal["switch", "choice", "number", "text", "list", "table"]
-"""How a field is edited; what a list and a table hold is separated by commas."""
+"""How a field is edited; the items of a list or table are separated by commas."""
 
 LONGEST_TEXT = 2000
-"""No field takes more characters."""
+"""Maximum number of characters of a field."""
 
 MASK = "•••"
-"""Stands for what is not shown: passwords in the address of a camera."""
+"""Replaces hidden parts: passwords in the address of a camera."""
 
 _FOR_THE_DRIVER = frozenset({("dashboard", "certificate"), ("dashboard", "private_key")})
 _UNIT = re.compile(r" \[([^\]]+)\]$")
@@ -32,18 +32,18 @@ _PASSWORD = re.compile(
 
 @dataclass(frozen=True)
 class FormField:
-    """One parameter, as a form shows it.
+    """One parameter in the form.
 
     Attributes:
         section: Its section of the configuration.
-        name: Its name there.
-        text: A line for people.
-        unit: The unit of its values; empty when there is none.
-        allowed: The range or the choices in words; empty when anything is.
+        name: Its name in the section.
+        text: A one-line description.
+        unit: The unit of its values; empty if none.
+        allowed: Its range or choices in words; empty if unrestricted.
         kind: How it is edited.
-        choices: What there is to choose from, of a choice; of a table, its values may be these.
-        optional: Whether it may be empty, which means none.
-        live: Whether it can change while the nodes run; else it is read at the next start.
+        choices: The choices; for a table, those of its values.
+        optional: Whether it may be empty, which means None.
+        live: Whether it can change while the nodes run; otherwise it is read at the next start.
     """
 
     section: str
@@ -58,11 +58,11 @@ class FormField:
 
     @property
     def path(self) -> str:
-        """The full name, as ``control.max_linear``."""
+        """The full name, such as ``control.max_linear``."""
         return f"{self.section}.{self.name}"
 
     def matches(self, words: str) -> bool:
-        """Return whether each of ``words``, whatever its case, is in its name or its meaning."""
+        """Return whether its name or description contains each of ``words``, ignoring case."""
         said = f"{self.path} {self.path.replace('_', ' ')} {self.text} {self.unit}".casefold()
         return all(word in said for word in words.casefold().split())
 
@@ -71,7 +71,7 @@ class FormField:
         return getattr(getattr(config, self.section), self.name)
 
     def show(self, value: Any, *, to_driver: bool = True) -> str:
-        """Return ``value`` as it is edited: passwords are masked, and paths of keys from those who only watch."""
+        """Return ``value`` as text for editing; masks passwords, and paths of keys unless ``to_driver``."""
         if value is None:
             return ""
         if (self.section, self.name) in _FOR_THE_DRIVER and not to_driver:
@@ -85,14 +85,14 @@ class FormField:
         return mask(str(value)) if self.kind == "text" else str(value)
 
     def parse(self, text: str, current: Any = None) -> Any:
-        """Return the value that ``text`` means, checked as the same value in a YAML file would be.
+        """Return the value of ``text``, validated like a value in a YAML file.
 
         Args:
-            text: What :meth:`show` returns, or people have typed.
-            current: The value so far, which has the passwords that were masked.
+            text: From :meth:`show`, or entered by a viewer.
+            current: The current value, which contains the masked passwords.
 
         Raises:
-            ConfigError: It means nothing, or a value that is not allowed; in the words that the file would get.
+            ConfigError: It is not valid YAML or not an allowed value; the message is that for a file.
         """
         if len(text) > LONGEST_TEXT:
             raise ConfigError(f"{self.path}: should have at most {LONGEST_TEXT} characters, and has {len(text)}")
@@ -112,7 +112,7 @@ class FormField:
         return self._unmasked(text, current) if MASK in text else text
 
     def _scalars(self, flow: str) -> list[str]:
-        # By events, because a loader would follow aliases and nesting as deep as they go.
+        # Parsed by events, because a loader would follow aliases and nesting to any depth.
         try:
             events = list(yaml.parse(flow, yaml.BaseLoader))
         except yaml.YAMLError:
@@ -132,7 +132,7 @@ class FormField:
 
 
 def mask(address: str) -> str:
-    """Return ``address`` with :data:`MASK` for its passwords: ``rtsp://me:•••@10.0.0.5/``."""
+    """Return ``address`` with :data:`MASK` instead of passwords: ``rtsp://me:•••@10.0.0.5/``."""
     shown, at = "", 0
     for begin, end in _spans(address):
         shown, at = shown + address[at:begin] + MASK, end
@@ -140,7 +140,7 @@ def mask(address: str) -> str:
 
 
 def form() -> dict[str, tuple[FormField, ...]]:
-    """Return the fields of every section of the configuration, in its order."""
+    """Return the fields of every section, in the order of the configuration."""
     return {
         name: tuple(_field(name, field) for field in section_model(name).model_fields) for name in Config.model_fields
     }
@@ -189,7 +189,7 @@ def _flow(value: Any) -> str:
 
 
 def _number_or_switch(text: str) -> Any:
-    """Return the number or the truth value that YAML finds in ``text``, else ``text``."""
+    """Return the number or boolean that YAML reads in ``text``, else ``text``."""
     if not _SCALAR.fullmatch(text.strip()):
         return text
     try:
@@ -210,7 +210,7 @@ def _passwords(address: str) -> list[str]:
 
 
 def _host(address: str) -> tuple[str, str]:
-    """Return scheme and host: where an address sends its password."""
+    """Return scheme and host: the destination of a password."""
     try:
         parts = urlsplit(address)
     except ValueError:

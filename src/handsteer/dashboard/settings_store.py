@@ -1,4 +1,4 @@
-"""What can be set on the page: what runs now, what is wanted at the next start, and what the file says."""
+"""The parameters on the page: those running, those wanted at the next start, and those in the file."""
 
 import threading
 from collections.abc import Callable, Iterable, Mapping
@@ -15,26 +15,26 @@ from handsteer.robots.world import load_world
 
 FORM: Mapping[str, tuple[FormField, ...]] = MappingProxyType(form())
 FIELDS: Mapping[str, FormField] = MappingProxyType({field.path: field for part in FORM.values() for field in part})
-"""By their full names."""
+"""All fields by full name."""
 
-# What these say decides over the defaults of others.
+# These select the defaults of other fields.
 _ROBOT = (FIELDS["robot.kind"], FIELDS["robot.preset"])
 
 
 class Settings:
-    """The parameters of a graph in this process; may be used from any thread.
+    """The parameters of a graph; thread-safe.
 
-    What can change while the nodes run is given to them at once; the rest is kept for the file, and the next start.
+    Live parameters are applied to the nodes immediately; the others are kept for the file and the next start.
 
     Args:
-        running: Returns what the nodes run with.
-        apply: Gives the nodes what they can take while they run.
-        file: Is saved to.
+        running: Returns the nodes' configuration.
+        apply: Applies live parameters to the nodes.
+        file: The file that settings are saved to.
 
     Attributes:
-        file: Is saved to.
-        wanted: What is in the form: what the next start would have, once it is saved.
-        revision: Counts the changes, and saves.
+        file: The file that settings are saved to.
+        wanted: The parameters in the form: those of the next start, once saved.
+        revision: Counts changes and saves.
     """
 
     def __init__(self, running: Callable[[], Config], apply: Callable[[Config], None], file: SettingsFile) -> None:
@@ -49,11 +49,11 @@ class Settings:
 
     @property
     def is_saved(self) -> bool:
-        """Whether the file says what is wanted."""
+        """Whether the file contains the wanted parameters."""
         return self.wanted == self._saved
 
     def follow(self) -> None:
-        """Take over what others have changed in what runs."""
+        """Adopt changes that others made to the running parameters."""
         with self._lock:
             running = self._running()
             if running is self._followed:
@@ -67,22 +67,22 @@ class Settings:
                 self._note(load(None, None, values))
 
     def is_changed(self, field: FormField) -> bool:
-        """Return whether the value that is wanted is another than the default."""
+        """Return whether the wanted value differs from the default."""
         return field.name in self._changed.get(field.section, {})
 
     def waits(self, field: FormField) -> bool:
-        """Return whether the value that is wanted is used from the next start on only."""
+        """Return whether the wanted value takes effect only at the next start."""
         return bool(field.value_in(self.wanted) != field.value_in(self._running()))
 
     def default(self, field: FormField) -> Any:
-        """Return the value that a reset gives: the robot that is chosen may have its own."""
+        """Return the default value, which may depend on the selected robot."""
         return field.value_in(self._defaults)
 
     def set(self, field: FormField, text: str) -> None:
-        """Set a parameter to what ``text`` means.
+        """Set a parameter to the value of ``text``.
 
         Raises:
-            ConfigError: It means nothing, is out of range, or does not go together with another.
+            ConfigError: It is invalid, out of range, or conflicts with another parameter.
         """
         with self._lock:
             self.follow()
@@ -93,17 +93,17 @@ class Settings:
         """Set these parameters to their defaults.
 
         Raises:
-            ConfigError: The defaults do not go together with others that are not reset.
+            ConfigError: The defaults conflict with parameters that are not reset.
         """
         with self._lock:
             self.follow()
             self._want(_without(self._changed, fields), fields)
 
     def save(self) -> str:
-        """Write what differs from the defaults to the file; return in words what was done.
+        """Write the parameters that differ from the defaults to the file; return a sentence on what was done.
 
         Raises:
-            ConfigError: The file was changed by somebody else since it was read, or cannot be written.
+            ConfigError: The file has changed since it was read, or cannot be written.
         """
         with self._lock:
             self.follow()
@@ -113,10 +113,10 @@ class Settings:
             return said
 
     def load(self) -> None:
-        """Want what the file says.
+        """Adopt the parameters in the file as the wanted ones.
 
         Raises:
-            ConfigError: The file cannot be read, or does not say what is allowed.
+            ConfigError: The file cannot be read, or is invalid.
         """
         with self._lock:
             self.follow()
@@ -137,7 +137,7 @@ class Settings:
         wanted = load(None, None, values)
         _check(wanted, edited)
         running = self._running()
-        # Another robot's defaults are for the next start, as that robot is.
+        # Another robot's defaults apply from the next start on, like that robot.
         base = defaults(running)
         fresh = {
             field: field.value_in(wanted if field.name in values.get(field.section, {}) else base)
@@ -153,12 +153,12 @@ class Settings:
 
 
 def defaults(config: Config) -> Config:
-    """Return the defaults for the robot of ``config``: its preset goes before those of the models."""
+    """Return the defaults for the robot of ``config``: its preset overrides those of the models."""
     return load(None, None, _of_robot(config))
 
 
 def changed(config: Config) -> dict[str, dict[str, Any]]:
-    """Return what differs from the defaults, as plain values: loaded, it gives ``config`` again."""
+    """Return the differences from the defaults as plain values; loading them gives ``config`` again."""
     values = _of_robot(config)
     while True:
         reached = load(None, None, values)
@@ -174,7 +174,7 @@ def _of_robot(config: Config) -> dict[str, dict[str, Any]]:
 
 
 def _check(config: Config, edited: Iterable[FormField]) -> None:
-    """Refuse what the next start would refuse."""
+    """Raise ConfigError for values that the next start would reject."""
     cmd_vel_type(config)
     if config.dashboard.private_key is not None and config.dashboard.certificate is None:
         raise ConfigError("dashboard.private_key: is of no use without dashboard.certificate: give that first")

@@ -1,7 +1,7 @@
-"""What browsers say by the page's websocket, looked at before NiceGUI believes it.
+"""Validates the events of browsers on the page's websocket before NiceGUI handles them.
 
-NiceGUI takes the page that an event is for from the event itself. Here a websocket speaks for the page alone that was
-served to the same browser, and only in the shape that its script has.
+NiceGUI reads an event's page from the event itself. Here a websocket may only send events for a page that was served to
+the same browser, and only in the format of its script.
 """
 
 import logging
@@ -20,7 +20,7 @@ Check = Callable[[Any], bool]
 log = logging.getLogger(__name__)
 
 _REFUSED: Final = "Implicit handshake failed"
-"""At these words NiceGUI's script loads the page anew, which gives it a session."""
+"""With this message NiceGUI's script reloads the page, which gives it a session."""
 
 _LONGEST_NAME: Final = 100
 _LONGEST_LOG: Final = 300
@@ -63,16 +63,12 @@ _SHAPES: Final[dict[str, dict[str, Check]]] = {
 
 
 class SocketEvents:
-    """Stands before the handlers that NiceGUI has on its Socket.IO server.
-
-    Args:
-        server: The server; its handlers are replaced.
-    """
+    """Replaces NiceGUI's handlers on its Socket.IO ``server`` with validating ones."""
 
     def __init__(self, server: AsyncServer) -> None:
         self._server = server
         self._handlers: dict[str, Callable[..., Any]] = dict(server.handlers["/"])
-        self._pages: dict[str, str] = {}  # the page of each websocket that has shaken hands
+        self._pages: dict[str, str] = {}  # the page of each connected websocket after its handshake
         server.on("connect", self._connect)
         server.on("handshake", self._handshake)
         server.on("disconnect", self._disconnect)
@@ -101,7 +97,7 @@ class SocketEvents:
         self._handlers["disconnect"](socket)
 
     def _checked(self, name: str) -> Callable[..., Awaitable[None]]:
-        """Return what takes the events ``name`` of all websockets."""
+        """Return the validating handler of the events ``name``."""
 
         async def take(socket: str, said: Any = None, *_: Any) -> None:
             if not _fits(said, _SHAPES[name]) or self._pages.get(socket) != said["client_id"]:
@@ -113,14 +109,14 @@ class SocketEvents:
                 answer = self._handlers[name](socket, said)
                 if isawaitable(answer):
                     await answer
-            except Exception as error:  # NiceGUI believes what it is told
+            except Exception as error:  # NiceGUI does not validate its input
                 _note(name, error)
 
         return take
 
 
 def is_page_of(page: str, scope: Mapping[str, Any]) -> bool:
-    """Return whether the request of ``scope`` is of the browser to which ``page`` was served."""
+    """Return whether the request of ``scope`` comes from the browser to which ``page`` was served."""
     client = Client.instances.get(page)
     session = scope.get("state", {}).get(SESSION)
     return bool(client and session) and client.request.scope["state"].get(SESSION) == session  # type: ignore[union-attr]

@@ -1,4 +1,4 @@
-"""What the page says, worked out of what the topics said: pure functions, no page and no transport."""
+"""Computes what the page shows from the topics' messages: pure functions, without page or transport."""
 
 import json
 import math
@@ -19,18 +19,18 @@ STALE_S = 2.0
 """A node that has not reported for this long counts as silent; the slowest reports twice a second."""
 
 COMMAND_HOLDS_S = ROBOT_S
-"""A command counts for this long, as in the robot's controller; then nothing is commanded."""
+"""A command expires after this time, as in the robot's controller."""
 
 
 @dataclass(frozen=True)
 class Report:
-    """What a node last said of itself on ``/diagnostics``.
+    """The last report of a node on ``/diagnostics``.
 
     Attributes:
         level: 0 OK, 1 WARN, 2 ERROR.
         message: A sentence for people.
         values: Named values.
-        came_s: When it came, in seconds of the graph's clock.
+        came_s: Time of arrival in seconds of the graph's clock.
     """
 
     level: int
@@ -48,19 +48,19 @@ class Report:
 
 
 Person = Literal["", "you", "another viewer"]
-"""Who of the viewers did it, for the one who is told; empty when none of them did."""
+"""A viewer, as seen by one of them; empty if none."""
 
 
 @dataclass(frozen=True)
 class Viewers:
-    """What the viewers of the page do, as one of them is told.
+    """The viewers' activity, as seen by one of them.
 
     Attributes:
-        steers: Who steers by hand on the page.
-        stopped: Who pressed Stop last, on the page.
-        may_reset: Whether the one who is told may reset it.
-        topic: Where the steering goes past control; empty where it does not.
-        stands: Whether the steering stands because the robot was stopped; counts where no control says so.
+        steers: The viewer who steers.
+        stopped: The viewer who pressed Stop last.
+        may_reset: Whether this viewer may reset Stop.
+        topic: The topic of steering that bypasses the control; empty otherwise.
+        stands: Whether steering is disabled by Stop; used if no control reports Stop.
     """
 
     steers: Person = ""
@@ -78,10 +78,10 @@ class Observed:
     """The newest of everything that the page shows in figures.
 
     Attributes:
-        reports: By name of node.
+        reports: By node name.
         command: The last velocity command.
-        command_came_s: When it came, in seconds of the graph's clock.
-        measured: The velocity that odometry says.
+        command_came_s: Its time of arrival in seconds of the graph's clock.
+        measured: The velocity from odometry.
         frame_counts: Times and frame counters of the camera's last reports, oldest first.
     """
 
@@ -94,35 +94,35 @@ class Observed:
 
 @dataclass(frozen=True)
 class PageState:
-    """Everything that the page shows in words and figures.
+    """Everything that the page shows as text and figures.
 
     Attributes:
-        mood: What colour the sentence has.
-        headline: One or two words: what the robot does.
-        reason: The rest of the sentence: what makes it do so.
-        sign: The sign that counts.
-        seen: The sign that the newest frame alone shows.
-        confidence: 0 to 1, how sure ``seen`` is.
+        mood: Selects the colour of the banner.
+        headline: What the robot does, in one or two words.
+        reason: Why it does so.
+        sign: The confirmed sign.
+        seen: The sign in the newest frame alone.
+        confidence: Of ``seen``, 0 to 1.
         handedness: ``Left``, ``Right`` or empty.
-        signs: Those that the recogniser can tell, as it last said.
-        rule: What decides what signs do, as the control last said; None when it has not.
-        no_picture: Why no pictures come; empty when they come.
+        signs: The signs that can be recognised, as last reported.
+        rule: Configures the signs' actions, as last reported by the control; None if unknown.
+        no_picture: Why there are no pictures; empty if there are.
         camera: Short name of the camera.
-        driver: Who drives: ``signs``, ``steering`` or ``nobody``.
-        stopped: Whether somebody has stopped the robot until it is reset.
-        commanded: The velocity that the robot is told, zero when it is told nothing.
-        measured: The velocity that odometry says.
-        latency_median_ms: From capture to command; None when not known yet.
-        latency_p99_ms: Likewise, 99 of 100 were faster.
-        fps: Frames a second of the camera; None when not known yet.
-        path_length_m: How far the robot has gone; None when it does not say.
-        collisions: How often it has begun to touch an obstacle; None when it does not say.
-        confirmed: 0 to 1, how far ``seen`` is on its way to count; 1 when it counts.
-        viewers: What the viewers of the page do.
-        max_linear_mps: The highest speed that control lets through, either way; None when it does not say.
+        driver: The active input: ``signs``, ``steering`` or ``nobody``.
+        stopped: Whether the robot is stopped until reset.
+        commanded: The commanded velocity, zero without a command.
+        measured: The velocity from odometry.
+        latency_median_ms: Latency from capture to command; None if unknown.
+        latency_p99_ms: 99th percentile of the same.
+        fps: Frame rate of the camera in Hz; None if unknown.
+        path_length_m: Distance driven; None if not reported.
+        collisions: Number of collisions with obstacles; None if not reported.
+        confirmed: Progress of confirming ``seen``, 0 to 1 (confirmed).
+        viewers: The viewers' activity.
+        max_linear_mps: Speed limit of the control, either way; None if not reported.
         max_angular_radps: Likewise, for turning.
-        course: How far it is on the course of its world; None where there is none.
-        warnings: What is amiss though everything goes on, a sentence each, as two nodes that command one robot.
+        course: Progress on the world's course; None without one.
+        warnings: Problems that do not stop operation, such as two nodes that command one robot; a sentence each.
     """
 
     mood: Mood
@@ -154,7 +154,7 @@ class PageState:
 
 
 def compose(observed: Observed, now_s: float, viewers: Viewers = NOBODY) -> PageState:
-    """Return what the page says at ``now_s``, in seconds of the graph's clock, to one of its ``viewers``."""
+    """Return the page's state at ``now_s``, in seconds of the graph's clock, as one of its ``viewers`` sees it."""
     reports = {name: report for name, report in observed.reports.items() if now_s - report.came_s < STALE_S}
     seen = reports.get("hand_sign_recognition", _NO_REPORT)
     control = reports.get("hand_sign_control", _NO_REPORT)
@@ -193,19 +193,19 @@ def compose(observed: Observed, now_s: float, viewers: Viewers = NOBODY) -> Page
 
 
 def warnings_in(reports: Mapping[str, Report]) -> tuple[str, ...]:
-    """Return what nodes report as a warning of its own, each sentence once."""
+    """Return the warnings in the nodes' reports, each sentence once."""
     said = (report.values.get("warning", "") for report in reports.values())
     return tuple(dict.fromkeys(warning for warning in said if warning))
 
 
 def is_stopped(control: Report | None, viewers: Viewers) -> bool:
-    """Return whether the robot is stopped until it is reset, by what ``control`` reports, or the steering past it."""
+    """Return whether the robot is stopped until reset, as ``control`` or the steering that bypasses it reports."""
     says_so = control is not None and control.values.get("stopped") == str(True)
     return says_so or (viewers.stands and (control is None or bool(viewers.topic)))
 
 
 def confirmed(recognition: Report) -> float:
-    """Return how far the sign that ``recognition`` sees is on its way to count, 0 to 1."""
+    """Return the progress of confirming the sign that ``recognition`` reports, 0 to 1."""
     seen = recognition.values.get("seen", NONE)
     if seen == NONE:
         return 0.0
@@ -217,12 +217,12 @@ def confirmed(recognition: Report) -> float:
 def explain(reports: Mapping[str, Report], viewers: Viewers = NOBODY) -> tuple[Mood, str, str]:
     """Return in words what the robot does and why: mood, headline, reason.
 
-    Control knows whether the robot is told to move. When it is not, because no sign counts, the reason lies further
-    up: the camera gives no picture, no hand is in view, or the hand shows no sign.
+    The control reports whether the robot is commanded to move. If it is not, because no sign is confirmed, the reason
+    lies upstream: the camera gives no picture, no hand is in view, or the hand shows no sign.
 
     Args:
-        reports: The reports of the nodes that are not silent, by name of node.
-        viewers: What the viewers of the page do, of which control does not know.
+        reports: The reports of nodes that are not silent, by node name.
+        viewers: The viewers' activity, which the control does not know.
     """
     if viewers.topic and viewers.steers:
         return "driving", "Driving", f"steered by hand, straight on {viewers.topic}"
@@ -242,7 +242,7 @@ def explain(reports: Mapping[str, Report], viewers: Viewers = NOBODY) -> tuple[M
     steered = control.values.get("source") == "steering"
     mood, obstacle = ("standing", None) if steered else _why_no_sign(reports)
     if control.values.get("armed") == str(False) and "seen" in reports.get("hand_sign_recognition", _NO_REPORT).values:
-        obstacle = None  # that no sign is seen is what it waits for
+        obstacle = None  # the robot waits for no sign to be seen
     return mood, "Standing", obstacle or reason
 
 
@@ -257,12 +257,12 @@ def _why_no_sign(reports: Mapping[str, Report]) -> tuple[Mood, str | None]:
 
 
 def camera_name(message: str) -> str:
-    """Return the name of the camera in its ``message``: no folders, and no address, which may hold a password."""
+    """Return the camera's name from its ``message``, without folders or address, which may contain a password."""
     return message.partition(": ")[0].rstrip("/").rpartition("/")[2]
 
 
 def known_signs(values: Mapping[str, str]) -> tuple[str, ...]:
-    """Return the signs that a report of the recogniser names; those that are shipped when it names none."""
+    """Return the signs in a report of the recognition; the shipped ones if it has none."""
     try:
         names = json.loads(values["signs"])
     except (KeyError, ValueError):
@@ -271,9 +271,9 @@ def known_signs(values: Mapping[str, str]) -> tuple[str, ...]:
 
 
 def frame_rate(counts: Sequence[tuple[float, float]], now_s: float) -> float | None:
-    """Return frames a second from times and frame counters, oldest first; None when that cannot be told.
+    """Return the frame rate in Hz from times and frame counters, oldest first; None if unknown.
 
-    A counter that has not come for :data:`STALE_S` gives 0.
+    0 if the last counter is older than :data:`STALE_S`.
     """
     if len(counts) < 2:
         return None
@@ -284,15 +284,10 @@ def frame_rate(counts: Sequence[tuple[float, float]], now_s: float) -> float | N
 
 
 def place_in_world(truth: Pose2D, odometry_then: Pose2D, odometry_now: Pose2D) -> Pose2D:
-    """Return where the robot is in the world now, from a true pose of a moment ago and what the wheels counted since.
+    """Return the robot's current pose in the world: ``truth``, moved by the odometry since.
 
-    This is REP 105's ``map`` to ``odom`` to ``base_link``: the step is turned from the frame of odometry, which drifts,
-    into the world.
-
-    Args:
-        truth: The true pose when odometry said ``odometry_then``.
-        odometry_then: Odometry at that moment.
-        odometry_now: Odometry now.
+    These are the transforms ``map`` to ``odom`` to ``base_link`` of REP 105: the step is rotated from the odometry
+    frame, which drifts, into the world. ``odometry_then`` is of the same time as ``truth``.
     """
     turn = truth.yaw - odometry_then.yaw
     dx, dy = odometry_now.x - odometry_then.x, odometry_now.y - odometry_then.y

@@ -1,4 +1,4 @@
-"""The page ``/teach``: teach a sign of one's own, and let the running robot obey it."""
+"""The page ``/teach``: teach a new sign, and let the running robot use it."""
 
 import asyncio
 from collections.abc import Callable
@@ -27,7 +27,7 @@ _STEPS: Final = {"name": "Name", "collect": "Collect", "train": "Train", "try": 
 
 
 class TeachPage(Page):
-    """Teach a sign, if the graph is in this process."""
+    """Teaches a sign, if the graph can be accessed."""
 
     def __init__(self, served: PageContext) -> None:
         super().__init__(served, "/teach")
@@ -48,7 +48,7 @@ class TeachPage(Page):
         self.client.on_delete(self._lesson.end)
 
     def show(self, node: DashboardNode, state: PageState) -> None:
-        """Show what is new."""
+        """Show changes."""
         super().show(node, state)
         if self._lesson is not None:
             self._camera.update(state)
@@ -67,12 +67,7 @@ class TeachPage(Page):
 
 
 class _LessonCard:
-    """The lesson, step by step.
-
-    Args:
-        page: The page that it is on.
-        teaching: Gives it.
-    """
+    """The lesson, step by step."""
 
     def __init__(self, page: Page, teaching: Teaching) -> None:
         self._page = page
@@ -107,11 +102,11 @@ class _LessonCard:
         ui.timer(0, self._load_known, once=True)
 
     def say(self, words: str) -> None:
-        """Say what went wrong, or nothing."""
+        """Show an error message, or clear it."""
         self._said = words
 
     def update(self) -> None:
-        """Show what is new; a lesson whose teacher does not drive any more is over."""
+        """Show changes; ends the lesson if its viewer no longer drives."""
         lesson = self._teaching.lesson(self._viewer)
         if lesson is not None and not self._page.drives():
             self._teaching.end(self._viewer)
@@ -132,7 +127,7 @@ class _LessonCard:
             self._result.update(view)
 
     def end(self) -> None:
-        """End the lesson: the page is left."""
+        """End the lesson, because the page is left."""
         self._is_over = True
         self._teaching.end(self._viewer)
 
@@ -161,7 +156,7 @@ class _LessonCard:
         return f"Somebody teaches {label} now." if view is None and label is not None else ""
 
     def _do(self, what: Callable[[LessonNode], None]) -> Callable[[], None]:
-        """Return what does ``what`` with the lesson, if it is this viewer's."""
+        """Return a handler that calls ``what`` with the lesson, if it is this viewer's."""
 
         def done() -> None:
             self.say("")

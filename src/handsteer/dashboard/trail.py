@@ -1,4 +1,4 @@
-"""Where the robot has gone, in few points: pure."""
+"""The robot's path, reduced to few points."""
 
 import math
 from dataclasses import dataclass, replace
@@ -6,25 +6,25 @@ from dataclasses import dataclass, replace
 from handsteer.types import Pose2D
 
 MOST_POINTS = 1000
-"""Older ones are forgotten."""
+"""The oldest points beyond these are dropped."""
 
 STEP_M = 0.08
-"""Points are so far apart."""
+"""Distance between points."""
 
 LEAP_M = 0.5
-"""Whoever is so far from the last point was put there, and begins a new trail."""
+"""A robot farther than this from the last point was repositioned, which starts a new trail."""
 
 Point = tuple[float, float]
 
 
 @dataclass(frozen=True)
 class Trail:
-    """The way so far.
+    """The path so far.
 
     Attributes:
         points: x and y in metres, oldest first.
-        count: How many points there have been, those that were forgotten too.
-        number: How many trails there were before.
+        count: Total number of points, including dropped ones.
+        number: Number of earlier trails.
     """
 
     points: tuple[Point, ...] = ()
@@ -32,7 +32,7 @@ class Trail:
     number: int = 0
 
     def to(self, pose: Pose2D) -> "Trail":
-        """Return the trail as it is when the robot is at ``pose``."""
+        """Return the trail extended to ``pose``."""
         point = (pose.x, pose.y)
         distance_m = math.dist(self.points[-1], point) if self.points else math.inf
         if distance_m < STEP_M:
@@ -42,10 +42,10 @@ class Trail:
         return replace(self, points=(*self.points[-MOST_POINTS + 1 :], point), count=self.count + 1)
 
     def anew(self) -> "Trail":
-        """Return an empty trail that others can tell from this one."""
+        """Return an empty trail with another number."""
         return Trail(number=self.number + 1)
 
     def since(self, shown: "Trail") -> tuple[Point, ...]:
-        """Return the points that are new since ``shown``, an earlier state of the same trail."""
+        """Return the points added since ``shown``, an earlier state of the same trail."""
         new = self.count - shown.count
         return self.points[-new:] if new else ()

@@ -1,4 +1,4 @@
-"""What works on this machine, and what to do about the rest."""
+"""Checks what works on this machine, and suggests fixes for the rest."""
 
 import ctypes.util
 import importlib.util
@@ -18,11 +18,7 @@ __all__ = ["Finding", "examine"]
 
 
 def examine(port: int) -> list[Finding]:
-    """Look at everything that a run may need.
-
-    Args:
-        port: Where the page would be.
-    """
+    """Check everything that a run may need; ``port`` is the page's."""
     return [_python(), _models(), *_cameras(), _port(port), *_ros(), *examine_ros2(os.environ), _gl()]
 
 

@@ -1,4 +1,4 @@
-"""What an examination comes to."""
+"""The result of one check."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -8,13 +8,13 @@ Verdict = Literal["ok", "optional", "wrong", "missing"]
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that was looked at.
+    """The result of one check.
 
     Attributes:
-        name: What it is: ``camera``, ``models``, ``port``...
-        verdict: ``ok``; ``optional`` when it is not there, but handsteer works without; ``wrong`` when it is there, but
-            will not do what was probably meant; ``missing`` when handsteer does not work without.
-        detail: What was found, and what to do where something is amiss.
+        name: The subject: ``camera``, ``models``, ``port``...
+        verdict: ``ok``; ``optional`` if missing, but handsteer works without it; ``wrong`` if present, but probably not
+            as intended; ``missing`` if handsteer does not work without it.
+        detail: What was found, and how to fix a problem.
     """
 
     name: str

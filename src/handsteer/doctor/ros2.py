@@ -1,4 +1,4 @@
-"""Whether this machine can be a part of a ROS 2 graph over DDS, and what keeps it from being one."""
+"""Checks whether this machine can join a ROS 2 graph over DDS, and what prevents it."""
 
 import contextlib
 import importlib.util
@@ -18,7 +18,7 @@ from handsteer.errors import TransportError
 from handsteer.transports.dds.interfaces import multicast_addresses
 from handsteer.transports.dds.network import PLACES_BY_MULTICAST, Network, network
 
-# RTPS 2.3, section 9.6.1.1: the ports of a domain, and of a participant in it.
+# RTPS 2.3, section 9.6.1.1: ports of a domain, and of a participant in it.
 _BASE, _PER_DOMAIN, _PER_PARTICIPANT, _OWN, _LARGEST_DOMAIN = 7400, 250, 2, 10, 232
 _TABLES = ("/proc/net/udp", "/proc/net/udp6")
 _GROUP = "239.255.0.1"
@@ -26,7 +26,7 @@ _ANSWER_S = 0.3
 
 
 def taken_ports() -> set[int]:
-    """Return the UDP ports that are taken on this machine; empty where the system does not tell (all but Linux)."""
+    """Return the UDP ports in use on this machine; empty if the system does not report them (all but Linux)."""
     taken: set[int] = set()
     for table in _TABLES:
         with contextlib.suppress(OSError):
@@ -36,13 +36,13 @@ def taken_ports() -> set[int]:
 
 
 def domains_in_use(taken: set[int], participants: int) -> list[int]:
-    """Return the DDS domains that have participants on this machine.
+    """Return the DDS domains with participants on this machine.
 
-    A participant takes two neighbouring ports of its own (unicast), or it shares the two of its domain (multicast).
+    A participant uses two neighbouring ports of its own (unicast), or shares the two of its domain (multicast).
 
     Args:
-        taken: UDP ports.
-        participants: How many places are looked at in each domain.
+        taken: UDP ports in use.
+        participants: Number of participant indices to check in each domain.
     """
     return [
         domain
@@ -52,7 +52,7 @@ def domains_in_use(taken: set[int], participants: int) -> list[int]:
 
 
 def places_left(domain: int, taken: set[int], participants: int) -> int:
-    """Return how many more participants find a port of their own in ``domain`` on this machine."""
+    """Return how many more participants can get ports in ``domain`` on this machine."""
     return sum(not {port, port + 1} & taken for port in _places(domain, participants))
 
 
@@ -62,7 +62,7 @@ def _places(domain: int, participants: int) -> range:
 
 
 def multicast_interfaces() -> dict[str, bool]:
-    """Return whether each network interface lets a multicast packet through that this machine sends to itself.
+    """Return whether a multicast packet from this machine to itself passes each network interface.
 
     The packet does not leave the machine. Loopback and interfaces that are down or without multicast are left out.
     """
@@ -88,17 +88,17 @@ def _hears_itself(address: str) -> bool:
 
 
 _TIMEOUT_S = 20.0
-# Cyclone DDS begins its lines with the time, the domain and the program.
+# Cyclone DDS prefixes its lines with the time, the domain and the program.
 _ENGINE_LINE = re.compile(r"^\d+\.\d+ \[\d+\]\s+\S+: (.*)$", re.MULTILINE)
 
 
 @dataclass(frozen=True)
 class Sight:
-    """What was seen in a domain.
+    """What was observed in a domain.
 
     Attributes:
-        graph: As :meth:`~handsteer.transports.observed.ObservedGraph.as_dict` has it; None when it cannot be joined.
-        problem: Why it cannot be joined: what the engine says, or else what we say.
+        graph: As returned by :meth:`~handsteer.transports.observed.ObservedGraph.as_dict`; None if it cannot be joined.
+        problem: Why it cannot be joined: the engine's message, or else ours.
     """
 
     graph: dict[str, Any] | None
@@ -106,17 +106,13 @@ class Sight:
 
     @property
     def others(self) -> list[str]:
-        """The nodes in the domain, and topics of those that have no name."""
+        """The nodes in the domain, and the topics of unnamed ones."""
         graph = self.graph or {"nodes": [], "topics": []}
         return [*graph["nodes"]] or [topic["name"] for topic in graph["topics"]]
 
 
 def look(environments: Mapping[int, Mapping[str, str]]) -> dict[int, Sight]:
-    """Return what is seen in each domain, all at the same time.
-
-    Args:
-        environments: The environment variables with which each domain is looked at.
-    """
+    """Return what is observed in each domain, looked at simultaneously with its environment variables."""
     processes = {
         domain: subprocess.Popen(
             [sys.executable, "-m", "handsteer.transports.look"],
@@ -146,16 +142,12 @@ def _sight(process: subprocess.Popen[str]) -> Sight:
 _NAME = "dds"
 _NEWEST_PYTHON = (3, 13)
 _DOMAINS_AT_ONCE = 4
-# Linux gives the ports from 32768 on to whoever asks for any.
+# Linux assigns ports from 32768 on dynamically.
 _LARGEST_SAFE_DOMAIN = 101
 
 
 def examine_ros2(environment: Mapping[str, str]) -> list[Finding]:
-    """Look at the variables, the DDS engine, the network and the domain.
-
-    Args:
-        environment: ROS 2's environment variables among others.
-    """
+    """Check the ROS 2 variables in ``environment``, the DDS engine, the network and the domain."""
     try:
         here = network(environment)
     except TransportError as error:
@@ -224,7 +216,7 @@ def _domain(environment: Mapping[str, str], here: Network) -> list[Finding]:
     in_use = domains_in_use(taken, PLACES_BY_MULTICAST)
     elsewhere = [domain for domain in in_use if domain != here.domain]
     if here.reach != "LOCALHOST" and here.domain != 0 and 0 not in elsewhere:
-        elsewhere.append(0)  # where ROS 2 is unless it is told otherwise, here on other machines
+        elsewhere.append(0)  # ROS 2's default domain, which other machines may use
     sights = look(dict.fromkeys([here.domain, *elsewhere[:_DOMAINS_AT_ONCE]], environment))
     ours = sights.pop(here.domain)
     if ours.graph is None:

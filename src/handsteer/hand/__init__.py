@@ -1,1 +1,1 @@
-"""The kinematic hand: joints, angles, poses of the signs, and pictures of it."""
+"""The kinematic hand: joints, angles, poses of the signs, and rendered pictures."""

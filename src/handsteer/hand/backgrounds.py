@@ -1,4 +1,4 @@
-"""What is behind the hand: a plain wall, or a room full of things."""
+"""Backgrounds for the rendered hand: a plain wall, or a cluttered room."""
 
 import cv2
 import numpy as np
@@ -10,16 +10,16 @@ Image = NDArray[np.uint8]
 
 
 def make_background(kind: str, width: int, height: int, seed: int = 0) -> Image:
-    """Return a (height, width, 3) uint8 BGR picture, the same for the same arguments.
+    """Return a (height, width, 3) uint8 BGR picture; deterministic.
 
     Args:
         kind: ``plain`` or ``cluttered``.
         width: Pixels.
         height: Pixels.
-        seed: Which of all such walls or rooms.
+        seed: Selects one of many walls or rooms.
 
     Raises:
-        ConfigError: There is no such kind.
+        ConfigError: ``kind`` is unknown.
     """
     random = np.random.default_rng(seed)
     if kind not in ("plain", "cluttered"):
@@ -47,7 +47,7 @@ def _put_things(picture: NDArray[np.float32], random: np.random.Generator) -> No
     height, width = picture.shape[:2]
     unit = max(height, 8) / 480
     for _ in range(26):
-        # The colours of real rooms are nearer to grey than random ones.
+        # Colours in real rooms are closer to grey than random ones.
         colour = (random.uniform(25, 225) + random.normal(0, 22, 3)).tolist()
         x, y = random.uniform(0, width), random.uniform(0, height)
         if random.random() < 0.7:

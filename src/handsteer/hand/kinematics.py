@@ -1,8 +1,8 @@
-"""The kinematic hand: joint angles in, joint positions out, for any number of hands at once.
+"""Forward kinematics of the hand, vectorised over hands.
 
 The *hand frame* is that of a right hand: origin at the wrist, x to the thumb's side, y along the middle finger, z out
-of the palm (metres). With the palm to the viewer and the fingers up it is x right, y up, z to the viewer. A left hand
-is the mirror image, made where the hand is placed before a camera (:mod:`handsteer.hand.placement`).
+of the palm (metres). Seen with the palm to the viewer and the fingers up, x is right, y up, and z towards the viewer. A
+left hand is the mirror image, made by its placement in the camera frame (:mod:`handsteer.hand.placement`).
 
 Joints are in the order of the landmark models: wrist, then thumb, index, middle, ring and little finger, each from its
 base to its tip. Angles are in radians, in the order of :data:`ANGLES`.
@@ -30,10 +30,10 @@ ANGLES: tuple[str, ...] = (
 )
 """Names of the angles; zero is a flat hand with straight fingers and the thumb along the index finger.
 
-``wrist_flexion`` bends the palm towards the forearm, ``wrist_deviation`` the thumb's side. ``spread`` turns a digit
+``wrist_flexion`` bends the palm towards the forearm, ``wrist_deviation`` the thumb's side. ``spread`` rotates a digit
 in the plane of the palm towards the thumb's side. ``mcp``, ``pip``, ``dip`` and ``ip`` bend it towards the palm (the
 thumb: towards its own pulp). ``thumb_opposition`` lifts the thumb out of the plane of the palm, ``thumb_rotation``
-turns it about its own axis, its pulp from the fingers to the viewer of the palm.
+rotates it about its own axis, its pulp from the fingers to the viewer of the palm.
 """
 
 LIMITS: Array = np.radians(
@@ -46,7 +46,7 @@ LIMITS: Array = np.radians(
         *((-35, 20), (-25, 95), (-5, 115), (-10, 80)),
     ]
 )
-"""(23, 2) least and greatest angle, radians: the active range of healthy adults (AAOS, *Joint Motion*, rounded)."""
+"""(23, 2) smallest and largest angle in radians: active range of healthy adults (AAOS, *Joint Motion*, rounded)."""
 
 BONE_LENGTHS_M: Array = np.array(
     [
@@ -57,10 +57,11 @@ BONE_LENGTHS_M: Array = np.array(
         *(0.0810, 0.0327, 0.0181, 0.0197),
     ]
 )
-"""(20,) length of the bone that ends at joint 1 to 20, metres.
+"""(20,) lengths of the bones that end at joints 1 to 20, in metres.
 
 Phalanges and the thumb's metacarpal are the means of A. Buryanov and V. Kotiuk, *Proportions of hand segments*, Int. J.
-Morphol. 28(3), 2010, the last ones with the soft tip; the first of each digit runs from the wrist through the palm.
+Morphol. 28(3), 2010, the distal ones including the soft tip; the first of each digit runs from the wrist through the
+palm.
 """
 
 _PALM = np.array(
@@ -75,7 +76,7 @@ _PALM = np.array(
 _PALM_DIRECTIONS: Array = _PALM / np.linalg.norm(_PALM, axis=1, keepdims=True)
 
 _REST_SPREAD = np.radians([0.0, 3.0, 0.0, -4.0, -9.0])
-# Bent fingers point to the scaphoid, at the thumb's side of the wrist, so their bending axes are turned.
+# Bent fingers point to the scaphoid, on the thumb's side of the wrist, so their bending axes are rotated.
 _REST_TWIST = np.radians([-85.0, -4.0, 2.0, 9.0, 17.0])
 
 
@@ -85,9 +86,9 @@ class Skeleton:
 
     Attributes:
         joints: (N, 21, 3) positions in metres.
-        axes: (N, 5, 3, 3, 3) for each digit and each of its three moving bones the rotation whose columns are the
-            bone's bending axis, its direction, and the side of its pulp.
-        forearm: (N, 3) unit vector from the wrist to the elbow.
+        axes: (N, 5, 3, 3, 3) rotations of the three moving bones of each digit; the columns are the bone's bending
+            axis, its direction, and the side of its pulp.
+        forearm: (N, 3) unit vectors from the wrist to the elbow.
     """
 
     joints: Array
@@ -99,7 +100,7 @@ def angles_of(**degrees: float) -> Array:
     """Return the (23,) angles in radians with the named ones set in degrees, the others zero.
 
     Raises:
-        KeyError: There is no angle of that name.
+        KeyError: A name is unknown.
     """
     angles = np.zeros(len(ANGLES))
     for name, value in degrees.items():
@@ -110,13 +111,13 @@ def angles_of(**degrees: float) -> Array:
 
 
 def clamp(angles: ArrayLike) -> Array:
-    """Return (..., 23) angles moved into :data:`LIMITS`."""
+    """Return (..., 23) angles clamped to :data:`LIMITS`."""
     clamped: Array = np.clip(np.asarray(angles, float), LIMITS[:, 0], LIMITS[:, 1])
     return clamped
 
 
 def pose_joints(angles: ArrayLike, bone_lengths: ArrayLike = BONE_LENGTHS_M) -> Array:
-    """Return the (N, 21, 3) joints, metres in the hand frame; arguments as :func:`pose_skeleton`."""
+    """Return the (N, 21, 3) joints in metres in the hand frame; arguments as for :func:`pose_skeleton`."""
     return pose_skeleton(angles, bone_lengths).joints
 
 
@@ -146,7 +147,7 @@ def _digit_axes(angles: Array) -> Array:
     twist = np.tile(_REST_TWIST, (len(angles), 1))
     spread = turn_z(-(digits[..., 0] + _REST_SPREAD))
     bend = turn_x(digits[..., 1:])
-    # A finger's twist turns the axis it bends about. The thumb turns about its own length, after it has been lifted.
+    # A finger's twist rotates its bending axis. The thumb rotates about its own length, after it has been lifted.
     twist[:, 0] += thumb[:, 4]
     twisted = turn_y(twist)
     first = np.where(_IS_THUMB, bend[:, :, 0] @ twisted, twisted @ bend[:, :, 0])
@@ -159,7 +160,7 @@ _IS_THUMB = np.array([True, False, False, False, False])[:, None, None]
 
 
 def _forearm(angles: Array) -> Array:
-    """Return (N, 3) directions to the elbow: straight on is -y."""
+    """Return (N, 3) directions to the elbow; -y with a straight wrist."""
     flexion, deviation = angles[:, 0], angles[:, 1]
     return np.stack(
         [np.sin(deviation) * np.cos(flexion), -np.cos(deviation) * np.cos(flexion), np.sin(flexion)], axis=-1

@@ -1,4 +1,4 @@
-"""The signs as hand poses: the shape of the hand, and how it is held before the camera."""
+"""The signs as hand poses: the shape of the hand, and its pose relative to the camera."""
 
 from dataclasses import dataclass
 
@@ -12,7 +12,7 @@ from handsteer.types import BACKWARD, FORWARD, GO, NONE, STOP, TURN_LEFT, TURN_R
 
 @dataclass(frozen=True)
 class View:
-    """How a right hand is held before the camera; a left hand is held as its mirror image.
+    """Pose of a right hand relative to the camera; a left hand has its mirror image.
 
     Attributes:
         yaw: Radians about the hand's length: at 0 the camera sees the palm, at pi the back.
@@ -27,29 +27,29 @@ class View:
     position: tuple[float, float, float] = (0.0, 0.0, 0.55)
 
     def placement(self, handedness: Handedness) -> Placement:
-        """Return where that hand is."""
+        """Return the placement of that hand."""
         matrix = orientation(yaw=self.yaw, pitch=self.pitch, roll=self.roll)
         right = Placement(matrix, np.array(self.position))
         return right if handedness == "Right" else right.mirrored()
 
     def to_array(self) -> Array:
-        """Return the (6,) numbers yaw, pitch, roll, x, y, z."""
+        """Return (6,): yaw, pitch, roll, x, y, z."""
         return np.array([self.yaw, self.pitch, self.roll, *self.position])
 
     @classmethod
     def from_array(cls, numbers: Array) -> "View":
-        """Return the view of the (6,) numbers that :meth:`to_array` gives."""
+        """Return the view from the (6,) array of :meth:`to_array`."""
         yaw, pitch, roll, x, y, z = (float(number) for number in numbers)
         return cls(yaw, pitch, roll, (x, y, z))
 
 
 @dataclass(frozen=True)
 class HandPose:
-    """A hand shape before the camera.
+    """A hand shape and its pose relative to the camera.
 
     Attributes:
         angles: (23,) joint angles, radians, in the order of :data:`handsteer.hand.kinematics.ANGLES`.
-        view: How it is held.
+        view: Its pose.
     """
 
     angles: Array
@@ -57,7 +57,7 @@ class HandPose:
 
 
 def _shape(*, thumb: tuple[float, ...], wrist: tuple[float, float] = (0.0, 0.0), **fingers: tuple[float, ...]) -> Array:
-    """Return angles from degrees: thumb and fingers in the order of ``ANGLES``; fingers not named are closed."""
+    """Return angles from degrees: thumb and fingers in the order of ``ANGLES``; omitted fingers are closed."""
     degrees = {"wrist_flexion": wrist[0], "wrist_deviation": wrist[1]}
     names = ("spread", "opposition", "mcp", "ip", "rotation")
     degrees |= {f"thumb_{name}": value for name, value in zip(names, thumb, strict=True)}
@@ -96,7 +96,7 @@ RELAXED = _shape(
 FIST = _shape(thumb=_THUMB_OVER_INDEX)
 INDEX = _shape(thumb=_THUMB_OVER_MIDDLE, index=_STRAIGHT_INDEX)
 THUMB = _shape(
-    # Seen from the back, only a tight fist is told from straight fingers.
+    # From the back, only a tight fist is distinguishable from straight fingers.
     thumb=_THUMB_OUT,
     index=(0.0, 80.0, 106.0, 62.0),
     middle=(0.0, 82.0, 108.0, 66.0),
@@ -127,7 +127,7 @@ OK = _shape(
 )
 
 _HEIGHT_M, _DEPTH_M = 0.03, 0.55
-_LOWERED_M = 0.75 * _DEPTH_M + 0.20  # below the picture, whatever the camera's shape
+_LOWERED_M = 0.75 * _DEPTH_M + 0.20  # below the picture, for any aspect ratio
 
 
 def _held(angles: Array, *, yaw: float = 0.0, pitch: float = 0.0, roll: float = 0.0, y: float = _HEIGHT_M) -> HandPose:
@@ -143,7 +143,7 @@ _POSES = {
     TURN_RIGHT: _held(THUMB, yaw=150, pitch=-30, roll=-28),
     GO: _held(FIST, yaw=10, pitch=3),
     NONE: _held(RELAXED, y=_LOWERED_M),
-    # No signs until they are taught.
+    # Not signs until they are taught.
     "Peace": _held(PEACE, yaw=8),
     "Three": _held(THREE, yaw=8),
     "Four": _held(FOUR, yaw=8),
@@ -155,14 +155,14 @@ _OTHER_HANDS = {TURN_LEFT: TURN_RIGHT, TURN_RIGHT: TURN_LEFT}
 
 
 def sign_pose(sign: str, handedness: Handedness = "Right") -> HandPose:
-    """Return how ``sign`` is shown, as people would with that hand.
+    """Return how people show ``sign`` with that hand.
 
-    A left hand is the mirror image of a right one, so it shows ``Turn Left`` as the right hand does ``Turn Right``:
-    with the back to the camera. ``NONE`` is the hand lowered out of the picture. There are also ``Peace``, ``Three``,
-    ``Four``, ``Horns``, ``Call`` and ``OK``, which are no signs until they are taught.
+    A left hand is the mirror image of a right one: it shows ``Turn Left`` as the right hand does ``Turn Right``, with
+    the back to the camera. ``NONE`` is the hand lowered out of the picture. ``Peace``, ``Three``, ``Four``, ``Horns``,
+    ``Call`` and ``OK`` are available too, and are no signs until they are taught.
 
     Raises:
-        PoseError: There is no such sign.
+        PoseError: ``sign`` is unknown.
     """
     shown = _OTHER_HANDS.get(sign, sign) if handedness == "Left" else sign
     if shown not in _POSES:

@@ -1,4 +1,4 @@
-"""Pictures of the hand: traced on a coarse grid around it, shaded, enlarged and laid over a background."""
+"""Renders the hand: traced on a coarse grid around it, shaded, upscaled and composed with a background."""
 
 from dataclasses import dataclass
 
@@ -18,12 +18,12 @@ SKINS: dict[str, tuple[tuple[float, float, float], ...]] = {
     "medium": ((0.34, 0.46, 0.70), (0.33, 0.42, 0.70), (0.56, 0.62, 0.84)),
     "dark": ((0.14, 0.20, 0.36), (0.15, 0.20, 0.37), (0.34, 0.40, 0.56)),
 }
-"""Reflected light (blue, green, red; 0 to 1) of the skin, of its redder parts, and of the nails."""
+"""Reflectance (blue, green, red; 0 to 1) of the skin, of its redder parts, and of the nails."""
 
 _STRIPS = 3
-_TOLERANCE = 0.08  # of a cell
-_NEAR_M = 0.002  # where whole blocks stop
-_EDGE = 0.75  # the nearness at which the hand ends
+_TOLERANCE = 0.08  # in cells
+_NEAR_M = 0.002  # end of the tracing of whole blocks
+_EDGE = 0.75  # nearness at the hand's outline
 _GAMMA = 0.8
 _SPECULAR, _SHININESS = 0.24, 14.0
 _AMBIENT, _DIFFUSE = 0.46, 0.62
@@ -32,13 +32,13 @@ _OCCLUSION, _OCCLUSION_REACH_M = 0.22, 0.010
 
 @dataclass(frozen=True)
 class Look:
-    """What the hand looks like.
+    """The appearance of the hand.
 
     Attributes:
         skin: A key of :data:`SKINS`.
-        sleeve: Whether the arm wears one.
+        sleeve: Whether the arm has a sleeve.
         sleeve_colour: Blue, green, red, 0 to 1.
-        light: (3,) direction to the light in the camera frame; its length does not matter.
+        light: (3,) direction to the light in the camera frame, of any length.
         brightness: Factor on all light.
     """
 
@@ -50,14 +50,14 @@ class Look:
 
 
 def render(skeleton: Skeleton, placement: Placement, camera: Pinhole, look: Look, background: Image) -> Image:
-    """Return the picture of the first hand of ``skeleton``.
+    """Return a picture of the first hand of ``skeleton``.
 
     Args:
         skeleton: The posed hand.
-        placement: Where it is.
-        camera: What it is seen by.
-        look: What it looks like.
-        background: (height, width, 3) uint8 BGR of the camera's size; not changed.
+        placement: Its pose in the camera frame.
+        camera: The camera.
+        look: Its appearance.
+        background: (height, width, 3) uint8 BGR of the camera's size; not modified.
 
     Returns:
         (height, width, 3) uint8, BGR.
@@ -71,9 +71,9 @@ def render(skeleton: Skeleton, placement: Placement, camera: Pinhole, look: Look
 
 
 def _trace_grid(grid: Grid, cones: Cones, camera: Pinhole, look: Look) -> tuple[Float, Float]:
-    """Return (rows, columns, 3) colours 0..1 and (rows, columns) how near each cell is to the hand, 1 on it.
+    """Return (rows, columns, 3) colours, 0 to 1, and each cell's (rows, columns) nearness to the hand, 1 on it.
 
-    It goes strip by strip: few cones are seen in each, and what they need stays in the processor's cache.
+    Processed in strips: each contains few cones, and their data stays in the processor's cache.
     """
     colour = np.zeros((grid.rows, grid.columns, 3), np.float32)
     cover = np.zeros((grid.rows, grid.columns), np.float32)
@@ -90,9 +90,9 @@ def _trace_grid(grid: Grid, cones: Cones, camera: Pinhole, look: Look) -> tuple[
 
 
 def _near_depth(grid: Grid, cones: Cones, camera: Pinhole) -> Float:
-    """Return (rows, columns) how far each cell can be looked along before the hand comes near; infinite if never.
+    """Return the (rows, columns) depth to which each cell's ray is surely free; infinite if it misses the hand.
 
-    Whole blocks of cells are followed as one thick ray (the first pass of cone marching).
+    Blocks of cells are traced as one thick ray each (the first pass of cone marching).
     """
     shape = grid.rows // BLOCK, grid.columns // BLOCK
     row, column = (at.ravel() * BLOCK + BLOCK / 2 for at in np.indices(shape))
@@ -106,7 +106,7 @@ def _near_depth(grid: Grid, cones: Cones, camera: Pinhole) -> Float:
 
 
 def _look_along(directions: Float, near: Float, cell_rad: float, cones: Cones, look: Look) -> tuple[Float, Float]:
-    """Return (n, 3) colours and (n,) nearness along (3, n) directions that are ``cell_rad`` apart."""
+    """Return (n, 3) colours and (n,) nearness along (3, n) directions, ``cell_rad`` apart."""
     field = Field(cones)
     cell_m = cell_rad * float(np.median(near))
     hits = trace(field, directions, near, end=cones.depths()[1], tolerance=_TOLERANCE * cell_m)
@@ -118,7 +118,7 @@ def _look_along(directions: Float, near: Float, cell_rad: float, cones: Cones, l
 
 
 def _shade(cones: Cones, points: Float, clearance: Float, directions: Float, look: Look) -> Float:
-    """Return (n, 3) colours 0..1 of the skin at (3, n) points that are (n,) ``clearance`` off it."""
+    """Return the (n, 3) colours, 0 to 1, of the skin at (3, n) points with (n,) ``clearance`` from it."""
     field = Field(cones)
     normals, weights = field.surface(points)
     light = np.array(look.light, np.float32)
@@ -127,7 +127,7 @@ def _shade(cones: Cones, points: Float, clearance: Float, directions: Float, loo
     half = light[:, None] - directions
     half /= np.linalg.norm(half, axis=0)
     shine = np.maximum(np.einsum("in,in->n", half, normals), 0.0) ** _SHININESS
-    # Skin lets light through: its shadows begin later than a plaster hand's.
+    # Skin is translucent: its shadows begin later than those of an opaque surface.
     diffuse = np.clip((facing + 0.35) / 1.35, 0.0, 1.0)
     gap = field.distance(points + normals * np.float32(_OCCLUSION_REACH_M)) - clearance
     open_sky = np.clip(gap / np.float32(_OCCLUSION_REACH_M), 0.0, 1.0)
@@ -141,7 +141,7 @@ def _shade(cones: Cones, points: Float, clearance: Float, directions: Float, loo
 
 
 def _lay_over(picture: Image, grid: Grid, colour: Float, cover: Float) -> None:
-    """Enlarge the traced cells and lay them over the picture, in place."""
+    """Upscale the traced cells and compose them with the picture, in place."""
     width = min(int(np.ceil(grid.columns * grid.cell_px)), picture.shape[1] - grid.left)
     height = min(int(np.ceil(grid.rows * grid.cell_px)), picture.shape[0] - grid.top)
     scale = np.array([[grid.cell_px, 0, 0.5 * grid.cell_px - 0.5], [0, grid.cell_px, 0.5 * grid.cell_px - 0.5]])
@@ -149,11 +149,11 @@ def _lay_over(picture: Image, grid: Grid, colour: Float, cover: Float) -> None:
     large = cv2.warpAffine(layers, scale, (width, height), flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
     patch = picture[grid.top : grid.top + height, grid.left : grid.left + width]
     weight = large[..., 3]
-    # The border of a cell is blurred by the enlargement; a steeper step gives back the sharp outline.
+    # Upscaling blurs the border of a cell; a steeper step restores the sharp outline.
     sharp = np.clip((weight - _EDGE) * np.float32(min(grid.cell_px, 4.0)) + 0.5, 0.0, 1.0)
     patch[:] = cv2.blendLinear(large[..., :3].astype(np.uint8), patch, sharp, 1.0 - sharp)
 
 
 def true_pixels(skeleton: Skeleton, placement: Placement, camera: Pinhole) -> Array:
-    """Return (21, 2) pixels where the camera sees the joints of the first hand."""
+    """Return the (21, 2) pixels of the first hand's joints."""
     return camera.project(placement.apply(skeleton.joints[0]))

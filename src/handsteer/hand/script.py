@@ -1,4 +1,4 @@
-"""A script of signs, such as ``Forward:3 Turn Left:2 NONE:1``, and the hand's motion through it."""
+"""Scripts of signs, such as ``Forward:3 Turn Left:2 NONE:1``, and the hand's motion through them."""
 
 import math
 import re
@@ -15,7 +15,7 @@ _CHANGE_S = 0.30
 _MAX_S = 3600.0
 _PART = re.compile(r"([^:]*):(\S*)\s*")
 
-# The sway of a hand held up: sums of slow waves, of these sizes. Angles in radians, positions in metres.
+# The sway of a raised hand: sums of slow waves of these amplitudes, in radians and metres.
 _SWAY_HZ = (0.23, 0.41, 0.67)
 _SWAY_JOINTS = 0.010
 _SWAY_VIEW = np.array([0.030, 0.022, 0.022, 0.003, 0.003, 0.004])
@@ -23,7 +23,7 @@ _SWAY_VIEW = np.array([0.030, 0.022, 0.022, 0.003, 0.003, 0.004])
 
 @dataclass(frozen=True)
 class Part:
-    """One sign of a script and how long it lasts, in seconds."""
+    """One sign of a script and its duration in seconds."""
 
     sign: str
     duration_s: float
@@ -35,8 +35,8 @@ class Moment:
 
     Attributes:
         pose: Shape and view.
-        sign: The sign that is being shown or taken up.
-        settled: Whether the hand has arrived at it.
+        sign: The sign that is shown or approached.
+        settled: Whether the hand has reached it.
     """
 
     pose: HandPose
@@ -45,7 +45,7 @@ class Moment:
 
 
 def parse_script(text: str) -> tuple[Part, ...]:
-    """Return the parts of ``text``: signs with their durations in seconds, ``SIGN:SECONDS``, separated by spaces.
+    """Return the parts of ``text``: signs with durations in seconds, ``SIGN:SECONDS``, separated by spaces.
 
     Raises:
         PoseError: The script is empty, or a sign or duration in it is wrong; the message names the place.
@@ -82,11 +82,11 @@ def _part(sign: str, duration: str, number: int) -> Part:
 
 
 class Motion:
-    """A hand that goes through a script, over and over; the same for the same script, hand, seed and time.
+    """A hand that repeats a script; deterministic.
 
     Args:
-        script: As :func:`parse_script` takes it.
-        handedness: Which hand.
+        script: As for :func:`parse_script`.
+        handedness: ``Left`` or ``Right``.
         seed: Seed of the sway.
 
     Raises:
@@ -101,11 +101,11 @@ class Motion:
 
     @property
     def duration_s(self) -> float:
-        """How long the script takes once."""
+        """The duration of one repetition in seconds."""
         return float(self._ends[-1])
 
     def at(self, time_s: float) -> Moment:
-        """Return the hand ``time_s`` seconds after the start; before it, at the start."""
+        """Return the hand ``time_s`` seconds after the start; the start for negative times."""
         time_s = max(0.0, time_s)
         within = math.fmod(time_s, self.duration_s)
         index = min(int(np.searchsorted(self._ends, within, side="right")), len(self._parts) - 1)
@@ -131,6 +131,6 @@ def _pose(numbers: Array) -> HandPose:
 
 
 def _ease(share: float) -> float:
-    """Return 0..1 for 0..1, starting and ending at rest (K. Perlin's smootherstep)."""
+    """Map 0 to 1 onto 0 to 1 with zero velocity at both ends (K. Perlin's smootherstep)."""
     share = min(max(share, 0.0), 1.0)
     return share**3 * (share * (6.0 * share - 15.0) + 10.0)

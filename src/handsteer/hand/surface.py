@@ -1,7 +1,7 @@
 """The hand's skin: a smooth union of round cones that follows the skeleton.
 
-A round cone is a ball that changes its size while it moves along a line. The smooth union of cones at distances d_i
-is ``-k log(sum(exp(-d_i / k)))`` (I. Quilez, *Smooth minimum*), which also says how much each of them counts.
+A round cone is swept by a ball whose radius changes along a line. The smooth union of cones at distances d_i is ``-k
+log(sum(exp(-d_i / k)))`` (I. Quilez, *Smooth minimum*), which also gives the weight of each.
 """
 
 from dataclasses import dataclass, replace
@@ -16,15 +16,15 @@ from handsteer.hand.placement import Placement
 Float = NDArray[np.float32]
 
 BLEND_M = 0.0020
-"""k of the smooth union: how far neighbouring cones melt into each other, metres."""
+"""k of the smooth union, in metres: how far adjacent cones blend."""
 
 
 MARGIN_M = 0.006
-"""What the smooth union adds to the cones at most, metres."""
+"""Maximum that the smooth union adds to the cones, in metres."""
 
 
 class Material(IntEnum):
-    """What a cone is made of."""
+    """The material of a cone."""
 
     SKIN = 0
     FLUSHED = 1
@@ -51,11 +51,11 @@ class Cones:
     material: NDArray[np.int64]
 
     def placed(self, placement: Placement) -> "Cones":
-        """Return these cones of the hand frame in the camera frame."""
+        """Transform these cones from the hand frame to the camera frame."""
         return replace(self, start=placement.apply(self.start), end=placement.apply(self.end))
 
     def depths(self) -> tuple[float, float]:
-        """Return bounds on how far off the nearest and the farthest point of them is, metres."""
+        """Return bounds on the depths of their nearest and farthest points, in metres."""
         axis = self.end - self.start
         square = np.maximum(np.sum(axis**2, axis=1), 1e-12)
         along = np.clip(-np.sum(self.start * axis, axis=1) / square, 0.0, 1.0)
@@ -65,7 +65,7 @@ class Cones:
         return max(float(near.min()), 0.0), float(far.max())
 
     def only(self, which: NDArray[np.bool_]) -> "Cones":
-        """Return some of the cones."""
+        """Return the selected cones."""
         radii = self.start_radius[which], self.end_radius[which]
         return Cones(self.start[which], self.end[which], *radii, self.material[which])
 
@@ -77,15 +77,15 @@ _RADII_M = (
     (0.0098, 0.0080, 0.0071, 0.0060),
     (0.0088, 0.0069, 0.0061, 0.0052),
 )
-"""Thumb to little finger: radii at the base, at both joints and at the tip, metres."""
+"""Radii at the base, at both joints and at the tip, in metres, from thumb to little finger."""
 
 _PALM = (
-    # (start, end, start radius, end radius) in the hand frame, metres: wrist to the four knuckles,
+    # (start, end, start radius, end radius) in the hand frame, in metres: wrist to the four knuckles,
     ((0.0130, 0.004, 0.0), (0.0250, 0.0850, -0.001), 0.0140, 0.0098),
     ((0.0050, 0.004, 0.0), (0.0040, 0.0860, -0.002), 0.0140, 0.0102),
     ((-0.0050, 0.004, 0.0), (-0.0160, 0.0790, -0.001), 0.0140, 0.0100),
     ((-0.0130, 0.004, 0.0), (-0.0325, 0.0685, 0.003), 0.0140, 0.0096),
-    # the ball of the little finger, the pads under the fingers, the hollow of the hand.
+    # the ball of the little finger, the pads below the fingers, the hollow of the hand.
     ((-0.0170, 0.018, 0.005), (-0.0280, 0.0560, 0.004), 0.0125, 0.0105),
     ((0.0235, 0.0890, 0.0022), (-0.0305, 0.0720, 0.0045), 0.0088, 0.0083),
     ((0.0215, 0.0800, 0.0014), (-0.0285, 0.0655, 0.0035), 0.0098, 0.0094),
@@ -139,7 +139,7 @@ def _add_digit(builder: _Builder, joints: Array, axes: Array, radii: tuple[float
     ends = (joints[0], joints[1], joints[2], tip)
     for bone in range(3):
         material = Material.FLUSHED if bone == 2 else Material.SKIN
-        # Cones that stop short of the joints leave room there for what the union adds.
+        # Cones end before the joints, to compensate for what the union adds there.
         inset = 0.14 * (ends[bone + 1] - ends[bone])
         builder.add(ends[bone] + inset, ends[bone + 1] - inset * (bone < 2), (radii[bone], radii[bone + 1]), material)
     _add_knuckles(builder, ends, axes, radii, digit)
@@ -155,7 +155,7 @@ def _add_digit(builder: _Builder, joints: Array, axes: Array, radii: tuple[float
 def _add_knuckles(
     builder: _Builder, ends: tuple[Array, ...], axes: Array, radii: tuple[float, ...], digit: int
 ) -> None:
-    """Add the bumps on the back of the joints, which stand out more the more a joint is bent."""
+    """Add bumps on the back of the joints, which protrude more the more a joint is bent."""
     before = np.array([0.0, 0.0, 1.0]) if digit else axes[0][:, 2]
     for joint in range(2):
         after = axes[joint][:, 2]

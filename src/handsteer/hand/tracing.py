@@ -1,4 +1,4 @@
-"""Finding where rays meet the skin: sphere tracing through the smooth union of round cones, by numpy."""
+"""Intersects rays with the skin: sphere tracing of the smooth union of round cones, in NumPy."""
 
 from dataclasses import dataclass
 
@@ -11,9 +11,9 @@ from handsteer.hand.surface import BLEND_M, MARGIN_M, Cones, Float
 
 _MOST_CELLS, _CELLS_A_PIXEL = 14000, 0.11
 BLOCK = 4
-"""Cells a side of the blocks that are traced first."""
+"""Cells per side of the blocks that are traced first."""
 _LEAST_CELL_PX = 1.0
-_NEAREST_M = 0.05  # what is nearer is seen as if it were this far
+_NEAREST_M = 0.05  # minimum depth for the projection
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class Grid:
 
     @classmethod
     def around(cls, cones: Cones, camera: Pinhole) -> "Grid | None":
-        """Return the grid around what the camera sees of the cones, or None when that is nothing."""
+        """Return the grid around the projection of the cones; None if they are out of view."""
         pixels, reach = _seen(cones, camera)
         size = np.array([camera.width, camera.height])
         low = np.clip(np.floor((pixels - reach[..., None]).min(axis=(0, 1))), 0, size)
@@ -49,12 +49,12 @@ class Grid:
         return cls(int(low[0]), int(low[1]), int(blocks[0]) * BLOCK, int(blocks[1]) * BLOCK, cell)
 
     def directions(self, columns: ArrayLike, rows: ArrayLike, camera: Pinhole) -> Float:
-        """Return (3, n) unit vectors to the (n,) places ``columns`` and ``rows``, in cells."""
+        """Return (3, n) unit vectors to the (n,) positions ``columns`` and ``rows``, in cells."""
         x, y = np.asarray(columns) * self.cell_px + self.left, np.asarray(rows) * self.cell_px + self.top
         return camera.rays(x, y)
 
     def cones_between(self, first_row: int, last_row: int, cones: Cones, camera: Pinhole) -> NDArray[np.bool_]:
-        """Return (M,) which of the cones may be seen from one row of cells to another."""
+        """Return (M,) flags of the cones that may be visible between two rows of cells."""
         pixels, reach = _seen(cones, camera)
         rows = (pixels[..., 1] - self.top) / self.cell_px
         reach = reach / self.cell_px + 1.5
@@ -63,7 +63,7 @@ class Grid:
 
 
 def _seen(cones: Cones, camera: Pinhole) -> tuple[Array, Array]:
-    """Return (M, 2, 2) pixels of the ends of the cones and (M, 2) their radii in pixels."""
+    """Return the (M, 2, 2) pixels of the cones' ends and their (M, 2) radii in pixels."""
     ends = np.stack([cones.start, cones.end], axis=1)
     ends[..., 2] = np.maximum(ends[..., 2], _NEAREST_M)
     radii = np.stack([cones.start_radius, cones.end_radius], axis=1) + MARGIN_M
@@ -71,18 +71,18 @@ def _seen(cones: Cones, camera: Pinhole) -> tuple[Array, Array]:
 
 
 _STEPS = 16
-_SLOWEST, _LEAP_M = 0.4, np.float32(0.004)  # bounds on the longer steps: least fall a metre, metres added
+_SLOWEST, _LEAP_M = 0.4, np.float32(0.004)  # bounds on the longer steps: least fall per metre, metres added
 
 
 class Field:
-    """The distance to the skin, for many points at once; all in the frame of the cones.
+    """The distance to the skin for many points at once, in the frame of the cones.
 
-    Arrays are (M cones, n points), so that every sum over the cones runs along the points.
+    Arrays are (M cones, n points), so that sums over the cones run along the points.
     """
 
     def __init__(self, cones: Cones) -> None:
         axis = cones.end - cones.start
-        # Squares of distances are taken about the hand, so that single precision is enough.
+        # Squared distances are relative to the hand, so that single precision suffices.
         middle = cones.start.mean(axis=0)
         self._middle: Float = middle[:, None].astype(np.float32)
         first = cones.start - middle
@@ -107,7 +107,7 @@ class Field:
         return summed
 
     def surface(self, points: Float) -> tuple[Float, Float]:
-        """Return (3, n) outward unit normals, and (M, n) how much each cone counts, at (3, n) points."""
+        """Return (3, n) outward unit normals, and (M, n) weights of the cones, at (3, n) points."""
         points = points - self._middle
         distances, along, centre_distances = self._each(points)
         weights = np.exp((distances.min(axis=0) - distances) * np.float32(1.0 / BLEND_M))
@@ -118,7 +118,7 @@ class Field:
         return normals, weights
 
     def _each(self, points: Float) -> tuple[Float, Float, Float]:
-        """Return (M, n) distances to each cone, positions along it (0..1), distances to its axis."""
+        """Return (M, n) distances to each cone, positions along it (0 to 1), and distances to its axis."""
         along = self._axis @ points
         along -= self._along
         position = along * self._inverse
@@ -141,12 +141,12 @@ class Field:
 
 @dataclass(frozen=True)
 class Hits:
-    """Where n rays meet the skin, or pass it closest.
+    """The points at which n rays hit the skin, or pass it closest.
 
     Attributes:
         points: (3, n) metres.
-        travelled: (n,) how far along the rays, metres.
-        clearance: (n,) signed distance of the ray to the skin there, metres; about 0 where it hits.
+        travelled: (n,) distances along the rays, metres.
+        clearance: (n,) signed distances to the skin there, metres; about 0 for a hit.
     """
 
     points: Float
@@ -157,19 +157,19 @@ class Hits:
 def trace(
     field: Field, directions: Float, start: Float, *, end: float, tolerance: float, width_rad: float = 0.0
 ) -> Hits:
-    """Follow rays from the camera to the skin.
+    """Trace rays from the camera to the skin.
 
-    A step is the distance (J. C. Hart, *Sphere tracing*, 1996), and longer where a ray grazes: as far as the skin
-    would be if the distance went on falling as it did in the last step. A step too far is taken back by the next.
+    A step is the distance (J. C. Hart, *Sphere tracing*, 1996), and longer for grazing rays: as far as the skin would
+    be if the distance decreased further as in the last step. A step too far is corrected by the next.
 
     Args:
         field: The skin.
         directions: (3, n) unit vectors.
-        start: (n,) where to start on each ray, metres; outside the skin.
-        end: How far along a ray to give up, metres.
-        tolerance: How near counts as a hit, metres.
-        width_rad: Radius of a ray, growing with its distance, that must not touch the skin: then all rays within it
-            can go on from there.
+        start: (n,) start on each ray, metres; outside the skin.
+        end: Maximum distance along a ray, metres.
+        tolerance: Distance that counts as a hit, metres.
+        width_rad: Radius of a ray, growing with its distance, that must not touch the skin, so that all rays within it
+            can continue from there.
     """
     here, best, ahead = start, start.copy(), directions
     clearance = np.full(len(best), np.inf, np.float32)

@@ -1,8 +1,8 @@
-"""From a frame to the 21 landmarks of a hand.
+"""Finds the 21 landmarks of hands in a frame.
 
-``protocol`` says what every landmarker offers; ``mediapipe`` is the real one, ``recorded`` replays.
+``hand`` defines the interface of landmarkers; ``mediapipe`` implements it, ``recorded`` replays hands.
 
-Inside the real one: ``search`` says where to look for new hands, ``palm`` finds palms in the whole frame, ``roi``
-turns a palm (or the landmarks of the last frame) into the rotated square to look at, ``hand_landmark`` finds the
-landmarks in that square, ``tflite`` runs the model files and ``models`` knows where those come from.
+``mediapipe`` uses ``search``, which decides where to look for new hands, ``stillness``, which decides when, ``palm``,
+which detects palms in the whole frame, and ``roi``, which computes the region of a hand from its palm or its last
+landmarks. ``tflite`` runs the model files, and ``models`` locates and downloads them.
 """

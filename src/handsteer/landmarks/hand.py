@@ -1,4 +1,4 @@
-"""One hand as every landmarker reports it, and what every landmarker offers."""
+"""A detected hand, and the interface of landmarkers."""
 
 from dataclasses import dataclass
 from math import inf
@@ -25,12 +25,12 @@ class Hand:
 
     Attributes:
         points: (21, 3) float32 landmarks, image-normalised: x / width, y / height, and depth z (0 at the wrist,
-            towards the camera negative) in the scale of x. Order: wrist, then thumb, index, middle, ring and little
+            negative towards the camera) in the scale of x. Order: wrist, then thumb, index, middle, ring and little
             finger, each from its base to its tip.
-        world: (21, 3) float32 landmarks in metres about the hand's centre, axes as ``points``.
-        handedness: Which hand of the person it is (the frame is not mirrored).
-        handedness_score: 0.5 to 1, how sure that is.
-        presence: 0 to 1, how sure it is that there is a hand.
+        world: (21, 3) float32 landmarks in metres relative to the hand's centre, with the axes of ``points``.
+        handedness: The person's hand (the frame is not mirrored).
+        handedness_score: 0.5 to 1.
+        presence: Likelihood that there is a hand, 0 to 1.
         image_size: Width and height of the frame in pixels.
     """
 
@@ -49,28 +49,28 @@ class Hand:
 
     @property
     def longer_side_px(self) -> float:
-        """The longer side of the box about the landmarks, in pixels."""
+        """The longer side of the landmarks' box, in pixels."""
         return float(np.ptp(self.pixels[:, :2], axis=0).max())
 
     @property
     def box_px(self) -> tuple[int, int, int, int]:
-        """The box about the landmarks: left, top, right and bottom in pixels; it may reach beyond the frame."""
+        """The landmarks' box: left, top, right and bottom in pixels; it may extend beyond the frame."""
         (left, top), (right, bottom) = self.pixels[:, :2].min(axis=0), self.pixels[:, :2].max(axis=0)
         return int(left), int(top), int(right) + 1, int(bottom) + 1
 
 
 class Landmarker(Protocol):
-    """Finds hands in frames; follows them from one frame to the next."""
+    """Detects hands in frames, and tracks them from frame to frame."""
 
     def detect(self, image: NDArray[np.uint8], *, search: bool = True, dt_s: float = inf) -> list[Hand]:
-        """Return the hands in ``image``; an empty list when there is none.
+        """Return the hands in ``image``; may be empty.
 
-        Hands that are already followed come first and keep their order; new ones after them, the surest first.
+        Tracked hands come first and keep their order, then new ones by descending score.
 
         Args:
             image: (height, width, 3) uint8, BGR, not mirrored.
-            search: Whether to look for further hands while one is followed already, which takes time.
-            dt_s: Seconds since the last frame, >= 0, by which less can be looked at where nothing changes.
+            search: Whether to search for further hands while one is tracked, which takes time.
+            dt_s: Seconds since the last frame, >= 0, used to process fewer frames while nothing changes.
 
         Raises:
             FrameError: The image has another shape or type.
@@ -78,9 +78,9 @@ class Landmarker(Protocol):
         ...
 
     def follow_only(self, hand: Hand) -> None:
-        """Forget all hands of the last frame but ``hand``, which is one of them: the others take time."""
+        """Stop tracking all hands of the last frame except ``hand``, to save time."""
         ...
 
     def reset(self) -> None:
-        """Forget the hands of the last frame."""
+        """Stop tracking all hands."""
         ...

@@ -1,10 +1,10 @@
 """MediaPipe's hand landmark models, run without MediaPipe.
 
-The way from frame to landmarks is that of MediaPipe 0.10.21's graph ``hand_landmark_tracking_cpu``, the one behind
-``mp.solutions.hands``: while enough hands are followed, only the landmark model runs, on the region that the last
-landmarks give; otherwise palms are looked for in the whole frame first. Beyond that, a hand that is new is looked at
-twice, unless the configuration says otherwise: the second time in the region that its own landmarks give, as a palm
-says less well where a hand is. And hands are looked for in more ways than by palms in the frame, see ``search``.
+The processing follows MediaPipe 0.10.21's graph ``hand_landmark_tracking_cpu``, used by ``mp.solutions.hands``: while
+enough hands are tracked, only the landmark model runs, on the region from the last landmarks; otherwise palms are
+detected in the whole frame first. In addition, unless configured otherwise, a new hand is processed twice, the second
+time in the region from its own landmarks, because a palm locates a hand less precisely; and hands are searched for in
+further ways than by palms in the frame, see ``search``.
 """
 
 from dataclasses import dataclass
@@ -27,20 +27,20 @@ from handsteer.landmarks.stillness import Pace, Stillness, cells_of_frame, cells
 from handsteer.landmarks.tflite import PictureModel
 
 _DEPTH_SCALE: Final = 0.4
-"""The model's depth is this much larger than its x and y."""
+"""Factor of the model's depth relative to its x and y."""
 
 Array = NDArray[np.floating]
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """What the model sees in a region.
+    """The model's output for a region.
 
     Attributes:
         pixels: (21, 3) x and y in pixels of the frame, z in the scale of x.
-        world: (21, 3) in metres about the hand's centre, axes as ``pixels``.
-        rightness: 0 to 1, how much it looks like a person's left (0) or right (1) hand in an unmirrored frame.
-        presence: 0 to 1, how sure it is that there is a hand.
+        world: (21, 3) in metres relative to the hand's centre, with the axes of ``pixels``.
+        rightness: Likelihood, 0 to 1, of a person's right hand, rather than the left, in an unmirrored frame.
+        presence: Likelihood that there is a hand, 0 to 1.
     """
 
     pixels: Array
@@ -57,14 +57,14 @@ class HandLandmarkModel:
         threads: CPU threads to run it on.
 
     Raises:
-        ModelCorrupt: The file is no model that can be run.
+        ModelCorrupt: The file is not a model that can be run.
     """
 
     def __init__(self, path: Path, threads: int) -> None:
         self._model = PictureModel(path, threads)
 
     def estimate(self, image: NDArray[np.uint8], roi: Roi) -> Estimate:
-        """Return what is seen in the region ``roi`` of ``image``, (height, width, 3) uint8 BGR."""
+        """Return the output for the region ``roi`` of ``image``, (height, width, 3) uint8 BGR."""
         side = self._model.side
         outputs = self._model.run(roi.crop(image, side, cv2.BORDER_REPLICATE))
         picture, presence, rightness, metric = outputs
@@ -73,7 +73,7 @@ class HandLandmarkModel:
         return Estimate(
             pixels=np.column_stack([roi.to_frame(points[:, :2]), points[:, 2] * (roi.side / _DEPTH_SCALE)]),
             world=np.column_stack([world[:, :2] @ roi.axes, world[:, 2]]),
-            # MediaPipe calls this "Left", because it takes every picture for mirrored.
+            # MediaPipe calls this "Left", because it assumes mirrored pictures.
             rightness=float(rightness[0]),
             presence=float(presence[0]),
         )
@@ -82,29 +82,29 @@ class HandLandmarkModel:
 _SAME_HAND_OVERLAP: Final = 0.5
 _PART: Final = 0.7
 _SECOND_LOOK: Final = 1.15
-"""How much larger the region of the second look is than MediaPipe's: of 57 misread hands of people it reads 12 more."""
+"""Factor on MediaPipe's region in the second pass: of 57 misread hands of people, it corrects 12 more."""
 _SEARCH: Final = Pace(change=6, settle_s=0.12, period_s=0.2)
-"""How often to search without a hand: by the end of the settling, each of the four main ways had its frame at 30 Hz."""
+"""How often to search without a hand: when settled, each of the four main ways has had its frame at 30 Hz."""
 _SEARCH_BESIDE_A_HAND: Final = Pace(change=6, settle_s=0.2, period_s=1.0, least_s=0.2)
 _FOLLOW: Final = Pace(change=3, settle_s=0.08, period_s=0.1)
-"""How often to look at hands that are followed: below three levels, landmarks stray by 0.03 of the hand at most."""
+"""How often to process tracked hands: below three levels, landmarks deviate by at most 0.03 of the hand."""
 _MAX_SIDE: Final = 32766
-"""OpenCV samples no picture that is larger."""
+"""Maximum side of a picture that OpenCV can sample, in pixels."""
 
 
 class MediaPipeLandmarker:
-    """Finds hands in frames, and follows them. Not for several threads at once.
+    """Detects and tracks hands in frames; not thread-safe.
 
-    Hands that are already followed come first, in the order of the frame before; new ones after them, the surest
-    first. So two hands never swap places from frame to frame.
+    Tracked hands come first, in the order of the previous frame, then new ones by descending score, so hands never swap
+    places between frames.
 
     Args:
         config: Model, number of hands, thresholds, threads.
-        models: Folder of the model files that are fetched; by default :func:`handsteer.landmarks.models.models_dir`.
+        models: Folder of the downloaded model files; :func:`handsteer.landmarks.models.models_dir` by default.
 
     Raises:
-        ModelMissing: A model file is not there.
-        ModelCorrupt: A model file is not the one that was expected.
+        ModelMissing: A model file is missing.
+        ModelCorrupt: A model file has unexpected content.
     """
 
     def __init__(self, config: LandmarksConfig, models: Path | None = None) -> None:
@@ -122,17 +122,16 @@ class MediaPipeLandmarker:
         self._image_size = (0, 0)
 
     def detect(self, image: NDArray[np.uint8], *, search: bool = True, dt_s: float = inf) -> list[Hand]:
-        """Return the hands in ``image``; an empty list when there is none.
+        """Return the hands in ``image``; may be empty.
 
-        A frame of another size than the one before is taken as the start of another stream: nothing is followed
-        into it. A frame that is refused changes nothing.
+        A frame of another size starts a new stream: no hand is tracked into it. A rejected frame changes nothing.
 
         Args:
-            image: (height, width, 3) uint8, BGR, not mirrored; 1 to 32766 pixels a side, of any memory layout. Grey
-                and BGRA pictures are refused rather than guessed at.
-            search: Whether to look for further hands while one is followed already.
-            dt_s: Seconds since the last frame, >= 0. By it less is looked at while the picture does not change; without
-                it, each frame is looked at.
+            image: (height, width, 3) uint8, BGR, not mirrored; 1 to 32766 pixels a side, of any memory layout. Grey and
+                BGRA pictures are rejected.
+            search: Whether to search for further hands while one is tracked.
+            dt_s: Seconds since the last frame, >= 0, used to process fewer frames while the picture does not change;
+                without it, every frame is processed.
 
         Raises:
             FrameError: The image has another shape or type.
@@ -161,13 +160,13 @@ class MediaPipeLandmarker:
         return list(self._hands)
 
     def follow_only(self, hand: Hand) -> None:
-        """Forget all hands of the last frame but ``hand``, which is one of them."""
+        """Stop tracking all hands of the last frame except ``hand``."""
         kept = [index for index, each in enumerate(self._hands) if each is hand]
         self._hands = [self._hands[index] for index in kept]
         self._followed = [self._followed[index] for index in kept]
 
     def reset(self) -> None:
-        """Forget the hands of the last frame."""
+        """Stop tracking all hands."""
         self._followed = []
         self._hands = []
         self._search.reset()
@@ -175,7 +174,7 @@ class MediaPipeLandmarker:
             stillness.reset()
 
     def _wants_search(self, image: NDArray[np.uint8], further: bool) -> bool:
-        """Return whether to look for hands, with one that is followed only if ``further`` ones are asked for."""
+        """Return whether to search for hands; while one is tracked, only if ``further`` ones are requested."""
         searched, pace = self._searched, _SEARCH
         if self._followed:
             if not further or len(self._followed) >= self._config.max_hands:
@@ -189,18 +188,18 @@ class MediaPipeLandmarker:
         return True
 
     def _followed_on(self, image: NDArray[np.uint8]) -> list[Estimate]:
-        """Return the hands that are seen where they were; if none is, those that are found."""
+        """Return the tracked hands that are still visible; if none is, newly found ones."""
         present = self._present(image, self._followed)
         if present or not self._config.wide_search:
             return present
-        # A hand that has jumped is looked for at once: it may show Stop.
+        # Search immediately for a hand that has jumped: it may show Stop.
         self._search.begin_again()
         return self._new_and_followed(image, [])
 
     def _new_and_followed(self, image: NDArray[np.uint8], followed: list[Roi]) -> list[Estimate]:
-        """Return the hands that are seen where they were, and those that are found."""
+        """Return the tracked hands that are still visible, and newly found ones."""
         if not followed:
-            # One of two hands may be found only in the next frame, in which it is looked for in another way.
+            # One of two hands may be found only in the next frame, which is searched in another way.
             self._searched_beside.reset()
         for places in self._search.places(image, beside_a_hand=bool(followed)):
             regions = _distinct([*followed, *places.regions])[: self._config.max_hands]
@@ -210,7 +209,7 @@ class MediaPipeLandmarker:
         return []
 
     def _present(self, image: NDArray[np.uint8], regions: list[Roi], min_presence: float = 0.0) -> list[Estimate]:
-        """Return what is seen in the regions that show a hand; of one that is new, at the second look."""
+        """Return the estimates of the regions that show a hand; for a new hand, those of the second pass."""
         present = []
         for region in regions:
             estimate = self._landmarks.estimate(image, region)
@@ -226,9 +225,9 @@ class MediaPipeLandmarker:
 
 
 def _distinct(regions: list[Roi]) -> list[Roi]:
-    """Return ``regions`` without those that look at the same hand as one before them.
+    """Return ``regions`` without those of the same hand as an earlier one.
 
-    MediaPipe keeps the last of such regions instead, which is the palm that is less sure.
+    MediaPipe instead keeps the last of such regions, which is the palm with the lower score.
     """
     distinct: list[Roi] = []
     for region in regions:
@@ -238,9 +237,9 @@ def _distinct(regions: list[Roi]) -> list[Roi]:
 
 
 def _of_different_hands(estimates: list[Estimate]) -> tuple[list[Estimate], list[Roi]]:
-    """Return ``estimates``, and where each hand is, without hands that one before has, and parts taken for a hand.
+    """Return ``estimates`` and their regions, without duplicates of earlier hands and parts mistaken for a hand.
 
-    Two regions may lead to the same hand, and some fingers of a hand to a smaller one within it.
+    Two regions may lead to the same hand, and some fingers of a hand to a smaller hand within it.
     """
     whole = [estimate for estimate in estimates if not any(_is_part(estimate, other) for other in estimates)]
     regions = [from_landmarks(estimate.pixels[:, :2]) for estimate in whole]
@@ -270,7 +269,7 @@ def _hand(estimate: Estimate, width: int, height: int) -> Hand:
 
 
 def _check(image: object) -> None:
-    """Raise FrameError unless ``image`` is a picture that can be used."""
+    """Raise FrameError unless ``image`` is a valid picture."""
     wanted = "expected a (height, width, 3) uint8 BGR image"
     if not isinstance(image, np.ndarray):
         raise FrameError(f"{wanted}, got {type(image).__name__}")

@@ -1,8 +1,8 @@
-"""The landmark model files: which they are, where they are kept, how they are fetched.
+"""The landmark model files: their names, location and download.
 
-They are MediaPipe's (Apache-2.0) and are in no package of their own, so they are taken, with their licence, out of
-the ``mediapipe`` wheel on PyPI; MediaPipe itself is not installed. ``pip`` downloads the wheel, because it knows the
-user's package index, proxies and certificates. What was made of one of them is small, and part of handsteer.
+They are MediaPipe's (Apache-2.0). No package of their own exists, so they are extracted, with their licence, from the
+``mediapipe`` wheel on PyPI; MediaPipe itself is not installed. ``pip`` downloads the wheel, because it knows the user's
+package index, proxies and certificates. A small model derived from one of them is part of handsteer.
 """
 
 import hashlib
@@ -28,19 +28,19 @@ MODELS: Final = {
     "hand_landmark_full.tflite": "11c272b891e1a99ab034208e23937a8008388cf11ed2a9d776ed3d01d0ba00e3",
     "hand_landmark_lite.tflite": "048edd3645c9bf7397d19a9f6e3a42957d6e414c9bea6598030a2e9b624156e6",
 }
-"""SHA-256 of each model file that is fetched."""
+"""SHA-256 of each downloaded model file."""
 
 SHIPPED: Final = {
     "hand_landmark_fast.tflite": "383471f879c29961bb5c2b53a3cb4fc5cf84abe41751c612700b288ed815e1bd",
 }
-"""SHA-256 of each model file that is part of handsteer; ``make landmark-model`` makes it."""
+"""SHA-256 of each model file that is part of handsteer, as built by ``make landmark-model``."""
 
 Progress = Callable[[int, int], None]
-"""Called now and then with the bytes downloaded so far and the bytes to download in all."""
+"""Called repeatedly with the number of downloaded bytes and of all bytes."""
 
 _PACKAGE: Final = "mediapipe==0.10.21"
 _WHEEL_BYTES: Final = 35_622_638
-# Which wheel does not matter, as the models are the same in each; this is the smallest.
+# The models are the same in each wheel; this one is the smallest.
 _WHEEL: Final = ("--only-binary=:all:", "--python-version=3.11", "--platform=manylinux_2_28_x86_64")
 _LICENCE: Final = "mediapipe-0.10.21.dist-info/LICENSE"
 _MEMBERS: Final = {
@@ -60,15 +60,15 @@ def models_dir() -> Path:
 
 
 def find_model(name: str, directory: Path | None = None) -> Path:
-    """Return the path of the model file ``name``, after checking its content.
+    """Return the path of the model file ``name``, after verifying its content.
 
     Args:
         name: A key of :data:`MODELS` or :data:`SHIPPED`.
-        directory: Where to look; by default :func:`models_dir`, and handsteer itself for what is part of it.
+        directory: Folder to search; by default :func:`models_dir`, or handsteer's own for shipped models.
 
     Raises:
-        ModelMissing: It is not there, or cannot be read.
-        ModelCorrupt: Its content is not what it should be.
+        ModelMissing: It does not exist, or cannot be read.
+        ModelCorrupt: Its content is unexpected.
     """
     is_shipped = name in SHIPPED
     path = (directory or (Path(__file__).parent if is_shipped else models_dir())) / name
@@ -82,17 +82,17 @@ def find_model(name: str, directory: Path | None = None) -> Path:
 
 
 def find_pair(model: str, directory: Path | None = None) -> tuple[Path, Path]:
-    """Return the paths of the palm and the hand landmark model that go together.
+    """Return the paths of the palm model and the hand landmark model of a configuration.
 
     Args:
         model: ``fast``, ``full`` or ``lite``, as ``landmarks.model`` of the configuration.
-        directory: Where to look for those that are fetched; by default :func:`models_dir`.
+        directory: Folder of the downloaded models; by default :func:`models_dir`.
 
     Raises:
-        ModelMissing: One is not there, or cannot be read.
-        ModelCorrupt: The content of one is not what it should be.
+        ModelMissing: One does not exist, or cannot be read.
+        ModelCorrupt: The content of one is unexpected.
     """
-    palm = "full" if model == "fast" else model  # The palm model gains little by integers.
+    palm = "full" if model == "fast" else model  # the palm model gains little from 8-bit integers
     landmark = f"hand_landmark_{model}.tflite"
     return (
         find_model(f"palm_detection_{palm}.tflite", directory),
@@ -101,15 +101,15 @@ def find_pair(model: str, directory: Path | None = None) -> tuple[Path, Path]:
 
 
 def fetch_models(progress: Progress) -> list[Path]:
-    """Return the paths of all model files in :func:`models_dir`, after downloading those that are not there.
+    """Return the paths of all model files in :func:`models_dir`, after downloading missing ones.
 
-    Files that are already right are kept, and without any to fetch no network is needed. A file appears only whole
-    and checked, so this may be broken off, repeated, or run by several processes at once.
+    Valid files are kept, and no network is needed if none is missing. A file appears only complete and verified, so
+    this may be interrupted, repeated, or run by several processes at once.
 
     Raises:
         ModelMissing: They cannot be downloaded.
-        ModelCorrupt: What was downloaded is not what was expected.
-        ModelError: The folder cannot be written to.
+        ModelCorrupt: The download has unexpected content.
+        ModelError: The folder is not writable.
     """
     folder = models_dir()
     missing = [name for name in MODELS if not _is_there(name, folder)]
@@ -136,9 +136,9 @@ def _download_wheel(folder: Path, progress: Progress) -> Path:
     """Download the wheel with pip into ``folder`` and return its path."""
     command = [*_pip(), "download", "--no-deps", *_WHEEL, "--dest", str(folder), _PACKAGE]
     command += ["--quiet", "--no-input", "--disable-pip-version-check"]
-    # pip keeps its partial file in the temporary folder: its size is the progress, whatever the version of pip.
+    # pip keeps its partial file in the temporary folder: its size is the progress, with any version of pip.
     environment = os.environ | dict.fromkeys(("TMPDIR", "TEMP", "TMP"), str(folder))
-    # Go on with a broken download. An option would stop pip before 25.1, which does not know it.
+    # Resume a broken download. As an option it would fail with pip before 25.1, which does not know it.
     environment.setdefault("PIP_RESUME_RETRIES", "5")
     log = folder / "pip.log"
     with log.open("wb") as output, subprocess.Popen(command, env=environment, stdout=output, stderr=output) as pip:
@@ -160,7 +160,7 @@ def _download_wheel(folder: Path, progress: Progress) -> Path:
 
 
 def _pip() -> list[str]:
-    """Return the command that starts pip: this environment's own, or else one that uv brings."""
+    """Return the command that starts pip: this environment's, or else uv's."""
     if importlib.util.find_spec("pip"):
         return [sys.executable, "-P", "-m", "pip"]
     if uv := shutil.which("uv"):
@@ -171,20 +171,20 @@ def _pip() -> list[str]:
 
 
 def _wheel_bytes(folder: Path) -> int:
-    with suppress(OSError):  # pip moves its file about
+    with suppress(OSError):  # pip moves its file
         return max((path.stat().st_size for path in folder.rglob("*.whl")), default=0)
     return 0
 
 
 def _last_error(log: str) -> str:
-    """Return the line of pip's output that says most: the first error, or else the last line."""
+    """Return the most informative line of pip's output: the first error, or else the last line."""
     lines = [line.strip() for line in log.splitlines() if line.strip()]
     errors = [line.removeprefix("ERROR: ") for line in lines if line.startswith("ERROR: ")]
     return next(iter(errors or lines[-1:]), "pip failed without a word")
 
 
 def _extract(wheel: Path, names: list[str], folder: Path) -> None:
-    """Write the licence and the model files ``names`` out of ``wheel`` into ``folder``, each at once."""
+    """Extract the licence and the model files ``names`` from ``wheel`` into ``folder``, each atomically."""
     try:
         with zipfile.ZipFile(wheel) as archive:
             contents = {name: archive.read(_MEMBERS[name]) for name in names}
@@ -203,7 +203,7 @@ def _check(name: str, content: bytes, message: str) -> None:
 
 
 def _write(path: Path, content: bytes) -> None:
-    """Write a file so that it is never seen half written."""
+    """Write a file atomically."""
     with tempfile.NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}.", delete=False) as part:
         try:
             part.write(content)

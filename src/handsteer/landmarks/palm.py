@@ -1,7 +1,7 @@
-"""Finds palms in a whole frame: MediaPipe's ``palm_detection`` models.
+"""Detects palms in a whole frame, with MediaPipe's ``palm_detection`` models.
 
-Such a model is a single-shot detector: for each of 2016 anchors (places in the picture) it gives a score, a box and
-seven keypoints. Anchors, decoding and suppression are as in MediaPipe 0.10.21's graph ``palm_detection_cpu``.
+The model is a single-shot detector: for each of 2016 anchors (positions in the picture) it gives a score, a box and
+seven keypoints. Anchors, decoding and suppression follow MediaPipe 0.10.21's graph ``palm_detection_cpu``.
 """
 
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ from handsteer.landmarks.roi import Roi, from_palm, whole_frame
 from handsteer.landmarks.tflite import PictureModel
 
 _ANCHOR_GRIDS: Final = ((8, 2), (16, 6))
-"""Side of a grid's cells in pixels of the model's picture, and how many anchors share a cell's centre."""
+"""Side of a grid's cells in pixels of the model's input, and number of anchors at each cell's centre."""
 
 _WRIST: Final = 0
 _MIDDLE_BASE: Final = 2
@@ -42,7 +42,7 @@ class Palm:
 
     @property
     def roi(self) -> Roi:
-        """The region in which to look for the landmarks of its hand."""
+        """The region of its hand for the landmark model."""
         return from_palm(self.corners, self.keypoints[_WRIST], self.keypoints[_MIDDLE_BASE])
 
 
@@ -52,10 +52,10 @@ class PalmDetector:
     Args:
         path: The model file.
         threads: CPU threads to run it on.
-        min_score: Score from which a palm counts, 0 to 1.
+        min_score: Minimum score of a palm, 0 to 1.
 
     Raises:
-        ModelCorrupt: The file is no model that can be run.
+        ModelCorrupt: The file is not a model that can be run.
     """
 
     def __init__(self, path: Path, threads: int, min_score: float) -> None:
@@ -64,13 +64,9 @@ class PalmDetector:
         self._anchors = _anchors(self._model.side)
 
     def detect(self, image: NDArray[np.uint8], limit: int, *, widened: float = 1.0) -> list[Palm]:
-        """Return at most ``limit`` palms in ``image``, (height, width, 3) uint8 BGR; the surest first.
+        """Return at most ``limit`` palms in ``image``, (height, width, 3) uint8 BGR, by descending score.
 
-        Args:
-            image: The frame.
-            limit: How many palms are wanted.
-            widened: The frame is looked at as if it had a black border that makes it so many times as large: hands look
-                smaller then.
+        ``widened`` enlarges the frame by this factor with a black border, so that hands appear smaller.
         """
         height, width = image.shape[:2]
         square = whole_frame(width, height, widened)
@@ -116,9 +112,9 @@ def _merged(points: Array, scores: Array, limit: int) -> list[tuple[Array, float
     This is MediaPipe's weighted non-maximum suppression. A candidate without an area overlaps nothing and is dropped.
 
     Args:
-        points: (n, 9, 2) boxes and keypoints, the surest first.
+        points: (n, 9, 2) boxes and keypoints, by descending score.
         scores: (n,).
-        limit: How many are wanted.
+        limit: Maximum number of results.
 
     Returns:
         At most ``limit`` pairs of (9, 2) points and the best score of the group.
@@ -142,13 +138,13 @@ def _overlap(box: Array, boxes: Array) -> Array:
 
 
 def _sigmoid(logits: Array) -> Array:
-    """Return the scores, 0 to 1, that belong to ``logits``; beyond 80 it makes no difference in float32."""
+    """Return the sigmoid of ``logits``, which are clipped to 80; beyond, float32 makes no difference."""
     scores: Array = 1 / (1 + np.exp(-np.clip(logits, -80, 80)))
     return scores
 
 
 def _logit(score: float) -> float:
-    """Return the number whose sigmoid is ``score``, 0 to 1."""
+    """Return the inverse sigmoid of ``score``, 0 to 1."""
     if score in (0, 1):
         return inf if score else -inf
     return log(score / (1 - score))

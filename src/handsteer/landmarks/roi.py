@@ -1,7 +1,7 @@
-"""The region of interest: the rotated square of a frame that a model looks at.
+"""The region of interest: the rotated square of a frame that is a model's input.
 
-How a region follows from a palm or from landmarks (which points, how much larger, how far moved) is as in MediaPipe
-0.10.21's graphs ``palm_detection_detection_to_roi`` and ``hand_landmark_landmarks_to_roi``.
+The regions from a palm and from landmarks (points, scale and shift) follow MediaPipe 0.10.21's graphs
+``palm_detection_detection_to_roi`` and ``hand_landmark_landmarks_to_roi``.
 """
 
 from dataclasses import dataclass
@@ -24,8 +24,8 @@ class Roi:
     """A rotated square in a frame; all lengths in pixels.
 
     Attributes:
-        center_x: Where its centre is, from the left edge of the frame.
-        center_y: Where its centre is, from the top edge of the frame.
+        center_x: From the left edge of the frame.
+        center_y: From the top edge of the frame.
         side: Length of its sides.
         rotation: Angle of its x axis from the frame's, in radians, clockwise as seen.
     """
@@ -37,7 +37,7 @@ class Roi:
 
     @property
     def axes(self) -> Array:
-        """(2, 2) float64 rotation that turns a row of the square's coordinates ``p`` into the frame's: ``p @ axes``."""
+        """(2, 2) float64 rotation of a row of the square's coordinates ``p`` into the frame's: ``p @ axes``."""
         c, s = cos(self.rotation), sin(self.rotation)
         return np.array([[c, s], [-s, c]])
 
@@ -51,7 +51,7 @@ class Roi:
         Args:
             image: (height, width, 3) uint8.
             pixels: Side of the result.
-            border: What lies outside the frame, as ``cv2.BORDER_REPLICATE``.
+            border: OpenCV's border mode outside the frame, such as ``cv2.BORDER_REPLICATE``.
         """
         scale = self.side / pixels
         c, s = cos(self.rotation) * scale, sin(self.rotation) * scale
@@ -63,7 +63,7 @@ class Roi:
         return cv2.warpAffine(image, crop_to_frame, (pixels, pixels), flags=flags, borderMode=border)  # type: ignore[return-value]
 
     def grown(self, factor: float) -> "Roi":
-        """Return the square about the same centre, ``factor`` times as large."""
+        """Return the square scaled by ``factor`` about its centre."""
         return Roi(self.center_x, self.center_y, self.side * factor, self.rotation)
 
     def overlap(self, other: "Roi") -> float:
@@ -79,28 +79,24 @@ class Roi:
 
 
 def whole_frame(width: int, height: int, widened: float = 1.0) -> Roi:
-    """Return the smallest upright square about a whole frame of that size in pixels, ``widened`` so many times."""
+    """Return the smallest upright square around a frame of that size in pixels, enlarged by the factor ``widened``."""
     return Roi(width / 2, height / 2, max(width, height) * widened)
 
 
 def from_palm(corners: Array, wrist: Array, middle_base: Array) -> Roi:
-    """Return the region of the hand whose palm was found.
+    """Return the region of the hand of a detected palm; all arguments in pixels.
 
     Args:
-        corners: (2, 2) top left and bottom right of the palm's box, x and y in pixels.
-        wrist: (2,) in pixels.
-        middle_base: (2,) base of the middle finger in pixels.
+        corners: (2, 2) top left and bottom right of the palm's box, x and y.
+        wrist: (2,).
+        middle_base: (2,) base of the middle finger.
     """
     width, height = corners[1] - corners[0]
     return _grown(corners.mean(axis=0), width, height, _upright(wrist, middle_base), shift=0.5, scale=2.6)
 
 
 def from_landmarks(points: Array) -> Roi:
-    """Return the region in which to look for the hand in the next frame.
-
-    Args:
-        points: (21, 2) landmarks in pixels of this frame.
-    """
+    """Return the region of the hand for the next frame from (21, 2) landmarks in pixels of this frame."""
     index, middle, ring = points[list(_BASES_OF_INDEX_MIDDLE_RING)]
     rotation = _upright(points[0], ((index + ring) / 2 + middle) / 2)
     steady = points[list(_STEADY_LANDMARKS)]
@@ -120,7 +116,7 @@ def _upright(wrist: Array, fingers: Array) -> float:
 
 
 def _grown(center: Array, width: float, height: float, rotation: float, *, shift: float, scale: float) -> Roi:
-    """Return a square about a box, moved by ``shift`` of its height towards the fingers and grown by ``scale``."""
+    """Return a square around a box, shifted by ``shift`` of its height towards the fingers and scaled by ``scale``."""
     x = center[0] + shift * height * sin(rotation)
     y = center[1] - shift * height * cos(rotation)
     return Roi(float(x), float(y), float(max(width, height) * scale), rotation)

@@ -1,8 +1,8 @@
-"""Where to look for hands that are not followed yet.
+"""Decides where to search for new hands.
 
-In the plain frame palms are looked for as MediaPipe does. The palm model misses hands that nearly fill a frame, fists
-above all, so they are also looked for in a widened frame, where they look smaller; and while there is none, in the
-middle of the frame without any palm, for the landmark model to say whether that is a hand.
+Palms are detected in the plain frame as MediaPipe does. The palm model misses hands that nearly fill a frame, fists
+above all, so palms are also detected in a widened frame, where they appear smaller; and while there is no hand, the
+landmark model is applied to the middle of the frame without any palm.
 """
 
 import itertools
@@ -18,24 +18,25 @@ from handsteer.landmarks.palm import Palm, PalmDetector
 from handsteer.landmarks.roi import Roi
 
 _MIDDLE: Final = 0.7
-"""Side of the square in the middle, as a share of the frame's shorter side."""
+"""Side of the square in the middle, relative to the frame's shorter side."""
 _NEAR: Final = 0.4
-"""Side of a near hand's region, as a share of the frame's longer side; a hand takes about half of its region."""
+"""Side of a near hand's region, relative to the frame's longer side; a hand takes about half of its region."""
 _NEAR_PRESENCE: Final = 0.9
-"""How sure the landmark model has to be where the palm model saw nothing in the plain frame, at least."""
+"""Minimum presence of a hand that the palm model did not detect in the plain frame."""
 _TURNED_PRESENCE: Final = 0.95
-"""Likewise for a hand that does not point upwards: faces and people look like one then, now and then."""
+"""Likewise of a hand that does not point upwards: faces and people sometimes resemble one."""
 _SURE_PALM: Final = 0.8
 
 
 @dataclass(frozen=True)
 class Places:
-    """Where hands may be in a frame.
+    """Possible regions of hands in a frame.
 
     Attributes:
-        regions: The surest first.
-        min_presence: 0 to 1, how sure the landmark model has to be for it to be a hand, at least.
-        rivals: Other ways to see the one region: of those in which a hand is seen, the surest counts.
+        regions: By descending score.
+        min_presence: Minimum presence of a hand, 0 to 1.
+        rivals: Other rotations of a single region; of those that show a hand, the one with the highest presence is
+            used.
     """
 
     regions: list[Roi]
@@ -45,16 +46,16 @@ class Places:
 
 @dataclass(frozen=True)
 class Palms:
-    """Look for palms in a frame that is ``widened`` so many times, or only for those of ``near`` hands.
+    """Detect palms in a frame that is ``widened`` by these factors, optionally only those of ``near`` hands.
 
-    With several factors it is looked in one frame after another, until there are enough palms that are sure.
+    The factors are tried in order, until there are enough palms with a high score.
     """
 
     widened: tuple[float, ...] = (1.0,)
     near: bool = False
 
     def places(self, image: NDArray[np.uint8], palms: PalmDetector, limit: int) -> Places:
-        """Return where there are palms, at most ``limit`` in each of the widened frames."""
+        """Return the regions of palms, at most ``limit`` in each of the widened frames."""
         found: list[Palm] = []
         for widened in self.widened:
             if sum(palm.score >= _SURE_PALM for palm in found) < limit:
@@ -67,14 +68,14 @@ class Palms:
 
 @dataclass(frozen=True)
 class Middle:
-    """Look at the middle of the frame, as if the fingers pointed ``turned_deg`` clockwise from up."""
+    """Use the middle of the frame, as if the fingers pointed ``turned_deg`` clockwise from up."""
 
     turned_deg: float = 0.0
 
     def places(self, image: NDArray[np.uint8], palms: PalmDetector, limit: int) -> Places:
-        """Return the one place, and how it is seen with the fingers pointing elsewhere.
+        """Return the region, with its other rotations as rivals.
 
-        A thumb up looks like an index finger to a model that expects the fingers there.
+        In a region rotated wrongly, the landmark model takes a thumb up for an index finger.
         """
         height, width = image.shape[:2]
         region, *rivals = (
@@ -85,7 +86,7 @@ class Middle:
 
 
 Turn = tuple[Palms | Middle, ...]
-"""Ways to look for hands in one frame; each only if those before find none."""
+"""Ways to search one frame; each is used only if the previous ones find no hand."""
 
 _PLAIN: Final = Palms()
 _WIDE: Final = Palms((1.25,))
@@ -94,21 +95,21 @@ _MIDDLE_UP, *_MIDDLES_TURNED = (Middle(turned_deg) for turned_deg in (0.0, 180.0
 
 _AS_MEDIAPIPE: Final[Turn] = (_PLAIN,)
 _FIRST: Final[Turn] = (Palms((1.0, 1.25)), _VERY_WIDE, _MIDDLE_UP, *_MIDDLES_TURNED)
-# A search of palms takes the longest, so there is one in a frame. Most hands that are shown point upwards.
+# Palm detection takes longest, so there is one per frame. Most hands that are shown point upwards.
 _WITHOUT_HANDS: Final[tuple[Turn, ...]] = tuple(
     turn for turned in _MIDDLES_TURNED for turn in ((_PLAIN,), (_WIDE, _MIDDLE_UP), (_PLAIN,), (_VERY_WIDE, turned))
 )
-# A hand that is followed was mostly found in the plain frame, in which a second one would have been seen too.
+# A tracked hand was usually found in the plain frame, in which a second one would have been found too.
 _BESIDE_A_HAND: Final[tuple[Turn, ...]] = ((_WIDE,), (_PLAIN,))
 
 
 class Search:
-    """Looks for hands in one frame after another, each time in other ways, so that no frame takes long.
+    """Searches for hands in successive frames in alternating ways, so that no frame takes long.
 
     Args:
         palms: The palm model.
-        limit: How many hands are wanted.
-        wide: Whether to look in other ways than MediaPipe at all.
+        limit: Number of hands wanted.
+        wide: Whether to use other ways than MediaPipe's.
     """
 
     def __init__(self, palms: PalmDetector, limit: int, *, wide: bool) -> None:
@@ -118,7 +119,7 @@ class Search:
         self.reset()
 
     def reset(self) -> None:
-        """Take the next frame for the first of a stream, in which it is looked for hands in all ways."""
+        """Start a new stream, whose first frame is searched in all ways."""
         self._without_hands: Iterator[Turn] = itertools.repeat(_AS_MEDIAPIPE)
         self._beside_a_hand: Iterator[Turn] = itertools.repeat(_AS_MEDIAPIPE)
         if self._wide:
@@ -126,16 +127,14 @@ class Search:
             self._beside_a_hand = itertools.cycle(_BESIDE_A_HAND)
 
     def begin_again(self) -> None:
-        """Of the ways to look in frames without hands, begin with those that find most: there may be one just now."""
+        """Restart the cycle for frames without hands at its most effective ways: a hand may be in view now."""
         if self._wide:
             self._without_hands = itertools.cycle(_WITHOUT_HANDS)
 
     def places(self, image: NDArray[np.uint8], *, beside_a_hand: bool) -> Iterator[Places]:
-        """Yield where hands may be in the next frame; further places are for when those before are no hands.
+        """Yield possible regions of hands in the next frame; later ones are for when the earlier ones show no hand.
 
-        Args:
-            image: (height, width, 3) uint8, BGR.
-            beside_a_hand: Whether one is followed already.
+        ``beside_a_hand`` is whether a hand is tracked already; ``image`` is (height, width, 3) uint8, BGR.
         """
         if self._wide and not beside_a_hand:
             self._beside_a_hand = itertools.cycle(_BESIDE_A_HAND)

@@ -1,4 +1,4 @@
-"""One TensorFlow Lite model that looks at a square picture."""
+"""A TensorFlow Lite model with a square picture as its input."""
 
 import time
 from pathlib import Path
@@ -16,7 +16,7 @@ _BETWEEN_TRIES_S = 0.001
 
 
 class PictureModel:
-    """A model with one square RGB picture as its input, run on the CPU. Not for several threads at once.
+    """A model with one square RGB picture as its input, run on the CPU; not thread-safe.
 
     Args:
         path: The model file.
@@ -26,7 +26,7 @@ class PictureModel:
         side: Width and height of the input in pixels.
 
     Raises:
-        ModelCorrupt: The file is no model that can be run.
+        ModelCorrupt: The file is not a model that can be run.
     """
 
     def __init__(self, path: Path, threads: int) -> None:
@@ -54,7 +54,7 @@ class PictureModel:
             try:
                 self._interpreter.invoke()
             except RuntimeError as error:
-                # It counts the references to its own part; a thread that looks through all objects holds one too.
+                # It counts references to its internal data; a thread that inspects all objects holds one too.
                 if "internal data" not in str(error) or not tries_left:
                     raise
                 time.sleep(_BETWEEN_TRIES_S)

@@ -1,1 +1,1 @@
-"""From 21 landmarks to the name of a sign."""
+"""Recognises signs from 21 hand landmarks."""

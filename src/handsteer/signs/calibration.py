@@ -1,4 +1,4 @@
-"""Whether likelihoods can be trusted: of the hands with 90 %, do 90 % show that sign? And other thresholds than set."""
+"""Calibration of likelihoods (of hands with 90 %, do 90 % show that sign?), and results for other thresholds."""
 
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import asdict, dataclass, replace
@@ -10,18 +10,18 @@ from handsteer.types import NONE
 
 BINS: Final = 10
 THRESHOLDS: Final = (*(percent / 100 for percent in range(30, 100, 5)), 0.97, 0.99)
-"""The confidences that :func:`sweep` tries."""
+"""The confidence thresholds that :func:`sweep` evaluates."""
 
 
 @dataclass(frozen=True)
 class Bin:
-    """The hands whose likeliest sign is about as likely.
+    """The hands whose likeliest sign has a likelihood in one range.
 
     Attributes:
-        low: The least likelihood in it, 0 to 1.
-        high: The greatest, which only the last bin has itself.
+        low: Lower end of the range, 0 to 1.
+        high: Upper end, exclusive except in the last bin.
         confidence: The mean likelihood; None in an empty bin.
-        right: How many of the hands do show their likeliest sign.
+        right: Number of hands that show their likeliest sign.
     """
 
     low: float
@@ -32,11 +32,11 @@ class Bin:
 
 @dataclass(frozen=True)
 class Calibration:
-    """How well likelihoods agree with what is true.
+    """How well likelihoods agree with the truth.
 
     Attributes:
-        bins: From the least likely to the likeliest, each as wide as the others.
-        expected_error: The expected calibration error, 0 to 1; None of nothing.
+        bins: Of equal width, in ascending order.
+        expected_error: The expected calibration error, 0 to 1; None without hands.
     """
 
     bins: tuple[Bin, ...]
@@ -49,12 +49,12 @@ class Calibration:
 
 
 def calibration(results: Iterable[PhotoResult]) -> Calibration:
-    """Return how well the likelihoods of ``results`` agree with what is true.
+    """Return how well the likelihoods of ``results`` agree with the truth.
 
-    Each photo in which a hand was found counts once, with its likeliest sign, sure enough or not; a photo that shows no
-    sign is never right. The expected error is the distance between the mean likelihood of a bin and the share that is
-    right in it, the mean of all bins, each weighed by its hands: C. Guo et al., "On calibration of modern neural
-    networks", ICML 2017, equation 3.
+    Each photo with a hand counts once, by its likeliest sign, even below its threshold; a photo without a sign is never
+    right. The expected error is the distance between a bin's mean likelihood and its share of right hands, averaged
+    over the bins and weighted by their hands: C. Guo et al., "On calibration of modern neural networks", ICML 2017,
+    equation 3.
     """
     found = [(*photo.likeliest, photo.truth) for photo in results if photo.likelihoods]
     in_bin: list[list[tuple[float, bool]]] = [[] for _ in range(BINS)]
@@ -83,10 +83,10 @@ def sweep(
     motion: Collection[str],
     thresholds: Iterable[float] = THRESHOLDS,
 ) -> dict[float, Tally]:
-    """Return what would be counted of ``results`` if a sign were seen from each of ``thresholds`` on.
+    """Return the counts of ``results`` for each of ``thresholds`` on the confidence.
 
-    It follows from the likelihoods; nothing is recognised again. Where several hands are in view, the one that was
-    looked at stays, though another threshold might have chosen another.
+    They are computed from the likelihoods, without recognising again. With several hands in view, the selected hand
+    stays the same, though another threshold might have selected another.
     """
     return {
         threshold: tally([replace(photo, seen=_seen(photo, threshold)) for photo in results], signs, motion)

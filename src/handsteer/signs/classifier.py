@@ -1,4 +1,4 @@
-"""What every sign classifier offers."""
+"""The interface of sign classifiers."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -9,12 +9,12 @@ from handsteer.landmarks.hand import Hand
 
 @dataclass(frozen=True)
 class SignGuess:
-    """What one hand in one frame shows.
+    """The sign of one hand in one frame.
 
     Attributes:
         sign: The likeliest sign, or ``NONE``.
-        confidence: 0 to 1, how sure that is.
-        likelihoods: How likely each sign is that the classifier knows, 0 to 1; empty when it does not say.
+        confidence: 0 to 1.
+        likelihoods: The likelihood of each sign of the classifier, 0 to 1; may be empty.
     """
 
     sign: str
@@ -23,11 +23,11 @@ class SignGuess:
 
 
 class Classifier(Protocol):
-    """Tells the sign from the landmarks of one hand; keeps nothing from one frame to the next."""
+    """Recognises the sign from the landmarks of one hand; keeps no state between frames."""
 
     @property
     def signs(self) -> tuple[str, ...]:
-        """The signs that it can tell, without ``NONE``."""
+        """The recognised signs, without ``NONE``."""
         ...
 
     def classify(self, hand: Hand) -> SignGuess:
@@ -35,5 +35,5 @@ class Classifier(Protocol):
         ...
 
     def confidence(self, sign: str, likelihood: float) -> float:
-        """Return the confidence, 0 to 1, of one of its signs that is as likely as ``likelihood``, 0 to 1."""
+        """Return the confidence, 0 to 1, of ``sign`` with this ``likelihood``, 0 to 1."""
         ...

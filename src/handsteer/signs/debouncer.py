@@ -1,4 +1,4 @@
-"""Over time: how sure the last frames are of a sign, and when a sign that is seen comes to count."""
+"""Filters signs over time: mean likelihoods of the last frames, and the debouncer that confirms signs."""
 
 from collections import deque
 from collections.abc import Mapping
@@ -11,7 +11,7 @@ from handsteer.types import NONE, STOP
 
 _FRAMES: Final = 12
 _STILL: Final = 0.25
-"""How far a hand that is held still may stray during the confirmation, in its own sizes; chosen, not measured."""
+"""Largest movement of a still hand during the confirmation, in hand sizes; chosen, not measured."""
 
 
 @dataclass(frozen=True)
@@ -22,17 +22,17 @@ class _Seen:
 
 
 class Evidence:
-    """The last 12 frames of one hand: whether it is held still, and how likely each sign has been."""
+    """The last 12 frames of one hand: its stillness, and the likelihoods of signs."""
 
     def __init__(self) -> None:
         self._seen: deque[_Seen] = deque(maxlen=_FRAMES)
 
     def add(self, place: HandPosition | None, likelihoods: Mapping[str, float], dt_s: float) -> None:
-        """Take the next frame.
+        """Add the next frame.
 
         Args:
-            place: Where its palm is; None when it is not in view, which forgets all before.
-            likelihoods: How likely each sign is, 0 to 1.
+            place: Position of its palm; None if it is not in view, which clears all earlier frames.
+            likelihoods: The likelihood of each sign, 0 to 1.
             dt_s: Seconds since the last frame, >= 0.
         """
         if place is None:
@@ -41,9 +41,9 @@ class Evidence:
             self._seen.append(_Seen(dt_s, place, likelihoods))
 
     def is_still(self, seconds: float) -> bool:
-        """Return whether the hand strayed by less than a quarter of its size in the last ``seconds``.
+        """Return whether the hand moved by less than a quarter of its size in the last ``seconds``.
 
-        A hand that has been in view for less than that is judged by the frames there are.
+        A hand that has been in view for less time is judged by the available frames.
         """
         if not self._seen:
             return False
@@ -56,11 +56,11 @@ class Evidence:
         return sum(each.likelihoods.get(sign, 0.0) for each in last) / len(last) if last else 0.0
 
     def reset(self) -> None:
-        """Forget all frames."""
+        """Clear all frames."""
         self._seen.clear()
 
     def _last(self, seconds: float) -> list[_Seen]:
-        """Return the newest frame, and those before it that are at most ``seconds`` older."""
+        """Return the newest frame, and the earlier ones that are at most ``seconds`` older."""
         last: list[_Seen] = []
         age_s = 0.0
         for each in reversed(self._seen):
@@ -71,16 +71,16 @@ class Evidence:
         return last
 
 
-# Frames that come in step have stamps that do not: without it, rounding decides about a whole frame.
+# The stamps of periodic frames jitter: without slack, rounding would decide about a whole frame.
 _SLACK_S = 0.001
 
 
 class Debouncer:
     """Confirms signs, and bridges short losses.
 
-    - ``Stop`` counts at its first frame.
-    - Any other sign counts once a hand that is held still has shown it, frame after frame, for ``confirm_time``.
-    - A sign that counts goes on counting for up to ``dropout_hold`` in which it is not seen; then it is ``NONE``.
+    - ``Stop`` is confirmed at its first frame.
+    - Any other sign is confirmed once a still hand has shown it in every frame for ``confirm_time``.
+    - A confirmed sign that is not seen stays active for up to ``dropout_hold``; then it becomes ``NONE``.
     """
 
     def __init__(self, config: SignsConfig) -> None:
@@ -92,28 +92,28 @@ class Debouncer:
 
     @property
     def candidate(self) -> str:
-        """The sign that is seen but does not count yet; ``NONE`` when there is none."""
+        """The sign that is seen but not confirmed yet; ``NONE`` if there is none."""
         return self._candidate
 
     @property
     def candidate_s(self) -> float:
-        """For how long the candidate has been seen, seconds."""
+        """Seconds since the candidate was first seen."""
         return self._candidate_s
 
     @property
     def progress(self) -> float:
-        """How far the candidate is on its way to count, 0 to 1."""
+        """Progress of confirming the candidate, 0 to 1."""
         if self._candidate == NONE:
             return 0.0
         return min(1.0, self._candidate_s / self._config.confirm_time) if self._config.confirm_time else 1.0
 
     def step(self, seen: str, dt_s: float, *, still: bool = True) -> str:
-        """Take what one frame shows and return the sign that counts.
+        """Process one frame and return the confirmed sign.
 
         Args:
             seen: A sign, or ``NONE``.
             dt_s: Seconds since the last frame, >= 0.
-            still: Whether the hand is held still; while it is not, no time is counted for a new sign.
+            still: Whether the hand is held still; otherwise the frame's time does not count towards a new sign.
         """
         if seen in (self.sign, STOP):
             self._accept(seen)
@@ -128,11 +128,11 @@ class Debouncer:
         return self.sign
 
     def reconfigure(self, config: SignsConfig) -> None:
-        """Go on with other times; the sign that counts stays."""
+        """Change the times; the confirmed sign stays."""
         self._config = config
 
     def reset(self) -> None:
-        """Forget everything: the next sign starts from ``NONE``."""
+        """Reset to ``NONE``."""
         self._accept(NONE)
 
     def _accept(self, sign: str) -> None:

@@ -1,4 +1,4 @@
-"""What was understood, drawn into the picture for people: mirrored, as they see themselves."""
+"""Draws the recognition into the picture, mirrored, as people see themselves."""
 
 import cv2
 import numpy as np
@@ -15,15 +15,7 @@ _WAITS = (60, 180, 250)
 
 
 def annotate(image: NDArray[np.uint8], recognition: Recognition) -> NDArray[np.uint8]:
-    """Return a mirrored copy of ``image`` with the hand's skeleton and the sign.
-
-    Args:
-        image: (height, width, 3) uint8, BGR, not mirrored.
-        recognition: What was understood of it.
-
-    Returns:
-        (height, width, 3) uint8, BGR, mirrored.
-    """
+    """Return a mirrored copy of ``image``, (height, width, 3) uint8, BGR, with the hand's skeleton and the sign."""
     picture = draw_hand(image, recognition.hand)
     if recognition.seen != NONE:
         _draw_label(picture, recognition)
@@ -41,7 +33,7 @@ def draw_hand(image: NDArray[np.uint8], hand: Hand | None) -> NDArray[np.uint8]:
 def _draw_skeleton(picture: NDArray[np.uint8], pixels: NDArray[np.float32]) -> None:
     height, width = picture.shape[:2]
     x = width - 1 - pixels[:, 0]
-    # Landmarks may lie far outside the frame; OpenCV wants coordinates that fit 16 bits.
+    # Landmarks may lie far outside the frame; OpenCV requires coordinates that fit 16 bits.
     points = np.stack([x, pixels[:, 1]], axis=1).clip(-width, 2 * width).round().astype(int).tolist()
     thickness = max(1, height // 240)
     for begin, end in CONNECTIONS:
@@ -55,6 +47,6 @@ def _draw_label(picture: NDArray[np.uint8], recognition: Recognition) -> None:
     colour = _COUNTS if recognition.sign == recognition.seen else _WAITS
     text = f"{recognition.seen} {recognition.confidence:.0%}"
     origin = (round(16 * scale), round(40 * scale))
-    # To smooth the outline would take as long as all the rest of the drawing, and hardly shows.
+    # An anti-aliased outline would double the drawing time for little visible effect.
     for ink, thickness, line in (((0, 0, 0), 5, cv2.LINE_8), (colour, 2, cv2.LINE_AA)):
         cv2.putText(picture, text, origin, cv2.FONT_HERSHEY_SIMPLEX, scale, ink, max(1, round(thickness * scale)), line)

@@ -1,4 +1,4 @@
-"""The recogniser, put to the test on photos and videos whose signs are known."""
+"""Evaluates the recognizer on labelled photos and videos."""
 
 from collections.abc import Iterable, Iterator, Mapping
 
@@ -20,9 +20,9 @@ from handsteer.types import NONE
 
 
 def evaluate_photos(photos: Iterable[LabelledPhoto], recognizer: Recognizer, view: View) -> Iterator[PhotoResult]:
-    """Yield what is seen in each photo, with nothing kept from one to the next.
+    """Yield the recognition of each photo, independently of the others.
 
-    Photos that are not to be scored, or cannot be when they are seen as ``view`` does, are left out.
+    Photos that are not to be scored, or cannot be in this ``view``, are left out.
 
     Raises:
         CameraUnreadable: A photo cannot be decoded.
@@ -50,14 +50,13 @@ def evaluate_photos(photos: Iterable[LabelledPhoto], recognizer: Recognizer, vie
 def evaluate_frames(
     frames: Iterable[Frame], truths: Mapping[int, str] | None, recognizer: Recognizer, view: View
 ) -> Iterator[FrameVerdict]:
-    """Yield what is seen in each frame of a video, as a camera would give it, and which sign counts then.
+    """Yield the recognised and the confirmed sign of each frame of a video, processed as a camera's stream.
 
     Args:
-        frames: The frames in their order.
-        truths: The sign of each frame, by its number from 0; a frame that is not there is not scored. None when
-            nothing is known.
-        recognizer: What is tested.
-        view: How the frames are looked at.
+        frames: The frames in order.
+        truths: The sign of each frame by its number, from 0; missing frames are not scored. None without labels.
+        recognizer: The recognizer to evaluate.
+        view: How the frames are transformed.
 
     Raises:
         LabelError: There are labels for more frames than there are.
@@ -78,16 +77,16 @@ def evaluate_frames(
 def evaluate_takes(
     dataset: Dataset, classifier: Classifier, min_confidence: float, view: View
 ) -> Iterator[PhotoResult]:
-    """Yield what is seen in each hand of a dataset, with nothing kept from one to the next.
+    """Yield the recognition of each hand of a dataset, independently of the others.
 
-    Its kind and its set of persons are the person. Hands that cannot be scored when they are seen as ``view`` does are
-    left out, and so are those without the depth that it takes to tell them (:func:`lacks_depth`).
+    The person becomes the result's kind and person set. Hands that cannot be scored in this ``view``, or lack the
+    required depth (:func:`lacks_depth`), are left out.
 
     Args:
-        dataset: Whose signs are all known to the classifier, or ``NONE``.
-        classifier: What is tested.
-        min_confidence: 0 to 1, from which a sign is seen.
-        view: How the hands are looked at.
+        dataset: Contains only signs of the classifier, and ``NONE``.
+        classifier: The classifier to evaluate.
+        min_confidence: Minimum confidence of a sign, 0 to 1.
+        view: How the hands are transformed.
     """
     for number, take in enumerate(dataset.takes, start=1):
         truth, _ = view.truth(take.label)
@@ -111,9 +110,10 @@ def evaluate_takes(
 
 
 def lacks_depth(hand: Hand, label: str, classifier: Classifier) -> bool:
-    """Return whether ``hand`` has no depth and ``label`` cannot be told without it, so that it cannot be scored.
+    """Return whether ``hand`` has no depth, but recognising ``label`` requires it, so that it cannot be scored.
 
-    Only signs that were taught from such landmarks can. For ``NONE`` the shipped signs would have to be told too.
+    Only signs taught from flat landmarks can be recognised without depth. ``NONE`` requires recognising the shipped
+    signs.
     """
     if np.isfinite(hand.world).all():
         return False

@@ -1,4 +1,4 @@
-"""All that an evaluation found, of each source, of each view, and together."""
+"""The results of an evaluation: by source, by view, and overall."""
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
@@ -13,15 +13,15 @@ from handsteer.signs.views import View
 
 @dataclass(frozen=True)
 class Evaluation:
-    """What was seen in all sources, and what to make of it.
+    """The results of all sources, and figures computed from them.
 
     Attributes:
-        signs: The signs that can be told, without ``NONE``, in the order of the tables.
-        motion: Those that can move the robot.
-        photos: What was seen in folders of photos: a run for each folder and view.
-        hands: Likewise, in datasets of landmarks.
-        videos: Likewise, in videos.
-        grace_s: In videos, how long a sign that is no longer shown may go on to count, in seconds.
+        signs: The recognised signs, without ``NONE``, in the order of the tables.
+        motion: The signs that move the robot.
+        photos: Results of photo folders: one run per folder and view.
+        hands: Likewise, of datasets of landmarks.
+        videos: Likewise, of videos.
+        grace_s: In videos, how long a sign may stay active after it was last shown, in seconds.
     """
 
     signs: tuple[str, ...]
@@ -33,43 +33,43 @@ class Evaluation:
 
     @property
     def views(self) -> tuple[View, ...]:
-        """How the sources were looked at."""
+        """The views of the sources."""
         stills = [run.view for run in (*self.photos, *self.hands)]
         return tuple(dict.fromkeys([*stills, *(run.view for run in self.videos)]))
 
     @property
     def stills(self) -> tuple[PhotoRun, ...]:
-        """The runs that belong together: those of photos, or where there are none, of datasets.
+        """The runs to combine: those of photos, or if there are none, of datasets.
 
-        A dataset doesn't say whether hands are found, so that its figures are others.
+        They are not mixed, because a dataset has no figures on whether hands are found.
         """
         return self.photos or self.hands
 
     @property
     def results(self) -> list[PhotoResult]:
-        """What was seen in all :attr:`stills`."""
+        """The results of all :attr:`stills`."""
         return [result for run in self.stills for result in run.results]
 
     @property
     def calibration(self) -> Calibration:
-        """How far the likelihoods of all :attr:`stills` can be trusted."""
+        """The calibration of the likelihoods of all :attr:`stills`."""
         return calibration(self.results)
 
     @property
     def sweep(self) -> dict[float, Tally]:
-        """What other thresholds would give of all :attr:`stills`."""
+        """The results of all :attr:`stills` for other thresholds."""
         return sweep(self.results, self.signs, self.motion)
 
     @property
     def confusion(self) -> Confusion | None:
-        """Which sign was taken for which in all :attr:`stills`, or else in all videos; None where nobody knows."""
+        """The confusion matrix of all :attr:`stills`, or else of all videos; None without labels."""
         if self.stills:
             return self.of_photos(self.stills).confusion
         labels = self.of_videos(self.videos).labels
         return labels.confusion if labels else None
 
     def of_photos(self, runs: Sequence[PhotoRun]) -> PhotoReport:
-        """Return the figures of ``runs`` together."""
+        """Return the combined figures of ``runs``."""
         return photo_report(
             [result for run in runs for result in run.results],
             self.signs,
@@ -79,7 +79,7 @@ class Evaluation:
         )
 
     def of_videos(self, runs: Sequence[VideoRun]) -> VideoReport:
-        """Return the figures of ``runs`` together."""
+        """Return the combined figures of ``runs``."""
         several = len({run.view for run in runs}) > 1
         videos = {f"{run.source}, {run.view.name}" if several else run.source: run.frames for run in runs}
         return video_report(videos, self.signs, self.motion, self.grace_s)
@@ -87,11 +87,9 @@ class Evaluation:
     def as_dict(self, *, with_sweep: bool = False) -> dict[str, Any]:
         """Return everything as plain values, for JSON.
 
-        At the top are the figures of all :attr:`stills` and of all videos together; then those of each view under
-        ``views``, of each source and view under ``sources``, and each photo's under ``verdicts``.
-
-        Args:
-            with_sweep: Also what other thresholds would give, under ``sweep``.
+        The top level has the figures of all :attr:`stills` and of all videos; ``views`` has those of each view,
+        ``sources`` those of each source and view, and ``verdicts`` those of each photo; ``sweep``, if ``with_sweep``,
+        has the results for other thresholds.
         """
         together = self._figures(self.stills, self.videos)
         if self.stills:

@@ -1,8 +1,8 @@
-"""Numbers that say what shape a hand has, whichever hand it is, wherever it is and however it is turned in the image.
+"""Features of a hand's shape, invariant to side, position, size and rotation in the image.
 
-All of them are distances in palm lengths and angles between bones: moving, scaling, mirroring and turning the picture
-change none of them, so one half of the hands and one direction are enough to learn from. Where the hand points is
-measured apart (:func:`directions`).
+They are distances in palm lengths and angles between bones, which translation, scaling, mirroring and rotation of the
+picture do not change. So one side and one direction are enough to train on. Pointing directions are measured separately
+(:func:`directions`).
 """
 
 from typing import Final
@@ -32,12 +32,12 @@ _PAIRS: Final = np.array(
         *((5, 17), (5, 0), (17, 0)),
     ]
 )
-"""Pairs of landmarks whose distances tell shapes apart."""
+"""Pairs of landmarks whose distances distinguish shapes."""
 
 BEND_COUNT: Final = 15
 PAIR_COUNT: Final = len(_PAIRS)
 COUNT: Final = BEND_COUNT + 2 * PAIR_COUNT + 1
-"""How many features there are."""
+"""Number of features."""
 
 
 def shape_features(pixels: Array, world: Array) -> NDArray[np.float64]:
@@ -45,7 +45,7 @@ def shape_features(pixels: Array, world: Array) -> NDArray[np.float64]:
 
     Args:
         pixels: (n, 21, 2) landmarks in pixels.
-        world: (n, 21, 3) landmarks in metres, axes as the image's.
+        world: (n, 21, 3) landmarks in metres, with the image's axes.
     """
     world = np.asarray(world, np.float64)
     palm = np.linalg.norm(world[:, KNUCKLES] - world[:, :1], axis=2).mean(axis=1)
@@ -60,12 +60,12 @@ def shape_features(pixels: Array, world: Array) -> NDArray[np.float64]:
 
 
 def directions(pixels: Array) -> tuple[Array, Array, Array]:
-    """Return where index finger, thumb and palm point in the image: (n, 2) vectors each, x right, y down.
+    """Return the directions of index finger, thumb and palm in the image: (n, 2) vectors each, x right, y down.
 
-    The thumb's is between that from the middle of the knuckles to its tip and that from the little finger's knuckle to
-    the index finger's: thumbs bend, and on photos of thumbs up this direction was off the vertical by 9 degrees (root
-    mean square), where either by itself was by 12 and the thumb's own by 25. The palm's is that from the wrist to the
-    middle of the knuckles.
+    The thumb's direction is the mean of two: from the middle of the knuckles to the thumb's tip, and from the little
+    finger's knuckle to the index finger's. Thumbs bend: on photos of thumbs up this direction deviated from the
+    vertical by 9 degrees (root mean square), each of the two alone by 12, and the thumb's own direction by 25. The
+    palm's direction is from the wrist to the middle of the knuckles.
 
     Args:
         pixels: (n, 21, 2) landmarks in pixels.
@@ -82,8 +82,8 @@ def _unit(vectors: Array) -> Array:
 
 
 def _facing(world: Array) -> Array:
-    """Return (n, 1) cosines, 0 to 1, of the angle between the palm's normal and the camera's axis."""
-    # Written out, as numpy's cross product takes as long as all other features together.
+    """Return (n, 1) cosines, 0 to 1, between the palm's normal and the camera's axis."""
+    # Written out, because numpy's cross product takes as long as all other features together.
     ax, ay, az = (world[:, 5] - world[:, 0]).T
     bx, by, bz = (world[:, 17] - world[:, 0]).T
     x, y, z = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
@@ -92,7 +92,7 @@ def _facing(world: Array) -> Array:
 
 
 def _in_metres(pixels: Array, world: Array) -> Array:
-    """Return (n, 21, 2) image points, scaled to fit the world landmarks as seen from the camera."""
+    """Return (n, 21, 2) centred image points, scaled to the size of the world landmarks in the image plane."""
     flat = world[:, :, :2] - world[:, :, :2].mean(axis=1, keepdims=True)
     pixels = pixels - pixels.mean(axis=1, keepdims=True)
     scale = np.sqrt((flat**2).sum(axis=(1, 2)) / np.maximum((pixels**2).sum(axis=(1, 2)), 1e-12))
@@ -101,11 +101,7 @@ def _in_metres(pixels: Array, world: Array) -> Array:
 
 
 def bone_bends(points: Array) -> Array:
-    """Return (n, 15) angles between neighbouring bones, radians, digit by digit from the base.
-
-    Args:
-        points: (n, 21, 2 or 3) landmarks, in any unit.
-    """
+    """Return (n, 15) angles between adjacent bones of (n, 21, 2 or 3) landmarks, in radians, digit by digit."""
     bones = points[:, _BONE_ENDS[0]] - points[:, _BONE_ENDS[1]]
     bones = (bones / np.maximum(np.linalg.norm(bones, axis=2, keepdims=True), 1e-9)).reshape(-1, 5, 4, bones.shape[2])
     cosines = (bones[:, :, 1:] * bones[:, :, :-1]).sum(axis=3)
@@ -114,11 +110,7 @@ def bone_bends(points: Array) -> Array:
 
 
 def pair_distances(points: Array) -> Array:
-    """Return (n, :data:`PAIR_COUNT`) distances between landmarks that tell shapes apart, in the points' unit.
-
-    Args:
-        points: (n, 21, 2 or 3) landmarks.
-    """
+    """Return (n, :data:`PAIR_COUNT`) distances that distinguish shapes of (n, 21, 2 or 3) landmarks, in their unit."""
     gaps = points[:, _PAIRS[:, 0]] - points[:, _PAIRS[:, 1]]
     lengths: Array = np.sqrt((gaps**2).sum(axis=2))
     return lengths

@@ -1,4 +1,4 @@
-"""Whose hand it is that gives the signs, when there are several in view."""
+"""Selects the active hand when several are in view."""
 
 import math
 from collections.abc import Sequence
@@ -15,14 +15,14 @@ from handsteer.types import NONE, STOP
 
 _PALM: Final = [WRIST, *KNUCKLES]
 _JUMP: Final = 1.0
-"""How far a hand can move from one frame to the next, in its own sizes."""
+"""Largest movement of a hand between two frames, in hand sizes."""
 _MUCH_SMALLER: Final = 0.6
-"""A hand that is smaller than this share of the followed one is somebody's in the background."""
+"""Hands smaller than this fraction of the active one belong to people in the background."""
 
 
 @dataclass(frozen=True)
 class HandPosition:
-    """Where a hand is in the image: the centre of its box and the box's longer side, in pixels."""
+    """A hand's position in the image: the centre of its box and the box's longer side, in pixels."""
 
     x: float
     y: float
@@ -30,29 +30,29 @@ class HandPosition:
 
     @classmethod
     def of(cls, hand: Hand) -> "HandPosition":
-        """Return where ``hand`` is."""
+        """Return the position of ``hand``."""
         low, high = hand.pixels[:, :2].min(axis=0), hand.pixels[:, :2].max(axis=0)
         x, y = ((low + high) / 2).tolist()
         return cls(x, y, max(1.0, float(np.max(high - low))))
 
     @classmethod
     def of_palm(cls, hand: Hand) -> "HandPosition":
-        """Return where the palm of ``hand`` is, which stays when fingers move, and how large the whole hand is."""
+        """Return the position of the palm of ``hand``, independent of the fingers, with the size of the whole hand."""
         x, y = hand.pixels[_PALM, :2].mean(axis=0).tolist()
         return cls(x, y, max(1.0, hand.longer_side_px))
 
     def distance(self, other: "HandPosition") -> float:
-        """Return how far ``other`` is from here, in sizes of this one."""
+        """Return the distance to ``other`` in sizes of this hand."""
         return float(np.hypot(self.x - other.x, self.y - other.y)) / self.size
 
 
 class HandSelector:
-    """Chooses the hand that gives the signs, and stays with it.
+    """Selects the active hand, which gives the signs, and follows it.
 
-    - While none is followed, it is the hand that shows a sign: the surest and largest of them.
-    - Once a sign of it counts, it stays the one while it is in view, until none has counted for ``switch_time`` and
-      another hand, which is not much smaller, shows one: a resting hand or a bystander doesn't take over.
-    - A hand that is out of view for ``dropout_hold`` is followed no more; while it is, any hand may show ``Stop``.
+    - Without an active hand, it selects one that shows a sign, by confidence and size.
+    - Once a sign of the active hand is confirmed, it stays active while in view, until it has had no confirmed sign for
+      ``switch_time`` and another hand, not much smaller, shows one: a resting hand or a bystander does not take over.
+    - A hand that is out of view for ``dropout_hold`` is no longer active; until then, any hand may show ``Stop``.
     """
 
     def __init__(self, config: SignsConfig) -> None:
@@ -60,25 +60,25 @@ class HandSelector:
         self.reset()
 
     def reconfigure(self, config: SignsConfig) -> None:
-        """Go on with other times; the hand that is followed stays."""
+        """Change the times; the active hand stays."""
         self._config = config
 
     def reset(self) -> None:
-        """Forget the hand that is followed."""
+        """Forget the active hand."""
         self._followed: HandPosition | None = None
         self._unseen_s = 0.0
         self._idle_s = math.inf
 
     def wants_search(self) -> bool:
-        """Return whether to look for further hands, which takes time: while the followed one gives no sign."""
+        """Return whether to search for further hands, which takes time: while the active one shows no sign."""
         return self._idle_s > 0.0
 
     def choose(self, hands: Sequence[Hand], guesses: Sequence[SignGuess], dt_s: float) -> int | None:
-        """Return the index of the hand that gives the signs; None when it is not in view.
+        """Return the index of the active hand; None if it is not in view.
 
         Args:
-            hands: Those of one frame.
-            guesses: What each of them shows; ``NONE`` where it is not sure enough.
+            hands: The hands of one frame.
+            guesses: The sign of each hand; ``NONE`` below the threshold.
             dt_s: Seconds since the last frame, >= 0.
         """
         places = [HandPosition.of(hand) for hand in hands]
@@ -86,7 +86,7 @@ class HandSelector:
         self._idle_s += dt_s
         followed = self._find(places, dt_s)
         if self._followed is not None and followed is None:
-            # Anybody may stop the robot, and so may the hand that was followed where it has jumped to.
+            # Any hand may stop the robot, including the active one after a jump.
             showing = [index for index in showing if guesses[index].sign == STOP]
             if not showing:
                 return None
@@ -103,11 +103,11 @@ class HandSelector:
         return followed
 
     def confirm(self) -> None:
-        """Note that the sign of the followed hand counts: from now on it is kept."""
+        """Report that the active hand's sign is confirmed: from now on the hand stays active."""
         self._idle_s = 0.0
 
     def _find(self, places: list[HandPosition], dt_s: float) -> int | None:
-        """Return the index of the followed hand among ``places``; None when it is not there, or none is followed."""
+        """Return the index of the active hand among ``places``; None if it is not there, or there is none."""
         before = self._followed
         if before is None:
             return None

@@ -1,4 +1,4 @@
-"""Labelled photos and videos: which sign each of them shows, as people have noted it down."""
+"""Reads the labels of photos and videos."""
 
 import csv
 from collections.abc import Iterator, Sequence
@@ -16,13 +16,13 @@ UNSCORED = "ambiguous"
 
 @dataclass(frozen=True)
 class LabelledPhoto:
-    """A photo and what it shows.
+    """A photo and its label.
 
     Attributes:
         path: The file.
-        truth: The sign that must come out, ``NONE`` among them; None when it is not to be scored.
-        kind: What it shows in other words, such as ``thumb_up`` for a hand that is no sign; may be empty.
-        person_set: Whose hand it is, or from which set of photos; may be empty.
+        truth: The correct sign, or ``NONE``; None if it is not to be scored.
+        kind: A further description, such as ``thumb_up`` for a hand that is no sign; may be empty.
+        person_set: The person, or the set of photos; may be empty.
     """
 
     path: Path
@@ -32,20 +32,15 @@ class LabelledPhoto:
 
 
 def read_photo_labels(folder: Path, signs: Sequence[str]) -> list[LabelledPhoto]:
-    """Return the photos of ``folder`` with their labels.
+    """Return the photos of ``folder`` with their labels, which are ``NONE`` or of ``signs``.
 
-    The folder has an ``index.csv`` with the columns ``path`` (from the folder) and ``sign`` (empty: not scored), and
-    ``kind`` and ``person_set`` if wanted; or a subfolder for each sign. Everything under ``negatives`` shows no sign,
-    and the folder below it is its kind; what is under ``ambiguous`` is not scored. Names may be written in any case,
-    with spaces, ``_``, ``-`` or nothing between words.
-
-    Args:
-        folder: Where the photos are.
-        signs: The signs that may occur, without ``NONE``.
+    The folder has an ``index.csv`` with the columns ``path`` (relative to the folder) and ``sign`` (empty: not scored),
+    and optionally ``kind`` and ``person_set``; or a subfolder for each sign. Photos under ``negatives`` show no sign,
+    and their subfolder is their kind; photos under ``ambiguous`` are not scored. Names may be in any case, with spaces,
+    ``_``, ``-`` or nothing between words.
 
     Raises:
-        LabelError: There is no such folder, no label, a sign that is not known, a photo that is not there, or
-            nothing to score.
+        LabelError: The folder or a photo does not exist, a sign is unknown, or there are no labels or nothing to score.
     """
     if not folder.is_dir():
         raise LabelError(f"there is no folder {folder}: give a folder of labelled photos or a video")
@@ -57,10 +52,10 @@ def read_photo_labels(folder: Path, signs: Sequence[str]) -> list[LabelledPhoto]
 
 
 def read_video_labels(video: Path, signs: Sequence[str]) -> dict[int, str] | None:
-    """Return the sign of each frame, from 0, of ``video``; None when there is no labels file beside it.
+    """Return the sign of each frame of ``video``, by number from 0; None if there is no labels file.
 
-    The file is called as the video, with ``.labels.csv`` for its ending, and has the columns ``frame`` and ``sign``.
-    A frame without a line, or with an empty sign, is not in what is returned.
+    The labels file has the video's name with the suffix ``.labels.csv``, and the columns ``frame`` and ``sign``. Frames
+    without a line, or with an empty sign, are left out.
 
     Raises:
         LabelError: The file cannot be read, or a line in it is wrong.
@@ -81,7 +76,7 @@ def read_video_labels(video: Path, signs: Sequence[str]) -> dict[int, str] | Non
 
 
 def labels_of(video: Path) -> Path:
-    """Return where the labels of ``video`` are: as the video, with ``.labels.csv`` for its ending."""
+    """Return the path of the labels of ``video``: its name with the suffix ``.labels.csv``."""
     return video.with_name(f"{video.stem}.labels.csv")
 
 
@@ -133,7 +128,7 @@ def _truth(name: str, signs: Sequence[str], where: str) -> str | None:
 
 
 def _rows(path: Path, needed: tuple[str, ...]) -> Iterator[tuple[str, dict[str, str]]]:
-    """Yield where each line of a CSV file is, for people, and its fields without spaces around them."""
+    """Yield each line of a CSV file: its place, for messages, and its fields without surrounding spaces."""
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
             reader = csv.DictReader(file, skipinitialspace=True)

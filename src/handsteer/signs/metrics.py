@@ -1,4 +1,4 @@
-"""How good signs are told in photos: recall, false commands, confusion matrix."""
+"""Figures of sign recognition in photos: recall, false commands, confusion matrix."""
 
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
@@ -9,23 +9,23 @@ from handsteer.signs.intervals import Share
 from handsteer.types import NONE
 
 SIZES = ("< 45 px", "45-80 px", "> 80 px", "no hand")
-"""The longer side of the hand that was looked at; ``no hand`` where none was found."""
+"""Longer side of the selected hand; ``no hand`` if none was found."""
 
 
 @dataclass(frozen=True)
 class PhotoResult:
-    """What one photo shows, and what was seen in it.
+    """The label of one photo, and its recognition.
 
     Attributes:
         path: The photo.
-        kind: What it shows in other words; may be empty.
-        truth: The sign that it shows, or ``NONE``.
-        seen: The sign that was seen.
-        confidence: 0 to 1, how sure that was.
-        hand_px: The longer side of the box about the landmarks, in pixels; None when no hand was found.
-        presence: 0 to 1, how sure the landmark model was that there is a hand; None when none was found.
-        person_set: Whose hand it is, or from which set of photos; may be empty.
-        likelihoods: How likely each sign is, 0 to 1; empty when no hand was found.
+        kind: A further description; may be empty.
+        truth: The correct sign, or ``NONE``.
+        seen: The recognised sign.
+        confidence: Of ``seen``, 0 to 1.
+        hand_px: The longer side of the landmarks' box, in pixels; None if no hand was found.
+        presence: The landmark model's hand presence, 0 to 1; None if no hand was found.
+        person_set: The person, or the set of photos; may be empty.
+        likelihoods: The likelihood of each sign, 0 to 1; empty if no hand was found.
     """
 
     path: str
@@ -47,7 +47,7 @@ class PhotoResult:
 
     @property
     def likeliest(self) -> tuple[str, float]:
-        """The likeliest sign, sure enough or not, and how likely it is; ``NONE`` and 0 without a hand."""
+        """The likeliest sign, even below its threshold, and its likelihood; ``NONE`` and 0 without a hand."""
         return max(self.likelihoods.items(), key=lambda item: item[1], default=(NONE, 0.0))
 
     def as_dict(self) -> dict[str, Any]:
@@ -68,11 +68,11 @@ class PhotoResult:
 
 @dataclass(frozen=True)
 class Confusion:
-    """How often each sign was taken for each.
+    """A confusion matrix.
 
     Attributes:
         labels: The signs, ``NONE`` last.
-        counts: A row for each true sign, in it a column for each sign that was seen.
+        counts: A row for each true sign, with a column for each recognised sign.
     """
 
     labels: tuple[str, ...]
@@ -80,7 +80,7 @@ class Confusion:
 
     @classmethod
     def of(cls, pairs: Iterable[tuple[str, str]], signs: Sequence[str]) -> "Confusion":
-        """Count ``pairs`` of a true sign and the one that was seen; ``signs`` gives the order."""
+        """Count ``pairs`` of the true and the recognised sign; ``signs`` gives the order."""
         labels = (*signs, NONE)
         counts = [[0] * len(labels) for _ in labels]
         for truth, seen in pairs:
@@ -94,15 +94,15 @@ class Confusion:
 
 @dataclass(frozen=True)
 class Tally:
-    """What is counted of any set of labelled photos; signs that none of them shows are left out.
+    """The counts of a set of labelled photos; signs that none of them shows are left out.
 
     Attributes:
-        photos: How many there are.
+        photos: Number of photos.
         recall: Of the photos of each sign, how many were right; a hand that is not found is wrong.
         recall_of_found: Likewise, of the photos in which a hand was found.
         wrong_motion: Of the photos of each sign, how many gave another sign that moves the robot.
-        false_commands: Of all photos that show no sign, how many gave one that moves the robot.
-        false_alarms: For each sign that can be told, of the photos that don't show it, how many gave it.
+        false_commands: Of all photos without a sign, how many gave one that moves the robot.
+        false_alarms: For each recognised sign, of the photos that do not show it, how many gave it.
     """
 
     photos: int
@@ -114,12 +114,12 @@ class Tally:
 
     @property
     def false_motion(self) -> Share:
-        """Of all photos, how many gave a sign that moves the robot and that they don't show."""
+        """Of all photos, how many gave a sign that moves the robot but is not shown."""
         return Share(sum(share.count for share in self.wrong_motion.values()), self.photos)
 
     @property
     def wrong_motion_of_signs(self) -> Share:
-        """Of all photos that show a sign, how many gave another one that moves the robot."""
+        """Of all photos with a sign, how many gave another one that moves the robot."""
         shares = [share for sign, share in self.wrong_motion.items() if sign != NONE]
         return Share(sum(share.count for share in shares), sum(share.of for share in shares))
 
@@ -142,12 +142,12 @@ class PhotoReport(Tally):
     """The figures of a set of labelled photos.
 
     Attributes:
-        unscored: How many photos were left out, as nobody could say what they show.
-        without_depth: How many hands were left out, as their landmarks have no depth.
-        recall_by_size: As ``recall``, for each of :data:`SIZES`.
-        false_commands_by_kind: As ``false_commands``, for each kind.
-        by_person_set: What is counted of each set of persons; empty when all are of the same.
-        confusion: Which sign was taken for which.
+        unscored: Number of photos left out because their sign is ambiguous.
+        without_depth: Number of hands left out because their landmarks have no depth.
+        recall_by_size: ``recall`` for each of :data:`SIZES`.
+        false_commands_by_kind: ``false_commands`` for each kind.
+        by_person_set: The counts of each set of persons; empty if there is only one.
+        confusion: The confusion matrix.
     """
 
     unscored: int
@@ -171,7 +171,7 @@ class PhotoReport(Tally):
 
 
 def tally(results: Collection[PhotoResult], signs: Sequence[str], motion: Collection[str]) -> Tally:
-    """Return what is counted of ``results``; the arguments are those of :func:`photo_report`."""
+    """Return the counts of ``results``; the arguments are those of :func:`photo_report`."""
     every: dict[str, list[PhotoResult]] = {sign: [] for sign in (*signs, NONE)}
     for photo in results:
         every[photo.truth].append(photo)
@@ -204,11 +204,11 @@ def photo_report(
     """Return the figures of ``results``.
 
     Args:
-        results: What was seen in each photo.
-        signs: The signs that can occur, without ``NONE``, in the order of the tables.
-        motion: Those that can move the robot.
-        unscored: How many photos were left out.
-        without_depth: How many hands were left out for want of depth.
+        results: The results of all photos.
+        signs: The recognised signs, without ``NONE``, in the order of the tables.
+        motion: The signs that move the robot.
+        unscored: Number of photos left out.
+        without_depth: Number of hands left out for missing depth.
     """
     whole = tally(results, signs, motion)
     sets = sorted({photo.person_set for photo in results})

@@ -1,4 +1,4 @@
-"""The file of a sign model: what tells hand shapes apart, and what it was trained on."""
+"""The file of a sign model: the classifier of hand shapes, and its training data's description."""
 
 import json
 from collections.abc import Mapping
@@ -20,7 +20,7 @@ FORMAT: Final = 1
 """Version of the file format and of the features."""
 
 DEFAULT_MODEL: Final = Path(__file__).parent / "default_model.npz"
-"""The model that handsteer ships; ``make signs-model`` makes it again."""
+"""The shipped model, which ``make signs-model`` reproduces."""
 
 _FILE: Final = NpzFormat(
     "sign model",
@@ -33,13 +33,13 @@ _FILE: Final = NpzFormat(
 
 @dataclass(frozen=True)
 class SignModel:
-    """Tells the shape of a hand from its features.
+    """Classifies the shape of a hand from its features.
 
     Attributes:
-        shapes: Names of the shapes, in the order of the network's classes; ``other`` is none of the rest.
+        shapes: Names of the shapes, in the order of the network's classes; ``other`` is any other shape.
         network: From features to shapes.
-        novelty: Knows how far from all that was learned a hand may be.
-        trained_on: What it was trained on, with which version, as plain values.
+        novelty: Limits the distance from the training data.
+        trained_on: Description of the training data and versions, as plain values.
     """
 
     shapes: tuple[str, ...]
@@ -48,7 +48,7 @@ class SignModel:
     trained_on: Mapping[str, Any]
 
     def probabilities(self, features: NDArray[np.float64]) -> dict[str, float]:
-        """Return how likely each shape is for the (features,) of one hand; nothing but ``other`` if it is all new."""
+        """Return the probability of each shape for the (features,) of one hand; only ``other`` for a new shape."""
         row = features[None]
         chances = self.network.probabilities(row)[0]
         if self.novelty.distances(row, np.array([chances.argmax()]))[0] > self.novelty.limit:
@@ -57,7 +57,7 @@ class SignModel:
 
 
 def save_model(model: SignModel, path: Path) -> None:
-    """Write ``model`` to ``path``: the same model always gives the same bytes."""
+    """Write ``model`` to ``path``, deterministically."""
     content = {
         "shapes": np.array(model.shapes),
         "limit": np.array(model.novelty.limit),
@@ -67,11 +67,11 @@ def save_model(model: SignModel, path: Path) -> None:
 
 
 def load_model(path: Path = DEFAULT_MODEL) -> SignModel:
-    """Return the model in the file ``path``. Nothing in a file is ever run.
+    """Return the model in the file ``path``, which may be untrusted: loading executes nothing.
 
     Raises:
         ModelMissing: It cannot be read.
-        ModelCorrupt: It is no sign model, is damaged, or has another format.
+        ModelCorrupt: It is not a sign model, is damaged, or has another format.
     """
     arrays = _FILE.read(path)
     try:

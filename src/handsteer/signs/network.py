@@ -22,10 +22,10 @@ class Network:
     """A multilayer perceptron from features to the scores of classes.
 
     Attributes:
-        mean: (features,) subtracted from the features first.
-        scale: (features,) that they are multiplied by then.
-        weights: One (inputs, outputs) matrix a layer.
-        biases: One (outputs,) vector a layer.
+        mean: (features,) subtracted from the features.
+        scale: (features,) factors applied after that.
+        weights: One (inputs, outputs) matrix per layer.
+        biases: One (outputs,) vector per layer.
     """
 
     mean: Array
@@ -34,7 +34,7 @@ class Network:
     biases: tuple[Array, ...]
 
     def logits(self, features: Array) -> Array:
-        """Return the (n, classes) scores of (n, features); their softmax gives probabilities."""
+        """Return the (n, classes) scores (logits) of (n, features)."""
         return self.layers(features)[-1]
 
     def probabilities(self, features: Array) -> Array:
@@ -42,7 +42,7 @@ class Network:
         return softmax(self.logits(features))
 
     def layers(self, features: Array) -> list[Array]:
-        """Return what each layer gets, the scaled features first, and last the scores."""
+        """Return the input of each layer, beginning with the scaled features, and the scores."""
         passed = [(features - self.mean) * self.scale]
         for layer, (weight, bias) in enumerate(zip(self.weights, self.biases, strict=True), 1):
             scores = passed[-1] @ weight + bias
@@ -66,18 +66,18 @@ def train(
     seed: int,
     progress: Callable[[int], object] = lambda _: None,
 ) -> Network:
-    """Return a network that tells the classes apart, all classes counting alike.
+    """Return a classification network, trained with equal weight for all classes.
 
-    Adam (D. Kingma and J. Ba, 2015) on the cross entropy, with a step that falls to nothing. After each epoch the
-    weights are rounded to a grid, so that the last digits in which processors differ don't grow: the same data gives
-    the same network everywhere.
+    Adam (D. Kingma and J. Ba, 2015) on the cross entropy, with a step that decays to zero. After each epoch the weights
+    are rounded to a grid, so that differences in rounding between processors do not grow: the same data gives the same
+    network everywhere.
 
     Args:
         features: (n, features).
         targets: (n,) class of each row, 0 to classes - 1; each class occurs.
         hidden: Sizes of the hidden layers.
-        epochs: How often all rows are seen.
-        seed: Of the first weights and the order of the rows.
+        epochs: Number of passes over all rows.
+        seed: Of the initial weights and the order of the rows.
         progress: Called after each epoch with its number, from 1.
     """
     random = np.random.default_rng(seed)
@@ -115,7 +115,7 @@ def _gradients(network: Network, features: Array, targets: NDArray[np.int64], im
 
 
 class _Adam:
-    """Changes parameters in place."""
+    """The Adam optimiser; updates parameters in place."""
 
     def __init__(self, parameters: list[Array]) -> None:
         self._parameters = parameters
@@ -134,7 +134,7 @@ class _Adam:
             parameter[:] -= step * corrected / (np.sqrt(square / (1 - 0.999**self._steps)) + 1e-8)
 
     def round(self) -> None:
-        """Put the parameters on a grid, and forget the gradients."""
+        """Round the parameters to a grid, and clear the moments."""
         for parameter, mean, square in zip(self._parameters, self._means, self._squares, strict=True):
             parameter[:] = rounded(parameter)
             mean[:] = 0.0
@@ -143,6 +143,6 @@ class _Adam:
 
 
 def rounded(values: Array) -> Array:
-    """Return ``values`` on a grid that is much coarser than the rounding errors of any processor."""
+    """Return ``values`` rounded to a grid much coarser than any processor's rounding errors."""
     on_grid: Array = np.round(values / _GRID) * _GRID
     return on_grid

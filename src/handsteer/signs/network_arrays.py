@@ -1,4 +1,4 @@
-"""A network and its novelty as the arrays of a file, and back."""
+"""Converts a network and its novelty to the arrays of a file, and back."""
 
 import itertools
 
@@ -9,11 +9,11 @@ from handsteer.signs.network import Network
 from handsteer.signs.novelty import Novelty
 from handsteer.signs.npz import Arrays
 
-_LARGEST = 1e9  # no number that was learnt comes near; products of some beyond would be infinite
+_LARGEST = 1e9  # trained values are far smaller; products of larger ones could be infinite
 
 
 def to_arrays(network: Network, novelty: Novelty) -> dict[str, NDArray[np.float32]]:
-    """Return the numbers of both by name, but the limit of the novelty."""
+    """Return the arrays of both by name, without the novelty's limit."""
     numbers = {"mean": network.mean, "scale": network.scale, "centres": novelty.centres, "whitening": novelty.whitening}
     for layer, (weights, biases) in enumerate(zip(network.weights, network.biases, strict=True)):
         numbers |= {f"weights_{layer}": weights, f"biases_{layer}": biases}
@@ -24,12 +24,12 @@ def from_arrays(arrays: Arrays, inputs: int) -> tuple[Network, Novelty]:
     """Return the network and the novelty of a file.
 
     Args:
-        arrays: Those that :func:`to_arrays` gives, and ``limit``.
-        inputs: How many features there are.
+        arrays: As from :func:`to_arrays`, with ``limit``.
+        inputs: Number of features.
 
     Raises:
         KeyError: An array is missing.
-        ValueError: They are no numbers, not finite, or do not fit together.
+        ValueError: They are not numeric, not finite, or inconsistent.
     """
     layers = range(sum(name.startswith("weights_") for name in arrays))
     network = Network(

@@ -1,4 +1,4 @@
-"""How far a hand is from all that was learned: landmarks that are no hand at all should not get a sign by chance."""
+"""Distance of a hand from the training data, so that landmarks that are no hand get no sign by chance."""
 
 from dataclasses import dataclass
 from typing import Final
@@ -15,13 +15,13 @@ _SHRINKAGE: Final = 0.1
 
 @dataclass(frozen=True)
 class Novelty:
-    """Mahalanobis distances to the classes, with one covariance for all of them.
+    """Mahalanobis distances to the classes, with one shared covariance.
 
     Attributes:
-        mean: (features,) subtracted from the features first.
-        scale: (features,) that they are multiplied by then.
+        mean: (features,) subtracted from the features.
+        scale: (features,) factors applied after that.
         centres: (classes, features) mean of each class, scaled.
-        whitening: (features, features) after which all classes spread alike in all directions.
+        whitening: (features, features) whitens the shared covariance.
         limit: Distance beyond which a hand counts as new.
     """
 
@@ -41,19 +41,19 @@ class Novelty:
 def learn_novelty(
     features: Array, classes: NDArray[np.int64], mean: Array, scale: Array, margin: float = 1.0
 ) -> Novelty:
-    """Return what is normal for (n, features) of (n,) classes: as far as 999 of 1000 are.
+    """Return the novelty of (n, features) of (n,) classes, with the 99.9 % quantile of their distances as limit.
 
     Args:
         features: (n, features).
         classes: (n,) from 0; each occurs.
-        mean: (features,) subtracted from the features first.
-        scale: (features,) that they are multiplied by then.
-        margin: How many times as far as those a hand may be.
+        mean: (features,) subtracted from the features.
+        scale: (features,) factors applied after that.
+        margin: Factor on the limit.
     """
     scaled = (features - mean) * scale
     centres = rounded(np.stack([scaled[classes == each].mean(axis=0) for each in range(classes.max() + 1)]))
     gaps = scaled - centres[classes]
-    # The covariance is mixed with an even one, as real hands differ from made ones in ways that these never do.
+    # Shrinkage towards a uniform covariance, because real hands vary in ways that synthetic ones never do.
     covariance = (1 - _SHRINKAGE) * (gaps.T @ gaps) / len(gaps) + _SHRINKAGE * np.eye(gaps.shape[1])
     whitening = rounded(np.linalg.cholesky(np.linalg.inv(covariance)))
     novelty = Novelty(mean, scale, centres, whitening, np.inf)

@@ -1,4 +1,4 @@
-"""Reads .npz files that came from anywhere: arrays only, nothing in them is ever run."""
+"""Reads untrusted .npz files: arrays only; nothing in them is executed."""
 
 import math
 import os
@@ -16,7 +16,7 @@ from handsteer.errors import HandsteerError
 Arrays = dict[str, NDArray[Any]]
 
 LARGEST_BYTES: Final = 256_000_000
-"""Of all arrays of a file together; half a million hands are as large."""
+"""Maximum size of all arrays of a file together; half a million hands take as much."""
 
 MOST_ARRAYS: Final = 100
 
@@ -27,14 +27,14 @@ _KINDS: Final = frozenset("biufU")
 
 
 class NpzFormat:
-    """A kind of .npz file: what it is called, its version, and the errors that tell what is wrong with one.
+    """A kind of .npz file: its name, version and errors.
 
     Args:
-        what: Its name for people, such as ``sign model``.
-        version: The version that is known; it stands in the array ``format``.
-        missing: Raised when a file cannot be read.
-        corrupt: Raised when a file is of another kind or version, or damaged.
-        remedy: What people can do then, as the end of a sentence.
+        what: Its name in messages, such as ``sign model``.
+        version: The supported version, stored in the array ``format``.
+        missing: Raised if a file cannot be read.
+        corrupt: Raised if a file is of another kind or version, or damaged.
+        remedy: What users can do then, as the end of a sentence.
     """
 
     def __init__(
@@ -50,7 +50,7 @@ class NpzFormat:
         """Return the arrays of the file ``path``, of this kind and version.
 
         Raises:
-            HandsteerError: It cannot be read, or is not such a file; of the types given.
+            HandsteerError: It cannot be read, or is not such a file; ``missing`` or ``corrupt``.
         """
         try:
             with zipfile.ZipFile(path) as file:
@@ -61,7 +61,7 @@ class NpzFormat:
             raise self._missing(f"cannot read the {self.what} {path} ({reason}): {self.remedy}") from None
         except _RefusedError as problem:
             raise self._corrupt(f"{path}: not a {self.what}: {problem}; {self.remedy}") from None
-        except Exception:  # the readers of headers and of packed data raise whatever they stumble on
+        except Exception:  # the readers of headers and of compressed data raise errors of any type
             raise self._corrupt(f"{path}: not a {self.what}, or damaged; {self.remedy}") from None
         version = arrays.pop("format", None)
         if version is None or version.shape != () or version != self.version:
@@ -70,14 +70,14 @@ class NpzFormat:
         return arrays
 
     def damaged(self, path: Path, reason: object) -> HandsteerError:
-        """Return the error that says that the file ``path`` is damaged."""
+        """Return the error for a damaged file ``path``."""
         return self._corrupt(f"{path}: a damaged {self.what} ({str(reason)[:_LONGEST_REASON]}); {self.remedy}")
 
     def write(self, path: Path, arrays: Mapping[str, Any]) -> None:
-        """Write ``arrays`` to ``path``, as a whole or not at all; the same arrays always give the same bytes.
+        """Write ``arrays`` to ``path``, atomically and deterministically.
 
         Raises:
-            OSError: There is no such folder, or no place.
+            OSError: The folder does not exist, or there is no space.
         """
         handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
         try:
@@ -95,7 +95,7 @@ class _RefusedError(Exception):
 
 
 def _check_sizes(file: zipfile.ZipFile) -> None:
-    """Look at what the directory of ``file`` says; no more than that is unpacked of any entry."""
+    """Check the sizes in the directory of ``file``; no more than that is decompressed of any entry."""
     entries = file.infolist()
     if len(entries) > MOST_ARRAYS:
         raise _RefusedError(f"it has {len(entries)} arrays")
@@ -105,12 +105,12 @@ def _check_sizes(file: zipfile.ZipFile) -> None:
 
 
 def _array(file: zipfile.ZipFile, entry: zipfile.ZipInfo) -> NDArray[Any]:
-    """Return the array of ``entry``, for which no more is taken than the directory says it has."""
+    """Return the array of ``entry``, without reading more than the directory specifies."""
     with file.open(entry) as stream:
         version = np.lib.format.read_magic(stream)
         read_header = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
         shape, _, kind = read_header(stream)
-    # In numbers of Python: a shape may be of more elements than a machine's integer holds.
+    # With Python's integers, because the number of elements may overflow a machine's.
     if kind.kind not in _KINDS:
         raise _RefusedError(f"its array {entry.filename[:60]!r} is neither of numbers nor of text")
     if math.prod(shape) * kind.itemsize > entry.file_size:
@@ -123,7 +123,7 @@ def _array(file: zipfile.ZipFile, entry: zipfile.ZipInfo) -> NDArray[Any]:
 
 
 def _is_text(array: NDArray[Any]) -> bool:
-    """Return whether ``array``, of kind U, has characters of Unicode alone; others break Python."""
+    """Return whether ``array``, of kind U, has only valid Unicode characters; others crash Python."""
     codes = np.frombuffer(array.tobytes(), np.dtype("u4").newbyteorder(array.dtype.byteorder))
     return not ((codes > _LAST_CHARACTER) | ((codes >> 11) == _SURROGATES)).any()
 

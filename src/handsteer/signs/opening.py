@@ -1,4 +1,4 @@
-"""What a configuration describes, opened: what finds hands, and what tells their signs."""
+"""Opens the landmarker and the classifier of a configuration."""
 
 from handsteer.config import Config, SignsConfig
 from handsteer.landmarks.hand import Landmarker
@@ -10,7 +10,7 @@ from handsteer.signs.trained import TrainedClassifier
 
 
 def open_landmarker(config: Config) -> Landmarker:
-    """Return what finds the hands in frames.
+    """Return the hand landmarker.
 
     Raises:
         ModelError: A landmark model is missing or broken.
@@ -19,7 +19,7 @@ def open_landmarker(config: Config) -> Landmarker:
 
 
 def open_classifier(config: SignsConfig) -> Classifier:
-    """Return the classifier that ``config`` describes: the signs that are shipped, and those that were taught.
+    """Return the classifier of the shipped and taught signs of ``config``.
 
     Raises:
         ModelError: A sign model is missing or broken.

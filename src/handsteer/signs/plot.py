@@ -1,4 +1,4 @@
-"""The plots of an evaluation, drawn by OpenCV: what a report needs, without another library to install."""
+"""The plots of an evaluation, drawn with OpenCV to avoid a further dependency."""
 
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
@@ -20,7 +20,7 @@ GRID: Colour = (210, 210, 210)
 BLUE: Colour = (142, 96, 24)
 RED: Colour = (48, 56, 200)
 COLOURS: tuple[Colour, ...] = (BLUE, RED, (60, 140, 40), (30, 150, 230), (150, 60, 150), (120, 120, 120), (160, 160, 0))
-"""Told apart also by most who see colours otherwise; the first for the first line, and so on."""
+"""Colours of successive lines, chosen to be distinguishable with most kinds of colour blindness."""
 
 _FONT = cv2.FONT_HERSHEY_SIMPLEX
 _LEFT, _RIGHT, _TOP, _BOTTOM = 76, 150, 60, 64
@@ -36,26 +36,26 @@ def write(picture: Picture, text: str, origin: tuple[int, int], scale: float, in
 def centre(
     picture: Picture, text: str, middle: tuple[int, int], scale: float, *, ink: Colour = INK, widest: int = 10_000
 ) -> None:
-    """Write ``text`` about ``middle``, smaller where it would be wider than ``widest`` pixels."""
+    """Write ``text`` centred at ``middle``, smaller if it would be wider than ``widest`` pixels."""
     scale *= min(1.0, widest / text_width(text, scale))
     (width, height), _ = cv2.getTextSize(text, _FONT, scale, 1)
     write(picture, text, (middle[0] - width // 2, middle[1] + height // 2), scale, ink)
 
 
 def text_width(text: str, scale: float) -> int:
-    """Return how wide ``text`` is, in pixels."""
+    """Return the width of ``text`` in pixels."""
     return max(1, int(cv2.getTextSize(text, _FONT, scale, 1)[0][0]))
 
 
 class Plot:
-    """Axes in percent, with room for a legend at their right.
+    """Axes in percent, with space for a legend on the right.
 
     Args:
-        title: A line above them.
-        x: What goes to the right.
-        y: What goes upwards.
-        x_range: The shares at the ends of the x axis, 0 to 1.
-        y_range: Likewise, of the y axis.
+        title: A line above the axes.
+        x: Label of the x axis.
+        y: Label of the y axis.
+        x_range: The ends of the x axis, 0 to 1.
+        y_range: The ends of the y axis, 0 to 1.
 
     Attributes:
         picture: (height, width, 3) uint8, BGR.
@@ -127,14 +127,10 @@ _LEFT, _TOP = 150, 96
 
 
 def draw_confusion(confusion: Confusion, title: str) -> Picture:
-    """Return a picture of ``confusion``: (height, width, 3) uint8, BGR.
+    """Return a picture of ``confusion``, below a ``title``: (height, width, 3) uint8, BGR.
 
-    A row for each true sign that occurs, a column for each sign that was seen. A cell is as dark as its share of its
-    row: blue where that is right, red where it is wrong. Rows without photos are left out.
-
-    Args:
-        confusion: What to draw.
-        title: A line above it.
+    A row for each true sign that occurs, and a column for each recognised sign. The shade of a cell is its share of the
+    row: blue if right, red if wrong. Rows without photos are left out.
     """
     labels = confusion.labels
     rows = [(at, label) for at, label in enumerate(labels) if sum(confusion.counts[at])]
@@ -156,7 +152,7 @@ def draw_confusion(confusion: Confusion, title: str) -> Picture:
 
 def _draw_cell(picture: Picture, corner: tuple[int, int], count: int, share: float, *, right: bool) -> None:
     x, y = corner
-    # The colour at a share of 1; at 0 a cell is white.
+    # Interpolates from white at a share of 0 to the full colour at 1.
     colour = (255 + share * (np.array(BLUE if right else RED) - 255)).astype(np.uint8)
     picture[y : y + _CELL, x : x + _CELL] = colour
     cv2.rectangle(picture, (x, y), (x + _CELL, y + _CELL), GRID, 1)
@@ -168,18 +164,14 @@ def _draw_cell(picture: Picture, corner: tuple[int, int], count: int, share: flo
 
 
 _TOPS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)
-"""Where an axis may end, so that its ticks are round."""
+"""Ends of axes that give round ticks."""
 
 
 def draw_reliability(figures: Calibration, title: str) -> Picture:
-    """Return a picture of ``figures``: (height, width, 3) uint8, BGR.
+    """Return a picture of the calibration ``figures``, below a ``title``: (height, width, 3) uint8, BGR.
 
-    A dot for each bin at its mean likelihood and the share that is right, with its 95 % interval and how many hands are
-    in it. Dots below the diagonal are too sure, dots above it not sure enough.
-
-    Args:
-        figures: What to draw.
-        title: A line above it.
+    A dot for each bin at its mean likelihood and share of right hands, with the 95 % interval and the number of hands.
+    Dots below the diagonal are overconfident, dots above it underconfident.
     """
     error = figures.expected_error
     plot = Plot(title, "likelihood of the likeliest sign", "share that shows it; the number of hands")
@@ -197,14 +189,10 @@ def draw_reliability(figures: Calibration, title: str) -> Picture:
 
 
 def draw_sweep(rows: Mapping[float, Tally], title: str) -> Picture:
-    """Return a picture of what thresholds do: (height, width, 3) uint8, BGR.
+    """Return a picture of the effect of thresholds, below a ``title``: (height, width, 3) uint8, BGR.
 
-    At the left recall, at the right what it costs: a line for each sign, a dot for each threshold; in black how many of
-    all photos would move the robot as they should not.
-
-    Args:
-        rows: What is counted with each threshold, 0.25 to 1.
-        title: A line above it.
+    On the left recall, on the right false alarms: a line for each sign, a dot for each threshold in ``rows``, 0.25 to
+    1; in black the share of all photos that would move the robot wrongly.
     """
     tallies = list(rows.values())
     shown = [sign for sign in tallies[0].recall if sign != NONE]

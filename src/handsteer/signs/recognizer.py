@@ -1,4 +1,4 @@
-"""From a frame to the sign that counts: landmarks, classifier and filter in a row."""
+"""From a frame to the confirmed sign: landmarks, classifier, hand selector and debouncer in a row."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -19,15 +19,15 @@ _NOTHING = SignGuess(NONE, 0.0)
 
 @dataclass(frozen=True)
 class Recognition:
-    """What was understood of one frame.
+    """The recognition of one frame.
 
     Attributes:
-        sign: The sign that counts; this is what drives.
-        seen: The sign that this frame alone shows.
-        confidence: 0 to 1, how sure ``seen`` is.
-        progress: 0 to 1, how far ``seen`` is on its way to count.
-        hand: The hand that was looked at; None when there is none.
-        likelihoods: How likely each known sign is for that hand, 0 to 1, sure enough or not; empty when there is none.
+        sign: The confirmed sign, which drives.
+        seen: The sign in this frame alone.
+        confidence: Of ``seen``, 0 to 1.
+        progress: Progress of confirming ``seen``, 0 to 1.
+        hand: The active hand; None if there is none.
+        likelihoods: The likelihood of each known sign for that hand, 0 to 1; empty without a hand.
     """
 
     sign: str
@@ -39,7 +39,7 @@ class Recognition:
 
     @property
     def reason(self) -> str:
-        """A sentence for people on what is seen."""
+        """A sentence that describes what is seen."""
         if self.hand is None:
             return "no hand is in view"
         if self.seen == NONE:
@@ -53,9 +53,9 @@ class Recognizer:
     """Recognises signs: in a stream of frames by :meth:`step`, in one picture by :meth:`recognize`.
 
     Args:
-        config: Everything that can be set; the defaults when None.
-        landmarker: Finds the hands; opened as ``config.landmarks`` says when None.
-        classifier: Tells the sign of a hand; opened as ``config.signs`` says when None.
+        config: The configuration; the defaults if None.
+        landmarker: Finds the hands; opened from ``config.landmarks`` if None.
+        classifier: Recognises the sign of a hand; opened from ``config.signs`` if None.
 
     Raises:
         ModelError: A landmark model or the sign model is missing or broken.
@@ -78,13 +78,13 @@ class Recognizer:
 
     @property
     def signs(self) -> tuple[str, ...]:
-        """The signs that it can tell, without ``NONE``."""
+        """The recognised signs, without ``NONE``."""
         return self._classifier.signs
 
     def recognize(self, image: NDArray[np.uint8]) -> Recognition:
-        """Return what one picture shows by itself; the stream is forgotten, before and after.
+        """Return the recognition of one picture alone; resets the stream before and after.
 
-        Its ``sign`` is that of the picture, which nothing has to confirm.
+        Its ``sign`` is that of the picture, without confirmation.
 
         Args:
             image: (height, width, 3) uint8, BGR, not mirrored.
@@ -98,7 +98,7 @@ class Recognizer:
         return replace(recognition, sign=recognition.seen)
 
     def step(self, image: NDArray[np.uint8], dt_s: float) -> Recognition:
-        """Take the next frame.
+        """Process the next frame.
 
         Args:
             image: (height, width, 3) uint8, BGR, not mirrored.
@@ -107,7 +107,7 @@ class Recognizer:
         Raises:
             FrameError: The image has another shape or type.
         """
-        # A hand whose sign is about to count is as good as chosen.
+        # A hand whose sign is being confirmed is effectively selected.
         search = self._selector.wants_search() and self._filter.candidate == NONE
         hands = self._landmarker.detect(image, search=search, dt_s=dt_s)
         told = [self._classifier.classify(hand) for hand in hands]
@@ -126,25 +126,25 @@ class Recognizer:
         return Recognition(sign, guess.sign, guess.confidence, self._filter.progress, hand, likelihoods)
 
     def reconfigure(self, config: SignsConfig) -> None:
-        """Go on with other confidences and times; what is followed and what counts stays."""
+        """Change confidences and times; the active hand and the confirmed sign stay."""
         self._config = config
         self._filter.reconfigure(config)
         self._selector.reconfigure(config)
 
     def use(self, classifier: Classifier) -> None:
-        """Tell the signs by ``classifier`` from the next frame on; no sign counts until it is confirmed anew."""
+        """Use ``classifier`` from the next frame on; every sign must be confirmed again."""
         self._classifier = classifier
         self.reset()
 
     def reset(self) -> None:
-        """Forget the stream: no hand is followed and no sign counts."""
+        """Reset the stream: no active hand, no confirmed sign."""
         self._landmarker.reset()
         self._filter.reset()
         self._selector.reset()
         self._evidence.reset()
 
     def _bridged(self, guess: SignGuess, since_s: float) -> SignGuess:
-        """Return the candidate in place of a ``guess`` of nothing, if the frames since it began are sure of it."""
+        """Return the candidate instead of a ``NONE`` guess, if its mean likelihood so far is above its threshold."""
         candidate = self._filter.candidate
         if guess.sign != NONE or candidate == NONE:
             return guess
@@ -153,6 +153,6 @@ class Recognizer:
         return SignGuess(candidate, confidence) if confidence >= self._config.min_confidence else guess
 
     def _seen(self, guess: SignGuess) -> SignGuess:
-        """Return ``guess`` if it is sure enough, else ``NONE``; the sign that counts need be less sure to be kept."""
+        """Return ``guess`` if above its threshold, else ``NONE``; the confirmed sign has a lower threshold."""
         least = self._config.release_confidence if guess.sign == self._filter.sign else self._config.min_confidence
         return guess if guess.confidence >= min(least, self._config.min_confidence) else _NOTHING

@@ -1,4 +1,4 @@
-"""What signs are evaluated on: folders of labelled photos, datasets of landmarks, videos."""
+"""Sources of an evaluation: folders of labelled photos, datasets of landmarks, videos."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -18,19 +18,19 @@ from handsteer.signs.views import View
 from handsteer.types import NONE
 
 Watch = Callable[[Iterable[Any], str], Iterable[Any]]
-"""Passes on what it is given, a unit of what; and may show how far it is."""
+"""Passes items through, given their unit; may show the progress."""
 
 
 @dataclass(frozen=True)
 class PhotoRun:
-    """What was seen in the photos of a folder, or in the hands of a dataset.
+    """The results of the photos of a folder, or of the hands of a dataset.
 
     Attributes:
         source: The folder or file.
-        view: How it was looked at.
-        results: What was seen in each that is scored.
-        unscored: How many were left out.
-        without_depth: How many hands were left out for want of depth.
+        view: How it was transformed.
+        results: The results of all scored items.
+        unscored: Number of items left out.
+        without_depth: Number of hands left out for missing depth.
     """
 
     source: str
@@ -42,7 +42,7 @@ class PhotoRun:
 
 @dataclass(frozen=True)
 class VideoRun:
-    """What was seen in the frames of a video."""
+    """The results of the frames of a video."""
 
     source: str
     view: View
@@ -51,13 +51,13 @@ class VideoRun:
 
 @dataclass(frozen=True)
 class LabelledFolder:
-    """A folder of photos whose signs are known."""
+    """A folder of labelled photos."""
 
     path: Path
     photos: tuple[LabelledPhoto, ...]
 
     def run(self, recognizer: Recognizer, view: View, watch: Watch) -> PhotoRun:
-        """Return what ``recognizer`` sees in the photos when they are looked at as ``view`` does.
+        """Return the results of ``recognizer`` on the photos, transformed by ``view``.
 
         Raises:
             CameraUnreadable: A photo cannot be decoded.
@@ -68,13 +68,13 @@ class LabelledFolder:
 
 @dataclass(frozen=True)
 class LabelledHands:
-    """A dataset of landmarks whose signs are all known."""
+    """A dataset of landmarks with known signs only."""
 
     path: Path
     dataset: Dataset
 
     def run(self, classifier: Classifier, min_confidence: float, view: View, watch: Watch) -> PhotoRun:
-        """Return what ``classifier`` tells of the hands when they are looked at as ``view`` does."""
+        """Return the results of ``classifier`` on the hands, transformed by ``view``."""
         hands = [(take.label, hand) for take in self.dataset.takes for hand in take.hands]
         without_depth = sum(lacks_depth(hand, label, classifier) for label, hand in hands)
         results = tuple(watch(evaluate_takes(self.dataset, classifier, min_confidence, view), "hands"))
@@ -84,16 +84,16 @@ class LabelledHands:
 
 @dataclass(frozen=True)
 class LabelledVideo:
-    """A video, and the sign of each frame where it is known; None where nothing is."""
+    """A video, and the sign of each labelled frame; None without labels."""
 
     path: Path
     truths: dict[int, str] | None
 
     def run(self, recognizer: Recognizer, view: View, watch: Watch) -> VideoRun:
-        """Return what ``recognizer`` sees in the frames when they are looked at as ``view`` does.
+        """Return the results of ``recognizer`` on the frames, transformed by ``view``.
 
         Raises:
-            CameraUnreadable: It is not a video that can be decoded.
+            CameraUnreadable: It is not a video, or cannot be decoded.
             LabelError: There are labels for more frames than there are.
         """
         frames = watch(video_frames(self.path), "frames")
@@ -104,13 +104,13 @@ Source = LabelledFolder | LabelledHands | LabelledVideo
 
 
 def open_source(path: Path, classifier: Classifier) -> Source:
-    """Return what is at ``path``, with its labels: a folder, a dataset (``.npz``), or else a video.
+    """Return the source at ``path``, with its labels: a folder, a dataset (``.npz``), or else a video.
 
     Raises:
-        EvaluationError: There is nothing, its labels are wrong or name signs that ``classifier`` doesn't know, or
-            nothing in it can be scored.
-        CameraUnreadable: It is not a video that can be decoded.
-        DatasetError: It is not a dataset that can be read.
+        EvaluationError: It does not exist, its labels are wrong or name signs unknown to ``classifier``, or nothing in
+            it can be scored.
+        CameraUnreadable: It is not a video, or cannot be decoded.
+        DatasetError: It is not a dataset, or cannot be read.
     """
     if path.suffix.lower() == ".npz":
         return _open_dataset(path, classifier)
@@ -118,7 +118,7 @@ def open_source(path: Path, classifier: Classifier) -> Source:
         return LabelledFolder(path, tuple(read_photo_labels(path, classifier.signs)))
     if path.suffix.lower() in PHOTO_SUFFIXES:
         raise EvaluationError(f"{path} is a photo: give the folder of labelled photos that it is in, or a video")
-    next(video_frames(path))  # now rather than when others have been looked at for an hour
+    next(video_frames(path))  # fail now, not after an hour of evaluating other sources
     return LabelledVideo(path, read_video_labels(path, classifier.signs))
 
 

@@ -1,4 +1,4 @@
-"""Signs recognised by a trained network from the shape of the hand, and by where it points."""
+"""Recognises signs by the hand's shape, with a trained network, and by its direction."""
 
 import math
 from typing import Final
@@ -22,53 +22,62 @@ from handsteer.signs.model import SignModel
 from handsteer.types import BACKWARD, FORWARD, GO, NONE, SIGNS, STOP, TURN_LEFT, TURN_RIGHT
 
 _DOUBT: Final = 1.5
-"""Width of the doubt about a limit, degrees."""
+"""Width of the soft limits below, in degrees."""
 _POINTING: Final = 52.0
-"""How far off its axis an index finger may point, degrees: people tilt their hands by up to 30, and their fingers in
-their hands."""
+"""Largest angle of an index finger to its axis, in degrees.
+
+People tilt their hands by up to 30 degrees, and their fingers relative to the hand.
+"""
 _SIDEWAYS: Final = 49.0
-"""How far off the horizontal a thumb may point, degrees: about half-way to a thumb up or down."""
+"""Largest angle of a thumb to the horizontal, in degrees: about half-way to a thumb up or down."""
 _UPRIGHT: Final = 55.0
-"""How far from upwards an open hand may point: others hang, or rest."""
+"""Largest angle of an open hand to upwards: beyond it, hands hang or rest."""
 _RAISED: Final = 120.0
-"""How far from upwards a fist may point, likewise."""
+"""Likewise, of a fist."""
 _HANGING: Final = 145.0
-"""How far from upwards the palms of hands point that hang down: of people who do nothing, 156 to 178 degrees."""
+"""Smallest angle of a hanging hand's palm to upwards: 156 to 178 degrees for people at rest."""
 _HANGING_TRUST: Final = 0.82
-"""What a thumb of a hand that hangs is worth: it may lie beside the fingers, and look as if it pointed to a side."""
+"""Factor on the thumb's likelihood for a hanging hand: next to the fingers, it may seem to point sideways."""
 _AWAY: Final = 0.06
 _AWAY_DOUBT: Final = 0.01
-"""How much farther from the camera than its base the tip of an index finger is that hangs at rest, in palm lengths, and
-the width of that: 0.08 to 0.18 of people who do nothing; of those who point, 99 of 100 point towards the camera."""
+"""Depth of a resting index finger's tip beyond its base, in palm lengths, and the width of that limit.
+
+0.08 to 0.18 for people at rest; of people who point, 99 of 100 point towards the camera.
+"""
 _HALF_OPEN: Final = 0.56
 _HALF_OPEN_DOUBT: Final = 0.012
-"""How far from its base the tip of the middle finger is then, likewise: 0.55 to 0.68; 0.45 in one that points."""
+"""Likewise, the distance of the middle finger's tip from its base: 0.55 to 0.68 at rest; 0.45 in a pointing hand."""
 
 _PRESENT: Final = 0.7
 _PRESENT_DOUBT: Final = 0.05
-"""The landmark model's certainty at which it is as likely that there is no hand, and the width of that: of people's
-hands 99 of 100 are above 0.85, of faces that it takes for a hand half are below."""
+"""Presence at which a hand and none are equally likely, and the width of that limit.
+
+The landmark model reports above 0.85 for 99 of 100 hands, and less than the limit for half of the faces it mistakes for
+one.
+"""
 _SMALL_PX: Final = 17.0
 _SMALL_DOUBT_PX: Final = 4.0
-"""Longer side at which a hand is read half as surely, pixels, and the width of that: at 35 pixels a hundredth is
-missing, and a fist 3 m from a webcam of 640x480 has some 17."""
+"""Longer side of a hand at which likelihoods are halved, in pixels, and the width of that limit.
+
+At 35 pixels they lose a hundredth; a fist 3 m from a webcam of 640x480 has some 17.
+"""
 
 _THRESHOLDS: Final = {STOP: 0.5, GO: 0.6, FORWARD: 0.7, BACKWARD: 0.9, TURN_LEFT: 0.65, TURN_RIGHT: 0.65}
-"""Likelihood from which each sign is sure enough; docs/signs.md has the false rates that they were chosen for."""
+"""Likelihood thresholds of the signs; docs/signs.md has the false rates that they were chosen for."""
 SURE: Final = 0.8
-"""The confidence of a sign whose likelihood is just at its threshold."""
+"""The confidence of a sign whose likelihood equals its threshold."""
 
 
 class TrainedClassifier:
-    """A :class:`~handsteer.signs.classifier.Classifier` that knows the shapes of a model.
+    """A :class:`~handsteer.signs.classifier.Classifier` for the shapes of a model.
 
-    The network says how likely it is that the hand is open, points with its index finger, stretches out its thumb or
-    is a fist; where it points in the image makes a sign of that. A sign's likelihood is that of the shape, times that
-    of the direction, times how far the hand can be read (:func:`legibility`). Its confidence grows with it from 0 by
-    0.8 at the sign's own threshold to 1: a motion has to be likelier than ``Go`` and ``Stop`` to be as sure.
+    The network gives the likelihoods that the hand is open, points with its index finger, extends its thumb or is a
+    fist; the direction in the image determines the sign. A sign's likelihood is the product of those of its shape, of
+    its direction and of the hand's :func:`legibility`. The confidence increases with it from 0 through 0.8 at the
+    sign's threshold to 1. Motions have higher thresholds than ``Go`` and ``Stop``.
 
     Args:
-        model: As :func:`~handsteer.signs.model.load_model` gives it.
+        model: As from :func:`~handsteer.signs.model.load_model`.
     """
 
     def __init__(self, model: SignModel) -> None:
@@ -76,13 +85,13 @@ class TrainedClassifier:
 
     @property
     def signs(self) -> tuple[str, ...]:
-        """The signs that it can tell, without ``NONE``."""
+        """The recognised signs, without ``NONE``."""
         return SIGNS
 
     def classify(self, hand: Hand) -> SignGuess:
-        """Return the sign that ``hand`` shows; ``NONE`` when it is likelier that it shows none.
+        """Return the sign that ``hand`` shows; ``NONE`` if that is likelier.
 
-        Nothing can be said of a hand whose landmarks are not all finite: it is ``NONE`` with a confidence of 0.
+        A hand with landmarks that are not finite is ``NONE`` with a confidence of 0.
         """
         if not (np.isfinite(hand.points[:, :2]).all() and np.isfinite(hand.world).all()):
             return SignGuess(NONE, 0.0, dict.fromkeys(SIGNS, 0.0))
@@ -97,14 +106,14 @@ class TrainedClassifier:
         return SignGuess(best, self.confidence(best, likelihoods[best]), likelihoods)
 
     def confidence(self, sign: str, likelihood: float) -> float:
-        """Return the confidence, 0 to 1, of ``sign`` when it is as likely as ``likelihood``."""
+        """Return the confidence, 0 to 1, of ``sign`` with this ``likelihood``."""
         return float(likelihood ** (math.log(SURE) / math.log(_THRESHOLDS[sign])))
 
 
 def legibility(hand: Hand) -> float:
-    """Return how far ``hand`` can be read at all, 0 to 1.
+    """Return how reliably ``hand`` can be read, 0 to 1.
 
-    That is how sure the landmark model is that it is there, times that it has enough pixels, times the share of its
+    The product of the likelihood that it is present, the likelihood that it has enough pixels, and the share of its
     landmarks that are in the frame.
     """
     inside = ((hand.points[:, :2] >= 0.0) & (hand.points[:, :2] <= 1.0)).all(axis=1).mean()
@@ -114,7 +123,7 @@ def legibility(hand: Hand) -> float:
 
 
 def _signs(shapes: dict[str, float], pixels: NDArray[np.float64], world: NDArray[np.floating]) -> dict[str, float]:
-    """Return how likely each sign is, given the shapes' likelihoods, (1, 21, 2) and (21, 3) world landmarks."""
+    """Return the likelihood of each sign from those of the shapes, (1, 21, 2) pixels and (21, 3) world landmarks."""
     index, thumb, palm = (vectors[0] for vectors in directions(pixels))
     hangs = 1.0 - _within(_HANGING, _from_up(palm))
     sideways = shapes.get("thumb", 0.0) * (1.0 - (1.0 - _HANGING_TRUST) * hangs)
@@ -123,16 +132,16 @@ def _signs(shapes: dict[str, float], pixels: NDArray[np.float64], world: NDArray
         GO: shapes.get("fist", 0.0) * _within(_RAISED, _from_up(palm)),
         FORWARD: shapes.get("index", 0.0) * _within(_POINTING, _from_up(index)),
         BACKWARD: shapes.get("index", 0.0) * _within(_POINTING, 180.0 - _from_up(index)) * (1.0 - _at_rest(world)),
-        # The frame is not mirrored: the user's own right is the left of the image.
+        # The frame is not mirrored: the user's right is the left of the image.
         TURN_LEFT: sideways * _within(_SIDEWAYS, _from_right(thumb)),
         TURN_RIGHT: sideways * _within(_SIDEWAYS, 180.0 - _from_right(thumb)),
     }
 
 
 def _at_rest(world: NDArray[np.floating]) -> float:
-    """Return how sure it is, 0 to 1, that a hand whose index finger points down, (21, 3), is at rest.
+    """Return the likelihood, 0 to 1, that a hand with its index finger down, (21, 3), is at rest.
 
-    Then the finger points away from the camera, and the others are half open.
+    At rest, the finger points away from the camera, and the others are half open.
     """
     palm = max(float(np.linalg.norm(world[list(KNUCKLES)] - world[WRIST], axis=1).mean()), 1e-6)
     away = float(world[INDEX_TIP, 2] - world[INDEX_BASE, 2]) / palm
@@ -141,15 +150,15 @@ def _at_rest(world: NDArray[np.floating]) -> float:
 
 
 def _from_up(vector: NDArray[np.float64]) -> float:
-    """Return the angle between ``vector``, x right and y down, and upwards in the image, degrees."""
+    """Return the angle of ``vector``, x right and y down, to upwards in the image, in degrees."""
     return math.degrees(math.atan2(abs(float(vector[0])), -float(vector[1])))
 
 
 def _from_right(vector: NDArray[np.float64]) -> float:
-    """Return the angle between ``vector``, x right and y down, and the image's right, degrees."""
+    """Return the angle of ``vector``, x right and y down, to the image's right, in degrees."""
     return math.degrees(math.atan2(abs(float(vector[1])), float(vector[0])))
 
 
 def _within(limit: float, value: float, doubt: float = _DOUBT) -> float:
-    """Return how sure it is, 0 to 1, that ``value`` is below ``limit``."""
+    """Return the likelihood, 0 to 1, that ``value`` is below ``limit``."""
     return 1.0 / (1.0 + math.exp(min(50.0, (value - limit) / doubt)))

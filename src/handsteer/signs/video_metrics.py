@@ -1,4 +1,4 @@
-"""How well signs are told over time: false commands a minute, and how soon each sign counts."""
+"""Figures of sign recognition over time: false commands per minute, and reaction times."""
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
@@ -13,13 +13,13 @@ from handsteer.types import NONE
 
 @dataclass(frozen=True)
 class FrameVerdict:
-    """What one frame shows, and what was made of it.
+    """The label of one frame, and its recognition.
 
     Attributes:
-        time_s: When it is, from the first frame.
-        truth: The sign that it shows, or ``NONE``; None when nobody knows.
-        seen: The sign that was seen in this frame alone.
-        counts: The sign that counted, and drove.
+        time_s: Seconds since the first frame.
+        truth: The correct sign, or ``NONE``; None if unknown.
+        seen: The sign recognised in this frame alone.
+        counts: The confirmed sign, which drives.
     """
 
     time_s: float
@@ -30,14 +30,14 @@ class FrameVerdict:
 
 @dataclass(frozen=True)
 class Event:
-    """A time in which a sign counted without a break.
+    """A period in which one sign was confirmed without a break.
 
     Attributes:
         sign: The sign.
-        start_s: When it began, in seconds from the first frame of the video.
-        end_s: When its last frame was.
+        start_s: Its start, in seconds from the first frame of the video.
+        end_s: The time of its last frame.
         video: The video.
-        engaged: Whether another sign counted right before, so that somebody was driving.
+        engaged: Whether another sign was confirmed directly before, so that the user was driving.
     """
 
     sign: str
@@ -49,13 +49,14 @@ class Event:
 
 @dataclass(frozen=True)
 class Reaction:
-    """How soon a sign counted after it was first shown.
+    """How soon a sign was confirmed after it was first shown.
 
     Attributes:
         shown: How often it was shown.
-        missed: How often it never counted while it was.
-        median_s: Of the other times, the time from its first frame to the frame at which it counted, in seconds.
-        slowest_s: Likewise, the longest.
+        missed: How often it was not confirmed while shown.
+        median_s: Median time from the first frame that shows it to its confirmation, in seconds, without the missed
+            ones.
+        slowest_s: Likewise, the longest time.
     """
 
     shown: int
@@ -66,15 +67,15 @@ class Reaction:
 
 @dataclass(frozen=True)
 class VideoReport:
-    """The figures of a video, or of several together.
+    """The figures of one or several videos.
 
     Attributes:
-        videos: How many there are.
-        frames: How many there are.
-        duration_s: How long it is.
-        counted_s: For how long each sign counted, ``NONE`` among them.
-        motion_events: Each time in which a sign counted that moves the robot.
-        labels: What the labels say about it; None when there are none.
+        videos: Number of videos.
+        frames: Number of frames.
+        duration_s: Total duration.
+        counted_s: Time in which each sign was confirmed, including ``NONE``.
+        motion_events: Each period in which a sign that moves the robot was confirmed.
+        labels: Figures from the labels; None without labels.
     """
 
     videos: int
@@ -86,18 +87,18 @@ class VideoReport:
 
     @property
     def motion_rate(self) -> Rate:
-        """How often a sign began to count that moves the robot."""
+        """Rate at which signs that move the robot were confirmed."""
         return Rate(len(self.motion_events), self.duration_s)
 
     @property
     def engaged_rate(self) -> Rate:
-        """How often one began behind another sign, in the time in which signs counted."""
+        """Rate of those directly after another sign, in the time in which a sign was confirmed."""
         engaged_s = sum(time_s for sign, time_s in self.counted_s.items() if sign != NONE)
         return Rate(sum(event.engaged for event in self.motion_events), engaged_s)
 
     @property
     def idle_rate(self) -> Rate:
-        """How often one began when none had counted, in the time in which none did."""
+        """Rate of those directly after ``NONE``, in the time in which no sign was confirmed."""
         return Rate(sum(not event.engaged for event in self.motion_events), self.counted_s.get(NONE, 0.0))
 
     def as_dict(self) -> dict[str, Any]:
@@ -117,15 +118,15 @@ class VideoReport:
 
 @dataclass(frozen=True)
 class LabelledFigures:
-    """The figures of the frames whose sign is known.
+    """The figures of the labelled frames.
 
     Attributes:
-        scored_s: For how long the sign is known.
-        seen_right: Of the frames of each sign, in how many it was seen.
-        counted_right: Of the frames of each sign, for how many it counted; the time to react is lost here.
-        reactions: How soon each sign counted.
-        false_commands: Each time in which a sign counted that moves the robot and that was not shown.
-        confusion: Frames by the sign that they show and the one that counted.
+        scored_s: Duration of the labelled frames.
+        seen_right: Of the frames of each sign, in how many it was recognised.
+        counted_right: Of the frames of each sign, in how many it was confirmed; this includes the reaction time.
+        reactions: Reaction times of each sign.
+        false_commands: Each period in which a sign that moves the robot was confirmed but not shown.
+        confusion: Frames by true and confirmed sign.
     """
 
     scored_s: float
@@ -137,7 +138,7 @@ class LabelledFigures:
 
     @property
     def false_rate(self) -> Rate:
-        """How many false commands there are in the time in which the sign is known."""
+        """Rate of false commands in the labelled time."""
         return Rate(len(self.false_commands), self.scored_s)
 
     def as_dict(self) -> dict[str, Any]:
@@ -159,17 +160,17 @@ def video_report(
     motion: Collection[str],
     grace_s: float = 0.3,
 ) -> VideoReport:
-    """Return the figures of one video, or of several together.
+    """Return the figures of one or several videos.
 
-    A false command is a time in which one sign counts that moves the robot, but was not shown at any moment of the
-    last ``grace_s`` seconds: those who change their sign are given that long to be understood. It is one event however
-    long it lasts. Where the truth is not known within that time, nothing is held against the recogniser.
+    A false command is a period in which a sign that moves the robot is confirmed, but was not shown at any time in the
+    last ``grace_s`` seconds, which allows for reaction time after a change. It is one event, however long it lasts.
+    Periods with unknown truth are not counted.
 
     Args:
-        videos: The name of each, and all its frames in their order.
-        signs: The signs that can occur, without ``NONE``.
-        motion: Those that can move the robot.
-        grace_s: How long a sign that is no longer shown may go on to count, in seconds.
+        videos: All frames of each video, in order, by its name.
+        signs: The recognised signs, without ``NONE``.
+        motion: The signs that move the robot.
+        grace_s: How long a sign may stay active after it was last shown, in seconds.
     """
     periods_s = {name: _period_s(frames) for name, frames in videos.items()}
     counted = {
@@ -220,7 +221,7 @@ def _is_false(frames: Sequence[FrameVerdict], at: int, motion: Collection[str], 
     if now.counts not in motion:
         return False
     begin = at
-    # What a frame shows is shown until the next one.
+    # The sign of a frame holds until the next frame.
     while begin > 0 and now.time_s - frames[begin].time_s < grace_s:
         begin -= 1
     return all(frame.truth not in (None, now.counts) for frame in frames[begin : at + 1])
@@ -242,7 +243,7 @@ def _reaction(sign: str, videos: Iterable[Sequence[FrameVerdict]]) -> Reaction:
 
 
 def _events(marks: Mapping[str, Sequence[str | None]], videos: Mapping[str, Sequence[FrameVerdict]]) -> Iterator[Event]:
-    """Yield an event for each run of the same mark; None marks nothing. It ends with its last frame."""
+    """Yield an event for each run of equal marks, except None. It ends with its last frame."""
     for video, frames in videos.items():
         for mark, group in groupby(enumerate(marks[video]), key=lambda pair: pair[1]):
             if mark is not None:

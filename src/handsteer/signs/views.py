@@ -1,4 +1,4 @@
-"""Photos seen in another way: flipped, turned, enlarged; and which sign they show then."""
+"""Transforms photos (flip, rotate, enlarge), and the signs they show accordingly."""
 
 import math
 from dataclasses import dataclass
@@ -13,11 +13,11 @@ from handsteer.types import BACKWARD, FORWARD, NONE, TURN_LEFT, TURN_RIGHT
 _SMALL_PX = 400
 _ENLARGED_PX = 480
 _MARGIN = 0.3
-# The most that people tilt a hand while they mean the same direction.
+# The largest tilt of a hand that still means the same direction.
 _TILT_DEG = 30.0
 
-# Where each points in the image, in degrees clockwise from up. The image is not mirrored: the user's own right is its
-# left. A sideways index finger, and a thumb up or down, are no signs, but become one when they are turned.
+# Directions in the image, in degrees clockwise from up. The image is not mirrored: the user's right is its left. A
+# sideways index finger, and a thumb up or down, are no signs, but become one when rotated.
 _DIRECTIONS: dict[tuple[str, str], tuple[str, float]] = {
     (FORWARD, ""): ("index", 0.0),
     (BACKWARD, ""): ("index", 180.0),
@@ -34,12 +34,12 @@ _DIRECTIONS: dict[tuple[str, str], tuple[str, float]] = {
 
 @dataclass(frozen=True)
 class View:
-    """How to look at pictures.
+    """A transformation of pictures.
 
     Attributes:
-        flip: Left to right, which makes the other hand of each hand.
-        rotate_deg: Turned clockwise by so many degrees, after the flip.
-        enlarge: Pad and enlarge pictures below 400 px: a camera would not frame a hand as tightly as they do.
+        flip: Mirror left to right, which also swaps left and right hands.
+        rotate_deg: Rotate clockwise by so many degrees, after the flip.
+        enlarge: Pad and enlarge pictures below 400 px, because a camera does not frame a hand as tightly.
     """
 
     flip: bool = False
@@ -48,12 +48,12 @@ class View:
 
     @property
     def name(self) -> str:
-        """How tables call it: ``raw`` or ``flipped``, and by how many degrees it is turned."""
+        """Its name in tables: ``raw`` or ``flipped``, with the rotation in degrees."""
         turned = f" {self.rotate_deg:+g}" if self.rotate_deg else ""
         return ("flipped" if self.flip else "raw") + turned
 
     def picture(self, image: NDArray[np.uint8]) -> NDArray[np.uint8]:
-        """Return ``image``, (height, width, 3) uint8, seen so; its size may change."""
+        """Return the transformed ``image``, (height, width, 3) uint8; its size may change."""
         if self.enlarge and max(image.shape[:2]) < _SMALL_PX:
             image = _enlarged(image)
         if self.flip:
@@ -61,7 +61,7 @@ class View:
         return _turned(image, self.rotate_deg)
 
     def hand(self, hand: Hand) -> Hand:
-        """Return ``hand`` as it would be found in the picture that is seen so."""
+        """Return ``hand`` as it would be found in the transformed picture."""
         pixels, world = hand.pixels.astype(np.float64), hand.world.astype(np.float64)
         width, height = hand.image_size
         handedness = hand.handedness
@@ -82,12 +82,12 @@ class View:
         )
 
     def truth(self, sign: str | None, kind: str = "") -> tuple[str | None, str]:
-        """Return the sign and the kind of a picture of ``sign`` and ``kind`` when it is seen so.
+        """Return the sign and the kind of a picture of ``sign`` and ``kind`` after the transformation.
 
-        A flip makes ``Turn Left`` of ``Turn Right``. Half a turn makes ``Backward`` of ``Forward``, and swaps the
-        turns too. A quarter turn makes a turn of a thumb up or down, and the reverse; an index finger that points
-        sideways is ``NONE``. A direction further than 30 degrees from all of these is not scored (None). ``Stop``,
-        ``Go``, taught signs and all other kinds stay what they are.
+        A flip swaps ``Turn Left`` and ``Turn Right``. Half a turn swaps ``Forward`` and ``Backward``, and the turns
+        too. A quarter turn makes a turn of a thumb up or down, and the reverse; an index finger that points sideways is
+        ``NONE``. A direction further than 30 degrees from all of these is not scored (None). ``Stop``, ``Go``, taught
+        signs and all other kinds stay the same.
         """
         name = kind.lower().replace(" ", "_").replace("-", "_") if sign == NONE else ""
         pose = _DIRECTIONS.get((sign or "", name))

@@ -1,1 +1,1 @@
-"""The panels of the pages: each builds its elements once and then only changes what has changed."""
+"""The pages' panels: each builds its elements once, and then updates only what has changed."""

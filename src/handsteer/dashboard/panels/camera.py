@@ -1,4 +1,4 @@
-"""The camera's picture, and whose camera it is from."""
+"""The camera's picture, and the choice of camera."""
 
 from collections.abc import Callable
 
@@ -13,23 +13,23 @@ _MOST_WORDS = 200
 
 
 class CameraPanel:
-    """The mirrored picture, what was understood of it, and whose camera it is from.
+    """The mirrored picture, the recognised sign, and the choice of camera.
 
     Args:
-        picture_url: Where the stream of pictures is.
-        cameras: What there is to choose from; None where there is no choice.
-        viewer: Who looks at this page.
-        use_own: Is called to choose the camera of the machine that handsteer runs on.
+        picture_url: URL of the picture stream.
+        cameras: The cameras to choose from; None if there is no choice.
+        viewer: The viewer of this page.
+        use_own: Called to select the camera of the machine that handsteer runs on.
 
     Attributes:
-        stage: Holds the picture, and what lies over it.
+        stage: Holds the picture and its overlays.
     """
 
     def __init__(self, picture_url: str, cameras: Cameras | None, viewer: str, use_own: Callable[[], None]) -> None:
         self._cameras = cameras
         with ui.element("section").classes("card viewer camera"):
             with box("stage") as self.stage:
-                # Lazy, because a page counts as loaded only when its other pictures have come.
+                # Lazy, because otherwise the page would count as loaded only with its first picture.
                 picture = ui.element("img").props('loading="lazy" alt="What the camera sees, mirrored"')
                 picture.props(f'src="{picture_url}"')
                 with box("veil") as self._veil:
@@ -49,7 +49,7 @@ class CameraPanel:
 
     def update(self, state: PageState) -> None:
         """Show ``state``."""
-        # A sign that counts goes on counting for a moment in which it is not seen.
+        # A confirmed sign stays active for a moment when it is not seen.
         shown = state.sign if state.seen == NONE else state.seen
         self._sign.set_text("No sign" if shown == NONE else shown)
         switch(self._sign, "pending", on=shown != state.sign)
@@ -88,6 +88,6 @@ class CameraPanel:
 
 
 def read_words(sent: object) -> str:
-    """Return what a browser says of its camera, for its own page; nothing of what makes no sense."""
+    """Return the camera status sent by a browser, for its own page; empty if it is invalid."""
     words = sent.get("words") if isinstance(sent, dict) else None
     return words[:_MOST_WORDS] if isinstance(words, str) else ""

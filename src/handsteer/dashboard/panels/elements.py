@@ -1,4 +1,4 @@
-"""The elements that panels are built of."""
+"""The basic elements of panels."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -6,12 +6,12 @@ from contextlib import contextmanager
 from nicegui import ui
 
 UNKNOWN = "--"
-"""Stands for a figure that is not known."""
+"""Shown for an unknown value."""
 
 
 @contextmanager
 def card(title: str, classes: str) -> Iterator[ui.element]:
-    """Put what follows into a card with a heading, and yield the card."""
+    """Put the elements created within into a card with a heading; yield the card."""
     with ui.element("section").classes(f"card {classes}") as element:
         tag("h2", "", title)
         yield element
@@ -35,12 +35,12 @@ def tag(name: str, classes: str, words: str) -> ui.label:
 
 
 def button(words: str, props: str) -> ui.element:
-    """Return a button with ``words``; a screen reader is told ``aria-label`` of ``props`` if that says more."""
+    """Return a button with ``words``; ``props`` may set an ``aria-label`` for screen readers."""
     with ui.element("button").classes("text-button").props(f'type="button" {props}') as element:
         ui.label(words).style("display: inline")
     return element
 
 
 def switch(element: ui.element, name: str, *, on: bool) -> None:
-    """Give ``element`` the class ``name``, or take it away."""
+    """Add the class ``name`` to ``element``, or remove it."""
     element.classes(add=name if on else "", remove="" if on else name)

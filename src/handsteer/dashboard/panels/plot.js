@@ -1,4 +1,4 @@
-// The last seconds of one velocity as two lines. The server sends each sample once; older ones are kept here.
+// Plots the last seconds of one velocity as two lines. The server sends each sample once; they are stored here.
 
 const HALF = 50; // the drawing is 100 units high, with zero in the middle
 
@@ -25,7 +25,7 @@ export default {
     this.$emit("begin");
   },
   methods: {
-    // rows: [seconds, commanded, measured], null where there was none
+    // rows: [seconds, commanded, measured], null if missing
     add(rows, afresh) {
       const known = afresh ? [] : this.rows;
       const begin = rows.length ? rows[rows.length - 1][0] - this.span : -Infinity;

@@ -1,4 +1,4 @@
-"""The parameters as a form: one row each, in their sections."""
+"""A form of all parameters: one row each, in sections."""
 
 from collections.abc import Callable
 
@@ -16,12 +16,12 @@ _KEYBOARDS = {"number": 'inputmode="decimal"', "text": "", "list": "", "table": 
 
 
 class SettingRow:
-    """One parameter: what it means, its value, and the way back to its default.
+    """One parameter: its meaning, its value, and a reset to its default.
 
     Args:
         field: The parameter.
-        settings: Has its value.
-        commit: Is called with a change to make, which may be refused; returns what was wrong, else nothing.
+        settings: Stores its value.
+        commit: Called with a change to make; returns an error message if it is refused.
     """
 
     def __init__(
@@ -50,11 +50,11 @@ class SettingRow:
 
     @property
     def is_due(self) -> bool:
-        """Whether what is set is to be shown again."""
+        """Whether the value needs to be shown again."""
         return not self._shown
 
     def update(self, *, to_driver: bool, editable: bool) -> None:
-        """Show what is set; what is being typed stays."""
+        """Show the value, unless it is being edited."""
         field, settings = self.field, self._settings
         value = field.show(field.value_in(settings.wanted), to_driver=to_driver)
         state = (value, settings.default(field), settings.is_changed(field), settings.waits(field), editable)
@@ -92,7 +92,7 @@ class SettingRow:
         return str(value).lower() if isinstance(value, bool) else value if isinstance(value, str) else ""
 
     def _put(self, value: str) -> None:
-        self._is_being_put = True  # and not to be taken for what somebody chose
+        self._is_being_put = True  # not a change by the viewer
         if isinstance(self._input, ui.switch):
             self._input.set_value(value == "true")
         else:
@@ -100,7 +100,7 @@ class SettingRow:
         self._is_being_put = False
 
     def _check(self, _value: object) -> str | None:
-        """Return at each key why the text cannot be taken; None when it can."""
+        """Validate the text at each key; return an error message, or None."""
         if self._is_current:
             return None
         self._is_edited = True
@@ -124,11 +124,11 @@ class SettingRow:
         problem = self._commit(lambda: self._settings.set(self.field, typed))
         self._shown = ()
         self._refuse(problem)
-        # What was typed stays, to be mended; what was chosen goes back to what is set.
+        # Invalid text stays to be corrected; an invalid choice returns to the value that is set.
         self._is_edited = problem is not None and isinstance(self._input, ui.input)
 
     def _give_up(self) -> None:
-        """Show what is set instead of what was typed."""
+        """Discard the edit and show the value that is set."""
         self._is_edited = False
         self._shown = ()
         self._refuse(None)
@@ -147,11 +147,11 @@ class SettingRow:
 
 
 class SettingsPanel:
-    """All parameters, a search among them, and the way to the file.
+    """All parameters, with a search, and buttons to load and save the file.
 
     Args:
-        settings: What can be set.
-        drives: Returns whether this viewer may change anything; it is given the control lease if that is free.
+        settings: The parameters.
+        drives: Returns whether this viewer may change anything, after giving it the lease if that is free.
     """
 
     def __init__(self, settings: Settings, drives: Callable[[], bool]) -> None:
@@ -169,12 +169,7 @@ class SettingsPanel:
             self._nothing = text("nothing hidden", "No parameter is called so, or says so.")
 
     def update(self, *, to_driver: bool, editable: bool) -> None:
-        """Show what is set.
-
-        Args:
-            to_driver: Whether this viewer drives.
-            editable: Whether it may change anything: it drives, or nobody does.
-        """
+        """Show the values; they are ``editable`` if this viewer drives (``to_driver``) or the lease is free."""
         settings = self._settings
         settings.follow()
         seen = (settings.revision, to_driver, editable)
@@ -214,7 +209,7 @@ class SettingsPanel:
         self._reset_all.on("click", dialog.open)
 
     def _commit(self, change: Callable[[], object]) -> str | None:
-        """Make a change if this viewer may; return what was wrong, which is said here too, else nothing."""
+        """Make a change if this viewer may; show and return the error message, if any."""
         problem = None
         if not self._drives():
             problem = "only who drives may change settings: ask to drive first"

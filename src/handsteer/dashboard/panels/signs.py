@@ -1,4 +1,4 @@
-"""The signs and what they do, with a drawing of each."""
+"""The signs and their actions, with a drawing of each."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -11,8 +11,8 @@ from handsteer.dashboard.panels.elements import box, card, switch, text
 from handsteer.dashboard.state import PageState
 from handsteer.types import BACKWARD, EFFECTS, FORWARD, GO, NONE, SIGNS, STOP, TURN_LEFT, TURN_RIGHT, action_of
 
-# The user's right hand as a mirror shows it, in a box of 64 x 64: palm, then the fingers as thick lines. The thumb is
-# on the left, where a mirror shows the thumb of a right hand that turns its palm to it.
+# The user's right hand in a mirror, in a box of 64 x 64: the palm, then the fingers as thick lines. The thumb is on the
+# left, where a mirror shows the thumb of a right hand with its palm turned to it.
 _PALM = '<rect x="20" y="30" width="26" height="26" rx="10" class="palm"/>'
 _FINGER = '<path d="M{x} 34V{top}" class="finger"/>'
 _FIST = _PALM + "".join(_FINGER.format(x=x, top=29) for x in (23, 30, 37, 43))
@@ -30,13 +30,13 @@ _TURN_LEFT = _FIST + _THUMB_LEFT
 
 @dataclass(frozen=True)
 class LegendEntry:
-    """One sign and what it does.
+    """One sign and its action.
 
     Attributes:
         sign: Its name on ``/gesture/hand_sign``.
         pose: How to hold the hand.
         effect: What the robot does.
-        figures: By how much, and up to what; empty where that means nothing.
+        figures: Step and limit; empty if not applicable.
         drawing: SVG.
     """
 
@@ -59,16 +59,16 @@ _DRAWN: Mapping[str, tuple[str, str]] = {
     TURN_RIGHT: ("thumb to your right", _svg(_TURN_LEFT, "matrix(-1 0 0 1 64 0)")),
     GO: ("closed fist", _svg(_FIST + _TUCKED_THUMB)),
 }
-# A sign that was taught may have any shape.
+# A taught sign may have any shape.
 _TAUGHT = ("taught", f'<svg viewBox="0 0 64 64" aria-hidden="true" class="taught">{_OPEN_PALM}</svg>')
 
 
 def legend(signs: tuple[str, ...], rule: ControlConfig | None) -> tuple[LegendEntry, ...]:
-    """Return what there is to know of ``signs``: those that are shipped first, in the page's order.
+    """Return the legend of ``signs``: shipped ones first, in the page's order.
 
     Args:
-        signs: Those that the recogniser can tell.
-        rule: What decides what they do; None when that is not known, and what is built in is said, without figures.
+        signs: The signs that the classifier recognises.
+        rule: Configures the signs' actions; None if unknown, which gives the default actions, without figures.
     """
     order = [*(sign for sign in _DRAWN if sign in signs), *(sign for sign in signs if sign not in _DRAWN)]
     return tuple(LegendEntry(sign, *_entry(sign, rule)) for sign in order)
@@ -77,13 +77,13 @@ def legend(signs: tuple[str, ...], rule: ControlConfig | None) -> tuple[LegendEn
 def _entry(sign: str, rule: ControlConfig | None) -> tuple[str, str, str, str]:
     pose, drawing = _DRAWN.get(sign, _TAUGHT)
     action = action_of(sign, rule.actions if rule else {})
-    # What does not change is left out, so that the rest is read.
+    # The semicolon precedes what does not change, which is left out for brevity.
     effect = EFFECTS[action].partition(";")[0]
     return pose, effect, figures_of(action, rule) if rule else "", drawing
 
 
 class SignsPanel:
-    """Which sign does what, as the nodes say; the one that counts is lit."""
+    """The signs and their actions as reported by the nodes; the active sign is highlighted."""
 
     def __init__(self) -> None:
         self._lit = NONE

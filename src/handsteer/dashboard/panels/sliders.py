@@ -1,4 +1,4 @@
-"""Two sliders that stay where they are set, as rqt_robot_steering has them: linear upright, angular across."""
+"""Two sliders that stay where they are set, as in rqt_robot_steering: linear vertical, angular horizontal."""
 
 import math
 from collections.abc import Callable
@@ -15,13 +15,13 @@ _DIGITS = 2
 
 
 class Sliders:
-    """Two sliders with limits that can be edited, steps, and the way back to zero.
+    """Two sliders with editable limits, step buttons, and a return to zero.
 
     Args:
-        change: Is called with the velocity that both ask for when one of them was moved.
+        change: Called with the velocity of both sliders after one was moved.
 
     Attributes:
-        across: Holds the angular slider, with room for more below it.
+        across: Holds the angular slider, with space below it.
     """
 
     def __init__(self, change: Callable[[Velocity], None]) -> None:
@@ -35,7 +35,7 @@ class Sliders:
                 self._angular = _Axis("angular", *names, reach=_ANGULAR_RADPS, change=self._read, upright=False)
 
     def show(self, velocity: Velocity) -> None:
-        """Put both sliders where ``velocity`` is."""
+        """Set both sliders to ``velocity``."""
         if velocity != self._velocity:
             self._velocity = velocity
             self._linear.set(velocity.linear_mps)
@@ -43,12 +43,12 @@ class Sliders:
             switch(self._box, "set", on=not velocity.is_zero)
 
     def limit(self, linear_mps: float, angular_radps: float) -> None:
-        """Let no limit be beyond these."""
+        """Restrict the sliders' limits to these values."""
         self._linear.bound(linear_mps)
         self._angular.bound(angular_radps)
 
     def enable(self, *, on: bool) -> None:
-        """Let the sliders be used, or not."""
+        """Enable or disable the sliders."""
         self._linear.enable(on=on)
         self._angular.enable(on=on)
 
@@ -101,20 +101,20 @@ class _Axis:
         self._show_bound()
 
     def set(self, value: float) -> None:
-        """Put the slider to ``value`` without telling anybody."""
+        """Set the slider to ``value`` without calling back."""
         self.value = value
         self._slider.set_value(value)
         self._label.set_text(f"{value + 0.0:.2f}")
 
     def bound(self, bound: float) -> None:
-        """Let no limit be beyond ``bound``, which is positive."""
+        """Restrict the limits to ``bound``, which is positive."""
         if bound != self._bound:
             self._bound = bound
             self._show_bound()
             self._on_limits()
 
     def enable(self, *, on: bool) -> None:
-        """Let the slider and its steps be used, or not."""
+        """Enable or disable the slider and its step buttons."""
         if self._slider.enabled != on:
             self._slider.set_enabled(on)
             for step in self._steps:
@@ -137,7 +137,7 @@ class _Axis:
 
     def _on_slide(self) -> None:
         value = round(read_limit(self._slider.value, self._low, self._high, 0.0), _DIGITS)
-        if value != self.value:  # moved by hand, not put there by set()
+        if value != self.value:  # moved by the viewer, not by set()
             self._take(value)
 
     def _step(self, direction: int) -> None:
@@ -149,8 +149,8 @@ class _Axis:
 
 
 def read_limit(sent: object, low: float, high: float, otherwise: float) -> float:
-    """Return the number that a browser sent, put between ``low`` and ``high``; ``otherwise``, too, if it is none."""
+    """Return the number a browser sent, or ``otherwise`` if it is invalid, clamped to ``low`` to ``high``."""
     value = otherwise
     if isinstance(sent, int | float) and not isinstance(sent, bool) and -math.inf < sent < math.inf:
-        value = sent  # put between the bounds as it is: an integer may be too large for any float
+        value = sent  # clamped without conversion: an integer may be too large for any float
     return float(max(low, min(value, high)))

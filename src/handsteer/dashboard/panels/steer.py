@@ -1,4 +1,4 @@
-"""Steering by hand: pad, sliders, who is followed, and on which topic."""
+"""Manual steering: pad, sliders, active input, and topic."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -18,11 +18,10 @@ _LONGEST = 200
 
 
 class TopicBox:
-    """The topic's name, and what it means that it is this one.
+    """The steering topic's name, and its consequences.
 
     Args:
-        choose: Is called with another name, and raises TransportError when that cannot be; None where there is no
-            choice.
+        choose: Called with another name; raises TransportError if it is rejected. None if there is no choice.
     """
 
     def __init__(self, choose: Callable[[str], None] | None) -> None:
@@ -67,12 +66,12 @@ class TopicBox:
 
 @dataclass(frozen=True)
 class Entry:
-    """One source of commands.
+    """One input of the twist mux.
 
     Attributes:
-        name: What it is called.
-        holds: Whether it has the robot now.
-        whose: Whose it is, when it holds; empty when that is not known.
+        name: Its display name.
+        holds: Whether it is active.
+        whose: The viewer whose input it is, while active; empty if unknown.
     """
 
     name: str
@@ -81,7 +80,7 @@ class Entry:
 
 
 def entries(state: PageState) -> tuple[Entry, ...]:
-    """Return the sources of commands, the first before the second and so on; at most one of them holds."""
+    """Return the inputs in order of priority; at most one is active."""
     directly = bool(state.viewers.topic and state.viewers.steers)
     by_hand = not state.stopped and (directly or state.driver == "steering")
     by_signs = not state.stopped and not by_hand and state.driver == "signs"
@@ -93,7 +92,7 @@ def entries(state: PageState) -> tuple[Entry, ...]:
 
 
 class MuxPanel:
-    """The sources in a row, the one that holds lit."""
+    """The inputs in a row, with the active one highlighted."""
 
     def __init__(self) -> None:
         self._shown: tuple[Entry, ...] = ()
@@ -125,10 +124,10 @@ class SteerPanel:
     """A pad that drives while it is held, and sliders that drive while the page is in front.
 
     Args:
-        steer: Is called with m/s forward and rad/s to the left again and again while the robot is to go on.
-        release: Is called when it is to stop.
+        steer: Called repeatedly with m/s forward and rad/s to the left while the robot is to move.
+        release: Called to stop.
         now: Returns seconds of a monotonic clock.
-        choose_topic: Is called with the name of another topic to steer on; None where there is no choice.
+        choose_topic: Called with the name of another topic to steer on; None if there is no choice.
     """
 
     _TURN_PER_SPEED = 2.0  # rad/s to the left at full deflection for each m/s of top speed
@@ -169,7 +168,7 @@ class SteerPanel:
         ui.on("let_go", self.let_go)
 
     def update(self, state: PageState, place: LeaseStatus) -> None:
-        """Show ``state`` to a viewer who has ``place``; sliders of others, and of a robot that is stopped, are at 0."""
+        """Show ``state`` to a viewer with ``place``; sliders of others, and of a stopped robot, are at 0."""
         self._mux.update(state)
         self._topic.update(state)
         watches = place.role == "watcher"
@@ -185,7 +184,7 @@ class SteerPanel:
         switch(self._card, "yours", on=place.role == "driver")
 
     def let_go(self) -> None:
-        """Stop what is steered from here; the sliders go to zero."""
+        """Stop steering from this page and set the sliders to zero."""
         self._manual.let_go()
         self._sliders.show(self._manual.sliders)
         self._release()
@@ -219,7 +218,7 @@ class SteerPanel:
 
 
 def read_deflection(sent: object) -> tuple[float, float]:
-    """Return x (right) and y (forward) of the pad, -1 to 1, as a browser sent it; anything odd is 0."""
+    """Return the pad's x (right) and y (forward), -1 to 1, as sent by a browser; 0 for invalid values."""
     values = sent if isinstance(sent, dict) else {}
     x, y = (_within_one(values.get(name)) for name in ("x", "y"))
     return x, y

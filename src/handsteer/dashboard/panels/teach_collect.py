@@ -1,4 +1,4 @@
-"""The first two steps of a lesson: the sign's name, and takes of it."""
+"""The first steps of a lesson: the sign's name, its takes, and the training."""
 
 import base64
 import math
@@ -16,11 +16,7 @@ _LONGEST = 200
 
 
 class NamePanel:
-    """Name a sign, or pick one that was taught before.
-
-    Args:
-        begin: Is called with the name and the person to begin the lesson.
-    """
+    """Name a new sign, or select one that was taught before; calls ``begin`` with the name and the person."""
 
     def __init__(self, begin: Callable[[str, str], Any]) -> None:
         with box("step name") as self.element:
@@ -35,7 +31,7 @@ class NamePanel:
             text("faint", "The robot is stopped while you teach. Pictures are not stored, only the hand's landmarks.")
 
     def show_known(self, known: Dataset) -> None:
-        """Offer the signs of ``known`` to be picked."""
+        """Offer the signs of ``known`` for selection."""
         self._known.clear()
         takes = {each.label: each.takes for each in summarise(known)}
         with self._known:
@@ -54,7 +50,7 @@ class NamePanel:
 
 
 class Countdown:
-    """What is to be done now, in large letters on the camera's picture: who shows a sign stands back."""
+    """The current instruction in large letters on the camera's picture, readable from a distance."""
 
     def __init__(self, stage: ui.element) -> None:
         self._stage = stage
@@ -74,14 +70,14 @@ class Countdown:
 
 
 class CollectPanel:
-    """Record takes, look at them, delete some, and go on to the training.
+    """Record takes, view them, delete some, and start the training.
 
     Args:
-        record: Is called to begin the countdown.
-        pause: Is called to stop it.
-        train: Is called to go on.
-        discard: Is called to end the lesson.
-        delete: Is called with the number of a take to delete it.
+        record: Called to start the countdown.
+        pause: Called to stop recording.
+        train: Called to start the training.
+        discard: Called to end the lesson.
+        delete: Called with the number of a take to delete it.
     """
 
     def __init__(
@@ -137,11 +133,7 @@ class CollectPanel:
 
 
 class TrainPanel:
-    """How far the training is.
-
-    Args:
-        cancel: Is called to go back to the takes.
-    """
+    """The progress of the training; calls ``cancel`` to return to the takes."""
 
     def __init__(self, cancel: Callable[[], None]) -> None:
         self._percent = -1
@@ -167,14 +159,14 @@ class TrainPanel:
 
 
 def counted(view: View) -> str:
-    """Return how many takes of ``view`` there are, in words."""
+    """Return the number of takes of ``view`` in words."""
     takes = len(view.takes)
     of = f" of {view.wanted}" if takes <= view.wanted else ""
     return f"{takes}{of} takes, {hands_in(view.takes)} hands"
 
 
 def said_now(view: View) -> tuple[str, str]:
-    """Return what is to be done now while takes are recorded: a number, and words."""
+    """Return the current instruction while takes are recorded: a number, and words."""
     if view.status.phase == "recording":
         return str(view.status.hands), f"hands: show {view.label}"
     return str(math.ceil(view.status.left_s)), f"then show {view.label}"

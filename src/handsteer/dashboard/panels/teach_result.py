@@ -1,4 +1,4 @@
-"""The last steps of a lesson: what was learnt, and what becomes of it."""
+"""The last steps of a lesson: the result of the training, and what to do with it."""
 
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -15,14 +15,14 @@ from handsteer.types import EFFECTS, NONE, Action
 
 
 class ResultPanel:
-    """How well the sign was learnt; try it, say what it does, and keep it or not.
+    """How well the sign was learnt; try it, assign an action, and keep or discard it.
 
     Args:
-        actions: What a sign can be given to do.
-        action_of: Returns what a sign does now.
-        keep: Is called with the action.
-        more: Is called to collect further takes.
-        discard: Is called to end the lesson.
+        actions: The available actions.
+        action_of: Returns the current action of a sign.
+        keep: Called with the action.
+        more: Called to collect further takes.
+        discard: Called to end the lesson.
     """
 
     def __init__(
@@ -59,7 +59,7 @@ class ResultPanel:
         self._would.set_text(would)
 
     def fill(self, view: View, lost: Sequence[str]) -> None:
-        """Show the figures of ``view``, what the sign does so far, and which signs would be lost."""
+        """Show the figures of ``view``, the sign's current action, and the signs that would be lost."""
         self._action.set_value(self._action_of(view.label))
         switch(self._action, "hidden", on=view.label == NONE)
         words = f"There are no takes of {', '.join(lost)}: what was learnt before of it would be lost." if lost else ""
@@ -71,11 +71,7 @@ class ResultPanel:
 
 
 class KeptPanel:
-    """What was kept, and how it stays so.
-
-    Args:
-        again: Is called to teach another sign.
-    """
+    """The kept sign, and how to make it permanent; calls ``again`` to teach another sign."""
 
     def __init__(self, again: Callable[[], Any]) -> None:
         with box("step kept hidden") as self.element:
@@ -93,7 +89,7 @@ class KeptPanel:
                 ui.link("Drive", "/").classes("text-button")
 
     def fill(self, kept: Kept) -> None:
-        """Show what was kept."""
+        """Show the kept sign."""
         if kept.action is None:
             self._words.set_text("What shall not count is learnt")
         else:
@@ -108,12 +104,12 @@ def worded(action: Action) -> str:
 
 
 def opinion(seen: Recognition | None, label: str, does: Callable[[str], Action]) -> tuple[str, str]:
-    """Return in words what the hand is told as by what was learnt, and what the robot would do.
+    """Return in words how the taught model recognises the hand, and what the robot would do.
 
     Args:
-        seen: What was understood of the newest frame; None when there is none.
-        label: The sign that is taught.
-        does: Returns what a sign does, or shall do.
+        seen: The recognition of the newest frame; None without a frame.
+        label: The taught sign.
+        does: Returns the action of a sign, current or intended.
     """
     if seen is None:
         return "No picture", ""

@@ -1,4 +1,4 @@
-"""The figures of one thing in the world."""
+"""A form with the properties of one thing in the world."""
 
 import math
 from collections.abc import Awaitable, Callable
@@ -17,13 +17,13 @@ _DIGITS = 3
 
 @dataclass(frozen=True)
 class Figure:
-    """One figure of a thing.
+    """One numeric property of a thing.
 
     Attributes:
         name: With its unit.
-        value: What it is now.
-        step: How far the arrows beside it go.
-        fields: Returns the fields of the world file that make it another value.
+        value: Current value.
+        step: Increment of the input's arrows.
+        fields: Returns the fields of the world file that set another value.
     """
 
     name: str
@@ -33,7 +33,7 @@ class Figure:
 
 
 def figures(thing: Thing) -> list[Figure]:
-    """Return all figures of ``thing`` that people can change."""
+    """Return all editable figures of ``thing``."""
     x, y = thing.position
     found = [
         Figure("x [m]", x, 0.1, lambda value: {"position": (value, y)}),
@@ -58,11 +58,7 @@ def figures(thing: Thing) -> list[Figure]:
 
 
 class ThingForm:
-    """Fields for one thing; each change is passed on at once.
-
-    Args:
-        edit: Is called with the name of the thing and the fields that change.
-    """
+    """Inputs for one thing; calls ``edit`` with its name and the changed fields immediately."""
 
     def __init__(self, edit: Callable[[str, dict[str, Any]], Awaitable[None]]) -> None:
         self._edit = edit
@@ -71,18 +67,18 @@ class ThingForm:
         self._box = box("row form")
 
     def show(self, thing: Thing | None) -> None:
-        """Show the figures of ``thing`` as they are, also where a field holds what was refused; nothing for None."""
+        """Show the current figures of ``thing``, replacing rejected input; nothing for None."""
         before, self._shown = self._shown, thing
         if thing is None:
             self._box.clear()
         elif before is None or (before.name, before.shape) != (thing.name, thing.shape):
             self._build(thing)
-        else:  # The same fields, so that the one that has the focus keeps it.
+        else:  # The inputs are reused, so that the focused one keeps the focus.
             for number, figure in zip(self._numbers, figures(thing), strict=True):
                 number.set_value(round(figure.value, _DIGITS))
             self._movable.set_value(thing.movable)
         if thing is not None:
-            switch(self._numbers[-1], "off", on=not thing.movable)  # the mass of what stands fast means nothing
+            switch(self._numbers[-1], "off", on=not thing.movable)  # a fixed thing's mass has no effect
 
     def _build(self, thing: Thing) -> None:
         self._box.clear()
@@ -90,7 +86,7 @@ class ThingForm:
             self._numbers = [self._number(index, figure) for index, figure in enumerate(figures(thing))]
             with ui.element("label").classes("field"):
                 ui.label("colour")
-                # An attribute, not a property: it would be set again and again while people choose.
+                # An attribute, not a property, which would be set again while the viewer chooses a colour.
                 colour = ui.element("input").props(f'type="color" ^value="{thing.colour}"')
                 colour.on("change", self._on_colour, js_handler="(event) => emit(event.target.value)")
             self._movable = ui.checkbox("can be pushed", value=thing.movable, on_change=self._on_movable)

@@ -1,4 +1,4 @@
-"""The velocities, now and over the last 30 s, as figures and a plot."""
+"""The current velocities, and those of the last 30 s, as figures and plots."""
 
 from collections.abc import Callable, Sequence
 
@@ -10,18 +10,18 @@ from handsteer.dashboard.state import PageState
 from handsteer.types import Velocity
 
 Row = tuple[float, float | None, float | None]
-"""Seconds, and the velocity commanded and measured, in m/s or rad/s; None where there was none."""
+"""Seconds, and the commanded and measured velocity in m/s or rad/s; None if missing."""
 
 
 class Plot(ui.element, component="plot.js"):
-    """Two lines, commanded and measured, which the browser keeps; it is sent each sample once.
+    """Commanded and measured velocity as two lines, stored in the browser; each sample is sent once.
 
-    A library for plots would cost the browser a megabyte, and sends all points again for each that is new.
+    A plotting library would add a megabyte to the page, and would send all points for each new one.
 
     Args:
-        name: What a screen reader says of it.
-        least: The reach of the axis when there is less to show, in m/s or rad/s.
-        begin: Is called when the browser has none of the samples.
+        name: Label for screen readers.
+        least: Smallest range of the axis, in m/s or rad/s.
+        begin: Called when the browser has no samples.
     """
 
     def __init__(self, name: str, least: float, begin: Callable[[], None]) -> None:
@@ -32,12 +32,12 @@ class Plot(ui.element, component="plot.js"):
         self.on("begin", begin)
 
     def add(self, rows: Sequence[Row], *, afresh: bool) -> None:
-        """Show further ``rows``, or these only."""
+        """Append ``rows``, or replace all."""
         self.run_method("add", rows, afresh)
 
 
 def rows_of(samples: Sequence[Sample]) -> tuple[list[Row], list[Row]]:
-    """Return the rows of the linear velocity and of the angular velocity, as short as they are to be sent."""
+    """Return the rows of the linear and of the angular velocity, rounded for sending."""
     linear: list[Row] = []
     angular: list[Row] = []
     for sample in samples:
@@ -55,13 +55,13 @@ def _short(velocity: Velocity | None) -> tuple[float | None, float | None]:
 
 
 class VelocityPanel:
-    """Both velocities, commanded and measured, as figures and as a plot."""
+    """Commanded and measured velocities, as figures and plots."""
 
     def __init__(self) -> None:
         self._sent: int | None = None
         with card("Velocity", "panel velocity"):
             self._linear = _Axis("Linear", "m/s", least=0.2, ends=("forward", "backward"), begin=self._begin)
-            # Left is positive (REP 103), and up.
+            # Left is positive (REP 103) and drawn upwards.
             self._angular = _Axis("Angular", "rad/s", least=0.5, ends=("left", "right"), begin=self._begin)
             with box("scale"):
                 text("", "30 s ago")
@@ -76,7 +76,7 @@ class VelocityPanel:
         self._angular.update(state.commanded.angular_radps, state.measured.angular_radps)
 
     def draw(self, history: VelocityHistory, now_s: float) -> None:
-        """Draw what ``history`` has that the browser does not have yet, at ``now_s`` of the graph's clock."""
+        """Plot the samples of ``history`` that the browser does not have yet; ``now_s`` is of the graph's clock."""
         afresh = self._sent is None
         self._sent, samples = history.since(self._sent or 0, now_s)
         if samples or afresh:

@@ -1,4 +1,4 @@
-"""The world card: the 3D view with its tools, the course, and the way to edit the world."""
+"""The world card: the 3D view with its controls, the course, and the editor."""
 
 from collections.abc import Callable
 
@@ -17,7 +17,7 @@ _RULES = f"score: the time, {BUMP_S:.0f} s for each bump, {MISS_S:.0f} s for eac
 
 
 class CourseLine:
-    """Gates, bumps, stopwatch and score; hidden in a world without gates."""
+    """Gates, collisions, stopwatch and score; hidden in a world without gates."""
 
     def __init__(self) -> None:
         self._shown: CourseState | None = None
@@ -57,7 +57,7 @@ _DRIVERS = {"signs": "your signs", "steering": "hand steering", "nobody": "nobod
 
 
 class RobotFoot:
-    """How far the robot went, what it bumped into, and who drives it."""
+    """Distance driven, collisions, and the active input."""
 
     def __init__(self) -> None:
         with box("foot"):
@@ -89,9 +89,9 @@ class WorldPanel:
     """The robot in its world.
 
     Args:
-        robot: The robot, if its world can be reached from here.
-        may: Returns whether this viewer drives; it is given the lease if that is free.
-        watches: Returns whether somebody else drives.
+        robot: The robot, if its world can be accessed.
+        may: Returns whether this viewer drives; a free lease is given to it.
+        watches: Returns whether another viewer drives.
     """
 
     def __init__(self, robot: RobotInWorld | None, may: Callable[[], bool], watches: Callable[[], bool]) -> None:
@@ -126,7 +126,7 @@ class WorldPanel:
             self._close("Somebody else drives now, so the world is theirs to edit.")
 
     def look(self, view: View) -> None:
-        """Look at the robot from where ``view`` begins."""
+        """Move the camera to the start of ``view``."""
         self._view.look(view)
         for name, element in self._views.items():
             element.props(f'aria-pressed="{"true" if name == view else "false"}"')
@@ -156,7 +156,7 @@ class WorldPanel:
         before, self._collisions = self._collisions, collisions
         if before is None or collisions is None or collisions <= before:
             return
-        # Two names of one animation, in turn: it begins anew.
+        # Alternating between two names of one animation restarts it.
         self._flashes += 1
         for name, on in (("bump-a", self._flashes % 2 == 1), ("bump-b", self._flashes % 2 == 0)):
             switch(self._stage, name, on=on)

@@ -1,4 +1,4 @@
-"""The editor of the world: puts things in, changes them, takes them out, loads and saves."""
+"""The world editor: adds, changes and removes things; loads and saves worlds."""
 
 import asyncio
 import math
@@ -20,7 +20,7 @@ from handsteer.robots.world import Thing, World, load_world, parse_world, shippe
 from handsteer.types import Pose2D
 
 LARGEST_FILE_BYTES = 64 * 1024
-"""A world file that is opened from a browser has at most so many; 200 things need half of it."""
+"""Largest world file accepted from a browser; 200 things need half of it."""
 
 _PATIENCE_S = 5.0
 _STILL_M = 0.02
@@ -34,16 +34,16 @@ _READ_FILE = f"""async (event) => {{
 
 
 class WorldEditor:
-    """Changes the world of a simulated robot, for whoever drives.
+    """Edits the world of a simulated robot, for the driver.
 
     Args:
-        robot: The robot, if its world can be reached from here.
+        robot: The robot, if its world can be accessed.
         may: Returns whether this viewer drives.
         view: Shows the world.
 
     Attributes:
-        is_open: Whether the world is edited.
-        place: Where the robot is; new things are put near it.
+        is_open: Whether the world is being edited.
+        place: Pose of the robot; new things are placed near it.
     """
 
     def __init__(self, robot: RobotInWorld | None, may: Callable[[], bool], view: WorldView) -> None:
@@ -82,7 +82,7 @@ class WorldEditor:
         self._message = text("message", "").props('role="status"')
 
     def open(self) -> bool:
-        """Begin to edit; return False, and say why, if that cannot be."""
+        """Start editing; return False and show why if that is not possible."""
         if self._world() is None or not self._allowed():
             return False
         self._set_open(on=True)
@@ -91,18 +91,18 @@ class WorldEditor:
         return True
 
     def close(self, why: str) -> None:
-        """Edit no more, and say ``why``."""
+        """Stop editing, and show ``why``."""
         self._set_open(on=False)
         self._say(why)
 
     def pick(self, index: int) -> None:
-        """Choose the obstacle with this index."""
+        """Select the obstacle with this index."""
         world = self._world()
         if world and index < len(world.obstacles):
             self._things.set_value(world.obstacles[index].name)
 
     async def drop(self, index: int, x: float, y: float) -> None:
-        """Put the obstacle with this index to x and y in metres, if that is not where it is."""
+        """Move the obstacle with this index to x and y in metres, unless it is already there."""
         world = self._world()
         # A browser may send anything.
         is_place = all(isinstance(value, int | float) and abs(value) <= _FARTHEST_M for value in (x, y))
@@ -113,7 +113,7 @@ class WorldEditor:
             await self._edit(thing.name, {"position": (round(x, 2), round(y, 2))})
 
     async def restart(self) -> None:
-        """Put the robot and all things back to the start."""
+        """Move the robot and all things to their start positions."""
         if self._world() is not None and self._robot and self._allowed():
             await self._wait_for(self._robot.reset(), "The robot and all things are where they started.")
 
@@ -123,7 +123,7 @@ class WorldEditor:
         self._view.edit(on=on)
 
     def _world(self) -> World | None:
-        """Return the robot's world; if there is none, say so."""
+        """Return the robot's world; show an error if there is none."""
         world = self._robot.world if self._robot else None
         if self._robot is None:
             self._say("The robot runs in another process; its world can be edited on the page of `handsteer run` only.")
@@ -156,7 +156,7 @@ class WorldEditor:
 
     async def _load(self) -> None:
         name = self._worlds.value
-        if name in shipped_worlds():  # and no path of a browser's choice
+        if name in shipped_worlds():  # not a path chosen by a browser
             await self._enter(load_world(name), name)
 
     async def _open_file(self, sent: object) -> None:
@@ -184,7 +184,7 @@ class WorldEditor:
         return bool(self._robot and self._allowed() and await self._wait_for(self._robot.change_world(change), done))
 
     async def _wait_for(self, change: Future[None], done: str) -> bool:
-        """Return whether ``change`` was made; say ``done``, or why it was not."""
+        """Return whether ``change`` succeeded; show ``done``, or the error."""
         try:
             await asyncio.wait_for(asyncio.wrap_future(change), _PATIENCE_S)
         except WorldError as error:
@@ -226,10 +226,10 @@ class WorldEditor:
 
 
 def read_file(sent: object) -> tuple[str, str]:
-    """Return name and text of a file as a browser sent it.
+    """Return the name and text of a file sent by a browser.
 
     Raises:
-        WorldError: It is too large, or none.
+        WorldError: It is too large, or not a file.
     """
     values = sent if isinstance(sent, dict) else {}
     name, words = values.get("name"), values.get("text")

@@ -1,6 +1,6 @@
-// What a page from Python cannot do: stop the robot by a key, and remember light or dark.
+// What needs the browser: stopping the robot by a key, and remembering light or dark.
 
-// Wherever the focus is, but not where a space is typed; a button would take it as a click.
+// Anywhere except in text inputs; a focused button would otherwise take the space key as a click.
 document.addEventListener("keydown", (event) => {
   if (event.code !== "Space" || event.target.closest?.("input:not([type=number]), textarea, select, [contenteditable]")) return;
   event.preventDefault();

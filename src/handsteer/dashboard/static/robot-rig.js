@@ -1,16 +1,16 @@
-// The robot in the 3D view, and the camera that goes along with it from wherever people have turned it.
+// The robot in the 3D view, and the camera that follows it from the viewpoint the viewer has chosen.
 import { THREE } from "nicegui-scene";
 
 const UP = new THREE.Vector3(0, 0, 1);
-const GLIDE_MS = 120; // a little more than from one pose to the next, so that it never waits for one
+const GLIDE_MS = 120; // slightly longer than between two poses, so that the motion does not pause
 const STEP_MS = 40;
-const LEAP_M = 0.5; // who is so far away was put there
+const LEAP_M = 0.5; // a robot this far away was repositioned
 
-// Where the camera stands and what it looks at, from the robot; x is forward in "follow", east in the others.
+// Position and target of the camera relative to the robot; x is forward in "follow", east in the others.
 const PLACES = {
   orbit: { camera: [-1.6, -0.7, 1.05], target: [0.6, 0.1, 0] },
   follow: { camera: [-1.5, 0, 0.95], target: [0.9, 0, 0] },
-  top: { camera: [0, -0.01, 13], target: [0, 0, 0] }, // a little to the south, so that north is up
+  top: { camera: [0, -0.01, 13], target: [0, 0, 0] }, // slightly south, so that north is up
 };
 
 const shortest = (turn) => Math.atan2(Math.sin(turn), Math.cos(turn));
@@ -50,7 +50,7 @@ export default class RobotRig {
     });
   }
 
-  // Poses come less often than pictures are drawn: the robot glides from one to the next.
+  // Poses arrive less often than pictures are drawn, so they are interpolated.
   go(x, y, yaw, angles) {
     const isUnderWay = this.target !== undefined;
     this.target = { x, y, yaw, angles };
@@ -70,20 +70,20 @@ export default class RobotRig {
       yaw: target.yaw - (1 - part) * shortest(target.yaw - from.yaw),
       angles,
     });
-    // Not at each frame of the screen: the view is drawn 20 times a second, and the rest of the page seldom.
+    // Not at each frame of the screen: the view is drawn 20 times a second, and the rest of the page rarely.
     if (part < 1) setTimeout(() => this.glide(), STEP_MS);
     else this.target = undefined;
   }
 
   look(view) {
     const { camera, controls } = getElement(this.scene) ?? {};
-    if (!controls) return; // there is no WebGL
+    if (!controls) return; // without WebGL
     this.view = view;
     const turn = view === "follow" ? this.mesh.rotation.z : 0;
     const from = (place) => new THREE.Vector3(...place).applyAxisAngle(UP, turn).add(this.mesh.position);
     camera.position.copy(from(PLACES[view].camera));
     controls.target.copy(from(PLACES[view].target));
-    // From above, a map is moved, not turned.
+    // From above, dragging moves the map instead of rotating it.
     const isMap = view === "top";
     controls.enableRotate = !isMap;
     controls.mouseButtons.LEFT = isMap ? THREE.MOUSE.PAN : THREE.MOUSE.ROTATE;

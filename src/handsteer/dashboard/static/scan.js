@@ -1,4 +1,4 @@
-// What the robot's laser scanner sees in the 3D view: a dot for each ray that meets something.
+// The laser scan in the 3D view: a dot for each ray that hits something.
 import { THREE } from "nicegui-scene";
 
 export default class ScanDots {

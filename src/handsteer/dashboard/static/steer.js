@@ -1,6 +1,6 @@
-// What a page from Python cannot feel: how long the pad or a key is held, and whether the page is in front.
+// What needs the browser: how long the pad or a key is held, and whether the page is in front.
 
-const REPEAT_MS = 100; // the server stops the robot when it hears nothing for 300 ms
+const REPEAT_MS = 100; // the server stops the robot after 300 ms without a message
 const KEYS = {
   ArrowUp: [0, 1], KeyW: [0, 1], ArrowDown: [0, -1], KeyS: [0, -1],
   ArrowLeft: [-1, 0], KeyA: [-1, 0], ArrowRight: [1, 0], KeyD: [1, 0],
@@ -10,7 +10,7 @@ const TYPED_IN = "input, textarea, select, [contenteditable]";
 let held = null; // the pad that is held: {pad, timer, x, y}, x to the right and y up, -1 to 1
 const pressed = new Set();
 
-// What cannot be sent now must not be sent later. The time is the day's, which goes on while a laptop sleeps.
+// A message that cannot be sent now must not be sent later. The clock is the wall clock, which runs on in standby.
 function say(name, what = {}) {
   if (window.socket?.connected) emitEvent(name, { ...what, at: Date.now() });
 }
@@ -42,7 +42,7 @@ function releasePad() {
   say("let_go");
 }
 
-// Sliders stay where they are set, but only while somebody looks.
+// Sliders hold their velocity only while the page is visible.
 const slidersInUse = () => document.querySelector(".sliders.set, .sliders:focus-within") !== null;
 setInterval(() => {
   if (slidersInUse() && !document.hidden && document.hasFocus()) say("sliders_held");
@@ -74,14 +74,14 @@ for (const type of ["pointerup", "pointercancel", "lostpointercapture"]) {
   document.addEventListener(type, (event) => event.target.closest?.(".pad") && releasePad());
 }
 
-// Arrows scroll the page and move sliders, so they steer on the pad only; letters steer anywhere for who drives.
+// Arrows scroll the page and move sliders, so they steer on the pad only; letters steer anywhere for the driver.
 function padOf(event) {
   const anywhere = event.code.startsWith("Key") && !event.target.closest?.(TYPED_IN);
   return event.target.closest?.(".pad") ?? (anywhere ? document.querySelector(".steer.yours .pad") : null);
 }
 
 document.addEventListener("keydown", (event) => {
-  if (event.ctrlKey || event.altKey || event.metaKey) releasePad(); // with these, some systems tell of no keyup
+  if (event.ctrlKey || event.altKey || event.metaKey) releasePad(); // with these, some systems send no keyup
   else if (event.code in KEYS) pressKey(event);
 });
 

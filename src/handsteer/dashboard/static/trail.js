@@ -1,4 +1,4 @@
-// The robot's way in the 3D view: a ribbon on the floor through points that come a few at a time.
+// The robot's trail in the 3D view: a ribbon on the floor through points that arrive a few at a time.
 import { THREE } from "nicegui-scene";
 
 export default class Trail {
@@ -6,7 +6,7 @@ export default class Trail {
     this.most = most;
     this.width = width;
     this.points = [];
-    // Basic, so that it looks the same from all sides; its bounds would have to be computed again and again.
+    // Basic, so that it looks the same from all sides. Not culled: its bounds would need repeated computation.
     this.mesh = new THREE.Mesh(new THREE.BufferGeometry(), new THREE.MeshBasicMaterial({ transparent: true }));
     this.mesh.frustumCulled = false;
     this.extend(points);

@@ -1,4 +1,4 @@
-// Sends pictures as the server wants them: 8 bytes with the time of capture in milliseconds, then a JPEG file.
+// Sends pictures in the server's format: 8 bytes with the capture time in milliseconds, then a JPEG file.
 
 const MOST_PIXELS = 640 * 480, QUALITY = 0.8, HEADER_BYTES = 8;
 

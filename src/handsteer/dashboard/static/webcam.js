@@ -1,4 +1,4 @@
-// Gives this browser's webcam to handsteer: the newest picture, whenever the last one has arrived.
+// Sends this browser's webcam to handsteer: the newest picture, whenever the last one has arrived.
 
 const WHY_NOT = {
   NotAllowedError: "the browser was told not to give its camera away: allow it beside the address, then try again",
@@ -8,7 +8,7 @@ const WHY_NOT = {
 
 const LOOK_MS = 10;
 
-let giving = null; // {stream, video, sender, shown} while the camera is given
+let giving = null; // {stream, video, sender, shown} while the camera is in use
 
 function sayCamera(state, words = "") {
   emitEvent("webcam", { state, words });
@@ -39,7 +39,7 @@ function sendFrames(viewer) {
   const address = new URL("camera", location.origin);
   address.searchParams.set("viewer", viewer);
   address.protocol = address.protocol.replace("http", "ws");
-  // A worker, because a page that draws a lot lets pictures wait for their encoding for up to a second.
+  // A worker, because a page busy with drawing delays the encoding of pictures by up to a second.
   const sender = giving.sender = new Worker("/assets/webcam-sender.js");
   sender.postMessage({ address: address.href });
   sender.onmessage = ({ data }) => {
@@ -54,7 +54,7 @@ function sendFrames(viewer) {
   sayCamera("on");
 }
 
-// A picture that is sent twice would only look newer than it is.
+// A picture sent twice would only look newer than it is.
 function whenNew(video, send) {
   if (video.requestVideoFrameCallback) {
     video.requestVideoFrameCallback(send);
@@ -66,7 +66,7 @@ function whenNew(video, send) {
   }
 }
 
-// A figure that is another for each picture; older browsers have one or another.
+// A number that differs for each picture; older browsers provide one or the other.
 function picturesOf(video) {
   return video.mozPaintedFrames || video.getVideoPlaybackQuality?.().totalVideoFrames || video.currentTime;
 }

@@ -1,1 +1,1 @@
-"""Teaches signs on the page: one lesson at a time, which is given by who drives."""
+"""Teaches signs on the page: one lesson at a time, run by the driver."""

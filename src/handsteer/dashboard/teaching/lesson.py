@@ -1,4 +1,4 @@
-"""The lesson in which one sign is taught: what comes after what. No page, no clock, no camera and no threads."""
+"""The steps of a lesson that teaches one sign, without page, clock, camera or threads."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -29,12 +29,12 @@ STILL: Final = "Move the hand a little: nearer, farther, tilted."
 
 
 def hint(hand: Hand | None, guess: SignGuess, hands: Sequence[Hand]) -> str:
-    """Return one sentence on what to do better; empty when all is well.
+    """Return one sentence on what to improve; empty if nothing.
 
     Args:
         hand: The hand in the newest frame.
-        guess: What that is told as by the signs that are shipped.
-        hands: Those of the take that is under way, the oldest first.
+        guess: What the shipped signs' classifier recognises it as.
+        hands: The hands of the current take, oldest first.
     """
     if hand is None:
         return NO_HAND
@@ -46,13 +46,13 @@ def hint(hand: Hand | None, guess: SignGuess, hands: Sequence[Hand]) -> str:
 
 
 def is_still(hands: Sequence[Hand]) -> bool:
-    """Return whether many ``hands`` are all of one size and one tilt."""
+    """Return whether ``hands`` are many, and all of similar size and tilt."""
     if len(hands) < _ENOUGH_HANDS:
         return False
     pixels = np.array([hand.pixels[:, :2] for hand in hands], np.float64)
     palms = pixels[:, KNUCKLES].mean(axis=1) - pixels[:, WRIST]
     lengths = np.maximum(np.linalg.norm(palms, axis=1), 1e-9)
-    # About the mean direction, so that a hand that points up or down is no different.
+    # Relative to the mean direction, so that a hand that points up or down is treated alike.
     mean = palms.mean(axis=0)
     turns = np.arctan2(palms[:, 1] * mean[0] - palms[:, 0] * mean[1], palms @ mean)
     return bool(np.ptp(turns) < _LEAST_TURN_RAD and lengths.max() / lengths.min() < _LEAST_GROWTH)
@@ -61,7 +61,7 @@ def is_still(hands: Sequence[Hand]) -> bool:
 Step = Literal["collect", "train", "try"]
 
 MOST_TAKES: Final = 50
-"""More are not collected in one lesson."""
+"""Maximum number of takes in one lesson."""
 
 _LEAST_TAKES: Final = 2
 _READY: Final = Status("ready", 0.0, 0)
@@ -73,9 +73,9 @@ class Collected:
     """A take of this lesson.
 
     Attributes:
-        number: From 1, in the order in which they were collected.
+        number: From 1, in order of collection.
         take: The hands.
-        picture: A small JPEG file of a frame of it, mirrored, with the hand's skeleton; it stays in memory.
+        picture: A small JPEG file of one of its frames, mirrored, with the hand's skeleton; it stays in memory.
     """
 
     number: int
@@ -85,21 +85,21 @@ class Collected:
 
 @dataclass(frozen=True)
 class View:
-    """What there is to show of a lesson.
+    """The state of a lesson for the page.
 
     Attributes:
         label: The sign.
-        step: Takes are collected, learnt from, or what was learnt is tried.
-        recording: Whether takes are under way.
-        status: How far the collecting is.
-        hint: What to do better; empty when all is well.
-        takes: Those that were collected and not deleted.
-        wanted: How many takes are asked for.
-        can_train: Whether there are enough of them.
-        progress: 0 to 1, how far the training is.
-        trouble: What went wrong; empty when nothing did.
+        step: Collecting takes, training, or trying the result.
+        recording: Whether takes are being recorded.
+        status: Progress of collecting.
+        hint: What to improve; empty if nothing.
+        takes: Collected takes, without deleted ones.
+        wanted: Number of takes to collect.
+        can_train: Whether there are enough takes.
+        progress: Of the training, 0 to 1.
+        trouble: The last error; empty if none.
         report: How well the sign was learnt.
-        seen: What the sign that was learnt is told as, in the newest frame.
+        seen: Recognition of the newest frame by the taught model.
     """
 
     label: str
@@ -117,11 +117,11 @@ class View:
 
 
 class Lesson:
-    """Collect takes, train, try what was learnt; whatever does not fit the step is left undone.
+    """Collect takes, train, try the result; calls that do not fit the current step have no effect.
 
     Args:
-        facts: About all takes, the sign among them.
-        plan: How many takes of which length are asked for.
+        facts: Of all takes, including the sign.
+        plan: Number and length of takes.
     """
 
     def __init__(self, facts: Facts, plan: TeachConfig) -> None:
@@ -142,17 +142,17 @@ class Lesson:
 
     @property
     def takes(self) -> tuple[Take, ...]:
-        """Those that were collected and not deleted."""
+        """Collected takes, without deleted ones."""
         return tuple(each.take for each in self._takes)
 
     @property
     def is_recording(self) -> bool:
-        """Whether a take, or the countdown before it, is under way."""
+        """Whether a take, or the countdown before it, is in progress."""
         return self._collector is not None
 
     @property
     def view(self) -> View:
-        """What there is to show."""
+        """The state for the page."""
         return View(
             label=self.facts.label,
             step=self.step,
@@ -169,7 +169,7 @@ class Lesson:
         )
 
     def record(self) -> None:
-        """Begin the countdown to the takes that are missing; to one more if none is."""
+        """Start the countdown to the missing takes, or to one more if none is missing."""
         room = MOST_TAKES - len(self._takes)
         if self.step != "collect" or self.is_recording or room <= 0:
             return
@@ -181,18 +181,16 @@ class Lesson:
         self._hands = []
 
     def pause(self) -> None:
-        """Drop the take that is under way, and collect no more until :meth:`record`."""
+        """Drop the current take, and stop collecting until :meth:`record`."""
         self._collector = None
         self._status = _READY
         self._hands = []
 
     def see(self, hand: Hand | None, guess: SignGuess, dt_s: float) -> Status:
-        """Take what the next frame shows while takes are collected, and return how far that is.
+        """Process the next frame while takes are collected, and return the progress.
 
-        Args:
-            hand: The hand in it, if there is one.
-            guess: What that is told as by the signs that are known.
-            dt_s: Seconds since the last frame.
+        ``guess`` is what the classifier of known signs recognises ``hand`` as; ``dt_s`` are the seconds since the last
+        frame.
         """
         if self.step != "collect":
             return _READY
@@ -206,12 +204,12 @@ class Lesson:
         return self._status
 
     def keep(self, take: Take, picture: bytes) -> None:
-        """Keep a take that has ended."""
+        """Store a finished take."""
         self._count += 1
         self._takes.append(Collected(self._count, take, picture))
 
     def delete(self, number: int) -> None:
-        """Delete a take; another one is collected for it if takes are under way."""
+        """Delete a take; it is replaced by another one while takes are recorded."""
         left = [each for each in self._takes if each.number != number]
         if self.step == "collect" and len(left) < len(self._takes):
             self._takes = left
@@ -219,33 +217,33 @@ class Lesson:
                 self._collector.again()
 
     def lose_frames(self) -> None:
-        """Say that no frames come."""
+        """Report that no frames arrive."""
         self._hint = "No picture comes from the camera."
         self._seen = None
 
     def begin_training(self) -> bool:
-        """Go on to the training, if there are enough takes; return whether that is so."""
+        """Start the training if there are enough takes; return whether it has started."""
         if self.step != "collect" or not self.view.can_train:
             return False
         self.step, self._progress, self._trouble = "train", 0.0, ""
         return True
 
     def advance(self, done: int, of: int) -> None:
-        """Take how many steps of the training are done."""
+        """Set the number of training steps that are done."""
         self._progress = done / of
 
     def learn(self, model: TaughtModel, report: TeachingReport) -> None:
-        """Take what was learnt, to be tried."""
+        """Set the result of the training, to be tried."""
         if self.step == "train":
             self.step, self.model, self._report, self._seen = "try", model, report, None
 
     def try_out(self, seen: Recognition) -> None:
-        """Take what the next frame is told as by what was learnt."""
+        """Set the recognition of the next frame by the taught model."""
         if self.step == "try":
             self._seen, self._hint = seen, ""
 
     def go_back(self, trouble: str = "") -> None:
-        """Go back to the collecting, with all takes, and say what went wrong."""
+        """Return to collecting, with all takes; ``trouble`` is the error to show."""
         self.step, self.model, self._report, self._trouble = "collect", None, None, trouble
         self.pause()
 

@@ -1,4 +1,4 @@
-"""The node ``dashboard_lesson``: shows the camera's frames to a lesson, and has what it collects learnt."""
+"""The node ``dashboard_lesson``: passes the camera's frames to a lesson, and runs its training."""
 
 import logging
 import threading
@@ -40,12 +40,12 @@ _NOTHING: Final = SignGuess(NONE, 0.0)
 
 @dataclass(frozen=True)
 class LessonVision:
-    """What a lesson sees with.
+    """Recognition for a lesson.
 
     Attributes:
-        open_landmarker: Opens what finds the hands.
-        open_shipped: Opens the classifier of the signs that are shipped.
-        signs: Returns what decides when a sign counts, as it is now.
+        open_landmarker: Opens the hand landmarker.
+        open_shipped: Opens the classifier of the shipped signs.
+        signs: Returns the current parameters of recognition.
     """
 
     open_landmarker: Callable[[], Landmarker]
@@ -54,16 +54,16 @@ class LessonVision:
 
 
 class LessonNode(Node):
-    """Gives one lesson; all may be called from any thread.
+    """Runs one lesson; thread-safe.
 
-    Hands are looked for a second time, beside the recognition, only while takes are collected or tried.
+    Hands are detected a second time, in addition to the recognition, only while takes are collected or tried.
 
     Args:
         transport: Carries the messages.
         clock: The graph's clock.
-        lesson: From here on only this node uses it.
-        known: The takes of earlier lessons, which are learnt from too.
-        eyes: What it sees with; the models are opened on this node's thread.
+        lesson: Used only by this node from here on.
+        known: The takes of earlier lessons, which are trained on too.
+        eyes: Its recognition; the models are opened on this node's thread.
     """
 
     def __init__(self, transport: Transport, clock: Clock, lesson: Lesson, known: Dataset, eyes: LessonVision) -> None:
@@ -84,27 +84,27 @@ class LessonNode(Node):
 
     @property
     def view(self) -> View:
-        """What there is to show."""
+        """The state for the page."""
         with self._lock:
             return self._lesson.view
 
     @property
     def learnt(self) -> TaughtModel | None:
-        """What was learnt, while it is tried."""
+        """The taught model, while it is tried."""
         with self._lock:
             return self._lesson.model
 
     def attend(self) -> None:
-        """Say that the page of who teaches is there: without it for a second, no takes are collected."""
+        """Report that the teaching viewer's page is open; without this for a second, no takes are collected."""
         self._attended_s = self.clock.now()
 
     def record(self) -> None:
-        """Begin the countdown to the takes that are missing."""
+        """Start the countdown to the missing takes."""
         with self._lock:
             self._lesson.record()
 
     def pause(self) -> None:
-        """Drop the take that is under way, and collect no more."""
+        """Drop the current take, and stop collecting."""
         with self._lock:
             self._lesson.pause()
 
@@ -114,7 +114,7 @@ class LessonNode(Node):
             self._lesson.delete(number)
 
     def train(self) -> None:
-        """Learn from the takes, of this lesson and of those before, on a thread and in a process of their own."""
+        """Train on the takes of this and earlier lessons, on a separate thread and in a separate process."""
         with self._lock:
             if not self._lesson.begin_training():
                 return
@@ -123,7 +123,7 @@ class LessonNode(Node):
         threading.Thread(target=self._learn, args=(training,), name="lesson_training", daemon=True).start()
 
     def go_back(self) -> None:
-        """Collect further takes; a training that is under way is cancelled, and what was learnt is dropped."""
+        """Collect further takes; cancels a running training and drops the taught model."""
         with self._lock:
             self._cancel()
             self._lesson.go_back()
@@ -193,7 +193,7 @@ class LessonNode(Node):
                 self._shown = None
 
     def _remember(self, image: NDArray[np.uint8], hand: Hand, left_s: float) -> None:
-        """Remember the frame in the middle of the take: at its begin the hand is still on its way."""
+        """Store the frame in the middle of the take; at its start the hand is still moving."""
         if self._shown is None or left_s >= self._shown[2] / 2:
             whole_s = left_s if self._shown is None else self._shown[2]
             self._shown = image, hand, whole_s

@@ -1,4 +1,4 @@
-"""Who teaches, where it is kept, and how the running graph takes it."""
+"""Manages lessons: who teaches, where the results are stored, and how the running graph adopts them."""
 
 import datetime
 import threading
@@ -31,10 +31,10 @@ class Kept:
 
     Attributes:
         label: The sign.
-        action: What it does; None for what shall not count.
-        dataset: The file that has its takes.
-        model: The file that has what was learnt, which is in use now.
-        lines: YAML that makes it so at the next start too.
+        action: Its action; None for ``NONE``.
+        dataset: The file with its takes.
+        model: The file with the taught model, which is now in use.
+        lines: YAML that makes the change permanent.
     """
 
     label: str
@@ -46,12 +46,12 @@ class Kept:
 
 @dataclass
 class _Given:
-    """The lesson that is given.
+    """The current lesson.
 
     Attributes:
-        viewer: Who gives it.
-        node: Gives it.
-        lost: Signs of the model so far that cannot be learnt again, as there are no takes of them.
+        viewer: The viewer who teaches.
+        node: Runs it.
+        lost: Signs of the current model that cannot be trained again, because there are no takes of them.
         takes_are_saved: Whether its takes are in the file.
     """
 
@@ -62,17 +62,17 @@ class _Given:
 
 
 class Teaching:
-    """One lesson at a time on a running graph; may be used from any thread.
+    """Runs one lesson at a time on a running graph; thread-safe.
 
-    Files are read and written by :meth:`known`, :meth:`begin` and :meth:`keep`.
+    :meth:`known`, :meth:`begin` and :meth:`keep` read and write files.
 
     Args:
         transport: Carries the graph's messages.
         clock: The graph's clock.
-        plan: Which files, how many takes, how long.
-        eyes: What lessons see with.
+        plan: Files, and number and length of takes.
+        eyes: Recognition for lessons.
         config: Returns the configuration of the running graph.
-        reconfigure: Lets the running graph take another one; raises ConfigError if it cannot.
+        reconfigure: Applies another one to the running graph; raises ConfigError if it is rejected.
     """
 
     def __init__(
@@ -96,7 +96,7 @@ class Teaching:
 
     @classmethod
     def of(cls, graph: JoinedGraph) -> "Teaching":
-        """Return the teaching on a graph."""
+        """Return the teaching for a graph."""
         config = graph.config
         eyes = LessonVision(
             open_landmarker=lambda: open_landmarker(config),
@@ -108,13 +108,13 @@ class Teaching:
 
     @property
     def label(self) -> str | None:
-        """The sign that is being taught, whoever does; None when none is."""
+        """The sign that is being taught by any viewer; None if none is."""
         given = self._given
         return given.node.view.label if given else None
 
     @property
     def model_path(self) -> Path:
-        """The file that what is learnt is written to."""
+        """The file that the taught model is written to."""
         return self._config().signs.model or self._plan.model
 
     def known(self) -> Dataset:
@@ -127,25 +127,25 @@ class Teaching:
         return load_dataset(path) if path.exists() else Dataset()
 
     def actions(self) -> tuple[Action, ...]:
-        """Return what a sign can be given to do."""
+        """Return the available actions."""
         several = bool(self._config().control.robots)
         return tuple(action for action in ACTIONS if several or action != "next_robot")
 
     def action_of(self, label: str) -> Action:
-        """Return what the sign ``label`` does now, or would."""
+        """Return the current or default action of the sign ``label``."""
         return action_of(label, self._config().control.actions)
 
     def begin(self, viewer: str, name: str, person: str = "") -> None:
-        """Begin a lesson; one that another viewer has left is over.
+        """Begin a lesson; a lesson abandoned by another viewer ends.
 
         Args:
-            viewer: Who teaches.
-            name: The sign: one that was taught before, a new one, or ``NONE`` for what shall not count.
-            person: Who shows it; ``me`` by default.
+            viewer: The viewer who teaches.
+            name: The sign: taught before, new, or ``NONE`` for hands that are no sign.
+            person: The person who shows it; ``me`` by default.
 
         Raises:
-            DatasetError: It is no name, the name of a shipped sign, or the file of takes is damaged.
-            ModelError: The file that would be written over is no model of taught signs.
+            DatasetError: It is not a valid name, the name of a shipped sign, or the file of takes is damaged.
+            ModelError: The file to be overwritten is not a model of taught signs.
         """
         known = self.known()
         label = label_for(name, known.labels)
@@ -164,36 +164,36 @@ class Teaching:
                 node.start()
 
     def lesson(self, viewer: str) -> LessonNode | None:
-        """Return the lesson that ``viewer`` gives, if it does."""
+        """Return the lesson of ``viewer``, if any."""
         given = self._given
         return given.node if given is not None and given.viewer == viewer else None
 
     def view(self, viewer: str) -> View | None:
-        """Return what there is to show of the lesson that ``viewer`` gives, if it does."""
+        """Return the state of the lesson of ``viewer``, if any."""
         node = self.lesson(viewer)
         return node.view if node else None
 
     def lost(self) -> tuple[str, ...]:
-        """Return the signs that are in the model so far, and would not be in the one of this lesson."""
+        """Return the signs of the current model that would be missing in this lesson's."""
         given = self._given
         return given.lost if given else ()
 
     def keep(self, viewer: str, action: str) -> Kept | None:
-        """Keep what was learnt, and let the graph use it; the lesson is over.
+        """Save the takes and the taught model, let the graph use it, and end the lesson.
 
-        The takes and the model are in their files, and the robot obeys the sign as soon as it may move again.
+        The robot obeys the sign as soon as it may move again.
 
         Args:
-            viewer: Who gives the lesson.
-            action: What the sign does.
+            viewer: The viewer who teaches.
+            action: The sign's action.
 
         Returns:
-            What was kept; None when ``viewer`` gives no lesson, or has nothing to keep yet.
+            What was kept; None if ``viewer`` has no lesson, or nothing to keep yet.
 
         Raises:
-            ConfigError: There is no such action, or the running nodes refuse the sign.
+            ConfigError: The action does not exist, or the running nodes reject the sign.
             DatasetError: The file of takes is damaged, or cannot be written.
-            ModelError: The file of what was learnt cannot be written.
+            ModelError: The model cannot be written.
         """
         with self._lock:
             given = self._given
@@ -215,13 +215,13 @@ class Teaching:
             return Kept(view.label, does, self._plan.dataset, path, self._lines(path))
 
     def end(self, viewer: str) -> None:
-        """End the lesson that ``viewer`` gives, if it does, and keep nothing of it."""
+        """End the lesson of ``viewer``, if any, without keeping anything."""
         with self._lock:
             if self._given is not None and self._given.viewer == viewer:
                 self._end()
 
     def close(self) -> None:
-        """End whatever is under way, for good."""
+        """End any lesson permanently."""
         with self._lock:
             self._closed = True
             self._end()
@@ -229,7 +229,7 @@ class Teaching:
     def _end(self) -> None:
         given, self._given = self._given, None
         if given is not None:
-            # Off this thread, which may be the server's: a frame may be under way.
+            # Off this thread, which may be the server's: a frame may be in progress.
             threading.Thread(target=given.node.stop, name="lesson_end", daemon=True).start()
 
     def _lines(self, model: Path) -> str:
@@ -239,10 +239,10 @@ class Teaching:
 
 
 def with_sign(config: Config, model: Path, label: str, action: Action | None) -> Config:
-    """Return ``config`` with another model of taught signs, and what the sign ``label`` does, if it does anything.
+    """Return ``config`` with another model of taught signs, and with the action of the sign ``label``, if any.
 
     Raises:
-        ConfigError: ``label`` cannot do that.
+        ConfigError: ``label`` cannot have that action.
     """
     control = config.control
     if action is not None:

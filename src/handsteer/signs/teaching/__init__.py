@@ -1,4 +1,4 @@
-"""Teaches further signs: collects takes of hands, learns what they have in common, and tells them from all other hands.
+"""Teaches further signs: collects takes of hands, and trains a model that distinguishes them from all other hands.
 
-:mod:`~handsteer.signs.training`, its neighbour, makes the model of the six signs that handsteer ships.
+:mod:`~handsteer.signs.training` trains the model of the six shipped signs.
 """

@@ -1,7 +1,7 @@
-"""Trains in a process of its own, so that a robot can be driven meanwhile.
+"""Trains in a separate process, so that a robot can be driven meanwhile.
 
-Beside a graph, training in the same process would take the interpreter from the nodes, and the linear algebra library
-all processors: where these are busy its threads wait for each other, and training takes ten times as long.
+In the process of a graph, training would block the interpreter for the nodes, and the linear algebra library would use
+all processors: if they are busy, its threads wait for each other, and training takes ten times as long.
 """
 
 import contextlib
@@ -28,11 +28,9 @@ _ROOT: Final = Path(__file__).parents[3]
 
 
 class TrainingApart:
-    """One training, in a process of its own; for one :meth:`run`.
+    """One training in a separate process; arguments as for :func:`~handsteer.signs.teaching.train.train_signs`.
 
-    Args:
-        dataset: As for :func:`~handsteer.signs.teaching.train.train_signs`.
-        sided: Likewise.
+    Use it for one :meth:`run` only.
     """
 
     def __init__(self, dataset: Dataset, sided: Sequence[str] = ()) -> None:
@@ -42,13 +40,13 @@ class TrainingApart:
         self._cancelled = threading.Event()
 
     def run(self, progress: Progress = lambda _done, _of: None) -> tuple[TaughtModel, TeachingReport] | None:
-        """Train, and return what was learnt; None when it was cancelled meanwhile.
+        """Train, and return the model and its report; None if cancelled.
 
         Args:
-            progress: Called with the number of steps that are done, and of all.
+            progress: Called with the number of completed steps and of all steps.
 
         Raises:
-            TrainingError: As by ``train_signs``; or the process ended before it was done.
+            TrainingError: As for ``train_signs``; or the process ended early.
         """
         with self._lock:
             if self._cancelled.is_set():
@@ -72,7 +70,7 @@ class TrainingApart:
         return learnt
 
     def cancel(self) -> None:
-        """End the training, if it has not ended; may be called from any thread."""
+        """Cancel the training, if it is running; thread-safe."""
         with self._lock:
             self._cancelled.set()
             if self._process is not None:
@@ -80,7 +78,7 @@ class TrainingApart:
 
 
 def _follow(process: "subprocess.Popen[bytes]", work: object, progress: Progress) -> Any:
-    """Return what the process came to; None when it ended before."""
+    """Return the result of the process; None if it ended early."""
     assert process.stdin is not None
     assert process.stdout is not None
     with contextlib.suppress(OSError):
@@ -97,8 +95,8 @@ def _follow(process: "subprocess.Popen[bytes]", work: object, progress: Progress
 
 
 def _main() -> None:
-    """Take the work from standard input, and tell the progress and what comes of it on standard output."""
-    # Whatever else is printed must not get between.
+    """Read the work from standard input; write the progress and the result to standard output."""
+    # Other output must not mix with the messages.
     out, sys.stdout = sys.stdout.buffer, sys.stderr
 
     def tell(kind: str, said: object) -> None:

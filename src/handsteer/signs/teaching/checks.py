@@ -1,4 +1,4 @@
-"""What a dataset must have before signs are learnt from it."""
+"""Checks a dataset before training."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ def taught_labels(dataset: Dataset, sided: Sequence[str]) -> tuple[str, ...]:
     """Return the labels of ``dataset`` that are new signs.
 
     Raises:
-        TrainingError: There is none, two mean the same, or one of ``sided`` is none of them.
+        TrainingError: There is none, two mean the same, or one of ``sided`` is not among them.
     """
     labels = tuple(label for label in dataset.labels if label not in (*SIGNS, NONE))
     if not labels:
@@ -39,7 +39,7 @@ def taught_labels(dataset: Dataset, sided: Sequence[str]) -> tuple[str, ...]:
 
 
 def check_enough(dataset: Dataset, labels: Sequence[str]) -> None:
-    """Raise TrainingError unless there is enough of each of ``labels``."""
+    """Raise TrainingError unless there are enough takes and hands of each of ``labels``."""
     for summary in summarise(dataset):
         if summary.label in labels and (summary.takes < _LEAST_TAKES or summary.rows < _LEAST_ROWS):
             raise TrainingError(
@@ -50,7 +50,7 @@ def check_enough(dataset: Dataset, labels: Sequence[str]) -> None:
 
 @dataclass(frozen=True)
 class Lookalike:
-    """Hands of a new sign that are told as a sign that is known already."""
+    """Hands of a new sign that are recognised as a known sign."""
 
     label: str
     sign: str
@@ -58,7 +58,7 @@ class Lookalike:
 
 
 def lookalikes(dataset: Dataset, labels: Sequence[str], shipped: Classifier) -> tuple[Lookalike, ...]:
-    """Return which of ``labels`` are told as a sign of ``shipped`` already, and how often."""
+    """Return which of ``labels`` the classifier ``shipped`` already recognises as a sign, and how often."""
     found = []
     for label in labels:
         told = [
@@ -72,7 +72,7 @@ def lookalikes(dataset: Dataset, labels: Sequence[str], shipped: Classifier) -> 
 
 
 def check_not_known(found: Sequence[Lookalike]) -> None:
-    """Raise TrainingError when a sign is often told as one that is known already."""
+    """Raise TrainingError if a new sign is often recognised as a known one."""
     for each in found:
         share = each.hands.rate or 0.0
         if share > _KNOWN_SHARE:
@@ -83,10 +83,9 @@ def check_not_known(found: Sequence[Lookalike]) -> None:
 
 
 def check_told_apart(likeliest: Confusion) -> None:
-    """Raise TrainingError when a sign is often likelier to be another.
+    """Raise TrainingError if a sign is often confused with another.
 
-    Args:
-        likeliest: What hands that were held out are likeliest to be, sure or not.
+    ``likeliest`` has the likeliest signs of held-out hands, regardless of thresholds.
     """
     *labels, _ = likeliest.labels
     for row, label in enumerate(labels):

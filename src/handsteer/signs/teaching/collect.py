@@ -1,4 +1,4 @@
-"""Collects takes: live, one after the other, or from recordings."""
+"""Collects takes, live or from recordings."""
 
 import math
 import time
@@ -20,16 +20,16 @@ from handsteer.signs.teaching.dataset import Take
 Phase = Literal["ready", "countdown", "recording", "done"]
 
 _FEWEST: Final = 5
-"""Hands in the shortest take that is kept."""
+"""Minimum number of hands in a take."""
 
 
 _HELD_S: Final = 0.7
-"""Terminals tell of a key that is held by sending it again and again, the second time after up to 0.66 s."""
+"""Terminals report a held key by repeating it; the first repetition comes after up to 0.66 s."""
 
 
 @dataclass(frozen=True)
 class Facts:
-    """What is the same for all takes that are collected together: see :class:`Take`."""
+    """Attributes shared by all takes that are collected together: see :class:`Take`."""
 
     label: str
     person: str
@@ -45,14 +45,14 @@ class Facts:
 
 @dataclass(frozen=True)
 class Status:
-    """How far the collecting is.
+    """The progress of collecting.
 
     Attributes:
-        phase: ``ready`` waits for a key, ``countdown`` for the time to pass.
-        left_s: How long the countdown or the take still lasts, in seconds; 0 when nobody knows.
-        hands: Hands in the take that is under way.
-        finished: The take that ended with this frame, if one did.
-        failed: Whether a take ended with this frame in which there were too few hands to keep it.
+        phase: ``ready`` waits for a key, ``countdown`` for time to pass.
+        left_s: Seconds left of the countdown or take; 0 if unknown.
+        hands: Number of hands in the current take.
+        finished: The take that ended with this frame, if any.
+        failed: Whether a take with too few hands ended with this frame.
     """
 
     phase: Phase
@@ -63,16 +63,16 @@ class Status:
 
 
 class Collector:
-    """Says when to show the sign, and keeps the hands that are seen meanwhile; has no clock and no camera.
+    """Controls when to show the sign, and collects the hands; has no clock and no camera.
 
-    Hands-free, a countdown goes before each take. With ``hold``, a take lasts for as long as the caller says so.
+    Without ``hold``, a countdown precedes each take. With ``hold``, a take lasts while a key is held.
 
     Args:
-        facts: About all takes.
-        takes: How many to collect.
-        take_s: How long each lasts, in seconds; not with ``hold``.
-        countdown_s: How long to wait before each, in seconds; not with ``hold``.
-        hold: Whether takes last for as long as a key is held.
+        facts: The takes' shared attributes.
+        takes: Number of takes to collect.
+        take_s: Duration of each in seconds; ignored with ``hold``.
+        countdown_s: Duration of the countdown in seconds; ignored with ``hold``.
+        hold: Whether takes last while a key is held.
     """
 
     def __init__(self, facts: Facts, *, takes: int, take_s: float, countdown_s: float, hold: bool = False) -> None:
@@ -88,16 +88,16 @@ class Collector:
 
     @property
     def done(self) -> bool:
-        """Whether all takes are there."""
+        """Whether all takes are collected."""
         return self._left == 0
 
     def step(self, hand: Hand | None, dt_s: float, *, key_age_s: float = math.inf) -> Status:
-        """Take what the next frame shows.
+        """Process the next frame.
 
         Args:
-            hand: The hand in it, if there is one.
+            hand: The hand in it, if any.
             dt_s: Seconds since the last frame.
-            key_age_s: How long ago the key that is held last made itself known, in seconds.
+            key_age_s: Seconds since the last report of the held key.
         """
         held = key_age_s < _HELD_S
         if self.done:
@@ -114,7 +114,7 @@ class Collector:
         return self._waiting()
 
     def again(self) -> None:
-        """Collect one take more, as one was undone."""
+        """Collect one more take, to replace a deleted one."""
         self._left += 1
 
     def _record(self, hand: Hand | None) -> Status:
@@ -153,12 +153,12 @@ def collect_live(
     """Yield the takes of ``collector`` as they end.
 
     Args:
-        camera: Is read at its own pace.
-        landmarker: Finds the hands; the largest one counts.
-        collector: Says what to keep.
-        clock: The camera's.
-        show: Called for each frame, with the hand and how far the collecting is.
-        key_age: Returns how long ago the key that is held last made itself known, in seconds.
+        camera: Read at its own pace.
+        landmarker: Finds the hands; the largest one is used.
+        collector: Selects the frames.
+        clock: The camera's clock.
+        show: Called for each frame, with the hand and the progress.
+        key_age: Returns the seconds since the last report of the held key.
 
     Raises:
         CameraLost: The camera gives no more frames.
@@ -182,13 +182,13 @@ def collect_live(
 def collect_recorded(source: Path, landmarker: Landmarker, facts: Facts, take_s: float) -> list[Take]:
     """Return the takes in a video, a photo or a folder of photos.
 
-    A video has takes of ``take_s`` seconds, one after the other. Each photo is a take of its own, as it was taken at
-    another moment; photos of one folder are of one session.
+    A video is divided into takes of ``take_s`` seconds. Each photo is a separate take; the photos of a folder form a
+    session.
 
     Raises:
-        CameraNotFound: There is no such file, or there are no photos in the folder.
+        CameraNotFound: The file does not exist, or the folder contains no photos.
         CameraUnreadable: A file cannot be decoded.
-        DatasetError: There is no hand to be found in it.
+        DatasetError: No hand was found in it.
     """
     if source.is_dir() or source.suffix.lower() in PHOTO_SUFFIXES:
         takes = list(_photo_takes(source, landmarker, facts))

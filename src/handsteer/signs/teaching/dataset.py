@@ -1,4 +1,4 @@
-"""The file that signs are taught from: raw landmarks, and who showed what. ``docs/dataset.md`` describes it."""
+"""The dataset file for teaching signs: raw landmarks with labels and persons, described in ``docs/dataset.md``."""
 
 import json
 from collections.abc import Iterable, Sequence
@@ -16,7 +16,7 @@ from handsteer.signs.npz import Arrays, NpzFormat
 from handsteer.types import NONE, SIGNS, find_sign
 
 FORMAT: Final = 1
-"""Version of the file."""
+"""Version of the file format."""
 
 _FILE: Final = NpzFormat(
     "dataset of signs",
@@ -26,7 +26,7 @@ _FILE: Final = NpzFormat(
     remedy="give a file that `handsteer signs collect` or `handsteer signs import` has written",
 )
 _LONGEST_NAME: Final = 40
-# A hand may be half out of the picture, and nearer than it looks.
+# A hand may be partly outside the picture, and nearer than it looks.
 _LARGEST_PX: Final = 65_535
 _FARTHEST_PX: Final = 4 * _LARGEST_PX
 _FARTHEST_M: Final = 10.0
@@ -35,15 +35,15 @@ _LONGEST_S: Final = 1e7
 
 @dataclass(frozen=True, eq=False)
 class Take:
-    """A sign shown by one person for a while, without a break.
+    """A sign shown by one person without a break.
 
     Attributes:
         label: The sign.
-        person: Who showed it.
-        session: When or where it was: takes of one session are much alike.
-        source: Where the frames came from.
-        hands: The hand in each frame in which there was one, as the landmark model saw it.
-        times_s: (n,) when each was, in seconds from the first.
+        person: The person who showed it.
+        session: Time or place: takes of one session are similar.
+        source: Origin of the frames.
+        hands: The hand in each frame with one, as the landmark model reported it.
+        times_s: (n,) seconds since the first.
     """
 
     label: str
@@ -55,7 +55,7 @@ class Take:
 
     @property
     def is_flat(self) -> bool:
-        """Whether the third dimension is missing, as in landmarks that come from elsewhere."""
+        """Whether the landmarks have no depth, as imported ones do."""
         return not all(np.isfinite(hand.world).all() for hand in self.hands)
 
     @cached_property
@@ -65,7 +65,7 @@ class Take:
 
     @cached_property
     def world(self) -> NDArray[np.float64]:
-        """(n, 21, 3) landmarks in metres; not numbers when the take is flat."""
+        """(n, 21, 3) landmarks in metres; NaN if the take is flat."""
         return np.array([hand.world for hand in self.hands], np.float64).reshape(-1, 21, 3)
 
 
@@ -77,7 +77,7 @@ class Dataset:
 
     @property
     def labels(self) -> tuple[str, ...]:
-        """The signs in it, in the order in which they first came."""
+        """Its signs, in order of first occurrence."""
         return tuple(dict.fromkeys(take.label for take in self.takes))
 
     def of(self, label: str) -> tuple[Take, ...]:
@@ -92,7 +92,7 @@ class Dataset:
         """Return this dataset without its last take.
 
         Raises:
-            DatasetError: There is none.
+            DatasetError: It is empty.
         """
         if not self.takes:
             raise DatasetError("there is no take to undo")
@@ -100,10 +100,10 @@ class Dataset:
 
 
 def label_for(name: str, known: Sequence[str] = ()) -> str:
-    """Return the label that ``name`` means: a sign of handsteer, one of ``known``, or a new one.
+    """Return the label for ``name``: a sign of handsteer, one of ``known``, or a new one.
 
     Raises:
-        DatasetError: It is empty, too long, or cannot be printed.
+        DatasetError: It is empty, too long, or not printable.
     """
     name = " ".join(name.split())
     if not name or not name.isprintable() or len(name) > _LONGEST_NAME:
@@ -114,7 +114,7 @@ def label_for(name: str, known: Sequence[str] = ()) -> str:
 
 
 def load_dataset(path: Path) -> Dataset:
-    """Return the dataset in the file ``path``. Nothing in a file is ever run.
+    """Return the dataset in the file ``path``, which may be untrusted: loading executes nothing.
 
     Raises:
         DatasetError: It cannot be read, is damaged, or has another version.
@@ -127,7 +127,7 @@ def load_dataset(path: Path) -> Dataset:
 
 
 def save_dataset(dataset: Dataset, path: Path) -> None:
-    """Write ``dataset`` to ``path``, as a whole or not at all: an older file is there until the new one is.
+    """Write ``dataset`` to ``path`` atomically: an older file exists until the new one does.
 
     Raises:
         DatasetError: It cannot be written.
@@ -210,7 +210,7 @@ def _hands(arrays: Arrays) -> list[Hand]:
 
 
 def _check_range(name: str, values: NDArray[Any], highest: float, lowest: float | None = None) -> None:
-    """Refuse what no camera has seen, and what learning would never come to an end with; what is unknown is NaN."""
+    """Raise for values that no camera produces, and with which training would not end; unknown ones are NaN."""
     low = -highest if lowest is None else lowest
     if (values < low).any() or (values > highest).any():
         raise ValueError(f"some of its {name} are not from {low:g} to {highest:g}")
@@ -218,7 +218,7 @@ def _check_range(name: str, values: NDArray[Any], highest: float, lowest: float 
 
 @dataclass(frozen=True)
 class LabelSummary:
-    """How much there is of one sign in a dataset."""
+    """The amount of data of one sign in a dataset."""
 
     label: str
     takes: int
@@ -232,7 +232,7 @@ class LabelSummary:
 
 
 def summarise(dataset: Dataset) -> list[LabelSummary]:
-    """Return how much there is of each sign."""
+    """Return the amount of data of each sign."""
     return [
         LabelSummary(
             label=label,

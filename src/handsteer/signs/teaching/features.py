@@ -1,4 +1,4 @@
-"""Numbers that say what shape a hand has and where it points: a thumb up is another sign than a thumb sideways."""
+"""Features of a hand's shape and of its direction: unlike shipped shapes, taught signs may differ in direction only."""
 
 from typing import Final, Literal
 
@@ -20,26 +20,26 @@ from handsteer.signs.features import (
 Array = NDArray[np.float64]
 
 Depth = Literal["full", "flat"]
-"""Whether hands are known in space, or in the image only."""
+"""Whether landmarks have depth, or are known in the image only."""
 
 _DIRECTIONS: Final = 6
 FEATURE_COUNTS: Final[dict[Depth, int]] = {
     "full": COUNT + _DIRECTIONS,
     "flat": BEND_COUNT + PAIR_COUNT + _DIRECTIONS,
 }
-"""How many features there are."""
+"""Number of features."""
 
 
 def taught_features(pixels: Array, world: Array, depth: Depth) -> Array:
     """Return the (n, features) of n hands.
 
     They are those of :func:`~handsteer.signs.features.shape_features` (``flat``: the angles and distances in the image,
-    in palm lengths), and unit vectors for where index finger, thumb and palm point in the image.
+    in palm lengths), and unit vectors of the directions of index finger, thumb and palm in the image.
 
     Args:
         pixels: (n, 21, 2) landmarks in pixels, of an image that is not mirrored.
-        world: (n, 21, 3) landmarks in metres, axes as the image's; not looked at when ``flat``.
-        depth: What is known of the hands.
+        world: (n, 21, 3) landmarks in metres, with the image's axes; ignored if ``flat``.
+        depth: Kind of the landmarks.
     """
     pointing = [_unit(vectors) for vectors in directions(pixels)]
     if depth == "full":

@@ -1,7 +1,7 @@
-"""Landmark rows as projects that teach hand signs share them: a class number, then 42 numbers.
+"""Landmark rows in the format of several hand sign projects: a class number, then 42 numbers.
 
-The numbers are x and y of the 21 landmarks in the *mirrored* image, from the wrist, divided by the largest absolute
-value among them. So size, place and the third dimension are gone.
+The numbers are x and y of the 21 landmarks in the *mirrored* image, relative to the wrist, divided by the largest
+absolute value among them. Size, position and depth are lost.
 """
 
 import csv
@@ -23,20 +23,19 @@ _LONGEST_TAKE: Final = 100
 _LONGEST_LINE: Final = 10_000
 _MOST_ROWS: Final = 1_000_000
 _SIZE_PX: Final = 240
-_FARTHEST: Final = 1.001  # the files have rounded numbers
+_FARTHEST: Final = 1.001  # allows for rounding in the files
 
 
 def read_keypoints(path: Path, labels: Mapping[str, str], person: str, *, mirrored: bool = True) -> list[Take]:
-    """Return the takes in a file of keypoints, which may be compressed by gzip (``.gz``).
+    """Return the takes in a file of keypoints, which may be compressed with gzip (``.gz``).
 
-    Such files don't say where a take begins: up to 100 rows of one class that follow on one another
-    make one.
+    Such files do not mark takes: up to 100 consecutive rows of one class form one.
 
     Args:
         path: The file.
         labels: The sign of each class; rows of other classes are left out.
-        person: Who showed them.
-        mirrored: Whether the rows come from mirrored images, as those projects make them.
+        person: The person who showed them.
+        mirrored: Whether the rows come from mirrored images, as is usual.
 
     Raises:
         DatasetError: The file cannot be read, a row in it is wrong, or there is no row of these classes.
@@ -54,7 +53,7 @@ def read_keypoints(path: Path, labels: Mapping[str, str], person: str, *, mirror
 
 
 def read_class_names(path: Path) -> dict[str, str]:
-    """Return the sign of each class from a file that has the name of class 0 in its first line, and so on.
+    """Return the sign of each class from a file that lists their names, one per line, from class 0 on.
 
     Raises:
         DatasetError: The file cannot be read, or a line is empty.
@@ -86,7 +85,7 @@ def _rows(path: Path, *, mirrored: bool) -> Iterator[tuple[str, Hand]]:
 
 
 def _lines(file: TextIO, path: Path) -> Iterator[str]:
-    """Yield the lines of ``file``, which may be small only as long as it is packed."""
+    """Yield the lines of ``file``, with a limit on its decompressed size."""
     for _ in range(_MOST_ROWS):
         line = file.readline(_LONGEST_LINE)
         if not line:
@@ -111,5 +110,5 @@ def _hand(row: list[str], where: str, *, mirrored: bool) -> Hand:
     unknown = np.full((21, 3), np.nan, np.float32)
     flat = unknown.copy()
     flat[:, :2] = points
-    # Which hand it was, and how large, nobody has noted.
+    # Handedness and size are not recorded.
     return Hand(flat, unknown, "Right", handedness_score=0.5, presence=1.0, image_size=(_SIZE_PX, _SIZE_PX))

@@ -1,4 +1,4 @@
-"""Which takes are held out together, so that nobody is on both sides of a test."""
+"""Splits takes into folds, so that no person is in both training and test data."""
 
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
@@ -11,21 +11,21 @@ _FOLDS: Final = 3
 
 @dataclass(frozen=True)
 class Fold:
-    """Takes that are held out together, and what is learnt from meanwhile."""
+    """Takes that are held out together, and the rest, which are trained on."""
 
     held_out: tuple[Take, ...]
     rest: tuple[Take, ...]
 
 
 def split(dataset: Dataset, labels: Sequence[str]) -> tuple[str, list[Fold]]:
-    """Return what is held out at a time, ``person``, ``session`` or ``take``, and up to three folds.
+    """Return the unit that is held out, ``person``, ``session`` or ``take``, and up to three folds.
 
-    Where a sign is shown by several persons, a person is never on both sides; what nobody else shows is not held out.
-    Otherwise a session is on one side only if each label has several, else a take is.
+    If a sign is shown by several persons, whole persons are held out, without their takes of signs that no other person
+    shows. Otherwise sessions are held out if each label has several, else takes.
 
     Args:
         dataset: All takes, with at least two of each label.
-        labels: The signs that are taught: only takes of them are held out.
+        labels: The taught signs: only their takes are held out.
     """
     if any(len({take.person for take in dataset.of(label)}) > 1 for label in labels):
         return "person", _folds(dataset, labels, {take: take.person for take in dataset.takes})

@@ -1,4 +1,4 @@
-"""Signs that were taught: their model file, and the classifier that knows them beside those that are shipped."""
+"""Taught signs: their model file, and a classifier that adds them to the shipped signs."""
 
 import json
 import math
@@ -22,7 +22,7 @@ from handsteer.signs.trained import SURE, legibility
 from handsteer.types import NONE, SIGNS
 
 FORMAT: Final = 1
-"""Version of the file and of the features."""
+"""Version of the file format and of the features."""
 
 _FILE: Final = NpzFormat(
     "model of taught signs",
@@ -38,15 +38,15 @@ _DEPTHS: Final[dict[str, Depth]] = {"full": "full", "flat": "flat"}
 
 @dataclass(frozen=True)
 class TaughtModel:
-    """Tells taught signs from all other hands.
+    """Distinguishes taught signs from all other hands.
 
     Attributes:
-        labels: The signs, in the order of the network's classes; one more class is all other hands.
-        depth: Which features it takes.
+        labels: The signs, in the order of the network's classes; the last class is all other hands.
+        depth: Kind of its features.
         network: From features to classes.
-        novelty: How far from all that was taught a hand may be.
-        thresholds: (labels,) likelihood from which each sign is sure, between 0 and 1.
-        trained_on: What it was trained on, with which version, as plain values.
+        novelty: Limits the distance from the training data.
+        thresholds: (labels,) likelihood thresholds, between 0 and 1.
+        trained_on: Description of the training data and versions, as plain values.
     """
 
     labels: tuple[str, ...]
@@ -59,8 +59,7 @@ class TaughtModel:
     def confidences(self, pixels: Array, world: Array) -> Array:
         """Return the (n, labels) confidences, 0 to 1, of (n, 21, 2) pixels and (n, 21, 3) metres.
 
-        All but that of the likeliest sign are 0. So is that one for a shape that is new, and for landmarks that are not
-        numbers.
+        Only the likeliest sign has a confidence above 0. All are 0 for a new shape, and for landmarks that are NaN.
         """
         features = taught_features(pixels, world, self.depth)
         chances = np.nan_to_num(self.network.probabilities(features)[:, :-1])
@@ -72,13 +71,13 @@ class TaughtModel:
 
 
 class TaughtClassifier:
-    """A :class:`~handsteer.signs.classifier.Classifier` for taught signs beside those of another.
+    """A :class:`~handsteer.signs.classifier.Classifier` that adds taught signs to another classifier's.
 
-    What the other is sure of stays, so that no taught sign can change how the shipped ones drive.
+    Confident results of the other are kept, so that no taught sign changes how the shipped ones drive.
 
     Args:
-        other: Knows the signs that are shipped.
-        model: As :func:`load_taught` gives it.
+        other: Recognises the shipped signs.
+        model: As from :func:`load_taught`.
     """
 
     def __init__(self, other: Classifier, model: TaughtModel) -> None:
@@ -87,13 +86,13 @@ class TaughtClassifier:
 
     @property
     def signs(self) -> tuple[str, ...]:
-        """The signs that it can tell, without ``NONE``."""
+        """The recognised signs, without ``NONE``."""
         return (*self._other.signs, *self._model.labels)
 
     def classify(self, hand: Hand) -> SignGuess:
-        """Return the sign that ``hand`` shows; ``NONE`` when it is likelier that it shows none.
+        """Return the sign that ``hand`` shows; ``NONE`` if that is likelier.
 
-        The likelihoods of the taught signs are 0 when the other is sure, as nothing can come of them.
+        The likelihoods of the taught signs are 0 if the other is confident, because they are not used then.
         """
         known = self._other.classify(hand)
         if known.sign != NONE and known.confidence >= SURE:
@@ -109,17 +108,17 @@ class TaughtClassifier:
         return SignGuess(best, taught[best], likelihoods)
 
     def confidence(self, sign: str, likelihood: float) -> float:
-        """Return the confidence, 0 to 1, of ``sign``; the likelihood of a taught sign is its confidence."""
+        """Return the confidence, 0 to 1, of ``sign``; for a taught sign it is the likelihood."""
         return likelihood if sign in self._model.labels else self._other.confidence(sign, likelihood)
 
     @property
     def signs_without_depth(self) -> tuple[str, ...]:
-        """The signs that it can tell from landmarks in the image alone, as those of imported rows are."""
+        """The signs that can be recognised from landmarks without depth, such as imported ones."""
         return self._model.labels if self._model.depth == "flat" else ()
 
 
 def save_taught(model: TaughtModel, path: Path) -> None:
-    """Write ``model`` to ``path``, as a whole or not at all; the same model always gives the same bytes.
+    """Write ``model`` to ``path``, atomically and deterministically.
 
     Raises:
         ModelError: It cannot be written.
@@ -138,11 +137,11 @@ def save_taught(model: TaughtModel, path: Path) -> None:
 
 
 def load_taught(path: Path) -> TaughtModel:
-    """Return the model in the file ``path``. Nothing in a file is ever run.
+    """Return the model in the file ``path``, which may be untrusted: loading executes nothing.
 
     Raises:
         ModelMissing: It cannot be read.
-        ModelCorrupt: It is no model of taught signs, is damaged, or has another format.
+        ModelCorrupt: It is not a model of taught signs, is damaged, or has another format.
     """
     arrays = _FILE.read(path)
     try:

@@ -1,4 +1,4 @@
-"""Learns what the takes of a sign have in common, and how well that tells it from all other hands."""
+"""Trains a model of taught signs, and measures how well it distinguishes them from all other hands."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass
@@ -35,23 +35,23 @@ _HIDDEN: Final = (64, 32)
 _EPOCHS: Final = 8
 _OF_EACH: Final = 6_000
 _MADE: Final = 50_000
-"""Hands to make of all shapes; about four of five have a shape that nobody would doubt, and are used."""
+"""Synthetic hands of all shapes to generate; about four of five have an unambiguous shape and are used."""
 _LEAST_RECALL: Final = 0.975
 _THRESHOLDS: Final = (0.7, 0.98)
 _LIMIT_MARGIN: Final = 1.2
-"""How much farther than those of the takes and their variations a hand of the same sign may be."""
+"""Factor on the distance limit of the takes and their variations."""
 
 
 @dataclass(frozen=True)
 class TaughtSign:
-    """How a sign was learnt.
+    """How well a sign was learnt.
 
     Attributes:
-        summary: What there was of it.
-        sided: Whether it is told as it was shown only, and not mirrored too.
-        threshold: Likelihood from which it is sure.
-        recall: Of the rows that were held out, how many were told right; None when it could not be held out, as only
-            one person showed it and others showed other signs.
+        summary: The amount of its data.
+        sided: Whether its mirror image is not the same sign.
+        threshold: Likelihood threshold.
+        recall: Of the held-out rows, how many were right; None if it could not be held out, because only one person
+            showed it and others showed other signs.
     """
 
     summary: LabelSummary
@@ -70,11 +70,11 @@ class TeachingReport:
     """How well the signs were learnt.
 
     Attributes:
-        signs: Each of them.
-        held_out: What was held out at a time to find out: ``person``, ``session`` or ``take``.
-        confusion: Held-out rows, both hands, by the sign that they show and the one that was told.
-        made: Of made hands of all shapes, how many are told as one of the signs; some of them truly show it.
-        known: Hands of the takes that are told as a shipped sign already, which goes before.
+        signs: The results of each sign.
+        held_out: The held-out unit: ``person``, ``session`` or ``take``.
+        confusion: Held-out rows, both hands, by true and recognised sign.
+        made: Of synthetic hands of all shapes, how many are recognised as one of the signs; some truly show it.
+        known: Hands of the takes that are recognised as a shipped sign, which overrides the taught one.
     """
 
     signs: tuple[TaughtSign, ...]
@@ -96,7 +96,7 @@ class TeachingReport:
 
 @dataclass(frozen=True)
 class _Rows:
-    """Hands with the class that they are of."""
+    """Hands with their classes."""
 
     pixels: Array
     world: Array
@@ -110,22 +110,22 @@ def train_signs(
     sided: Sequence[str] = (),
     progress: Callable[[int, int], object] = lambda _done, _of: None,
 ) -> tuple[TaughtModel, TeachingReport]:
-    """Return a model that tells the signs of ``dataset`` from all other hands, and how well it does.
+    """Return a model that distinguishes the signs of ``dataset`` from all other hands, and its measured quality.
 
-    Each sign is told with either hand, by its mirror image, unless it points to a side. What makes other hands is made
-    (:mod:`handsteer.signs.training`), and what the dataset has of ``NONE`` and of the signs that are shipped.
-    Persons are held out in turn to find out how well the signs are told, and from which likelihood on; where no sign is
-    shown by several, sessions or takes are. The model is then trained on all of them.
+    Each sign is learnt for both hands, by mirroring, unless it points sideways. Examples of other hands are synthetic
+    (:mod:`handsteer.signs.training`), and the takes of ``NONE`` and of shipped signs. To measure recall and set the
+    thresholds, persons are held out in turn, or sessions or takes if no sign is shown by several persons. The model is
+    then trained on all takes.
 
     Args:
         dataset: The takes.
-        shipped: Knows the signs that are shipped, which cannot be taught again.
-        sided: Signs that are another sign, or none, when they are mirrored, beyond those that point to a side.
-        progress: Called with the number of steps that are done, and of all.
+        shipped: Recognises the shipped signs, which cannot be taught again.
+        sided: Further signs, besides those that point sideways, whose mirror image is another sign or none.
+        progress: Called with the number of completed steps and of all steps.
 
     Raises:
-        TrainingError: There is no sign to learn or too little of one, two labels mean the same or look alike, one looks
-            like a shipped sign, or ``sided`` names a sign that is not there.
+        TrainingError: There is no sign to learn or too little data of one, two labels mean the same or look alike, one
+            looks like a shipped sign, or ``sided`` names an unknown sign.
     """
     labels = taught_labels(dataset, sided)
     check_enough(dataset, labels)
@@ -170,7 +170,7 @@ class _Steps:
 
 
 class _Teacher:
-    """Makes models of taught signs.
+    """Trains models of taught signs.
 
     Attributes:
         sided: Signs that are not mirrored.
@@ -211,9 +211,9 @@ class _Teacher:
     def try_out(
         self, model: TaughtModel, takes: Sequence[Take], labels: tuple[str, ...]
     ) -> tuple[NDArray[np.int64], Array]:
-        """Return the (n,) true ``labels`` of ``takes``, as indices, and the (n, labels) confidences that they get.
+        """Return the (n,) true ``labels`` of ``takes``, as indices, and their (n, labels) confidences.
 
-        Each hand is tried as it is, and mirrored if its sign is one of both hands.
+        Hands of signs that are not sided are evaluated mirrored too.
         """
         truths, chances = [], []
         columns = [labels.index(label) for label in model.labels]
@@ -254,7 +254,7 @@ def _made(seed: int) -> Hands:
 
 
 def _thresholds(truths: NDArray[np.int64], chances: Array, count: int) -> Array:
-    """Return the (labels,) likelihoods from which a sign is sure: as high as most held-out rows of it allow."""
+    """Return the (labels,) likelihood thresholds: as high as most held-out rows of the sign allow."""
     thresholds = np.full(count, SURE)
     for label in range(count):
         mine = chances[truths == label, label]

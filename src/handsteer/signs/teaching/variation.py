@@ -1,4 +1,4 @@
-"""Further hands out of those of a few takes: what others would look like who show the same sign."""
+"""Data augmentation: varies the hands of a few takes, to resemble other people who show the same sign."""
 
 from typing import Final
 
@@ -23,27 +23,27 @@ _PARENTS: Final = (0, 0, 1, 2, 3, 0, 5, 6, 7, 0, 9, 10, 11, 0, 13, 14, 15, 0, 17
 def vary(
     pixels: Array, world: Array, count: int, random: np.random.Generator, *, both_hands: bool
 ) -> tuple[Array, Array]:
-    """Return pixels and world landmarks of ``count`` hands, each a variation of one that is given.
+    """Return pixels and world landmarks of ``count`` hands, each a variation of a given one.
 
-    They are tilted in the image by up to 30 degrees, seen from 12 degrees (one standard deviation) further to a side,
-    above or below, have bones 6 % longer or shorter, landmarks that err by 2 % of the hand, and half of them are the
-    other hand if ``both_hands``. Without world landmarks the same is done in the image.
+    They are rotated in the image by up to 30 degrees, turned sideways, up or down by 12 degrees (standard deviation),
+    with bones longer or shorter by 6 % and landmark errors of 2 % of the hand; half of them are mirrored if
+    ``both_hands``. Without world landmarks the same is done in the image.
 
     Args:
         pixels: (n, 21, 2) landmarks in pixels.
-        world: (n, 21, 3) landmarks in metres, or not numbers.
-        count: How many to make.
-        random: Where chance comes from.
-        both_hands: Whether the other hand, mirrored, shows the same sign.
+        world: (n, 21, 3) landmarks in metres, or NaN.
+        count: Number of hands to return.
+        random: Random generator.
+        both_hands: Whether the mirrored hand shows the same sign.
 
     Returns:
-        (count, 21, 2) pixels and (count, 21, 3) metres, about the hands' centres.
+        (count, 21, 2) pixels and (count, 21, 3) metres, relative to the hands' centres.
     """
     chosen = random.integers(0, len(pixels), count)
     image = _about_centre(pixels[chosen])
     flat = not np.isfinite(world).all()
     solid = np.concatenate([image, np.zeros((count, 21, 1))], axis=2) if flat else _about_centre(world[chosen])
-    # In the unit of the world landmarks from here on; what the image shows otherwise than they do stays.
+    # In the unit of the world landmarks from here on; differences between the two remain.
     image = image * _sizes(solid[..., :2]) / np.maximum(_sizes(image), 1e-12)
     rest = image - solid[..., :2]
     solid = _with_other_bones(solid, 1.0 + _BONES * random.normal(0, 1, (count, 21, 1)))
@@ -62,17 +62,17 @@ def vary(
 
 
 def mirrored(points: Array) -> Array:
-    """Return (n, 21, 2 or 3) landmarks of the other hands."""
+    """Return (n, 21, 2 or 3) landmarks, mirrored."""
     other = points.copy()
     other[..., 0] *= -1
     return other
 
 
 def points_sideways(pixels: Array) -> bool:
-    """Return whether (n, 21, 2) hands all point to one side of the image: mirrored, they would say the opposite.
+    """Return whether (n, 21, 2) hands all point to one side of the image, so that mirroring reverses their meaning.
 
-    The palm does, from the wrist to the knuckles, and so do the fingertips on average, from the middle of the palm. A
-    thumb alone is not enough: which side it is on tells left hands from right ones.
+    Both the palm, from the wrist to the knuckles, and the mean of the fingertips, from the middle of the palm, must
+    point sideways. A thumb alone is not enough: its side only distinguishes left from right hands.
     """
     knuckles = pixels[:, KNUCKLES].mean(axis=1)
     palm = _mean_direction(knuckles - pixels[:, WRIST])
@@ -81,13 +81,13 @@ def points_sideways(pixels: Array) -> bool:
 
 
 def _mean_direction(vectors: Array) -> float:
-    """Return how far (n, 2) vectors point to the right on average, -1 to 1."""
+    """Return the mean horizontal direction of (n, 2) vectors, -1 to 1, right positive."""
     lengths = np.maximum(np.linalg.norm(vectors, axis=1), 1e-9)
     return float((vectors[:, 0] / lengths).mean())
 
 
 def _with_other_bones(points: Array, factors: Array) -> Array:
-    """Return (n, 21, 3) points with each bone longer by its (n, 21, 1) factor, in the same directions."""
+    """Return (n, 21, 3) points with each bone scaled by its (n, 21, 1) factor, in the same directions."""
     grown = points.copy()
     for joint, parent in enumerate(_PARENTS):
         if joint != parent:
@@ -101,6 +101,6 @@ def _about_centre(points: Array) -> Array:
 
 
 def _sizes(points: Array) -> Array:
-    """Return (n, 1, 1) sizes of (n, points, axes): the root of all squares."""
+    """Return (n, 1, 1) sizes of (n, points, axes): the root of the sum of squares."""
     sizes: Array = np.sqrt((points**2).sum(axis=(1, 2), keepdims=True))
     return sizes

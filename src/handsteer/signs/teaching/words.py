@@ -1,23 +1,23 @@
-"""What a training came to, in sentences for people."""
+"""Describes the results of a training in sentences."""
 
 from handsteer.signs.teaching.train import TeachingReport
 from handsteer.types import NONE
 
 
 def how_it_was_tried(report: TeachingReport) -> str:
-    """Return what the figures are of, without a full stop."""
+    """Return how the figures were measured, without a full stop."""
     tried = f"How well hands are told that were held out, one {report.held_out} after the other"
     return tried if report.held_out == "person" else f"{tried}; how well those of others are told, nobody knows yet"
 
 
 def false_hands(report: TeachingReport) -> str:
-    """Return how many hands of any shape are told as one of the signs."""
+    """Return how many hands of any shape are recognised as one of the signs."""
     rate = f"{report.made.rate or 0.0:.1%}"
     return f"Of made hands of all shapes, {rate} are told as one of these signs; some of them do show it."
 
 
 def mistakes(report: TeachingReport) -> list[str]:
-    """Return what is taken for what, the most frequent mistake first; empty when nothing is."""
+    """Return the confusions of signs, the most frequent first; may be empty."""
     labels, counts = report.confusion.labels, report.confusion.counts
     found = [
         (count / sum(row), f"{shown} is taken for {_sign(told)} {count} of {sum(row)} times")

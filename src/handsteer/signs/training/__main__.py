@@ -1,4 +1,4 @@
-"""Writes the shipped sign model again: ``python -m handsteer.signs.training [FILE]``."""
+"""Trains the shipped sign model: ``python -m handsteer.signs.training [FILE]``."""
 
 import sys
 from pathlib import Path
@@ -10,7 +10,7 @@ from handsteer.signs.training.default import EPOCHS, train_default
 
 
 def main() -> None:
-    """Train, and write the file named on the command line, or the one in the package."""
+    """Train, and write the file given on the command line, or else the one in the package."""
     path = Path(sys.argv[1]) if len(sys.argv) > 1 else DEFAULT_MODEL
     with tqdm(total=EPOCHS, unit="epoch", disable=None) as bar:
         model = train_default(lambda _: bar.update(1))

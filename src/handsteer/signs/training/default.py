@@ -1,6 +1,6 @@
-"""Trains the sign model that handsteer ships, from hands that are made and drawn: ``make signs-model``.
+"""Trains the shipped sign model on synthetic and drawn hands: ``make signs-model``.
 
-The same code gives the same bytes, so the file in the repository can be checked against it.
+The result is deterministic, so the file in the repository can be verified.
 """
 
 from collections.abc import Callable
@@ -24,18 +24,16 @@ EPOCHS: Final = 30
 
 
 def made_hands(chunks: int, seed: int) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Return (n, features) of n made hands, and their (n,) shapes as indices into ``SHAPES``.
+    """Return (n, features) of n synthetic hands, and their (n,) shapes as indices into ``SHAPES``; deterministic.
 
-    Args:
-        chunks: How much to make: each is about 58 000 hands.
-        seed: The same seed gives the same hands.
+    A chunk gives about 58 000 hands.
     """
     people = load_people()
     features, shapes = [], []
     for random in np.random.default_rng(seed).spawn(chunks):
         hands = make_hands(_CHUNK, random)
         image, space, theirs = draw_people(_PEOPLE, random, people)
-        # Rounded, so that the last digits in which processors differ are gone.
+        # Rounded, to remove differences between processors.
         features += [np.round(shape_features(hands.pixels, hands.world), 4), np.round(shape_features(image, space), 4)]
         shapes += [hands.shapes, theirs]
     return np.concatenate(features), np.concatenate(shapes)
@@ -46,8 +44,8 @@ def train_default(progress: Callable[[int], object], chunks: int = _CHUNKS, epoc
 
     Args:
         progress: Called after each epoch with its number, from 1.
-        chunks: How much to train on, as :func:`made_hands` takes it.
-        epochs: How often all of it is seen.
+        chunks: Amount of training data, as for :func:`made_hands`.
+        epochs: Number of passes over it.
     """
     features, shapes = made_hands(chunks, SEED)
     network = train(features, shapes, hidden=HIDDEN, epochs=epochs, seed=SEED, progress=progress)

@@ -1,7 +1,7 @@
-"""Fits the statistics of real people's hands to labelled photos: ``python -m handsteer.signs.training.fit FOLDER...``.
+"""Fits the statistics of people's hands to labelled photos: ``python -m handsteer.signs.training.fit FOLDER...``.
 
-Each folder has an ``index.csv`` (docs/signs-evaluate.md). Only photos of the part to tune on are looked at
-(:mod:`handsteer.signs.training.fit`). What is written holds means and spreads, no picture and no row of a person.
+Each folder has an ``index.csv`` (docs/signs-evaluate.md). Only photos of the part ``tune`` are used (:func:`part_of`).
+The result has means and variances, but no pictures and no person's landmarks.
 """
 
 import hashlib
@@ -43,15 +43,15 @@ from handsteer.types import NONE, SIGNS
 Part = Literal["tune", "report"]
 
 _WHOLE_SETS: Final[dict[str, Part]] = {"emre": "tune", "sld": "report"}
-"""Sets of few people, or of people who cannot be told apart: all of such a set is in one part."""
+"""Sets of few people, or of people who cannot be distinguished: each is in one part as a whole."""
 
 
 def part_of(path: PurePath | str, person_set: str = "") -> Part:
-    """Return the part that a photo is in.
+    """Return the part of a photo.
 
     Args:
-        path: The photo; only the name of the file counts, so that folders may be moved.
-        person_set: Whose photo it is, as in the column of that name of an ``index.csv``.
+        path: The photo; only its file name matters, so that folders may be moved.
+        person_set: The column ``person_set`` of an ``index.csv``.
     """
     if person_set in _WHOLE_SETS:
         return _WHOLE_SETS[person_set]
@@ -66,7 +66,7 @@ _KINDS: Final = {
     **dict.fromkeys(("rock", "horns"), "horns"),
     **dict.fromkeys(("three", "four", "other_digits"), "digits"),
 }
-"""Kinds of photos without a sign that are one kind of hand; others are kinds of their own."""
+"""Maps kinds of photos without a sign to a common kind; others are kinds of their own."""
 _SIZE: Final = (640, 480)
 _SIDES: Final = 8
 _DRAWN: Final = 45
@@ -83,11 +83,11 @@ _POSES: Final = (
 _CLUSTERS: Final = {REST: 8, THUMB: 6, "digits": 4}
 _DIRECTIONS: Final = 12
 _RAISED: Final = 0.6
-"""Of several hands the highest is the one that shows something, if it is not smaller than this share of the largest."""
+"""Of several hands the highest is the one with the sign, unless it is smaller than this fraction of the largest."""
 
 
 def main() -> None:
-    """Write the statistics of the photos in the folders named on the command line."""
+    """Write the statistics of the photos in the folders given on the command line."""
     if len(sys.argv) < 2:
         raise SystemExit(
             "name the folders of labelled photos to fit to: without any, the statistics would be of no people"
@@ -106,7 +106,7 @@ def seen_hands(folder: Path, part: Part = "tune") -> Iterator[tuple[str, Array]]
     """Yield the kind and the (105,) canonical coordinates of the hand in each photo of a part of ``folder``.
 
     Raises:
-        LabelError: The folder has no labels that can be used.
+        LabelError: The folder has no usable labels.
     """
     landmarker = MediaPipeLandmarker(LandmarksConfig())
     for photo in tqdm(read_photo_labels(folder, SIGNS), desc=folder.name, disable=None):
@@ -120,9 +120,9 @@ def seen_hands(folder: Path, part: Part = "tune") -> Iterator[tuple[str, Array]]
 
 
 def drawn_hands() -> Iterator[tuple[str, Array]]:
-    """Yield shape and (n, 105) canonical coordinates of virtual hands, seen from one side after another.
+    """Yield shape and (n, 105) canonical coordinates of rendered hands, viewed from several sides.
 
-    Nobody shows a camera all sides of a fist; what the landmark model makes of them is seen on drawn ones.
+    Photos do not show all sides of a fist; rendered hands show what the landmark model reports for them.
     """
     random = np.random.default_rng(0)
     landmarker = MediaPipeLandmarker(LandmarksConfig())
@@ -146,7 +146,7 @@ def drawn_hands() -> Iterator[tuple[str, Array]]:
 
 
 def _is_aslant(joints: Array, shape: str) -> bool:
-    """Return whether what (21, 3) joints of a shape point with is seen from the side, rather than end on."""
+    """Return whether the pointing part of (21, 3) joints of a shape is seen from the side, not end on."""
     start, end = {THUMB: (2, 4), POINTING: (5, 8), OPEN: (9, 12)}[shape]
     pointing = joints[end] - joints[start]
     return bool(abs(pointing[2]) <= _END_ON * np.linalg.norm(pointing))
@@ -164,13 +164,13 @@ def _raised(hands: list[Hand]) -> Hand:
 
 
 def fit(kind: str, hands: Array) -> list[Distribution]:
-    """Return the distributions of (n, 105) hands of one kind; none of fewer than :data:`LEAST_HANDS` hands."""
+    """Return the distributions of (n, 105) hands of one kind; none for fewer than :data:`LEAST_HANDS` hands."""
     shape = SHAPES.index(kind if kind in SHAPES else OTHER)
     return [_normal(kind, shape, part) for part in _clusters(hands, _CLUSTERS.get(kind, 2))]
 
 
 def _clusters(hands: Array, wanted: int) -> list[Array]:
-    """Return ``hands`` in up to ``wanted`` groups of at least :data:`LEAST_HANDS`; all if they are too few."""
+    """Return ``hands`` in up to ``wanted`` groups of at least :data:`LEAST_HANDS`; none if they are too few."""
     for count in range(wanted, 1, -1):
         cv2.setRNGSeed(0)
         stop = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_MAX_ITER, 100, 1e-5)

@@ -1,4 +1,4 @@
-"""Hands before a camera as the landmark model would see them, with their true shape."""
+"""Synthetic hands in front of a camera as the landmark model would report them, with their true shape."""
 
 from dataclasses import dataclass
 from typing import Final
@@ -19,10 +19,12 @@ BONES_M: Final = 0.096 * np.array(
         *(0.87, 0.23, 0.21, 0.19),
     ]
 )
-"""(20,) bone lengths as MediaPipe's world landmarks have them, metres: its knuckles are nearer to the fingertips than
-the joints are. Medians over photos, rounded."""
+"""(20,) bone lengths in metres: medians over photos, rounded, of MediaPipe's world landmarks.
 
-# Standard deviations of the landmark model's errors, metres at the size of its own world landmarks.
+Their knuckles are nearer to the fingertips than the joints are.
+"""
+
+# Standard deviations of the landmark model's errors, in metres at the scale of its world landmarks.
 _IMAGE_ERROR_M: Final = 0.0022
 _WORLD_ERROR_M: Final = 0.0022
 _DEPTH_ERROR_M: Final = 0.005
@@ -36,11 +38,11 @@ PIP: Final = [ANGLES.index(f"{finger}_pip") for finger in FINGERS]
 
 @dataclass(frozen=True)
 class Hands:
-    """N hands as a landmark model sees them.
+    """N hands as a landmark model reports them.
 
     Attributes:
         pixels: (n, 21, 2) landmarks in pixels.
-        world: (n, 21, 3) landmarks in metres, axes as the image's.
+        world: (n, 21, 3) landmarks in metres, with the image's axes.
         shapes: (n,) indices into :data:`~handsteer.signs.training.truth.SHAPES`.
     """
 
@@ -50,7 +52,7 @@ class Hands:
 
 
 def make_hands(count: int, random: Random) -> Hands:
-    """Return fewer than ``count`` random hands: those whose shape nobody would doubt."""
+    """Return fewer than ``count`` random hands: those with an unambiguous shape."""
     angles = random_shapes(count, random)
     count = len(angles)
     bones = BONES_M * random.normal(1.0, 0.06, (count, 20)) * random.normal(1.0, 0.05, (count, 1))
@@ -66,7 +68,7 @@ def make_hands(count: int, random: Random) -> Hands:
 
 
 def _views(count: int, random: Random) -> Array:
-    """Return (count, 3, 3) rotations to the camera frame: most show palm or back, some are any."""
+    """Return (count, 3, 3) rotations to the camera frame: most show palm or back, some are arbitrary."""
     back = random.random(count) < 0.5
     yaw = np.where(back, np.pi, 0.0) + np.radians(random.normal(0, 32, count))
     pitch = np.radians(random.normal(0, 28, count))
@@ -79,7 +81,7 @@ def _views(count: int, random: Random) -> Array:
 
 
 def _elevations(joints: Array) -> Array:
-    """Return (n, 2) angles of index finger and thumb tip (from the knuckles) off the image plane, radians."""
+    """Return (n, 2) angles of index finger and thumb tip (from the knuckles) to the image plane, in radians."""
     index = joints[:, 8] - joints[:, 5]
     thumb = joints[:, 4] - joints[:, [5, 9, 13, 17]].mean(axis=1)
     both = np.stack([index, thumb], axis=1)
@@ -94,10 +96,10 @@ def _facing(joints: Array) -> Array:
 
 
 def _misread(angles: Array, views: Array, random: Random) -> Array:
-    """Return (n, 23) errors of joint angles: a landmark model takes whole fingers for more or less bent than they are.
+    """Return (n, 23) errors of joint angles: a landmark model reports whole fingers as too bent or too straight.
 
-    Hands far away or in poor light are read much worse than others, and seen from the back, closed fingers are hidden:
-    they are taken for bent at the knuckles rather than in the middle.
+    Errors are much larger for hands far away or in poor light. From the back, closed fingers are hidden, and are
+    reported as bent at the knuckles rather than in the middle.
     """
     size = _BEND_ERROR_RAD * _badness(len(angles), random)
     errors: Array = random.normal(0, 1, angles.shape) * size
@@ -109,13 +111,13 @@ def _misread(angles: Array, views: Array, random: Random) -> Array:
 
 
 def _badness(count: int, random: Random) -> Array:
-    """Return (count, 1) factors on the errors, about 1, seldom 3."""
+    """Return (count, 1) factors on the errors, about 1, rarely 3."""
     factors: Array = np.exp(random.normal(-0.3, 0.5, (count, 1)))
     return factors
 
 
 def _landmarks(joints: Array, random: Random) -> tuple[Array, Array]:
-    """Return pixels and world landmarks of (n, 21, 3) joints in the camera frame, with errors."""
+    """Return pixels and world landmarks, with errors, of (n, 21, 3) joints in the camera frame."""
     count = len(joints)
     centred = joints - joints.mean(axis=1, keepdims=True)
     badness = _badness(count, random)[..., None]

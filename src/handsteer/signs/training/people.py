@@ -1,11 +1,11 @@
-"""What the landmarks of real people's hands are like, as statistics, and made hands that are drawn from them.
+"""Statistics of people's hand landmarks, and random hands drawn from them.
 
 Hands of one kind (fists, thumbs, ...) are described in *canonical coordinates*: the landmarks in the image and in
-space, turned in the image so that the palm points up, mirrored so that the index finger's knuckle is left of the
-little finger's, in palm lengths. There they are a mixture of normal distributions, each with its mean, its principal
-directions and what is left beside them (a probabilistic principal component analysis, M. Tipping and C. Bishop, J. R.
-Statist. Soc. B 61(3), 1999). So they hold what people do with their fingers together with how the landmark model errs
-on it. No row of a person is kept: each distribution is made of :data:`LEAST_HANDS` hands or more.
+space, rotated in the image so that the palm points up, mirrored so that the index finger's knuckle is left of the
+little finger's, in palm lengths. In these, they are a mixture of normal distributions, each with its mean, its
+principal directions and the residual variance (probabilistic principal component analysis, M. Tipping and C. Bishop, J.
+R. Statist. Soc. B 61(3), 1999). So they combine how people hold their fingers with the landmark model's errors. They
+contain no person's landmarks: each distribution is computed from :data:`LEAST_HANDS` hands or more.
 """
 
 from dataclasses import dataclass
@@ -25,17 +25,17 @@ Random = np.random.Generator
 
 LEAST_HANDS: Final = 30
 REST: Final = "rest"
-"""The kind of hands that show nothing: they hang, rest or hold something."""
+"""The kind of hands without a sign: hanging, resting or holding something."""
 COORDINATES: Final = 21 * 2 + 21 * 3
 FILE: Final = Path(__file__).parent / "people.npz"
-"""The statistics that are shipped; :mod:`handsteer.signs.training.fit` makes them."""
+"""The shipped statistics, written by :mod:`handsteer.signs.training.fit`."""
 
 _WIDER: Final = 1.2
-"""Times the measured spread: strangers differ more from these people than these do among themselves."""
+"""Factor on the measured spread, because other people differ more from these people than these among themselves."""
 _CHOICES: Final = 24
 _THUMB: Final = slice(1, 5)
 _TURNED_RAD: Final = np.radians(18.0)
-"""Standard deviation by which half of the hands are seen from further aside, above or below, radians."""
+"""Standard deviation of the turn sideways, up or down that is applied to half of the hands, in radians."""
 
 _NPZ: Final = NpzFormat(
     "file of hand statistics", 1, missing=ModelMissing, corrupt=ModelCorrupt, remedy="use the one that is shipped"
@@ -49,10 +49,10 @@ class Distribution:
     Attributes:
         kind: What the hands show, such as ``fist``.
         shape: Index into :data:`~handsteer.signs.training.truth.SHAPES`.
-        hands: How many hands it was fitted to.
+        hands: Number of hands it was fitted to.
         mean: (105,) palm lengths: 21 points in the image (x, y), then 21 in space (x, y, z).
-        directions: (k, 105) principal directions, each as long as one standard deviation.
-        rest: (105,) standard deviation of what is beside them.
+        directions: (k, 105) principal directions, with lengths of one standard deviation.
+        rest: (105,) standard deviation of the residuals.
     """
 
     kind: str
@@ -70,12 +70,7 @@ class Distribution:
 
 
 def draw_people(count: int, random: Random, people: tuple[Distribution, ...]) -> tuple[Array, Array, NDArray[np.int64]]:
-    """Return about ``count`` hands like those of people: all kinds alike, within a kind as often as people had them.
-
-    Args:
-        count: How many.
-        random: Where chance comes from.
-        people: As :func:`load_people` gives them.
+    """Return about ``count`` hands like people's: each kind equally often, and within a kind as often as measured.
 
     Returns:
         (n, 21, 2) and (n, 21, 3) landmarks in the image and in space, palm lengths; (n,) indices into ``SHAPES``.
@@ -98,9 +93,9 @@ def draw_people(count: int, random: Random, people: tuple[Distribution, ...]) ->
 
 
 def _closed_like(hands: Array, others: Array, random: Random) -> Array:
-    """Return (n, 105) hands with their thumb out as fists: each with the thumb of that of ``others`` held most like it.
+    """Return (n, 105) hands with their thumb out as fists: each with the thumb of the most similar of ``others``.
 
-    People show a camera their fists from the front; the backs and sides of closed fingers are seen on hands with the
+    People show their fists to a camera from the front; the backs and sides of closed fingers appear on hands with the
     thumb out, and thumbs along the fingers on the backs of hands at rest.
     """
     image, space = (points.copy() for points in from_canonical(hands))
@@ -119,7 +114,7 @@ def to_canonical(pixels: Array, world: Array) -> Array:
 
     Args:
         pixels: (n, 21, 2) landmarks in pixels.
-        world: (n, 21, 3) landmarks in metres, axes as the image's.
+        world: (n, 21, 3) landmarks in metres, with the image's axes.
     """
     space = np.asarray(world - world.mean(axis=1, keepdims=True), np.float64)
     image = np.asarray(pixels - pixels.mean(axis=1, keepdims=True), np.float64)
@@ -144,7 +139,7 @@ def from_canonical(coordinates: Array) -> tuple[Array, Array]:
 
 
 def _seen_from_elsewhere(image: Array, space: Array, random: Random) -> tuple[Array, Array]:
-    """Return hands, half of them turned about; in the image they err as before."""
+    """Return the hands, half of them turned; their errors in the image stay the same."""
     count = len(space)
     amount = _TURNED_RAD * (random.random((2, count)) < 0.5)
     turned = space @ (turn_x(amount[0] * random.normal(0, 1, count)) @ turn_y(amount[1] * random.normal(0, 1, count)))
@@ -152,7 +147,7 @@ def _seen_from_elsewhere(image: Array, space: Array, random: Random) -> tuple[Ar
 
 
 def save_people(people: tuple[Distribution, ...], path: Path) -> None:
-    """Write ``people`` to ``path``, to three digits; the same always gives the same bytes."""
+    """Write ``people`` to ``path``, deterministically and rounded to three digits."""
     content = {
         "kinds": np.array([each.kind for each in people]),
         "shapes": np.array([SHAPES[each.shape] for each in people]),
@@ -170,7 +165,7 @@ def load_people(path: Path = FILE) -> tuple[Distribution, ...]:
 
     Raises:
         ModelMissing: It cannot be read.
-        ModelCorrupt: It is no such file, or damaged.
+        ModelCorrupt: It is not such a file, or is damaged.
     """
     arrays = _NPZ.read(path)
     try:

@@ -1,7 +1,7 @@
-"""Random hand shapes: those of the signs with all that people vary in them, and everything else a hand can do.
+"""Random hand shapes: those of the signs with people's variations, and all other shapes a hand can have.
 
-A shape is made first and named afterwards, from its true joints (:mod:`handsteer.signs.training.truth`). So the
-makers here need not be exact: a thumb that comes out too far just makes another shape.
+A shape is generated first and labelled afterwards, from its true joints (:mod:`handsteer.signs.training.truth`). So the
+generators here need not be exact: a thumb that extends too far just gives another shape.
 """
 
 from collections.abc import Callable
@@ -19,7 +19,7 @@ _THUMB: Final = slice(2, 7)
 _JOINTS: Final = 4
 _FIRST_FINGER: Final = ANGLES.index("index_spread")
 
-# Degrees (mean, standard deviation) of spread, mcp, pip and dip for one finger that is ...
+# Spread, mcp, pip and dip in degrees (mean, standard deviation) for one finger that is ...
 _STRAIGHT: Final = ((0, 5), (6, 14), (8, 9), (4, 7))
 _CURLED: Final = ((0, 4), (62, 15), (88, 13), (48, 20))
 _LOOSE: Final = ((0, 4), (34, 14), (76, 11), (38, 14))
@@ -29,11 +29,11 @@ _ROUND: Final = ((0, 5), (52, 16), (54, 12), (40, 13))
 _FINGER_STATES: Final = np.array([_STRAIGHT, _CURLED, _HALF, _HOOKED, _LOOSE, _ROUND], float)
 STRAIGHT, CURLED, HALF, HOOKED, LOOSE, ROUND = range(6)
 
-# Degrees of spread, opposition, mcp, ip and rotation for a thumb that is ...
+# Spread, opposition, mcp, ip and rotation in degrees for a thumb that is ...
 _THUMB_STATES: Final = np.array(
     [
-        ((54, 11), (12, 12), (-2, 13), (-4, 19), (0, 8)),  # stretched out, some bent back as a hitch-hiker's
-        ((22, 10), (14, 11), (6, 12), (8, 14), (0, 8)),  # beside the index finger
+        ((54, 11), (12, 12), (-2, 13), (-4, 19), (0, 8)),  # extended, partly bent back as a hitch-hiker's
+        ((22, 10), (14, 11), (6, 12), (8, 14), (0, 8)),  # along the index finger
         ((14, 9), (40, 11), (28, 14), (55, 20), (-1, 8)),  # folded over bent fingers
         ((10, 8), (55, 12), (35, 16), (45, 22), (0, 8)),  # across the palm
         ((30, 12), (48, 14), (18, 14), (28, 18), (15, 15)),  # opposite the fingers
@@ -44,7 +44,7 @@ OUT, BESIDE, FOLDED, ACROSS, OPPOSITE = range(5)
 
 
 def open_hand(count: int, random: Random) -> Array:
-    """Return (count, 23) angles of an open hand, fingers together or apart, the thumb beside or stretched out."""
+    """Return (count, 23) angles of an open hand, fingers together or apart, the thumb along them or extended."""
     angles = _posed(np.full((count, 4), STRAIGHT), _choice([OUT, BESIDE], [0.7, 0.3], count, random), random)
     _bend_together(angles, random, mcp=10, pip=6)
     apart = random.uniform(-0.2, 1.3, (count, 1))
@@ -53,7 +53,7 @@ def open_hand(count: int, random: Random) -> Array:
 
 
 def index_up(count: int, random: Random) -> Array:
-    """Return (count, 23) angles of a pointing index finger, the others closed, loosely too."""
+    """Return (count, 23) angles of a pointing index finger, the others closed, some loosely."""
     states = np.full((count, 4), STRAIGHT)
     states[:, 1:] = _choice([CURLED, LOOSE, HOOKED], [0.6, 0.3, 0.1], count, random)[:, None]
     thumbs = _choice([FOLDED, ACROSS, OPPOSITE, BESIDE, OUT], [0.35, 0.25, 0.2, 0.15, 0.05], count, random)
@@ -63,7 +63,7 @@ def index_up(count: int, random: Random) -> Array:
 
 
 def thumb_out(count: int, random: Random) -> Array:
-    """Return (count, 23) angles of a fist with the thumb stretched out, tightly or loosely closed."""
+    """Return (count, 23) angles of a fist with the thumb extended, tightly or loosely closed."""
     states = np.repeat(_choice([CURLED, LOOSE, HOOKED], [0.7, 0.2, 0.1], count, random)[:, None], 4, axis=1)
     angles = _posed(states, _choice([OUT, BESIDE], [0.85, 0.15], count, random), random)
     _bend_together(angles, random, mcp=10, pip=10)
@@ -71,7 +71,7 @@ def thumb_out(count: int, random: Random) -> Array:
 
 
 def fist(count: int, random: Random) -> Array:
-    """Return (count, 23) angles of a fist, the thumb over the fingers, beside them or inside."""
+    """Return (count, 23) angles of a fist, the thumb over the fingers, along them or inside."""
     states = np.repeat(_choice([CURLED, LOOSE], [0.8, 0.2], count, random)[:, None], 4, axis=1)
     angles = _posed(states, _choice([FOLDED, ACROSS, BESIDE], [0.45, 0.2, 0.35], count, random), random)
     _bend_together(angles, random, mcp=10, pip=8)
@@ -85,7 +85,7 @@ def any_fingers(count: int, random: Random) -> Array:
 
 
 def known_others(count: int, random: Random) -> Array:
-    """Return (count, 23) angles of the shapes that people do show: peace, three, four, horns, call, L, little..."""
+    """Return (count, 23) angles of common other shapes: peace, three, four, horns, call, L, little finger..."""
     fingers = np.array(_KNOWN)
     which = random.integers(0, len(fingers), count)
     return _posed(fingers[which, :4], fingers[which, 4], random)
@@ -119,7 +119,7 @@ _KNOWN: Final = (
 
 
 def relaxed(count: int, random: Random) -> Array:
-    """Return (count, 23) angles of hands at rest or half open: all fingers bent about alike, more to the little one."""
+    """Return (count, 23) angles of hands at rest or half open: all fingers bent similarly, the little one most."""
     angles = _posed(np.full((count, 4), STRAIGHT), random.integers(0, 5, count), random)
     amount = random.uniform(0.1, 1.0, (count, 1))
     growing = 1.0 + random.uniform(-0.2, 1.0, (count, 1)) * np.linspace(0, 1, 4)
@@ -138,7 +138,7 @@ def holding(count: int, random: Random) -> Array:
 
 
 def touching(count: int, random: Random) -> Array:
-    """Return (count, 23) angles of OK and of pinches: the tips of thumb and index finger meet, or nearly."""
+    """Return (count, 23) angles of OK and of pinches: the tips of thumb and index finger meet, or almost."""
     tries = 6
     states = np.full((count * tries, 4), STRAIGHT)
     states[:, 0] = ROUND
@@ -158,7 +158,7 @@ def _round_thumbs(count: int, random: Random) -> Array:
 
 
 def anything(count: int, random: Random) -> Array:
-    """Return (count, 23) angles anywhere within the limits of the joints."""
+    """Return (count, 23) angles anywhere within the joints' limits."""
     low, high = LIMITS.T
     angles: Array = random.uniform(low, high, (count, len(ANGLES)))
     return angles
@@ -176,11 +176,11 @@ MAKERS: Final[tuple[tuple[Callable[[int, Random], Array], float], ...]] = (
     (touching, 0.05),
     (anything, 0.03),
 )
-"""The makers of shapes and their shares."""
+"""The generators of shapes and their shares."""
 
 
 def random_shapes(count: int, random: Random) -> Array:
-    """Return about (count, 23) random joint angles within the limits, radians, from all makers."""
+    """Return about (count, 23) random joint angles within the limits, in radians, from all generators."""
     made = [maker(round(count * share), random) for maker, share in MAKERS]
     return clamp(np.concatenate(made))
 

@@ -1,4 +1,4 @@
-"""Which shape a hand truly has, told from its joints; hands between two shapes have none and teach nothing."""
+"""Labels the shape of a hand by its true joints; ambiguous hands get no label and are not trained on."""
 
 from typing import Final
 
@@ -9,7 +9,7 @@ from handsteer.hand.kinematics import ANGLES, Array
 
 OPEN, INDEX, THUMB, FIST, OTHER = "open", "index", "thumb", "fist", "other"
 SHAPES: Final = (OPEN, INDEX, THUMB, FIST, OTHER)
-"""What the network tells apart."""
+"""The classes of the network."""
 
 Flags = NDArray[np.bool_]
 
@@ -18,13 +18,13 @@ _FIRST_FINGER: Final = ANGLES.index("index_spread")
 
 
 def name_shapes(angles: Array, joints: Array, elevations: Array, facing: Array) -> NDArray[np.int64]:
-    """Return (n,) indices into :data:`SHAPES`, -1 where people might disagree.
+    """Return (n,) indices into :data:`SHAPES`, -1 if ambiguous.
 
     Args:
         angles: (n, 23) joint angles, radians.
         joints: (n, 21, 3) metres.
-        elevations: (n, 2) angles of the index finger and of the thumb's tip from the image plane, radians, 0 to pi / 2.
-        facing: (n,) 0 to 1, how much the palm or the back of the hand faces the camera.
+        elevations: (n, 2) angles of the index finger and of the thumb's tip to the image plane, radians, 0 to pi / 2.
+        facing: (n,) 0 to 1, how directly the palm or the back of the hand faces the camera.
     """
     reach = thumb_reach(joints)
     straight, open_enough = _straight(angles)
@@ -68,7 +68,7 @@ def thumb_gap(joints: Array) -> Array:
 def thumb_angle(joints: Array) -> Array:
     """Return (n,) angles between the thumb, from its knuckle to its tip, and the palm, radians.
 
-    A thumb that lies along the index finger belongs to a fist; so the landmark model sees most plain fists.
+    A thumb along the index finger belongs to a fist, as the landmark model reports most plain fists.
     """
     thumb = joints[:, 4] - joints[:, 2]
     palm = joints[:, [5, 9, 13, 17]].mean(axis=1) - joints[:, 0]
@@ -78,14 +78,14 @@ def thumb_angle(joints: Array) -> Array:
 
 
 def _straight(angles: Array) -> tuple[Flags, Flags]:
-    """Return (n, 4) which fingers are straight for sure, and which are perhaps."""
+    """Return (n, 4) flags of fingers that are surely straight, and of those that may be."""
     mcp, pip, dip = _degrees(angles)
     fold = mcp + pip + 0.5 * dip
     return (pip <= 32) & (fold <= 70), (pip <= 52) & (fold <= 100)
 
 
 def _closed(angles: Array, ease: float = 0.0) -> tuple[Flags, Flags]:
-    """Return (n, 4) which fingers are closed for sure, and which are perhaps; ``ease`` degrees less are enough."""
+    """Return (n, 4) flags of fingers that are surely closed, and that may be; ``ease`` relaxes both, in degrees."""
     mcp, pip, dip = _degrees(angles)
     # Little fingers bend less than the others, even in a fist.
     fold = (mcp + pip + 0.5 * dip) * (1.0, 1.0, 1.0, 1.15) + ease
