@@ -9,8 +9,7 @@ STALE_S: Final = 0.35
 """Older frames, signs and steering commands are ignored. In seconds, as all that follow."""
 
 ROBOT_S: Final = 0.4
-"""A robot without commands for this long brakes on its own; longer than :data:`STALE_S`, so that it gets a zero first.
-"""
+"""A robot without commands for this long brakes on its own; longer than :data:`STALE_S`, so that a zero comes first."""
 
 ODOMETRY_S: Final = 0.45
 """Without odometry for this long, the robot is considered absent."""
