@@ -126,6 +126,7 @@ def test_ros2_sees_the_node_by_its_names_types_hashes_and_profiles(network: Zeno
     assert token[:2] == ["@ros2_lv", str(DOMAIN)]
     assert token[3] == "0"  # the node's own number
     assert token[5:10] == ["MP", "%", "%far", "driver", "%base%cmd_vel"]
+    eventually(lambda: "is ready" in control.text)
     control.signal(signal.SIGTERM)
     assert control.code() == 0
     eventually(lambda: "/far/driver" not in network.nodes(), what="the node to be gone")
