@@ -94,6 +94,7 @@ def test_ros2_sees_the_node_by_its_names_types_and_hashes(dds: DdsGraph) -> None
     }
     assert node["readers"]["rt/far/gesture/hand_sign"] == string
     assert node["readers"]["rt/far/steering/cmd_vel"] == twist
+    eventually(lambda: "is ready" in control.text)
     control.signal(signal.SIGTERM)
     assert control.code() == 0
 

@@ -148,6 +148,7 @@ def test_ros2_sees_its_own_services_at_the_node_and_their_end(ros2: Ros2Graph) -
     assert {f"{node}/{name}": [kind] for name, kind in SERVICES.items()}.items() <= seen.items()
     assert seen[f"{node}/get_type_description"] == ["type_description_interfaces/srv/GetTypeDescription"]
     assert ros2.peer.ask("servers", service=f"{node}/list_parameters") == 1
+    eventually(lambda: "is ready" in control.text)
     control.signal(signal.SIGTERM)
     assert control.code() == 0
     eventually(lambda: ros2.peer.ask("servers", service=f"{node}/list_parameters") == 0, 5.0, what="it to be gone")

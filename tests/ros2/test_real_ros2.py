@@ -103,6 +103,7 @@ def test_ros2_lists_the_node_its_topics_types_hashes_and_profiles(ros2: Ros2Grap
             "durability": "VOLATILE",
         }
     ]
+    eventually(lambda: "is ready" in control.text)
     control.signal(signal.SIGTERM)
     assert control.code() == 0
     eventually(lambda: "/far/driver" not in ros2.nodes(), what="the node to be gone for ROS 2 too")
