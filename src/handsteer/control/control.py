@@ -1,5 +1,7 @@
 """Converts signs and steering commands to safe velocities: ``hand_sign_control`` without the node."""
 
+import math
+
 from handsteer.config import ControlConfig
 from handsteer.control.safety import Ramp, Safety
 from handsteer.control.twist_mux import TwistMux
@@ -36,6 +38,9 @@ class Control:
         Returns:
             The velocity to command now, or None to command nothing new.
         """
+        if not (math.isfinite(dt_s) and dt_s >= 0):
+            self.safety.fault(f"{dt_s} s is no time between two steps")
+            return self.halt()
         self.safety.step(dt_s)
         self._since_command_s += dt_s
         if sign is not None:
