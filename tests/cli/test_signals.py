@@ -35,7 +35,8 @@ def ends(command: Sequence[str], env: dict[str, str], home: Path, *, code: int =
             threading.Event().wait(moment_s)
             process.signal(wish)
             ended = process.code()
-            # Seen once on a busy machine: the interpreter itself ended by the signal, without a word.
+            # CPython, run by -m, ends itself by SIGINT at its very end after an interrupt within exec of a text, as
+            # dataclasses use it, though all was left in order.
             assert ended in (code, -wish), (moment_s, wish, process.text)
             assert "Traceback" not in process.text, (moment_s, wish)
         finally:

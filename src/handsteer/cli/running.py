@@ -1,4 +1,4 @@
-"""What the verbs share beside their options: how they are told what, how they speak, and how they end."""
+"""What the verbs share besides their options: logging, settings, messages and exit codes."""
 
 import gc
 import logging
@@ -72,7 +72,7 @@ def keep_what_is_loaded() -> None:
 
 @contextmanager
 def uninterrupted() -> Iterator[None]:
-    """Ignore Ctrl-C and SIGTERM in this block: whoever presses Ctrl-C twice must not keep a robot from standing."""
+    """Ignore Ctrl-C and SIGTERM in this block: pressing Ctrl-C twice must not keep the robot from stopping."""
     handlers = {number: signal.signal(number, signal.SIG_IGN) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
         yield

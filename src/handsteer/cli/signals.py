@@ -11,7 +11,7 @@ import time
 from collections.abc import Callable
 from types import FrameType
 
-# Another signal so soon after one is the same wish; it must not cut off what the first one has begun.
+# Another signal so soon after one means the same; it must not interrupt the orderly end that the first one began.
 _SAME_WISH_S = 1.0
 
 _ENDING = (
@@ -67,12 +67,12 @@ def _handle(handler: Handler) -> None:
         number = getattr(signal, name, None)
         if number is None:
             continue  # not on this system
-        # Whoever starts a program by nohup wants it to outlive the terminal. SIGINT is taken even so: a shell lets its
+        # A program started by nohup is to outlive the terminal. SIGINT is taken even so: a shell lets its
         # background jobs ignore it, and a robot must be stopped all the same.
         if name == "SIGHUP" and signal.getsignal(number) == signal.SIG_IGN:
             continue
         signal.signal(number, handler)
         numbers.append(number)
     if sys.platform != "win32":
-        # Whoever started the program may have blocked them until now, when they can be taken.
+        # The parent process may have blocked them until now, when they can be handled.
         signal.pthread_sigmask(signal.SIG_UNBLOCK, numbers)
