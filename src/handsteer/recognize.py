@@ -7,7 +7,7 @@ from typing import Any
 
 from handsteer.cameras.files import PHOTO_SUFFIXES, find_photos, read_photo, video_frames
 from handsteer.errors import CameraNotFound
-from handsteer.signs.recognizer import Recognition, Recognizer
+from handsteer.recognition.recognizer import Recognition, Recognizer
 
 
 @dataclass(frozen=True)

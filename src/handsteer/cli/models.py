@@ -4,7 +4,7 @@ from typing import Any
 
 from tqdm import tqdm
 
-from handsteer.landmarks.models import fetch_models
+from handsteer.recognition.landmark_models import fetch_models
 
 
 def models() -> int:

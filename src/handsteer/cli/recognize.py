@@ -5,9 +5,9 @@ from pathlib import Path
 
 from handsteer.cli.options import ConfigFile, Flag, Parameters
 from handsteer.cli.running import settings
+from handsteer.recognition.recognizer import Recognizer
 from handsteer.recognize import FrameResult
 from handsteer.recognize import recognize as results
-from handsteer.signs.recognizer import Recognizer
 
 
 def recognize(

@@ -15,11 +15,12 @@ from handsteer.cli.terminal import Keys, TerminalPicture
 from handsteer.clock import RealClock
 from handsteer.config import Config, TeachConfig
 from handsteer.errors import DatasetError
-from handsteer.landmarks.hand import Hand
-from handsteer.signs.drawing import draw_hand
-from handsteer.signs.opening import open_landmarker
-from handsteer.signs.teaching.collect import Collector, Facts, Status, collect_live, collect_recorded
-from handsteer.signs.teaching.dataset import Dataset, label_for, load_dataset, save_dataset
+from handsteer.recognition.custom_signs import label_for
+from handsteer.recognition.drawing import draw_hand
+from handsteer.recognition.hand import Hand
+from handsteer.recognition.recognizer import open_landmarker
+from handsteer.training.custom.collect import Collector, Facts, Status, collect_live, collect_recorded
+from handsteer.training.custom.dataset import Dataset, load_dataset, save_dataset
 
 _DEFAULTS = TeachConfig()
 

@@ -3,12 +3,11 @@
 from collections.abc import Iterable, Mapping, Sequence
 
 from handsteer.cli.signs.tables import cells, confusion_table, rate, table
-from handsteer.signs.calibration import Calibration
-from handsteer.signs.evaluation import Evaluation
-from handsteer.signs.intervals import Rate
-from handsteer.signs.metrics import SIZES, PhotoReport, Tally
-from handsteer.signs.sources import PhotoRun
-from handsteer.signs.video_metrics import Event, LabelledFigures, VideoReport
+from handsteer.training.evaluation.intervals import Rate
+from handsteer.training.evaluation.photo_metrics import SIZES, PhotoReport, Tally
+from handsteer.training.evaluation.report import Calibration, Evaluation
+from handsteer.training.evaluation.sources import PhotoRun
+from handsteer.training.evaluation.video_metrics import Event, LabelledFigures, VideoReport
 from handsteer.types import NONE
 
 _PHOTOS_AGAIN = (

@@ -8,8 +8,9 @@ from cyclopts import Parameter
 from handsteer.cli.options import Flag
 from handsteer.cli.signs.tables import dataset_table
 from handsteer.errors import DatasetError
-from handsteer.signs.teaching.dataset import Dataset, label_for, load_dataset, save_dataset
-from handsteer.signs.teaching.keypoint_csv import read_class_names, read_keypoints
+from handsteer.recognition.custom_signs import label_for
+from handsteer.training.custom.dataset import Dataset, load_dataset, save_dataset
+from handsteer.training.custom.keypoint_csv import read_class_names, read_keypoints
 
 
 def import_keypoints(

@@ -2,11 +2,10 @@
 
 from collections.abc import Sequence
 
-from handsteer.signs.intervals import Share
-from handsteer.signs.metrics import Confusion
-from handsteer.signs.teaching.dataset import Dataset, summarise
-from handsteer.signs.teaching.train import TeachingReport
-from handsteer.signs.teaching.words import false_hands, how_it_was_tried, mistakes
+from handsteer.training.custom.dataset import Dataset, summarise
+from handsteer.training.custom.report import TrainingReport, false_hands, how_it_was_tried, mistakes
+from handsteer.training.evaluation.intervals import Share
+from handsteer.training.evaluation.photo_metrics import Confusion
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]], text_columns: int = 1) -> str:
@@ -28,7 +27,7 @@ def dataset_table(dataset: Dataset) -> str:
     return table(["sign", "takes", "hands", "persons"], rows)
 
 
-def teaching_tables(report: TeachingReport) -> str:
+def teaching_tables(report: TrainingReport) -> str:
     """Return how well signs were learnt, as text."""
     rows = [
         [
