@@ -10,9 +10,9 @@ import cv2
 from cyclopts import Parameter
 from tqdm import tqdm
 
-from handsteer.cli.options import ConfigFile, Flag, Parameters
+from handsteer.cli.app import ConfigFile, Flag, Parameters
 from handsteer.cli.running import settings
-from handsteer.cli.signs.evaluation_tables import evaluation_tables
+from handsteer.cli.signs.tables import evaluation_tables
 from handsteer.config import Config
 from handsteer.errors import EvaluationError
 from handsteer.recognition.classifier import Classifier

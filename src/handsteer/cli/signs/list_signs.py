@@ -2,7 +2,7 @@
 
 import json as json_format
 
-from handsteer.cli.options import ConfigFile, Flag, Parameters
+from handsteer.cli.app import ConfigFile, Flag, Parameters
 from handsteer.cli.running import settings
 from handsteer.cli.signs.tables import table
 from handsteer.control.effects import effect_of

@@ -8,7 +8,7 @@ from typing import Annotated
 from cyclopts import Parameter
 from tqdm import tqdm
 
-from handsteer.cli.options import Flag
+from handsteer.cli.app import Flag
 from handsteer.cli.running import say
 from handsteer.cli.signs.tables import teaching_tables
 from handsteer.config import SignsConfig, TeachConfig
