@@ -206,7 +206,7 @@ def draw_sweep(rows: Mapping[float, Tally], title: str) -> Picture:
     right = Plot(
         "",
         "threshold",
-        "of those that don't show the sign, how many gave it",
+        "false alarms: share of pictures without the sign",
         x_range=(0.25, 1.0),
         y_range=(0.0, next(top for top in _TOPS if top >= most)),
     )
