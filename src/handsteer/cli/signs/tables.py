@@ -15,6 +15,11 @@ from handsteer.training.evaluation.sources import PhotoRun
 from handsteer.training.evaluation.video_metrics import Event, LabelledFigures, VideoReport
 from handsteer.types import NONE
 
+_WIDEST = 10_000
+_PHOTOS_AGAIN = (
+    "Each counts once per view, though it shows the same person: intervals over several views are too narrow."
+)
+
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]], text_columns: int = 1) -> str:
     """Return a table as text; columns after the first ``text_columns`` are aligned to the right."""
@@ -78,12 +83,6 @@ def rate(share: Share) -> str:
     low, high = share.interval
     digits = 1 if high < 0.1 else 0
     return f"{share.rate:.1%} ({100 * low:.{digits}f}-{100 * high:.{digits}f})"
-
-
-_WIDEST = 10_000
-_PHOTOS_AGAIN = (
-    "Each counts once per view, though it shows the same person: intervals over several views are too narrow."
-)
 
 
 def evaluation_tables(evaluation: Evaluation, *, with_reliability: bool = False, with_sweep: bool = False) -> str:
