@@ -1,7 +1,7 @@
-"""Every parameter of handsteer: type, unit, range, default and a line of explanation.
+"""Every parameter of handsteer: type, unit, range, default and a one-line description.
 
 The YAML file, the command line and the settings of the page are generated from these models. Names are as in ROS nodes,
-units are SI (REP 103) and in brackets in each description.
+units are SI (REP 103), in brackets in each description.
 """
 
 import logging
@@ -31,11 +31,11 @@ _NAMESPACE = re.compile(r"[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)
 
 
 class Section(BaseModel):
-    """A group of parameters; unknown names and values out of range are refused.
+    """A group of parameters; unknown names and values out of range are rejected.
 
     Attributes:
-        live: Those that can change while a node runs; the others are read when it starts.
-        renamed: New names of parameters by their old ones, which still count.
+        live: Those that can change while a node runs; the others are read at start-up.
+        renamed: New names of parameters by their old ones, which are still accepted.
     """
 
     live: ClassVar[frozenset[str]] = frozenset()
@@ -48,7 +48,7 @@ class Section(BaseModel):
         new = cls.renamed.get(name, name)
         if new != name and name not in _OLD_NAMES_SEEN:
             _OLD_NAMES_SEEN.add(name)
-            log.warning("the parameter %s is called %s now; the old name still counts", name, new)
+            log.warning("parameter %s is deprecated: use %s", name, new)
         return new
 
     @model_validator(mode="before")
@@ -71,70 +71,78 @@ class CameraConfig(Section):
 
     source: str = Field(
         "auto",
-        description="auto, virtual, browser (that of whoever looks at the page), a webcam's index or /dev/videoN, "
-        "an address (rtsp, http), a video file or a folder",
+        description="auto, virtual, browser (of the device that shows the page), a webcam's index or /dev/videoN, "
+        "an address (rtsp, http), a video file or a folder of photos",
     )
-    width: int = Field(640, ge=64, le=4096, description="Width asked of a webcam or drawn by the virtual hand [px]")
-    height: int = Field(480, ge=48, le=4096, description="Height asked of a webcam or drawn by the virtual hand [px]")
-    fps: float = Field(30.0, gt=0, le=240, description="Frames a second asked of a webcam or drawn [1/s]")
+    width: int = Field(
+        640, ge=64, le=4096, description="Width requested from a webcam, or of the virtual hand's picture [px]"
+    )
+    height: int = Field(
+        480, ge=48, le=4096, description="Height requested from a webcam, or of the virtual hand's picture [px]"
+    )
+    fps: float = Field(
+        30.0, gt=0, le=240, description="Frame rate requested from a webcam, or of the virtual hand [1/s]"
+    )
     at_end: Literal["loop", "hold", "end"] = Field(
         "loop",
-        description="When a file ends: start again, hold (no frames, so NONE), or end the run; "
-        "a headless run ends unless told otherwise",
+        description="At the end of a file: start again, hold (no frames, so NONE), or end (default if headless)",
     )
     photo_duration: float = Field(1.0, gt=0, le=3600, description="How long each photo of a folder is shown [s]")
     frame_id: str = Field(
         "camera_optical_frame",
-        description="Coordinate frame that stands in the header of each image, as REP 103 has it: z forward, x right; "
-        "in a namespace that shares /tf with others, /r1, its default is r1/camera_optical_frame",
+        description="Coordinate frame in the header of each image, optical as in REP 103: z forward, x right; the "
+        "default in a namespace that shares /tf, such as /r1, is r1/camera_optical_frame",
     )
     calibration: OptionalPath = Field(
         None,
-        description="YAML file of ROS's camera_calibration, for camera_info; without one, camera_info is all zeros "
+        description="YAML file of ROS's camera_calibration, for camera_info; without it, camera_info is all zeros "
         "(uncalibrated)",
     )
 
 
 class VirtualHandConfig(Section):
-    """The rendered hand that stands in for a webcam."""
+    """The rendered hand that replaces a webcam."""
 
     script: str = Field(
         "Forward:3 Turn Left:2 Forward:2 Turn Right:2 Go:1 Backward:3 Stop:2 NONE:1",
-        description="Signs to show with their durations in seconds, over and over; NONE lowers the hand; "
-        "Peace, Three, Four, Horns, Call and OK are there to be taught",
+        description="Signs to show, with their durations in seconds, repeated; NONE lowers the hand; "
+        "Peace, Three, Four, Horns, Call and OK are for teaching",
     )
-    handedness: Handedness = Field("Right", description="Which hand")
+    handedness: Handedness = Field("Right", description="Left or right hand")
     skin: Literal["light", "medium", "dark"] = Field("medium", description="Skin tone")
-    background: Literal["plain", "cluttered"] = Field("plain", description="What is behind the hand")
+    background: Literal["plain", "cluttered"] = Field("plain", description="Background of the picture")
     sleeve: bool = Field(True, description="Whether the forearm wears a sleeve")
-    seed: int = Field(0, ge=0, description="Seed of the background and of the hand's small movements")
+    seed: int = Field(0, ge=0, description="Random seed of the background and of the hand's small movements")
 
 
 class LandmarksConfig(Section):
-    """How the hand is found in a frame."""
+    """Detection and tracking of hands in a frame."""
 
     renamed = {"second_look": "refine_new_hands"}
 
     model: Literal["fast", "full", "lite"] = Field(
         "fast",
-        description="full is MediaPipe's own; fast is full with 8-bit integers, half the time and the same to a "
-        "quarter of a pixel; lite is as fast, and less accurate",
+        description="full is MediaPipe's own; fast is full in 8-bit integers, takes half the time and differs by up "
+        "to a quarter of a pixel; lite is as fast, but less accurate",
     )
     max_hands: int = Field(
-        2, ge=1, le=2, description="How many hands are looked for in a frame, to choose the one that shows a sign"
+        2,
+        ge=1,
+        le=2,
+        description="Maximum number of hands in a frame, from which the one that shows a sign is selected",
     )
-    min_detection_confidence: float = Field(0.3, ge=0, le=1, description="Score from which a palm counts as found")
-    refine_new_hands: bool = Field(True, description="Look twice at a hand that is new, which reads it better")
+    min_detection_confidence: float = Field(0.3, ge=0, le=1, description="Minimum score to accept a detected palm")
+    refine_new_hands: bool = Field(True, description="Run the landmark model twice on a new hand, for better landmarks")
     wide_search: bool = Field(
         True,
-        description="Look for hands also as if they were smaller, and in the middle of the frame; finds more near ones",
+        description="Also search a widened frame, where hands are smaller, and its middle; finds more close hands",
     )
-    min_presence: float = Field(0.5, ge=0, le=1, description="Score below which a followed hand counts as lost")
+    min_presence: float = Field(0.5, ge=0, le=1, description="Minimum score to keep tracking a hand")
     threads: int = Field(1, ge=1, le=64, description="CPU threads of the landmark model")
 
 
 class SignsConfig(Section):
-    """How the sign is recognised from the landmarks, and when it counts."""
+    """Recognition of signs from the landmarks, and when a sign counts."""
 
     renamed = {"bridge_time": "dropout_hold", "keep_confidence": "release_confidence"}
 
@@ -151,34 +159,38 @@ class SignsConfig(Section):
     )
 
     model: OptionalPath = Field(
-        None, description="File of taught signs, as `handsteer signs train` writes it; none has the shipped signs only"
+        None,
+        description="File of taught signs, written by `handsteer signs train`; none for the shipped signs only",
     )
-    min_confidence: float = Field(0.8, ge=0, le=1, description="Confidence from which a sign is seen")
+    min_confidence: float = Field(0.8, ge=0, le=1, description="Minimum confidence to recognise a sign")
     release_confidence: float = Field(
-        0.5, ge=0, le=1, description="Confidence down to which the sign that counts is seen"
+        0.5, ge=0, le=1, description="Minimum confidence to keep the sign that already counts"
     )
     confirm_time: float = Field(
-        0.1, ge=0, le=2, description="How long a sign must be seen before it counts; Stop counts at once [s]"
+        0.1, ge=0, le=2, description="How long a sign must be recognised before it counts; Stop counts at once [s]"
     )
-    dropout_hold: float = Field(0.1, ge=0, le=2, description="How long a lost hand keeps its sign [s]")
+    dropout_hold: float = Field(0.1, ge=0, le=2, description="How long a sign still counts after its hand is lost [s]")
     switch_time: float = Field(
-        0.5, ge=0, le=10, description="How long the followed hand shows no sign before another that shows one is [s]"
+        0.5,
+        ge=0,
+        le=10,
+        description="How long the selected hand must show no sign before another hand with a sign is selected [s]",
     )
-    max_frame_age: float = Field(STALE_S, gt=0, le=10, description="An older frame counts as no frame [s]")
+    max_frame_age: float = Field(STALE_S, gt=0, le=10, description="Older frames are ignored [s]")
     recorded: Recorded = Field(
         "auto",
-        description="Whether frames with old stamps count, as a recording's: auto takes what rosbag play sends, always "
-        "takes whatever is stamped more than 5 s ago, so it is for recordings alone",
+        description="Whether to accept frames with old stamps, as in recordings: auto accepts those of rosbag play; "
+        "always accepts all that are stamped more than 5 s ago, so use it for recordings only",
     )
     image_transport: Literal["auto", "raw", "compressed"] = Field(
         "auto",
-        description="Which images are recognised: raw is /image_raw, compressed is /image_raw/compressed; "
-        "auto is compressed where others may be on other machines (DDS beyond localhost), or whichever there is",
+        description="Images to subscribe to: raw is /image_raw, compressed is /image_raw/compressed; auto is "
+        "compressed if nodes may be on other machines (DDS beyond localhost), or the one that is published",
     )
 
 
 class ControlConfig(Section):
-    """How a sign becomes a velocity."""
+    """Conversion of signs to velocities."""
 
     live = frozenset(
         {
@@ -202,64 +214,78 @@ class ControlConfig(Section):
 
     ramp: Literal["per_message", "per_second"] = Field(
         "per_message",
-        description="per_message grows by a step a message, as the tutorial does; per_second whatever the frame rate",
+        description="per_message adds a step per message, as in the tutorial; per_second is independent of frame rate",
     )
-    linear_step: float = Field(0.01, gt=0, le=1, description="Growth of forward speed a message [m/s]")
-    angular_step: float = Field(0.1, gt=0, le=5, description="Growth of turning speed a message [rad/s]")
-    linear_acceleration: float = Field(0.3, gt=0, le=10, description="Growth of forward speed if per_second [m/s²]")
-    angular_acceleration: float = Field(3.0, gt=0, le=50, description="Growth of turning speed if per_second [rad/s²]")
+    linear_step: float = Field(0.01, gt=0, le=1, description="Change of linear speed per message [m/s]")
+    angular_step: float = Field(0.1, gt=0, le=5, description="Change of angular speed per message [rad/s]")
+    linear_acceleration: float = Field(0.3, gt=0, le=10, description="Change of linear speed with per_second [m/s²]")
+    angular_acceleration: float = Field(
+        3.0, gt=0, le=50, description="Change of angular speed with per_second [rad/s²]"
+    )
     max_sign_rate: float = Field(
-        60.0, gt=0, le=1000, description="More signs than this a second make the robot no faster, if per_message [1/s]"
+        60.0,
+        gt=0,
+        le=1000,
+        description="Signs above this rate do not speed the robot up further, with per_message [1/s]",
     )
-    max_linear: float = Field(1.0, gt=0, le=10, description="Highest forward and backward speed [m/s]")
-    max_angular: float = Field(2.0, gt=0, le=20, description="Highest turning speed [rad/s]")
+    max_linear: float = Field(1.0, gt=0, le=10, description="Maximum linear speed [m/s]")
+    max_angular: float = Field(2.0, gt=0, le=20, description="Maximum angular speed [rad/s]")
     max_linear_acceleration: float = Field(
-        0.0, ge=0, le=1000, description="Limit of what is commanded when speeding up, whoever drives; 0 is none [m/s²]"
+        0.0,
+        ge=0,
+        le=1000,
+        description="Maximum linear acceleration of commands from any input when speeding up; 0 is unlimited [m/s²]",
     )
     max_angular_acceleration: float = Field(
         0.0,
         ge=0,
         le=1000,
-        description="Limit of what is commanded when speeding up, whoever drives; 0 is none [rad/s²]",
+        description="Maximum angular acceleration of commands from any input when speeding up; 0 is unlimited [rad/s²]",
     )
     max_linear_jerk: float = Field(
-        0.0, ge=0, le=1000, description="Limit of what is commanded when speeding up, whoever drives; 0 is none [m/s³]"
+        0.0,
+        ge=0,
+        le=1000,
+        description="Maximum linear jerk of commands from any input when speeding up; 0 is unlimited [m/s³]",
     )
     max_angular_jerk: float = Field(
         0.0,
         ge=0,
         le=1000,
-        description="Limit of what is commanded when speeding up, whoever drives; 0 is none [rad/s³]",
+        description="Maximum angular jerk of commands from any input when speeding up; 0 is unlimited [rad/s³]",
     )
     sign_timeout: float = Field(
-        STALE_S, gt=0, le=5, description="Without a sign for this long, the robot is stopped [s]"
+        STALE_S, gt=0, le=5, description="The robot is stopped after this long without a sign [s]"
     )
     steering_timeout: float = Field(
-        STALE_S, gt=0, le=5, description="Steering by hand keeps the signs out for this long after its last command [s]"
+        STALE_S,
+        gt=0,
+        le=5,
+        description="Manual steering overrides the signs until this long after its last command [s]",
     )
     actions: dict[str, Action] = Field(
-        {}, description="What further signs do, as {Hi: stop, Peace: turbo}; Stop and NONE always stop"
+        {}, description="Actions of signs, such as {Hi: stop, Peace: turbo}; Stop and NONE always stop"
     )
     arming: Literal["auto", "on", "off"] = Field(
         "auto",
-        description="Whether nothing moves before neutral was seen (Stop, or no hand), after the start and after every "
-        "fault; auto is on unless the robot is simulated in the same process",
+        description="Whether the robot moves only after neutral (Stop, or no hand) at start-up and after each fault; "
+        "auto is on unless the robot is simulated in the same process",
     )
     cmd_vel_type: CmdVelType = Field(
         "auto",
-        description="What commands are sent as: geometry_msgs/Twist or TwistStamped; auto follows robot.cmd_vel_type, "
-        "and in ROS 2 the robot's subscriber; twist elsewhere",
+        description="Type of commands to send: geometry_msgs/Twist or TwistStamped; auto follows robot.cmd_vel_type, "
+        "in ROS 2 also the robot's subscriber, and is otherwise twist",
     )
-    cmd_vel_frame_id: str = Field("base_link", description="Coordinate frame in the header of a TwistStamped")
+    cmd_vel_frame_id: str = Field("base_link", description="Coordinate frame in the header of TwistStamped commands")
     robots: tuple[str, ...] = Field(
         (),
         max_length=32,
-        description="Namespaces of robots that one hand drives in turn, as [r1, r2]; none has one robot, without one",
+        description="Namespaces of robots that one hand drives in turn, such as [r1, r2]; empty for a single robot",
     )
 
     @field_validator("arming", mode="before")
     @classmethod
-    def _as_yaml_reads_it(cls, arming: object) -> object:
+    def _from_yaml(cls, arming: object) -> object:
         # YAML, and so ROS, converts on and off to true and false.
         return {True: "on", False: "off"}[arming] if isinstance(arming, bool) else arming
 
@@ -268,7 +294,7 @@ class ControlConfig(Section):
     def _names_of_robots(cls, robots: tuple[str, ...]) -> tuple[str, ...]:
         wrong = [name for name in robots if not _NAMESPACE.fullmatch(name) or robots.count(name) > 1]
         if wrong:
-            raise ValueError(f"should name each robot once, by letters, digits and _, and {wrong[0]!r} is not that")
+            raise ValueError(f"should name each robot once, with letters, digits and _; {wrong[0]!r} does not")
         return robots
 
     @field_validator("actions")
@@ -278,7 +304,7 @@ class ControlConfig(Section):
         for name, action in actions.items():
             sign = find_sign(name, BUILT_IN) or name.strip()
             if not sign or sign in named:
-                raise ValueError(f"should name each sign once, and {name!r} does not")
+                raise ValueError(f"should name each sign once; {name!r} does not")
             if sign in ALWAYS_STOP and action != "stop":
                 raise ValueError(f"should leave {sign} at 'stop', so that the robot can always be stopped")
             named[sign] = action
@@ -286,7 +312,7 @@ class ControlConfig(Section):
 
 
 class CollisionMonitorConfig(Section):
-    """Slows the robot before what a laser scanner sees in its way, and stops it in front."""
+    """Slows and stops the robot before obstacles that a laser scanner sees in its path."""
 
     live = frozenset(
         {
@@ -305,89 +331,95 @@ class CollisionMonitorConfig(Section):
         }
     )
 
-    enabled: bool = Field(False, description="Whether commands are slowed before obstacles; this needs a topic `scan`")
+    enabled: bool = Field(False, description="Whether to slow commands before obstacles; needs the topic `scan`")
     source_timeout: float = Field(
-        0.45, gt=0, le=5, description="Without a scan for this long, or when it is older, the robot is stopped [s]"
+        0.45, gt=0, le=5, description="The robot is stopped after this long without a scan, or if the scan is older [s]"
     )
-    margin: float = Field(0.15, ge=0, le=5, description="How far before an obstacle in its way the robot stops [m]")
-    deceleration: float = Field(0.7, gt=0, le=20, description="How hard the robot surely brakes [m/s²]")
-    angular_deceleration: float = Field(1.5, gt=0, le=50, description="How hard it surely brakes a turn [rad/s²]")
+    margin: float = Field(
+        0.15, ge=0, le=5, description="Distance to an obstacle in its path at which the robot stops [m]"
+    )
+    deceleration: float = Field(0.7, gt=0, le=20, description="Guaranteed linear deceleration of the robot [m/s²]")
+    angular_deceleration: float = Field(
+        1.5, gt=0, le=50, description="Guaranteed angular deceleration of the robot [rad/s²]"
+    )
     reaction_time: float = Field(
-        0.25, ge=0, le=5, description="How long a command takes to act, the wait for the next scan included [s]"
+        0.25, ge=0, le=5, description="Delay until a command takes effect, including the wait for the next scan [s]"
     )
-    front: float = Field(0.26, gt=0, le=10, description="How far the robot reaches ahead of its base frame [m]")
-    back: float = Field(0.26, gt=0, le=10, description="How far it reaches behind it [m]")
-    side: float = Field(0.245, gt=0, le=10, description="How far it reaches to either side [m]")
-    scan_x: float = Field(0.0, ge=-10, le=10, description="How far ahead of the base frame the scanner is [m]")
-    scan_y: float = Field(0.0, ge=-10, le=10, description="How far to the left of it the scanner is [m]")
-    scan_yaw: float = Field(0.0, ge=-7, le=7, description="By how much the scanner is turned to the left [rad]")
+    front: float = Field(0.26, gt=0, le=10, description="Extent of the robot ahead of its base frame [m]")
+    back: float = Field(0.26, gt=0, le=10, description="Extent of the robot behind its base frame [m]")
+    side: float = Field(0.245, gt=0, le=10, description="Extent of the robot to either side [m]")
+    scan_x: float = Field(0.0, ge=-10, le=10, description="Position of the scanner ahead of the base frame [m]")
+    scan_y: float = Field(0.0, ge=-10, le=10, description="Position of the scanner to the left of the base frame [m]")
+    scan_yaw: float = Field(0.0, ge=-7, le=7, description="Rotation of the scanner to the left [rad]")
 
 
 class RobotConfig(Section):
-    """The robot, and the world it is simulated in or the topics it listens to."""
+    """The robot: simulated in a world, or a real one with its topics."""
 
     kind: RobotKind = Field(
         "sim",
-        description="sim is the simulated robot; ros2, dds, zenoh and ros1 drive a real one, on its topics, "
-        "auto by ros2 where that is, else by dds",
+        description="sim is the simulated robot; ros2, dds, zenoh and ros1 drive a real one, auto uses ros2 if "
+        "installed, else dds",
     )
     preset: Preset | None = Field(
-        None, description="A robot whose topics, types and limits are known; a real one is generic unless said"
+        None, description="A robot with known topics, types and limits; the default for a real robot is generic"
     )
     cmd_vel_type: CmdVelType = Field(
         "auto",
-        description="What commands it takes: geometry_msgs/Twist or TwistStamped; auto follows control.cmd_vel_type, "
-        "and is what a real robot of ROS 2 takes, twist elsewhere",
+        description="Type of commands it subscribes to: geometry_msgs/Twist or TwistStamped; auto follows "
+        "control.cmd_vel_type, for a real ROS 2 robot its subscriber, and is otherwise twist",
     )
     cmd_vel_topic: str = Field("cmd_vel", min_length=1, description="Topic of a real robot's commands")
-    odom_topic: str = Field("odom", description="Topic of a real robot's odometry; none when empty")
+    odom_topic: str = Field("odom", description="Topic of a real robot's odometry; empty for none")
     odom_type: Literal["odometry", "turtlesim_pose"] = Field(
-        "odometry", description="What it carries: nav_msgs/Odometry or turtlesim/Pose"
+        "odometry", description="Type of the odometry: nav_msgs/Odometry or turtlesim/Pose"
     )
     odom_timeout: float = Field(
-        ODOMETRY_S, gt=0, le=10, description="Odometry of a real robot that stops for this long stops the robot [s]"
+        ODOMETRY_S, gt=0, le=10, description="A real robot is stopped if its odometry stops for this long [s]"
     )
-    scan_topic: str = Field("scan", description="Topic of a real robot's laser scanner; none when empty")
+    scan_topic: str = Field("scan", description="Topic of a real robot's laser scanner; empty for none")
     command_rate: float = Field(
-        20.0, ge=5, le=50, description="How often a real robot is told again what it is told [1/s]"
+        20.0, ge=5, le=50, description="Rate at which commands to a real robot are repeated [1/s]"
     )
     world: str = Field("obstacles", description="Name of a shipped world, or a YAML file")
-    wheel_separation: float = Field(0.45, gt=0, le=10, description="Distance between left and right wheels [m]")
+    wheel_separation: float = Field(0.45, gt=0, le=10, description="Distance between the left and right wheels [m]")
     wheel_radius: float = Field(0.06, gt=0, le=2, description="Radius of the wheels [m]")
-    max_linear: float = Field(2.0, gt=0, le=20, description="Limit of the controller [m/s]")
-    max_linear_acceleration: float = Field(1.0, gt=0, le=50, description="Limit of the controller [m/s²]")
-    max_angular: float = Field(8.0, gt=0, le=50, description="Limit of the controller [rad/s]")
-    max_angular_acceleration: float = Field(2.0, gt=0, le=50, description="Limit of the controller [rad/s²]")
+    max_linear: float = Field(2.0, gt=0, le=20, description="Maximum linear speed of the controller [m/s]")
+    max_linear_acceleration: float = Field(
+        1.0, gt=0, le=50, description="Maximum linear acceleration of the controller [m/s²]"
+    )
+    max_angular: float = Field(8.0, gt=0, le=50, description="Maximum angular speed of the controller [rad/s]")
+    max_angular_acceleration: float = Field(
+        2.0, gt=0, le=50, description="Maximum angular acceleration of the controller [rad/s²]"
+    )
     cmd_vel_timeout: float = Field(
         ROBOT_S,
         gt=0,
         le=10,
-        description="Without a command for this long, or when a stamped one is older, it brakes [s]",
+        description="It brakes after this long without a command, or if a stamped one is older [s]",
     )
     odom_frame_id: str = Field("odom", description="Coordinate frame of the odometry")
     base_frame_id: str = Field("base_link", description="Coordinate frame of the robot")
     scan_frame_id: str = Field("base_scan", description="Coordinate frame of the laser scanner")
     frame_prefix: str = Field(
         "auto",
-        description="What stands before the names of these frames, as robot_state_publisher has it; auto is the node's "
-        "namespace (r1/) where several robots share /tf, and nothing where the topic is remapped",
+        description="Prefix of these coordinate frames, as in robot_state_publisher; auto is the node's namespace, "
+        "such as r1/, or empty if /tf is remapped",
     )
-    publish_clock: bool = Field(False, description="Whether it publishes /clock; it then runs on real time itself")
+    publish_clock: bool = Field(False, description="Whether to publish /clock; the robot itself then runs on real time")
 
 
 class TeachConfig(Section):
-    """Signs that are taught on the page."""
+    """Teaching of signs on the page."""
 
-    dataset: Path = Field(
-        Path("signs.npz"), description="File that the takes are added to, as `handsteer signs collect` does"
-    )
+    dataset: Path = Field(Path("signs.npz"), description="File to add takes to, as with `handsteer signs collect`")
     model: Path = Field(
         Path("my-signs.npz"),
-        description="File that what is learnt is written to, as `handsteer signs train` does; signs.model goes before",
+        description="File to write the learnt signs to, as with `handsteer signs train`; signs.model overrides it",
     )
-    takes: int = Field(5, ge=2, le=50, description="How many takes to collect of a sign")
-    take_time: float = Field(3.0, ge=0.2, le=60, description="How long each is [s]")
-    countdown: float = Field(3.0, ge=0, le=60, description="How long to wait before each [s]")
+    takes: int = Field(5, ge=2, le=50, description="Number of takes of a sign")
+    take_time: float = Field(3.0, ge=0.2, le=60, description="Duration of each take [s]")
+    countdown: float = Field(3.0, ge=0, le=60, description="Countdown before each take [s]")
 
 
 class DashboardConfig(Section):
@@ -396,21 +428,22 @@ class DashboardConfig(Section):
     host: str = Field(
         "127.0.0.1",
         min_length=1,
-        description="Address of this machine that the page is served on; any other than 127.0.0.1 lets other machines "
-        "in, who need the token that stands in the printed address",
+        description="Address that the page is served on; any other than 127.0.0.1 makes it reachable from other "
+        "machines, which need the token in the printed address",
     )
-    port: int = Field(8080, ge=0, le=65535, description="Port of the page; 0 takes a free one")
+    port: int = Field(8080, ge=0, le=65535, description="Port of the page; 0 picks a free one")
     certificate: Path | None = Field(
-        None, description="PEM file with the certificate for https, which browsers want before they give a camera away"
+        None, description="PEM file with the certificate for https, without which browsers do not share a camera"
     )
-    private_key: Path | None = Field(None, description="PEM file with its key, unless the certificate's file has it")
+    private_key: Path | None = Field(None, description="PEM file with its key, if not in the certificate's file")
     token: Literal["auto", "always"] = Field(
         "auto",
-        description="Whether the page needs the token: only where other machines can reach it, or always, as where "
-        "several people are logged in on this machine",
+        description="When the page needs the token: auto if other machines can reach it, or always, for machines with "
+        "several users",
     )
     open_browser: bool = Field(
-        True, description="Whether run opens the page in a browser; never with token: always, as commands are public"
+        True,
+        description="Whether run opens the page in a browser; never with token: always, as command lines are public",
     )
 
     @property
@@ -420,7 +453,7 @@ class DashboardConfig(Section):
 
 
 class Config(Section):
-    """Everything that can be set."""
+    """All parameters, by section."""
 
     camera: CameraConfig = CameraConfig()
     virtual_hand: VirtualHandConfig = VirtualHandConfig()
@@ -466,7 +499,7 @@ def cmd_vel_type(config: Config) -> CmdVelType:
     if "auto" not in {control, robot} and control != robot:
         raise ConfigError(
             f"control.cmd_vel_type is {control} and robot.cmd_vel_type {robot}: "
-            "they should be the same, or the robot would not hear a command"
+            "they should be the same, or the robot receives no command"
         )
     return robot if control == "auto" else control
 
@@ -504,7 +537,7 @@ def _preset(values: dict[str, Any]) -> dict[str, Any]:
 
 
 def _read_yaml(path: Path) -> dict[str, Any]:
-    # Programs without a file, such as those that only recognise signs, need not load it.
+    # Imported late: programs without a file, such as those that only recognise signs, load faster.
     from handsteer import plain_yaml  # noqa: PLC0415
 
     values = plain_yaml.read(path, str(path), ConfigError, f"cannot read the configuration {path}")

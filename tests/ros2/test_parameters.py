@@ -51,7 +51,7 @@ def test_the_parameters_of_a_node_are_listed_read_and_described(ros2: Ros2Graph)
     everything = ask(ros2, node, "describe_parameters", *names)["descriptors"]
     assert [one["name"] for one in everything] == names
     about = everything[names.index("max_linear")]
-    assert about["description"] == "Highest forward and backward speed [m/s]"
+    assert about["description"] == "Maximum linear speed [m/s]"
     assert about["floating_point_range"] == [{"from_value": 0.0, "to_value": 10.0, "step": 0.0}]
 
 

@@ -97,7 +97,7 @@ def test_one_unknown_name_leaves_the_answer_empty() -> None:
 
 def test_descriptions_have_ranges_and_say_what_is_fixed() -> None:
     speed = Client().describe("max_linear")
-    assert (speed.type, speed.read_only, speed.description) == (3, False, "Highest forward and backward speed [m/s]")
+    assert (speed.type, speed.read_only, speed.description) == (3, False, "Maximum linear speed [m/s]")
     assert [(one.from_value, one.to_value) for one in speed.floating_point_range] == [(0.0, 10.0)]
     assert speed.additional_constraints == "above 0"
     assert Client().describe("ramp").additional_constraints == "one of per_message, per_second"
