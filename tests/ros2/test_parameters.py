@@ -84,7 +84,7 @@ def test_a_limit_that_is_broken_and_a_change_too_late_are_refused_in_words(ros2:
     ros2.node("camera", *FORWARD, name=node, ros=("-r", "__ns:=/late"))
     ask(ros2, node, "list_parameters")
     (result,) = ask(ros2, node, "set_parameters", {"name": "fps", "value": 20.0})["results"]
-    assert result == {"successful": False, "reason": "fps cannot be set: it is read when the node starts: give it then"}
+    assert result == {"successful": False, "reason": "fps cannot be set: it is only read when the node starts"}
     (result,) = ask(ros2, node, "set_parameters", {"name": "use_sim_time", "value": True})["results"]
     assert not result["successful"]
     assert result["reason"].startswith("use_sim_time cannot be set")
