@@ -43,10 +43,10 @@ check: lint models
 	@$(BIN)/pytest -n auto -m "not (slow or browser)" $(ARGS)
 
 test: lint models
-	@$(BIN)/pytest -n auto --dist loadfile -m "$(PLAIN)" --durations=10 $(ARGS)
+	@HANDSTEER_STEPS=20000 $(BIN)/pytest -n auto --dist loadfile -m "$(PLAIN)" --durations=10 $(ARGS)
 
 test-all: lint models
-	@$(BIN)/pytest -n auto --dist loadfile --durations=30 $(ARGS)
+	@HANDSTEER_STEPS=20000 $(BIN)/pytest -n auto --dist loadfile --durations=30 $(ARGS)
 
 lint: $(BIN)/.dev
 	@$(BIN)/ruff format --check .

@@ -30,7 +30,7 @@ moves.
 Parameters marked with * can change while a node runs ([ros2.md](ros2.md#parameters-of-a-running-node)); the others are
 read at start-up.
 
-This page is generated from `src/handsteer/config.py` by `make docs`.
+This page is generated from `src/handsteer/config` by `make docs`.
 """
 
 

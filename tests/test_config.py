@@ -5,8 +5,8 @@ import pytest
 
 from handsteer import config
 from handsteer.config import Config, cmd_vel_type, load
+from handsteer.config.presets import PRESETS
 from handsteer.errors import ConfigError
-from handsteer.presets import PRESETS
 
 
 def sections() -> list[tuple[str, Any]]:
@@ -108,7 +108,7 @@ def test_robots_have_names_that_differ(robots: list[str]) -> None:
 def test_old_names_still_count_with_one_warning(
     tmp_path: Path, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(config, "_OLD_NAMES_SEEN", set())
+    monkeypatch.setattr("handsteer.config.section._OLD_NAMES_SEEN", set())
     path = tmp_path / "old.yaml"
     path.write_text("signs: {bridge_time: 0.3, keep_confidence: 0.6}\nlandmarks: {second_look: false}")
     settings = load(path)

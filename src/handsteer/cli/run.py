@@ -13,11 +13,11 @@ from handsteer.cli.running import freeze_loaded_objects, say, signals_ignored
 from handsteer.cli.running import settings as make_settings
 from handsteer.clock import RealClock, SteppedClock
 from handsteer.config import Config
+from handsteer.config.presets import PRESETS
 from handsteer.dashboard.apart import PageApart
 from handsteer.errors import ConfigError
 from handsteer.graph import Graph, Summary
 from handsteer.parameters import from_parameters
-from handsteer.presets import PRESETS
 from handsteer.transports import join
 from handsteer.transports.protocol import Session
 
