@@ -19,7 +19,7 @@ SOURCES = [
     ROOT / ".ci" / "run",
     *sorted(
         path
-        for folder in ("src/handsteer/cli", "src/handsteer/config", "src/handsteer/doctor", "examples", "ros", "scripts")
+        for folder in (*(f"src/handsteer/{each}" for each in ("cli", "config", "doctor")), "examples", "ros", "scripts")
         for path in (ROOT / folder).rglob("*")
         if path.is_file() and path.suffix != ".pyc"
     ),
