@@ -23,7 +23,7 @@ from handsteer.robots.command_limiter import CommandLimiter
 from handsteer.robots.diff_drive import Velocity
 from handsteer.signs.drawing import annotate
 from handsteer.signs.opening import open_classifier
-from handsteer.transports.protocol import Received
+from handsteer.transports.base import Received
 from tests.faults.domain import Domain
 from tests.faults.painted import FPS, PaintedCamera, painted_recognizer
 from tests.faults.rules import Rules

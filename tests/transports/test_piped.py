@@ -23,9 +23,9 @@ from handsteer.messages import (
     Twist,
     twist,
 )
+from handsteer.transports.base import Received, Transport
 from handsteer.transports.in_process import InProcessTransport
 from handsteer.transports.piped import Gateway, Pipe, PipedTransport
-from handsteer.transports.protocol import Received, Transport
 from tests.contracts.transport_contract import TransportContract, eventually
 
 TOPICS = [value for value in vars(messages).values() if isinstance(value, Topic)]

@@ -4,8 +4,8 @@ from hypothesis import strategies as st
 
 pytest.importorskip("zenoh")
 
+from handsteer.transports.ros2.base_transport import Profile
 from handsteer.transports.ros2.names import NodeName
-from handsteer.transports.ros2.profiles import Profile
 from handsteer.transports.zenoh.keys import (
     Endpoint,
     Entity,

@@ -25,7 +25,7 @@ from handsteer.signs.teaching.apart import TrainingApart
 from handsteer.signs.teaching.collect import largest
 from handsteer.signs.teaching.dataset import Dataset
 from handsteer.signs.teaching.taught import TaughtClassifier, TaughtModel
-from handsteer.transports.protocol import Received, Transport
+from handsteer.transports.base import Received, Transport
 from handsteer.types import NONE
 
 log = logging.getLogger(__name__)

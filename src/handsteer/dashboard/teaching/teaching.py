@@ -19,7 +19,7 @@ from handsteer.signs.opening import open_classifier, open_landmarker
 from handsteer.signs.teaching.collect import Facts
 from handsteer.signs.teaching.dataset import Dataset, label_for, load_dataset, save_dataset
 from handsteer.signs.teaching.taught import load_taught, save_taught
-from handsteer.transports.protocol import Transport
+from handsteer.transports.base import Transport
 from handsteer.types import ACTIONS, NONE, SIGNS, Action, action_of, find_sign
 
 _LONGEST_PERSON: Final = 40

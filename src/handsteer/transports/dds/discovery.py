@@ -11,8 +11,8 @@ from cyclonedds.pub import DataWriter
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
 
+from handsteer.transports.dds.idl import dds_type
 from handsteer.transports.dds.qos import discovery_qos
-from handsteer.transports.dds.types import dds_type
 from handsteer.transports.ros2.encoding import types
 from handsteer.transports.ros2.names import NodeName
 

@@ -9,8 +9,8 @@ from typing import Any
 from cyclonedds.core import Policy, Qos
 
 from handsteer.messages import Topic, type_name
+from handsteer.transports.ros2.base_transport import Profile, offered, requested
 from handsteer.transports.ros2.encoding import type_hash
-from handsteer.transports.ros2.profiles import Profile, offered, requested
 
 _RELIABLE = Policy.Reliability.Reliable(0)
 _BEST_EFFORT = Policy.Reliability.BestEffort

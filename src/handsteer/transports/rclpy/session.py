@@ -18,10 +18,10 @@ from rclpy.utilities import remove_ros_args
 from handsteer.clock import Clock, SimulatedClock, WallClock
 from handsteer.errors import HandsteerError, TransportError
 from handsteer.parameters import NodeParameters
-from handsteer.transports.protocol import Call
+from handsteer.transports.base import Call
 from handsteer.transports.rclpy.parameters import ParameterLink, take_given
-from handsteer.transports.rclpy.transport import RclpyTransport
-from handsteer.transports.rclpy.types import ros_class
+from handsteer.transports.rclpy.topics import RclpyTransport, ros_class
+from handsteer.transports.timing import ClockMonitor
 
 _OURS = "handsteer"
 
@@ -74,7 +74,6 @@ def _log(logger: Any, level: int, text: str) -> None:
         logger.debug(text)
 
 
-_CLOCK_SILENCE_S = 2.0
 _DELIVER_S = 0.2
 _LEAVE_S = 2.0
 _AFTER_FAILURE_S = 0.05
@@ -85,7 +84,7 @@ log = logging.getLogger(__name__)
 
 
 class RclpySession:
-    """A :class:`~handsteer.transports.protocol.Session` of ROS 2, by a node of rclpy.
+    """A :class:`~handsteer.transports.base.Session` of ROS 2, by a node of rclpy.
 
     rclpy itself provides ROS 2's common features of nodes: arguments and remapping, parameters and ``qos_overrides``,
     ``use_sim_time``, the log, ``get_type_description``.
@@ -100,7 +99,6 @@ class RclpySession:
 
     def __init__(self, node: str, arguments: Sequence[str]) -> None:
         self._left = threading.Event()
-        self._was_silent = False
         self._context = rclpy.Context()
         self._executor: SingleThreadedExecutor | None = None
         self._log: RosLog | None = None
@@ -110,6 +108,7 @@ class RclpySession:
             self.name: str = self._node.get_fully_qualified_name()
             self.parameters: dict[str, Any] = take_given(self._node)
             self.clock = self._make_clock()
+            self._clock_monitor = ClockMonitor(self.clock)
             self.transport = RclpyTransport(self._node, self.clock)
             self._executor = SingleThreadedExecutor(context=self._context)
             self._executor.add_node(self._node)
@@ -134,10 +133,7 @@ class RclpySession:
 
     def wait(self, timeout_s: float) -> bool:
         """Wait for at most ``timeout_s`` seconds; return whether rclpy has been shut down, or this session closed."""
-        silent = isinstance(self.clock, SimulatedClock) and self.clock.silence_s > _CLOCK_SILENCE_S
-        if silent and not self._was_silent:
-            log.warning("use_sim_time is set, but /clock stands still: frames count as old, the robot stands")
-        self._was_silent = silent
+        self._clock_monitor.check()
         return self._left.wait(timeout_s) or not self._context.ok()
 
     def close(self) -> None:

@@ -4,7 +4,7 @@ pytest.importorskip("cyclonedds")
 
 from handsteer import messages
 from handsteer.messages import Topic, type_name
-from handsteer.transports.dds.types import dds_type
+from handsteer.transports.dds.idl import dds_type
 from handsteer.transports.ros2.encoding import dds_type_name
 
 NAMES = sorted({type_name(topic.type) for topic in vars(messages).values() if isinstance(topic, Topic)})

@@ -1,6 +1,6 @@
-"""The interface of all transports: publishing and subscribing to topics."""
+"""The interfaces of transports, which publish and subscribe to topics, and of sessions, which join a graph."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Generic, Protocol, TypeVar, runtime_checkable
 
@@ -10,6 +10,17 @@ from handsteer.parameters import NodeParameters
 
 M = TypeVar("M")
 M_contra = TypeVar("M_contra", contravariant=True)
+
+UNNAMED = "a node without a name"
+"""Name of a node that was not announced, for its publishers and subscribers."""
+
+
+def many_publishers(topic: str, publishers: Sequence[str]) -> str:
+    """Return a warning about a command topic that has several ``publishers``."""
+    return (
+        f"{topic} has {len(publishers)} publishers ({', '.join(publishers)}), and a robot "
+        "obeys all of them in turn: end all but one, or give each a topic of its own by remapping"
+    )
 
 
 @dataclass(frozen=True)
@@ -31,6 +42,7 @@ class Received(Generic[M]):
     by_player: bool = False
 
 
+Deliver = Callable[[Received[M]], None]
 Call = Callable[[], str]
 """A service call: returns a sentence at once, on any thread, or raises a HandsteerError with the reason."""
 
@@ -110,7 +122,7 @@ class Transport(Protocol):
 
 
 @runtime_checkable
-class TellsTypes(Protocol):
+class KnowsTypes(Protocol):
     """Additional methods of a transport that knows the types of other processes' subscribers."""
 
     def subscribed_types(self, topic: Topic[Any]) -> set[str]:

@@ -1,17 +1,20 @@
-"""``python -m handsteer.transports.look``: prints the ROS 2 graph in the environment's domain, as JSON."""
+"""``python -m handsteer.transports.dds.look``: prints the ROS 2 graph in the environment's domain, as JSON."""
 
 import json
 import os
 import sys
 import time
+from collections import Counter
 from collections.abc import Callable, Iterable
+from dataclasses import asdict, dataclass
+from typing import Any
 
 from handsteer.errors import TransportError
+from handsteer.transports.base import UNNAMED, many_publishers
 from handsteer.transports.dds.matching import Endpoint
 from handsteer.transports.dds.network import Network, network
 from handsteer.transports.dds.participant import Participant
 from handsteer.transports.dds.qos import describe, misfits
-from handsteer.transports.observed import UNNAMED, ObservedGraph, ObservedTopic, amiss
 from handsteer.transports.ros2.encoding import ros_type_name
 from handsteer.transports.ros2.names import NodeName
 
@@ -19,11 +22,65 @@ from handsteer.transports.ros2.names import NodeName
 _HIDDEN = "_"
 _TOPIC = "rt/"
 _LOOK_S = 0.02
+_VELOCITIES = {"geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped", "geometry_msgs/Twist"}
 _AT_LEAST_S, _QUIET_S, _AT_MOST_S = 0.6, 0.4, 3.0
 # Fast DDS announces the names of nodes up to three seconds after their publishers and subscribers, most sooner.
 _NAMES_S = 2.0
 
 Ends = list[tuple[Endpoint, str | None]]
+
+
+@dataclass(frozen=True)
+class ObservedTopic:
+    """A topic and its publishers.
+
+    Attributes:
+        name: Full name, such as ``/r1/image_raw``.
+        types: Its types, such as ``sensor_msgs/msg/Image``; more than one is a fault.
+        publishers: The node of each publisher; a node with two publishers is listed twice.
+    """
+
+    name: str
+    types: tuple[str, ...]
+    publishers: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class ObservedGraph:
+    """An observed graph.
+
+    Attributes:
+        place: Where it was observed, in words: ``domain 0, this machine``.
+        nodes: Full names; two nodes of one name are listed twice.
+        topics: By name.
+        warnings: Problems, one sentence each.
+    """
+
+    place: str
+    nodes: tuple[str, ...]
+    topics: tuple[ObservedTopic, ...]
+    warnings: tuple[str, ...]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the fields as plain values, for JSON."""
+        return asdict(self)
+
+
+def problems_of(nodes: Iterable[str], topics: Iterable[ObservedTopic]) -> list[str]:
+    """Return problems common to all transports: several commanders or types of a topic, duplicate node names."""
+    found = [
+        f"{count} nodes have the name {name}: end one of them, or rename it (-r __node:=other)"
+        for name, count in Counter(nodes).items()
+        if count > 1
+    ]
+    for topic in topics:
+        if len(topic.types) > 1:
+            found.append(
+                f"{topic.name} has the types {' and '.join(topic.types)}: only those of one type are connected"
+            )
+        if len(topic.publishers) > 1 and _VELOCITIES & set(topic.types):
+            found.append(many_publishers(topic.name, topic.publishers))
+    return found
 
 
 def observe_domain(network: Network) -> ObservedGraph:
@@ -32,7 +89,7 @@ def observe_domain(network: Network) -> ObservedGraph:
     Raises:
         TransportError: The domain cannot be joined.
     """
-    participant = Participant(network, NodeName("handsteer_graph"), looks_on=True)
+    participant = Participant(network, NodeName("handsteer_graph"), is_observer=True)
     try:
         began_s = time.monotonic()
         _wait_until_quiet(participant)
@@ -67,7 +124,7 @@ def _graph(place: str, nodes: Iterable[str], ends: Ends) -> ObservedGraph:
     shown = tuple(sorted(name for name in nodes if not _is_hidden(name)))
     seen = [(end, node or UNNAMED) for end, node in ends if end.topic.startswith(_TOPIC) and not _is_hidden(node or "")]
     topics = tuple(_topic(name, seen) for name in sorted({end.topic for end, _ in seen}))
-    return ObservedGraph(place, shown, topics, (*amiss(shown, topics), *_misfits(seen)))
+    return ObservedGraph(place, shown, topics, (*problems_of(shown, topics), *_misfits(seen)))
 
 
 def _topic(name: str, ends: list[tuple[Endpoint, str]]) -> ObservedTopic:

@@ -1,4 +1,4 @@
-"""Configures the connection to a Zenoh network from rmw_zenoh's environment variables.
+"""Sessions and routers of Zenoh as configured by rmw_zenoh's environment variables.
 
 Source: ros2/rmw_zenoh, README.md and its default configurations of sessions and routers.
 """
@@ -157,3 +157,37 @@ def _attempts(environment: Mapping[str, str]) -> int | None:
             f"{_ATTEMPTS} is {text!r}: it should be a whole number, 0 to wait, -1 not to look"
         ) from None
     return None if number < 0 else number
+
+
+class Router:
+    """A Zenoh router in this process, until it is closed.
+
+    Args:
+        environment: ``ZENOH_ROUTER_CONFIG_URI`` and ``ZENOH_CONFIG_OVERRIDE`` have their meanings in ``rmw_zenohd``.
+        endpoint: Address to listen on, such as ``tcp/[::]:7447``; by default that of the variables, else this machine
+            only.
+
+    Raises:
+        TransportError: It cannot listen there, or a variable is wrong.
+    """
+
+    def __init__(self, environment: Mapping[str, str], endpoint: str | None = None) -> None:
+        zenoh.try_init_log_from_env()
+        config = router_config(environment, endpoint)
+        endpoints = json.loads(config.get_json("listen/endpoints"))
+        if isinstance(endpoints, dict):
+            endpoints = endpoints.get("router", [])
+        self.endpoints: list[str] = endpoints
+        """Addresses it listens on."""
+        try:
+            self._session = zenoh.open(config)
+        except zenoh.ZError as error:
+            raise TransportError(
+                f"no Zenoh router can be started at {' and '.join(endpoints)}: is there one already, or another "
+                f"program on that port? ({reason(error)})"
+            ) from None
+
+    def close(self) -> None:
+        """Stop the router; may be called twice."""
+        if not self._session.is_closed():
+            self._session.close()
