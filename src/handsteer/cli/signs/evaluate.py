@@ -4,26 +4,33 @@ import json as json_format
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-import cv2
 from cyclopts import Parameter
 from tqdm import tqdm
 
-from handsteer.cli.options import ConfigFile, Flag, Parameters
+from handsteer.cli.app import ConfigFile, Flag, Parameters
 from handsteer.cli.running import settings
-from handsteer.cli.signs.evaluation_tables import evaluation_tables
+from handsteer.cli.signs.tables import evaluation_tables
 from handsteer.config import Config
-from handsteer.errors import EvaluationError
-from handsteer.signs.classifier import Classifier
-from handsteer.signs.evaluation import Evaluation
-from handsteer.signs.labelled import labels_of
-from handsteer.signs.opening import open_classifier
-from handsteer.signs.plot import Picture, draw_confusion, draw_reliability, draw_sweep
-from handsteer.signs.recognizer import Recognizer
-from handsteer.signs.sources import LabelledFolder, LabelledHands, LabelledVideo, PhotoRun, Source, open_source
-from handsteer.signs.views import View
+from handsteer.errors import EvaluationError, needing
+from handsteer.recognition.classifier import Classifier
+from handsteer.recognition.recognizer import Recognizer, open_classifier
+from handsteer.training.evaluation.labels import labels_of
+from handsteer.training.evaluation.report import Evaluation
+from handsteer.training.evaluation.sources import (
+    LabelledFolder,
+    LabelledHands,
+    LabelledVideo,
+    PhotoRun,
+    Source,
+    open_source,
+)
+from handsteer.training.evaluation.views import View
 from handsteer.types import motion_signs
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 def evaluate(
@@ -87,7 +94,7 @@ def evaluate(
     names = ", ".join(dict.fromkeys(Path(run.source).resolve().name for run in runs))
     for option, path in pictures.items():
         if path is not None:
-            _write_picture(option, path, _picture(option, evaluation, names))
+            _write_plot(option, path, _plot(option, evaluation, names))
     with_sweep = sweep or sweep_png is not None
     if json:
         print(json_format.dumps(evaluation.as_dict(with_sweep=with_sweep)))
@@ -161,6 +168,9 @@ def _check(grace_s: float, pictures: Mapping[str, Path | None]) -> None:
     for option, png in pictures.items():
         if png is not None and (png.suffix.lower() != ".png" or not png.parent.is_dir()):
             raise EvaluationError(f"{option}: {png} should be a file name that ends in .png, in a folder that is there")
+    if any(pictures.values()):
+        with needing("a plot", "plots", "matplotlib"):
+            pass
 
 
 def _check_figures(sources: Sequence[Source], wanted: Mapping[str, object]) -> None:
@@ -178,7 +188,10 @@ def _check_figures(sources: Sequence[Source], wanted: Mapping[str, object]) -> N
             raise EvaluationError(f"{option}: it takes photos or a dataset; here are only videos")
 
 
-def _picture(option: str, evaluation: Evaluation, names: str) -> Picture:
+def _plot(option: str, evaluation: Evaluation, names: str) -> "Figure":
+    # Loaded only when asked for: it is an extra.
+    from handsteer.training.evaluation.plots import draw_confusion, draw_reliability, draw_sweep  # noqa: PLC0415
+
     if option == "--reliability":
         return draw_reliability(evaluation.calibration, f"{names}: how far likelihoods can be trusted")
     if option == "--sweep-png":
@@ -187,9 +200,8 @@ def _picture(option: str, evaluation: Evaluation, names: str) -> Picture:
     return draw_confusion(evaluation.confusion, f"{names}: signs shown and seen")
 
 
-def _write_picture(option: str, path: Path, picture: Picture) -> None:
-    _, data = cv2.imencode(".png", picture)
+def _write_plot(option: str, path: Path, plot: "Figure") -> None:
     try:
-        path.write_bytes(data.tobytes())
+        plot.savefig(path)
     except OSError as error:
         raise EvaluationError(f"{option}: cannot write {path}: {error.strerror}") from None
