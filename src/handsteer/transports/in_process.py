@@ -7,11 +7,12 @@ import threading
 import weakref
 from abc import ABC, abstractmethod
 from collections.abc import Callable, MutableSet
+from contextlib import ExitStack
 from typing import Any, Generic, TypeVar
 
 from handsteer.errors import TransportError
 from handsteer.messages import Topic, type_name
-from handsteer.transports.base import Deliver, Received
+from handsteer.transports.base import Deliver, Received, Subscription
 
 M = TypeVar("M")
 Receive = Callable[[Deliver[M]], Callable[[], None]]
@@ -77,15 +78,17 @@ class Fanout(Generic[M]):
         """Whether there is a subscriber."""
         return bool(self._subscribers)
 
-    def add(self, deliver: Deliver[M]) -> "FanoutSubscription[M]":
+    def add(self, deliver: Deliver[M]) -> Subscription:
         """Call ``deliver`` for each message from now on."""
+        subscription = ExitStack()
+        subscription.callback(self.remove, deliver)
         with self._lock:
             self._subscribers = (*self._subscribers, deliver)
             if self._last is not None:
                 deliver(self._last)
             if self._receive is not None and self._end is None:
                 self._end = self._receive(self.send)
-        return FanoutSubscription(self, deliver)
+        return subscription
 
     def remove(self, deliver: Deliver[M]) -> None:
         """Stop calling ``deliver``; does nothing if it was removed already."""
@@ -112,18 +115,6 @@ class Fanout(Generic[M]):
         # Outside the lock, because a message that is being delivered may wait for it.
         if end is not None:
             end()
-
-
-class FanoutSubscription(Generic[M]):
-    """A subscription to a topic."""
-
-    def __init__(self, fanout: Fanout[M], deliver: Deliver[M]) -> None:
-        self._fanout = fanout
-        self._deliver = deliver
-
-    def close(self) -> None:
-        """End the subscription; may be called twice."""
-        self._fanout.remove(self._deliver)
 
 
 class BasePublisher(ABC, Generic[M]):
@@ -183,7 +174,7 @@ class BaseTransport(ABC):
             self._publishers.add(publisher)
         return publisher
 
-    def subscribe(self, node: str, topic: Topic[M], deliver: Deliver[M]) -> FanoutSubscription[M]:
+    def subscribe(self, node: str, topic: Topic[M], deliver: Deliver[M]) -> Subscription:
         """Call ``deliver`` for each message on ``topic`` from now on."""
         return self._fanout(node, self._claim(topic), topic).add(deliver)
 

@@ -46,19 +46,19 @@ class RosGraph:
         topic = Topic(participant, DISCOVERY_TOPIC, self._type)
         self.reader: Any = DataReader(participant, topic, qos=discovery_qos(_INFO, _AT_ONCE))
         self._writer: Any = DataWriter(participant, topic, qos=discovery_qos(_INFO, 1)) if name else None
-        self._tell()
+        self._announce()
 
     def add(self, endpoint: DataWriter[Any] | DataReader[Any]) -> None:
         """Announce that ``endpoint`` belongs to our node."""
         with self._lock:
             self._list_of(endpoint).append(endpoint.guid)
-            self._tell()
+            self._announce()
 
     def remove(self, endpoint: DataWriter[Any] | DataReader[Any]) -> None:
         """Announce that ``endpoint`` is gone."""
         with self._lock:
             self._list_of(endpoint).remove(endpoint.guid)
-            self._tell()
+            self._announce()
 
     def node_of(self, endpoint: uuid.UUID) -> str | None:
         """Return the full name of the node of a publisher or subscriber; None if it was not announced yet."""
@@ -97,7 +97,7 @@ class RosGraph:
     def _list_of(self, endpoint: DataWriter[Any] | DataReader[Any]) -> list[uuid.UUID]:
         return self._writers if isinstance(endpoint, DataWriter) else self._readers
 
-    def _tell(self) -> None:
+    def _announce(self) -> None:
         if self._name is None or self._writer is None:
             return
         kinds = self._store.types

@@ -7,7 +7,6 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass
-from typing import Any
 
 from handsteer.errors import TransportError
 from handsteer.transports.base import UNNAMED, many_publishers
@@ -60,10 +59,6 @@ class ObservedGraph:
     nodes: tuple[str, ...]
     topics: tuple[ObservedTopic, ...]
     warnings: tuple[str, ...]
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the fields as plain values, for JSON."""
-        return asdict(self)
 
 
 def problems_of(nodes: Iterable[str], topics: Iterable[ObservedTopic]) -> list[str]:
@@ -130,7 +125,7 @@ def _graph(place: str, nodes: Iterable[str], ends: Ends) -> ObservedGraph:
 def _topic(name: str, ends: list[tuple[Endpoint, str]]) -> ObservedTopic:
     here = [(end, node) for end, node in ends if end.topic == name]
     return ObservedTopic(
-        name=_ros_topic(name),
+        name=name.removeprefix("rt"),
         types=tuple(sorted({ros_type_name(end.type) for end, _ in here})),
         publishers=tuple(sorted(node for end, node in here if end.publishes)),
     )
@@ -139,7 +134,7 @@ def _topic(name: str, ends: list[tuple[Endpoint, str]]) -> ObservedTopic:
 def _misfits(ends: list[tuple[Endpoint, str]]) -> list[str]:
     """Return a sentence for each mismatch of a publisher and a subscriber, once for identical ones."""
     lines = [
-        f"{_ros_topic(writer.topic)}: nothing passes from {publisher} to {subscriber}: {'; '.join(reasons)} "
+        f"{writer.topic.removeprefix('rt')}: nothing passes from {publisher} to {subscriber}: {'; '.join(reasons)} "
         f"(offered: {describe(writer.qos)}; requested: {describe(reader.qos)})"
         for writer, publisher in ends
         for reader, subscriber in ends
@@ -150,10 +145,6 @@ def _misfits(ends: list[tuple[Endpoint, str]]) -> list[str]:
     return sorted(set(lines))
 
 
-def _ros_topic(name: str) -> str:
-    return name.removeprefix("rt")
-
-
 def _is_hidden(node: str) -> bool:
     return node.rpartition("/")[2].startswith(_HIDDEN)
 
@@ -161,7 +152,7 @@ def _is_hidden(node: str) -> bool:
 def main() -> None:
     """Print nodes, topics and problems; exit code 2 if the domain cannot be joined."""
     try:
-        seen = observe_domain(network(os.environ)).as_dict()
+        seen = asdict(observe_domain(network(os.environ)))
     except TransportError as error:
         sys.stderr.write(f"{error}\n")
         sys.stderr.flush()

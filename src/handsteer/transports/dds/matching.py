@@ -8,6 +8,7 @@ import threading
 import time
 import uuid
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from cyclonedds.builtin import (
@@ -67,6 +68,9 @@ class Matching:
     Args:
         participant: The participant of this process; its own endpoints are assumed to match.
         graph: Provides the names of nodes, as far as they were announced.
+
+    Attributes:
+        readers: Readers of the announcements of publishers and subscribers, and what processes them.
     """
 
     def __init__(self, participant: DomainParticipant, graph: RosGraph) -> None:
@@ -76,11 +80,12 @@ class Matching:
         self._ours: dict[tuple[str, bool], Endpoint] = {}
         self._theirs: dict[uuid.UUID, Endpoint] = {}
         self._pending: dict[uuid.UUID, float] = {}
-        self._said: set[uuid.UUID] = set()
+        self._reported: set[uuid.UUID] = set()
         self._advised = False
         self._participants: Any = BuiltinDataReader(participant, BuiltinTopicDcpsParticipant)
-        self.publications: Any = BuiltinDataReader(participant, BuiltinTopicDcpsPublication)
-        self.subscriptions: Any = BuiltinDataReader(participant, BuiltinTopicDcpsSubscription)
+        ends = ((BuiltinTopicDcpsPublication, True), (BuiltinTopicDcpsSubscription, False))
+        readers: list[Any] = [(BuiltinDataReader(participant, kind), publishes) for kind, publishes in ends]
+        self.readers = [(reader, partial(self._serve, reader, publishes=publishes)) for reader, publishes in readers]
 
     def add(self, endpoint: Endpoint) -> None:
         """Compare our publisher or subscriber with those of others, now and later."""
@@ -88,14 +93,6 @@ class Matching:
             self._ours[endpoint.topic, endpoint.publishes] = endpoint
             for key in self._theirs:
                 self._compare(key)
-
-    def serve_publications(self) -> None:
-        """Process new and removed publishers."""
-        self._serve(self.publications, publishes=True)
-
-    def serve_subscriptions(self) -> None:
-        """Process new and removed subscribers."""
-        self._serve(self.subscriptions, publishes=False)
 
     def others(self) -> dict[uuid.UUID, Endpoint]:
         """Return the publishers and subscribers of other processes."""
@@ -115,7 +112,8 @@ class Matching:
 
     def close(self) -> None:
         """Stop comparing; may be called twice."""
-        self.publications = self.subscriptions = self._participants = None
+        self.readers.clear()
+        self._participants = None
 
     def _serve(self, reader: Any, *, publishes: bool) -> None:
         for seen in reader.take(_AT_ONCE):
@@ -135,10 +133,10 @@ class Matching:
 
     def _compare(self, key: uuid.UUID) -> None:
         ours = self._ours_for(key)
-        if ours is None or key in self._said:
+        if ours is None or key in self._reported:
             return
         if reasons(ours, self._theirs[key]) or (ours.type == _IMAGE and ours.publishes):
-            self._said.add(key)
+            self._reported.add(key)
             self._pending[key] = time.monotonic() + _NAME_DUE_S
 
     def _line(self, key: uuid.UUID) -> str | None:
@@ -173,7 +171,7 @@ class Matching:
         gone = self._theirs.pop(key, None)
         if gone is not None and gone.publishes and gone.topic == DISCOVERY_TOPIC:
             self._graph.forget(key)
-        self._said.discard(key)
+        self._reported.discard(key)
         self._pending.pop(key, None)
 
 

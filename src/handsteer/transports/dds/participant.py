@@ -76,8 +76,8 @@ class Participant:
         self._dispatcher = Dispatcher(self._participant)
         self._dispatcher.tick(self._matching.tick)
         self._dispatcher.add(self._graph.reader, self._graph.serve)
-        self._dispatcher.add(self._matching.publications, self._matching.serve_publications)
-        self._dispatcher.add(self._matching.subscriptions, self._matching.serve_subscriptions)
+        for reader, serve in self._matching.readers:
+            self._dispatcher.add(reader, serve)
         self._dispatcher.start()
 
     def writer(self, topic: Topic[Any]) -> DataWriter[Any]:

@@ -1,11 +1,19 @@
-"""Messages over ROS 1: one ROS node for all nodes of this process."""
+"""Messages over ROS 1, by rospy, with cheaper replacements for two of its operations.
 
+rospy's sending wakes a thread per message, and its receiving of images returns all memory to the system each time.
+"""
+
+import ctypes
+import functools
+import itertools
 import re
+import socket
 from collections.abc import Callable, Mapping
 from typing import Any, TypeVar
 
 import rosgraph
 import rospy
+from rospy.impl.tcpros_pubsub import QueuedConnection
 
 from handsteer.clock import Clock
 from handsteer.messages import Topic, type_name
@@ -13,7 +21,6 @@ from handsteer.transports.base import Deliver, Received
 from handsteer.transports.in_process import BasePublisher, BaseTransport, Receive
 from handsteer.transports.ros1.conversion import from_ros1, ros1_type, to_ros1
 from handsteer.transports.ros1.master import SystemState
-from handsteer.transports.ros1.prompt import keep_freed_memory, send_promptly
 from handsteer.transports.timing import capture_time
 
 M = TypeVar("M")
@@ -23,6 +30,9 @@ M = TypeVar("M")
 _BUFFER_BYTES = {"sensor_msgs/msg/Image": 2**24, "sensor_msgs/msg/CompressedImage": 2**22}
 _SMALL_BUFFER_BYTES = 2**16
 _PLAYER = re.compile(r"(/\w+)*/play_\d{6,}", re.ASCII)
+# Names and numbers of malloc.h; glibc accepts no larger threshold than this.
+_M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD = -1, -3
+_LARGEST_KEPT_BYTES = 2**25
 
 
 class Ros1Transport(BaseTransport):
@@ -107,9 +117,10 @@ def _is_player(theirs: Any) -> bool:
 class _Ros1Publisher(BasePublisher[M]):
     def __init__(self, node: str, name: str, topic: Topic[M]) -> None:
         super().__init__(node, name, topic)
-        there = ros1_type(type_name(topic.type))
+        self._numbers = itertools.count(1)
+        kind = ros1_type(type_name(topic.type))
         self._publisher: Any = rospy.Publisher(
-            name, there, queue_size=topic.depth, latch=topic.latched, tcp_nodelay=True
+            name, kind, queue_size=topic.depth, latch=topic.latched, tcp_nodelay=True
         )
         if topic.lifespan_s is not None:  # commands and signs are small and frequent, and useless when late
             send_promptly(self._publisher, topic.depth)
@@ -130,7 +141,116 @@ class _Ros1Publisher(BasePublisher[M]):
             return
         try:
             # rospy's senders, one per subscriber, drop messages for slow ones.
-            publisher.publish(to_ros1(message))
+            publisher.publish(to_ros1(message, next(self._numbers)))
         except rospy.ROSException:
             if self._publisher is not None and not rospy.is_shutdown():
                 raise
+
+
+@functools.cache
+def keep_freed_memory() -> None:
+    """Let the allocator keep freed memory, up to 32 MB at once; does nothing where there is no ``mallopt``.
+
+    rospy allocates a buffer of 16 MB for each read of an image. By default the library returns each to the system and
+    gets the next one from there, page by page, which takes as long as everything else in receiving an image.
+    """
+    try:
+        mallopt = ctypes.CDLL(None).mallopt
+    except (AttributeError, OSError):
+        return
+    mallopt(_M_MMAP_THRESHOLD, _LARGEST_KEPT_BYTES)
+    mallopt(_M_TRIM_THRESHOLD, 2 * _LARGEST_KEPT_BYTES)
+
+
+def send_promptly(publisher: Any, depth: int) -> None:
+    """Let a ``rospy.Publisher`` send on the publishing thread what a subscriber's socket accepts at once.
+
+    Args:
+        publisher: One without subscribers yet.
+        depth: How many messages may wait for a slow subscriber.
+    """
+    implementation = publisher.impl
+    add = implementation.add_connection
+    implementation.set_queue_size(None)
+    implementation.add_connection = lambda connection: add(PromptConnection(connection, depth))
+
+
+class PromptConnection:
+    """A subscriber's connection that never blocks: what its socket does not accept at once waits in a queue.
+
+    From then on, all messages go through rospy's queue, with its sending thread.
+
+    Args:
+        connection: rospy's own.
+        depth: How many messages may wait; older ones are dropped.
+    """
+
+    def __init__(self, connection: Any, depth: int) -> None:
+        self._connection = connection
+        self._depth = depth
+        self._queue: QueuedConnection | None = None
+        # Python waits despite MSG_DONTWAIT if a socket has a timeout, which rospy sets for new ones.
+        connection.socket.setblocking(True)
+
+    def __getattr__(self, name: str) -> Any:
+        # Other attributes are the connection's, as in rospy's own queue.
+        if name.startswith("__"):
+            raise AttributeError(name)
+        return getattr(self._connection, name)
+
+    def write_data(self, data: bytes) -> bool:
+        """Send or queue a message; rospy never calls this concurrently.
+
+        Raises:
+            rospy.exceptions.TransportException: The subscriber has left.
+        """
+        if self._queue is None:
+            sent = self._send(data)
+            if sent == len(data):
+                return True
+            self._queue = QueuedConnection(_Rest(self._connection, data[sent:]), self._depth)
+            data = b""  # sends the rest of this message
+        return bool(self._queue.write_data(data))
+
+    def _send(self, data: bytes) -> int:
+        """Return how many bytes the socket has accepted."""
+        connection = self._connection
+        if not connection.socket or connection.done:
+            raise rospy.exceptions.TransportTerminated("connection closed")
+        try:
+            sent = int(connection.socket.send(data, socket.MSG_DONTWAIT))
+        except BlockingIOError:
+            return 0
+        except OSError as error:
+            connection.close()
+            raise rospy.exceptions.TransportTerminated(str(error)) from None
+        connection.stat_bytes += sent
+        connection.stat_num_msg += 1
+        return sent
+
+
+class _Rest:
+    """A connection that sends the rest of a message first."""
+
+    def __init__(self, connection: Any, rest: bytes) -> None:
+        self._connection = connection
+        self._rest = rest
+
+    @property
+    def done(self) -> bool:
+        return bool(self._connection.done)
+
+    def set_cleanup_callback(self, callback: Callable[[Any], None]) -> None:
+        """Call it when the connection ends, after the topic's own callback."""
+        before = self._connection.cleanup_cb
+
+        def end(connection: Any) -> None:
+            if before:
+                before(connection)
+            callback(connection)
+
+        self._connection.set_cleanup_callback(end)
+
+    def write_data(self, data: bytes) -> None:
+        rest, self._rest = self._rest, b""
+        self._connection.write_data(rest + data)

@@ -9,7 +9,7 @@ import logging
 import threading
 import time
 from abc import abstractmethod
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, ClassVar, Generic, Protocol, TypeVar
 
@@ -163,7 +163,7 @@ class Ros2Transport(BaseTransport):
 
     def withdraw(self, publisher: BasePublisher[Any]) -> None:
         """Close a publisher once its subscribers have what it sent."""
-        self._flush([publisher], _LAST_S)
+        publisher.flush(_LAST_S)
         with self._lock:
             self._publishers.remove(publisher)
         publisher.close()
@@ -177,9 +177,6 @@ class Ros2Transport(BaseTransport):
         """Wait until all subscribers have what was published, for at most ``timeout_s`` seconds."""
         with self._lock:
             publishers = list(self._publishers)
-        self._flush(publishers, timeout_s)
-
-    def _flush(self, publishers: Iterable[BasePublisher[Any]], timeout_s: float) -> None:
         deadline_s = time.monotonic() + timeout_s
         for publisher in publishers:
             publisher.flush(max(0.0, deadline_s - time.monotonic()))

@@ -5,10 +5,11 @@ a reply has the number and the sender of its request, by which the client identi
 """
 
 import logging
+import math
 import os
 import threading
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from typing import Any
 
 import zenoh
@@ -16,7 +17,6 @@ import zenoh.ext
 
 from handsteer.clock import Clock
 from handsteer.messages import Topic, type_name
-from handsteer.transports.in_process import BasePublisher
 from handsteer.transports.ros2.base_transport import IMAGES, Profile, Take, WireTransport, offered, requested
 from handsteer.transports.ros2.names import NodeName
 from handsteer.transports.zenoh.configuration import network
@@ -51,9 +51,6 @@ class ZenohTransport(WireTransport):
         """Leave the network; may be called twice."""
         super().close()
         self._member.close()
-
-    def _flush(self, publishers: Iterable[BasePublisher[Any]], timeout_s: float) -> None:
-        time.sleep(min(timeout_s, _DELIVER_S))
 
     def _open_writer(self, name: str, topic: Topic[Any]) -> "_Writer":
         return _Writer(self._member, name, topic)
@@ -104,6 +101,7 @@ class _Writer:
         self._token, text = member.introduce("publisher", name, kind, profile, or_type)
         self._gid = gid(text)
         self._number = 0
+        self._written_s = -math.inf
 
     @property
     def has_readers(self) -> bool:
@@ -112,11 +110,12 @@ class _Writer:
 
     def write(self, raw: bytes) -> None:
         self._number += 1
+        self._written_s = time.monotonic()
         put = self._publisher.put if self._keeper is None else self._keeper.put
         put(raw, attachment=attachment(self._number, time.time_ns(), self._gid))
 
     def flush(self, timeout_s: float) -> bool:
-        time.sleep(min(timeout_s, _DELIVER_S))
+        time.sleep(max(0.0, min(timeout_s, self._written_s + _DELIVER_S - time.monotonic())))
         return True
 
     def close(self) -> None:
