@@ -11,8 +11,7 @@ from cyclonedds.pub import DataWriter
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
 
-from handsteer.transports.dds.idl import dds_type
-from handsteer.transports.dds.qos import discovery_qos
+from handsteer.transports.dds.topics import dds_type, discovery_qos
 from handsteer.transports.ros2.encoding import types
 from handsteer.transports.ros2.names import NodeName
 

@@ -13,7 +13,7 @@ from handsteer.transports.base import UNNAMED, many_publishers
 from handsteer.transports.dds.matching import Endpoint
 from handsteer.transports.dds.network import Network, network
 from handsteer.transports.dds.participant import Participant
-from handsteer.transports.dds.qos import describe, misfits
+from handsteer.transports.dds.topics import describe, misfits
 from handsteer.transports.ros2.encoding import ros_type_name
 from handsteer.transports.ros2.names import NodeName
 

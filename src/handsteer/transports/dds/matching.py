@@ -22,7 +22,7 @@ from cyclonedds.domain import DomainParticipant
 
 from handsteer.messages import Image, type_name
 from handsteer.transports.dds.discovery import DISCOVERY_TOPIC, RosGraph
-from handsteer.transports.dds.qos import describe, host, misfits
+from handsteer.transports.dds.topics import describe, host, misfits
 from handsteer.transports.ros2.encoding import dds_type_name, ros_type_name
 
 log = logging.getLogger(__name__)

@@ -21,7 +21,7 @@ from handsteer.clock import Clock
 from handsteer.messages import Topic
 from handsteer.transports.dds.network import network
 from handsteer.transports.dds.participant import Participant
-from handsteer.transports.dds.qos import user_data
+from handsteer.transports.dds.topics import user_data
 from handsteer.transports.ros2.base_transport import Take, WireTransport
 from handsteer.transports.ros2.names import NodeName
 

@@ -2,7 +2,8 @@
 
 import logging
 import threading
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
 from functools import partial
 from typing import Any
 
@@ -23,64 +24,50 @@ from handsteer.transports.rclpy.parameters import ParameterLink, take_given
 from handsteer.transports.rclpy.topics import RclpyTransport, ros_class
 from handsteer.transports.timing import ClockMonitor
 
-_OURS = "handsteer"
+_DELIVER_S = 0.2
+_LEAVE_S = 2.0
+_AFTER_FAILURE_S = 0.05
+_ANY_JUMP = JumpThreshold(min_forward=Duration(nanoseconds=1), min_backward=Duration(nanoseconds=-1))
+_TRIGGER = "std_srvs/srv/Trigger"
+log = logging.getLogger(__name__)
+# One function per level, because rclpy requires that a line of code always logs at the same level.
+_LOG_AS: dict[int, Callable[[Any, str], None]] = {
+    logging.CRITICAL: lambda logger, text: logger.fatal(text),
+    logging.ERROR: lambda logger, text: logger.error(text),
+    logging.WARNING: lambda logger, text: logger.warning(text),
+    logging.INFO: lambda logger, text: logger.info(text),
+    logging.NOTSET: lambda logger, text: logger.debug(text),
+}
 
 
-class RosLog:
-    """Forwards log records of handsteer to the logger of an rclpy node, until it is closed.
+class _RclpyHandler(logging.Handler):
+    """Forwards log records to the logger of an rclpy node."""
 
-    Args:
-        logger: The node's logger; its level is set by ``--log-level``.
-    """
-
-    def __init__(self, logger: Any) -> None:
-        ours = logging.getLogger(_OURS)
-        self._before = (ours.handlers, ours.level, ours.propagate)
-        ours.handlers = [_Handler(logger)]
-        ours.setLevel(int(logger.get_effective_level()))
-        # rclpy shows them on the screen already.
-        ours.propagate = False
-
-    def close(self) -> None:
-        """Restore the previous logging; may be called twice."""
-        ours = logging.getLogger(_OURS)
-        ours.handlers, level, ours.propagate = self._before
-        ours.setLevel(level)
-
-
-class _Handler(logging.Handler):
     def __init__(self, logger: Any) -> None:
         super().__init__()
         self._logger = logger
 
     def emit(self, record: logging.LogRecord) -> None:
         try:
-            _log(self._logger, record.levelno, self.format(record))
+            level = next(level for level in _LOG_AS if record.levelno >= level)
+            _LOG_AS[level](self._logger, self.format(record))
         except Exception:
             self.handleError(record)
 
 
-def _log(logger: Any, level: int, text: str) -> None:
-    # One call per level, because rclpy requires that a line of code always logs at the same level.
-    if level >= logging.CRITICAL:
-        logger.fatal(text)
-    elif level >= logging.ERROR:
-        logger.error(text)
-    elif level >= logging.WARNING:
-        logger.warning(text)
-    elif level >= logging.INFO:
-        logger.info(text)
-    else:
-        logger.debug(text)
-
-
-_DELIVER_S = 0.2
-_LEAVE_S = 2.0
-_AFTER_FAILURE_S = 0.05
-_ANY_JUMP = JumpThreshold(min_forward=Duration(nanoseconds=1), min_backward=Duration(nanoseconds=-1))
-_TRIGGER = "std_srvs/srv/Trigger"
-
-log = logging.getLogger(__name__)
+@contextmanager
+def _logging_by(logger: Any) -> Iterator[None]:
+    """Forward log records of handsteer to a logger of rclpy, whose level is set by ``--log-level``."""
+    ours = logging.getLogger("handsteer")
+    before = (ours.handlers, ours.level, ours.propagate)
+    ours.handlers = [_RclpyHandler(logger)]
+    ours.setLevel(int(logger.get_effective_level()))
+    ours.propagate = False  # rclpy shows them on the screen already
+    try:
+        yield
+    finally:
+        ours.handlers, level, ours.propagate = before
+        ours.setLevel(level)
 
 
 class RclpySession:
@@ -101,10 +88,10 @@ class RclpySession:
         self._left = threading.Event()
         self._context = rclpy.Context()
         self._executor: SingleThreadedExecutor | None = None
-        self._log: RosLog | None = None
+        self._log = ExitStack()
         self._node = _make_node(self._context, node, arguments)
         try:
-            self._log = RosLog(self._node.get_logger())
+            self._log.enter_context(_logging_by(self._node.get_logger()))
             self.name: str = self._node.get_fully_qualified_name()
             self.parameters: dict[str, Any] = take_given(self._node)
             self.clock = self._make_clock()
@@ -146,8 +133,7 @@ class RclpySession:
             self.transport.close()
             self._executor.shutdown()
             self._thread.join(_LEAVE_S)
-        if self._log is not None:
-            self._log.close()
+        self._log.close()
         self._node.destroy_node()
         self._context.try_shutdown()
         self._context.destroy()
@@ -172,7 +158,7 @@ class RclpySession:
                 return
             except Exception:
                 if not self._left.is_set():
-                    log.exception("ROS 2: what has come could not be served")
+                    log.exception("ROS 2: a message could not be served")
                     self._left.wait(_AFTER_FAILURE_S)  # repeated failures must not use up the processor
 
 
