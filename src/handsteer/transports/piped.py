@@ -99,25 +99,25 @@ class Pipe:
         try:
             while True:
                 kind, *what = pickle.load(self._source)
-                self._take(kind, what)
+                self._handle(kind, what)
         except (EOFError, OSError, ValueError, pickle.UnpicklingError):
             self.close()
 
-    def _take(self, kind: str, what: list[Any]) -> None:
+    def _handle(self, kind: str, what: list[Any]) -> None:
         try:
             self._handlers[kind](*what)
         except Exception:
-            log.exception("what another process said of %s has failed", kind)
+            log.exception("a message of another process about %s could not be handled", kind)
 
     def _write(self) -> None:
         try:
-            while (said := self._next()) is not None:
-                pickle.dump(said, self._sink, protocol=5)
+            while (message := self._next()) is not None:
+                pickle.dump(message, self._sink, protocol=5)
                 self._sink.flush()
         except (OSError, ValueError):
             pass  # the other end is closed
         except Exception:
-            log.exception("what another process was to hear cannot be told")
+            log.exception("a message to another process cannot be sent")
         # Nothing can be sent any more, so the other end must be informed.
         self.ended.set()
         with contextlib.suppress(OSError):
@@ -129,10 +129,10 @@ class Pipe:
             if not self._order:
                 return None
             key = self._order.popleft()
-            said = self._queues[key].popleft()
+            message = self._queues[key].popleft()
             if not self._queues[key]:
                 del self._queues[key]
-            return said
+            return message
 
 
 class PipedTransport(BaseTransport):

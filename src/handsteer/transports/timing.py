@@ -73,5 +73,5 @@ class ClockMonitor:
         """Look whether ``/clock`` has stopped."""
         is_silent = isinstance(self._clock, SimulatedClock) and self._clock.silence_s > _CLOCK_SILENCE_S
         if is_silent and not self._was_silent:
-            log.warning("use_sim_time is set, but /clock stands still: frames count as old, the robot stands")
+            log.warning("use_sim_time is set, but /clock stands still: frames count as old, and the robot is stopped")
         self._was_silent = is_silent

@@ -39,8 +39,8 @@ class RosGraph:
         self._lock = threading.Lock()
         self._writers: list[uuid.UUID] = []
         self._readers: list[uuid.UUID] = []
-        self._names: dict[bytes, dict[bytes, str]] = {}
-        self._nodes: dict[bytes, list[str]] = {}
+        # The nodes of each other participant, with the identifiers of their publishers and subscribers.
+        self._nodes: dict[bytes, list[tuple[str, set[bytes]]]] = {}
         self._type = dds_type(_INFO, distribution)
         topic = Topic(participant, DISCOVERY_TOPIC, self._type)
         self.reader: Any = DataReader(participant, topic, qos=discovery_qos(_INFO, _AT_ONCE))
@@ -62,12 +62,13 @@ class RosGraph:
     def node_of(self, endpoint: uuid.UUID) -> str | None:
         """Return the full name of the node of a publisher or subscriber; None if it was not announced yet."""
         with self._lock:
-            return next((nodes[endpoint.bytes] for nodes in self._names.values() if endpoint.bytes in nodes), None)
+            known = [node for nodes in self._nodes.values() for node in nodes]
+        return next((name for name, ends in known if endpoint.bytes in ends), None)
 
     def nodes(self) -> list[str]:
         """Return the full names of other nodes; two nodes of one name are listed twice."""
         with self._lock:
-            return [name for names in self._nodes.values() for name in names]
+            return [name for nodes in self._nodes.values() for name, _ in nodes]
 
     def serve(self) -> None:
         """Read announcements of other nodes."""
@@ -75,19 +76,18 @@ class RosGraph:
             if isinstance(sample, InvalidSample):
                 continue
             info: Any = self._store.deserialize_cdr(sample.raw, _INFO)
+            nodes = [
+                (_full_name(node), {_bytes(gid) for gid in (*node.reader_gid_seq, *node.writer_gid_seq)})
+                for node in info.node_entities_info_seq
+            ]
             with self._lock:
-                self._nodes[_bytes(info.gid)] = [_full_name(node) for node in info.node_entities_info_seq]
-                self._names[_bytes(info.gid)] = {
-                    _bytes(gid): _full_name(node)
-                    for node in info.node_entities_info_seq
-                    for gid in (*node.reader_gid_seq, *node.writer_gid_seq)
-                }
+                self._nodes[_bytes(info.gid)] = nodes
 
     def forget(self, endpoint: uuid.UUID) -> None:
         """Forget the nodes of the participant that had ``endpoint``."""
         with self._lock:
-            for gid in [gid for gid in self._names if gid[:_PREFIX_BYTES] == endpoint.bytes[:_PREFIX_BYTES]]:
-                del self._names[gid], self._nodes[gid]
+            for gid in [gid for gid in self._nodes if gid[:_PREFIX_BYTES] == endpoint.bytes[:_PREFIX_BYTES]]:
+                del self._nodes[gid]
 
     def close(self) -> None:
         """Leave the topic; may be called twice."""
@@ -113,9 +113,7 @@ class RosGraph:
         kind = "rmw_dds_common/msg/Gid"
         fields: Any = self._store.fielddefs[kind][1]
         _, length = fields[0][1][1]
-        data = np.zeros(length, np.uint8)
-        data[:16] = np.frombuffer(guid.bytes, np.uint8)
-        return self._store.types[kind](data=data)
+        return self._store.types[kind](data=np.frombuffer(guid.bytes.ljust(length, b"\0"), np.uint8))
 
 
 def _full_name(node: Any) -> str:

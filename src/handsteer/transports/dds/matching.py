@@ -43,8 +43,7 @@ class Endpoint:
     """A publisher or subscriber.
 
     Attributes:
-        topic: Its name in DDS, such as ``rt/image_raw``.
-        type: Name of its type in DDS.
+        topic: Its name in DDS, such as ``rt/image_raw``; ``type`` is the type's name there.
         qos: The QoS offered or requested.
         publishes: Whether it is a publisher.
         or_type: Another type that it changes to if there is a subscriber of it.

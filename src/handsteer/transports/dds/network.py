@@ -111,8 +111,8 @@ def _range(environment: Mapping[str, str]) -> str:
         raise TransportError(f"ROS_LOCALHOST_ONLY is {only!r}: it should be 0 or 1")
     if only == "1":
         return "LOCALHOST"
-    unsaid = "SUBNET" if only == "0" else "LOCALHOST"
-    reach = environment.get("ROS_AUTOMATIC_DISCOVERY_RANGE") or unsaid
+    default = "SUBNET" if only == "0" else "LOCALHOST"
+    reach = environment.get("ROS_AUTOMATIC_DISCOVERY_RANGE") or default
     if reach.upper() not in _RANGES:
         raise TransportError(f"ROS_AUTOMATIC_DISCOVERY_RANGE is {reach!r}: it should be {' or '.join(_RANGES)}")
     return reach.upper()

@@ -4,7 +4,7 @@ import itertools
 import logging
 import threading
 from collections.abc import Callable
-from typing import Any
+from typing import Any, TypeVar
 
 from cyclonedds.core import (
     DDSException,
@@ -39,6 +39,8 @@ _AFTER_FAILURE_S = 0.05
 _LEAVE_TIMEOUT_S = 2.0
 _ANY = SampleState.Any | ViewState.Any | InstanceState.Any
 
+E = TypeVar("E", DataWriter[Any], DataReader[Any])
+
 log = logging.getLogger(__name__)
 
 
@@ -68,7 +70,7 @@ class Participant:
                 f"process, are there more than 32 others on this machine, is CYCLONEDDS_URI wrong?"
             ) from None
         self._lock = threading.Lock()
-        self._topics: dict[tuple[str, type], Any] = {}
+        self._topics: dict[tuple[str, str], Any] = {}
         self._service_numbers = itertools.count(1)
         self._graph = RosGraph(self._participant, None if is_observer else name, network.distribution)
         self._matching = Matching(self._participant, self._graph)
@@ -81,19 +83,11 @@ class Participant:
 
     def writer(self, topic: Topic[Any]) -> DataWriter[Any]:
         """Return a new writer of ``topic``; its messages are instances of its ``data_type``."""
-        qos = writer_qos(topic)
-        writer: DataWriter[Any] = DataWriter(self._participant, self._topic(topic), qos=qos)
-        self._graph.add(writer)
-        self._matching.add(self._endpoint(topic, qos, publishes=True))
-        return writer
+        return self._open(DataWriter, topic, writer_qos(topic), publishes=True)
 
     def reader(self, topic: Topic[Any]) -> DataReader[Any]:
         """Return a new reader of ``topic``."""
-        qos = reader_qos(topic)
-        reader: DataReader[Any] = DataReader(self._participant, self._topic(topic), qos=qos)
-        self._graph.add(reader)
-        self._matching.add(self._endpoint(topic, qos, publishes=False))
-        return reader
+        return self._open(DataReader, topic, reader_qos(topic), publishes=False)
 
     def service(self, name: str, kind: str) -> tuple[DataReader[Any], DataWriter[Any]]:
         """Return a reader of the requests and a writer of the replies of the service of this full name and type."""
@@ -123,10 +117,9 @@ class Participant:
         return self._graph.nodes(), [(end, self._graph.node_of(key)) for key, end in self._matching.others().items()]
 
     def publishers_of(self, name: str) -> list[str]:
-        """Return the node of each publisher of a topic in other processes; names come up to three seconds late.
+        """Return the node of each publisher of the topic of this full name in other processes.
 
-        Args:
-            name: Full name of the topic, such as ``/r1/image_raw``.
+        Names of nodes come up to three seconds late.
         """
         ends = self._matching.others().items()
         return [self._graph.node_of(key) or UNNAMED for key, end in ends if end.publishes and end.topic == f"rt{name}"]
@@ -150,21 +143,17 @@ class Participant:
         self._topics.clear()
         self._participant = self._domain = None
 
-    def _topic(self, topic: Topic[Any]) -> DdsTopic[Any]:
-        name = self._dds_name(topic)
-        key = name, topic.type
+    def _open(self, kind: Callable[..., E], topic: Topic[Any], qos: Qos, *, publishes: bool) -> E:
+        name, message = f"rt{self.name.topic(topic)}", type_name(topic.type)
         with self._lock:
-            if key not in self._topics:
-                self._topics[key] = DdsTopic(self._participant, name, dds_type(type_name(topic.type)))
-            known: DdsTopic[Any] = self._topics[key]
-        return known
-
-    def _endpoint(self, topic: Topic[Any], qos: Qos, *, publishes: bool) -> Endpoint:
+            if (name, message) not in self._topics:
+                self._topics[name, message] = DdsTopic(self._participant, name, dds_type(message))
+            dds_topic = self._topics[name, message]
+        endpoint = kind(self._participant, dds_topic, qos=qos)
+        self._graph.add(endpoint)
         or_type = dds_type_name(type_name(topic.or_type)) if publishes and topic.or_type else None
-        return Endpoint(self._dds_name(topic), dds_type_name(type_name(topic.type)), qos, publishes, or_type)
-
-    def _dds_name(self, topic: Topic[Any]) -> str:
-        return f"rt{self.name.topic(topic)}"
+        self._matching.add(Endpoint(name, dds_type_name(message), qos, publishes, or_type))
+        return endpoint
 
 
 class Dispatcher:

@@ -1,4 +1,7 @@
-"""Quality of service in DDS: conversion of our profiles, and the reasons why two endpoints do not match.
+"""ROS 2's topics and services in DDS: their types and quality of service, and why two endpoints do not match.
+
+DDS needs the definition of a type to match endpoints; the messages themselves are passed in encoded form, which is much
+faster than cyclonedds's own encoder for large ones.
 
 A writer never waits for a slow reader. Commands and signs have a lifespan, so that old ones are not delivered after a
 loss of connection; the log has one, so that a late subscriber gets recent records only.
@@ -47,22 +50,15 @@ def reader_qos(topic: Topic[Any]) -> Qos:
 
 
 def discovery_qos(name: str, depth: int) -> Qos:
-    """Return ROS 2's QoS for ``ros_discovery_info``; a writer keeps one message, a reader one per writer.
-
-    Args:
-        name: The message type.
-        depth: How many messages are kept.
-    """
+    """Return ROS 2's QoS for ``ros_discovery_info``, whose messages have the type ``name``; ``depth`` are kept."""
     history = Policy.History.KeepLast(depth)
     return Qos(_RELIABLE, _TRANSIENT_LOCAL, history, _CDR, Policy.IgnoreLocal.Participant, _user_data(name))
 
 
 def service_qos(name: str, service: str) -> Qos:
-    """Return ROS 2's QoS for both endpoints of a parameter service.
+    """Return ROS 2's QoS for the requests or replies of a parameter service, by their type.
 
-    Args:
-        name: Type of the request or the reply.
-        service: Identifies the service; the same for its reader and its writer.
+    ``service`` identifies it, and is the same for its reader and its writer.
     """
     data = Policy.Userdata(f"serviceid={service};typehash={type_hash(name)};".encode())
     return Qos(_RELIABLE, _VOLATILE, Policy.History.KeepLast(_REQUESTS), _CDR, data)

@@ -3,14 +3,17 @@
 from collections.abc import Sequence
 from typing import Any
 
-from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor, SetParametersResult
+from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.parameter_service import ParameterService
+from rclpy.serialization import deserialize_message
 
 from handsteer.errors import ConfigError
 from handsteer.parameters import Description, NodeParameters, Value
 from handsteer.transports.ros2.arguments import nested
+from handsteer.transports.ros2.encoding import encode
+from handsteer.transports.ros2.parameter_services import descriptor
 
 _QOS = "qos_overrides."
 _OF_ROS = ("use_sim_time", "start_type_description_service")
@@ -49,7 +52,7 @@ class ParameterLink:
         self._parameters = parameters
         for name, value in parameters.values().items():
             self._declare(name, value)
-        node.add_pre_set_parameters_callback(self._as_meant)
+        node.add_pre_set_parameters_callback(self._as_all_declared)
         node.add_on_set_parameters_callback(self._set)
         # Only now, because rclpy would accept values for parameters that are not declared yet.
         self._services = ParameterService(node)
@@ -57,19 +60,17 @@ class ParameterLink:
     def _declare(self, name: str, value: Value) -> None:
         description = self._parameters.describe(name)
         assert description is not None
-        descriptor = _descriptor(description)
-        kind = _TYPES[description.kind]
-        if description.removable:  # rclpy does not undeclare parameters of a static type
-            descriptor.dynamic_typing = True
-            self._node.declare_parameter(name, value, descriptor, ignore_override=True)
+        kind, theirs = _TYPES[description.kind], _descriptor(name, description)
+        if description.removable:
+            self._node.declare_parameter(name, value, theirs, ignore_override=True)
             return
-        self._node.declare_parameter(name, kind, descriptor, ignore_override=True)
+        self._node.declare_parameter(name, kind, theirs, ignore_override=True)
         typed = float(value) if kind is Parameter.Type.DOUBLE else value  # type: ignore[arg-type]
         self._node.set_parameters([Parameter(name, kind, typed)])
 
-    def _as_meant(self, wanted: list[Parameter]) -> list[Parameter]:
-        """Return ``wanted`` with declared types: an empty list in YAML has no type, and ``off`` is not a text."""
-        return [self._as_declared(one) for one in wanted]
+    def _as_all_declared(self, given: list[Parameter]) -> list[Parameter]:
+        """Return ``given`` with declared types: an empty list in YAML has no type, and ``off`` is not a text."""
+        return [self._as_declared(one) for one in given]
 
     def _as_declared(self, one: Parameter) -> Parameter:
         description = self._parameters.describe(one.name)
@@ -83,16 +84,16 @@ class ParameterLink:
             return Parameter(one.name, kind, text)
         return one
 
-    def _set(self, wanted: Sequence[Parameter]) -> SetParametersResult:
+    def _set(self, given: Sequence[Parameter]) -> SetParametersResult:
         try:
-            self._refuse_ros_own(wanted)
-            self._parameters.set({one.name: _plain(one) for one in wanted if not _is_of_ros(one.name)})
+            self._refuse_ros_own(given)
+            self._parameters.set({one.name: _plain(one) for one in given if not _is_of_ros(one.name)})
         except ConfigError as error:
             return SetParametersResult(successful=False, reason=str(error))
         return SetParametersResult(successful=True)
 
-    def _refuse_ros_own(self, wanted: Sequence[Parameter]) -> None:
-        for one in wanted:
+    def _refuse_ros_own(self, given: Sequence[Parameter]) -> None:
+        for one in given:
             is_set = _is_of_ros(one.name) and self._node.has_parameter(one.name)
             if is_set and self._node.get_parameter(one.name).value != one.value:
                 raise ConfigError(f"{one.name} cannot be set: it is read when the node starts: give it then")
@@ -106,14 +107,9 @@ def _plain(parameter: Parameter) -> Any:
     return list(parameter.value) if parameter.type_ in _ARRAYS else parameter.value
 
 
-def _descriptor(description: Description) -> ParameterDescriptor:
-    low, high = description.minimum, description.maximum
-    # Not read-only for rclpy, which would refuse even the current value, which `ros2 param load` sets.
-    constraints = [text for text in (description.constraint, description.why_fixed) if text]
-    descriptor = ParameterDescriptor(description=description.text, additional_constraints="; ".join(constraints))
-    if description.kind == "double" and low is not None and high is not None:
-        descriptor.floating_point_range = [FloatingPointRange(from_value=float(low), to_value=float(high), step=0.0)]
-    elif description.kind == "integer" and low is not None:
-        highest = 2**63 - 1 if high is None else int(high)
-        descriptor.integer_range = [IntegerRange(from_value=int(low), to_value=highest, step=1)]
-    return descriptor
+def _descriptor(name: str, description: Description) -> ParameterDescriptor:
+    theirs = deserialize_message(encode(descriptor(name, description)), ParameterDescriptor)
+    # rclpy would refuse even the current value, which `ros2 param load` sets.
+    theirs.read_only = False
+    theirs.dynamic_typing = description.removable  # rclpy does not undeclare parameters of a static type
+    return theirs

@@ -163,11 +163,9 @@ def keep_freed_memory() -> None:
 
 
 def send_promptly(publisher: Any, depth: int) -> None:
-    """Let a ``rospy.Publisher`` send on the publishing thread what a subscriber's socket accepts at once.
+    """Let a new ``rospy.Publisher`` send on the publishing thread what a subscriber's socket accepts at once.
 
-    Args:
-        publisher: One without subscribers yet.
-        depth: How many messages may wait for a slow subscriber.
+    Up to ``depth`` messages wait for a slow subscriber.
     """
     implementation = publisher.impl
     add = implementation.add_connection
@@ -176,13 +174,9 @@ def send_promptly(publisher: Any, depth: int) -> None:
 
 
 class PromptConnection:
-    """A subscriber's connection that never blocks: what its socket does not accept at once waits in a queue.
+    """A connection of rospy's to a subscriber that never blocks: what its socket does not accept at once is queued.
 
-    From then on, all messages go through rospy's queue, with its sending thread.
-
-    Args:
-        connection: rospy's own.
-        depth: How many messages may wait; older ones are dropped.
+    From then on, all messages go through rospy's queue, which keeps ``depth`` of them, and has its own sending thread.
     """
 
     def __init__(self, connection: Any, depth: int) -> None:

@@ -46,13 +46,7 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class Profile:
-    """The quality of service of one endpoint of a topic; the history is always keep last.
-
-    Attributes:
-        reliable: Reliable if true, else best effort.
-        latched: Transient local if true, else volatile.
-        depth: How many messages are kept.
-    """
+    """The quality of service of one endpoint: reliable or best effort, transient local or volatile, keep last."""
 
     reliable: bool
     latched: bool
@@ -92,14 +86,9 @@ class Writer(Protocol):
 
 
 class Ros2Publisher(BasePublisher[M]):
-    """Publisher of a topic.
+    """Publisher of a topic by ``writer``, which raises one of ``errors`` if it cannot send.
 
-    Args:
-        node: Full name of this process's node.
-        name: Full name of the topic.
-        topic: The topic.
-        writer: Sends the messages; None if there can be no subscribers.
-        errors: Exceptions of ``writer`` if it cannot send.
+    Without a writer, there are never subscribers.
     """
 
     def __init__(
@@ -222,12 +211,9 @@ class WireTransport(Ros2Transport):
         return self._name.topic(topic)
 
     def serve(self, name: str, kind: str, respond: Callable[[bytes], bytes]) -> None:
-        """Offer the service of this full name until the end.
+        """Offer the service of this full name, and of a type such as ``rcl_interfaces/srv/ListParameters``.
 
-        Args:
-            name: Such as ``/my_camera/list_parameters``.
-            kind: Its type, such as ``rcl_interfaces/srv/ListParameters``.
-            respond: Converts an encoded request to a reply, at once; raises any exception if the request is invalid.
+        ``respond`` converts an encoded request to a reply, at once; it raises any exception if the request is invalid.
         """
         self._services.append(self._open_service(name, kind, respond))
 
@@ -254,13 +240,9 @@ Take = Callable[[bytes, bytes, float | None], None]
 
 
 class Intake(Generic[M]):
-    """Decodes the messages of a topic and passes them on, except late ones that do not stop the robot.
+    """Decodes the messages of a topic and sends them on, except late ones that do not stop the robot.
 
-    Invalid and late messages are logged once, until they cease.
-
-    Args:
-        name: The topic's full name in the graph.
-        send: Receives the messages.
+    The first invalid message is logged, and the first of several late ones.
     """
 
     def __init__(self, topic: Topic[M], name: str, clock: Clock, send: Deliver[M]) -> None:

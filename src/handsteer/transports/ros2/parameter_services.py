@@ -76,7 +76,7 @@ class ParameterServices:
 
     def _describe(self, request: Any) -> Any:
         descriptions = self._descriptions(request.names)
-        descriptors = [_descriptor(name, each) for name, each in zip(request.names, descriptions, strict=False)]
+        descriptors = [descriptor(name, each) for name, each in zip(request.names, descriptions, strict=False)]
         return _reply("DescribeParameters", descriptors=descriptors)
 
     def _set(self, request: Any) -> Any:
@@ -164,7 +164,8 @@ def _value(kind: str, value: Value) -> Any:
     return _message("ParameterValue", type=number, **fields)
 
 
-def _descriptor(name: str, description: Description) -> Any:
+def descriptor(name: str, description: Description) -> Any:
+    """Return the ``ParameterDescriptor`` of the parameter ``name``."""
     low, high = description.minimum, description.maximum
     ranges: dict[str, list[Any]] = {"floating_point_range": [], "integer_range": []}
     if description.kind == "double" and low is not None and high is not None:

@@ -111,8 +111,8 @@ def _endpoints(config: zenoh.Config, what: str) -> list[str]:
 
 def reason(error: zenoh.ZError) -> str:
     """Return Zenoh's error message without the locations in its source."""
-    said = re.search(r'msg: "(.*?)"[,}]', str(error))
-    return re.sub(r" at /[^\s\]]+", "", said[1] if said else str(error)).replace(".]", "]").rstrip(". ")
+    found = re.search(r'msg: "(.*?)"[,}]', str(error))
+    return re.sub(r" at /[^\s\]]+", "", found[1] if found else str(error)).replace(".]", "]").rstrip(". ")
 
 
 def _config(environment: Mapping[str, str], variable: str, settings: Mapping[str, Any]) -> zenoh.Config:
@@ -126,8 +126,8 @@ def _config(environment: Mapping[str, str], variable: str, settings: Mapping[str
         config = zenoh.Config()
         for name, value in settings.items():
             config.insert_json5(name, json.dumps(value))
-    for name, said in _overrides(environment.get(_OVERRIDE, "")):
-        _set(config, _OVERRIDE, name, said)
+    for name, value in _overrides(environment.get(_OVERRIDE, "")):
+        _set(config, _OVERRIDE, name, value)
     return config
 
 
@@ -160,12 +160,9 @@ def _attempts(environment: Mapping[str, str]) -> int | None:
 
 
 class Router:
-    """A Zenoh router in this process, until it is closed.
+    """A Zenoh router in this process, by which nodes find each other if there is no ``rmw_zenohd`` of ROS 2.
 
-    Args:
-        environment: ``ZENOH_ROUTER_CONFIG_URI`` and ``ZENOH_CONFIG_OVERRIDE`` have their meanings in ``rmw_zenohd``.
-        endpoint: Address to listen on, such as ``tcp/[::]:7447``; by default that of the variables, else this machine
-            only.
+    The arguments are those of :func:`router_config`.
 
     Raises:
         TransportError: It cannot listen there, or a variable is wrong.

@@ -72,13 +72,7 @@ class Entity:
 
 
 def topic_key(domain: int, name: str, type_name: str) -> str:
-    """Return the key expression of messages or requests.
-
-    Args:
-        domain: The ROS 2 domain.
-        name: Full name of the topic or service.
-        type_name: Its type, such as ``std_msgs/msg/String``.
-    """
+    """Return the key expression of the messages or requests of a topic or service, by its full name and its type."""
     return f"{domain}{name}/{dds_type_name(type_name)}/{type_hash(type_name)}"
 
 
@@ -93,14 +87,7 @@ def node_token(place: Place) -> str:
 
 
 def endpoint_token(place: Place, number: int, endpoint: Endpoint, profile: Profile) -> str:
-    """Return the liveliness token of an endpoint.
-
-    Args:
-        place: The node that has the endpoint.
-        number: Identifies the endpoint within its session; from 1.
-        endpoint: The endpoint.
-        profile: Its quality of service.
-    """
+    """Return the liveliness token of an endpoint of a node; ``number``, from 1, identifies it within its session."""
     who = f"{_ROOT}/{place.domain}/{place.zid}/0/{number}/{_LETTERS[endpoint.kind]}/{_name(place.node)}"
     what = (_mangled(endpoint.topic), dds_type_name(endpoint.type), endpoint.type_hash, _quality(profile))
     return f"{who}/{'/'.join(what)}"
@@ -129,10 +116,7 @@ def gid(token: str) -> bytes:
 def attachment(number: int, time_ns: int, source: bytes) -> bytes:
     """Return the attachment of a message, request or reply.
 
-    Args:
-        number: Sequence number, from 1.
-        time_ns: Time of sending, in nanoseconds of Unix time.
-        source: Identifier of the sender, 16 bytes.
+    It has a sequence number, from 1, the time of sending in nanoseconds of Unix time, and the sender's identifier.
     """
     return _ATTACHMENT.pack(number, time_ns, _GID_BYTES, source)
 

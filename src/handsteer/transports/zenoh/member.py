@@ -35,6 +35,7 @@ class Member:
     Attributes:
         name: The node's name.
         is_local: Whether this process connects to this machine only, as far as is known.
+        neighbours: The other nodes.
 
     Raises:
         TransportError: The network cannot be joined.
@@ -56,23 +57,16 @@ class Member:
         self._had_router = True
         self._place = Place(network.domain, str(self.session.zid()), name)
         self._numbers = itertools.count(1)
-        self._lock = threading.Lock()
-        self._neighbours: Neighbours | None = None
         try:
             self._look_for_router()
-            self._neighbours = Neighbours(self.session, network.domain)
+            self.neighbours = Neighbours(self.session, network.domain)
             self._token = self.session.liveliness().declare_token(node_token(self._place))
         except BaseException:  # including interrupts: an open session would keep the process from ending
-            self.close()
+            self.session.close()
             raise
 
     def key(self, name: str, type_name: str) -> str:
-        """Return the key expression of a topic or service.
-
-        Args:
-            name: Its full name, such as ``/r1/image_raw``.
-            type_name: Its type, such as ``sensor_msgs/msg/Image``.
-        """
+        """Return the key expression of the topic or service of this full name and type."""
         return topic_key(self._place.domain, name, type_name)
 
     def introduce(
@@ -88,21 +82,10 @@ class Member:
             or_type: Another type that it changes to if there is a subscriber of it.
         """
         endpoint = Endpoint(kind, name, type_name, type_hash(type_name))
-        with self._lock:
-            number = next(self._numbers)
-        text = endpoint_token(self._place, number, endpoint, profile)
+        text = endpoint_token(self._place, next(self._numbers), endpoint, profile)
         token = self.session.liveliness().declare_token(text)
-        if self._neighbours is not None:
-            self._neighbours.add(endpoint, or_type)
+        self.neighbours.add(endpoint, or_type)
         return token, text
-
-    def publishers_of(self, topic: str) -> list[str]:
-        """Return the node of each publisher of the topic of this full name in other processes."""
-        return [] if self._neighbours is None else self._neighbours.publishers_of(topic)
-
-    def subscribed_types(self, topic: str) -> set[str]:
-        """Return the types of the subscribers of the topic of this full name in other processes."""
-        return set() if self._neighbours is None else self._neighbours.subscribed_types(topic)
 
     def watch_router(self) -> None:
         """Log when the router is lost or found again; does nothing if none is used."""
@@ -113,14 +96,13 @@ class Member:
             if has_router:
                 log.info("the Zenoh router is there")
             else:
-                log.warning("%s", self._lonely("the Zenoh router has gone: those who come now are not found"))
+                log.warning("%s", self._without_router("the Zenoh router has gone: those who come now are not found"))
         self._had_router = has_router
 
     def close(self) -> None:
         """Leave the network; may be called twice."""
         if not self.session.is_closed():
-            if self._neighbours is not None:
-                self._neighbours.close()
+            self.neighbours.close()
             self.session.close()
 
     def _look_for_router(self) -> None:
@@ -131,7 +113,7 @@ class Member:
         if self._had_router:
             return
         waits = "it waits for one" if attempts == 0 else "until there is one, nobody is found"
-        log.warning("%s", self._lonely(f"no Zenoh router answers: {waits}"))
+        log.warning("%s", self._without_router(f"no Zenoh router answers: {waits}"))
         for tried in itertools.count(1):
             if tried == attempts:
                 return
@@ -140,7 +122,7 @@ class Member:
                 self.watch_router()
                 return
 
-    def _lonely(self, what: str) -> str:
+    def _without_router(self, what: str) -> str:
         return (
             f"{what} (looked at {routers(self._network.config)}); start one with handsteer zenoh-router, "
             "or where ROS 2 is installed, ros2 run rmw_zenoh_cpp rmw_zenohd"

@@ -83,10 +83,10 @@ class ZenohTransport(WireTransport):
         return close
 
     def _other_publishers(self, name: str) -> list[str]:
-        return self._member.publishers_of(name)
+        return self._member.neighbours.publishers_of(name)
 
     def _subscribed_types(self, topic: Topic[Any]) -> set[str]:
-        return self._member.subscribed_types(self.topic_name(topic))
+        return self._member.neighbours.subscribed_types(self.topic_name(topic))
 
 
 class _Writer:
