@@ -79,7 +79,7 @@ def check_not_known(found: Sequence[Lookalike]) -> None:
         share = each.hands.rate or 0.0
         if share > _KNOWN_SHARE:
             raise TrainingError(
-                f"{each.label} looks like {each.sign}: {share:.0%} of its hands are told as that already; "
+                f"{each.label} looks like {each.sign}: {share:.0%} of its hands are recognised as that already; "
                 f"teach another shape, or give {each.sign} another action"
             )
 

@@ -91,7 +91,7 @@ def draw_sweep(rows: Mapping[float, Tally], title: str) -> Figure:
     motion = _rates([tally.false_motion.rate for tally in tallies])
     right.plot(list(rows), motion, "o-", c="black", label="moves wrongly")
     _in_percent(left, "threshold", "recall")
-    _in_percent(right, "threshold", "of those that don't show the sign, how many gave it")
+    _in_percent(right, "threshold", "false alarms: share of pictures without the sign")
     return figure
 
 
