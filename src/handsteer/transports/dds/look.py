@@ -10,7 +10,7 @@ from dataclasses import asdict, dataclass
 
 from handsteer.errors import TransportError
 from handsteer.transports.base import UNNAMED, many_publishers
-from handsteer.transports.dds.matching import Endpoint
+from handsteer.transports.dds.discovery import Endpoint
 from handsteer.transports.dds.network import Network, network
 from handsteer.transports.dds.participant import Participant
 from handsteer.transports.dds.topics import describe, misfits

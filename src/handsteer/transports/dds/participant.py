@@ -25,8 +25,7 @@ from cyclonedds.topic import Topic as DdsTopic
 from handsteer.errors import TransportError
 from handsteer.messages import Topic, type_name
 from handsteer.transports.base import UNNAMED
-from handsteer.transports.dds.discovery import RosGraph
-from handsteer.transports.dds.matching import Endpoint, Matching
+from handsteer.transports.dds.discovery import Endpoint, Matching, RosGraph
 from handsteer.transports.dds.network import Network
 from handsteer.transports.dds.topics import dds_type, opaque_type, reader_qos, service_dds_type, service_qos, writer_qos
 from handsteer.transports.ros2.encoding import dds_type_name, reply_type, request_type, ros_type_name

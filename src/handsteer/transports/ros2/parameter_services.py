@@ -19,7 +19,8 @@ PARAMETER_EVENTS = Topic("/parameter_events", ParameterEvent, is_global=True, de
 """Changes of all nodes' parameters."""
 
 NOT_SET = 0
-_TYPES = {"bool": 1, "integer": 2, "double": 3, "string": 4, "strings": 9}
+TYPES = {"bool": 1, "integer": 2, "double": 3, "string": 4, "strings": 9}
+"""Numbers of ``rcl_interfaces/msg/ParameterType``, by our names of types."""
 _FIELDS = {1: "bool_value", 2: "integer_value", 3: "double_value", 4: "string_value", 9: "string_array_value"}
 _ARRAYS = ("byte_array_value", "bool_array_value", "integer_array_value", "double_array_value", "string_array_value")
 _EMPTY = dict(zip((5, 6, 7, 8, 9), _ARRAYS, strict=True))
@@ -72,7 +73,7 @@ class ParameterServices:
 
     def _get_types(self, request: Any) -> Any:
         descriptions = self._descriptions(request.names)
-        return _reply("GetParameterTypes", types=np.array([_TYPES[each.kind] for each in descriptions], np.uint8))
+        return _reply("GetParameterTypes", types=np.array([TYPES[each.kind] for each in descriptions], np.uint8))
 
     def _describe(self, request: Any) -> Any:
         descriptions = self._descriptions(request.names)
@@ -151,7 +152,7 @@ def _read(parameter: Any) -> Any:
     if kind not in _FIELDS:
         raise ConfigError(f"{parameter.name}: a list of numbers should be a single value")
     value = getattr(parameter.value, _FIELDS[kind])
-    return list(value) if kind == _TYPES["strings"] else value
+    return list(value) if kind == TYPES["strings"] else value
 
 
 def _value(kind: str, value: Value) -> Any:
@@ -159,7 +160,7 @@ def _value(kind: str, value: Value) -> Any:
     fields |= {name: [] for name in _ARRAYS}
     fields |= {"byte_array_value": np.zeros(0, np.uint8), "bool_array_value": np.zeros(0, np.bool_)}
     fields |= {"integer_array_value": np.zeros(0, np.int64), "double_array_value": np.zeros(0, np.float64)}
-    number = _TYPES[kind]
+    number = TYPES[kind]
     fields[_FIELDS[number]] = float(value) if isinstance(value, int | float) and kind == "double" else value
     return _message("ParameterValue", type=number, **fields)
 
@@ -178,7 +179,7 @@ def descriptor(name: str, description: Description) -> Any:
     return _message(
         "ParameterDescriptor",
         name=name,
-        type=_TYPES[description.kind],
+        type=TYPES[description.kind],
         description=description.text,
         additional_constraints="; ".join(constraints),
         read_only=description.why_fixed is not None,
