@@ -5,7 +5,7 @@ import os
 import sys
 import time
 from collections import Counter
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 
 from handsteer.errors import TransportError
@@ -21,7 +21,7 @@ from handsteer.transports.ros2.names import NodeName
 _HIDDEN = "_"
 _TOPIC = "rt/"
 _LOOK_S = 0.02
-_VELOCITIES = {"geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped", "geometry_msgs/Twist"}
+_VELOCITIES = {"geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped"}
 _AT_LEAST_S, _QUIET_S, _AT_MOST_S = 0.6, 0.4, 3.0
 # Fast DDS announces the names of nodes up to three seconds after their publishers and subscribers, most sooner.
 _NAMES_S = 2.0
@@ -62,7 +62,7 @@ class ObservedGraph:
 
 
 def problems_of(nodes: Iterable[str], topics: Iterable[ObservedTopic]) -> list[str]:
-    """Return problems common to all transports: several commanders or types of a topic, duplicate node names."""
+    """Return problems common to all transports: several publishers of commands, several types of a topic, nodes of one name."""
     found = [
         f"{count} nodes have the name {name}: end one of them, or rename it (-r __node:=other)"
         for name, count in Counter(nodes).items()
@@ -86,33 +86,24 @@ def observe_domain(network: Network) -> ObservedGraph:
     """
     participant = Participant(network, NodeName("handsteer_graph"), is_observer=True)
     try:
-        began_s = time.monotonic()
         _wait_until_quiet(participant)
-        _wait(lambda: all(node for _, node in participant.others()[1]), began_s + _NAMES_S)
         return _graph(network.place, *participant.others())
     finally:
         participant.close()
 
 
-def _wait(condition: Callable[[], bool], deadline_s: float) -> None:
-    while not condition() and time.monotonic() < deadline_s:
-        time.sleep(_LOOK_S)
-
-
 def _wait_until_quiet(participant: Participant) -> None:
-    """Wait until no further node is found."""
+    """Wait until nothing new is found, and all nodes have announced their names."""
     began_s = changed_s = time.monotonic()
     known = -1
-
-    def quiet() -> bool:
-        nonlocal known, changed_s
+    while (now_s := time.monotonic()) < began_s + _AT_MOST_S:
         nodes, ends = participant.others()
-        now = time.monotonic()
         if len(nodes) + len(ends) != known:
-            known, changed_s = len(nodes) + len(ends), now
-        return now - began_s >= _AT_LEAST_S and now - changed_s >= _QUIET_S
-
-    _wait(quiet, began_s + _AT_MOST_S)
+            known, changed_s = len(nodes) + len(ends), now_s
+        is_quiet = now_s - began_s >= _AT_LEAST_S and now_s - changed_s >= _QUIET_S
+        if is_quiet and (now_s - began_s >= _NAMES_S or all(node for _, node in ends)):
+            return
+        time.sleep(_LOOK_S)
 
 
 def _graph(place: str, nodes: Iterable[str], ends: Ends) -> ObservedGraph:

@@ -49,6 +49,7 @@ class Participant:
     Attributes:
         name: The node's name.
         is_local: Whether all others are certainly on this machine.
+        dispatcher: The thread that serves readers, until they are released.
 
     Args:
         is_observer: Whether it only observes, and announces no node.
@@ -73,12 +74,12 @@ class Participant:
         self._service_numbers = itertools.count(1)
         self._graph = RosGraph(self._participant, None if is_observer else name, network.distribution)
         self._matching = Matching(self._participant, self._graph)
-        self._dispatcher = Dispatcher(self._participant)
-        self._dispatcher.tick(self._matching.tick)
-        self._dispatcher.add(self._graph.reader, self._graph.serve)
+        self.dispatcher = Dispatcher(self._participant)
+        self.dispatcher.tick(self._matching.tick)
+        self.dispatcher.add(self._graph.reader, self._graph.serve)
         for reader, serve in self._matching.readers:
-            self._dispatcher.add(reader, serve)
-        self._dispatcher.start()
+            self.dispatcher.add(reader, serve)
+        self.dispatcher.start()
 
     def writer(self, topic: Topic[Any]) -> DataWriter[Any]:
         """Return a new writer of ``topic``; its messages are instances of its ``data_type``."""
@@ -103,14 +104,6 @@ class Participant:
         self._graph.add(writer)
         return reader, writer
 
-    def tick(self, call: Callable[[], None]) -> None:
-        """Call ``call`` on the DDS thread, four times a second and whenever something was received."""
-        self._dispatcher.tick(call)
-
-    def serve(self, reader: DataReader[Any], serve: Callable[[], None]) -> None:
-        """Call ``serve`` on the DDS thread whenever ``reader`` has messages, until it is released."""
-        self._dispatcher.add(reader, serve)
-
     def others(self) -> tuple[list[str], list[tuple[Endpoint, str | None]]]:
         """Return the nodes of other processes, and their publishers and subscribers with the node of each, if known."""
         return self._graph.nodes(), [(end, self._graph.node_of(key)) for key, end in self._matching.others().items()]
@@ -131,12 +124,12 @@ class Participant:
     def release(self, endpoint: DataWriter[Any] | DataReader[Any]) -> None:
         """Release a writer or reader; it is deleted when the caller drops its reference too."""
         if isinstance(endpoint, DataReader):
-            self._dispatcher.remove(endpoint)
+            self.dispatcher.remove(endpoint)
         self._graph.remove(endpoint)
 
     def close(self) -> None:
         """Leave the domain; may be called twice."""
-        self._dispatcher.close()
+        self.dispatcher.close()
         self._matching.close()
         self._graph.close()
         self._topics.clear()

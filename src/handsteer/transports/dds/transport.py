@@ -62,7 +62,7 @@ class DdsTransport(WireTransport):
                     sent_s = info.source_timestamp / 1e9 if info.source_timestamp > 0 else None
                     take(sample.raw, info.publication_handle.to_bytes(8, "big"), sent_s)
 
-        self._participant.serve(reader, serve)
+        self._participant.dispatcher.add(reader, serve)
         return partial(self._participant.release, reader)
 
     def _open_service(self, name: str, kind: str, respond: Callable[[bytes], bytes]) -> Callable[[], None]:
@@ -128,8 +128,8 @@ class _Service:
         self._reader: Any
         self._writer: Any
         self._reader, self._writer = participant.service(name, kind)
-        participant.serve(self._reader, self._serve)
-        participant.tick(self._send_waiting)
+        participant.dispatcher.add(self._reader, self._serve)
+        participant.dispatcher.tick(self._send_waiting)
 
     def close(self) -> None:
         reader, writer, self._reader, self._writer = self._reader, self._writer, None, None
