@@ -163,14 +163,14 @@ class BaseTransport(ABC):
 
     def __init__(self, publishers: MutableSet[BasePublisher[Any]]) -> None:
         self._types = TopicTypes()
-        self._lock = threading.Lock()
+        self._lock = threading.RLock()
         self._publishers = publishers
         self._fanouts: dict[str, Fanout[Any]] = {}
 
     def advertise(self, node: str, topic: Topic[M]) -> BasePublisher[M]:
         """Return a publisher of ``topic`` for the node named ``node``."""
-        publisher = self._open_publisher(node, self._claim(topic), topic)
         with self._lock:
+            publisher = self._open_publisher(node, self._claim(topic), topic)
             self._publishers.add(publisher)
         return publisher
 

@@ -84,8 +84,7 @@ class Ros1Transport(BaseTransport):
         super().close()
 
     def _open_publisher(self, node: str, name: str, topic: Topic[M]) -> BasePublisher[M]:
-        with self._lock:
-            known = next((publisher for publisher in self._publishers if publisher.name == name), None)
+        known = next((publisher for publisher in self._publishers if publisher.name == name), None)
         return known or _Ros1Publisher(rospy.get_name(), name, topic)
 
     def _reception(self, node: str, name: str, topic: Topic[M]) -> Receive[M]:
