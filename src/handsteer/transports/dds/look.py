@@ -62,7 +62,7 @@ class ObservedGraph:
 
 
 def problems_of(nodes: Iterable[str], topics: Iterable[ObservedTopic]) -> list[str]:
-    """Return problems common to all transports: several publishers of commands, several types of a topic, nodes of one name."""
+    """Return problems: several publishers of commands, several types of a topic, several nodes of one name."""
     found = [
         f"{count} nodes have the name {name}: end one of them, or rename it (-r __node:=other)"
         for name, count in Counter(nodes).items()

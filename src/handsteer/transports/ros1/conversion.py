@@ -15,7 +15,7 @@ from rosbags.typesys import Stores, get_typestore
 from rosbags.typesys.store import Typestore
 
 from handsteer.messages import CompressedImage, Header, Marker, MeshFile, Time, type_name
-from handsteer.transports.ros2.encoding import new_types, types
+from handsteer.transports.ros2.encoding import message_types
 
 _HEADER, _MARKER = "std_msgs/msg/Header", "visualization_msgs/msg/Marker"
 _SEQ_BYTES = 4
@@ -49,9 +49,11 @@ class RawMessage(genpy.Message):  # type: ignore[misc]
 @functools.cache
 def ros1_type(name: str) -> type[RawMessage]:
     """Return rospy's class for a message type such as ``std_msgs/msg/String``."""
-    store = get_typestore(Stores.ROS1_NOETIC)
+    store = message_types(Stores.ROS1_NOETIC)
     if name not in store.fielddefs:  # those that rosbags has for ROS 2 only are the same in ROS 1
-        store.register({name: types().fielddefs[name]})
+        store.register({name: _written_types().fielddefs[name]})
+    for used in (_written_types(), _read_types()):
+        used.get_msgdef(name)  # compiles it before the first message
     definition, md5 = store.generate_msgdef(name)
     package, _, message = name.split("/")
     fields = store.fielddefs[name][1]
@@ -80,7 +82,7 @@ def from_ros1(message: RawMessage, name: str) -> Any:
 @functools.cache
 def _written_types() -> Typestore:
     """Return our types without the fields that ROS 1 does not have; rosbags adds ``seq`` to headers."""
-    store = new_types()
+    store = message_types()
     there = {field for field, _ in get_typestore(Stores.ROS1_NOETIC).fielddefs[_MARKER][1]}
     constants, fields = store.fielddefs[_MARKER]
     store.fielddefs[_MARKER] = (constants, [(field, kind) for field, kind in fields if field in there])
@@ -90,7 +92,7 @@ def _written_types() -> Typestore:
 @functools.cache
 def _read_types() -> Typestore:
     """Return types with the fields of ROS 1, whose messages are instances of our classes."""
-    store = new_types()
+    store = message_types()
     store.fielddefs[_MARKER] = _written_types().fielddefs[_MARKER]
     store.fielddefs[_HEADER] = get_typestore(Stores.ROS1_NOETIC).fielddefs[_HEADER]
     makers: dict[str, Any] = {_MARKER: _make_marker, _HEADER: lambda _seq, stamp, frame_id: Header(stamp, frame_id)}

@@ -64,15 +64,16 @@ def types(distribution: str = "jazzy") -> Typestore:
 
     The types of the parameter services are in ``jazzy``, and are the same in both.
     """
-    return new_types(distribution)
-
-
-def new_types(distribution: str = "jazzy") -> Typestore:
-    """Return the same as :func:`types`, which may be changed."""
-    store = get_typestore(Stores.ROS2_HUMBLE if distribution == "humble" else Stores.ROS2_JAZZY)
-    store.register({TurtlePose.__msgtype__: ([], [(part.name, _FLOAT32) for part in dataclasses.fields(TurtlePose)])})
+    store = message_types(Stores.ROS2_HUMBLE if distribution == "humble" else Stores.ROS2_JAZZY)
     if distribution != "humble":
         _register_services(store)
+    return store
+
+
+def message_types(stores: Stores = Stores.ROS2_JAZZY) -> Typestore:
+    """Return a new copy of the message types of rosbags, with those that it lacks."""
+    store = get_typestore(stores)
+    store.register({TurtlePose.__msgtype__: ([], [(part.name, _FLOAT32) for part in dataclasses.fields(TurtlePose)])})
     return store
 
 
