@@ -21,7 +21,7 @@ _LETTERS = {words: letters for letters, words in _KINDS.items()}
 _DEFAULT_DEPTH = 42
 _ATTACHMENT = struct.Struct("<qqB16s")
 _GID_BYTES = 16
-_NODE_PARTS, _ENDPOINT_PARTS = 9, 13
+_ENDPOINT_PARTS = 13
 
 
 @dataclass(frozen=True)
@@ -43,13 +43,7 @@ class Endpoint:
 
 @dataclass(frozen=True)
 class Place:
-    """This process's node in the graph.
-
-    Attributes:
-        domain: The ROS 2 domain.
-        zid: Identifier of the Zenoh session.
-        node: The node's name.
-    """
+    """This process's node in the graph: the ROS 2 domain, the identifier of the Zenoh session, and the node's name."""
 
     domain: int
     zid: str
@@ -58,17 +52,11 @@ class Place:
 
 @dataclass(frozen=True)
 class Entity:
-    """A node, or an endpoint of one, announced by a liveliness token.
-
-    Attributes:
-        zid: Identifier of the Zenoh session.
-        node: Full name of the node.
-        endpoint: None if the token announces the node itself.
-    """
+    """An endpoint, the full name of its node, and the identifier of its Zenoh session."""
 
     zid: str
     node: str
-    endpoint: Endpoint | None = None
+    endpoint: Endpoint
 
 
 def topic_key(domain: int, name: str, type_name: str) -> str:
@@ -94,18 +82,13 @@ def endpoint_token(place: Place, number: int, endpoint: Endpoint, profile: Profi
 
 
 def read_token(token: str) -> Entity | None:
-    """Return the entity that a liveliness token announces; None if the token is not one of rmw_zenoh's."""
+    """Return the endpoint that a liveliness token announces; None if it announces something else."""
     parts = token.split("/")
-    if len(parts) < _NODE_PARTS or parts[0] != _ROOT:
+    if len(parts) < _ENDPOINT_PARTS or parts[0] != _ROOT or parts[5] not in _KINDS:
         return None
-    zid, kind, namespace, name = parts[2], parts[5], _demangled(parts[7]), parts[8]
-    node = f"{namespace.rstrip('/')}/{name}"
-    if kind == _NODE:
-        return Entity(zid, node)
-    if kind not in _KINDS or len(parts) < _ENDPOINT_PARTS:
-        return None
+    node = f"{_demangled(parts[7]).rstrip('/')}/{parts[8]}"
     topic, dds_type, digest = parts[9:12]
-    return Entity(zid, node, Endpoint(_KINDS[kind], _demangled(topic), ros_type_name(dds_type), digest))
+    return Entity(parts[2], node, Endpoint(_KINDS[parts[5]], _demangled(topic), ros_type_name(dds_type), digest))
 
 
 def gid(token: str) -> bytes:

@@ -165,27 +165,23 @@ class Neighbours:
     def _others(self, kind: str, topic: str) -> list[tuple[str, Endpoint]]:
         with self._lock:
             theirs = [(entity.node, entity.endpoint) for entity in self._theirs.values()]
-        return [(node, end) for node, end in theirs if end and (end.kind, end.topic) == (kind, topic)]
+        return [(node, end) for node, end in theirs if (end.kind, end.topic) == (kind, topic)]
 
     def _note(self, sample: zenoh.Sample) -> None:
         token = str(sample.key_expr)
         entity = read_token(token)
         if entity is None or entity.zid == self._own:
             return
-        came = sample.kind == zenoh.SampleKind.PUT
         with self._lock:
-            known = token in self._theirs
-            if came:
+            is_known = self._theirs.pop(token, None) is not None
+            is_there = sample.kind == zenoh.SampleKind.PUT
+            if is_there:
                 self._theirs[token] = entity
-            else:
-                self._theirs.pop(token, None)
-        if came and not known:
+        if is_there and not is_known:
             self._compare(entity)
 
     def _compare(self, entity: Entity) -> None:
         theirs = entity.endpoint
-        if theirs is None:
-            return
         with self._lock:
             ours, or_type = self._ours.get((theirs.topic, _OPPOSITE.get(theirs.kind, "")), (None, None))
         if ours is None or theirs.type == or_type:
