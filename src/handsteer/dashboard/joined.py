@@ -9,7 +9,7 @@ from handsteer.clock import Clock
 from handsteer.config import Config
 from handsteer.nodes.steering import SteeringNode
 from handsteer.robots.world import World
-from handsteer.transports.protocol import Transport
+from handsteer.transports.base import Transport
 
 
 class BrowserFrames(Protocol):
