@@ -28,7 +28,7 @@ from handsteer.messages import (
 )
 from handsteer.transports.base import Deliver, Received
 from handsteer.transports.in_process import BasePublisher, BaseTransport, Receive
-from handsteer.transports.ros2.encoding import decode, encode
+from handsteer.transports.ros2.encoding import compile_type, decode, encode
 from handsteer.transports.ros2.names import NodeName
 from handsteer.transports.timing import StaleMessageFilter, capture_time
 
@@ -171,9 +171,11 @@ class Ros2Transport(BaseTransport):
             publisher.flush(max(0.0, deadline_s - time.monotonic()))
 
     def _open_publisher(self, node: str, name: str, topic: Topic[M]) -> Ros2Publisher[M]:
+        compile_type(type_name(topic.type))
         return Ros2Publisher(self._node_name, name, topic, self._open_writer(name, topic), self.errors)
 
     def _reception(self, node: str, name: str, topic: Topic[M]) -> Receive[M]:
+        compile_type(type_name(topic.type))
         return lambda send: self._open_reader(name, topic, Intake(topic, name, self._clock, send).take)
 
     @abstractmethod

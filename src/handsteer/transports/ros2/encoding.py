@@ -77,6 +77,19 @@ def message_types(stores: Stores = Stores.ROS2_JAZZY) -> Typestore:
     return store
 
 
+@functools.cache
+def compile_type(name: str) -> None:
+    """Let rosbags compile what encodes and decodes the type ``name``, which otherwise delays its first message.
+
+    A signal must not interrupt it: where Python runs source text, an interrupt ends the process with another exit code.
+    """
+    types().get_msgdef(name)
+    for _, kind in types().fielddefs[name][1]:
+        of: Any = kind[1][0] if kind[0] in (Nodetype.ARRAY, Nodetype.SEQUENCE) else kind
+        if of[0] == Nodetype.NAME:
+            compile_type(of[1])
+
+
 def encode(message: Any) -> bytes:
     """Return ``message`` as little-endian CDR."""
     return bytes(types().serialize_cdr(message, message.__msgtype__))
