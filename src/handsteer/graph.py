@@ -21,7 +21,7 @@ from handsteer.clock import Clock, RealClock, SteppedClock
 from handsteer.config import Config
 from handsteer.errors import ConfigError
 from handsteer.making import make_camera, make_control, make_recognition, make_robot, make_steering, open_cameras
-from handsteer.nodes.node import Node
+from handsteer.nodes.base import Node
 from handsteer.nodes.steering import SteeringNode
 from handsteer.robots.course import CourseState
 from handsteer.transports.in_process import InProcessTransport

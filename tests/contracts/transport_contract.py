@@ -25,7 +25,7 @@ from handsteer.messages import (
     Topic,
     twist,
 )
-from handsteer.nodes.node import Node
+from handsteer.nodes.base import Node
 from handsteer.nodes.reporters import split_reporter
 from handsteer.transports.protocol import Publisher, Received, Transport
 

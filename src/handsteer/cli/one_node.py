@@ -13,7 +13,7 @@ from handsteer.cli import signals
 from handsteer.cli.running import exit_code, keep_what_is_loaded, set_up_logging, settings, uninterrupted
 from handsteer.clock import Clock
 from handsteer.config import Config
-from handsteer.nodes.node import Node
+from handsteer.nodes.base import Node
 from handsteer.parameters import NodeParameters, from_parameters
 from handsteer.transports import join
 from handsteer.transports.protocol import Session, Transport

@@ -8,7 +8,7 @@ from typing import Literal
 
 from handsteer.config import ControlConfig
 from handsteer.control.effects import rule_from_diagnostics
-from handsteer.nodes.node import ERROR, OK
+from handsteer.nodes.base import ERROR, OK
 from handsteer.robots.course import CourseState, read_course
 from handsteer.timeouts import ROBOT_S
 from handsteer.types import NONE, SIGNS, ZERO, Pose2D, Velocity

@@ -10,8 +10,8 @@ from handsteer.clock import Clock
 from handsteer.errors import CameraError
 from handsteer.images import image_message, jpeg_message
 from handsteer.messages import CAMERA_INFO, IMAGE_COMPRESSED, IMAGE_RAW, CameraInfo, Header
-from handsteer.nodes.node import ERROR, OK, Node
-from handsteer.nodes.stop_keeper import StopKeeper
+from handsteer.nodes.base import ERROR, OK, Node
+from handsteer.nodes.supervision import StopKeeper
 from handsteer.timeouts import STALE_S
 from handsteer.transports.protocol import Transport
 

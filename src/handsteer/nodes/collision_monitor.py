@@ -7,11 +7,25 @@ from collections.abc import Callable
 from handsteer.config import CollisionMonitorConfig
 from handsteer.control.obstacles import ObstacleLimiter
 from handsteer.control.scan_points import points_of
-from handsteer.messages import ODOM, SCAN, LaserScan, Odometry
-from handsteer.nodes.node import Node
-from handsteer.nodes.odometry import MeasuredVelocity
+from handsteer.messages import ODOM, SCAN, LaserScan, Odometry, Pose
+from handsteer.nodes.base import Node
 from handsteer.transports.protocol import Received
 from handsteer.types import Velocity
+
+
+class MeasuredVelocity:
+    """Reads velocities from odometry, including sources that leave the twist at zero while the pose changes."""
+
+    def __init__(self) -> None:
+        self._pose: Pose | None = None
+
+    def read(self, odometry: Odometry) -> Velocity | None:
+        """Return the robot's velocity; None if it moves but its twist does not give the velocity."""
+        twist, pose = odometry.twist.twist, odometry.pose.pose
+        velocity = Velocity(twist.linear.x, twist.angular.z)
+        has_moved, self._pose = self._pose not in (None, pose), pose
+        return None if velocity.is_zero and has_moved else velocity
+
 
 log = logging.getLogger(__name__)
 

@@ -5,9 +5,8 @@ from typing import Any
 
 from handsteer.clock import Clock
 from handsteer.config import CollisionMonitorConfig, Config, ControlConfig
-from handsteer.control.control import Control
+from handsteer.control import Control
 from handsteer.control.effects import rule_to_diagnostics
-from handsteer.control.fleet import NEXT
 from handsteer.control.safety import Following
 from handsteer.messages import (
     CMD_VEL,
@@ -21,14 +20,11 @@ from handsteer.messages import (
     Topic,
     Twist,
 )
-from handsteer.nodes.collision_monitor import CollisionMonitor
-from handsteer.nodes.latency import LatencyLog
-from handsteer.nodes.node import OK, WARN, Node
-from handsteer.nodes.odometry import MeasuredVelocity
-from handsteer.nodes.rivals import Rivals
-from handsteer.nodes.selection import Selection
-from handsteer.nodes.stall_guard import CALM_S, StallGuard
-from handsteer.nodes.stop_keeper import StopKeeper
+from handsteer.nodes.base import OK, WARN, Node
+from handsteer.nodes.collision_monitor import CollisionMonitor, MeasuredVelocity
+from handsteer.nodes.selection import NEXT, Selection
+from handsteer.nodes.supervision import Rivals, StopKeeper
+from handsteer.nodes.timing import CALM_S, LatencyLog, StallGuard
 from handsteer.transports.commands import Commands
 from handsteer.transports.protocol import Call, Received, Transport
 from handsteer.types import NONE, ZERO, Velocity, action_of

@@ -16,12 +16,9 @@ from handsteer.config import Config, SignsConfig
 from handsteer.errors import ConfigError, ModelError
 from handsteer.images import bgr_image, image_message, jpeg_picture
 from handsteer.messages import HAND_SIGN, IMAGE_ANNOTATED, IMAGE_COMPRESSED, IMAGE_RAW, CompressedImage, Image, String
-from handsteer.nodes.frame_age import FrameAge
-from handsteer.nodes.latency import LatencyLog
-from handsteer.nodes.node import OK, WARN, Node
-from handsteer.nodes.recording import Recording
-from handsteer.nodes.stall_guard import CALM_S, StallGuard
-from handsteer.nodes.stop_keeper import StopKeeper
+from handsteer.nodes.base import OK, WARN, Node
+from handsteer.nodes.supervision import StopKeeper
+from handsteer.nodes.timing import CALM_S, FrameAge, LatencyLog, Recording, StallGuard
 from handsteer.signs.classifier import Classifier
 from handsteer.signs.recognizer import Recognition, Recognizer
 from handsteer.transports.protocol import Received, Subscription, Transport

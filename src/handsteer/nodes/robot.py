@@ -42,11 +42,10 @@ from handsteer.messages import (
     twist,
     twist_in,
 )
-from handsteer.nodes.node import ERROR, OK, WARN, Node
-from handsteer.nodes.rivals import Rivals
+from handsteer.nodes.base import ERROR, OK, WARN, Node
 from handsteer.nodes.scans import scan_message
-from handsteer.nodes.stall_guard import StallGuard
-from handsteer.nodes.stop_keeper import StopKeeper
+from handsteer.nodes.supervision import Rivals, StopKeeper
+from handsteer.nodes.timing import StallGuard
 from handsteer.nodes.world_markers import Touches, WorldChanges, gate_strips, world_markers
 from handsteer.robots.course import CourseState, Referee
 from handsteer.robots.diff_drive import Velocity

@@ -10,9 +10,9 @@ from handsteer.config import Config, ControlConfig
 from handsteer.control.safety import Ramp, Safety
 from handsteer.errors import TransportError
 from handsteer.messages import CMD_VEL, STEERING_CMD_VEL, STOP, Bool, Topic
-from handsteer.nodes.node import Node
-from handsteer.nodes.stall_guard import StallGuard
-from handsteer.nodes.stop_keeper import StopKeeper
+from handsteer.nodes.base import Node
+from handsteer.nodes.supervision import StopKeeper
+from handsteer.nodes.timing import StallGuard
 from handsteer.timeouts import STALE_S
 from handsteer.transports.commands import Commands
 from handsteer.transports.protocol import Received, Transport

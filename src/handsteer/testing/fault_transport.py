@@ -10,7 +10,7 @@ from typing import Any, Generic, TypeVar
 
 from handsteer.clock import Clock
 from handsteer.messages import Topic
-from handsteer.nodes.node import Node
+from handsteer.nodes.base import Node
 from handsteer.transports.channels import check_type
 from handsteer.transports.protocol import Publisher, Received, Subscription, Transport
 from handsteer.transports.stale_messages import StaleMessageFilter

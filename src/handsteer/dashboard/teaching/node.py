@@ -17,7 +17,7 @@ from handsteer.errors import TrainingError
 from handsteer.images import bgr_image, encode_jpeg
 from handsteer.landmarks.hand import Hand, Landmarker
 from handsteer.messages import IMAGE_RAW, Image
-from handsteer.nodes.node import Node
+from handsteer.nodes.base import Node
 from handsteer.signs.classifier import Classifier, SignGuess
 from handsteer.signs.drawing import draw_hand
 from handsteer.signs.recognizer import Recognizer

@@ -45,7 +45,7 @@ from handsteer.messages import (
     twist_in,
     yaw_of,
 )
-from handsteer.nodes.node import Node
+from handsteer.nodes.base import Node
 from handsteer.nodes.reporters import split_reporter
 from handsteer.nodes.steering import SteeringNode
 from handsteer.transports.protocol import Received, TellsTypes, Transport
