@@ -8,12 +8,12 @@ from handsteer.config import TeachConfig
 from handsteer.dashboard.panels.teach_collect import counted, said_now
 from handsteer.dashboard.panels.teach_result import opinion
 from handsteer.dashboard.teaching.lesson import Collected, Lesson, View
-from handsteer.signs.recognizer import Recognition
-from handsteer.signs.teaching.collect import Facts, Status
+from handsteer.recognition.recognizer import Recognition
+from handsteer.training.custom.collect import Facts, Status
 from handsteer.types import EFFECTS, NONE, Action
 from tests.dashboard.served import Site
-from tests.signs.hands import show_sign
-from tests.signs.teaching.takes import take
+from tests.recognition.hands import show_sign
+from tests.training.custom.takes import take
 
 HAND = show_sign("Peace")
 

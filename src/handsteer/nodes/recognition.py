@@ -19,8 +19,8 @@ from handsteer.messages import HAND_SIGN, IMAGE_ANNOTATED, IMAGE_COMPRESSED, IMA
 from handsteer.nodes.base import OK, WARN, Node
 from handsteer.nodes.supervision import StopKeeper
 from handsteer.nodes.timing import CALM_S, FrameAge, LatencyLog, Recording, StallGuard
-from handsteer.signs.classifier import Classifier
-from handsteer.signs.recognizer import Recognition, Recognizer
+from handsteer.recognition.classifier import Classifier
+from handsteer.recognition.recognizer import Recognition, Recognizer
 from handsteer.transports.protocol import Received, Subscription, Transport
 from handsteer.types import NONE
 

@@ -9,7 +9,7 @@ from nicegui import ui
 
 from handsteer.dashboard.panels.elements import box, button, switch, text
 from handsteer.dashboard.teaching.lesson import Collected, View, hands_in
-from handsteer.signs.teaching.dataset import Dataset, summarise
+from handsteer.training.custom.dataset import Dataset, summarise
 from handsteer.types import NONE
 
 _LONGEST = 200
