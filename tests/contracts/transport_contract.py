@@ -26,7 +26,7 @@ from handsteer.messages import (
     twist,
 )
 from handsteer.nodes.base import Node
-from handsteer.nodes.reporters import split_reporter
+from handsteer.nodes.diagnostics import split_reporter
 from handsteer.transports.protocol import Publisher, Received, Transport
 
 M = TypeVar("M")

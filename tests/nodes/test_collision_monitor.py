@@ -26,8 +26,7 @@ from handsteer.messages import (
     twist,
 )
 from handsteer.nodes.control import HandSignControlNode
-from handsteer.nodes.robot import RobotNode
-from handsteer.nodes.scans import scan_message
+from handsteer.nodes.robot import RobotNode, scan_message
 from handsteer.nodes.steering import SteeringNode
 from handsteer.robots.protocol import RangeScan
 from handsteer.robots.simulated import SimulatedRobot

@@ -303,7 +303,7 @@ def test_says_that_it_is_stopped_and_then_disarmed_and_how_it_moves_again(bench:
     bench.steering.steer(0.5, 0.0)
     stop(bench, True)
     stop(bench, False)
-    assert says() == "standing: disarmed, steers once the steering has been let go"
+    assert says() == "standing: disarmed, steers once the steering has been released"
     bench.steering.release()
     assert says() == "standing: steered by hand, at zero"
 
@@ -541,5 +541,5 @@ def test_a_robot_that_nobody_hears_is_not_driven_on() -> None:
         signs.publish(String(data=sign), bench.clock.now())
         bench.run(1 / 30)
     values = {value.key: value.value for value in statuses[-1].status[0].values}
-    assert values["linear_mps"] == "0.000"
+    assert values["linear_mps"] == "0.0"
     assert "no robot listens" in statuses[-1].status[0].message

@@ -4,6 +4,7 @@ import math
 from typing import Literal
 
 from handsteer.config import ControlConfig
+from handsteer.control.explain import Reason
 from handsteer.control.sign_control import SignControl
 from handsteer.types import NONE, ZERO, Velocity, action_of
 
@@ -81,19 +82,18 @@ class TwistMux:
         return self._say(ZERO if was_driving else None)
 
     @property
-    def reason(self) -> str:
-        """A sentence on what is commanded, and why the robot is stopped if it is."""
+    def reason(self) -> Reason:
+        """Why this velocity is commanded."""
         if self.source == "steering":
-            return "standing: steered by hand, at zero" if self._velocity.is_zero else "driving: steered by hand"
+            return Reason("steered_at_zero" if self._velocity.is_zero else "steered")
         if self.source == "nobody":
-            return f"standing: no sign has come for {self._config.sign_timeout:g} s"
-        if not self._velocity.is_zero:
-            return f"driving: {self._last_sign}"
+            return Reason("no_input", f"{self._config.sign_timeout:g}")
         sign = self._last_sign or NONE
+        if not self._velocity.is_zero:
+            return Reason("sign", sign)
         if sign == NONE:
-            return "standing: no sign is seen"
-        stops = action_of(sign, self._config.actions) == "stop"
-        return f"standing: the {sign} sign is shown" if stops else "standing: no sign has set it in motion yet"
+            return Reason("no_sign")
+        return Reason("stop_sign", sign) if action_of(sign, self._config.actions) == "stop" else Reason("not_started")
 
     def _steer(self, wanted: Velocity) -> Velocity | None:
         config = self._config

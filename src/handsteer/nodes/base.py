@@ -6,15 +6,13 @@ from typing import Any, TypeVar
 
 from handsteer.clock import Clock
 from handsteer.config import Config
-from handsteer.messages import DIAGNOSTICS, DiagnosticArray, DiagnosticStatus, Header, KeyValue, Topic
+from handsteer.messages import DIAGNOSTICS, Topic
 from handsteer.nodes.callbacks import FailureLog, Inbox, Timer
+from handsteer.nodes.diagnostics import write_status
+from handsteer.nodes.status import Status
 from handsteer.transports.protocol import Call, Publisher, Received, Subscription, Transport
 
 M = TypeVar("M")
-
-OK, WARN, ERROR = 0, 1, 2
-"""Levels of ``diagnostic_msgs/DiagnosticStatus``."""
-
 
 _LOOK_FOR_LISTENERS_S = 0.5
 
@@ -119,15 +117,16 @@ class Node:
         self._timers.append(timer)
         return timer
 
-    def diagnose_every(self, period_s: float, report: Callable[[], None]) -> None:
-        """Call ``report``, which publishes this node's state by :meth:`diagnose`, every ``period_s`` seconds.
+    def diagnose_every(self, period_s: float, status: Callable[[], Status]) -> None:
+        """Publish ``status()``, the state of this node, on ``/diagnostics`` every ``period_s`` seconds.
 
         Without subscribers it is skipped; a new subscriber receives its first report within half a second.
         """
 
         def beat() -> None:
-            if self.is_diagnosed:
-                report()
+            if self._diagnostics.has_subscribers:
+                name = self.transport.full_name(self.name)
+                self._diagnostics.publish(write_status(status(), name, self.clock.stamp(self.clock.now())))
             else:
                 timer.delay_until(self.clock.now() + _LOOK_FOR_LISTENERS_S)
 
@@ -142,21 +141,6 @@ class Node:
         with self._wake:
             self._new_config = config
             self._wake.notify()
-
-    @property
-    def is_diagnosed(self) -> bool:
-        """Whether ``/diagnostics`` has subscribers."""
-        return self._diagnostics.has_subscribers
-
-    def diagnose(self, level: int, message: str, **values: object) -> None:
-        """Publish this node's state on ``/diagnostics``: a level, a sentence for people, and named values."""
-        if self.is_diagnosed:
-            pairs = [KeyValue(key, str(value)) for key, value in values.items()]
-            status = DiagnosticStatus(
-                level=level, name=self.transport.full_name(self.name), message=message, hardware_id="", values=pairs
-            )
-            header = Header(stamp=self.clock.stamp(self.clock.now()), frame_id="")
-            self._diagnostics.publish(DiagnosticArray(header=header, status=[status]))
 
     @property
     def next_due_s(self) -> float | None:

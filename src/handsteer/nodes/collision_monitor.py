@@ -3,8 +3,10 @@
 import logging
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 from handsteer.config import CollisionMonitorConfig
+from handsteer.control.explain import Reason
 from handsteer.control.obstacles import ObstacleLimiter
 from handsteer.control.scan_points import points_of
 from handsteer.messages import ODOM, SCAN, LaserScan, Odometry, Pose
@@ -71,13 +73,13 @@ class CollisionMonitor:
             self._on_slowed(allowed)
         return allowed
 
-    def explain(self, reason: str) -> str:
-        """Return the control's ``reason`` and what slows the robot, as ``driving: Forward, slowed: obstacle …``."""
+    def explain(self, reason: Reason) -> Reason:
+        """Return the control's ``reason``, with the obstacle that slows or stops the robot."""
         hit = self._limiter.hit if self._limiter.rule.enabled else None
         if hit is None:
             return reason
-        said = hit.describe(self._limiter.rule)
-        return f"standing: stopped before an {said}" if self._stands else f"{reason}, slowed: {said}"
+        obstacle = hit.describe(self._limiter.rule)
+        return Reason("obstacle", obstacle) if self._stands else replace(reason, slowed=obstacle)
 
     def why_blind(self) -> str:
         """Return why nothing may move without scans; empty if scans are received or not required."""
@@ -92,10 +94,11 @@ class CollisionMonitor:
             return "the laser scans that come say nothing, so what is in the way is not known"
         return f"laser scans come {self._limiter.silence_s(now):.1f} s after their stamp: are the clocks in step?"
 
-    def values(self) -> dict[str, str]:
-        """Return the values for diagnostics."""
+    @property
+    def obstacle_m(self) -> float | None:
+        """Distance of the obstacle that limited the last command; None if none did."""
         hit = self._limiter.hit
-        return {} if hit is None else {"obstacle_m": f"{max(0.0, hit.gap_m):.2f}"}
+        return None if hit is None else round(max(0.0, hit.gap_m), 2)
 
     def _on_scan(self, received: Received[LaserScan]) -> None:
         now = self._node.clock.now()

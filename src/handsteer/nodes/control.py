@@ -6,7 +6,7 @@ from typing import Any
 from handsteer.clock import Clock
 from handsteer.config import CollisionMonitorConfig, Config, ControlConfig
 from handsteer.control import Control
-from handsteer.control.effects import rule_to_diagnostics
+from handsteer.control.explain import Reason
 from handsteer.control.safety import Following
 from handsteer.messages import (
     CMD_VEL,
@@ -20,9 +20,10 @@ from handsteer.messages import (
     Topic,
     Twist,
 )
-from handsteer.nodes.base import OK, WARN, Node
+from handsteer.nodes.base import Node
 from handsteer.nodes.collision_monitor import CollisionMonitor, MeasuredVelocity
 from handsteer.nodes.selection import NEXT, Selection
+from handsteer.nodes.status import ControlStatus
 from handsteer.nodes.supervision import Rivals, StopKeeper
 from handsteer.nodes.timing import CALM_S, LatencyLog, StallGuard
 from handsteer.transports.commands import Commands
@@ -125,10 +126,10 @@ class HandSignControlNode(Node):
             self._publish(ZERO)
         else:
             if self._safety.is_stopped:
-                log.info("stop is reset by false on %s, which is published by %s", *self._told_by(STOP))
+                log.info("stop is reset by false on %s, which is published by %s", *self._published_by(STOP))
             self._control.reset()
 
-    def _told_by(self, topic: Topic[Any]) -> tuple[str, str]:
+    def _published_by(self, topic: Topic[Any]) -> tuple[str, str]:
         publishers = self.transport.publishers_of(topic)
         return self.transport.topic_name(topic), ", ".join(publishers) or "nobody that is known"
 
@@ -235,51 +236,41 @@ class HandSignControlNode(Node):
         now = self.clock.now()
         elapsed_s, self._last_step_s = now - self._last_step_s, now
         if self._stall_guard.note(now):
-            self._safety.fault("the control was held up")
+            self._safety.fault("the control was stalled")
         return elapsed_s
 
-    def _report(self) -> None:
+    def _report(self) -> ControlStatus:
         velocity = self._mux.velocity
-        self.diagnose(
-            WARN if self._rivals.warning or self._monitor.why_blind() else OK,
-            self._reason,
+        # There are no latencies if the transport does not carry capture times with signs.
+        is_measured = len(self.latency) > 0
+        return ControlStatus(
+            reason=self._reason,
             source=self._mux.source,
             stopped=self._safety.is_stopped,
             armed=self._safety.signs_wait is None,
-            linear_mps=f"{velocity.linear_mps:.3f}",
-            angular_radps=f"{velocity.angular_radps:.3f}",
-            **({"robot": self._selection.fleet.selected} if self._selection else {}),
-            **rule_to_diagnostics(self._config),
-            **self._monitor.values(),
-            **({"warning": self._rivals.warning} if self._rivals.warning else {}),
-            **self._latencies(),
+            linear_mps=round(velocity.linear_mps, 3),
+            angular_radps=round(velocity.angular_radps, 3),
+            robot=self._selection.fleet.selected if self._selection else None,
+            blind=bool(self._monitor.why_blind()),
+            obstacle_m=self._monitor.obstacle_m,
+            warning=self._rivals.warning or None,
+            latency_median_ms=round(self.latency.percentile_ms(50), 1) if is_measured else None,
+            latency_p99_ms=round(self.latency.percentile_ms(99), 1) if is_measured else None,
+            rule=self._config,
         )
 
     @property
-    def _reason(self) -> str:
+    def _reason(self) -> Reason:
         safety = self._safety
         if safety.is_stopped:
-            return "standing: stopped, until it is reset"
+            return Reason("stopped")
         if why_blind := self._monitor.why_blind():
-            return f"standing: {why_blind}"
-        source = self._mux.source
-        if source == "steering":
-            waits = safety.steering_waits
-            return (
-                f"standing: {self._disarmed}, steers once the steering has been let go"
-                if waits
-                else self._monitor.explain(self._mux.reason)
-            )
-        why = safety.signs_wait
-        if why is None or (source == "nobody" and not why):
+            return Reason("no_scan", why_blind)
+        source, why = self._mux.source, safety.signs_wait
+        robot = self._selection.fleet.selected if self._selection else ""
+        if source == "steering" and safety.steering_waits:
+            return Reason("steering_disarmed", robot=robot)
+        # Without any input, that is the reason after a reset, which needs no explanation.
+        if source == "steering" or why is None or (source == "nobody" and not why):
             return self._monitor.explain(self._mux.reason)
-        return f"standing: {self._disarmed}{f' ({why})' if why else ''}, moves once Stop is shown, or no hand"
-
-    @property
-    def _disarmed(self) -> str:
-        return f"{self._selection.fleet.selected} is disarmed" if self._selection else "disarmed"
-
-    def _latencies(self) -> dict[str, str]:
-        """Return the latency's percentiles; empty if the transport does not carry capture times with signs."""
-        percents = {"latency_median_ms": 50, "latency_p99_ms": 99} if len(self.latency) else {}
-        return {name: f"{self.latency.percentile_ms(percent):.1f}" for name, percent in percents.items()}
+        return Reason("disarmed", why, robot)

@@ -1,6 +1,5 @@
 """The node ``hand_sign_recognition``, which publishes a sign for each frame."""
 
-import json
 import logging
 import math
 from collections.abc import Callable
@@ -16,7 +15,8 @@ from handsteer.config import Config, SignsConfig
 from handsteer.errors import ConfigError, ModelError
 from handsteer.images import bgr_image, image_message, jpeg_picture
 from handsteer.messages import HAND_SIGN, IMAGE_ANNOTATED, IMAGE_COMPRESSED, IMAGE_RAW, CompressedImage, Image, String
-from handsteer.nodes.base import OK, WARN, Node
+from handsteer.nodes.base import Node
+from handsteer.nodes.status import RecognitionStatus
 from handsteer.nodes.supervision import StopKeeper
 from handsteer.nodes.timing import CALM_S, FrameAge, LatencyLog, Recording, StallGuard
 from handsteer.recognition.classifier import Classifier
@@ -29,7 +29,6 @@ _WATCH_PERIOD_S = 0.02
 _SILENCE_PERIOD_S = 0.5
 _DIAGNOSE_PERIOD_S = 0.1
 _CHOOSE_PERIOD_S = 0.5
-_SHORTLY_S = 3.0
 
 log = logging.getLogger(__name__)
 
@@ -128,7 +127,7 @@ class HandSignRecognitionNode(Node):
         if self._refused is not None:
             self._refused = self._recording.hint(began_s) or self._refused
         if self._refused is None and self._stall_guard.distrusts(began_s):
-            self._refused = "this process was held up, and frames may have waited meanwhile"
+            self._refused = "this process was stalled, and frames may have waited meanwhile"
         image = picture_of(received.message)
         if self._refused is None:
             self._look_at(image, received, began_s, captured_s)
@@ -170,7 +169,7 @@ class HandSignRecognitionNode(Node):
         if age_s <= self._config.max_frame_age:
             return None
         self._recognizer.reset()
-        return f"a frame was {age_s:.1f} s old when its sign was told: was this process held up?"
+        return f"a frame was {age_s:.1f} s old when its sign was known: was this process stalled?"
 
     def _take_images(self) -> Subscription:
         if self._compressed:
@@ -206,42 +205,27 @@ class HandSignRecognitionNode(Node):
             self._recognition = None
             self._sign.publish(String(data=NONE))
 
-    def _report(self) -> None:
-        seen = self._recognition
-        signs = json.dumps(self._recognizer.signs)
+    def _report(self) -> RecognitionStatus:
+        now, seen = self.clock.now(), self._recognition
         if seen is None:
-            self.diagnose(WARN, self._why_no_frame(), sign=NONE, signs=signs)
-            return
-        self.diagnose(
-            OK,
-            self._reason(seen),
+            refuses_now = self._refused is not None and now - self._refused_s <= self._config.max_frame_age
+            no_frame_s = None if refuses_now else round(now - max(self._last_frame_s, self._refused_s), 1)
+            return RecognitionStatus(signs=self._recognizer.signs, no_frame_s=no_frame_s, refused=self._refused or "")
+        is_hand_lost = seen.hand is None and self._last_hand_s is not None
+        return RecognitionStatus(
             sign=seen.sign,
-            signs=signs,
+            signs=self._recognizer.signs,
             seen=seen.seen,
-            confidence=f"{seen.confidence:.2f}",
-            progress=f"{seen.progress:.2f}",
+            confidence=round(seen.confidence, 2),
+            progress=round(seen.progress, 2),
             handedness=seen.hand.handedness if seen.hand else "",
-            processing_ms=f"{self.processing.percentile_ms(50):.1f}",
-            processing_p99_ms=f"{self.processing.percentile_ms(99):.1f}",
+            no_hand_s=round(now - (self._last_hand_s or 0.0), 1) if is_hand_lost else None,
+            processing_ms=round(self.processing.percentile_ms(50), 1),
+            processing_p99_ms=round(self.processing.percentile_ms(99), 1),
             recording=self._recording.is_followed,
-            frame_age_ms=f"{self._age.age_s * 1000:.0f}",
-            clock_ahead_ms=f"{self._age.ahead_s * 1000:.0f}",
+            frame_age_ms=round(self._age.age_s * 1000),
+            clock_ahead_ms=round(self._age.ahead_s * 1000),
         )
-
-    def _reason(self, seen: Recognition) -> str:
-        if seen.hand is not None or self._last_hand_s is None:
-            return seen.reason
-        unseen_s = self.clock.now() - self._last_hand_s
-        # Tenths matter only for a hand that was lost just now.
-        return f"no hand seen for {unseen_s:.{1 if unseen_s < _SHORTLY_S else 0}f} s"
-
-    def _why_no_frame(self) -> str:
-        now = self.clock.now()
-        if self._refused is not None and now - self._refused_s <= self._config.max_frame_age:
-            return self._refused
-        unseen_s = now - max(self._last_frame_s, self._refused_s)
-        before = f"; before: {self._refused}" if self._refused is not None else ""
-        return f"no frame for {unseen_s:.1f} s{before}"
 
 
 _GONE = (-1, -1)
