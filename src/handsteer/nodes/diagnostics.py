@@ -89,8 +89,8 @@ def _rule_values(rule: ControlConfig) -> Iterator[tuple[str, str]]:
 def _joined(items: Iterable[object]) -> str:
     """Return ``items`` separated by commas; one that has a comma itself is in quotes."""
     line = io.StringIO()
-    csv.writer(line, lineterminator="").writerow(items)
-    return line.getvalue()
+    csv.writer(line).writerow(items)
+    return line.getvalue().removesuffix("\r\n")
 
 
 @cache
