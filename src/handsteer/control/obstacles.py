@@ -13,8 +13,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handsteer.config import CollisionMonitorConfig
-from handsteer.control.footprint import after, braking, fastest_mps, gaps, least_gaps, on_a_circle, reach_m, seen_from
-from handsteer.control.scan_points import Points
+from handsteer.control.footprint import (
+    Points,
+    after,
+    braking,
+    fastest_mps,
+    gaps,
+    least_gaps,
+    on_a_circle,
+    reach_m,
+    seen_from,
+)
 from handsteer.types import ZERO, Velocity
 
 _PAD_M = 0.02

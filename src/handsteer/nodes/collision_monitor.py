@@ -7,8 +7,8 @@ from dataclasses import replace
 
 from handsteer.config import CollisionMonitorConfig
 from handsteer.control.explain import Reason
+from handsteer.control.footprint import points_of
 from handsteer.control.obstacles import ObstacleLimiter
-from handsteer.control.scan_points import points_of
 from handsteer.messages import ODOM, SCAN, LaserScan, Odometry, Pose
 from handsteer.nodes.base import Node
 from handsteer.transports.protocol import Received

@@ -16,6 +16,8 @@ from handsteer.recognition.landmarker import MediaPipeLandmarker
 from handsteer.recognition.shipped_signs import ShippedClassifier, load_model
 from handsteer.types import NONE, describe_seen
 
+_NOTHING = SignGuess(NONE, 0.0)
+
 
 def open_landmarker(config: Config) -> Landmarker:
     """Return the hand landmarker.
@@ -34,9 +36,6 @@ def open_classifier(config: SignsConfig) -> Classifier:
     """
     shipped = ShippedClassifier(load_model())
     return CustomClassifier(shipped, load_custom_model(config.model.expanduser())) if config.model else shipped
-
-
-_NOTHING = SignGuess(NONE, 0.0)
 
 
 @dataclass(frozen=True)

@@ -21,6 +21,9 @@ from handsteer.training.evaluation.video_metrics import FrameVerdict
 from handsteer.training.evaluation.views import View
 from handsteer.types import NONE
 
+Watch = Callable[[Iterable[Any], str], Iterable[Any]]
+"""Passes items through, given their unit; may show the progress."""
+
 
 def evaluate_photos(photos: Iterable[LabelledPhoto], recognizer: Recognizer, view: View) -> Iterator[PhotoResult]:
     """Yield the recognition of each photo, independently of the others.
@@ -121,10 +124,6 @@ def lacks_depth(hand: Hand, label: str, classifier: Classifier) -> bool:
     if np.isfinite(hand.world).all():
         return False
     return not (isinstance(classifier, CustomClassifier) and label in classifier.signs_without_depth)
-
-
-Watch = Callable[[Iterable[Any], str], Iterable[Any]]
-"""Passes items through, given their unit; may show the progress."""
 
 
 @dataclass(frozen=True)
