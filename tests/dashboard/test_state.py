@@ -177,9 +177,9 @@ def test_reads_only_sound_deflections_of_the_pad(sent: object, read: tuple[float
 
 def test_what_is_wrong_with_the_robot_is_said_whatever_it_is_told() -> None:
     for speed in (0.1, 0.0):
-        robot = RobotStatus(trouble="is not there: nobody listens on /cmd_vel")
+        robot = RobotStatus(trouble="is not there: no node subscribes to /cmd_vel")
         says = explain(reporting(control(Reason("sign", "Forward"), linear=speed), robot))
-        assert says == ("trouble", "Trouble", "the robot is not there: nobody listens on /cmd_vel")
+        assert says == ("trouble", "Trouble", "the robot is not there: no node subscribes to /cmd_vel")
 
 
 STOPPED = ControlStatus(Reason("stopped"), stopped=True)

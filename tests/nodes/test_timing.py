@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from handsteer.config import Recorded
 from handsteer.nodes.timing import FrameAge, Recording, StallGuard, duration_in_words
-from handsteer.timeouts import BURST_S, HELD_UP_S
+from handsteer.timeouts import BURST_S, DISTRUST_S
 
 
 def test_what_comes_soon_after_an_interruption_is_distrusted() -> None:
@@ -16,15 +16,15 @@ def test_what_comes_soon_after_an_interruption_is_distrusted() -> None:
     assert not interruption.distrusts(0.3)
     assert interruption.note(1.0)
     assert interruption.distrusts(1.0)
-    assert interruption.distrusts(1.0 + HELD_UP_S / 2)
-    assert not interruption.distrusts(1.0 + HELD_UP_S)
+    assert interruption.distrusts(1.0 + DISTRUST_S / 2)
+    assert not interruption.distrusts(1.0 + DISTRUST_S)
 
 
 def test_a_burst_is_distrusted_to_its_end_however_long_it_takes() -> None:
     interruption = StallGuard(0.35, 0.0)
     interruption.note(1.0)
     now_s = 1.0
-    while now_s < 1.0 + 5 * HELD_UP_S:
+    while now_s < 1.0 + 5 * DISTRUST_S:
         assert interruption.distrusts(now_s)
         now_s += BURST_S / 2
     now_s += BURST_S
@@ -123,7 +123,7 @@ def test_a_clock_that_is_set_while_frames_come_is_followed_after_a_second(set_by
     assert set(told[:90]) == {None}
     way = "back" if set_by_s > 0 else "ahead"
     assert told[91] is not None
-    assert told[91].startswith(f"a clock was set {way} by {abs(set_by_s):.1f} s: frames are timed anew")
+    assert told[91].startswith(f"a clock was set {way} by {abs(set_by_s):.1f} s: frames are timed again")
     assert set(told[121:]) == {None}
 
 

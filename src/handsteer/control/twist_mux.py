@@ -56,7 +56,7 @@ class TwistMux:
         if sign is not None:
             self._last_sign = sign
         self.source = "nobody" if self._signs.silent else "signs"
-        return self._say(velocity)
+        return self._take(velocity)
 
     def reconfigure(self, config: ControlConfig) -> Velocity | None:
         """Change limits, steps, times and actions; no change makes the robot faster.
@@ -67,7 +67,7 @@ class TwistMux:
         self._config = config
         self._signs.reconfigure(config)
         within = self._velocity.clamped(config.max_linear, config.max_angular)
-        return self._say(within if self.source != "nobody" and within != self._velocity else None)
+        return self._take(within if self.source != "nobody" and within != self._velocity else None)
 
     def hold_back(self, velocity: Velocity) -> None:
         """Continue from ``velocity``, a slower one that was commanded instead of the last."""
@@ -79,7 +79,7 @@ class TwistMux:
         was_driving = self.source != "nobody"
         self._signs.halt()
         self.source = "nobody"
-        return self._say(ZERO if was_driving else None)
+        return self._take(ZERO if was_driving else None)
 
     @property
     def reason(self) -> Reason:
@@ -100,13 +100,13 @@ class TwistMux:
         self._signs.halt()
         self.source = "steering"
         self._since_steering_s = 0.0
-        return self._say(wanted.clamped(config.max_linear, config.max_angular) if wanted.is_finite else ZERO)
+        return self._take(wanted.clamped(config.max_linear, config.max_angular) if wanted.is_finite else ZERO)
 
     def _wait_for_steering(self, dt_s: float) -> Velocity | None:
         self._since_steering_s += dt_s
         return self.halt() if self._since_steering_s >= self._config.steering_timeout else None
 
-    def _say(self, velocity: Velocity | None) -> Velocity | None:
+    def _take(self, velocity: Velocity | None) -> Velocity | None:
         if velocity is not None:
             self._velocity = velocity
         return velocity

@@ -91,7 +91,7 @@ class CollisionMonitor:
             since = f" for {now - self._came_s:.1f} s" if math.isfinite(self._came_s) else ""
             return f"no laser scan has come{since}, so what is in the way is not known"
         if self._is_broken:
-            return "the laser scans that come say nothing, so what is in the way is not known"
+            return "the laser scans that come have no valid range, so what is in the way is not known"
         return f"laser scans come {self._limiter.silence_s(now):.1f} s after their stamp: are the clocks in step?"
 
     @property
@@ -107,7 +107,7 @@ class CollisionMonitor:
         if (points is None) != self._is_broken:
             self._is_broken = points is None
             (log.warning if self._is_broken else log.info)(
-                "laser scans %s", "say nothing" if self._is_broken else "come again"
+                "laser scans %s", "have no valid range" if self._is_broken else "are valid again"
             )
         if points is not None:
             captured_s = now if received.captured_s is None else received.captured_s

@@ -104,13 +104,13 @@ class HandSignControlNode(Node):
         """Return ``stop`` and ``reset``, which are equivalent to true and false on ``/stop``."""
         publisher = self.publisher(STOP)
 
-        def say(is_stopped: bool, answer: str) -> str:
+        def publish(is_stopped: bool, answer: str) -> str:
             publisher.publish(Bool(data=is_stopped))
             return answer
 
         return {
-            "stop": lambda: say(True, "stopped, until it is reset"),
-            "reset": lambda: say(False, "reset"),
+            "stop": lambda: publish(True, "stopped, until it is reset"),
+            "reset": lambda: publish(False, "reset"),
         }
 
     def on_stop(self) -> None:
@@ -131,7 +131,7 @@ class HandSignControlNode(Node):
 
     def _published_by(self, topic: Topic[Any]) -> tuple[str, str]:
         publishers = self.transport.publishers_of(topic)
-        return self.transport.topic_name(topic), ", ".join(publishers) or "nobody that is known"
+        return self.transport.topic_name(topic), ", ".join(publishers) or "no known node"
 
     def _on_sign(self, received: Received[String]) -> None:
         captured_s = received.captured_s

@@ -186,7 +186,7 @@ class HandSignRecognitionNode(Node):
         self._compressed = not self._compressed
         self._images = self._take_images()
         here, there = (self.transport.topic_name(topic) for topic in (taken, other))
-        log.info("nobody publishes %s: images are taken from %s, of %s", here, there, ", ".join(names(other)))
+        log.info("no node publishes %s: images are taken from %s, of %s", here, there, ", ".join(names(other)))
 
     def _since_last_frame(self, captured_s: float) -> float:
         last_s = captured_s if self._last_captured_s is None else self._last_captured_s

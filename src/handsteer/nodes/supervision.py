@@ -71,21 +71,21 @@ class Rivals:
         self._looks: dict[str, Look] = {node.transport.topic_name(topic): self._look_at(topic) for topic in topics}
         self._looks |= elsewhere or {}
         self._seen: dict[str, int] = {}
-        self._said: set[str] = set()
+        self._logged: set[str] = set()
         node.every(_PERIOD_S, self._look)
 
     def _look_at(self, topic: Topic[Any]) -> Look:
         return lambda: self._node.transport.publishers_of(topic)
 
     def _look(self) -> None:
-        warnings = [warning for name, look in self._looks.items() if (warning := self._amiss(name, look()))]
+        warnings = [warning for name, look in self._looks.items() if (warning := self._problem(name, look()))]
         for warning in warnings:
-            if warning not in self._said:
+            if warning not in self._logged:
                 log.warning("%s: %s", self._node.name, warning)
-        self._said = set(warnings)
+        self._logged = set(warnings)
         self.warning = "; ".join(warnings)
 
-    def _amiss(self, topic: str, publishers: Sequence[str]) -> str:
+    def _problem(self, topic: str, publishers: Sequence[str]) -> str:
         if len(publishers) < 2:
             self._seen.pop(topic, None)
             return ""

@@ -7,7 +7,7 @@ import numpy as np
 
 from handsteer.clock import ClockWatch
 from handsteer.config import Recorded
-from handsteer.timeouts import BURST_S, HELD_UP_S, RECORDED_S, RESYNC_S, STALE_S
+from handsteer.timeouts import BURST_S, DISTRUST_S, RECORDED_S, RESYNC_S, STALE_S
 
 log = logging.getLogger(__name__)
 
@@ -41,7 +41,7 @@ class StallGuard:
         interrupted = now_s - self._noted_s > self.limit_s
         self._noted_s = now_s
         if interrupted:
-            self._distrust_until_s = now_s + HELD_UP_S
+            self._distrust_until_s = now_s + DISTRUST_S
             self._in_burst = True
         return interrupted
 
@@ -93,7 +93,7 @@ class FrameAge:
         self.ahead_s = max(0.0, self.ahead_s - _LEAK * elapsed_s)
         corrected_s = self._watch.corrected(now_s - captured_s, now_s)
         if corrected_s is None:
-            return f"{_clock_change(self._watch.set_by_s)}: frames are timed anew in a moment"
+            return f"{_clock_change(self._watch.set_by_s)}: frames are timed again in a moment"
         by_stamp_s = corrected_s
         if by_stamp_s < -self.limit_s:
             return f"frames are stamped {-by_stamp_s:.1f} s ahead of our clock: are the clocks of the machines in step?"
@@ -133,7 +133,7 @@ class Recording:
         self.is_followed = False
         self._captured_s: float | None = None
         self._in_step_since: tuple[float, float] | None = None
-        self._said = False
+        self._is_logged = False
 
     def follows(self, now_s: float, captured_s: float, *, by_player: bool) -> bool:
         """Record a frame; return whether it is accepted as a recording's, captured now.
@@ -151,7 +151,7 @@ class Recording:
         # A stamp that does not advance comes from a camera or clock that has failed.
         self.is_followed = meant and long_ago and not stands
         if self.is_followed:
-            self._say(
+            self._log_once(
                 logging.INFO, f"frames are stamped {duration_in_words(age_s)} ago: they are followed, as a recording's"
             )
         return self.is_followed
@@ -168,17 +168,17 @@ class Recording:
             "parameter recorded to always, or play it with --clock and use_sim_time; else the clocks of machines are "
             "not in step"
         )
-        self._say(logging.WARNING, hint)
+        self._log_once(logging.WARNING, hint)
         return hint
 
     def _note_step(self, now_s: float, age_s: float) -> None:
         if self._in_step_since is None or abs(age_s - self._in_step_since[1]) > STALE_S:
             self._in_step_since = (now_s, age_s)
 
-    def _say(self, level: int, message: str) -> None:
-        if not self._said:
+    def _log_once(self, level: int, message: str) -> None:
+        if not self._is_logged:
             log.log(level, message)
-        self._said = True
+        self._is_logged = True
 
 
 def duration_in_words(seconds: float) -> str:
