@@ -9,7 +9,16 @@ from handsteer.cameras.protocol import Camera, EndOfStream, Frame
 from handsteer.clock import Clock
 from handsteer.errors import CameraError
 from handsteer.images import image_message, jpeg_message
-from handsteer.messages import CAMERA_INFO, IMAGE_COMPRESSED, IMAGE_RAW, CameraInfo, Header
+from handsteer.messages import (
+    CAMERA_INFO,
+    IMAGE_COMPRESSED,
+    IMAGE_RAW,
+    CameraInfo,
+    CompressedImage,
+    Header,
+    Image,
+    Topic,
+)
 from handsteer.nodes.base import Node
 from handsteer.nodes.status import OK, CameraStatus
 from handsteer.nodes.supervision import StopKeeper
@@ -33,6 +42,8 @@ class CameraNode(Node):
         camera: Delivers the frames.
         frame_id: Coordinate frame of the images.
         calibration: Calibration of the lens, for pictures of its size; None if there is none.
+        image: Topic of the frames.
+        compressed: Topic of the same as JPEG, on demand.
 
     Attributes:
         ended: Set when a file has ended and ends the run.
@@ -46,6 +57,9 @@ class CameraNode(Node):
         camera: Camera,
         frame_id: str = "camera_optical_frame",
         calibration: CameraInfo | None = None,
+        *,
+        image: Topic[Image] = IMAGE_RAW,
+        compressed: Topic[CompressedImage] = IMAGE_COMPRESSED,
     ) -> None:
         super().__init__("my_camera", transport, clock)
         self.frames = 0
@@ -60,8 +74,8 @@ class CameraNode(Node):
         self._last_read_s = clock.now()
         self._is_frozen = False
         StopKeeper(self)
-        self._image = self.publisher(IMAGE_RAW)
-        self._compressed = self.publisher(IMAGE_COMPRESSED)
+        self._image = self.publisher(image)
+        self._compressed = self.publisher(compressed)
         self._info = self.publisher(CAMERA_INFO)
         self._reading = self.every(camera.period_s or 0.0, self._read)
         self.diagnose_every(_DIAGNOSE_PERIOD_S, self._report)

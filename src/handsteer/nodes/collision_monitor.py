@@ -9,7 +9,7 @@ from handsteer.config import CollisionMonitorConfig
 from handsteer.control.explain import Reason
 from handsteer.control.footprint import points_of
 from handsteer.control.obstacles import ObstacleLimiter
-from handsteer.messages import ODOM, SCAN, LaserScan, Odometry, Pose
+from handsteer.messages import LaserScan, Odometry, Pose, Topic
 from handsteer.nodes.base import Node
 from handsteer.transports.protocol import Received
 from handsteer.types import Velocity
@@ -39,11 +39,21 @@ class CollisionMonitor:
         node: The control.
         rule: Whether it is enabled, and its parameters.
         on_slowed: Receives each velocity that is commanded instead of a faster one.
+        scan: Topic of the laser scans.
+        odom: Topic of the robot's odometry.
     """
 
-    def __init__(self, node: Node, rule: CollisionMonitorConfig, on_slowed: Callable[[Velocity], None]) -> None:
+    def __init__(
+        self,
+        node: Node,
+        rule: CollisionMonitorConfig,
+        on_slowed: Callable[[Velocity], None],
+        scan: Topic[LaserScan],
+        odom: Topic[Odometry],
+    ) -> None:
         self._node = node
         self._on_slowed = on_slowed
+        self._scan, self._odom = scan, odom
         self._limiter = ObstacleLimiter(rule)
         self._listens = False
         self._came_s = -math.inf
@@ -58,8 +68,8 @@ class CollisionMonitor:
         self._limiter.hit = None
         if rule.enabled and not self._listens:
             self._listens = True
-            self._node.subscribe(SCAN, self._on_scan)
-            self._node.subscribe(ODOM, self._on_odometry)
+            self._node.subscribe(self._scan, self._on_scan)
+            self._node.subscribe(self._odom, self._on_odometry)
 
     def admit(self, wanted: Velocity) -> Velocity:
         """Return the velocity to command instead of ``wanted``."""

@@ -12,9 +12,11 @@ from handsteer.messages import (
     CMD_VEL,
     HAND_SIGN,
     ODOM,
+    SCAN,
     STEERING_CMD_VEL,
     STOP,
     Bool,
+    LaserScan,
     Odometry,
     String,
     Topic,
@@ -49,6 +51,10 @@ class HandSignControlNode(Node):
         collision_monitor: Whether and how to slow commands before obstacles; disabled by default.
         arming: Whether nothing moves before neutral was seen, or while no robot is subscribed
             (:mod:`handsteer.control.safety`).
+        sign: Topic of the signs.
+        steering: Topic of steering commands, which override signs.
+        odom: Topic of the robot's odometry.
+        scan: Topic of its laser scans.
 
     Attributes:
         latency: From the capture of a frame to the resulting Twist.
@@ -65,6 +71,10 @@ class HandSignControlNode(Node):
         collision_monitor: CollisionMonitorConfig | None = None,
         *,
         arming: bool = False,
+        sign: Topic[String] = HAND_SIGN,
+        steering: Topic[Twist] = STEERING_CMD_VEL,
+        odom: Topic[Odometry] = ODOM,
+        scan: Topic[LaserScan] = SCAN,
     ) -> None:
         super().__init__("hand_sign_control", transport, clock)
         self.latency = LatencyLog()
@@ -77,19 +87,20 @@ class HandSignControlNode(Node):
         self._measured = MeasuredVelocity()
         self._commanded = ZERO
         self._last_step_s = clock.now()
-        self._monitor = CollisionMonitor(self, collision_monitor or CollisionMonitorConfig(), self._mux.hold_back)
+        rule = collision_monitor or CollisionMonitorConfig()
+        self._monitor = CollisionMonitor(self, rule, self._mux.hold_back, scan, odom)
         self._stall_guard = StallGuard(config.sign_timeout, clock.now())
         self._last_sign = NONE
         self._selection = (
             Selection(self, config.robots, cmd_vel, self._commands, self._on_change) if config.robots else None
         )
         self._cmd_vel = self._selection.commands if self._selection else self._commands(cmd_vel)
-        self._rivals = Rivals(self, [HAND_SIGN, *(self._selection.topics if self._selection else [cmd_vel])])
+        self._rivals = Rivals(self, [sign, *(self._selection.topics if self._selection else [cmd_vel])])
         StopKeeper(self, self._on_stop_or_reset)
-        self.subscribe(STEERING_CMD_VEL, self._on_steering)
-        self.subscribe(HAND_SIGN, self._on_sign)
+        self.subscribe(steering, self._on_steering)
+        self.subscribe(sign, self._on_sign)
         if self._following:
-            self.subscribe(ODOM, self._on_odometry)
+            self.subscribe(odom, self._on_odometry)
         self._watchdog = self.every(_WATCHDOG_PERIOD_S, self._watch)
         self.diagnose_every(_DIAGNOSE_PERIOD_S, self._report)
 

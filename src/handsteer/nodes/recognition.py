@@ -14,7 +14,16 @@ from handsteer.clock import Clock
 from handsteer.config import Config, SignsConfig
 from handsteer.errors import ConfigError, ModelError
 from handsteer.images import bgr_image, image_message, jpeg_picture
-from handsteer.messages import HAND_SIGN, IMAGE_ANNOTATED, IMAGE_COMPRESSED, IMAGE_RAW, CompressedImage, Image, String
+from handsteer.messages import (
+    HAND_SIGN,
+    IMAGE_ANNOTATED,
+    IMAGE_COMPRESSED,
+    IMAGE_RAW,
+    CompressedImage,
+    Image,
+    String,
+    Topic,
+)
 from handsteer.nodes.base import Node
 from handsteer.nodes.status import RecognitionStatus
 from handsteer.nodes.supervision import StopKeeper
@@ -45,6 +54,9 @@ class HandSignRecognitionNode(Node):
         config: Maximum age of a frame, and which images to subscribe to.
         annotate: Draws the result into a copy of the frame, if there are subscribers.
         open_classifier: Opens the classifier of ``signs.model`` when it changes while the node runs.
+        image: Topic of the frames.
+        compressed: Topic of the same as JPEG.
+        sign: Topic of the signs.
 
     Attributes:
         counts: Number of frames per confirmed sign.
@@ -60,6 +72,9 @@ class HandSignRecognitionNode(Node):
         annotate: Annotate,
         *,
         open_classifier: OpenClassifier,
+        image: Topic[Image] = IMAGE_RAW,
+        compressed: Topic[CompressedImage] = IMAGE_COMPRESSED,
+        sign: Topic[String] = HAND_SIGN,
     ) -> None:
         super().__init__("hand_sign_recognition", transport, clock)
         self.counts: dict[str, int] = {}
@@ -82,8 +97,9 @@ class HandSignRecognitionNode(Node):
         self._refused_s = -math.inf
         self._recognition: Recognition | None = None
         StopKeeper(self)
-        self._sign = self.publisher(HAND_SIGN)
+        self._sign = self.publisher(sign)
         self._annotated = self.publisher(IMAGE_ANNOTATED)
+        self._frames, self._jpegs = image, compressed
         wanted = config.image_transport
         self._compressed = wanted == "compressed" or (wanted == "auto" and transport.crosses_network)
         self._images = self._take_images()
@@ -173,12 +189,12 @@ class HandSignRecognitionNode(Node):
 
     def _take_images(self) -> Subscription:
         if self._compressed:
-            return self.subscribe(IMAGE_COMPRESSED, lambda received: self._on_frame(received, jpeg_picture))
-        return self.subscribe(IMAGE_RAW, lambda received: self._on_frame(received, bgr_image))
+            return self.subscribe(self._jpegs, lambda received: self._on_frame(received, jpeg_picture))
+        return self.subscribe(self._frames, lambda received: self._on_frame(received, bgr_image))
 
     def _choose_images(self) -> None:
         """Subscribe to the other kind of images if a camera has only that."""
-        taken, other = (IMAGE_COMPRESSED, IMAGE_RAW) if self._compressed else (IMAGE_RAW, IMAGE_COMPRESSED)
+        taken, other = (self._jpegs, self._frames) if self._compressed else (self._frames, self._jpegs)
         names = self.transport.publishers_of
         if names(taken) or not names(other):
             return

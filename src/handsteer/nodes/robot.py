@@ -75,6 +75,8 @@ class RobotNode(Node):
         robot: The robot to drive.
         config: Names of the coordinate frames, and whether to publish ``/clock``.
         cmd_vel: Topic of the commands, with Twist or TwistStamped.
+        odom: Topic of the odometry.
+        scan: Topic of the laser scans.
 
     Attributes:
         state: The robot's newest state.
@@ -83,7 +85,15 @@ class RobotNode(Node):
     """
 
     def __init__(
-        self, transport: Transport, clock: Clock, robot: Robot, config: RobotConfig, cmd_vel: Topic[Any] = CMD_VEL
+        self,
+        transport: Transport,
+        clock: Clock,
+        robot: Robot,
+        config: RobotConfig,
+        cmd_vel: Topic[Any] = CMD_VEL,
+        *,
+        odom: Topic[Odometry] = ODOM,
+        scan: Topic[LaserScan] = SCAN,
     ) -> None:
         super().__init__("robot", transport, clock)
         self._robot = robot
@@ -96,11 +106,11 @@ class RobotNode(Node):
         self.path_length_m = 0.0
         self.was_located = self.state.located
         StopKeeper(self)
-        self._odom = self.publisher(ODOM)
+        self._odom = self.publisher(odom)
         self._tf = self.publisher(TF)
         self._joint_states = self.publisher(JOINT_STATES)
         self._clock_out = self.publisher(CLOCK) if config.publish_clock else None
-        self._scan = self.publisher(SCAN)
+        self._scan = self.publisher(scan)
         self.publisher(ROBOT_DESCRIPTION).publish(String(data=robot.description))
         self._hears_old = False
         self.subscribe(cmd_vel, self._on_command)
