@@ -1,4 +1,4 @@
-"""Writes docs/configuration.md from the configuration models: every parameter with its default, range and meaning."""
+"""Writes docs/configuration.md from the configuration models: each parameter with its default, range and meaning."""
 
 import sys
 from pathlib import Path

@@ -1,7 +1,7 @@
-"""Every parameter of handsteer: type, unit, range, default and a line of explanation.
+"""Every parameter of handsteer: type, unit, range, default and a one-line description.
 
 The YAML file, the command line and the settings of the page are generated from these models. Names are as in ROS nodes,
-units are SI (REP 103) and in brackets in each description.
+units are SI (REP 103), in brackets in each description.
 """
 
 from collections.abc import Mapping

@@ -77,28 +77,26 @@ def on_a_circle(velocity: Velocity, times_s: Array) -> Array:
     return poses
 
 
-def braking(
-    moving: Velocity, commanded: Velocity, rule: CollisionMonitorConfig, delay_s: float, times_s: Array
-) -> Array:
-    """Return the poses (K, 3), x, y and yaw, of a robot with the command ``commanded``, and zero ``delay_s`` later.
+def braking(moving: Velocity, target: Velocity, rule: CollisionMonitorConfig, delay_s: float, times_s: Array) -> Array:
+    """Return the poses of a robot commanded ``target``, and zero after ``delay_s`` seconds: (K, 3) x, y and yaw.
 
     Args:
         moving: Its current velocity, which changes at the deceleration of ``rule``.
-        commanded: The velocity commanded now.
+        target: The velocity commanded now.
         rule: Decelerations.
         delay_s: When zero is commanded.
         times_s: (K,), at equal intervals from 0.
     """
     early_s = np.minimum(times_s, delay_s)
     late_s = times_s - early_s
-    v = _speeds(moving.linear_mps, commanded.linear_mps, rule.deceleration, early_s, late_s)
+    v = _speeds(moving.linear_mps, target.linear_mps, rule.deceleration, early_s, late_s)
     poses = np.zeros((len(times_s), 3))
     half_step_s = times_s[1] / 2
     way = (v[1:] + v[:-1]) * half_step_s
-    if not (moving.angular_radps or commanded.angular_radps):
+    if not (moving.angular_radps or target.angular_radps):
         way.cumsum(out=poses[1:, 0])
         return poses
-    w = _speeds(moving.angular_radps, commanded.angular_radps, rule.angular_deceleration, early_s, late_s)
+    w = _speeds(moving.angular_radps, target.angular_radps, rule.angular_deceleration, early_s, late_s)
     turned = (w[1:] + w[:-1]) * half_step_s
     yaw = turned.cumsum(out=poses[1:, 2])
     middle = yaw - turned / 2
@@ -131,10 +129,10 @@ def after(velocity: Velocity, seconds: float, points: Array) -> Array:
     return seen
 
 
-def _speeds(moving: float, commanded: float, most: float, early_s: Array, late_s: Array) -> Array:
-    """Return the speeds towards ``commanded`` for ``early_s``, then braking for ``late_s``, both at rate ``most``."""
-    gap, sign = abs(commanded - moving), math.copysign(most, commanded - moving)
-    speeds: Array = moving + np.minimum(early_s, gap / most) * sign if gap else np.full(len(early_s), commanded)
+def _speeds(moving: float, target: float, most: float, early_s: Array, late_s: Array) -> Array:
+    """Return the speeds on the way to ``target`` for ``early_s``, then braking for ``late_s``, at rate ``most``."""
+    gap, sign = abs(target - moving), math.copysign(most, target - moving)
+    speeds: Array = moving + np.minimum(early_s, gap / most) * sign if gap else np.full(len(early_s), target)
     brakes = late_s * most
     return speeds - np.minimum(np.maximum(speeds, -brakes), brakes)
 

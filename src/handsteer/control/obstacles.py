@@ -172,14 +172,12 @@ def first_hit(velocity: Velocity, points: Points, rule: CollisionMonitorConfig, 
     return hit if hit and hit.time_s <= horizon_s else None
 
 
-def _met_while_braking(
-    moving: Velocity, commanded: Velocity, points: Points, rule: CollisionMonitorConfig
-) -> Hit | None:
-    """Return the first obstacle hit if ``commanded`` is commanded now and zero one reaction time later, or None."""
+def _met_while_braking(moving: Velocity, target: Velocity, points: Points, rule: CollisionMonitorConfig) -> Hit | None:
+    """Return the first obstacle hit if ``target`` is commanded now and zero one reaction time later, or None."""
     fastest = fastest_mps(
         Velocity(
-            max(abs(moving.linear_mps), abs(commanded.linear_mps)),
-            max(abs(moving.angular_radps), abs(commanded.angular_radps)),
+            max(abs(moving.linear_mps), abs(target.linear_mps)),
+            max(abs(moving.angular_radps), abs(target.angular_radps)),
         ),
         rule,
     )
@@ -187,11 +185,11 @@ def _met_while_braking(
         return None
     # A robot that reverses its direction stops on the way, and has to stop again.
     stop_s = max(
-        max(abs(moving.linear_mps), abs(commanded.linear_mps)) / rule.deceleration,
-        max(abs(moving.angular_radps), abs(commanded.angular_radps)) / rule.angular_deceleration,
+        max(abs(moving.linear_mps), abs(target.linear_mps)) / rule.deceleration,
+        max(abs(moving.angular_radps), abs(target.angular_radps)) / rule.angular_deceleration,
     )
     times_s = _times(fastest, rule.reaction_time + stop_s)
-    poses = braking(moving, commanded, rule, rule.reaction_time, times_s)
+    poses = braking(moving, target, rule, rule.reaction_time, times_s)
     return _met(poses, times_s, points, rule, pad_m=_PAD_M + _PAD_S * fastest, fastest_mps=fastest)
 
 
@@ -283,12 +281,12 @@ class ObstacleLimiter:
         The points are moved by the robot's estimated motion since the scan.
         """
         self._moving, self._moving_s = self._followed(now_s), now_s
-        self.hit, allowed = None, ZERO
+        self.hit, velocity = None, ZERO
         if self._points is not None and not self.is_blind(now_s):
             points = after(self._moving, self.silence_s(now_s), self._points)
-            allowed, self.hit = limit(wanted, points, self.rule, self._moving)
-        self._commanded, self._commanded_s = allowed, now_s
-        return allowed
+            velocity, self.hit = limit(wanted, points, self.rule, self._moving)
+        self._commanded, self._commanded_s = velocity, now_s
+        return velocity
 
     def _followed(self, now_s: float) -> Velocity:
         """Return the velocity at ``now_s`` of a robot that follows the last command at the configured decelerations."""

@@ -125,11 +125,11 @@ class Recognizer:
         # A hand whose sign is being confirmed is effectively selected.
         search = self._selector.wants_search() and self._filter.candidate == NONE
         hands = self._landmarker.detect(image, search=search, dt_s=dt_s)
-        told = [self._classifier.classify(hand) for hand in hands]
-        guesses = [self._seen(guess) for guess in told]
+        classified = [self._classifier.classify(hand) for hand in hands]
+        guesses = [self._seen(guess) for guess in classified]
         chosen = self._selector.choose(hands, guesses, dt_s)
         hand, guess = (hands[chosen], guesses[chosen]) if chosen is not None else (None, _NOTHING)
-        likelihoods = told[chosen].likelihoods if chosen is not None else {}
+        likelihoods = classified[chosen].likelihoods if chosen is not None else {}
         self._evidence.add(HandPosition.of_palm(hand) if hand else None, likelihoods, dt_s)
         since_s = self._filter.candidate_s + dt_s
         guess = self._bridged(guess, since_s)

@@ -63,13 +63,13 @@ def lookalikes(dataset: Dataset, labels: Sequence[str], shipped: Classifier) -> 
     """Return which of ``labels`` the classifier ``shipped`` already recognises as a sign, and how often."""
     found = []
     for label in labels:
-        told = [
+        seen = [
             guess.sign if guess.confidence >= SURE else NONE
             for take in dataset.of(label)
             if not take.is_flat
             for guess in map(shipped.classify, take.hands)
         ]
-        found += [Lookalike(label, sign, Share(told.count(sign), len(told))) for sign in shipped.signs if sign in told]
+        found += [Lookalike(label, sign, Share(seen.count(sign), len(seen))) for sign in shipped.signs if sign in seen]
     return tuple(found)
 
 

@@ -78,10 +78,10 @@ def mistakes(report: TrainingReport) -> list[str]:
     """Return the confusions of signs, the most frequent first; may be empty."""
     labels, counts = report.confusion.labels, report.confusion.counts
     found = [
-        (count / sum(row), f"{shown} is mistaken for {_sign(told)} {count} of {sum(row)} times")
+        (count / sum(row), f"{shown} is mistaken for {_sign(seen)} {count} of {sum(row)} times")
         for shown, row in zip(labels, counts, strict=True)
-        for told, count in zip(labels, row, strict=True)
-        if count and shown != told
+        for seen, count in zip(labels, row, strict=True)
+        if count and shown != seen
     ]
     found += [
         (hands.rate or 0.0, f"{each.label} is mistaken for {each.sign} {hands.count} of {hands.of} times")
@@ -91,5 +91,5 @@ def mistakes(report: TrainingReport) -> list[str]:
     return [words for _, words in sorted(found, key=lambda item: -item[0])]
 
 
-def _sign(told: str) -> str:
-    return "no sign" if told == NONE else told
+def _sign(seen: str) -> str:
+    return "no sign" if seen == NONE else seen

@@ -242,7 +242,7 @@ def _open_dataset(path: Path, classifier: Classifier) -> LabelledHands:
     if all(lacks_depth(hand, label, classifier) for label, hand in hands):
         raise EvaluationError(
             f"{path}: none of its {len(hands)} hands has depth, and without it {', '.join(dataset.labels)} cannot be "
-            "told: give hands of `handsteer signs collect`, or photos; only signs that were taught from rows without "
-            "depth are told from such rows (--signs.model)"
+            "recognised: give hands of `handsteer signs collect`, or photos; only signs that were taught from rows "
+            "without depth can be recognised in such rows (--signs.model)"
         )
     return LabelledHands(path, dataset)
