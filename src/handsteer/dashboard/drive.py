@@ -4,6 +4,7 @@ import time
 
 from nicegui import ui
 
+from handsteer.dashboard.node import DashboardNode
 from handsteer.dashboard.page import ASSETS_PATH, PICTURE_PATH, Page, PageContext
 from handsteer.dashboard.panels.camera import CameraPanel
 from handsteer.dashboard.panels.elements import UNKNOWN, box, card, text
@@ -12,7 +13,6 @@ from handsteer.dashboard.panels.steer import SteerPanel
 from handsteer.dashboard.panels.velocity import VelocityPanel
 from handsteer.dashboard.panels.world import WorldPanel
 from handsteer.dashboard.state import PageState
-from handsteer.dashboard.view_node import DashboardNode
 
 
 class TimingPanel:

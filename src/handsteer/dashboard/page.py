@@ -10,12 +10,12 @@ from nicegui import ui
 
 from handsteer.dashboard.joined import Cameras, RobotInWorld
 from handsteer.dashboard.lease import LeaseStatus, Role
+from handsteer.dashboard.node import DashboardNode
 from handsteer.dashboard.on_demand import OnDemandNode
 from handsteer.dashboard.panels.elements import box, button, switch, text
 from handsteer.dashboard.settings_store import Settings
 from handsteer.dashboard.state import PageState
 from handsteer.dashboard.teaching.teaching import Teaching
-from handsteer.dashboard.view_node import DashboardNode
 
 
 class LeasePanel:

@@ -15,9 +15,9 @@ from nicegui.elements.scene.scene_object3d import Object3D
 from nicegui.events import SceneDragEventArguments
 from numpy.typing import NDArray
 
+from handsteer.dashboard.node import WorldState
 from handsteer.dashboard.scene_objects import RobotRig, ScanDots, TrailLine, View
 from handsteer.dashboard.trail import MOST_POINTS, Trail
-from handsteer.dashboard.view_node import WorldState
 from handsteer.errors import WorldError
 from handsteer.messages import Marker, Quaternion
 from handsteer.nodes.world_markers import OBSTACLES
@@ -98,7 +98,7 @@ _Z_TO_Y: Rotation = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]
 
 
 class WorldView:
-    """Shows a :class:`~handsteer.dashboard.view_node.WorldState`; updates only what has moved.
+    """Shows a :class:`~handsteer.dashboard.node.WorldState`; updates only what has moved.
 
     Args:
         on_pick: Called with the index of an obstacle when a drag of it starts, while the view is editable.

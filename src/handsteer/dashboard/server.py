@@ -25,6 +25,7 @@ from handsteer.dashboard.doors import Doors, Unjoined
 from handsteer.dashboard.drive import DrivePage
 from handsteer.dashboard.history import VelocityHistory
 from handsteer.dashboard.joined import JoinedGraph
+from handsteer.dashboard.node import DashboardNode
 from handsteer.dashboard.on_demand import OnDemandNode
 from handsteer.dashboard.page import ASSETS_PATH, ICON, PICTURE_PATH, WEBCAM_PATH, GraphAccess, PageContext
 from handsteer.dashboard.page_log import keep_short
@@ -35,7 +36,6 @@ from handsteer.dashboard.settings_store import Settings
 from handsteer.dashboard.socket_events import SocketEvents
 from handsteer.dashboard.teach import TeachPage
 from handsteer.dashboard.teaching.teaching import Teaching
-from handsteer.dashboard.view_node import DashboardNode
 from handsteer.errors import DashboardError
 from handsteer.making import cmd_vel_topic
 from handsteer.messages import CMD_VEL, Topic

@@ -2,11 +2,11 @@
 
 from nicegui import ui
 
+from handsteer.dashboard.node import DashboardNode
 from handsteer.dashboard.page import ASSETS_PATH, Page, PageContext
 from handsteer.dashboard.panels.elements import text
 from handsteer.dashboard.panels.settings import SettingsPanel
 from handsteer.dashboard.state import PageState
-from handsteer.dashboard.view_node import DashboardNode
 
 _ELSEWHERE = (
     "Here are no settings: this process only serves the page. Each node has its own, where it runs; `ros2 param list` "

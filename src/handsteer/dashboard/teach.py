@@ -6,6 +6,7 @@ from typing import Final
 
 from nicegui import ui
 
+from handsteer.dashboard.node import DashboardNode
 from handsteer.dashboard.page import ASSETS_PATH, PICTURE_PATH, Page, PageContext
 from handsteer.dashboard.panels.camera import CameraPanel
 from handsteer.dashboard.panels.elements import box, card, switch, text
@@ -15,7 +16,6 @@ from handsteer.dashboard.state import PageState
 from handsteer.dashboard.teaching.lesson import View
 from handsteer.dashboard.teaching.node import LessonNode
 from handsteer.dashboard.teaching.teaching import Teaching
-from handsteer.dashboard.view_node import DashboardNode
 from handsteer.errors import HandsteerError
 
 _ELSEWHERE: Final = (
