@@ -60,15 +60,6 @@ def test_a_gate_that_is_driven_around_is_missed_and_a_bump_costs() -> None:
     assert CourseState(4, bumps=3, time_s=10.0).score_s == 10.0 + 3 * BUMP_S
 
 
-def test_a_restart_forgets_all() -> None:
-    referee = Referee(COURSE)
-    walk(referee, (2.5, 0.0))
-    referee.restart()
-    assert referee.state == CourseState(4)
-    referee.step(Pose2D(0.9, 0.0, 0.0), 0, 50.0)
-    assert referee.step(Pose2D(1.1, 0.0, 0.0), 0, 50.1).time_s == 0.0
-
-
 def test_no_gates_are_no_course() -> None:
     referee = Referee([])
     assert walk(referee, (5.0, 0.0)) == CourseState(0)

@@ -93,11 +93,6 @@ class Referee:
         self._collisions = 0
         self._time_s = 0.0
 
-    def restart(self) -> None:
-        """Reset the progress, with the robot before the start."""
-        self.state = CourseState(len(self._gates))
-        self._pose = None
-
     def step(self, pose: Pose2D, collisions: int, time_s: float) -> CourseState:
         """Take the robot's next pose and return the progress.
 
