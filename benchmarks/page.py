@@ -39,7 +39,7 @@ from handsteer.config import load
 from handsteer.dashboard.apart import PageApart
 from handsteer.graph import Graph
 from handsteer.messages import CMD_VEL, Twist
-from handsteer.nodes.latency import LatencyLog
+from handsteer.nodes.timing import LatencyLog
 from handsteer.transports.base import Received
 
 LIMIT_BYTES_PER_S = 2_000_000

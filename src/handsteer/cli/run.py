@@ -16,8 +16,9 @@ from handsteer.config import Config
 from handsteer.config.presets import PRESETS
 from handsteer.dashboard.apart import PageApart
 from handsteer.errors import ConfigError
-from handsteer.graph import Graph, Summary
+from handsteer.graph import Graph
 from handsteer.parameters import from_parameters
+from handsteer.summary import Summary
 from handsteer.transports import join
 from handsteer.transports.base import Session
 

@@ -4,7 +4,7 @@ import threading
 from collections.abc import Callable, Hashable
 from typing import Generic, TypeVar
 
-from handsteer.nodes.node import Node
+from handsteer.nodes.base import Node
 
 N = TypeVar("N", bound=Node)
 

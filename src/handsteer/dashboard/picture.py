@@ -22,7 +22,7 @@ from handsteer.dashboard.socket_events import is_page_of
 from handsteer.errors import FrameError
 from handsteer.images import bgr_image, encode_jpeg
 from handsteer.messages import IMAGE_ANNOTATED, Image
-from handsteer.nodes.node import Node
+from handsteer.nodes.base import Node
 from handsteer.transports.base import Received, Transport
 
 FRAMES_PER_S = 30.0

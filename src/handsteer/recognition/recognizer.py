@@ -14,7 +14,7 @@ from handsteer.recognition.hand import Hand, Landmarker
 from handsteer.recognition.hand_selector import HandPosition, HandSelector
 from handsteer.recognition.landmarker import MediaPipeLandmarker
 from handsteer.recognition.shipped_signs import ShippedClassifier, load_model
-from handsteer.types import NONE
+from handsteer.types import NONE, describe_seen
 
 _NOTHING = SignGuess(NONE, 0.0)
 
@@ -61,13 +61,7 @@ class Recognition:
     @property
     def reason(self) -> str:
         """A sentence that describes what is seen."""
-        if self.hand is None:
-            return "no hand is in view"
-        if self.seen == NONE:
-            return "the hand shows none of the signs"
-        if self.sign != self.seen:
-            return f"{self.seen} is not confirmed yet"
-        return f"{self.sign} is shown"
+        return describe_seen(self.sign, self.seen, is_hand_in_view=self.hand is not None)
 
 
 class Recognizer:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from nicegui import ui
 
 from handsteer.config import ControlConfig
-from handsteer.control.effects import figures_of
+from handsteer.control.explain import figures_of
 from handsteer.dashboard.panels.elements import box, card, switch, text
 from handsteer.dashboard.state import PageState
 from handsteer.types import BACKWARD, EFFECTS, FORWARD, GO, NONE, SIGNS, STOP, TURN_LEFT, TURN_RIGHT, action_of

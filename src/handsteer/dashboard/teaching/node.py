@@ -16,7 +16,7 @@ from handsteer.dashboard.teaching.lesson import Lesson, View
 from handsteer.errors import TrainingError
 from handsteer.images import bgr_image, encode_jpeg
 from handsteer.messages import IMAGE_RAW, Image
-from handsteer.nodes.node import Node
+from handsteer.nodes.base import Node
 from handsteer.recognition.classifier import Classifier, SignGuess
 from handsteer.recognition.custom_signs import CustomClassifier, CustomModel
 from handsteer.recognition.drawing import draw_hand

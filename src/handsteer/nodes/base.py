@@ -1,55 +1,20 @@
 """Base class of all nodes: subscriptions, timers, and the thread that runs their callbacks."""
 
-import logging
-import math
 import threading
-from collections import deque
 from collections.abc import Callable, Hashable
-from dataclasses import dataclass, field
-from typing import Any, Generic, TypeVar
+from typing import Any, TypeVar
 
 from handsteer.clock import Clock
 from handsteer.config import Config
-from handsteer.messages import DIAGNOSTICS, DiagnosticArray, DiagnosticStatus, Header, KeyValue, Topic
+from handsteer.messages import DIAGNOSTICS, Topic
+from handsteer.nodes.callbacks import FailureLog, Inbox, Timer
+from handsteer.nodes.diagnostics import write_status
+from handsteer.nodes.status import Status
 from handsteer.transports.base import Call, Publisher, Received, Subscription, Transport
 
 M = TypeVar("M")
-log = logging.getLogger(__name__)
 
-OK, WARN, ERROR = 0, 1, 2
-"""Levels of ``diagnostic_msgs/DiagnosticStatus``."""
-
-
-FAILURES_SAID_EVERY_S = 10.0
-"""Log period of a callback that fails repeatedly; bad pictures may arrive thirty times a second."""
-
-_LONGEST_REASON = 200
 _LOOK_FOR_LISTENERS_S = 0.5
-
-
-@dataclass
-class Timer:
-    """A periodic callback.
-
-    Attributes:
-        period_s: Time between two calls; 0 calls it in every cycle.
-        callback: What to call.
-        due_s: Time of the next call, on the graph's clock.
-    """
-
-    period_s: float
-    callback: Callable[[], None]
-    due_s: float
-
-    def schedule_next(self, now_s: float) -> None:
-        """Schedule the call after the one at ``now_s``."""
-        self.due_s += self.period_s
-        if self.due_s <= now_s:
-            self.due_s = now_s + self.period_s
-
-    def delay_until(self, time_s: float) -> None:
-        """Skip all calls before ``time_s``."""
-        self.due_s = max(self.due_s, time_s)
 
 
 class Node:
@@ -60,7 +25,7 @@ class Node:
     (:meth:`spin_once`, :attr:`next_due_s`) on a :class:`~handsteer.clock.SteppedClock`.
 
     A callback that raises is logged with its topic and counted in :attr:`callback_errors`, and the node continues.
-    Repeated failures are logged every :data:`FAILURES_SAID_EVERY_S`.
+    Repeated failures are logged every :data:`~handsteer.nodes.callbacks.FAILURES_LOGGED_EVERY_S`.
 
     Args:
         name: ROS node name.
@@ -83,10 +48,10 @@ class Node:
         self.callback_errors = 0
         self.stuck = False
         self.transport = transport
-        self._inboxes: list[_Inbox[Any]] = []
+        self._inboxes: list[Inbox[Any]] = []
         self._timers: list[Timer] = []
         self._new_config: Config | None = None
-        self._failures: dict[tuple[str, type[Exception]], _Failure] = {}
+        self._failures = FailureLog(name)
         self._subscriptions: list[Subscription] = []
         self._wake = threading.Condition()
         self._serving = threading.Lock()
@@ -126,7 +91,7 @@ class Node:
         """
         name = self.transport.topic_name(topic)
         self._topics["listens to"].add(name)
-        inbox = _Inbox(name, callback, key, 1 if key else topic.depth)
+        inbox = Inbox(name, callback, key, 1 if key else topic.depth)
         self._inboxes.append(inbox)
 
         def deliver(received: Received[M]) -> None:
@@ -152,15 +117,16 @@ class Node:
         self._timers.append(timer)
         return timer
 
-    def diagnose_every(self, period_s: float, report: Callable[[], None]) -> None:
-        """Call ``report``, which publishes this node's state by :meth:`diagnose`, every ``period_s`` seconds.
+    def diagnose_every(self, period_s: float, status: Callable[[], Status]) -> None:
+        """Publish ``status()``, the state of this node, on ``/diagnostics`` every ``period_s`` seconds.
 
         Without subscribers it is skipped; a new subscriber receives its first report within half a second.
         """
 
         def beat() -> None:
-            if self.is_diagnosed:
-                report()
+            if self._diagnostics.has_subscribers:
+                name = self.transport.full_name(self.name)
+                self._diagnostics.publish(write_status(status(), name, self.clock.stamp(self.clock.now())))
             else:
                 timer.delay_until(self.clock.now() + _LOOK_FOR_LISTENERS_S)
 
@@ -175,21 +141,6 @@ class Node:
         with self._wake:
             self._new_config = config
             self._wake.notify()
-
-    @property
-    def is_diagnosed(self) -> bool:
-        """Whether ``/diagnostics`` has subscribers."""
-        return self._diagnostics.has_subscribers
-
-    def diagnose(self, level: int, message: str, **values: object) -> None:
-        """Publish this node's state on ``/diagnostics``: a level, a sentence for people, and named values."""
-        if self.is_diagnosed:
-            pairs = [KeyValue(key, str(value)) for key, value in values.items()]
-            status = DiagnosticStatus(
-                level=level, name=self.transport.full_name(self.name), message=message, hardware_id="", values=pairs
-            )
-            header = Header(stamp=self.clock.stamp(self.clock.now()), frame_id="")
-            self._diagnostics.publish(DiagnosticArray(header=header, status=[status]))
 
     @property
     def next_due_s(self) -> float | None:
@@ -285,46 +236,4 @@ class Node:
             callback(*args)
         except Exception as error:
             self.callback_errors += 1
-            self._report_failure(source, error)
-
-    def _report_failure(self, source: str, error: Exception) -> None:
-        """Log a failed callback: the first time with its traceback, later the count at a limited rate."""
-        failure = self._failures.setdefault((source, type(error)), _Failure())
-        failure.count += 1
-        now = self.clock.now()
-        if now - failure.said_s < FAILURES_SAID_EVERY_S:
-            return
-        if failure.count == 1:
-            log.error("%s: callback of %s failed", self.name, source, exc_info=error)
-        else:
-            words = str(error)[:_LONGEST_REASON]
-            log.error("%s: callback of %s has failed %d times: %s", self.name, source, failure.count, words)
-        failure.said_s = now
-
-
-@dataclass
-class _Failure:
-    count: int = 0
-    said_s: float = -math.inf
-
-
-@dataclass
-class _Inbox(Generic[M]):
-    topic: str
-    callback: Callable[[Received[M]], None]
-    key: Callable[[M], Hashable] | None
-    depth: int = 1
-    _newest: dict[Hashable, deque[Received[M]]] = field(default_factory=dict)
-
-    @property
-    def filled(self) -> bool:
-        return bool(self._newest)
-
-    def put(self, received: Received[M]) -> None:
-        key = self.key(received.message) if self.key else None
-        self._newest.setdefault(key, deque(maxlen=self.depth)).append(received)
-
-    def take(self) -> list[Received[M]]:
-        taken = [received for waiting in self._newest.values() for received in waiting]
-        self._newest.clear()
-        return taken
+            self._failures.add(source, error, self.clock.now())

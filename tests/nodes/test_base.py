@@ -6,10 +6,12 @@ from functools import partial
 
 import pytest
 
-from handsteer.clock import RealClock, SteppedClock
+from handsteer.clock import RealClock, SteppedClock, to_stamp
 from handsteer.config import Config
 from handsteer.messages import DIAGNOSTICS, HAND_SIGN, DiagnosticArray, String, Topic
-from handsteer.nodes.node import OK, WARN, Node
+from handsteer.nodes.base import Node
+from handsteer.nodes.diagnostics import write_status
+from handsteer.nodes.status import CameraStatus
 from handsteer.transports.base import Received
 from handsteer.transports.in_process import InProcessTransport
 from tests.nodes.stepping import Bench
@@ -61,7 +63,12 @@ def test_state_is_worked_out_only_while_somebody_listens() -> None:
     node = Node("node", bench.transport, bench.clock)
     bench.nodes.append(node)
     reports: list[float] = []
-    node.diagnose_every(0.1, lambda: reports.append(bench.clock.now()))
+
+    def report() -> CameraStatus:
+        reports.append(bench.clock.now())
+        return CameraStatus()
+
+    node.diagnose_every(0.1, report)
     bench.run(3.0)
     assert reports == []
     bench.record(DIAGNOSTICS)
@@ -75,15 +82,15 @@ def test_with_a_key_the_newest_of_each_publisher_is_kept() -> None:
     got: list[str] = []
 
     def callback(received: Received[DiagnosticArray]) -> None:
-        got.append(f"{received.message.status[0].name}: {received.message.status[0].message}")
+        got.append(f"{received.message.status[0].name} {received.message.status[0].message}")
 
     node.subscribe(DIAGNOSTICS, callback, key=lambda message: message.status[0].name)
     for name in ("a", "b"):
-        other = Node(name, transport, SteppedClock())
-        other.diagnose(WARN, "old")
-        other.diagnose(OK, "new")
+        reports = transport.advertise(name, DIAGNOSTICS)
+        for status in (CameraStatus("old"), CameraStatus("new", "delivers")):
+            reports.publish(write_status(status, name, to_stamp(0.0)))
     node.spin_once()
-    assert sorted(got) == ["a: new", "b: new"]
+    assert sorted(got) == ["a new: delivers frames", "b new: delivers frames"]
 
 
 def test_the_thread_sleeps_until_there_is_work_and_ends_at_stop() -> None:
