@@ -21,7 +21,7 @@ from pathlib import Path
 import numpy as np
 
 from handsteer.config import load
-from handsteer.dashboard.apart import PageApart
+from handsteer.dashboard.page_process import PageApart
 from handsteer.graph import Graph
 from handsteer.messages import CMD_VEL, STOP, Bool, Twist
 from handsteer.transports.protocol import Received

@@ -36,7 +36,7 @@ from tests.dashboard.network import Relay, client_of, cookies_of, deaf, deaf_pag
 from handsteer.cameras.virtual import VirtualHandCamera
 from handsteer.clock import SteppedClock
 from handsteer.config import load
-from handsteer.dashboard.apart import PageApart
+from handsteer.dashboard.page_process import PageApart
 from handsteer.graph import Graph
 from handsteer.messages import CMD_VEL, Twist
 from handsteer.nodes.latency import LatencyLog

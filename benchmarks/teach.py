@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from handsteer.config import SignsConfig, load
-from handsteer.dashboard.teaching.teaching import Teaching
+from handsteer.dashboard.lessons import Teaching
 from handsteer.graph import Graph
 from handsteer.signs.opening import open_classifier
 from handsteer.signs.teaching.dataset import Dataset

@@ -15,7 +15,7 @@ from chromium import launch
 from playwright.sync_api import Page, sync_playwright
 
 from handsteer.config import load
-from handsteer.dashboard.apart import PageApart
+from handsteer.dashboard.page_process import PageApart
 from handsteer.errors import HandsteerError
 from handsteer.graph import Graph
 

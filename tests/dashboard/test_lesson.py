@@ -3,7 +3,7 @@
 import pytest
 
 from handsteer.config import TeachConfig
-from handsteer.dashboard.teaching.lesson import MOST_TAKES, NO_HAND, SMALL, STILL, Lesson, hint, is_still
+from handsteer.dashboard.lesson import MOST_TAKES, NO_HAND, SMALL, STILL, Lesson, hint, is_still
 from handsteer.landmarks.hand import Hand
 from handsteer.signs.classifier import SignGuess
 from handsteer.signs.recognizer import Recognition

@@ -6,8 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from handsteer.dashboard.page import spoken
-from handsteer.dashboard.panels.sliders import read_limit
-from handsteer.dashboard.panels.steer import entries, read_deflection
+from handsteer.dashboard.sliders import read_limit
 from handsteer.dashboard.state import (
     STALE_S,
     Observed,
@@ -19,6 +18,7 @@ from handsteer.dashboard.state import (
     frame_rate,
     place_in_world,
 )
+from handsteer.dashboard.steer_panel import entries, read_deflection
 from handsteer.types import ZERO, Pose2D, Velocity
 
 OK, WARN, ERROR = 0, 1, 2

@@ -8,8 +8,8 @@ from collections import Counter
 import pytest
 from nicegui import Client
 
-from handsteer.dashboard.doors import MOST_UNJOINED
 from handsteer.dashboard.history import Sample
+from handsteer.dashboard.limits import MOST_UNJOINED
 from tests.dashboard.network import client_of, join_query
 from tests.dashboard.served import Site
 from tests.dashboard.sockets import PageSocket

@@ -1,7 +1,6 @@
 import pytest
 
-from handsteer.dashboard.panels.thing_form import figures
-from handsteer.dashboard.panels.world_editor import LARGEST_FILE_BYTES, read_file
+from handsteer.dashboard.world_editor import LARGEST_FILE_BYTES, figures, read_file
 from handsteer.errors import WorldError
 from handsteer.robots.editing import add, edit
 from handsteer.robots.protocol import Shape

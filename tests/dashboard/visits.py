@@ -14,7 +14,7 @@ from playwright.sync_api import ConsoleMessage, Page, Request, ViewportSize
 from scripts import chromium
 
 from handsteer.config import load
-from handsteer.dashboard.apart import PageApart
+from handsteer.dashboard.page_process import PageApart
 from handsteer.graph import Graph
 from tests.dashboard.browsers import a_browser
 

@@ -17,12 +17,12 @@ from handsteer.cameras.browser import BrowserCamera
 from handsteer.cameras.files import read_photo
 from handsteer.clock import SteppedClock
 from handsteer.config import Config, ControlConfig, load
+from handsteer.dashboard.camera_panel import read_words
 from handsteer.dashboard.pad_input import PadInput
-from handsteer.dashboard.panels.camera import read_words
-from handsteer.dashboard.panels.sliders import read_limit
-from handsteer.dashboard.panels.steer import read_deflection
-from handsteer.dashboard.panels.world_editor import read_file
 from handsteer.dashboard.settings_form import form
+from handsteer.dashboard.sliders import read_limit
+from handsteer.dashboard.steer_panel import read_deflection
+from handsteer.dashboard.world_editor import read_file
 from handsteer.errors import FrameError, HandsteerError, TransportError
 from handsteer.images import bgr_image, jpeg_picture
 from handsteer.messages import (

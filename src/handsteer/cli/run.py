@@ -13,7 +13,7 @@ from handsteer.cli.running import keep_what_is_loaded, say, uninterrupted
 from handsteer.cli.running import settings as make_settings
 from handsteer.clock import RealClock, SteppedClock
 from handsteer.config import Config
-from handsteer.dashboard.apart import PageApart
+from handsteer.dashboard.page_process import PageApart
 from handsteer.errors import ConfigError
 from handsteer.graph import Graph, Summary
 from handsteer.parameters import from_parameters

@@ -18,7 +18,7 @@ from starlette.datastructures import Headers, MutableHeaders, State
 from starlette.responses import PlainTextResponse, RedirectResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from handsteer.dashboard.doors import Doors
+from handsteer.dashboard.limits import Doors
 
 # NiceGUI's pages contain inline scripts and styles, and Vue compiles their templates.
 _CONTENT: Final = {

@@ -5,9 +5,6 @@ import math
 from handsteer.transports.stale_messages import StaleMessageFilter
 from handsteer.types import ZERO, Velocity
 
-HOLD_TIMEOUT_S = 0.3
-"""Steering ends when the page has not repeated it for this long: the tab was closed, or the network lost."""
-
 SLIDERS_TIMEOUT_S = 0.5
 """Sliders return to zero when the page has not reported for this long."""
 

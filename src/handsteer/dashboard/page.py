@@ -8,14 +8,13 @@ from typing import ClassVar
 
 from nicegui import ui
 
+from handsteer.dashboard.elements import box, button, switch, text
 from handsteer.dashboard.joined import Cameras, RobotInWorld
-from handsteer.dashboard.lease import LeaseStatus, Role
+from handsteer.dashboard.lessons import Teaching
 from handsteer.dashboard.node import DashboardNode
-from handsteer.dashboard.on_demand import OnDemandNode
-from handsteer.dashboard.panels.elements import box, button, switch, text
 from handsteer.dashboard.settings_store import Settings
 from handsteer.dashboard.state import PageState
-from handsteer.dashboard.teaching.teaching import Teaching
+from handsteer.dashboard.viewers import LeaseStatus, OnDemandNode, Role
 
 
 class LeasePanel:

@@ -17,8 +17,8 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from handsteer.clock import Clock
 from handsteer.dashboard.joined import Cameras
-from handsteer.dashboard.on_demand import OnDemandNode
 from handsteer.dashboard.socket_events import is_page_of
+from handsteer.dashboard.viewers import OnDemandNode
 from handsteer.errors import FrameError
 from handsteer.images import bgr_image, encode_jpeg
 from handsteer.messages import IMAGE_ANNOTATED, Image

@@ -1,13 +1,14 @@
 """The 3D view: a fixed world, the robot that drives in it, and a camera that follows the robot.
 
 The world is fixed so that its things can be dragged. The camera moves in the browser, so that viewers can also turn and
-zoom it (:mod:`handsteer.dashboard.scene_objects`).
+zoom it (:mod:`handsteer.dashboard.scene`).
 """
 
 import logging
 import math
 from collections import defaultdict
-from collections.abc import Awaitable, Callable, Iterable, Iterator
+from collections.abc import Awaitable, Callable, Iterable, Iterator, Mapping, Sequence
+from typing import Literal
 
 import numpy as np
 from nicegui import ui
@@ -15,13 +16,77 @@ from nicegui.elements.scene.scene_object3d import Object3D
 from nicegui.events import SceneDragEventArguments
 from numpy.typing import NDArray
 
-from handsteer.dashboard.node import WorldState
-from handsteer.dashboard.scene_objects import RobotRig, ScanDots, TrailLine, View
-from handsteer.dashboard.trail import MOST_POINTS, Trail
+from handsteer.dashboard.elements import STATIC
+from handsteer.dashboard.world_state import TRAIL_POINTS, Trail, WorldState
 from handsteer.errors import WorldError
 from handsteer.messages import Marker, Quaternion
 from handsteer.nodes.world_markers import OBSTACLES
 from handsteer.robots.description import Joint, Vector, Visual, joints, visuals
+
+View = Literal["orbit", "follow", "top"]
+"""``orbit`` follows the robot's position; ``follow`` also turns with it; ``top`` looks down, north (+y) up."""
+
+
+class RobotRig(Object3D, component=STATIC / "robot-rig.js"):
+    """The robot, which moves the camera of ``scene`` with it.
+
+    All motion is sent in one message, because the overhead per message exceeds the cost of its content.
+    """
+
+    def __init__(self, scene: ui.scene) -> None:
+        super().__init__(scene.id, "orbit", [], 0.0, 0.0, 0.0, [])
+        self._names: tuple[str, ...] = ()
+
+    def hold(self, links: Sequence[tuple[Joint, Object3D]]) -> None:
+        """Control these links from now on, each by the angle of its joint."""
+        self._names = tuple(joint.name for joint, _ in links)
+        self.args[2] = [[link.id, *joint.rpy, *joint.axis] for joint, link in links]
+        self.args[6] = [0.0] * len(links)
+        self.run_method("hold", self.args[2])
+
+    def go(self, x: float, y: float, yaw: float, angles: Mapping[str, float]) -> None:
+        """Move to x and y in metres, heading ``yaw`` in rad, with joints at ``angles`` in rad; 0 if missing."""
+        turned = [round(angles.get(name, 0.0), 2) for name in self._names]
+        pose = [round(x, 3), round(y, 3), round(yaw, 3), turned]
+        if pose != self.args[3:]:
+            self.args[3:] = pose
+            self.run_method("go", *pose)
+
+    def look(self, view: View) -> None:
+        """Move the camera to the start of ``view``."""
+        self.args[1] = view
+        self.run_method("look", view)
+
+
+class ScanDots(Object3D, component=STATIC / "scan.js"):
+    """A laser scan: a dot of ``size_m`` for each ray that hits something, ``height_m`` above the floor."""
+
+    def __init__(self, size_m: float, height_m: float) -> None:
+        super().__init__([], size_m, height_m)
+
+    def show(self, points: Sequence[tuple[float, float]]) -> None:
+        """Draw these points, x and y in metres, instead of the previous ones."""
+        self.args[0] = [list(point) for point in points]
+        self.run_method("show", self.args[0])
+
+
+class TrailLine(Object3D, component=STATIC / "trail.js"):
+    """The robot's trail, ``width_m`` wide, of at most ``most`` points; the oldest are dropped."""
+
+    def __init__(self, most: int, width_m: float) -> None:
+        super().__init__([], most, width_m)
+
+    def extend(self, points: Sequence[tuple[float, float]]) -> None:
+        """Append ``points``, x and y in metres."""
+        new = [[round(x, 2), round(y, 2)] for x, y in points]
+        self.args[0] = [*self.args[0], *new][-self.args[1] :]
+        self.run_method("extend", new)
+
+    def clear(self) -> None:
+        """Start again."""
+        self.args[0] = []
+        self.run_method("clear")
+
 
 Rotation = NDArray[np.float64]
 """A rotation matrix, (3, 3)."""
@@ -98,7 +163,7 @@ _Z_TO_Y: Rotation = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]
 
 
 class WorldView:
-    """Shows a :class:`~handsteer.dashboard.node.WorldState`; updates only what has moved.
+    """Shows a :class:`~handsteer.dashboard.world_state.WorldState`; updates only what has moved.
 
     Args:
         on_pick: Called with the index of an obstacle when a drag of it starts, while the view is editable.
@@ -123,7 +188,7 @@ class WorldView:
         with scene:
             with scene.group() as self._floor:
                 _draw_floor(scene)
-            self._trail = TrailLine(MOST_POINTS, _TRAIL_WIDTH_M).material(_TRAIL, 0.75, "both").move(z=_TRAIL_HEIGHT_M)
+            self._trail = TrailLine(TRAIL_POINTS, _TRAIL_WIDTH_M).material(_TRAIL, 0.75, "both").move(z=_TRAIL_HEIGHT_M)
             self._scan = ScanDots(_SCAN_DOT_M, _SCAN_HEIGHT_M).material(_SCAN)
             self._ring = scene.ring(_RING_INNER, 0.5, 48).material(_RING, 1.0, "both").visible(False)
             self._robot = RobotRig(scene)

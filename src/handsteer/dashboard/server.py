@@ -21,21 +21,20 @@ from handsteer.cameras.browser import LARGEST_BYTES
 from handsteer.clock import Clock
 from handsteer.config import DashboardConfig
 from handsteer.dashboard.access import HEADERS, Access, AccessMiddleware
-from handsteer.dashboard.doors import Doors, Unjoined
-from handsteer.dashboard.drive import DrivePage
+from handsteer.dashboard.drive_page import DrivePage
 from handsteer.dashboard.history import VelocityHistory
 from handsteer.dashboard.joined import JoinedGraph
+from handsteer.dashboard.lesson_page import TeachPage
+from handsteer.dashboard.lessons import Teaching
+from handsteer.dashboard.limits import Doors, Unjoined, keep_short
 from handsteer.dashboard.node import DashboardNode
-from handsteer.dashboard.on_demand import OnDemandNode
 from handsteer.dashboard.page import ASSETS_PATH, ICON, PICTURE_PATH, WEBCAM_PATH, GraphAccess, PageContext
-from handsteer.dashboard.page_log import keep_short
 from handsteer.dashboard.picture import FrameSocket, PictureNode, PictureResponse
-from handsteer.dashboard.settings import SettingsPage
 from handsteer.dashboard.settings_file import DEFAULT_FILE, SettingsFile
+from handsteer.dashboard.settings_panel import SettingsPage
 from handsteer.dashboard.settings_store import Settings
 from handsteer.dashboard.socket_events import SocketEvents
-from handsteer.dashboard.teach import TeachPage
-from handsteer.dashboard.teaching.teaching import Teaching
+from handsteer.dashboard.viewers import OnDemandNode
 from handsteer.errors import DashboardError
 from handsteer.making import cmd_vel_topic
 from handsteer.messages import CMD_VEL, Topic

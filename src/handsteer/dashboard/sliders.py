@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 from nicegui import ui
 
-from handsteer.dashboard.panels.elements import box, button, switch, text
+from handsteer.dashboard.elements import box, button, switch, text
 from handsteer.types import Velocity
 
 _LINEAR_MPS = 0.5

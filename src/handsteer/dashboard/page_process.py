@@ -1,6 +1,6 @@
 """The page in its own process, seen from the graph: a stalled page does not delay the robot's nodes.
 
-:mod:`handsteer.dashboard.alone` is the other end.
+:mod:`handsteer.dashboard.remote_graph` is the other end.
 """
 
 import contextlib
@@ -50,7 +50,7 @@ class NearGraph:
     """Offers a graph of this process to the page in another process, as :class:`JoinedGraph` beyond the topics.
 
     Args:
-        pipe: Not started yet; connected to a :class:`~handsteer.dashboard.alone.FarGraph`.
+        pipe: Not started yet; connected to a :class:`~handsteer.dashboard.remote_graph.FarGraph`.
         graph: The graph.
         file: The YAML file that its parameters were read from, which settings are saved to.
     """
@@ -129,7 +129,7 @@ class PageApart:
                 raise ModuleNotFoundError(name="nicegui")
         path = os.pathsep.join(filter(None, [str(_ROOT), os.environ.get("PYTHONPATH")]))
         self.process = subprocess.Popen(
-            [sys.executable, "-P", "-m", "handsteer.dashboard.alone"],
+            [sys.executable, "-P", "-m", "handsteer.dashboard.remote_graph"],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             env={**os.environ, "PYTHONPATH": path},

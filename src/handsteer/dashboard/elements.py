@@ -2,8 +2,12 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
 from nicegui import ui
+
+STATIC = Path(__file__).parent / "static"
+"""Scripts and styles of the pages."""
 
 UNKNOWN = "--"
 """Shown for an unknown value."""

@@ -2,7 +2,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from handsteer.dashboard.lease import ANSWER_S, ControlLease, LeaseStatus
+from handsteer.dashboard.viewers import ANSWER_S, ControlLease, LeaseStatus
 
 
 @pytest.fixture

@@ -5,9 +5,8 @@ import dataclasses
 import pytest
 
 from handsteer.config import TeachConfig
-from handsteer.dashboard.panels.teach_collect import counted, said_now
-from handsteer.dashboard.panels.teach_result import opinion
-from handsteer.dashboard.teaching.lesson import Collected, Lesson, View
+from handsteer.dashboard.lesson import Collected, Lesson, View
+from handsteer.dashboard.lesson_panels import counted, opinion, said_now
 from handsteer.signs.recognizer import Recognition
 from handsteer.signs.teaching.collect import Facts, Status
 from handsteer.types import EFFECTS, NONE, Action

@@ -4,13 +4,12 @@ from collections.abc import Callable
 
 from nicegui import ui
 
+from handsteer.dashboard.elements import UNKNOWN, box, button, switch, tag, text
 from handsteer.dashboard.joined import RobotInWorld
-from handsteer.dashboard.node import WorldState
-from handsteer.dashboard.panels.elements import UNKNOWN, box, button, switch, tag, text
-from handsteer.dashboard.panels.world_editor import WorldEditor
-from handsteer.dashboard.scene import WorldView
-from handsteer.dashboard.scene_objects import View
+from handsteer.dashboard.scene import View, WorldView
 from handsteer.dashboard.state import PageState
+from handsteer.dashboard.world_editor import WorldEditor
+from handsteer.dashboard.world_state import WorldState
 from handsteer.robots.course import BUMP_S, MISS_S, CourseState, stopwatch
 
 _RULES = f"score: the time, {BUMP_S:.0f} s for each bump, {MISS_S:.0f} s for each missed gate"

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from handsteer.clock import Clock
 from handsteer.config import Config, SignsConfig
-from handsteer.dashboard.teaching.lesson import Lesson, View
+from handsteer.dashboard.lesson import Lesson, View
 from handsteer.errors import TrainingError
 from handsteer.images import bgr_image, encode_jpeg
 from handsteer.landmarks.hand import Hand, Landmarker

@@ -1,8 +1,11 @@
 """The control lease: one viewer at a time drives, the others watch and may request it."""
 
 import threading
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass
-from typing import Literal
+from typing import Generic, Literal, TypeVar
+
+from handsteer.nodes.node import Node
 
 ANSWER_S = 10.0
 """A request that the driver does not answer within this time is granted."""
@@ -101,3 +104,51 @@ class ControlLease:
             return False
         self._driver, self._request = self._request[0], None
         return True
+
+
+N = TypeVar("N", bound=Node)
+
+
+class OnDemandNode(Generic[N]):
+    """Starts a new node from ``make`` for the first viewer, and stops it after the last; thread-safe."""
+
+    def __init__(self, make: Callable[[], N]) -> None:
+        self._make = make
+        self._lock = threading.Lock()
+        self._viewers: set[Hashable] = set()
+        self._node: N | None = None
+        self._closed = False
+
+    def join(self, viewer: Hashable) -> N | None:
+        """Return the running node, or None after :meth:`close`; joining twice counts once."""
+        with self._lock:
+            if self._closed:
+                return None
+            self._viewers.add(viewer)
+            if self._node is None:
+                self._node = self._make()
+                self._node.start()
+            return self._node
+
+    def is_watched_by(self, viewer: Hashable) -> bool:
+        """Return whether ``viewer`` has joined, and has neither left nor been disconnected by :meth:`close`."""
+        return viewer in self._viewers
+
+    def leave(self, viewer: Hashable) -> None:
+        """Remove ``viewer``; has no effect if it has not joined."""
+        with self._lock:
+            self._viewers.discard(viewer)
+            if not self._viewers:
+                self._stop()
+
+    def close(self) -> None:
+        """Stop the node permanently, with or without viewers."""
+        with self._lock:
+            self._closed = True
+            self._viewers.clear()
+            self._stop()
+
+    def _stop(self) -> None:
+        if self._node is not None:
+            self._node.stop()
+            self._node = None

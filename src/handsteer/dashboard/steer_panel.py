@@ -5,11 +5,11 @@ from dataclasses import dataclass
 
 from nicegui import ui
 
-from handsteer.dashboard.lease import LeaseStatus
+from handsteer.dashboard.elements import box, button, card, switch, text
 from handsteer.dashboard.pad_input import PadInput
-from handsteer.dashboard.panels.elements import box, button, card, switch, text
-from handsteer.dashboard.panels.sliders import Sliders, read_limit
+from handsteer.dashboard.sliders import Sliders, read_limit
 from handsteer.dashboard.state import PageState
+from handsteer.dashboard.viewers import LeaseStatus
 from handsteer.errors import TransportError
 from handsteer.messages import STEERING_CMD_VEL
 from handsteer.types import Velocity

@@ -4,9 +4,12 @@ from collections.abc import Callable
 
 from nicegui import ui
 
-from handsteer.dashboard.panels.elements import box, button, card, switch, tag, text
+from handsteer.dashboard.elements import box, button, card, switch, tag, text
+from handsteer.dashboard.node import DashboardNode
+from handsteer.dashboard.page import ASSETS_PATH, Page, PageContext
 from handsteer.dashboard.settings_form import FormField
 from handsteer.dashboard.settings_store import FORM, Settings
+from handsteer.dashboard.state import PageState
 from handsteer.errors import ConfigError, HandsteerError
 from handsteer.parameters import section_model
 
@@ -258,3 +261,30 @@ def _facts(field: FormField, default: object) -> str:
     shown = field.show(default) or _NONE
     when = "takes effect at once" if field.live else "read at the start"
     return " · ".join(part for part in (allowed, f"default {shown}", when) if part)
+
+
+_ELSEWHERE = (
+    "Here are no settings: this process only serves the page. Each node has its own, where it runs; `ros2 param list` "
+    "and `ros2 param set` show and set them in ROS 2, `handsteer NODE --config FILE` reads them at its start."
+)
+
+
+class SettingsPage(Page):
+    """Sets all parameters; viewers who do not drive can read them."""
+
+    def __init__(self, served: PageContext) -> None:
+        super().__init__(served, "/settings")
+        ui.add_head_html(f'<link rel="stylesheet" href="{ASSETS_PATH}/settings.css">')
+        self._panel: SettingsPanel | None = None
+        if served.local.settings is None:
+            with ui.element("section").classes("card panel"):
+                text("elsewhere", _ELSEWHERE)
+        else:
+            self._panel = SettingsPanel(served.local.settings, self.drives)
+
+    def show(self, node: DashboardNode, state: PageState) -> None:
+        """Show changes."""
+        super().show(node, state)
+        if self._panel is not None:
+            role = self.place(node).role
+            self._panel.update(to_driver=role == "driver", editable=role != "watcher")

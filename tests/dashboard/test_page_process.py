@@ -18,8 +18,8 @@ import pytest
 
 from handsteer.cameras.browser import HEADER_BYTES
 from handsteer.config import load
-from handsteer.dashboard.alone import FarGraph
-from handsteer.dashboard.apart import NearGraph, PageApart
+from handsteer.dashboard.page_process import NearGraph, PageApart
+from handsteer.dashboard.remote_graph import FarGraph
 from handsteer.errors import ConfigError, DashboardError, FrameError, TransportError, WorldError
 from handsteer.graph import Graph
 from handsteer.messages import CMD_VEL, STOP, Bool, Twist
@@ -116,7 +116,7 @@ def test_a_run_ends_with_its_page_and_leaves_the_robot_standing(tmp_path: Path) 
 
 def test_a_page_ends_with_the_process_that_it_belongs_to() -> None:
     code = (
-        "import sys, time; from handsteer.dashboard.apart import NearGraph, PageApart; page = PageApart(); "
+        "import sys, time; from handsteer.dashboard.page_process import NearGraph, PageApart; page = PageApart(); "
         "print(page.process.pid, flush=True); time.sleep(600)"
     )
     with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True) as parent:

@@ -12,8 +12,8 @@ import yaml
 from handsteer.clock import Clock
 from handsteer.config import Config, ControlConfig, TeachConfig, validate
 from handsteer.dashboard.joined import JoinedGraph
-from handsteer.dashboard.teaching.lesson import Lesson, View
-from handsteer.dashboard.teaching.node import LessonNode, LessonVision
+from handsteer.dashboard.lesson import Lesson, View
+from handsteer.dashboard.lesson_node import LessonNode, LessonVision
 from handsteer.errors import ConfigError, DatasetError
 from handsteer.signs.opening import open_classifier, open_landmarker
 from handsteer.signs.teaching.collect import Facts

@@ -1,4 +1,4 @@
-"""The process that serves the page of another process's graph; started by :mod:`handsteer.dashboard.apart`."""
+"""The process that serves the page of another process's graph; started by :mod:`handsteer.dashboard.page_process`."""
 
 import gc
 import itertools
@@ -14,7 +14,7 @@ from pathlib import Path
 from handsteer.cameras.browser import Source, check_frame
 from handsteer.clock import Clock
 from handsteer.config import Config
-from handsteer.dashboard.apart import Facts
+from handsteer.dashboard.page_process import Facts
 from handsteer.dashboard.server import Dashboard
 from handsteer.errors import ConfigError, HandsteerError, TransportError
 from handsteer.making import make_steering
@@ -33,7 +33,7 @@ class FarGraph:
     Use it only after :meth:`join` has returned.
 
     Args:
-        pipe: Not started yet; connected to a :class:`~handsteer.dashboard.apart.NearGraph`.
+        pipe: Not started yet; connected to a :class:`~handsteer.dashboard.page_process.NearGraph`.
 
     Attributes:
         transport: Carries the graph's messages.

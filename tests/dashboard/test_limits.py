@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from handsteer.dashboard import doors
+from handsteer.dashboard import limits
 from tests.dashboard.served import PATIENCE_S, Site
 from tests.dashboard.sockets import PageSocket
 from tests.dashboard.test_socket_events import space, stopped
@@ -51,7 +51,7 @@ def is_open(connection: socket.socket) -> bool:
 def test_a_crowd_shuts_nobody_out(site: Site, words: bytes) -> None:
     html, cookies = site.page()
     with PageSocket(site, html, cookies) as page, crowd(site.port, words=words) as silent:
-        eventually(lambda: sum(map(is_open, silent)) <= doors.MOST_OF_ONE_ADDRESS, PATIENCE_S)
+        eventually(lambda: sum(map(is_open, silent)) <= limits.MOST_OF_ONE_ADDRESS, PATIENCE_S)
         assert site.get("/").status == 200  # who comes for the first time
         assert site.get("/", Cookie=cookies).status == 200
         page.say("event", space(html, page.client))
@@ -71,7 +71,7 @@ def test_who_is_known_is_not_sent_away_for_strangers(site: Site) -> None:
 
 def test_a_connection_on_which_nothing_is_said_is_closed(site: Site) -> None:
     with crowd(site.port, 1) as (silent,):
-        eventually(lambda: not is_open(silent), doors.FIRST_REQUEST_S + PATIENCE_S)
+        eventually(lambda: not is_open(silent), limits.FIRST_REQUEST_S + PATIENCE_S)
 
 
 def test_a_handshake_of_https_that_does_not_come_is_not_waited_for(tmp_path: Path) -> None:
@@ -81,7 +81,7 @@ def test_a_handshake_of_https_that_does_not_come_is_not_waited_for(tmp_path: Pat
     site = Site(certificate=certificate, private_key=key)
     try:
         with crowd(site.port, 300) as silent:
-            eventually(lambda: sum(map(is_open, silent)) <= doors.MOST_OF_ONE_ADDRESS, PATIENCE_S)
+            eventually(lambda: sum(map(is_open, silent)) <= limits.MOST_OF_ONE_ADDRESS, PATIENCE_S)
             trust = ssl._create_unverified_context()
             connection = http.client.HTTPSConnection("127.0.0.1", site.port, timeout=PATIENCE_S, context=trust)
             connection.request("GET", "/")

@@ -7,7 +7,7 @@ from nicegui import ui
 
 from handsteer.config import ControlConfig
 from handsteer.control.effects import figures_of
-from handsteer.dashboard.panels.elements import box, card, switch, text
+from handsteer.dashboard.elements import box, card, switch, text
 from handsteer.dashboard.state import PageState
 from handsteer.types import BACKWARD, EFFECTS, FORWARD, GO, NONE, SIGNS, STOP, TURN_LEFT, TURN_RIGHT, action_of
 

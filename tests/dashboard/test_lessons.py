@@ -10,9 +10,9 @@ import pytest
 
 from handsteer.clock import RealClock
 from handsteer.config import Config, TeachConfig
-from handsteer.dashboard.teaching.lesson import View
-from handsteer.dashboard.teaching.node import LessonVision, thumbnail
-from handsteer.dashboard.teaching.teaching import Teaching, with_sign
+from handsteer.dashboard.lesson import View
+from handsteer.dashboard.lesson_node import LessonVision, thumbnail
+from handsteer.dashboard.lessons import Teaching, with_sign
 from handsteer.errors import ConfigError, DatasetError, ModelCorrupt
 from handsteer.images import image_message
 from handsteer.landmarks.hand import Hand

@@ -6,16 +6,15 @@ from typing import Final
 
 from nicegui import ui
 
+from handsteer.dashboard.camera_panel import CameraPanel
+from handsteer.dashboard.elements import box, card, switch, text
+from handsteer.dashboard.lesson import View
+from handsteer.dashboard.lesson_node import LessonNode
+from handsteer.dashboard.lesson_panels import CollectPanel, Countdown, KeptPanel, NamePanel, ResultPanel, TrainPanel
+from handsteer.dashboard.lessons import Teaching
 from handsteer.dashboard.node import DashboardNode
 from handsteer.dashboard.page import ASSETS_PATH, PICTURE_PATH, Page, PageContext
-from handsteer.dashboard.panels.camera import CameraPanel
-from handsteer.dashboard.panels.elements import box, card, switch, text
-from handsteer.dashboard.panels.teach_collect import CollectPanel, Countdown, NamePanel, TrainPanel
-from handsteer.dashboard.panels.teach_result import KeptPanel, ResultPanel
 from handsteer.dashboard.state import PageState
-from handsteer.dashboard.teaching.lesson import View
-from handsteer.dashboard.teaching.node import LessonNode
-from handsteer.dashboard.teaching.teaching import Teaching
 from handsteer.errors import HandsteerError
 
 _ELSEWHERE: Final = (

@@ -4,8 +4,8 @@ from collections.abc import Callable, Sequence
 
 from nicegui import ui
 
+from handsteer.dashboard.elements import STATIC, box, card, tag, text
 from handsteer.dashboard.history import SPAN_S, Sample, VelocityHistory
-from handsteer.dashboard.panels.elements import box, card, tag, text
 from handsteer.dashboard.state import PageState
 from handsteer.types import Velocity
 
@@ -13,7 +13,7 @@ Row = tuple[float, float | None, float | None]
 """Seconds, and the commanded and measured velocity in m/s or rad/s; None if missing."""
 
 
-class Plot(ui.element, component="plot.js"):
+class Plot(ui.element, component=STATIC / "plot.js"):
     """Commanded and measured velocity as two lines, stored in the browser; each sample is sent once.
 
     A plotting library would add a megabyte to the page, and would send all points for each new one.

@@ -4,8 +4,8 @@ from collections.abc import Callable
 
 from nicegui import ui
 
+from handsteer.dashboard.elements import box, button, switch, text
 from handsteer.dashboard.joined import Cameras
-from handsteer.dashboard.panels.elements import box, button, switch, text
 from handsteer.dashboard.state import PageState
 from handsteer.types import NONE
 

@@ -4,15 +4,15 @@ import time
 
 from nicegui import ui
 
+from handsteer.dashboard.camera_panel import CameraPanel
+from handsteer.dashboard.elements import UNKNOWN, box, card, text
+from handsteer.dashboard.legend import SignsPanel
 from handsteer.dashboard.node import DashboardNode
 from handsteer.dashboard.page import ASSETS_PATH, PICTURE_PATH, Page, PageContext
-from handsteer.dashboard.panels.camera import CameraPanel
-from handsteer.dashboard.panels.elements import UNKNOWN, box, card, text
-from handsteer.dashboard.panels.signs import SignsPanel
-from handsteer.dashboard.panels.steer import SteerPanel
-from handsteer.dashboard.panels.velocity import VelocityPanel
-from handsteer.dashboard.panels.world import WorldPanel
 from handsteer.dashboard.state import PageState
+from handsteer.dashboard.steer_panel import SteerPanel
+from handsteer.dashboard.velocity import VelocityPanel
+from handsteer.dashboard.world_panel import WorldPanel
 
 
 class TimingPanel:
