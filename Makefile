@@ -84,12 +84,12 @@ bench-signs: $(BIN)/.dev models
 	@$(BIN)/python benchmarks/signs.py $(ARGS)
 
 signs-model: | $(BIN)/.run
-	@$(BIN)/python -m handsteer.signs.training
+	@$(BIN)/python -m handsteer.training.synthetic.train
 
 QUANTIZER := $(VENV)/quantizer
 landmark-model: models $(QUANTIZER)/.made
 	@$(QUANTIZER)/bin/python scripts/landmark_model/build.py "$$($(BIN)/python -c \
-		'from handsteer.landmarks.models import find_model; print(find_model("hand_landmark_full.tflite"))')"
+		'from handsteer.recognition.landmark_models import find_model; print(find_model("hand_landmark_full.tflite"))')"
 
 faults: $(BIN)/.dev models
 	@$(BIN)/python -m tests.faults $(ARGS)

@@ -12,12 +12,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from handsteer.signs.features import shape_features
-from handsteer.signs.network import train
-from handsteer.signs.training.fit import seen_hands
-from handsteer.signs.training.hands import make_hands
-from handsteer.signs.training.people import draw_people, from_canonical, load_people
-from handsteer.signs.training.truth import OTHER, SHAPES
+from handsteer.recognition.features import shape_features
+from handsteer.training.network import train
+from handsteer.training.synthetic.fit import seen_hands
+from handsteer.training.synthetic.hands import OTHER, SHAPES, make_hands
+from handsteer.training.synthetic.people import draw_people, from_canonical, load_people
 
 DATA = Path(__file__).parents[2] / "shared" / "data"
 FOLDERS = ("hagrid-dev", "photos")

@@ -13,8 +13,8 @@ import numpy as np
 from ai_edge_litert.interpreter import Interpreter
 
 from handsteer.config import LandmarksConfig
-from handsteer.landmarks.mediapipe import MediaPipeLandmarker
-from handsteer.landmarks.models import find_pair
+from handsteer.recognition.landmark_models import find_pair
+from handsteer.recognition.landmarker import MediaPipeLandmarker
 
 CLIP = Path(__file__).parents[2] / "shared" / "data" / "videos" / "dex-retargeting_human_hand_video_1280x720.mp4"
 PARTS = ("JPEG decode", "landmark model", "palm model", "JPEG to landmarks, hand followed")

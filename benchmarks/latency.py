@@ -13,8 +13,8 @@ from ai_edge_litert.interpreter import Interpreter
 
 from handsteer.config import CameraConfig, Config
 from handsteer.graph import Graph
-from handsteer.landmarks import tflite
 from handsteer.messages import CMD_VEL, HAND_SIGN, String, Twist
+from handsteer.recognition import tflite
 from handsteer.transports.protocol import Received
 
 CLIP = Path(__file__).parents[2] / "shared" / "data" / "videos" / "dex-retargeting_human_hand_video_1280x720.mp4"

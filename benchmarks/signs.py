@@ -15,13 +15,13 @@ from pathlib import Path
 
 import cv2
 
-from handsteer.signs.evaluate import evaluate_photos
-from handsteer.signs.intervals import Share
-from handsteer.signs.labelled import LabelledPhoto, read_photo_labels
-from handsteer.signs.metrics import PhotoResult
-from handsteer.signs.recognizer import Recognizer
-from handsteer.signs.training.fit import part_of
-from handsteer.signs.views import View
+from handsteer.recognition.recognizer import Recognizer
+from handsteer.training.evaluation.intervals import Share
+from handsteer.training.evaluation.labels import LabelledPhoto, read_photo_labels
+from handsteer.training.evaluation.photo_metrics import PhotoResult
+from handsteer.training.evaluation.sources import evaluate_photos
+from handsteer.training.evaluation.views import View
+from handsteer.training.synthetic.fit import part_of
 from handsteer.types import FORWARD, MOTION_SIGNS, NONE, SIGNS, TURN_LEFT, TURN_RIGHT
 
 DATA = Path(__file__).parents[2] / "shared" / "data"

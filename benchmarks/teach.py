@@ -16,9 +16,9 @@ import numpy as np
 from handsteer.config import SignsConfig, load
 from handsteer.dashboard.lessons import Teaching
 from handsteer.graph import Graph
-from handsteer.signs.opening import open_classifier
-from handsteer.signs.teaching.dataset import Dataset
-from handsteer.signs.teaching.train import train_signs
+from handsteer.recognition.recognizer import open_classifier
+from handsteer.training.custom.dataset import Dataset
+from handsteer.training.custom.train import train_signs
 
 ALONE_S = 5.0
 TRY_S = 8.0

@@ -10,7 +10,7 @@ from handsteer.hand.kinematics import angles_of, pose_skeleton
 from handsteer.hand.placement import Pinhole
 from handsteer.hand.poses import HandPose, View, sign_pose
 from handsteer.hand.renderer import Look, render
-from handsteer.signs.recognizer import Recognizer
+from handsteer.recognition.recognizer import Recognizer
 from handsteer.types import NONE, SIGNS
 
 FOLDER = Path(__file__).resolve().parents[1] / "docs" / "pictures"

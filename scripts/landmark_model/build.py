@@ -18,7 +18,7 @@ from folded import folded, operations
 
 HERE: Final = Path(__file__).parent
 RANGES: Final = HERE / "ranges.json"
-TARGET: Final = HERE.parents[1] / "src" / "handsteer" / "landmarks" / "hand_landmark_fast.tflite"
+TARGET: Final = HERE.parents[1] / "src" / "handsteer" / "recognition" / "hand_landmark_fast.tflite"
 
 # Which operations were left in float, and why, stands in docs/performance.md.
 WHOLLY_INTEGER: Final = range(5, 42)

@@ -14,8 +14,8 @@ from ai_edge_litert.interpreter import Interpreter
 from crops import Half, crops, photos
 
 from handsteer.config import Config
-from handsteer.landmarks.models import find_model
-from handsteer.signs.recognizer import Recognizer
+from handsteer.recognition.landmark_models import find_model
+from handsteer.recognition.recognizer import Recognizer
 
 MODELS = ("full", "fast")
 

@@ -13,7 +13,7 @@ from ai_edge_litert.interpreter import Interpreter
 from crops import crops
 from folded import folded, operations
 
-from handsteer.landmarks.models import find_model
+from handsteer.recognition.landmark_models import find_model
 
 TARGET = Path(__file__).with_name("ranges.json")
 OPERATIONS = range(4, 42)

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
     from handsteer.config import Config
-    from handsteer.signs.recognizer import Recognizer
+    from handsteer.recognition.recognizer import Recognizer
     from handsteer.teleop import Teleop
     from handsteer.types import Velocity
 
@@ -23,7 +23,7 @@ __all__ = ["Config", "Recognizer", "Teleop", "Velocity"]
 
 _HOMES: Final = {
     "Config": "handsteer.config",
-    "Recognizer": "handsteer.signs.recognizer",
+    "Recognizer": "handsteer.recognition.recognizer",
     "Teleop": "handsteer.teleop",
     "Velocity": "handsteer.types",
 }

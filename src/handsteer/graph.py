@@ -6,9 +6,9 @@
                                                                  steering ──/steering/cmd_vel──▲
 
 Each box is a node (:mod:`handsteer.nodes`), each arrow a topic (:mod:`handsteer.messages`). The work is done in
-packages that do not depend on nodes: :mod:`handsteer.cameras` deliver frames, :mod:`handsteer.landmarks` finds the
-hand, :mod:`handsteer.signs` recognises the sign, :mod:`handsteer.control` converts it to a velocity, and
-:mod:`handsteer.robots` follow it. A transport (:mod:`handsteer.transports`) carries the messages.
+packages that do not depend on nodes: :mod:`handsteer.cameras` deliver frames, :mod:`handsteer.recognition` recognises
+the hand's sign, :mod:`handsteer.control` converts it to a velocity, and :mod:`handsteer.robots` follow it. A transport
+(:mod:`handsteer.transports`) carries the messages.
 """
 
 import logging

@@ -66,9 +66,8 @@ def make_recognition(config: Config, transport: Transport, clock: Clock) -> "Han
         ModelError: A landmark model or the sign model is missing or broken.
     """
     from handsteer.nodes.recognition import HandSignRecognitionNode
-    from handsteer.signs.drawing import annotate
-    from handsteer.signs.opening import open_classifier
-    from handsteer.signs.recognizer import Recognizer
+    from handsteer.recognition.drawing import annotate
+    from handsteer.recognition.recognizer import Recognizer, open_classifier
 
     recognizer = Recognizer(config)
     _warn_of_unknown_signs(config, recognizer.signs)

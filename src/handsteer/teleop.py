@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from handsteer.cameras.freshness import Freshness
 from handsteer.config import Config
 from handsteer.control.control import Control
-from handsteer.signs.recognizer import Recognition, Recognizer
+from handsteer.recognition.recognizer import Recognition, Recognizer
 from handsteer.types import ZERO, Velocity
 
 

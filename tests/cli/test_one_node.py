@@ -7,7 +7,7 @@ import sys
 import pytest
 
 from tests.processes import free_port
-from tests.signs.test_opening import loaded_by
+from tests.recognition.test_imports import loaded_by
 
 BEGIN = "from handsteer.cli.one_node import load\nload({verb!r})\n"
 

@@ -5,7 +5,7 @@ import cv2
 import numpy as np
 import pytest
 
-from handsteer.signs.recognizer import Recognizer
+from handsteer.recognition.recognizer import Recognizer
 from handsteer.types import SIGNS
 from tests.cli.test_cli import fails, prints
 

@@ -9,10 +9,10 @@ import pytest
 from handsteer.cameras.virtual import VirtualHandCamera
 from handsteer.clock import SteppedClock
 from handsteer.config import VirtualHandConfig
-from handsteer.signs.teaching.dataset import Dataset, load_dataset, save_dataset
+from handsteer.training.custom.dataset import Dataset, load_dataset, save_dataset
 from tests.cli.test_cli import fails, prints
-from tests.signs.teaching.takes import takes
-from tests.signs.teaching.test_keypoint_csv import row, written
+from tests.training.custom.takes import takes
+from tests.training.custom.test_keypoint_csv import row, written
 
 VIRTUAL = [
     "--camera",

@@ -4,14 +4,14 @@ import pytest
 
 from handsteer.config import TeachConfig
 from handsteer.dashboard.lesson import MOST_TAKES, NO_HAND, SMALL, STILL, Lesson, hint, is_still
-from handsteer.landmarks.hand import Hand
-from handsteer.signs.classifier import SignGuess
-from handsteer.signs.recognizer import Recognition
-from handsteer.signs.teaching.collect import Facts
+from handsteer.recognition.classifier import SignGuess
+from handsteer.recognition.hand import Hand
+from handsteer.recognition.recognizer import Recognition
+from handsteer.training.custom.collect import Facts
 from handsteer.types import NONE
 from tests.dashboard.lessons import REPORT
-from tests.signs.hands import show_sign
-from tests.signs.teaching.models import model
+from tests.recognition.hands import show_sign
+from tests.recognition.models import model
 
 NOTHING = SignGuess(NONE, 0.0)
 HAND = show_sign("Peace")

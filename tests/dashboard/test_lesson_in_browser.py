@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from handsteer.cameras.files import video_frames
-from handsteer.signs.teaching.dataset import load_dataset
-from handsteer.signs.teaching.taught import load_taught
+from handsteer.recognition.custom_signs import load_custom_model
+from handsteer.training.custom.dataset import load_dataset
 from tests.dashboard.visits import NEEDS_A_BROWSER, PATIENCE_MS, Visit, visiting
 
 pytestmark = NEEDS_A_BROWSER
@@ -66,7 +66,7 @@ def test_a_sign_is_taught_from_the_browsers_webcam_and_drives(
         teach(visit)
         keep(visit)
         assert [take.label for take in load_dataset(tmp_path / "signs.npz").takes] == ["Two"] * 2
-        assert load_taught(tmp_path / "mine.npz").labels == ("Two",)
+        assert load_custom_model(tmp_path / "mine.npz").labels == ("Two",)
         drive(visit)
         assert visit.troubles == []
 

@@ -7,12 +7,12 @@ import pytest
 from handsteer.config import TeachConfig
 from handsteer.dashboard.lesson import Collected, Lesson, View
 from handsteer.dashboard.lesson_panels import counted, opinion, said_now
-from handsteer.signs.recognizer import Recognition
-from handsteer.signs.teaching.collect import Facts, Status
+from handsteer.recognition.recognizer import Recognition
+from handsteer.training.custom.collect import Facts, Status
 from handsteer.types import EFFECTS, NONE, Action
 from tests.dashboard.served import Site
-from tests.signs.hands import show_sign
-from tests.signs.teaching.takes import take
+from tests.recognition.hands import show_sign
+from tests.training.custom.takes import take
 
 HAND = show_sign("Peace")
 

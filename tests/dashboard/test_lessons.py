@@ -15,16 +15,15 @@ from handsteer.dashboard.lesson_node import LessonVision, thumbnail
 from handsteer.dashboard.lessons import Teaching, with_sign
 from handsteer.errors import ConfigError, DatasetError, ModelCorrupt
 from handsteer.images import image_message
-from handsteer.landmarks.hand import Hand
-from handsteer.landmarks.recorded import RecordedLandmarker
 from handsteer.messages import IMAGE_RAW, Header
-from handsteer.signs.opening import open_classifier
-from handsteer.signs.teaching.dataset import Dataset, load_dataset, save_dataset
-from handsteer.signs.teaching.taught import load_taught, save_taught
+from handsteer.recognition.custom_signs import load_custom_model, save_custom_model
+from handsteer.recognition.hand import Hand, RecordedLandmarker
+from handsteer.recognition.recognizer import open_classifier
+from handsteer.training.custom.dataset import Dataset, load_dataset, save_dataset
 from handsteer.transports.in_process import InProcessTransport
-from tests.signs.hands import show_sign
-from tests.signs.teaching.models import model
-from tests.signs.teaching.takes import shaken, takes
+from tests.recognition.hands import show_sign
+from tests.recognition.models import model
+from tests.training.custom.takes import shaken, takes
 
 PATIENCE_S = 180.0
 IMAGE = np.full((48, 64, 3), 90, np.uint8)
@@ -114,7 +113,7 @@ def collected(school: School) -> int:
 @pytest.mark.slow
 def test_a_sign_is_collected_learnt_kept_and_taken_by_the_graph(school: School) -> None:
     save_dataset(Dataset(tuple(takes("Call", count=2))), school.folder / "signs.npz")
-    save_taught(model(), school.folder / "mine.npz")
+    save_custom_model(model(), school.folder / "mine.npz")
     teaching = school.teaching
     teaching.begin("ann", " peace ", "Ann")
     assert teaching.lost() == ("Hi", "Ho")
@@ -147,7 +146,7 @@ def test_a_sign_is_collected_learnt_kept_and_taken_by_the_graph(school: School) 
     assert kept is not None
     assert school.config.control.actions == {"peace": "turbo"}
     assert school.config.signs.model == school.folder / "mine.npz"
-    assert load_taught(school.folder / "mine.npz").labels == ("Call", "peace")
+    assert load_custom_model(school.folder / "mine.npz").labels == ("Call", "peace")
     saved = load_dataset(school.folder / "signs.npz").takes
     assert [(take.label, take.person) for take in saved] == [("Call", "me")] * 2 + [("peace", "Ann")] * 2
     assert (teaching.label, teaching.view("ann")) == (None, None)

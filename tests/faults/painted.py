@@ -8,11 +8,11 @@ from numpy.typing import NDArray
 from handsteer.cameras.protocol import Frame
 from handsteer.clock import Clock
 from handsteer.config import Config, SignsConfig
-from handsteer.landmarks.hand import Hand
-from handsteer.signs.classifier import SignGuess
-from handsteer.signs.recognizer import Recognizer
+from handsteer.recognition.classifier import SignGuess
+from handsteer.recognition.hand import Hand
+from handsteer.recognition.recognizer import Recognizer
 from handsteer.types import NONE
-from tests.signs.hands import show_sign
+from tests.recognition.hands import show_sign
 
 SIGNS = ("Forward", "Backward", "Turn Left", "Turn Right", "Go", "Stop")
 FPS = 30.0

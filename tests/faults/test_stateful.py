@@ -19,10 +19,10 @@ from handsteer.messages import CMD_VEL, IMAGE_RAW, STEERING_CMD_VEL, STOP, Bool,
 from handsteer.nodes.control import HandSignControlNode
 from handsteer.nodes.node import Node
 from handsteer.nodes.recognition import HandSignRecognitionNode
+from handsteer.recognition.drawing import annotate
+from handsteer.recognition.recognizer import open_classifier
 from handsteer.robots.command_limiter import CommandLimiter
 from handsteer.robots.diff_drive import Velocity
-from handsteer.signs.drawing import annotate
-from handsteer.signs.opening import open_classifier
 from handsteer.transports.protocol import Received
 from tests.faults.domain import Domain
 from tests.faults.painted import FPS, PaintedCamera, painted_recognizer

@@ -42,20 +42,20 @@ from handsteer.messages import (
     Topic,
     type_name,
 )
+from handsteer.recognition.custom_signs import load_custom_model, save_custom_model
+from handsteer.recognition.shipped_signs import DEFAULT_MODEL, load_model
 from handsteer.robots.description import joints, robot_description, visuals
 from handsteer.robots.editing import edit
 from handsteer.robots.world import load_world, parse_world
-from handsteer.signs.labelled import read_photo_labels
-from handsteer.signs.model import DEFAULT_MODEL, load_model
-from handsteer.signs.teaching.dataset import load_dataset
-from handsteer.signs.teaching.keypoint_csv import read_class_names, read_keypoints
-from handsteer.signs.teaching.taught import load_taught, save_taught
+from handsteer.training.custom.dataset import load_dataset
+from handsteer.training.custom.keypoint_csv import read_class_names, read_keypoints
+from handsteer.training.evaluation.labels import read_photo_labels
 from handsteer.transports.ros2.arguments import parse_arguments
 from handsteer.transports.ros2.encoding import decode, encode
 from handsteer.types import SIGNS
 from tests.fuzz import corpus
 from tests.fuzz.mutants import CASES, hold, mutants
-from tests.signs.teaching.models import model
+from tests.recognition.models import model
 
 HEADER = Header(stamp=Time(1, 2), frame_id="camera")
 WORLDS = [
@@ -241,9 +241,9 @@ def test_arrays_of_datasets(tmp_path: Path) -> None:
 
 
 def test_models_of_signs(tmp_path: Path) -> None:
-    save_taught(model(), tmp_path / "t.npz")
+    save_custom_model(model(), tmp_path / "t.npz")
     taught = (tmp_path / "t.npz").read_bytes()
-    hold(in_file(tmp_path / "t.npz", load_taught), mutants([taught, corpus.dataset()]))
+    hold(in_file(tmp_path / "t.npz", load_custom_model), mutants([taught, corpus.dataset()]))
     few = max(100, CASES // 10)  # the shipped one is large
     hold(in_file(tmp_path / "m.npz", load_model), mutants([DEFAULT_MODEL.read_bytes(), taught], few))
 

@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 from handsteer.config import LandmarksConfig
-from handsteer.landmarks.mediapipe import MediaPipeLandmarker
-from handsteer.signs.model import load_model
-from handsteer.signs.trained import TrainedClassifier
+from handsteer.recognition.landmarker import MediaPipeLandmarker
+from handsteer.recognition.shipped_signs import ShippedClassifier, load_model
 from handsteer.types import SIGNS, Handedness
 from tests.hand.views import random_picture
 
@@ -35,7 +34,7 @@ class Outcome:
 def look_at(sign: str, hand: Handedness, views: int, distances_m: tuple[float, float]) -> Outcome:
     """Show random views, each by itself; a hand that is found elsewhere counts as not found."""
     random = np.random.default_rng([SIGNS.index(sign), hand == "Left"])
-    landmarker, classifier = MediaPipeLandmarker(LandmarksConfig()), TrainedClassifier(load_model())
+    landmarker, classifier = MediaPipeLandmarker(LandmarksConfig()), ShippedClassifier(load_model())
     outcome = Outcome(views)
     for _ in range(views):
         picture = random_picture(sign, hand, random, distances_m)

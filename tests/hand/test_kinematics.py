@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from handsteer.hand.kinematics import ANGLES, BONE_LENGTHS_M, LIMITS, angles_of, clamp, pose_joints, pose_skeleton
-from handsteer.landmarks.hand import CONNECTIONS
+from handsteer.recognition.hand import CONNECTIONS
 
 SHARES = hnp.arrays(float, (3, len(ANGLES)), elements=st.floats(0, 1))
 LENGTHS = hnp.arrays(float, (3, 20), elements=st.floats(0.005, 0.15))

@@ -8,21 +8,18 @@ from handsteer.cameras.noise import SensorNoise
 from handsteer.config import Config, SignsConfig
 from handsteer.errors import ConfigError
 from handsteer.images import image_message, jpeg_message
-from handsteer.landmarks.hand import Hand
-from handsteer.landmarks.recorded import RecordedLandmarker
 from handsteer.messages import DIAGNOSTICS, HAND_SIGN, IMAGE_ANNOTATED, IMAGE_COMPRESSED, IMAGE_RAW, Header, Image, Time
 from handsteer.nodes.recognition import HandSignRecognitionNode
 from handsteer.parameters import NodeParameters
-from handsteer.signs.drawing import annotate
-from handsteer.signs.model import load_model
-from handsteer.signs.opening import open_classifier
-from handsteer.signs.recognizer import Recognition, Recognizer
-from handsteer.signs.teaching.taught import save_taught
-from handsteer.signs.trained import TrainedClassifier
+from handsteer.recognition.custom_signs import save_custom_model
+from handsteer.recognition.drawing import annotate
+from handsteer.recognition.hand import Hand, RecordedLandmarker
+from handsteer.recognition.recognizer import Recognition, Recognizer, open_classifier
+from handsteer.recognition.shipped_signs import ShippedClassifier, load_model
 from handsteer.types import FORWARD
 from tests.nodes.stepping import Bench
-from tests.signs.hands import show_fingers, show_sign
-from tests.signs.teaching.models import model
+from tests.recognition.hands import show_fingers, show_sign
+from tests.recognition.models import model
 
 HEADER = Header(stamp=Time(0, 0), frame_id="camera")
 GREY = np.full((480, 640, 3), 100, np.uint8)
@@ -35,7 +32,7 @@ class RecognitionBench(Bench):
         super().__init__()
         config = config or SignsConfig()
         landmarker = RecordedLandmarker([[hand or show_sign(FORWARD)]] * 100)
-        recognizer = Recognizer(Config(signs=config), landmarker=landmarker, classifier=TrainedClassifier(load_model()))
+        recognizer = Recognizer(Config(signs=config), landmarker=landmarker, classifier=ShippedClassifier(load_model()))
         self.node = HandSignRecognitionNode(
             self.transport, self.clock, recognizer, config, annotate, open_classifier=open_classifier
         )
@@ -327,7 +324,7 @@ def with_model(path: Path) -> Config:
 
 def test_another_model_counts_from_the_next_frame_and_a_sign_is_confirmed_anew(tmp_path: Path) -> None:
     path = tmp_path / "mine.npz"
-    save_taught(model(hi=0.99), path)
+    save_custom_model(model(hi=0.99), path)
     bench = RecognitionBench(hand=show_fingers("index", "little"))
     bench.show(frames=5)
     assert set(bench.names) == {"NONE"}
@@ -341,7 +338,7 @@ def test_another_model_counts_from_the_next_frame_and_a_sign_is_confirmed_anew(t
     bench.show()
     assert bench.names[-1] == "Hi", "a file that has gone since it was read is still in use"
 
-    save_taught(model(hi=0.01, ho=0.98), path)
+    save_custom_model(model(hi=0.01, ho=0.98), path)
     bench.node.reconfigure(with_model(path))
     bench.show(frames=6)
     assert (bench.names[-6], bench.names[-1]) == ("NONE", "Ho"), "a file that was written anew is read again"
@@ -362,7 +359,7 @@ def test_a_model_that_cannot_be_used_is_refused_before_anything_changes(tmp_path
     with pytest.raises(ConfigError, match=r"^model: cannot read the model of taught signs .*gone.npz"):
         parameters.set({"model": str(tmp_path / "gone.npz")})
     assert (applied, parameters.values()["model"]) == ([], "")
-    save_taught(model(), path)
+    save_custom_model(model(), path)
     parameters.set({"model": str(path)})
     parameters.set({"model": str(path)})  # again, as it may have been written anew
     parameters.set({"model": ""})

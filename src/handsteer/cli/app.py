@@ -1,12 +1,20 @@
-"""The command line as a whole: its verbs, and what becomes of errors."""
+"""The command line as a whole: its verbs, the options that they share, and how errors are reported."""
 
-from cyclopts import App, CycloptsError, ValidationError
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import App, CycloptsError, Parameter, ValidationError
 from pydantic import ValidationError as PydanticError
 
 from handsteer import __version__, config
 from handsteer.cli import signals
 from handsteer.cli.running import exit_code, fail, set_up_logging
 from handsteer.parameters import section_model
+
+Flag = Annotated[bool, Parameter(negative="")]
+Parameters = Annotated[config.Config | None, Parameter(name="*", group="Every parameter (also in a --config file)")]
+ConfigFile = Annotated[Path | None, Parameter(name="--config")]
+
 
 _EXAMPLES = """Examples:
   handsteer run                                  drive, and open the page
@@ -29,8 +37,10 @@ app = App(
     result_action="return_value",
 )
 # Named, not imported: a verb's module is loaded when it is used.
-for verb in ("run", "recognize", "models", "doctor", "ros"):
+for verb in ("run", "recognize"):
     app.command(f"handsteer.cli.{verb}:{verb}", name=verb)
+for verb in ("models", "doctor", "ros"):
+    app.command(f"handsteer.cli.installation:{verb}", name=verb)
 app.command("handsteer.cli.signs:app", name="signs")
 for verb in _NODES:
     app.command(f"handsteer.cli.nodes:{verb}", name=verb, group="One node of a graph of several processes")

@@ -5,8 +5,8 @@ from contextlib import contextmanager
 from typing import Any
 
 from handsteer import making
+from handsteer.cli.app import ConfigFile, Flag, Parameters
 from handsteer.cli.one_node import Job, run
-from handsteer.cli.options import ConfigFile, Flag, Parameters
 from handsteer.cli.running import say
 from handsteer.config import Config
 from handsteer.errors import needing

@@ -1,19 +1,23 @@
 """``handsteer recognize``: which sign is it?"""
 
 import json as json_format
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from handsteer.cli.options import ConfigFile, Flag, Parameters
+from handsteer.cameras.files import PHOTO_SUFFIXES, find_photos, read_photo, video_frames
+from handsteer.cli.app import ConfigFile, Flag, Parameters
 from handsteer.cli.running import settings
-from handsteer.recognize import FrameResult
-from handsteer.recognize import recognize as results
-from handsteer.signs.recognizer import Recognizer
+from handsteer.errors import CameraNotFound
+from handsteer.recognition.recognizer import Recognition, Recognizer
 
 
 def recognize(
     source: Path, /, *, json: Flag = False, config_file: ConfigFile = None, parameters: Parameters = None
 ) -> int:
     """Print which sign each frame of a photo, a folder of photos or a video shows.
+
+    Photos are independent of each other; the frames of a video are processed like a camera's.
 
     Example: handsteer recognize drive.mp4 --json
 
@@ -24,15 +28,59 @@ def recognize(
     json
         Print one JSON object a line, with the landmarks.
     config_file
-        YAML file with parameters; those given here go before it.
+        YAML file with parameters; options override it.
     """
     recognizer = Recognizer(settings(config_file, parameters))
-    for result in results(source, recognizer):
-        print(json_format.dumps(result.as_dict()) if json else _text(result), flush=True)
+    if not source.exists():
+        raise CameraNotFound(f"there is no {source}: give a photo, a folder of photos or a video file")
+    is_photo = source.is_dir() or source.suffix.lower() in PHOTO_SUFFIXES
+    for result in (_photos if is_photo else _video)(source, recognizer):
+        print(json_format.dumps(asdict(result)) if json else _text(result), flush=True)
     return 0
 
 
-def _text(result: FrameResult) -> str:
+@dataclass(frozen=True)
+class _Result:
+    """What is printed of a frame: ``time_s`` is 0 for a photo, ``landmarks`` are image-normalised x, y and z."""
+
+    source: str
+    frame: int
+    time_s: float
+    sign: str
+    seen: str
+    confidence: float
+    handedness: str | None
+    landmarks: list[list[float]] | None
+
+
+def _photos(source: Path, recognizer: Recognizer) -> Iterator[_Result]:
+    for path in find_photos(source):
+        yield _result(path, 0, 0.0, recognizer.recognize(read_photo(path)))
+
+
+def _video(path: Path, recognizer: Recognizer) -> Iterator[_Result]:
+    last_s = 0.0
+    for number, frame in enumerate(video_frames(path)):
+        recognition = recognizer.step(frame.image, frame.captured_s - last_s)
+        last_s = frame.captured_s
+        yield _result(path, number, frame.captured_s, recognition)
+
+
+def _result(source: Path, number: int, time_s: float, recognition: Recognition) -> _Result:
+    hand = recognition.hand
+    return _Result(
+        source=str(source),
+        frame=number,
+        time_s=round(time_s, 6),
+        sign=recognition.sign,
+        seen=recognition.seen,
+        confidence=round(recognition.confidence, 4),
+        handedness=hand.handedness if hand else None,
+        landmarks=[[round(float(value), 5) for value in point] for point in hand.points] if hand else None,
+    )
+
+
+def _text(result: _Result) -> str:
     hand = f"{result.handedness} hand" if result.handedness else "no hand"
     seen = "" if result.seen == result.sign else f", {result.seen} seen"
     where = f"{result.source}  {result.frame:5d}  {result.time_s:8.3f} s"

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from handsteer.cli import signals
-from handsteer.cli.options import ConfigFile, Flag, Parameters
+from handsteer.cli.app import ConfigFile, Flag, Parameters
 from handsteer.cli.running import keep_what_is_loaded, say, uninterrupted
 from handsteer.cli.running import settings as make_settings
 from handsteer.clock import RealClock, SteppedClock

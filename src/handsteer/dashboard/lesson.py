@@ -7,15 +7,15 @@ from typing import Final, Literal
 import numpy as np
 
 from handsteer.config import TeachConfig
-from handsteer.landmarks.hand import Hand
-from handsteer.signs.classifier import SignGuess
-from handsteer.signs.features import KNUCKLES, WRIST
-from handsteer.signs.recognizer import Recognition
-from handsteer.signs.teaching.collect import Collector, Facts, Status
-from handsteer.signs.teaching.dataset import Take
-from handsteer.signs.teaching.taught import TaughtModel
-from handsteer.signs.teaching.train import TeachingReport
-from handsteer.signs.trained import SURE
+from handsteer.recognition.classifier import SignGuess
+from handsteer.recognition.custom_signs import CustomModel
+from handsteer.recognition.features import KNUCKLES, WRIST
+from handsteer.recognition.hand import Hand
+from handsteer.recognition.recognizer import Recognition
+from handsteer.recognition.shipped_signs import SURE
+from handsteer.training.custom.collect import Collector, Facts, Status
+from handsteer.training.custom.dataset import Take
+from handsteer.training.custom.report import TrainingReport
 from handsteer.types import NONE
 
 _SMALL_PX: Final = 60.0
@@ -112,7 +112,7 @@ class View:
     can_train: bool
     progress: float
     trouble: str
-    report: TeachingReport | None
+    report: TrainingReport | None
     seen: Recognition | None
 
 
@@ -127,7 +127,7 @@ class Lesson:
     def __init__(self, facts: Facts, plan: TeachConfig) -> None:
         self.facts = facts
         self.step: Step = "collect"
-        self.model: TaughtModel | None = None
+        self.model: CustomModel | None = None
         self._plan = plan
         self._collector: Collector | None = None
         self._status = _READY
@@ -137,7 +137,7 @@ class Lesson:
         self._count = 0
         self._progress = 0.0
         self._trouble = ""
-        self._report: TeachingReport | None = None
+        self._report: TrainingReport | None = None
         self._seen: Recognition | None = None
 
     @property
@@ -232,7 +232,7 @@ class Lesson:
         """Set the number of training steps that are done."""
         self._progress = done / of
 
-    def learn(self, model: TaughtModel, report: TeachingReport) -> None:
+    def learn(self, model: CustomModel, report: TrainingReport) -> None:
         """Set the result of the training, to be tried."""
         if self.step == "train":
             self.step, self.model, self._report, self._seen = "try", model, report, None

@@ -15,16 +15,16 @@ from handsteer.config import Config, SignsConfig
 from handsteer.dashboard.lesson import Lesson, View
 from handsteer.errors import TrainingError
 from handsteer.images import bgr_image, encode_jpeg
-from handsteer.landmarks.hand import Hand, Landmarker
 from handsteer.messages import IMAGE_RAW, Image
 from handsteer.nodes.node import Node
-from handsteer.signs.classifier import Classifier, SignGuess
-from handsteer.signs.drawing import draw_hand
-from handsteer.signs.recognizer import Recognizer
-from handsteer.signs.teaching.apart import TrainingApart
-from handsteer.signs.teaching.collect import largest
-from handsteer.signs.teaching.dataset import Dataset
-from handsteer.signs.teaching.taught import TaughtClassifier, TaughtModel
+from handsteer.recognition.classifier import Classifier, SignGuess
+from handsteer.recognition.custom_signs import CustomClassifier, CustomModel
+from handsteer.recognition.drawing import draw_hand
+from handsteer.recognition.hand import Hand, Landmarker
+from handsteer.recognition.recognizer import Recognizer
+from handsteer.training.custom.background import BackgroundTraining
+from handsteer.training.custom.collect import largest
+from handsteer.training.custom.dataset import Dataset
 from handsteer.transports.protocol import Received, Transport
 from handsteer.types import NONE
 
@@ -72,9 +72,9 @@ class LessonNode(Node):
         self._known = known
         self._eyes = eyes
         self._lock = threading.RLock()
-        self._training: TrainingApart | None = None
+        self._training: BackgroundTraining | None = None
         self._seeing: tuple[Landmarker, Classifier] | None = None
-        self._trying: tuple[TaughtModel, Recognizer] | None = None
+        self._trying: tuple[CustomModel, Recognizer] | None = None
         self._shown: tuple[NDArray[np.uint8], Hand, float] | None = None
         self._last_s: float | None = None
         self._last_frame_s = clock.now()
@@ -89,7 +89,7 @@ class LessonNode(Node):
             return self._lesson.view
 
     @property
-    def learnt(self) -> TaughtModel | None:
+    def learnt(self) -> CustomModel | None:
         """The taught model, while it is tried."""
         with self._lock:
             return self._lesson.model
@@ -118,7 +118,7 @@ class LessonNode(Node):
         with self._lock:
             if not self._lesson.begin_training():
                 return
-            training = TrainingApart(self._known.with_takes(self._lesson.takes))
+            training = BackgroundTraining(self._known.with_takes(self._lesson.takes))
             self._training = training
         threading.Thread(target=self._learn, args=(training,), name="lesson_training", daemon=True).start()
 
@@ -138,7 +138,7 @@ class LessonNode(Node):
         if training is not None:
             training.cancel()
 
-    def _learn(self, training: TrainingApart) -> None:
+    def _learn(self, training: BackgroundTraining) -> None:
         def progress(done: int, of: int) -> None:
             with self._lock:
                 if self._training is training:
@@ -204,7 +204,7 @@ class LessonNode(Node):
             return
         if self._trying is None or self._trying[0] is not model:
             landmarker.reset()
-            classifier, config = TaughtClassifier(shipped, model), Config(signs=self._eyes.signs())
+            classifier, config = CustomClassifier(shipped, model), Config(signs=self._eyes.signs())
             self._trying = model, Recognizer(config, landmarker=landmarker, classifier=classifier)
         seen = self._trying[1].step(image, step_s)
         with self._lock:

@@ -10,10 +10,9 @@ from nicegui import ui
 from handsteer.dashboard.elements import box, button, switch, tag, text
 from handsteer.dashboard.lesson import Collected, View, hands_in
 from handsteer.dashboard.lessons import Kept
-from handsteer.signs.recognizer import Recognition
-from handsteer.signs.teaching.dataset import Dataset, summarise
-from handsteer.signs.teaching.train import TeachingReport
-from handsteer.signs.teaching.words import false_hands, how_it_was_tried, mistakes
+from handsteer.recognition.recognizer import Recognition
+from handsteer.training.custom.dataset import Dataset, summarise
+from handsteer.training.custom.report import TrainingReport, false_hands, how_it_was_tried, mistakes
 from handsteer.types import EFFECTS, NONE, Action
 
 _LONGEST = 200
@@ -282,7 +281,7 @@ def opinion(seen: Recognition | None, label: str, does: Callable[[str], Action])
     return f"{seen.seen}, {seen.confidence:.0%}", f"would mean: {EFFECTS[does(seen.seen)]}"
 
 
-def _figures(report: TeachingReport) -> None:
+def _figures(report: TrainingReport) -> None:
     labels, counts = report.confusion.labels, report.confusion.counts
     with box("scroll").props('tabindex=0 role="region" aria-label="Confusion matrix"'), ui.element("table"):
         tag("caption", "", "A row for each sign that was shown, a column for each that came out, in hands")

@@ -15,10 +15,10 @@ from handsteer.dashboard.joined import JoinedGraph
 from handsteer.dashboard.lesson import Lesson, View
 from handsteer.dashboard.lesson_node import LessonNode, LessonVision
 from handsteer.errors import ConfigError, DatasetError
-from handsteer.signs.opening import open_classifier, open_landmarker
-from handsteer.signs.teaching.collect import Facts
-from handsteer.signs.teaching.dataset import Dataset, label_for, load_dataset, save_dataset
-from handsteer.signs.teaching.taught import load_taught, save_taught
+from handsteer.recognition.custom_signs import label_for, load_custom_model, save_custom_model
+from handsteer.recognition.recognizer import open_classifier, open_landmarker
+from handsteer.training.custom.collect import Facts
+from handsteer.training.custom.dataset import Dataset, load_dataset, save_dataset
 from handsteer.transports.protocol import Transport
 from handsteer.types import ACTIONS, NONE, SIGNS, Action, action_of, find_sign
 
@@ -152,7 +152,7 @@ class Teaching:
         if label in SIGNS:
             raise DatasetError(f"{label} is known already: give the new sign a name of its own")
         path = self.model_path.expanduser()
-        old = load_taught(path).labels if path.exists() else ()
+        old = load_custom_model(path).labels if path.exists() else ()
         lost = tuple(sign for sign in old if sign not in (*known.labels, label))
         when = f"{datetime.datetime.now():%Y-%m-%d %H:%M}"
         lesson = Lesson(Facts(label, _person(person), when, "page"), self._plan)
@@ -205,7 +205,7 @@ class Teaching:
             if does is None and view.label != NONE:
                 raise ConfigError(f"{action!r} is no action: choose one of {', '.join(self.actions())}")
             path = self.model_path
-            save_taught(model, path.expanduser())
+            save_custom_model(model, path.expanduser())
             if not given.takes_are_saved:
                 takes = [each.take for each in view.takes]
                 save_dataset(self.known().with_takes(takes), self._plan.dataset.expanduser())

@@ -12,7 +12,7 @@ from handsteer.config import CameraConfig
 from handsteer.doctor.finding import Finding
 from handsteer.doctor.ros2 import examine_ros2
 from handsteer.errors import CameraError, ModelError
-from handsteer.landmarks.models import MODELS, find_model, models_dir
+from handsteer.recognition.landmark_models import MODELS, find_model, models_dir
 
 __all__ = ["Finding", "examine"]
 

@@ -22,8 +22,8 @@ from handsteer.nodes.node import OK, WARN, Node
 from handsteer.nodes.recording import Recording
 from handsteer.nodes.stall_guard import CALM_S, StallGuard
 from handsteer.nodes.stop_keeper import StopKeeper
-from handsteer.signs.classifier import Classifier
-from handsteer.signs.recognizer import Recognition, Recognizer
+from handsteer.recognition.classifier import Classifier
+from handsteer.recognition.recognizer import Recognition, Recognizer
 from handsteer.transports.protocol import Received, Subscription, Transport
 from handsteer.types import NONE
 

@@ -21,7 +21,7 @@ for verb, function in {
     "list": "list_signs:list_signs",
     "evaluate": "evaluate:evaluate",
     "collect": "collect:collect",
-    "import": "import_keypoints:import_keypoints",
+    "import": "collect:import_keypoints",
     "train": "train:train",
 }.items():
     app.command(f"handsteer.cli.signs.{function}", name=verb)

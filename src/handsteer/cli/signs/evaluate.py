@@ -10,19 +10,25 @@ import cv2
 from cyclopts import Parameter
 from tqdm import tqdm
 
-from handsteer.cli.options import ConfigFile, Flag, Parameters
+from handsteer.cli.app import ConfigFile, Flag, Parameters
 from handsteer.cli.running import settings
-from handsteer.cli.signs.evaluation_tables import evaluation_tables
+from handsteer.cli.signs.tables import evaluation_tables
 from handsteer.config import Config
 from handsteer.errors import EvaluationError
-from handsteer.signs.classifier import Classifier
-from handsteer.signs.evaluation import Evaluation
-from handsteer.signs.labelled import labels_of
-from handsteer.signs.opening import open_classifier
-from handsteer.signs.plot import Picture, draw_confusion, draw_reliability, draw_sweep
-from handsteer.signs.recognizer import Recognizer
-from handsteer.signs.sources import LabelledFolder, LabelledHands, LabelledVideo, PhotoRun, Source, open_source
-from handsteer.signs.views import View
+from handsteer.recognition.classifier import Classifier
+from handsteer.recognition.recognizer import Recognizer, open_classifier
+from handsteer.training.evaluation.labels import labels_of
+from handsteer.training.evaluation.plots import Picture, draw_confusion, draw_reliability, draw_sweep
+from handsteer.training.evaluation.report import Evaluation
+from handsteer.training.evaluation.sources import (
+    LabelledFolder,
+    LabelledHands,
+    LabelledVideo,
+    PhotoRun,
+    Source,
+    open_source,
+)
+from handsteer.training.evaluation.views import View
 from handsteer.types import motion_signs
 
 

@@ -1,25 +1,33 @@
-"""Figures as text, as several verbs print them."""
+"""Tables of results, as text."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
-from handsteer.signs.intervals import Share
-from handsteer.signs.metrics import Confusion
-from handsteer.signs.teaching.dataset import Dataset, summarise
-from handsteer.signs.teaching.train import TeachingReport
-from handsteer.signs.teaching.words import false_hands, how_it_was_tried, mistakes
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from handsteer.training.custom.dataset import Dataset, summarise
+from handsteer.training.custom.report import TrainingReport, false_hands, how_it_was_tried, mistakes
+from handsteer.training.evaluation.intervals import Rate, Share
+from handsteer.training.evaluation.photo_metrics import SIZES, Confusion, PhotoReport, Tally
+from handsteer.training.evaluation.report import Calibration, Evaluation
+from handsteer.training.evaluation.sources import PhotoRun
+from handsteer.training.evaluation.video_metrics import Event, LabelledFigures, VideoReport
+from handsteer.types import NONE
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]], text_columns: int = 1) -> str:
-    """Return ``rows`` below ``head`` in columns; those after the first ``text_columns`` are set to the right."""
-    lines = [head, *rows]
-    widths = [max(len(line[column]) for line in lines) for column in range(len(head))]
-    return "\n".join(
-        "  ".join(
-            cell.ljust(width) if column < text_columns else cell.rjust(width)
-            for column, (cell, width) in enumerate(zip(line, widths, strict=True))
-        ).rstrip()
-        for line in lines
-    )
+    """Return a table as text; columns after the first ``text_columns`` are aligned to the right."""
+    grid = Table(box=None, pad_edge=False)
+    for column, name in enumerate(head):
+        grid.add_column(Text(name), justify="left" if column < text_columns else "right", no_wrap=True)
+    for row in rows:
+        grid.add_row(*map(Text, row))
+    # As wide as it needs to be: its lines may be read by another program.
+    console = Console(width=_WIDEST, color_system=None, force_terminal=False)
+    with console.capture() as text:
+        console.print(grid)
+    return "\n".join(line.rstrip() for line in text.get().splitlines())
 
 
 def dataset_table(dataset: Dataset) -> str:
@@ -28,7 +36,7 @@ def dataset_table(dataset: Dataset) -> str:
     return table(["sign", "takes", "hands", "persons"], rows)
 
 
-def teaching_tables(report: TeachingReport) -> str:
+def teaching_tables(report: TrainingReport) -> str:
     """Return how well signs were learnt, as text."""
     rows = [
         [
@@ -70,3 +78,216 @@ def rate(share: Share) -> str:
     low, high = share.interval
     digits = 1 if high < 0.1 else 0
     return f"{share.rate:.1%} ({100 * low:.{digits}f}-{100 * high:.{digits}f})"
+
+
+_WIDEST = 10_000
+_PHOTOS_AGAIN = (
+    "Each is counted once for each view, and is no further person: intervals over several views are too narrow."
+)
+
+
+def evaluation_tables(evaluation: Evaluation, *, with_reliability: bool = False, with_sweep: bool = False) -> str:
+    """Return the figures of ``evaluation`` as text.
+
+    Args:
+        evaluation: What was found.
+        with_reliability: Also how far likelihoods can be trusted.
+        with_sweep: Also what other thresholds would give.
+    """
+    parts: list[str] = []
+    for what, runs in (("photos", evaluation.photos), ("hands", evaluation.hands)):
+        parts += _stills(evaluation, what, runs) if runs else []
+    if evaluation.stills:
+        parts += _reliability(evaluation.calibration) if with_reliability else []
+        parts += _sweep(evaluation) if with_sweep else []
+    return "\n\n".join([*parts, *_videos(evaluation)])
+
+
+def _stills(evaluation: Evaluation, what: str, runs: Sequence[PhotoRun]) -> list[str]:
+    views, sources = (list(dict.fromkeys(names)) for names in ([r.view.name for r in runs], [r.source for r in runs]))
+    together = evaluation.of_photos(runs)
+    parts = []
+    if len(views) > 1:
+        rows = {view: evaluation.of_photos([run for run in runs if run.view.name == view]) for view in views}
+        parts += [f"Recall, and motion that was not asked for, by how the {what} are seen", _comparison("view", rows)]
+    if len(sources) > 1:
+        by_source = {name: evaluation.of_photos([run for run in runs if run.source == name]) for name in sources}
+        parts += [
+            "Recall, and motion that was not asked for, by source",
+            _comparison("source", {**by_source, "all": together}),
+        ]
+    parts += [f"{', '.join(sources)}: {_counted(together, what)}"]
+    parts += [f"In {len(views)} views. {_PHOTOS_AGAIN}"] if len(views) > 1 else []
+    return [*parts, *_photo_tables(together, what)]
+
+
+def _counted(report: PhotoReport, what: str) -> str:
+    text = f"{report.photos} {what}, and {report.unscored} that are not scored"
+    return f"{text}; {report.without_depth} more are not scored: no depth" if report.without_depth else text
+
+
+def _photo_tables(report: PhotoReport, what: str) -> list[str]:
+    recall = [
+        [
+            sign,
+            *cells(share),
+            str(share.of - report.recall_of_found[sign].of),
+            rate(report.recall_of_found[sign]),
+            rate(report.wrong_motion[sign]),
+        ]
+        for sign, share in report.recall.items()
+    ]
+    sizes = [[sign, *(rate(shares[size]) for size in SIZES[:3])] for sign, shares in report.recall_by_size.items()]
+    parts = [
+        f"Recall with its 95 % interval; how many hands were not found (they are wrong), recall of those that were;\n"
+        f"and how many {what} gave another sign that moves the robot",
+        table(["sign", "right", "of", "recall", "no hand", "of the found", "moves"], recall),
+        "Recall by the longer side of the hand that was found",
+        table(["sign", *SIZES[:3]], sizes),
+    ]
+    if report.by_person_set:
+        parts += [
+            "Recall, and motion that was not asked for, by who shows it (person_set)",
+            _comparison("person_set", report.by_person_set),
+        ]
+    if report.false_commands.of:
+        kinds = {**report.false_commands_by_kind, "all": report.false_commands}
+        parts += [
+            f"False commands: {what} that show no sign and gave one that moves the robot",
+            table(["kind", "false", "of", "rate"], [[kind or "(no kind)", *cells(kinds[kind])] for kind in kinds]),
+        ]
+    return [*parts, *confusion_table(what, report.confusion)]
+
+
+def _comparison(what: str, rows: Mapping[str, Tally]) -> str:
+    """Return a row for each tally: recall of each sign, false commands, and other signs that move the robot."""
+    signs = list(dict.fromkeys(sign for row in rows.values() for sign in row.recall if sign != NONE))
+    lines = [
+        [
+            name or f"(no {what})",
+            str(row.photos),
+            *(rate(row.recall[sign]) if sign in row.recall else "-" for sign in signs),
+            rate(row.false_commands),
+            rate(row.wrong_motion_of_signs),
+        ]
+        for name, row in rows.items()
+    ]
+    return table([what, "of", *signs, "NONE moves", "other moves"], lines)
+
+
+def _reliability(figures: Calibration) -> list[str]:
+    rows = [
+        [
+            f"{each.low:.1f} to {each.high:.1f}",
+            str(each.right.of),
+            "-" if each.confidence is None else f"{each.confidence:.3f}",
+            rate(each.right),
+        ]
+        for each in figures.bins
+    ]
+    error = "-" if figures.expected_error is None else f"{figures.expected_error:.1%}"
+    return [
+        f"Reliability: how likely the likeliest sign was, and how often it is shown.\n"
+        f"Expected calibration error: {error}",
+        table(["likelihood", "hands", "mean", "shown"], rows),
+    ]
+
+
+def _sweep(evaluation: Evaluation) -> list[str]:
+    rows = evaluation.sweep
+    alarms = [
+        [f"{threshold:.2f}", *(rate(row.false_alarms[sign]) for sign in evaluation.signs)]
+        for threshold, row in rows.items()
+    ]
+    return [
+        "Thresholds: recall, and motion that was not asked for, if a sign were seen from this likelihood on",
+        _comparison("threshold", {f"{threshold:.2f}": row for threshold, row in rows.items()}),
+        "Likewise, of those that don't show the sign, how many gave it",
+        table(["threshold", *evaluation.signs], alarms),
+    ]
+
+
+def _videos(evaluation: Evaluation) -> list[str]:
+    runs = evaluation.videos
+    several_views = len({run.view for run in runs}) > 1
+    reports = {
+        f"{run.source}, {run.view.name}" if several_views else run.source: evaluation.of_videos([run]) for run in runs
+    }
+    if len(runs) < 2:
+        return [part for name, report in reports.items() for part in _video_tables(name, report)]
+    together = {**reports, "all": evaluation.of_videos(runs)}
+    parts = [
+        "A minute, with its 95 % interval: how often a sign began to count that moves the robot; false commands",
+        table(["video", "s", "motion", "a minute", "labelled s", "false", "a minute"], _rates(together.items())),
+    ]
+    return [*parts, *(part for name, report in reports.items() for part in _video_tables(name, report))]
+
+
+def _rates(reports: Iterable[tuple[str, VideoReport]]) -> list[list[str]]:
+    return [
+        [
+            name,
+            f"{report.duration_s:.1f}",
+            str(len(report.motion_events)),
+            _per_minute(report.motion_rate),
+            *(
+                [
+                    f"{report.labels.scored_s:.1f}",
+                    str(len(report.labels.false_commands)),
+                    _per_minute(report.labels.false_rate),
+                ]
+                if report.labels
+                else ["-", "-", "-"]
+            ),
+        ]
+        for name, report in reports
+    ]
+
+
+def _video_tables(name: str, report: VideoReport) -> list[str]:
+    parts = [
+        f"{name}: {report.frames} frames, {report.duration_s:.1f} s",
+        table(["sign that counted", "seconds"], [[sign, f"{time_s:.1f}"] for sign, time_s in report.counted_s.items()]),
+        f"Times at which a sign began to count that moves the robot: {len(report.motion_events)}, "
+        f"{_per_minute(report.motion_rate, ' a minute')}",
+        f"Behind another sign {_per_minute(report.engaged_rate, ' a minute')} of the time with a sign, "
+        f"behind none {_per_minute(report.idle_rate, ' a minute')} of the time without one",
+    ]
+    if report.labels is None:
+        return [*parts, *_events(report.motion_events), "There are no labels to compare with."]
+    return [*parts, *_labelled(report.labels)]
+
+
+def _labelled(labels: LabelledFigures) -> list[str]:
+    rows = [_frames_row(labels, sign) for sign in labels.counted_right]
+    return [
+        "By the labels: in how many frames the sign was seen and for how many it counted, and how soon it counted",
+        table(["sign", "frames", "seen", "counted", "shown", "missed", "median s", "slowest s"], rows),
+        f"False commands: {len(labels.false_commands)} in {labels.scored_s:.1f} s, "
+        f"{_per_minute(labels.false_rate, ' a minute')}",
+        *_events(labels.false_commands),
+        *confusion_table("frames", labels.confusion),
+    ]
+
+
+def _frames_row(labels: LabelledFigures, sign: str) -> list[str]:
+    counted, reaction = labels.counted_right[sign], labels.reactions[sign]
+    frames = [str(counted.of), rate(labels.seen_right[sign]), rate(counted)]
+    times = [str(reaction.shown), str(reaction.missed), _seconds(reaction.median_s), _seconds(reaction.slowest_s)]
+    return [sign, *frames, *times]
+
+
+def _events(events: Sequence[Event]) -> list[str]:
+    rows = [[event.sign, f"{event.start_s:.2f}", f"{event.end_s:.2f}"] for event in events]
+    return [table(["sign", "from s", "to s"], rows)] if rows else []
+
+
+def _per_minute(events: Rate, unit: str = "") -> str:
+    if events.interval is None:
+        return "-"
+    low, high = events.interval
+    return f"{events.per_minute:.1f}{unit} ({low:.1f}-{high:.1f})"
+
+
+def _seconds(time_s: float | None) -> str:
+    return "-" if time_s is None else f"{time_s:.2f}"

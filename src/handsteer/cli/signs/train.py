@@ -8,15 +8,15 @@ from typing import Annotated
 from cyclopts import Parameter
 from tqdm import tqdm
 
-from handsteer.cli.options import Flag
+from handsteer.cli.app import Flag
 from handsteer.cli.running import say
 from handsteer.cli.signs.tables import teaching_tables
 from handsteer.config import SignsConfig, TeachConfig
 from handsteer.errors import TrainingError
-from handsteer.signs.opening import open_classifier
-from handsteer.signs.teaching.dataset import Dataset, load_dataset
-from handsteer.signs.teaching.taught import save_taught
-from handsteer.signs.teaching.train import train_signs
+from handsteer.recognition.custom_signs import save_custom_model
+from handsteer.recognition.recognizer import open_classifier
+from handsteer.training.custom.dataset import Dataset, load_dataset
+from handsteer.training.custom.train import train_signs
 
 _LOW_RECALL = 0.8
 _DEFAULTS = TeachConfig()
@@ -59,7 +59,7 @@ def train(
 
         shipped = open_classifier(SignsConfig())
         model, report = train_signs(Dataset(tuple(takes)), shipped, sided=tuple(sided or ()), progress=progress)
-    save_taught(model, output)
+    save_custom_model(model, output)
     print(json_format.dumps({"model": str(output), **report.as_dict()}) if json else teaching_tables(report))
     for sign in report.signs:
         if sign.recall is not None and (sign.recall.rate or 0) < _LOW_RECALL:

@@ -1,0 +1,10 @@
+"""Recognises hand signs: finds the 21 landmarks of hands in a frame, and classifies them.
+
+:mod:`~handsteer.recognition.recognizer` runs the whole chain. ``hand`` and ``classifier`` define its interfaces.
+
+``landmarker`` finds hands with MediaPipe's models: ``search`` decides where to look for new ones, ``stillness`` when,
+``palm`` detects palms in the whole frame, and ``roi`` computes the region of a hand from its palm or its last
+landmarks. ``tflite`` runs the model files, which ``landmark_models`` locates and downloads. ``shipped_signs`` and
+``custom_signs`` classify a hand by its ``features`` with a ``network``. ``hand_selector`` selects the active hand, and
+``debouncer`` confirms its sign.
+"""

@@ -1,0 +1,107 @@
+"""A detected hand, and the interface of landmarkers."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from math import inf
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from handsteer.types import Handedness
+
+CONNECTIONS: tuple[tuple[int, int], ...] = (
+    *((0, 1), (1, 2), (2, 3), (3, 4)),
+    *((0, 5), (5, 6), (6, 7), (7, 8)),
+    *((5, 9), (9, 10), (10, 11), (11, 12)),
+    *((9, 13), (13, 14), (14, 15), (15, 16)),
+    *((0, 17), (13, 17), (17, 18), (18, 19), (19, 20)),
+)
+"""The bones to draw between landmarks 0 (wrist) to 20 (tip of the little finger)."""
+
+
+@dataclass(frozen=True)
+class Hand:
+    """One hand in one frame.
+
+    Attributes:
+        points: (21, 3) float32 landmarks, image-normalised: x / width, y / height, and depth z (0 at the wrist,
+            negative towards the camera) in the scale of x. Order: wrist, then thumb, index, middle, ring and little
+            finger, each from its base to its tip.
+        world: (21, 3) float32 landmarks in metres relative to the hand's centre, with the axes of ``points``.
+        handedness: The person's hand (the frame is not mirrored).
+        handedness_score: 0.5 to 1.
+        presence: Likelihood that there is a hand, 0 to 1.
+        image_size: Width and height of the frame in pixels.
+    """
+
+    points: NDArray[np.float32]
+    world: NDArray[np.float32]
+    handedness: Handedness
+    handedness_score: float
+    presence: float
+    image_size: tuple[int, int]
+
+    @property
+    def pixels(self) -> NDArray[np.float32]:
+        """(21, 3) float32 landmarks in pixels; z in the scale of x."""
+        width, height = self.image_size
+        return self.points * np.array([width, height, width], np.float32)
+
+    @property
+    def longer_side_px(self) -> float:
+        """The longer side of the landmarks' box, in pixels."""
+        return float(np.ptp(self.pixels[:, :2], axis=0).max())
+
+    @property
+    def box_px(self) -> tuple[int, int, int, int]:
+        """The landmarks' box: left, top, right and bottom in pixels; it may extend beyond the frame."""
+        (left, top), (right, bottom) = self.pixels[:, :2].min(axis=0), self.pixels[:, :2].max(axis=0)
+        return int(left), int(top), int(right) + 1, int(bottom) + 1
+
+
+class Landmarker(Protocol):
+    """Detects hands in frames, and tracks them from frame to frame."""
+
+    def detect(self, image: NDArray[np.uint8], *, search: bool = True, dt_s: float = inf) -> list[Hand]:
+        """Return the hands in ``image``; may be empty.
+
+        Tracked hands come first and keep their order, then new ones by descending score.
+
+        Args:
+            image: (height, width, 3) uint8, BGR, not mirrored.
+            search: Whether to search for further hands while one is tracked, which takes time.
+            dt_s: Seconds since the last frame, >= 0, used to process fewer frames while nothing changes.
+
+        Raises:
+            FrameError: The image has another shape or type.
+        """
+        ...
+
+    def follow_only(self, hand: Hand) -> None:
+        """Stop tracking all hands of the last frame except ``hand``, to save time."""
+        ...
+
+    def reset(self) -> None:
+        """Stop tracking all hands."""
+        ...
+
+
+class RecordedLandmarker:
+    """A landmarker that returns the recorded hands of ``frames``, one list per frame, and then none."""
+
+    def __init__(self, frames: Iterable[list[Hand]]) -> None:
+        self._frames = [list(hands) for hands in frames]
+        self._next = 0
+
+    def detect(self, image: NDArray[np.uint8], *, search: bool = True, dt_s: float = inf) -> list[Hand]:
+        """Return the hands of the next frame, an empty list after the last one; ignores the arguments."""
+        hands = self._frames[self._next] if self._next < len(self._frames) else []
+        self._next += 1
+        return list(hands)
+
+    def follow_only(self, hand: Hand) -> None:
+        """Do nothing: a recording continues with all its hands."""
+
+    def reset(self) -> None:
+        """Do nothing: a recording tracks no hands, and continues where it is."""

@@ -1,0 +1,279 @@
+"""MediaPipe's hand landmark models, run without MediaPipe.
+
+The processing follows MediaPipe 0.10.21's graph ``hand_landmark_tracking_cpu``, used by ``mp.solutions.hands``: while
+enough hands are tracked, only the landmark model runs, on the region from the last landmarks; otherwise palms are
+detected in the whole frame first. In addition, unless configured otherwise, a new hand is processed twice, the second
+time in the region from its own landmarks, because a palm locates a hand less precisely; and hands are searched for in
+further ways than by palms in the frame, see ``search``.
+"""
+
+from dataclasses import dataclass
+from math import inf
+from pathlib import Path
+from typing import Final
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from handsteer.config import LandmarksConfig
+from handsteer.errors import FrameError
+from handsteer.recognition.hand import Hand
+from handsteer.recognition.landmark_models import find_pair
+from handsteer.recognition.palm import PalmDetector
+from handsteer.recognition.roi import Roi, from_landmarks
+from handsteer.recognition.search import Search
+from handsteer.recognition.stillness import Pace, Stillness, cells_of_frame, cells_of_hands
+from handsteer.recognition.tflite import PictureModel
+
+_DEPTH_SCALE: Final = 0.4
+"""Factor of the model's depth relative to its x and y."""
+
+Array = NDArray[np.floating]
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """The model's output for a region.
+
+    Attributes:
+        pixels: (21, 3) x and y in pixels of the frame, z in the scale of x.
+        world: (21, 3) in metres relative to the hand's centre, with the axes of ``pixels``.
+        rightness: Likelihood, 0 to 1, of a person's right hand, rather than the left, in an unmirrored frame.
+        presence: Likelihood that there is a hand, 0 to 1.
+    """
+
+    pixels: Array
+    world: Array
+    rightness: float
+    presence: float
+
+
+class HandLandmarkModel:
+    """A hand landmark model.
+
+    Args:
+        path: The model file.
+        threads: CPU threads to run it on.
+
+    Raises:
+        ModelCorrupt: The file is not a model that can be run.
+    """
+
+    def __init__(self, path: Path, threads: int) -> None:
+        self._model = PictureModel(path, threads)
+
+    def estimate(self, image: NDArray[np.uint8], roi: Roi) -> Estimate:
+        """Return the output for the region ``roi`` of ``image``, (height, width, 3) uint8 BGR."""
+        side = self._model.side
+        outputs = self._model.run(roi.crop(image, side, cv2.BORDER_REPLICATE))
+        picture, presence, rightness, metric = outputs
+        points = picture.reshape(21, 3) / side
+        world = metric.reshape(21, 3)
+        return Estimate(
+            pixels=np.column_stack([roi.to_frame(points[:, :2]), points[:, 2] * (roi.side / _DEPTH_SCALE)]),
+            world=np.column_stack([world[:, :2] @ roi.axes, world[:, 2]]),
+            # MediaPipe calls this "Left", because it assumes mirrored pictures.
+            rightness=float(rightness[0]),
+            presence=float(presence[0]),
+        )
+
+
+_SAME_HAND_OVERLAP: Final = 0.5
+_PART: Final = 0.7
+_SECOND_LOOK: Final = 1.15
+"""Factor on MediaPipe's region in the second pass: of 57 misread hands of people, it corrects 12 more."""
+_SEARCH: Final = Pace(change=6, settle_s=0.12, period_s=0.2)
+"""How often to search without a hand: when settled, each of the four main ways has had its frame at 30 Hz."""
+_SEARCH_BESIDE_A_HAND: Final = Pace(change=6, settle_s=0.2, period_s=1.0, least_s=0.2)
+_FOLLOW: Final = Pace(change=3, settle_s=0.08, period_s=0.1)
+"""How often to process tracked hands: below three levels, landmarks deviate by at most 0.03 of the hand."""
+_MAX_SIDE: Final = 32766
+"""Maximum side of a picture that OpenCV can sample, in pixels."""
+
+
+class MediaPipeLandmarker:
+    """Detects and tracks hands in frames; not thread-safe.
+
+    Tracked hands come first, in the order of the previous frame, then new ones by descending score, so hands never swap
+    places between frames.
+
+    Args:
+        config: Model, number of hands, thresholds, threads.
+        models: Folder of the model files; that of :func:`handsteer.recognition.landmark_models.models_dir` by default.
+
+    Raises:
+        ModelMissing: A model file is missing.
+        ModelCorrupt: A model file has unexpected content.
+    """
+
+    def __init__(self, config: LandmarksConfig, models: Path | None = None) -> None:
+        self._config = config
+        palm, landmark = find_pair(config.model, models)
+        palms = PalmDetector(palm, config.threads, config.min_detection_confidence)
+        self._search = Search(palms, config.max_hands, wide=config.wide_search)
+        self._searched = Stillness()
+        self._searched_beside = Stillness()
+        self._still = Stillness()
+        self._landmarks = HandLandmarkModel(landmark, config.threads)
+        self._followed: list[Roi] = []
+        self._looked_at: list[Roi] = []
+        self._hands: list[Hand] = []
+        self._image_size = (0, 0)
+
+    def detect(self, image: NDArray[np.uint8], *, search: bool = True, dt_s: float = inf) -> list[Hand]:
+        """Return the hands in ``image``; may be empty.
+
+        A frame of another size starts a new stream: no hand is tracked into it. A rejected frame changes nothing.
+
+        Args:
+            image: (height, width, 3) uint8, BGR, not mirrored; 1 to 32766 pixels a side, of any memory layout. Grey and
+                BGRA pictures are rejected.
+            search: Whether to search for further hands while one is tracked.
+            dt_s: Seconds since the last frame, >= 0, used to process fewer frames while the picture does not change;
+                without it, every frame is processed.
+
+        Raises:
+            FrameError: The image has another shape or type.
+        """
+        _check(image)
+        height, width = image.shape[:2]
+        if (width, height) != self._image_size:
+            self.reset()
+            self._image_size = (width, height)
+        for stillness in (self._searched, self._searched_beside, self._still):
+            stillness.wait(dt_s)
+        if self._wants_search(image, search):
+            self._still.reset()
+            estimates = self._new_and_followed(image, self._followed)
+        elif self._followed and self._still.wants_look(cells_of_hands(image, self._looked_at), _FOLLOW):
+            estimates = self._followed_on(image)
+        else:
+            return list(self._hands)
+        if self._followed and not estimates:
+            self._searched.reset()
+        present, self._followed = _of_different_hands(estimates)
+        if self._followed:
+            self._looked_at = self._followed
+            self._still.look(cells_of_hands(image, self._looked_at))
+        self._hands = [_hand(estimate, width, height) for estimate in present]
+        return list(self._hands)
+
+    def follow_only(self, hand: Hand) -> None:
+        """Stop tracking all hands of the last frame except ``hand``."""
+        kept = [index for index, each in enumerate(self._hands) if each is hand]
+        self._hands = [self._hands[index] for index in kept]
+        self._followed = [self._followed[index] for index in kept]
+
+    def reset(self) -> None:
+        """Stop tracking all hands."""
+        self._followed = []
+        self._hands = []
+        self._search.reset()
+        for stillness in (self._searched, self._searched_beside, self._still):
+            stillness.reset()
+
+    def _wants_search(self, image: NDArray[np.uint8], further: bool) -> bool:
+        """Return whether to search for hands; while one is tracked, only if ``further`` ones are requested."""
+        searched, pace = self._searched, _SEARCH
+        if self._followed:
+            if not further or len(self._followed) >= self._config.max_hands:
+                return False
+            searched, pace = self._searched_beside, _SEARCH_BESIDE_A_HAND
+        if searched.is_too_early(pace) or not searched.wants_look(cells := cells_of_frame(image), pace):
+            return False
+        if searched.woken and not self._followed:
+            self._search.begin_again()
+        searched.look(cells)
+        return True
+
+    def _followed_on(self, image: NDArray[np.uint8]) -> list[Estimate]:
+        """Return the tracked hands that are still visible; if none is, newly found ones."""
+        present = self._present(image, self._followed)
+        if present or not self._config.wide_search:
+            return present
+        # Search immediately for a hand that has jumped: it may show Stop.
+        self._search.begin_again()
+        return self._new_and_followed(image, [])
+
+    def _new_and_followed(self, image: NDArray[np.uint8], followed: list[Roi]) -> list[Estimate]:
+        """Return the tracked hands that are still visible, and newly found ones."""
+        if not followed:
+            # One of two hands may be found only in the next frame, which is searched in another way.
+            self._searched_beside.reset()
+        for places in self._search.places(image, beside_a_hand=bool(followed)):
+            regions = _distinct([*followed, *places.regions])[: self._config.max_hands]
+            if present := self._present(image, regions, places.min_presence):
+                rivals = [each for roi in places.rivals for each in self._present(image, [roi], places.min_presence)]
+                return [max(present + rivals, key=lambda each: each.presence)] if rivals else present
+        return []
+
+    def _present(self, image: NDArray[np.uint8], regions: list[Roi], min_presence: float = 0.0) -> list[Estimate]:
+        """Return the estimates of the regions that show a hand; for a new hand, those of the second pass."""
+        present = []
+        for region in regions:
+            estimate = self._landmarks.estimate(image, region)
+            is_new = all(region is not followed for followed in self._followed)
+            if is_new and self._config.refine_new_hands and self._is_present(estimate):
+                estimate = self._landmarks.estimate(image, from_landmarks(estimate.pixels[:, :2]).grown(_SECOND_LOOK))
+            if self._is_present(estimate) and estimate.presence >= min_presence:
+                present.append(estimate)
+        return present
+
+    def _is_present(self, estimate: Estimate) -> bool:
+        return estimate.presence > self._config.min_presence
+
+
+def _distinct(regions: list[Roi]) -> list[Roi]:
+    """Return ``regions`` without those of the same hand as an earlier one.
+
+    MediaPipe instead keeps the last of such regions, which is the palm with the lower score.
+    """
+    distinct: list[Roi] = []
+    for region in regions:
+        if all(region.overlap(other) <= _SAME_HAND_OVERLAP for other in distinct):
+            distinct.append(region)
+    return distinct
+
+
+def _of_different_hands(estimates: list[Estimate]) -> tuple[list[Estimate], list[Roi]]:
+    """Return ``estimates`` and their regions, without duplicates of earlier hands and parts mistaken for a hand.
+
+    Two regions may lead to the same hand, and some fingers of a hand to a smaller hand within it.
+    """
+    whole = [estimate for estimate in estimates if not any(_is_part(estimate, other) for other in estimates)]
+    regions = [from_landmarks(estimate.pixels[:, :2]) for estimate in whole]
+    kept = _distinct(regions)
+    return [each for each, region in zip(whole, regions, strict=True) if any(region is one for one in kept)], kept
+
+
+def _is_part(estimate: Estimate, other: Estimate) -> bool:
+    """Return whether ``estimate`` is much smaller than ``other`` and has its centre in its box."""
+    low, high = estimate.pixels[:, :2].min(axis=0), estimate.pixels[:, :2].max(axis=0)
+    other_low, other_high = other.pixels[:, :2].min(axis=0), other.pixels[:, :2].max(axis=0)
+    centre = (low + high) / 2
+    is_smaller = (high - low).max() < _PART * (other_high - other_low).max()
+    return bool(is_smaller and (other_low <= centre).all() and (centre <= other_high).all())
+
+
+def _hand(estimate: Estimate, width: int, height: int) -> Hand:
+    right = estimate.rightness > 0.5
+    return Hand(
+        points=(estimate.pixels / (width, height, width)).astype(np.float32),
+        world=estimate.world.astype(np.float32),
+        handedness="Right" if right else "Left",
+        handedness_score=max(estimate.rightness, 1 - estimate.rightness),
+        presence=estimate.presence,
+        image_size=(width, height),
+    )
+
+
+def _check(image: object) -> None:
+    """Raise FrameError unless ``image`` is a valid picture."""
+    wanted = "expected a (height, width, 3) uint8 BGR image"
+    if not isinstance(image, np.ndarray):
+        raise FrameError(f"{wanted}, got {type(image).__name__}")
+    if image.dtype != np.uint8 or image.ndim != 3 or image.shape[2] != 3:
+        raise FrameError(f"{wanted}, got {image.shape} {image.dtype}")
+    if not all(1 <= side <= _MAX_SIDE for side in image.shape[:2]):
+        raise FrameError(f"{wanted} of 1 to {_MAX_SIDE} pixels a side, got {image.shape[1]}x{image.shape[0]}")

@@ -1,0 +1,180 @@
+"""From a frame to the confirmed sign: landmarks, classifier, hand selector and debouncer in a row."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from handsteer.config import Config, SignsConfig
+from handsteer.recognition.classifier import Classifier, SignGuess
+from handsteer.recognition.custom_signs import CustomClassifier, load_custom_model
+from handsteer.recognition.debouncer import Debouncer, Evidence
+from handsteer.recognition.hand import Hand, Landmarker
+from handsteer.recognition.hand_selector import HandPosition, HandSelector
+from handsteer.recognition.landmarker import MediaPipeLandmarker
+from handsteer.recognition.shipped_signs import ShippedClassifier, load_model
+from handsteer.types import NONE
+
+
+def open_landmarker(config: Config) -> Landmarker:
+    """Return the hand landmarker.
+
+    Raises:
+        ModelError: A landmark model is missing or broken.
+    """
+    return MediaPipeLandmarker(config.landmarks)
+
+
+def open_classifier(config: SignsConfig) -> Classifier:
+    """Return the classifier of the shipped and taught signs of ``config``.
+
+    Raises:
+        ModelError: A sign model is missing or broken.
+    """
+    shipped = ShippedClassifier(load_model())
+    return CustomClassifier(shipped, load_custom_model(config.model.expanduser())) if config.model else shipped
+
+
+_NOTHING = SignGuess(NONE, 0.0)
+
+
+@dataclass(frozen=True)
+class Recognition:
+    """The recognition of one frame.
+
+    Attributes:
+        sign: The confirmed sign, which drives.
+        seen: The sign in this frame alone.
+        confidence: Of ``seen``, 0 to 1.
+        progress: Progress of confirming ``seen``, 0 to 1.
+        hand: The active hand; None if there is none.
+        likelihoods: The likelihood of each known sign for that hand, 0 to 1; empty without a hand.
+    """
+
+    sign: str
+    seen: str
+    confidence: float
+    progress: float
+    hand: Hand | None
+    likelihoods: Mapping[str, float] = field(default_factory=dict, compare=False)
+
+    @property
+    def reason(self) -> str:
+        """A sentence that describes what is seen."""
+        if self.hand is None:
+            return "no hand is in view"
+        if self.seen == NONE:
+            return "the hand shows none of the signs"
+        if self.sign != self.seen:
+            return f"{self.seen} is not confirmed yet"
+        return f"{self.sign} is shown"
+
+
+class Recognizer:
+    """Recognises signs: in a stream of frames by :meth:`step`, in one picture by :meth:`recognize`.
+
+    Args:
+        config: The configuration; the defaults if None.
+        landmarker: Finds the hands; opened from ``config.landmarks`` if None.
+        classifier: Recognises the sign of a hand; opened from ``config.signs`` if None.
+
+    Raises:
+        ModelError: A landmark model or the sign model is missing or broken.
+    """
+
+    def __init__(
+        self,
+        config: Config | None = None,
+        *,
+        landmarker: Landmarker | None = None,
+        classifier: Classifier | None = None,
+    ) -> None:
+        config = config or Config()
+        self._landmarker = landmarker or open_landmarker(config)
+        self._classifier = classifier or open_classifier(config.signs)
+        self._filter = Debouncer(config.signs)
+        self._selector = HandSelector(config.signs)
+        self._evidence = Evidence()
+        self._config = config.signs
+
+    @property
+    def signs(self) -> tuple[str, ...]:
+        """The recognised signs, without ``NONE``."""
+        return self._classifier.signs
+
+    def recognize(self, image: NDArray[np.uint8]) -> Recognition:
+        """Return the recognition of one picture alone; resets the stream before and after.
+
+        Its ``sign`` is that of the picture, without confirmation.
+
+        Args:
+            image: (height, width, 3) uint8, BGR, not mirrored.
+
+        Raises:
+            FrameError: The image has another shape or type.
+        """
+        self.reset()
+        recognition = self.step(image, 0.0)
+        self.reset()
+        return replace(recognition, sign=recognition.seen)
+
+    def step(self, image: NDArray[np.uint8], dt_s: float) -> Recognition:
+        """Process the next frame.
+
+        Args:
+            image: (height, width, 3) uint8, BGR, not mirrored.
+            dt_s: Seconds since the last frame was captured, >= 0.
+
+        Raises:
+            FrameError: The image has another shape or type.
+        """
+        # A hand whose sign is being confirmed is effectively selected.
+        search = self._selector.wants_search() and self._filter.candidate == NONE
+        hands = self._landmarker.detect(image, search=search, dt_s=dt_s)
+        told = [self._classifier.classify(hand) for hand in hands]
+        guesses = [self._seen(guess) for guess in told]
+        chosen = self._selector.choose(hands, guesses, dt_s)
+        hand, guess = (hands[chosen], guesses[chosen]) if chosen is not None else (None, _NOTHING)
+        likelihoods = told[chosen].likelihoods if chosen is not None else {}
+        self._evidence.add(HandPosition.of_palm(hand) if hand else None, likelihoods, dt_s)
+        since_s = self._filter.candidate_s + dt_s
+        guess = self._bridged(guess, since_s)
+        still = self._evidence.is_still(min(since_s, self._config.confirm_time))
+        sign = self._filter.step(guess.sign, dt_s, still=still)
+        if hand is not None and guess.sign == sign != NONE:
+            self._selector.confirm()
+            self._landmarker.follow_only(hand)
+        return Recognition(sign, guess.sign, guess.confidence, self._filter.progress, hand, likelihoods)
+
+    def reconfigure(self, config: SignsConfig) -> None:
+        """Change confidences and times; the active hand and the confirmed sign stay."""
+        self._config = config
+        self._filter.reconfigure(config)
+        self._selector.reconfigure(config)
+
+    def use(self, classifier: Classifier) -> None:
+        """Use ``classifier`` from the next frame on; every sign must be confirmed again."""
+        self._classifier = classifier
+        self.reset()
+
+    def reset(self) -> None:
+        """Reset the stream: no active hand, no confirmed sign."""
+        self._landmarker.reset()
+        self._filter.reset()
+        self._selector.reset()
+        self._evidence.reset()
+
+    def _bridged(self, guess: SignGuess, since_s: float) -> SignGuess:
+        """Return the candidate instead of a ``NONE`` guess, if its mean likelihood so far is above its threshold."""
+        candidate = self._filter.candidate
+        if guess.sign != NONE or candidate == NONE:
+            return guess
+        likelihood = self._evidence.likelihood(candidate, since_s)
+        confidence = self._classifier.confidence(candidate, likelihood)
+        return SignGuess(candidate, confidence) if confidence >= self._config.min_confidence else guess
+
+    def _seen(self, guess: SignGuess) -> SignGuess:
+        """Return ``guess`` if above its threshold, else ``NONE``; the confirmed sign has a lower threshold."""
+        least = self._config.release_confidence if guess.sign == self._filter.sign else self._config.min_confidence
+        return guess if guess.confidence >= min(least, self._config.min_confidence) else _NOTHING

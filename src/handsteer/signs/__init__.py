@@ -1,1 +1,0 @@
-"""Recognises signs from 21 hand landmarks."""

@@ -1,0 +1,114 @@
+"""Landmark rows in the format of several hand sign projects: a class number, then 42 numbers.
+
+The numbers are x and y of the 21 landmarks in the *mirrored* image, relative to the wrist, divided by the largest
+absolute value among them. Size, position and depth are lost.
+"""
+
+import csv
+import gzip
+import itertools
+import zlib
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import Final, TextIO, cast
+
+import numpy as np
+
+from handsteer.errors import DatasetError
+from handsteer.recognition.hand import Hand
+from handsteer.training.custom.dataset import Take
+
+_COLUMNS: Final = 43
+_LONGEST_TAKE: Final = 100
+_LONGEST_LINE: Final = 10_000
+_MOST_ROWS: Final = 1_000_000
+_SIZE_PX: Final = 240
+_FARTHEST: Final = 1.001  # allows for rounding in the files
+
+
+def read_keypoints(path: Path, labels: Mapping[str, str], person: str, *, mirrored: bool = True) -> list[Take]:
+    """Return the takes in a file of keypoints, which may be compressed with gzip (``.gz``).
+
+    Such files do not mark takes: up to 100 consecutive rows of one class form one.
+
+    Args:
+        path: The file.
+        labels: The sign of each class; rows of other classes are left out.
+        person: The person who showed them.
+        mirrored: Whether the rows come from mirrored images, as is usual.
+
+    Raises:
+        DatasetError: The file cannot be read, a row in it is wrong, or there is no row of these classes.
+    """
+    session = path.name.split(".")[0]
+    takes = [
+        Take(labels[number], person, session, path.name, hands, (0.0,) * len(hands))
+        for number, group in itertools.groupby(_rows(path, mirrored=mirrored), key=lambda row: row[0])
+        if number in labels
+        for hands in _parts(hand for _, hand in group)
+    ]
+    if not takes:
+        raise DatasetError(f"{path}: there is no row of class {', '.join(labels)}")
+    return takes
+
+
+def read_class_names(path: Path) -> dict[str, str]:
+    """Return the sign of each class from a file that lists their names, one per line, from class 0 on.
+
+    Raises:
+        DatasetError: The file cannot be read, or a line is empty.
+    """
+    try:
+        with path.open(encoding="utf-8-sig") as file:
+            names = file.read(_LONGEST_LINE).splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        raise DatasetError(f"cannot read the names of the classes {path}: {error}") from None
+    if not names or not all(name.strip() for name in names):
+        raise DatasetError(f"{path}: expected the name of one class a line, found an empty line")
+    return {str(number): name.strip() for number, name in enumerate(names)}
+
+
+def _parts(hands: Iterable[Hand]) -> Iterator[tuple[Hand, ...]]:
+    rest = iter(hands)
+    while part := tuple(itertools.islice(rest, _LONGEST_TAKE)):
+        yield part
+
+
+def _rows(path: Path, *, mirrored: bool) -> Iterator[tuple[str, Hand]]:
+    try:
+        with gzip.open(path, "rt", newline="") if path.suffix == ".gz" else path.open(newline="") as file:
+            for number, row in enumerate(csv.reader(_lines(cast(TextIO, file), path)), start=1):
+                if row:
+                    yield row[0].strip(), _hand(row, f"{path}, line {number}", mirrored=mirrored)
+    except (OSError, EOFError, UnicodeDecodeError, csv.Error, zlib.error) as error:
+        raise DatasetError(f"cannot read the keypoints {path}: {error}") from None
+
+
+def _lines(file: TextIO, path: Path) -> Iterator[str]:
+    """Yield the lines of ``file``, with a limit on its decompressed size."""
+    for _ in range(_MOST_ROWS):
+        line = file.readline(_LONGEST_LINE)
+        if not line:
+            return
+        if len(line) == _LONGEST_LINE:
+            raise DatasetError(f"{path}: a line has more than {_LONGEST_LINE} characters; 43 fields need fewer")
+        yield line
+    raise DatasetError(f"{path}: has more than {_MOST_ROWS} lines")
+
+
+def _hand(row: list[str], where: str, *, mirrored: bool) -> Hand:
+    if len(row) != _COLUMNS:
+        raise DatasetError(f"{where}: expected a class and 42 numbers, found {len(row)} fields")
+    try:
+        points = np.array([float(number) for number in row[1:]]).reshape(21, 2)
+    except ValueError as error:
+        raise DatasetError(f"{where}: expected a class and 42 numbers, {str(error)[:80]}") from None
+    if not np.isfinite(points).all() or np.abs(points).max() > _FARTHEST or not np.ptp(points, axis=0).any():
+        raise DatasetError(f"{where}: these are not the landmarks of a hand, relative to its wrist and up to 1")
+    if mirrored:
+        points[:, 0] *= -1
+    unknown = np.full((21, 3), np.nan, np.float32)
+    flat = unknown.copy()
+    flat[:, :2] = points
+    # Handedness and size are not recorded.
+    return Hand(flat, unknown, "Right", handedness_score=0.5, presence=1.0, image_size=(_SIZE_PX, _SIZE_PX))

@@ -1,0 +1,1 @@
+"""Measures how well signs are recognised in labelled photos, landmarks and videos."""

@@ -1,0 +1,118 @@
+import numpy as np
+import pytest
+
+from handsteer.config import Config, SignsConfig
+from handsteer.errors import FrameError
+from handsteer.recognition.hand import Hand, RecordedLandmarker
+from handsteer.recognition.recognizer import Recognizer
+from handsteer.recognition.shipped_signs import ShippedClassifier, load_model
+from handsteer.types import FORWARD, GO, NONE, SIGNS, STOP
+from tests.recognition.hands import moved, show_fingers, show_sign
+
+IMAGE = np.zeros((480, 640, 3), np.uint8)
+HAND = show_sign(FORWARD)
+CLASSIFIER = ShippedClassifier(load_model())
+
+
+def reading(frames: list[list[Hand]], **signs: float) -> Recognizer:
+    """Return a recogniser that finds ``frames``, whatever the images show."""
+    config = Config(signs=SignsConfig(**signs))
+    return Recognizer(config, landmarker=RecordedLandmarker(frames), classifier=CLASSIFIER)
+
+
+def recognizer(*frames: bool) -> Recognizer:
+    return reading([[HAND] if there else [] for there in frames])
+
+
+def test_reasons_on_the_way_to_a_sign() -> None:
+    stream = recognizer(False, True, True, True, True)
+    steps = [stream.step(IMAGE, 0.04) for _ in range(5)]
+    assert [step.sign for step in steps] == [NONE, NONE, NONE, NONE, FORWARD]
+    assert [step.reason for step in steps] == [
+        "no hand is in view",
+        "Forward is not confirmed yet",
+        "Forward is not confirmed yet",
+        "Forward is not confirmed yet",
+        "Forward is shown",
+    ]
+    assert steps[0].hand is None
+    assert steps[1].seen == FORWARD
+
+
+def test_a_hand_without_a_sign() -> None:
+    stream = reading([[show_fingers("index", "middle")]])
+    assert stream.step(IMAGE, 0.04).reason == "the hand shows none of the signs"
+
+
+def test_a_confidence_below_the_least_is_none() -> None:
+    stream = reading([[HAND]], min_confidence=1.0)
+    assert stream.step(IMAGE, 0.04).seen == NONE
+
+
+@pytest.mark.parametrize("image", [np.zeros((0, 0, 3), np.uint8), np.zeros((480, 640, 3), np.float32)])
+def test_a_broken_frame_raises(image: np.ndarray) -> None:
+    stream = Recognizer(classifier=CLASSIFIER)
+    with pytest.raises(FrameError):
+        stream.step(image, 0.0)
+
+
+def test_a_sign_that_passes_by_does_not_count_until_the_hand_is_held_still() -> None:
+    passing = [moved(HAND, x_px=-150.0 + 25.0 * frame) for frame in range(12)]
+    stream = reading([[hand] for hand in [*passing, *[passing[-1]] * 8]])
+    steps = [stream.step(IMAGE, 1 / 30) for _ in range(20)]
+    assert all(step.seen == FORWARD for step in steps)
+    assert [step.sign for step in steps[:12]] == [NONE] * 12
+    assert steps[-1].sign == FORWARD
+
+
+def test_stop_counts_at_its_first_frame_however_the_hand_moves() -> None:
+    hands = [moved(show_sign(STOP), x_px=-150.0 + 40.0 * frame) for frame in range(3)]
+    stream = reading([[hand] for hand in hands])
+    assert stream.step(IMAGE, 1 / 30).sign == STOP
+
+
+@pytest.mark.parametrize("x_px", [0.0, 30.0, 200.0])
+def test_another_sign_counts_as_soon_wherever_the_hand_is_by_then(x_px: float) -> None:
+    hands = [show_sign(GO)] * 10 + [moved(HAND, x_px=x_px)] * 10
+    stream = reading([[hand] for hand in hands], dropout_hold=0.0)
+    signs = [stream.step(IMAGE, 1 / 30).sign for _ in range(20)]
+    # A hand that jumps by more than its size is another hand, which is seen from the next frame on.
+    assert signs.index(FORWARD) <= (14 if x_px > 100 else 13)
+
+
+def test_stop_counts_at_its_first_frame_where_the_hand_has_jumped_to() -> None:
+    hands = [HAND] * 6 + [moved(show_sign(STOP), x_px=250.0)]
+    stream = reading([[hand] for hand in hands])
+    assert [stream.step(IMAGE, 1 / 30).sign for _ in range(7)][-2:] == [FORWARD, STOP]
+
+
+class Searching(RecordedLandmarker):
+    """Notes in which frames further hands were asked for."""
+
+    searched: tuple[bool, ...] = ()
+
+    def detect(self, image: np.ndarray, *, search: bool = True, dt_s: float = 0.0) -> list[Hand]:
+        self.searched = (*self.searched, search)
+        return super().detect(image, search=search, dt_s=dt_s)
+
+
+def test_further_hands_are_looked_for_only_while_no_sign_counts_or_is_about_to() -> None:
+    peace = show_fingers("index", "middle")
+    landmarker = Searching([[peace], [peace], *[[HAND]] * 6])
+    stream = Recognizer(landmarker=landmarker, classifier=CLASSIFIER)
+    assert [stream.step(IMAGE, 0.04).sign for _ in range(8)] == [NONE] * 5 + [FORWARD] * 3
+    assert landmarker.searched == (True, True, True, *[False] * 5)
+
+
+def test_a_sign_that_counts_goes_on_while_the_hand_moves() -> None:
+    hands = [HAND] * 6 + [moved(HAND, x_px=25.0 * frame) for frame in range(8)]
+    stream = reading([[hand] for hand in hands])
+    assert [stream.step(IMAGE, 1 / 30).sign for _ in range(14)][4:] == [FORWARD] * 10
+
+
+def test_the_likelihoods_are_there_whether_they_suffice_or_not() -> None:
+    step = reading([[HAND]], min_confidence=1.0).step(IMAGE, 0.04)
+    assert step.seen == NONE
+    assert set(step.likelihoods) == set(SIGNS)
+    assert max(step.likelihoods, key=step.likelihoods.__getitem__) == FORWARD
+    assert recognizer(False).step(IMAGE, 0.04).likelihoods == {}

@@ -1,0 +1,91 @@
+"""The regions of interest, as geometry."""
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+
+from handsteer.recognition.roi import Roi, from_landmarks, from_palm, whole_frame
+from tests.about import about
+
+coordinates = st.floats(-2000, 2000)
+angles = st.floats(-3.1, 3.1)
+rois = st.builds(Roi, coordinates, coordinates, st.floats(0.1, 2000), angles)
+hands = st.lists(st.tuples(coordinates, coordinates), min_size=21, max_size=21).map(np.array)
+
+
+def turned(points: np.ndarray, angle: float) -> np.ndarray:
+    """Return ``points`` turned clockwise as seen in a picture."""
+    c, s = np.cos(angle), np.sin(angle)
+    turned: np.ndarray = points @ np.array([[c, s], [-s, c]])
+    return turned
+
+
+def test_a_palm_that_points_up_gives_an_upright_region_above_it() -> None:
+    roi = from_palm(np.array([[100, 200], [140, 240]]), wrist=np.array([120, 240]), middle_base=np.array([120, 200]))
+    assert roi == Roi(about(120), about(220 - 0.5 * 40), about(2.6 * 40), about(0))
+
+
+def test_a_palm_that_points_right_gives_a_region_turned_clockwise() -> None:
+    roi = from_palm(np.array([[100, 200], [140, 240]]), wrist=np.array([100, 220]), middle_base=np.array([140, 220]))
+    assert roi.rotation == pytest.approx(np.pi / 2)
+    assert (roi.center_x, roi.center_y) == pytest.approx((120 + 0.5 * 40, 220))
+
+
+@given(hand=hands, angle=angles, scale=st.floats(0.1, 10), x=coordinates, y=coordinates)
+def test_a_hand_that_moves_turns_and_grows_takes_its_region_along(
+    hand: np.ndarray, angle: float, scale: float, x: float, y: float
+) -> None:
+    knuckles = (hand[5] + hand[13]) / 4 + hand[9] / 2
+    assume(np.linalg.norm(knuckles - hand[0]) > 1)
+    roi = from_landmarks(hand)
+    moved = from_landmarks(turned(hand, angle) * scale + (x, y))
+    assert np.cos(moved.rotation - roi.rotation - angle) == pytest.approx(1, abs=1e-6)
+    center = turned(np.array([roi.center_x, roi.center_y]), angle) * scale + (x, y)
+    np.testing.assert_allclose((moved.center_x, moved.center_y), center, atol=0.01)
+    assert moved.side == pytest.approx(roi.side * scale, abs=0.01)
+
+
+@given(roi=rois, other=rois)
+def test_overlap_is_symmetric_and_a_share(roi: Roi, other: Roi) -> None:
+    assert 0 <= roi.overlap(other) <= 1 + 1e-9
+    assert roi.overlap(other) == pytest.approx(other.overlap(roi))
+
+
+@given(roi=rois)
+def test_a_region_overlaps_itself_wholly(roi: Roi) -> None:
+    assert roi.overlap(roi) == pytest.approx(1)
+
+
+def test_overlap_is_intersection_over_union() -> None:
+    assert Roi(0, 0, 2).overlap(Roi(1, 0, 2)) == pytest.approx(1 / 3)
+    assert Roi(0, 0, 2).overlap(Roi(0, 0, 1)) == pytest.approx(1 / 4)
+    assert Roi(0, 0, 2).overlap(Roi(2, 0, 2)) == 0
+    assert Roi(0, 0, 2).overlap(Roi(9, 9, 2)) == 0
+
+
+@given(roi=rois)
+def test_the_middle_of_a_region_is_its_centre_and_its_corners_are_half_a_diagonal_away(roi: Roi) -> None:
+    center, corner = roi.to_frame(np.array([[0.5, 0.5], [1.0, 0.0]]))
+    np.testing.assert_allclose(center, (roi.center_x, roi.center_y))
+    assert np.linalg.norm(corner - center) == pytest.approx(roi.side / np.sqrt(2))
+
+
+def test_a_crop_shows_what_lies_where_to_frame_says() -> None:
+    image = np.zeros((480, 640, 3), np.uint8)
+    roi = Roi(300, 200, 150, 0.7)
+    spot = np.array([0.3, 0.6])
+    x, y = roi.to_frame(spot)
+    cv2.circle(image, (round(x), round(y)), 3, (255, 255, 255), -1)
+    crop = roi.crop(image, 224, cv2.BORDER_REPLICATE)
+    rows, columns = np.nonzero(crop[..., 0] > 127)
+    np.testing.assert_allclose((columns.mean() / 224, rows.mean() / 224), spot, atol=0.005)
+
+
+@pytest.mark.parametrize(("border", "outside"), [(cv2.BORDER_REPLICATE, 200), (cv2.BORDER_CONSTANT, 0)])
+def test_a_whole_frame_is_letterboxed(border: int, outside: int) -> None:
+    crop = whole_frame(640, 480).crop(np.full((480, 640, 3), 200, np.uint8), 192, border)
+    assert crop.shape == (192, 192, 3)
+    assert crop[96, 96, 0] == crop[96, 0, 0] == crop[25, 96, 0] == 200
+    assert crop[5, 96, 0] == crop[187, 96, 0] == outside

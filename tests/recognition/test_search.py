@@ -1,0 +1,141 @@
+"""Where hands are looked for, with palms that are where a test says."""
+
+from collections.abc import Iterator
+from itertools import islice
+
+import numpy as np
+import pytest
+
+from handsteer.config import LandmarksConfig
+from handsteer.hand.backgrounds import make_background
+from handsteer.hand.kinematics import pose_skeleton
+from handsteer.hand.placement import Pinhole
+from handsteer.hand.poses import THUMB, View
+from handsteer.hand.renderer import Look, render
+from handsteer.recognition.landmarker import MediaPipeLandmarker
+from handsteer.recognition.palm import Palm, PalmDetector
+from handsteer.recognition.roi import Roi
+from handsteer.recognition.search import Places, Search
+from tests.recognition.drawn_hand import draw, open_right_hand
+
+FRAME = np.zeros((480, 640, 3), np.uint8)
+
+
+class Palms(PalmDetector):
+    """Stands in for the palm model; finds the same palms however the frame is widened, and notes how it was."""
+
+    def __init__(self, *palms: Palm) -> None:
+        self.palms = list(palms)
+        self.widened: list[float] = []
+
+    def detect(self, image: np.ndarray, limit: int, *, widened: float = 1.0) -> list[Palm]:
+        self.widened.append(widened)
+        return self.palms[:limit]
+
+
+def palm(size: float, score: float = 0.9) -> Palm:
+    """Return an upright palm in the middle, of so many pixels; its hand's region is 2.6 times as large."""
+    corners = np.array([[320.0, 240.0], [320.0, 240.0]]) + np.array([[-size], [size]]) / 2
+    keypoints = np.tile([320.0, 240.0], (7, 1))
+    keypoints[2] -= (0, size)
+    return Palm(corners, keypoints, score)
+
+
+def frame_by_frame(search: Search, palms: Palms, frames: int) -> Iterator[tuple[list[float], list[Roi]]]:
+    """Yield how palms were looked for in each frame, and where there may be hands without any."""
+    for _ in range(frames):
+        palms.widened.clear()
+        places = list(search.places(FRAME, beside_a_hand=False))
+        yield list(palms.widened), [roi for each in places for roi in each.regions]
+
+
+def test_the_first_frame_is_looked_at_in_all_ways_one_after_another() -> None:
+    palms = Palms()
+    places = Search(palms, 2, wide=True).places(FRAME, beside_a_hand=False)
+    assert (next(places), palms.widened) == (Places([]), [1.0, 1.25])
+    assert next(places).regions == []
+    assert palms.widened == [1.0, 1.25, 2.0]
+    middles = list(places)
+    assert palms.widened == [1.0, 1.25, 2.0]
+    assert [roi.center_x for each in middles for roi in each.regions] == [320] * 4
+    assert len({roi.rotation for each in middles for roi in each.regions}) == 4
+    assert all(each.min_presence >= 0.9 for each in middles)
+
+
+def test_later_frames_without_a_hand_take_one_search_of_palms_each_and_all_ways_in_turn() -> None:
+    palms = Palms()
+    search = Search(palms, 2, wide=True)
+    later = list(islice(frame_by_frame(search, palms, 13), 1, None))
+    assert all(len(widened) == 1 and len(middle) <= 1 for widened, middle in later)
+    assert [widened[0] for widened, _ in later].count(1.0) == 6, "every second frame is looked at as MediaPipe does"
+    assert {widened[0] for widened, _ in later} == {1.0, 1.25, 2.0}
+    assert len({roi.rotation for _, middle in later for roi in middle}) == 4
+    assert sum(len(middle) for _, middle in later) == 6
+
+
+def test_a_reset_makes_the_next_frame_the_first() -> None:
+    palms = Palms()
+    search = Search(palms, 2, wide=True)
+    ((first, _), (second, _)) = frame_by_frame(search, palms, 2)
+    search.reset()
+    ((again, _),) = frame_by_frame(search, palms, 1)
+    assert first == again != second
+
+
+def test_a_hand_that_has_just_been_lost_is_looked_for_in_the_plain_frame_first() -> None:
+    palms = Palms()
+    search = Search(palms, 2, wide=True)
+    for frames in (1, 2, 3):
+        list(frame_by_frame(search, palms, frames))
+        search.begin_again()
+        assert [widened for widened, _ in frame_by_frame(search, palms, 2)] == [[1.0], [1.25]]
+
+
+def test_enough_sure_palms_in_the_plain_frame_end_the_search() -> None:
+    for sure, widened in ((palm(100, 0.9), [1.0]), (palm(100, 0.6), [1.0, 1.25])):
+        palms = Palms(sure)
+        next(Search(palms, 1, wide=True).places(FRAME, beside_a_hand=False))
+        assert palms.widened == widened
+
+
+def test_only_near_hands_are_looked_for_in_a_frame_that_is_much_widened() -> None:
+    for size, count in ((60, 0), (200, 1)):
+        places = Search(Palms(palm(size)), 2, wide=True).places(FRAME, beside_a_hand=False)
+        next(places)
+        assert len(next(places).regions) == count
+
+
+def test_beside_a_hand_and_without_the_wide_search_only_palms_are_looked_for() -> None:
+    for wide, beside_a_hand, ways in ((True, True, {1.0, 1.25}), (False, True, {1.0}), (False, False, {1.0})):
+        palms = Palms()
+        search = Search(palms, 2, wide=wide)
+        for _ in range(6):
+            assert list(search.places(FRAME, beside_a_hand=beside_a_hand)) == [Places([])]
+        assert set(palms.widened) == ways
+
+
+@pytest.mark.parametrize("turned", [0, 1, 2, 3])
+def test_a_hand_in_the_middle_is_found_without_any_palm(turned: int) -> None:
+    frame = np.ascontiguousarray(np.rot90(draw(open_right_hand(320, 220, size=110)), turned))
+    no_palms = MediaPipeLandmarker(LandmarksConfig(min_detection_confidence=1))
+    (hand,) = no_palms.detect(frame)
+    (as_with_a_palm,) = MediaPipeLandmarker(LandmarksConfig()).detect(frame)
+    assert np.abs(hand.pixels - as_with_a_palm.pixels)[:, :2].max() < 0.1 * hand.longer_side_px
+
+
+def test_a_thumb_up_in_the_middle_is_not_read_as_an_index_finger() -> None:
+    """Upright, the landmark model expects the fingers where the thumb is; turned, it is surer."""
+    view = View(yaw=np.radians(20), pitch=np.radians(-20), roll=np.radians(10 - 90), position=(0.0, 0.0, 0.35))
+    placement = view.placement("Right")
+    frame = render(
+        pose_skeleton(THUMB), placement, Pinhole.webcam(640, 480), Look(), make_background("plain", 640, 480)
+    )
+    no_palms = MediaPipeLandmarker(LandmarksConfig(min_detection_confidence=1))
+    (hand,) = no_palms.detect(frame)
+    (as_with_a_palm,) = MediaPipeLandmarker(LandmarksConfig()).detect(frame)
+    assert np.abs(hand.pixels - as_with_a_palm.pixels)[:, :2].max() < 0.15 * hand.longer_side_px
+
+
+def test_nothing_is_found_without_any_palm_in_an_empty_frame() -> None:
+    no_palms = MediaPipeLandmarker(LandmarksConfig(min_detection_confidence=1))
+    assert [no_palms.detect(draw()) for _ in range(13)] == [[]] * 13
