@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from handsteer.config import Config, ControlConfig
 from handsteer.control.effects import effect_of, rule_from_diagnostics, rule_to_diagnostics
-from handsteer.dashboard.legend import legend
+from handsteer.dashboard.drive_page import legend
 from handsteer.dashboard.state import known_signs
 from handsteer.types import ACTIONS, SIGNS, action_of
 

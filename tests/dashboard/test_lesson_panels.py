@@ -5,8 +5,7 @@ import dataclasses
 import pytest
 
 from handsteer.config import TeachConfig
-from handsteer.dashboard.lesson import Collected, Lesson, View
-from handsteer.dashboard.lesson_panels import counted, opinion, said_now
+from handsteer.dashboard.lesson import Collected, Lesson, LessonState, counted, instruction, outcome
 from handsteer.recognition.recognizer import Recognition
 from handsteer.training.custom.collect import Facts, Status
 from handsteer.types import EFFECTS, NONE, Action
@@ -32,29 +31,29 @@ def does(sign: str) -> Action:
     ],
 )
 def test_what_a_hand_would_do(seen: Recognition | None, expected: tuple[str, str]) -> None:
-    assert opinion(seen, "Peace", does) == expected
+    assert outcome(seen, "Peace", does) == expected
 
 
-def view(takes: int, status: Status) -> View:
+def state(takes: int, status: Status) -> LessonState:
     lesson = Lesson(Facts("Peace", "me", "today", "page"), TeachConfig(takes=2))
     for number in range(takes):
-        lesson.keep(take("Peace", hands=7, seed=number), b"")
-    return dataclasses.replace(lesson.view, status=status)
+        lesson.add(take("Peace", hands=7, seed=number), b"")
+    return dataclasses.replace(lesson.state, status=status)
 
 
 def test_takes_are_counted() -> None:
     ready = Status("ready", 0.0, 0)
-    assert [counted(view(takes, ready)) for takes in (0, 2, 3)] == [
+    assert [counted(state(takes, ready)) for takes in (0, 2, 3)] == [
         "0 of 2 takes, 0 hands",
         "2 of 2 takes, 14 hands",
         "3 takes, 21 hands",
     ]
-    assert isinstance(view(1, ready).takes[0], Collected)
+    assert isinstance(state(1, ready).takes[0], Collected)
 
 
 def test_the_large_letters_say_what_to_do_now() -> None:
-    assert said_now(view(0, Status("countdown", 2.1, 0))) == ("3", "then show Peace")
-    assert said_now(view(0, Status("recording", 1.0, 34))) == ("34", "hands: show Peace")
+    assert instruction(state(0, Status("countdown", 2.1, 0))) == ("3", "then show Peace")
+    assert instruction(state(0, Status("recording", 1.0, 34))) == ("34", "hands: show Peace")
 
 
 def test_where_the_graph_is_elsewhere_the_page_says_so(site: Site) -> None:

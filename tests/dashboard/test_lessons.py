@@ -10,9 +10,9 @@ import pytest
 
 from handsteer.clock import RealClock
 from handsteer.config import Config, TeachConfig
-from handsteer.dashboard.lesson import View
-from handsteer.dashboard.lesson_node import LessonVision, thumbnail
-from handsteer.dashboard.lessons import Teaching, with_sign
+from handsteer.dashboard.lesson import LessonState
+from handsteer.dashboard.lesson_node import thumbnail
+from handsteer.dashboard.lessons import Lessons, with_sign
 from handsteer.errors import ConfigError, DatasetError, ModelCorrupt
 from handsteer.images import image_message
 from handsteer.messages import IMAGE_RAW, Header
@@ -36,20 +36,14 @@ class School:
         self.folder = folder
         self.clock = RealClock()
         self.transport = InProcessTransport()
-        self.config = Config()
         plan = TeachConfig(
             dataset=folder / "signs.npz", model=folder / "mine.npz", takes=3, take_time=1.0, countdown=0.5
         )
-        eyes = LessonVision(
-            open_landmarker=lambda: RecordedLandmarker([[hand] for hand in hands] * 1000),
-            open_shipped=lambda: open_classifier(Config().signs),
-            signs=lambda: self.config.signs,
-        )
-        self.teaching = Teaching(
+        self.config = self.initial = Config(teach=plan)
+        self.lessons = Lessons(
             self.transport,
             self.clock,
-            plan,
-            eyes,
+            lambda: (RecordedLandmarker([[hand] for hand in hands] * 1000), open_classifier(Config().signs)),
             config=lambda: self.config,
             reconfigure=self._take,
         )
@@ -77,16 +71,16 @@ class School:
 
     def wait_until(self, condition: Callable[[], bool]) -> None:
         for _ in range(round(PATIENCE_S / 0.02)):
-            lesson = self.teaching.lesson("ann")
+            lesson = self.lessons.node("ann")
             if lesson is not None:
                 lesson.attend()
             if condition():
                 return
             self._ended.wait(0.02)
-        pytest.fail(f"waited in vain; the lesson is at {self.teaching.view('ann')}")
+        pytest.fail(f"waited in vain; the lesson is at {self.lessons.node('ann')}")
 
     def close(self) -> None:
-        self.teaching.close()
+        self.lessons.close()
         self._ended.set()
         self._camera.join()
 
@@ -99,100 +93,100 @@ def school(tmp_path: Path) -> Iterator[School]:
     school.close()
 
 
-def seen_by_ann(teaching: Teaching) -> View:
-    view = teaching.view("ann")
-    assert view is not None
-    return view
+def seen_by_ann(lessons: Lessons) -> LessonState:
+    node = lessons.node("ann")
+    assert node is not None
+    return node.state
 
 
 def collected(school: School) -> int:
-    view = school.teaching.view("ann")
-    return len(view.takes) if view else -1
+    node = school.lessons.node("ann")
+    return len(node.state.takes) if node else -1
 
 
 @pytest.mark.slow
 def test_a_sign_is_collected_learnt_kept_and_taken_by_the_graph(school: School) -> None:
     save_dataset(Dataset(tuple(takes("Call", count=2))), school.folder / "signs.npz")
     save_custom_model(model(), school.folder / "mine.npz")
-    teaching = school.teaching
-    teaching.begin("ann", " peace ", "Ann")
-    assert teaching.lost() == ("Hi", "Ho")
-    assert teaching.keep("ann", "turbo") is None, "nothing is learnt yet"
-    lesson = teaching.lesson("ann")
+    lessons = school.lessons
+    lessons.begin("ann", " peace ", "Ann")
+    assert lessons.lost() == ("Hi", "Ho")
+    assert lessons.save("ann", "turbo") is None, "nothing is learnt yet"
+    lesson = lessons.node("ann")
     assert lesson is not None
-    assert teaching.lesson("ben") is None
+    assert lessons.node("ben") is None
     lesson.record()
     school.wait_until(lambda: collected(school) == 3)
     lesson.delete(1)
     assert school.files == {"signs.npz", "mine.npz"}
-    assert seen_by_ann(teaching).takes[0].picture.startswith(b"\xff\xd8")
+    assert seen_by_ann(lessons).takes[0].picture.startswith(b"\xff\xd8")
 
     lesson.train()
-    school.wait_until(lambda: seen_by_ann(teaching).progress > 0)
-    school.wait_until(lambda: seen_by_ann(teaching).step == "try")
-    school.wait_until(lambda: (seen := seen_by_ann(teaching).seen) is not None and seen.sign == "peace")
-    report = seen_by_ann(teaching).report
+    school.wait_until(lambda: seen_by_ann(lessons).progress > 0)
+    school.wait_until(lambda: seen_by_ann(lessons).step == "try")
+    school.wait_until(lambda: (seen := seen_by_ann(lessons).seen) is not None and seen.sign == "peace")
+    report = seen_by_ann(lessons).report
     assert report is not None
     assert report.confusion.labels == ("Call", "peace", "NONE")
 
     with pytest.raises(ConfigError, match="'fly' is no action: choose one of forward"):
-        teaching.keep("ann", "fly")
-    assert teaching.keep("ben", "turbo") is None
+        lessons.save("ann", "fly")
+    assert lessons.save("ben", "turbo") is None
     school.refuses = True
     with pytest.raises(ConfigError, match="refused"):
-        teaching.keep("ann", "turbo")
+        lessons.save("ann", "turbo")
     school.refuses = False
-    kept = teaching.keep("ann", "turbo")
-    assert kept is not None
+    learnt = lessons.save("ann", "turbo")
+    assert learnt is not None
     assert school.config.control.actions == {"peace": "turbo"}
     assert school.config.signs.model == school.folder / "mine.npz"
     assert load_custom_model(school.folder / "mine.npz").labels == ("Call", "peace")
     saved = load_dataset(school.folder / "signs.npz").takes
     assert [(take.label, take.person) for take in saved] == [("Call", "me")] * 2 + [("peace", "Ann")] * 2
-    assert (teaching.label, teaching.view("ann")) == (None, None)
-    assert "actions:\n    peace: turbo" in kept.lines
+    assert (lessons.label, lessons.node("ann")) == (None, None)
+    assert "actions:\n    peace: turbo" in learnt.yaml
 
 
 def test_what_is_discarded_leaves_nothing(school: School) -> None:
-    school.teaching.begin("ann", "Peace")
-    lesson = school.teaching.lesson("ann")
+    school.lessons.begin("ann", "Peace")
+    lesson = school.lessons.node("ann")
     assert lesson is not None
     lesson.record()
     school.wait_until(lambda: collected(school) == 2)
-    school.teaching.end("ben")
-    label = school.teaching.label
+    school.lessons.end("ben")
+    label = school.lessons.label
     assert label == "Peace", "another one's lesson goes on"
-    school.teaching.end("ann")
-    assert (school.teaching.label, school.files, school.config) == (None, set(), Config())
+    school.lessons.end("ann")
+    assert (school.lessons.label, school.files, school.config) == (None, set(), school.initial)
 
 
 def test_a_training_is_cancelled_with_the_lesson_or_before(school: School) -> None:
-    school.teaching.begin("ann", "Peace")
-    lesson = school.teaching.lesson("ann")
+    school.lessons.begin("ann", "Peace")
+    lesson = school.lessons.node("ann")
     assert lesson is not None
     lesson.record()
     school.wait_until(lambda: collected(school) == 3)
     lesson.train()
     lesson.go_back()
-    assert (lesson.view.step, collected(school)) == ("collect", 3)
+    assert (lesson.state.step, collected(school)) == ("collect", 3)
     lesson.train()
-    school.teaching.end("ann")
+    school.lessons.end("ann")
     school.wait_until(lambda: not any(thread.name == "lesson_training" for thread in threading.enumerate()))
     assert school.files == set()
 
 
 def test_takes_are_collected_only_while_the_page_is_there(school: School) -> None:
-    school.teaching.begin("ann", "Peace")
-    lesson = school.teaching.lesson("ann")
+    school.lessons.begin("ann", "Peace")
+    lesson = school.lessons.node("ann")
     assert lesson is not None
     lesson.record()
     waiting = threading.Event()
     for _ in range(200):
-        if not lesson.view.recording:
+        if not lesson.state.recording:
             break
         waiting.wait(0.05)
-    assert not lesson.view.recording
-    assert school.teaching.label == "Peace", "the page may come back"
+    assert not lesson.state.recording
+    assert school.lessons.label == "Peace", "the page may come back"
 
 
 @pytest.mark.parametrize(
@@ -207,17 +201,17 @@ def test_takes_are_collected_only_while_the_page_is_there(school: School) -> Non
 )
 def test_what_is_no_name_is_refused(school: School, name: str, person: str, problem: str) -> None:
     with pytest.raises(DatasetError, match=problem):
-        school.teaching.begin("ann", name, person)
-    assert school.teaching.label is None
+        school.lessons.begin("ann", name, person)
+    assert school.lessons.label is None
 
 
 def test_files_that_are_something_else_are_not_written_over(school: School) -> None:
     (school.folder / "mine.npz").write_bytes(b"my thesis")
     with pytest.raises(ModelCorrupt, match="not a model of taught signs"):
-        school.teaching.begin("ann", "Peace")
+        school.lessons.begin("ann", "Peace")
     (school.folder / "signs.npz").write_bytes(b"my thesis")
     with pytest.raises(DatasetError, match="not a dataset of signs"):
-        school.teaching.begin("ann", "Peace")
+        school.lessons.begin("ann", "Peace")
 
 
 def test_a_sign_that_has_an_action_by_another_spelling_gets_another() -> None:

@@ -18,8 +18,8 @@ import pytest
 
 from handsteer.cameras.browser import HEADER_BYTES
 from handsteer.config import load
-from handsteer.dashboard.page_process import NearGraph, PageApart
-from handsteer.dashboard.remote_graph import FarGraph
+from handsteer.dashboard.page_process import PageProcess
+from handsteer.dashboard.remote_graph import RemoteGraph
 from handsteer.errors import ConfigError, DashboardError, FrameError, TransportError, WorldError
 from handsteer.graph import Graph
 from handsteer.messages import CMD_VEL, STOP, Bool, Twist
@@ -28,6 +28,7 @@ from handsteer.robots.world import load_world
 from handsteer.transports.protocol import Received
 from handsteer.types import Pose2D
 from tests.contracts.transport_contract import eventually
+from tests.dashboard.served import remote
 from tests.processes import Process
 from tests.transports.test_piped import joined
 
@@ -35,10 +36,10 @@ SMALL = {"source": "virtual", "width": 320, "height": 240, "fps": 15}
 
 
 @contextmanager
-def served(script: str = "NONE:600", **sections: dict[str, object]) -> Iterator[tuple[Graph, PageApart, str]]:
+def served(script: str = "NONE:600", **sections: dict[str, object]) -> Iterator[tuple[Graph, PageProcess, str]]:
     config = load(base={"camera": SMALL, "virtual_hand": {"script": script}, "dashboard": {"port": 0}, **sections})
     with Graph(config, steering=False) as graph:
-        page = PageApart()
+        page = PageProcess()
         try:
             yield graph, page, page.serve(graph)
         finally:
@@ -116,7 +117,7 @@ def test_a_run_ends_with_its_page_and_leaves_the_robot_standing(tmp_path: Path) 
 
 def test_a_page_ends_with_the_process_that_it_belongs_to() -> None:
     code = (
-        "import sys, time; from handsteer.dashboard.page_process import NearGraph, PageApart; page = PageApart(); "
+        "import sys, time; from handsteer.dashboard.page_process import PageProcess; page = PageProcess(); "
         "print(page.process.pid, flush=True); time.sleep(600)"
     )
     with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True) as parent:
@@ -146,7 +147,7 @@ def test_a_port_in_use_is_said_by_the_process_that_asked_for_the_page() -> None:
 
 
 def test_a_page_that_was_never_served_ends_at_once() -> None:
-    page = PageApart()
+    page = PageProcess()
     page.stop()
     assert page.process.poll() is not None
 
@@ -161,34 +162,26 @@ def near() -> Iterator[Graph]:
 
 
 @pytest.fixture
-def far(near: Graph) -> Iterator[FarGraph]:
+def far(near: Graph) -> Iterator[RemoteGraph]:
     """The same graph as the page's process sees it; both are in this one."""
-    here, there = joined()
-    end, far = NearGraph(here, near), FarGraph(there)
-    here.start()
-    there.start()
-    far.join()
-    far.steering.start()
-    yield far
-    far.steering.stop()
-    there.close()
-    end.close()
+    with remote(near) as far:
+        yield far
 
 
-def test_the_world_is_changed_from_afar(near: Graph, far: FarGraph) -> None:
-    far.robot.change_world(partial(add, shape="box", robot=Pose2D(0.0, 0.0, 0.0))).result(30)
-    assert far.robot.world is not None
-    (thing,) = far.robot.world.obstacles
-    assert near.robot.world == far.robot.world
-    far.robot.change_world(partial(remove, name=thing.name)).result(30)
+def test_the_world_is_changed_from_afar(near: Graph, far: RemoteGraph) -> None:
+    far.change_world(partial(add, shape="box", robot=Pose2D(0.0, 0.0, 0.0))).result(30)
+    assert far.state.world is not None
+    (thing,) = far.state.world.obstacles
+    assert near.robot.world == far.state.world
+    far.change_world(partial(remove, name=thing.name)).result(30)
     with pytest.raises(WorldError, match="nothing called 'box 1'"):
-        far.robot.change_world(partial(remove, name=thing.name)).result(30)
-    far.robot.enter_world(load_world("obstacles")).result(30)
-    assert near.robot.world == load_world("obstacles") == far.robot.world
-    far.robot.reset().result(30)
+        far.change_world(partial(remove, name=thing.name)).result(30)
+    far.enter_world(load_world("obstacles")).result(30)
+    assert near.robot.world == load_world("obstacles") == far.state.world
+    far.reset().result(30)
 
 
-def test_settings_reach_the_nodes_of_both_processes(near: Graph, far: FarGraph) -> None:
+def test_settings_reach_the_nodes_of_both_processes(near: Graph, far: RemoteGraph) -> None:
     slower = near.config.control.model_copy(update={"max_linear": 0.1})
     far.reconfigure(near.config.model_copy(update={"control": slower}))
     assert near.config.control.max_linear == far.config.control.max_linear == 0.1
@@ -199,21 +192,21 @@ def test_settings_reach_the_nodes_of_both_processes(near: Graph, far: FarGraph) 
     assert far.config.signs.model is None
 
 
-def test_a_browsers_camera_is_offered_from_afar(near: Graph, far: FarGraph) -> None:
-    assert far.cameras.source == "own"
-    far.cameras.choose("browser")
-    assert eventually(lambda: far.cameras.source == near.cameras.source == "browser")
+def test_a_browsers_camera_is_offered_from_afar(near: Graph, far: RemoteGraph) -> None:
+    assert far.state.camera_source == "own"
+    far.choose_camera("browser")
+    assert eventually(lambda: far.state.camera_source == near.cameras.source == "browser")
     with pytest.raises(FrameError, match="no JPEG"):
-        far.cameras.browser.offer(bytes(HEADER_BYTES + 100))
+        far.offer_frame(bytes(HEADER_BYTES + 100))
     assert not near.cameras.browser.is_given
     _, jpeg = cv2.imencode(".jpg", np.zeros((24, 32, 3), np.uint8))
-    far.cameras.browser.offer(bytes(HEADER_BYTES) + jpeg.tobytes())
-    assert eventually(lambda: far.cameras.browser.is_given)
-    far.cameras.browser.forget()
-    assert eventually(lambda: not far.cameras.browser.is_given)
+    far.offer_frame(bytes(HEADER_BYTES) + jpeg.tobytes())
+    assert eventually(lambda: far.state.has_browser)
+    far.forget_browser()
+    assert eventually(lambda: not far.state.has_browser)
 
 
-def test_steering_from_afar_drives_and_its_end_stops(near: Graph, far: FarGraph) -> None:
+def test_steering_from_afar_drives_and_its_end_stops(near: Graph, far: RemoteGraph) -> None:
     driven = Driven(near)
 
     def drives() -> bool:
@@ -227,7 +220,7 @@ def test_steering_from_afar_drives_and_its_end_stops(near: Graph, far: FarGraph)
 
 def test_a_graph_that_is_gone_is_told() -> None:
     here, there = joined()
-    far = FarGraph(there)
+    far = RemoteGraph(there)
     there.start()
     here.start()
     here.close()

@@ -6,7 +6,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from handsteer.dashboard.page import spoken
-from handsteer.dashboard.sliders import read_limit
 from handsteer.dashboard.state import (
     STALE_S,
     Observed,
@@ -18,7 +17,8 @@ from handsteer.dashboard.state import (
     frame_rate,
     place_in_world,
 )
-from handsteer.dashboard.steer_panel import entries, read_deflection
+from handsteer.dashboard.steer_panel import mux_inputs
+from handsteer.dashboard.steering_input import read_deflection, read_number
 from handsteer.types import ZERO, Pose2D, Velocity
 
 OK, WARN, ERROR = 0, 1, 2
@@ -283,9 +283,9 @@ def test_a_stop_is_said_once_the_control_obeys_it_or_when_there_is_no_control() 
 )
 def test_at_most_one_source_has_the_robot(stopped: str, source: str, viewers: Viewers, holds: str | None) -> None:
     reports = {"hand_sign_control": report("standing: x", stopped=stopped, source=source)}
-    shown = entries(compose(Observed(reports), 0.1, viewers))
+    shown = mux_inputs(compose(Observed(reports), 0.1, viewers))
     assert [entry.name for entry in shown] == ["Stop", "By hand", "Signs"]
-    holding = [entry.name + (f": {entry.whose}" if entry.whose else "") for entry in shown if entry.holds]
+    holding = [entry.name + (f": {entry.viewer}" if entry.viewer else "") for entry in shown if entry.is_active]
     assert holding == ([holds] if holds else [])
 
 
@@ -316,7 +316,7 @@ def test_knows_the_limits_of_the_control() -> None:
     high=st.floats(0, 5),
 )
 def test_a_number_of_a_browser_is_within_limits_whatever_was_sent(sent: object, low: float, high: float) -> None:
-    assert low <= read_limit(sent, low, high, 0.0) <= high
+    assert low <= read_number(sent, low, high, 0.0) <= high
 
 
 def test_a_screen_reader_is_not_told_each_tenth_of_a_second() -> None:

@@ -10,7 +10,7 @@ import pytest
 from playwright.sync_api import Browser, Page
 
 from handsteer.config import load
-from handsteer.dashboard.server import Dashboard
+from handsteer.dashboard.page_process import PageProcess
 from handsteer.graph import Graph
 from tests.dashboard.browsers import a_browser
 from tests.dashboard.visits import NEEDS_A_BROWSER, PATIENCE_MS, WINDOW
@@ -38,18 +38,18 @@ def graph() -> Iterator[Graph]:
         "virtual_hand": {"script": "NONE:60"},
     }
     config = load(base={**hand, "dashboard": {"port": 0}})
-    with Graph(config) as graph:
+    with Graph(config, steering=False) as graph:
         graph.start()
         yield graph
 
 
 @pytest.fixture
 def url(graph: Graph) -> Iterator[str]:
-    dashboard = Dashboard.of(graph)
+    page = PageProcess()
     try:
-        yield dashboard.start()
+        yield page.serve(graph)
     finally:
-        dashboard.stop()
+        page.stop()
 
 
 @pytest.fixture

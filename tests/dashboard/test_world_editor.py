@@ -1,8 +1,8 @@
 import pytest
 
-from handsteer.dashboard.world_editor import LARGEST_FILE_BYTES, figures, read_file
+from handsteer.dashboard.world_editor import LARGEST_FILE_BYTES, read_file
 from handsteer.errors import WorldError
-from handsteer.robots.editing import add, edit
+from handsteer.robots.editing import add, edit, figures
 from handsteer.robots.protocol import Shape
 from handsteer.robots.world import World
 from handsteer.types import Pose2D

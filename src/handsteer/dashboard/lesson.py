@@ -1,8 +1,9 @@
 """The steps of a lesson that teaches one sign, without page, clock, camera or threads."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Final, Literal
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Final, Literal
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from handsteer.recognition.shipped_signs import SURE
 from handsteer.training.custom.collect import Collector, Facts, Status
 from handsteer.training.custom.dataset import Take
 from handsteer.training.custom.report import TrainingReport
-from handsteer.types import NONE
+from handsteer.types import EFFECTS, NONE, Action
 
 _SMALL_PX: Final = 60.0
 _ENOUGH_HANDS: Final = 15
@@ -84,36 +85,41 @@ class Collected:
 
 
 @dataclass(frozen=True)
-class View:
-    """The state of a lesson for the page.
+class LessonState:
+    """The state of a lesson.
 
     Attributes:
         label: The sign.
+        wanted: Number of takes to collect.
         step: Collecting takes, training, or trying the result.
-        recording: Whether takes are being recorded.
+        recording: Whether a take, or the countdown before it, is in progress.
         status: Progress of collecting.
         hint: What to improve; empty if nothing.
         takes: Collected takes, without deleted ones.
-        wanted: Number of takes to collect.
-        can_train: Whether there are enough takes.
         progress: Of the training, 0 to 1.
-        trouble: The last error; empty if none.
+        error: The last error; empty if none.
+        model: The taught model, while it is tried.
         report: How well the sign was learnt.
         seen: Recognition of the newest frame by the taught model.
     """
 
     label: str
-    step: Step
-    recording: bool
-    status: Status
-    hint: str
-    takes: tuple[Collected, ...]
     wanted: int
-    can_train: bool
-    progress: float
-    trouble: str
-    report: TrainingReport | None
-    seen: Recognition | None
+    step: Step = "collect"
+    recording: bool = False
+    status: Status = _READY
+    hint: str = ""
+    takes: tuple[Collected, ...] = ()
+    progress: float = 0.0
+    error: str = ""
+    model: CustomModel | None = None
+    report: TrainingReport | None = None
+    seen: Recognition | None = None
+
+    @property
+    def can_train(self) -> bool:
+        """Whether there are enough takes."""
+        return len(self.takes) >= _LEAST_TAKES and not self.recording
 
 
 class Lesson:
@@ -122,69 +128,37 @@ class Lesson:
     Args:
         facts: Of all takes, including the sign.
         plan: Number and length of takes.
+
+    Attributes:
+        facts: Of all takes.
+        state: The state, replaced by each change.
     """
 
     def __init__(self, facts: Facts, plan: TeachConfig) -> None:
         self.facts = facts
-        self.step: Step = "collect"
-        self.model: CustomModel | None = None
+        self.state = LessonState(facts.label, plan.takes)
         self._plan = plan
         self._collector: Collector | None = None
-        self._status = _READY
-        self._hint = ""
         self._hands: list[Hand] = []
-        self._takes: list[Collected] = []
         self._count = 0
-        self._progress = 0.0
-        self._trouble = ""
-        self._report: TrainingReport | None = None
-        self._seen: Recognition | None = None
-
-    @property
-    def takes(self) -> tuple[Take, ...]:
-        """Collected takes, without deleted ones."""
-        return tuple(each.take for each in self._takes)
-
-    @property
-    def is_recording(self) -> bool:
-        """Whether a take, or the countdown before it, is in progress."""
-        return self._collector is not None
-
-    @property
-    def view(self) -> View:
-        """The state for the page."""
-        return View(
-            label=self.facts.label,
-            step=self.step,
-            recording=self.is_recording,
-            status=self._status,
-            hint=self._hint,
-            takes=tuple(self._takes),
-            wanted=self._plan.takes,
-            can_train=len(self._takes) >= _LEAST_TAKES and not self.is_recording,
-            progress=self._progress,
-            trouble=self._trouble,
-            report=self._report,
-            seen=self._seen,
-        )
 
     def record(self) -> None:
         """Start the countdown to the missing takes, or to one more if none is missing."""
-        room = MOST_TAKES - len(self._takes)
-        if self.step != "collect" or self.is_recording or room <= 0:
+        room = MOST_TAKES - len(self.state.takes)
+        if self.state.step != "collect" or self.state.recording or room <= 0:
             return
-        missing = max(1, self._plan.takes - len(self._takes))
+        missing = max(1, self._plan.takes - len(self.state.takes))
         self._collector = Collector(
             self.facts, takes=min(missing, room), take_s=self._plan.take_time, countdown_s=self._plan.countdown
         )
-        self._trouble = ""
         self._hands = []
+        self._set(recording=True, error="")
 
     def pause(self) -> None:
         """Drop the current take, and stop collecting until :meth:`record`."""
         self._collector = None
-        self._status = _READY
         self._hands = []
+        self._set(recording=False, status=_READY)
 
     def see(self, hand: Hand | None, guess: SignGuess, dt_s: float) -> Status:
         """Process the next frame while takes are collected, and return the progress.
@@ -192,69 +166,97 @@ class Lesson:
         ``guess`` is what the classifier of known signs recognises ``hand`` as; ``dt_s`` are the seconds since the last
         frame.
         """
-        if self.step != "collect":
+        if self.state.step != "collect":
             return _READY
-        self._status = _READY
+        status = _READY
         if self._collector is not None:
-            self._status = self._collector.step(hand, dt_s)
-            self._note(hand)
+            status = self._collector.step(hand, dt_s)
+            self._note(status, hand)
             if self._collector.done:
                 self._collector = None
-        self._hint = hint(hand, guess, self._hands)
-        return self._status
+        self._set(recording=self._collector is not None, status=status, hint=hint(hand, guess, self._hands))
+        return status
 
-    def keep(self, take: Take, picture: bytes) -> None:
-        """Store a finished take."""
+    def add(self, take: Take, picture: bytes) -> None:
+        """Add a finished take."""
         self._count += 1
-        self._takes.append(Collected(self._count, take, picture))
+        self._set(takes=(*self.state.takes, Collected(self._count, take, picture)))
 
     def delete(self, number: int) -> None:
         """Delete a take; it is replaced by another one while takes are recorded."""
-        left = [each for each in self._takes if each.number != number]
-        if self.step == "collect" and len(left) < len(self._takes):
-            self._takes = left
+        left = tuple(each for each in self.state.takes if each.number != number)
+        if self.state.step == "collect" and len(left) < len(self.state.takes):
+            self._set(takes=left)
             if self._collector is not None:
                 self._collector.again()
 
     def lose_frames(self) -> None:
         """Report that no frames arrive."""
-        self._hint = "No picture comes from the camera."
-        self._seen = None
+        self._set(hint="No picture comes from the camera.", seen=None)
 
     def begin_training(self) -> bool:
         """Start the training if there are enough takes; return whether it has started."""
-        if self.step != "collect" or not self.view.can_train:
+        if self.state.step != "collect" or not self.state.can_train:
             return False
-        self.step, self._progress, self._trouble = "train", 0.0, ""
+        self._set(step="train", progress=0.0, error="")
         return True
 
     def advance(self, done: int, of: int) -> None:
         """Set the number of training steps that are done."""
-        self._progress = done / of
+        self._set(progress=done / of)
 
     def learn(self, model: CustomModel, report: TrainingReport) -> None:
         """Set the result of the training, to be tried."""
-        if self.step == "train":
-            self.step, self.model, self._report, self._seen = "try", model, report, None
+        if self.state.step == "train":
+            self._set(step="try", model=model, report=report, seen=None)
 
     def try_out(self, seen: Recognition) -> None:
         """Set the recognition of the next frame by the taught model."""
-        if self.step == "try":
-            self._seen, self._hint = seen, ""
+        if self.state.step == "try":
+            self._set(seen=seen, hint="")
 
-    def go_back(self, trouble: str = "") -> None:
-        """Return to collecting, with all takes; ``trouble`` is the error to show."""
-        self.step, self.model, self._report, self._trouble = "collect", None, None, trouble
+    def go_back(self, error: str = "") -> None:
+        """Return to collecting, with all takes; ``error`` is shown."""
+        self._set(step="collect", model=None, report=None, error=error)
         self.pause()
 
-    def _note(self, hand: Hand | None) -> None:
-        if self._status.finished is not None or self._status.failed:
+    def _set(self, **changes: Any) -> None:
+        self.state = replace(self.state, **changes)
+
+    def _note(self, status: Status, hand: Hand | None) -> None:
+        if status.finished is not None or status.failed:
             self._hands = []
-            self._trouble = _TOO_FEW if self._status.failed else ""
-        elif self._status.phase == "recording" and hand is not None:
+            self._set(error=_TOO_FEW if status.failed else "")
+        elif status.phase == "recording" and hand is not None:
             self._hands.append(hand)
 
 
-def hands_in(takes: Sequence[Collected]) -> int:
-    """Return how many hands there are in ``takes``."""
-    return sum(len(each.take.hands) for each in takes)
+def counted(state: LessonState) -> str:
+    """Return the number of takes of ``state``, and of their hands, in words."""
+    takes, hands = len(state.takes), sum(len(each.take.hands) for each in state.takes)
+    of = f" of {state.wanted}" if takes <= state.wanted else ""
+    return f"{takes}{of} takes, {hands} hands"
+
+
+def instruction(state: LessonState) -> tuple[str, str]:
+    """Return the current instruction while takes are recorded: a number, and words."""
+    if state.status.phase == "recording":
+        return str(state.status.hands), f"hands: show {state.label}"
+    return str(math.ceil(state.status.left_s)), f"then show {state.label}"
+
+
+def outcome(seen: Recognition | None, label: str, action_of: Callable[[str], Action]) -> tuple[str, str]:
+    """Return in words how the taught model recognises the hand, and what the robot would do.
+
+    Args:
+        seen: The recognition of the newest frame; None without a frame.
+        label: The taught sign.
+        action_of: Returns the action of a sign, current or intended.
+    """
+    if seen is None:
+        return "No picture", ""
+    if seen.hand is None:
+        return "No hand", "no hand is in view"
+    if seen.seen == NONE:
+        return "No sign", f"show {label}" if label != NONE else "as it shall be"
+    return f"{seen.seen}, {seen.confidence:.0%}", f"would mean: {EFFECTS[action_of(seen.seen)]}"

@@ -3,7 +3,6 @@
 import logging
 import threading
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Final
 
 import cv2
@@ -12,7 +11,7 @@ from numpy.typing import NDArray
 
 from handsteer.clock import Clock
 from handsteer.config import Config, SignsConfig
-from handsteer.dashboard.lesson import Lesson, View
+from handsteer.dashboard.lesson import Lesson, LessonState
 from handsteer.errors import TrainingError
 from handsteer.images import bgr_image, encode_jpeg
 from handsteer.messages import IMAGE_RAW, Image
@@ -37,20 +36,7 @@ _LONGEST_STEP_S: Final = 0.5
 _THUMBNAIL_HEIGHT: Final = 120
 _NOTHING: Final = SignGuess(NONE, 0.0)
 
-
-@dataclass(frozen=True)
-class LessonVision:
-    """Recognition for a lesson.
-
-    Attributes:
-        open_landmarker: Opens the hand landmarker.
-        open_shipped: Opens the classifier of the shipped signs.
-        signs: Returns the current parameters of recognition.
-    """
-
-    open_landmarker: Callable[[], Landmarker]
-    open_shipped: Callable[[], Classifier]
-    signs: Callable[[], SignsConfig]
+OpenModels = Callable[[], tuple[Landmarker, Classifier]]
 
 
 class LessonNode(Node):
@@ -63,36 +49,38 @@ class LessonNode(Node):
         clock: The graph's clock.
         lesson: Used only by this node from here on.
         known: The takes of earlier lessons, which are trained on too.
-        eyes: Its recognition; the models are opened on this node's thread.
+        open_models: Opens the landmarker and the classifier of the shipped signs; called on this node's thread.
+        signs: Returns the current parameters of recognition.
     """
 
-    def __init__(self, transport: Transport, clock: Clock, lesson: Lesson, known: Dataset, eyes: LessonVision) -> None:
+    def __init__(
+        self,
+        transport: Transport,
+        clock: Clock,
+        *,
+        lesson: Lesson,
+        known: Dataset,
+        open_models: OpenModels,
+        signs: Callable[[], SignsConfig],
+    ) -> None:
         super().__init__("dashboard_lesson", transport, clock)
         self._lesson = lesson
         self._known = known
-        self._eyes = eyes
+        self._open_models, self._signs = open_models, signs
         self._lock = threading.RLock()
         self._training: BackgroundTraining | None = None
-        self._seeing: tuple[Landmarker, Classifier] | None = None
+        self._models: tuple[Landmarker, Classifier] | None = None
         self._trying: tuple[CustomModel, Recognizer] | None = None
-        self._shown: tuple[NDArray[np.uint8], Hand, float] | None = None
+        self._picture: tuple[NDArray[np.uint8], Hand, float] | None = None
         self._last_s: float | None = None
-        self._last_frame_s = clock.now()
-        self._attended_s = clock.now()
+        self._last_frame_s = self._attended_s = clock.now()
         self.subscribe(IMAGE_RAW, self._on_image)
         self.every(_WATCH_PERIOD_S, self._watch)
 
     @property
-    def view(self) -> View:
-        """The state for the page."""
-        with self._lock:
-            return self._lesson.view
-
-    @property
-    def learnt(self) -> CustomModel | None:
-        """The taught model, while it is tried."""
-        with self._lock:
-            return self._lesson.model
+    def state(self) -> LessonState:
+        """The state of the lesson."""
+        return self._lesson.state
 
     def attend(self) -> None:
         """Report that the teaching viewer's page is open; without this for a second, no takes are collected."""
@@ -118,7 +106,7 @@ class LessonNode(Node):
         with self._lock:
             if not self._lesson.begin_training():
                 return
-            training = BackgroundTraining(self._known.with_takes(self._lesson.takes))
+            training = BackgroundTraining(self._known.with_takes([each.take for each in self.state.takes]))
             self._training = training
         threading.Thread(target=self._learn, args=(training,), name="lesson_training", daemon=True).start()
 
@@ -144,14 +132,14 @@ class LessonNode(Node):
                 if self._training is training:
                     self._lesson.advance(done, of)
 
-        trouble, result = "", None
+        error, result = "", None
         try:
             result = training.run(progress)
-        except TrainingError as error:
-            trouble = str(error)
+        except TrainingError as problem:
+            error = str(problem)
         except Exception:
             log.exception("the training of %s failed", self._lesson.facts.label)
-            trouble = "the training failed; the log says why"
+            error = "the training failed; the log says why"
         with self._lock:
             if self._training is not training:
                 return  # it was cancelled
@@ -159,7 +147,7 @@ class LessonNode(Node):
             if result is not None:
                 self._lesson.learn(*result)
             else:
-                self._lesson.go_back(trouble)
+                self._lesson.go_back(error)
 
     def _on_image(self, received: Received[Image]) -> None:
         now = self.clock.now()
@@ -167,44 +155,46 @@ class LessonNode(Node):
         captured_s = received.captured_s if received.captured_s is not None else now
         step_s = 0.0 if self._last_s is None else min(max(0.0, captured_s - self._last_s), _LONGEST_STEP_S)
         self._last_s = captured_s
-        step = self._lesson.step
-        if step == "train":
+        state = self.state
+        if state.step == "train":
             return
-        if self._seeing is None:
-            self._seeing = self._eyes.open_landmarker(), self._eyes.open_shipped()
+        if self._models is None:
+            self._models = self._open_models()
         image = bgr_image(received.message)
-        if step == "collect":
-            self._collect(image, step_s, *self._seeing)
-        else:
-            self._try(image, step_s, *self._seeing)
+        if state.step == "collect":
+            self._collect(image, step_s, *self._models)
+        elif state.model is not None:
+            self._try(state.model, image, step_s, *self._models)
 
     def _collect(self, image: NDArray[np.uint8], step_s: float, landmarker: Landmarker, shipped: Classifier) -> None:
         hand = largest(landmarker.detect(image))
         guess = shipped.classify(hand) if hand is not None else _NOTHING
         with self._lock:
             status = self._lesson.see(hand, guess, step_s)
-            if status.finished is not None:
-                if self._shown is not None:
-                    self._lesson.keep(status.finished, thumbnail(*self._shown[:2]))
-                self._shown = None
-            elif status.phase == "recording" and hand is not None:
-                self._remember(image, hand, status.left_s)
-            elif status.phase != "recording":
-                self._shown = None
+            if status.finished is not None and self._picture is not None:
+                self._lesson.add(status.finished, thumbnail(*self._picture[:2]))
+            if status.finished is not None or status.phase != "recording":
+                self._picture = None
+            elif hand is not None:
+                self._choose_picture(image, hand, status.left_s)
 
-    def _remember(self, image: NDArray[np.uint8], hand: Hand, left_s: float) -> None:
+    def _choose_picture(self, image: NDArray[np.uint8], hand: Hand, left_s: float) -> None:
         """Store the frame in the middle of the take; at its start the hand is still moving."""
-        if self._shown is None or left_s >= self._shown[2] / 2:
-            whole_s = left_s if self._shown is None else self._shown[2]
-            self._shown = image, hand, whole_s
+        take_s = left_s if self._picture is None else self._picture[2]
+        if self._picture is None or left_s >= take_s / 2:
+            self._picture = image, hand, take_s
 
-    def _try(self, image: NDArray[np.uint8], step_s: float, landmarker: Landmarker, shipped: Classifier) -> None:
-        model = self.learnt
-        if model is None:
-            return
+    def _try(
+        self,
+        model: CustomModel,
+        image: NDArray[np.uint8],
+        step_s: float,
+        landmarker: Landmarker,
+        shipped: Classifier,
+    ) -> None:
         if self._trying is None or self._trying[0] is not model:
             landmarker.reset()
-            classifier, config = CustomClassifier(shipped, model), Config(signs=self._eyes.signs())
+            classifier, config = CustomClassifier(shipped, model), Config(signs=self._signs())
             self._trying = model, Recognizer(config, landmarker=landmarker, classifier=classifier)
         seen = self._trying[1].step(image, step_s)
         with self._lock:
@@ -213,7 +203,7 @@ class LessonNode(Node):
     def _watch(self) -> None:
         now = self.clock.now()
         with self._lock:
-            if now - self._attended_s > _UNATTENDED_S and self._lesson.is_recording:
+            if now - self._attended_s > _UNATTENDED_S and self.state.recording:
                 self._lesson.pause()
             if now - self._last_frame_s > _NO_FRAME_S:
                 self._lesson.lose_frames()

@@ -10,12 +10,15 @@ from typing import Final
 import yaml
 
 from handsteer.clock import Clock
-from handsteer.config import Config, ControlConfig, TeachConfig, validate
-from handsteer.dashboard.joined import JoinedGraph
-from handsteer.dashboard.lesson import Lesson, View
-from handsteer.dashboard.lesson_node import LessonNode, LessonVision
+from handsteer.config import Config, ControlConfig, validate
+from handsteer.dashboard.lesson import Lesson
+from handsteer.dashboard.lesson_node import LessonNode, OpenModels
+from handsteer.dashboard.remote_graph import RemoteGraph
 from handsteer.errors import ConfigError, DatasetError
+from handsteer.graph import Graph
+from handsteer.recognition.classifier import Classifier
 from handsteer.recognition.custom_signs import label_for, load_custom_model, save_custom_model
+from handsteer.recognition.hand import Landmarker
 from handsteer.recognition.recognizer import open_classifier, open_landmarker
 from handsteer.training.custom.collect import Facts
 from handsteer.training.custom.dataset import Dataset, load_dataset, save_dataset
@@ -26,26 +29,26 @@ _LONGEST_PERSON: Final = 40
 
 
 @dataclass(frozen=True)
-class Kept:
-    """A sign that was taught and kept.
+class LearntSign:
+    """A sign that was taught and saved.
 
     Attributes:
         label: The sign.
         action: Its action; None for ``NONE``.
         dataset: The file with its takes.
         model: The file with the taught model, which is now in use.
-        lines: YAML that makes the change permanent.
+        yaml: The lines of a configuration file that make the change permanent.
     """
 
     label: str
     action: Action | None
     dataset: Path
     model: Path
-    lines: str
+    yaml: str
 
 
 @dataclass
-class _Given:
+class _Current:
     """The current lesson.
 
     Attributes:
@@ -61,16 +64,15 @@ class _Given:
     takes_are_saved: bool = False
 
 
-class Teaching:
+class Lessons:
     """Runs one lesson at a time on a running graph; thread-safe.
 
-    :meth:`known`, :meth:`begin` and :meth:`keep` read and write files.
+    :meth:`known`, :meth:`begin` and :meth:`save` read and write files.
 
     Args:
         transport: Carries the graph's messages.
         clock: The graph's clock.
-        plan: Files, and number and length of takes.
-        eyes: Recognition for lessons.
+        open_models: Opens the landmarker and the classifier of the shipped signs, for a lesson.
         config: Returns the configuration of the running graph.
         reconfigure: Applies another one to the running graph; raises ConfigError if it is rejected.
     """
@@ -79,38 +81,34 @@ class Teaching:
         self,
         transport: Transport,
         clock: Clock,
-        plan: TeachConfig,
-        eyes: LessonVision,
-        *,
+        open_models: OpenModels,
         config: Callable[[], Config],
         reconfigure: Callable[[Config], None],
     ) -> None:
-        self._wires = (transport, clock)
-        self._plan = plan
-        self._eyes = eyes
+        self._transport, self._clock = transport, clock
+        self._plan = config().teach
+        self._open_models = open_models
         self._config = config
         self._reconfigure = reconfigure
         self._lock = threading.RLock()
-        self._given: _Given | None = None
+        self._current: _Current | None = None
         self._closed = False
 
     @classmethod
-    def of(cls, graph: JoinedGraph) -> "Teaching":
-        """Return the teaching for a graph."""
+    def of(cls, graph: Graph | RemoteGraph) -> "Lessons":
+        """Return the lessons of a graph."""
         config = graph.config
-        eyes = LessonVision(
-            open_landmarker=lambda: open_landmarker(config),
-            open_shipped=lambda: open_classifier(config.signs.model_copy(update={"model": None})),
-            signs=lambda: graph.config.signs,
-        )
-        wires = (graph.transport, graph.clock)
-        return cls(*wires, config.teach, eyes, config=lambda: graph.config, reconfigure=graph.reconfigure)
+
+        def open_models() -> tuple[Landmarker, Classifier]:
+            return open_landmarker(config), open_classifier(config.signs.model_copy(update={"model": None}))
+
+        return cls(graph.transport, graph.clock, open_models, lambda: graph.config, graph.reconfigure)
 
     @property
     def label(self) -> str | None:
         """The sign that is being taught by any viewer; None if none is."""
-        given = self._given
-        return given.node.view.label if given else None
+        current = self._current
+        return current.node.state.label if current else None
 
     @property
     def model_path(self) -> Path:
@@ -156,29 +154,31 @@ class Teaching:
         lost = tuple(sign for sign in old if sign not in (*known.labels, label))
         when = f"{datetime.datetime.now():%Y-%m-%d %H:%M}"
         lesson = Lesson(Facts(label, _person(person), when, "page"), self._plan)
-        node = LessonNode(*self._wires, lesson, known, self._eyes)
+        node = LessonNode(
+            self._transport,
+            self._clock,
+            lesson=lesson,
+            known=known,
+            open_models=self._open_models,
+            signs=lambda: self._config().signs,
+        )
         with self._lock:
             self._end()
             if not self._closed:
-                self._given = _Given(viewer, node, lost)
+                self._current = _Current(viewer, node, lost)
                 node.start()
 
-    def lesson(self, viewer: str) -> LessonNode | None:
+    def node(self, viewer: str) -> LessonNode | None:
         """Return the lesson of ``viewer``, if any."""
-        given = self._given
-        return given.node if given is not None and given.viewer == viewer else None
-
-    def view(self, viewer: str) -> View | None:
-        """Return the state of the lesson of ``viewer``, if any."""
-        node = self.lesson(viewer)
-        return node.view if node else None
+        current = self._current
+        return current.node if current is not None and current.viewer == viewer else None
 
     def lost(self) -> tuple[str, ...]:
         """Return the signs of the current model that would be missing in this lesson's."""
-        given = self._given
-        return given.lost if given else ()
+        current = self._current
+        return current.lost if current else ()
 
-    def keep(self, viewer: str, action: str) -> Kept | None:
+    def save(self, viewer: str, action: str) -> LearntSign | None:
         """Save the takes and the taught model, let the graph use it, and end the lesson.
 
         The robot obeys the sign as soon as it may move again.
@@ -188,7 +188,7 @@ class Teaching:
             action: The sign's action.
 
         Returns:
-            What was kept; None if ``viewer`` has no lesson, or nothing to keep yet.
+            What was saved; None if ``viewer`` has no lesson, or nothing to save yet.
 
         Raises:
             ConfigError: The action does not exist, or the running nodes reject the sign.
@@ -196,28 +196,27 @@ class Teaching:
             ModelError: The model cannot be written.
         """
         with self._lock:
-            given = self._given
-            model = given.node.learnt if given is not None and given.viewer == viewer else None
-            if given is None or model is None:
+            current = self._current
+            if current is None or current.viewer != viewer or (model := current.node.state.model) is None:
                 return None
-            view = given.node.view
-            does = next((each for each in self.actions() if each == action and view.label != NONE), None)
-            if does is None and view.label != NONE:
+            state = current.node.state
+            effect = next((each for each in self.actions() if each == action and state.label != NONE), None)
+            if effect is None and state.label != NONE:
                 raise ConfigError(f"{action!r} is no action: choose one of {', '.join(self.actions())}")
             path = self.model_path
             save_custom_model(model, path.expanduser())
-            if not given.takes_are_saved:
-                takes = [each.take for each in view.takes]
+            if not current.takes_are_saved:
+                takes = [each.take for each in state.takes]
                 save_dataset(self.known().with_takes(takes), self._plan.dataset.expanduser())
-                given.takes_are_saved = True
-            self._reconfigure(with_sign(self._config(), path, view.label, does))
+                current.takes_are_saved = True
+            self._reconfigure(with_sign(self._config(), path, state.label, effect))
             self._end()
-            return Kept(view.label, does, self._plan.dataset, path, self._lines(path))
+            return LearntSign(state.label, effect, self._plan.dataset, path, self._yaml(path))
 
     def end(self, viewer: str) -> None:
-        """End the lesson of ``viewer``, if any, without keeping anything."""
+        """End the lesson of ``viewer``, if any, without saving anything."""
         with self._lock:
-            if self._given is not None and self._given.viewer == viewer:
+            if self.node(viewer) is not None:
                 self._end()
 
     def close(self) -> None:
@@ -227,12 +226,12 @@ class Teaching:
             self._end()
 
     def _end(self) -> None:
-        given, self._given = self._given, None
-        if given is not None:
+        current, self._current = self._current, None
+        if current is not None:
             # Off this thread, which may be the server's: a frame may be in progress.
-            threading.Thread(target=given.node.stop, name="lesson_end", daemon=True).start()
+            threading.Thread(target=current.node.stop, name="lesson_end", daemon=True).start()
 
-    def _lines(self, model: Path) -> str:
+    def _yaml(self, model: Path) -> str:
         actions = dict(self._config().control.actions)
         content = {"signs": {"model": str(model)}, **({"control": {"actions": actions}} if actions else {})}
         return yaml.safe_dump(content, sort_keys=False, allow_unicode=True)

@@ -1,62 +1,133 @@
-"""The process that serves the page of another process's graph; started by :mod:`handsteer.dashboard.page_process`."""
+"""A graph for a page in another process: both ends of the pipe between them.
 
-import gc
+Topics pass through it as well (:mod:`handsteer.transports.piped`).
+"""
+
+import contextlib
 import itertools
-import logging
-import logging.handlers
-import os
-import sys
-import threading
 from collections.abc import Callable
 from concurrent.futures import Future
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from handsteer.cameras.browser import Source, check_frame
 from handsteer.clock import Clock
 from handsteer.config import Config
-from handsteer.dashboard.page_process import Facts
-from handsteer.dashboard.server import Dashboard
-from handsteer.errors import ConfigError, HandsteerError, TransportError
+from handsteer.errors import ConfigError, FrameError, HandsteerError, TransportError
+from handsteer.graph import Graph
 from handsteer.making import make_steering
 from handsteer.nodes.steering import SteeringNode
 from handsteer.robots.world import World
-from handsteer.transports.piped import Pipe, PipedTransport
+from handsteer.transports.piped import Gateway, Pipe, PipedTransport
 
-_PATIENCE_S = 5.0
-_FAREWELL_S = 2.0
+_ANSWER_TIMEOUT_S = 5.0
 _LOOK_PERIOD_S = 0.2
 
 
-class FarGraph:
-    """A :class:`~handsteer.dashboard.joined.JoinedGraph` that runs in the process at the other end of a pipe.
+@dataclass(frozen=True)
+class GraphState:
+    """What the page's process receives from the graph in addition to topics.
 
-    Use it only after :meth:`join` has returned.
+    Attributes:
+        config: The nodes' configuration.
+        world: The robot's world with all things at their start positions; None for a real robot.
+        camera_source: The selected camera.
+        has_browser: Whether a browser has sent frames since the last one was forgotten.
+    """
+
+    config: Config
+    world: World | None
+    camera_source: Source
+    has_browser: bool
+
+
+class GraphServer:
+    """The graph's end: offers a graph of this process to a :class:`RemoteGraph`.
 
     Args:
-        pipe: Not started yet; connected to a :class:`~handsteer.dashboard.page_process.NearGraph`.
+        pipe: Not started yet; connected to a :class:`RemoteGraph`.
+        graph: The graph.
+        file: The YAML file that its parameters were read from, which settings are saved to.
+    """
+
+    def __init__(self, pipe: Pipe, graph: Graph, file: Path | None = None) -> None:
+        self._pipe = pipe
+        self._graph = graph
+        self._gateway = Gateway(pipe, graph.transport)
+        self._sent = self._state()
+        self._actions: dict[str, Callable[..., Future[None] | None]] = {
+            "reconfigure": graph.reconfigure,
+            "change_world": graph.robot.change_world,
+            "enter_world": graph.robot.enter_world,
+            "reset": graph.robot.reset,
+            "choose_camera": graph.cameras.choose,
+            "forget_browser": graph.cameras.browser.forget,
+        }
+        pipe.on("frame", self._take_frame)
+        pipe.on("request", self._execute)
+        pipe.say("begin", self._sent, graph.clock, file)
+
+    def close(self) -> None:
+        """Close the page's publishers and subscriptions."""
+        self._gateway.close()
+
+    def _state(self) -> GraphState:
+        graph = self._graph
+        return GraphState(graph.config, graph.robot.world, graph.cameras.source, graph.cameras.browser.is_given)
+
+    def _send_state(self) -> None:
+        state = self._state()
+        if state != self._sent:
+            self._sent = state
+            self._pipe.say("state", state)
+
+    def _take_frame(self, frame: bytes) -> None:
+        with contextlib.suppress(FrameError):  # checked before
+            self._graph.cameras.browser.offer(frame)
+        self._send_state()
+
+    def _execute(self, number: int, action: str, *arguments: Any) -> None:
+        try:
+            result = self._actions[action](*arguments)
+        except HandsteerError as error:
+            self._answer(number, error)
+        else:
+            if isinstance(result, Future):
+                result.add_done_callback(lambda done: self._answer(number, done.exception()))
+            else:
+                self._answer(number, None)
+
+    def _answer(self, number: int, error: BaseException | None) -> None:
+        self._send_state()
+        self._pipe.say("answer", number, error)
+
+
+class RemoteGraph:
+    """The page's end: a graph that runs in another process. Use it only after :meth:`join` has returned.
+
+    Args:
+        pipe: Not started yet; connected to a :class:`GraphServer`.
 
     Attributes:
         transport: Carries the graph's messages.
         clock: The graph's clock.
-        cameras: Selects the camera in the other process.
-        robot: The robot's world.
+        state: What the graph has reported last.
         steering: Runs in this process; not started.
     """
 
     clock: Clock
+    state: GraphState
     steering: SteeringNode
 
     def __init__(self, pipe: Pipe) -> None:
         self.transport = PipedTransport(pipe)
-        self.cameras = _FarCameras(pipe, lambda: self._facts)
-        self.robot = _FarRobot(self._ask, lambda: self._facts)
-        self._facts: Facts
         self._pipe = pipe
-        self._begun: Future[tuple[Facts, Clock, Path | None]] = Future()
+        self._begun: Future[tuple[GraphState, Clock, Path | None]] = Future()
         self._numbers = itertools.count()
-        self._asked: dict[int, Future[None]] = {}
+        self._requests: dict[int, Future[None]] = {}
         pipe.on("begin", lambda *what: self._begun.set_result(what))
-        pipe.on("facts", self._take_facts)
+        pipe.on("state", self._take_state)
         pipe.on("answer", self._take_answer)
 
     def join(self) -> Path | None:
@@ -67,7 +138,7 @@ class FarGraph:
         """
         while not self._pipe.ended.is_set():
             try:
-                self._facts, self.clock, file = self._begun.result(_LOOK_PERIOD_S)
+                self.state, self.clock, file = self._begun.result(_LOOK_PERIOD_S)
             except TimeoutError:
                 continue
             self.steering = make_steering(self.config, self.transport, self.clock)
@@ -77,7 +148,7 @@ class FarGraph:
     @property
     def config(self) -> Config:
         """The nodes' configuration."""
-        return self._facts.config
+        return self.state.config
 
     def reconfigure(self, config: Config) -> None:
         """Apply the live parameters of ``config`` to the nodes, in both processes.
@@ -86,126 +157,55 @@ class FarGraph:
             ConfigError: A node rejects them, or the other process does not answer; nothing has changed.
         """
         try:
-            self._ask("reconfigure", config).result(_PATIENCE_S)
+            self._request("reconfigure", config).result(_ANSWER_TIMEOUT_S)
         except TimeoutError:
             raise ConfigError("the robot's process does not answer: try again") from None
         self.steering.reconfigure(config)
 
-    def _ask(self, what: str, *with_what: object) -> Future[None]:
+    def change_world(self, change: Callable[[World], World]) -> Future[None]:
+        """Change the robot's world; ``change`` must be picklable."""
+        return self._request("change_world", change)
+
+    def enter_world(self, world: World) -> Future[None]:
+        """Move the robot to the start of another world."""
+        return self._request("enter_world", world)
+
+    def reset(self) -> Future[None]:
+        """Move the robot and all things to their start positions."""
+        return self._request("reset")
+
+    def choose_camera(self, source: Source) -> None:
+        """Read frames from ``source`` from now on."""
+        self._request("choose_camera", source)
+
+    def offer_frame(self, data: bytes) -> None:
+        """Send a frame of a browser's camera, see :class:`~handsteer.cameras.browser.BrowserCamera`.
+
+        Raises:
+            FrameError: It is not such a frame, or too large.
+        """
+        check_frame(data)
+        self._pipe.say("frame", data, key="browser's frame", keep=1)
+
+    def forget_browser(self) -> None:
+        """Forget the browser that sends frames; another may follow."""
+        self._request("forget_browser")
+
+    def _request(self, action: str, *arguments: object) -> Future[None]:
         """Request an action of the other process; return a future of its result."""
         number, future = next(self._numbers), Future[None]()
-        self._asked[number] = future
-        self._pipe.say("ask", number, what, *with_what)
+        self._requests[number] = future
+        self._pipe.say("request", number, action, *arguments)
         return future
 
-    def _take_facts(self, facts: Facts) -> None:
-        self._facts = facts
+    def _take_state(self, state: GraphState) -> None:
+        self.state = state
 
     def _take_answer(self, number: int, error: BaseException | None) -> None:
-        future = self._asked.pop(number)
+        future = self._requests.pop(number)
         if not future.set_running_or_notify_cancel():
             return  # nothing waits for it any more
         if error is None:
             future.set_result(None)
         else:
             future.set_exception(error)
-
-
-class _FarCameras:
-    def __init__(self, pipe: Pipe, facts: Callable[[], Facts]) -> None:
-        self._pipe = pipe
-        self._facts = facts
-        self.browser = _FarBrowserFrames(pipe, facts)
-
-    @property
-    def source(self) -> Source:
-        return self._facts().source
-
-    def choose(self, source: Source) -> None:
-        self._pipe.say("camera", "choose", source)
-
-
-class _FarBrowserFrames:
-    def __init__(self, pipe: Pipe, facts: Callable[[], Facts]) -> None:
-        self._pipe = pipe
-        self._facts = facts
-
-    @property
-    def is_given(self) -> bool:
-        return self._facts().browser_is_given
-
-    def offer(self, data: bytes) -> None:
-        check_frame(data)
-        self._pipe.say("camera", "offer", data, key="browser's frame", keep=1)
-
-    def forget(self) -> None:
-        self._pipe.say("camera", "forget", None)
-
-
-class _FarRobot:
-    def __init__(self, ask: Callable[..., Future[None]], facts: Callable[[], Facts]) -> None:
-        self._ask = ask
-        self._facts = facts
-
-    @property
-    def world(self) -> World | None:
-        return self._facts().world
-
-    def change_world(self, change: Callable[[World], World]) -> Future[None]:
-        return self._ask("change_world", change)
-
-    def enter_world(self, world: World) -> Future[None]:
-        return self._ask("enter_world", world)
-
-    def reset(self) -> Future[None]:
-        return self._ask("reset")
-
-
-def serve(pipe: Pipe) -> None:
-    """Serve the page of the graph at the other end of ``pipe``, not started yet, until it asks to end or is gone.
-
-    Raises:
-        HandsteerError: The page cannot be served.
-    """
-    graph, end = FarGraph(pipe), threading.Event()
-    pipe.on("end", end.set)
-    pipe.start()
-    dashboard = Dashboard.of(graph, graph.join())
-    pipe.say("served", dashboard.start())
-    graph.steering.start()
-    # Objects loaded so far stay. Frozen, they do not slow down collections, which can then run as soon as a few pages
-    # have been closed; each takes a megabyte.
-    gc.collect()
-    gc.freeze()
-    while not (end.wait(_LOOK_PERIOD_S) or pipe.ended.is_set()):
-        pass
-    graph.steering.stop()
-    dashboard.stop()
-
-
-class _Records:
-    """The queue of a :class:`logging.handlers.QueueHandler`: forwards records to the other process's log."""
-
-    def __init__(self, pipe: Pipe) -> None:
-        self._pipe = pipe
-
-    def put_nowait(self, record: logging.LogRecord) -> None:
-        self._pipe.say("log", record, key="log", keep=100)
-
-
-def main() -> None:
-    """Communicate with the other process by standard input and output."""
-    # Other output must not mix with the messages.
-    sink = os.fdopen(os.dup(sys.stdout.fileno()), "wb")
-    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
-    pipe = Pipe(sys.stdin.buffer, sink)
-    logging.basicConfig(level=logging.INFO, handlers=[logging.handlers.QueueHandler(_Records(pipe))])  # type: ignore[arg-type] # it only puts
-    try:
-        serve(pipe)
-    except HandsteerError as error:
-        pipe.say("refused", error)
-    pipe.close(_FAREWELL_S)
-
-
-if __name__ == "__main__":
-    main()

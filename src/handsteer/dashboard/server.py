@@ -21,15 +21,16 @@ from handsteer.cameras.browser import LARGEST_BYTES
 from handsteer.clock import Clock
 from handsteer.config import DashboardConfig
 from handsteer.dashboard.access import HEADERS, Access, AccessMiddleware
+from handsteer.dashboard.camera import FrameSocket, PictureNode, PictureResponse
 from handsteer.dashboard.drive_page import DrivePage
+from handsteer.dashboard.elements import STATIC
 from handsteer.dashboard.history import VelocityHistory
-from handsteer.dashboard.joined import JoinedGraph
-from handsteer.dashboard.lesson_page import TeachPage
-from handsteer.dashboard.lessons import Teaching
+from handsteer.dashboard.lesson_page import LessonPage
+from handsteer.dashboard.lessons import Lessons
 from handsteer.dashboard.limits import Doors, Unjoined, keep_short
 from handsteer.dashboard.node import DashboardNode
 from handsteer.dashboard.page import ASSETS_PATH, ICON, PICTURE_PATH, WEBCAM_PATH, GraphAccess, PageContext
-from handsteer.dashboard.picture import FrameSocket, PictureNode, PictureResponse
+from handsteer.dashboard.remote_graph import RemoteGraph
 from handsteer.dashboard.settings_file import DEFAULT_FILE, SettingsFile
 from handsteer.dashboard.settings_panel import SettingsPage
 from handsteer.dashboard.settings_store import Settings
@@ -62,13 +63,12 @@ class Dashboard:
         steering: Drives when a viewer steers on the page.
         config: Address and options of the page.
         cmd_vel: The topic of the displayed commands.
-        local: What pages can access of the graph in addition to topics; nothing by default.
-        topics: Whether manual steering may use topics other than the control's, for other robots.
+        access: What pages can do in addition to topics; nothing by default.
 
     Attributes:
         node: Subscribes and steers for the browsers that show the page.
         pictures: Encodes the camera's picture for the browsers that show it.
-        served: What all pages share.
+        context: What all pages share.
         webcam: Receives the frames of a browser's own camera.
     """
 
@@ -80,22 +80,20 @@ class Dashboard:
         config: DashboardConfig,
         *,
         cmd_vel: Topic[Any] = CMD_VEL,
-        local: GraphAccess | None = None,
-        topics: bool = False,
+        access: GraphAccess | None = None,
     ) -> None:
-        local = local or GraphAccess()
         history = VelocityHistory()  # outlives the node, so that a reloaded page shows it
         self.node = OnDemandNode(lambda: DashboardNode(transport, clock, steering, cmd_vel, history))
         self.pictures = OnDemandNode(lambda: PictureNode(transport, clock))
-        self.served = PageContext(self.node, local, topics)
-        self.webcam = FrameSocket(local.cameras, self._drives)
+        self.context = PageContext(self.node, access)
+        self.webcam = FrameSocket(self.context.graph, self._drives)
         self._config = config
         self._server: uvicorn.Server | None = None
         self._thread: threading.Thread | None = None
 
     @classmethod
-    def of(cls, graph: JoinedGraph, file: Path | None = None) -> "Dashboard":
-        """Return the page of a graph that this process can access.
+    def of(cls, graph: RemoteGraph, file: Path | None = None) -> "Dashboard":
+        """Return the page of a whole graph.
 
         Settings are saved to ``file``, the YAML file that the graph's parameters were read from; by default
         :data:`~handsteer.dashboard.settings_file.DEFAULT_FILE`.
@@ -105,10 +103,9 @@ class Dashboard:
         """
         settings_file = SettingsFile(file or DEFAULT_FILE, is_read=file is not None)
         settings = Settings(lambda: graph.config, graph.reconfigure, settings_file)
-        topic = cmd_vel_topic(graph.config)
-        wires = (graph.transport, graph.clock, graph.steering)
-        local = GraphAccess(graph.cameras, graph.robot, settings, Teaching.of(graph))
-        return cls(*wires, graph.config.dashboard, cmd_vel=topic, local=local)
+        access = GraphAccess(graph, settings, Lessons.of(graph))
+        config, topic = graph.config.dashboard, cmd_vel_topic(graph.config)
+        return cls(graph.transport, graph.clock, graph.steering, config, cmd_vel=topic, access=access)
 
     def start(self) -> str:
         """Serve the page and return its address once it answers; it contains the token if one is needed.
@@ -143,8 +140,8 @@ class Dashboard:
         """Close the page and all connections; may be called more than once."""
         self.node.close()
         self.pictures.close()
-        if self.served.local.teaching is not None:
-            self.served.local.teaching.close()
+        if self.context.access is not None:
+            self.context.access.lessons.close()
         if self._server is not None and self._thread is not None:
             self._server.should_exit = True
             self._thread.join(_STOP_TIMEOUT_S)
@@ -239,7 +236,7 @@ def _certificate(config: DashboardConfig) -> ssl.SSLContext | None:
 def _application() -> FastAPI:
     """Return the web application, one per process, as NiceGUI requires; it serves ``state.dashboard``."""
     application = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
-    application.mount(ASSETS_PATH, StaticFiles(directory=Path(__file__).parent / "static"))
+    application.mount(ASSETS_PATH, StaticFiles(directory=STATIC))
 
     @application.get(PICTURE_PATH)
     async def picture() -> Response:
@@ -253,15 +250,15 @@ def _application() -> FastAPI:
 
     @ui.page("/")
     def index() -> None:
-        unjoined.add(DrivePage(application.state.dashboard.served).client)
+        unjoined.add(DrivePage(application.state.dashboard.context).client)
 
     @ui.page("/settings")
     def settings() -> None:
-        unjoined.add(SettingsPage(application.state.dashboard.served).client)
+        unjoined.add(SettingsPage(application.state.dashboard.context).client)
 
     @ui.page("/teach")
     def teach() -> None:
-        unjoined.add(TeachPage(application.state.dashboard.served).client)
+        unjoined.add(LessonPage(application.state.dashboard.context).client)
 
     ui.run_with(
         application,

@@ -6,7 +6,7 @@ from nicegui import ui
 
 from handsteer.dashboard.elements import box, button, card, switch, tag, text
 from handsteer.dashboard.node import DashboardNode
-from handsteer.dashboard.page import ASSETS_PATH, Page, PageContext
+from handsteer.dashboard.page import Page, PageContext
 from handsteer.dashboard.settings_form import FormField
 from handsteer.dashboard.settings_store import FORM, Settings
 from handsteer.dashboard.state import PageState
@@ -272,19 +272,18 @@ _ELSEWHERE = (
 class SettingsPage(Page):
     """Sets all parameters; viewers who do not drive can read them."""
 
-    def __init__(self, served: PageContext) -> None:
-        super().__init__(served, "/settings")
-        ui.add_head_html(f'<link rel="stylesheet" href="{ASSETS_PATH}/settings.css">')
+    def __init__(self, context: PageContext) -> None:
+        super().__init__(context, "/settings", "settings.css")
         self._panel: SettingsPanel | None = None
-        if served.local.settings is None:
+        if context.access is None:
             with ui.element("section").classes("card panel"):
                 text("elsewhere", _ELSEWHERE)
         else:
-            self._panel = SettingsPanel(served.local.settings, self.drives)
+            self._panel = SettingsPanel(context.access.settings, self.drives)
 
     def show(self, node: DashboardNode, state: PageState) -> None:
         """Show changes."""
         super().show(node, state)
         if self._panel is not None:
-            role = self.place(node).role
+            role = self.lease(node).role
             self._panel.update(to_driver=role == "driver", editable=role != "watcher")

@@ -1,117 +1,23 @@
-"""Manual steering: pad, sliders, active input, and topic."""
+"""The card for manual steering: pad, sliders, active input, and topic."""
 
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
 from nicegui import ui
 
 from handsteer.dashboard.elements import box, button, card, switch, text
-from handsteer.dashboard.pad_input import PadInput
-from handsteer.dashboard.sliders import Sliders, read_limit
+from handsteer.dashboard.page import Page
 from handsteer.dashboard.state import PageState
+from handsteer.dashboard.steering_input import SteeringInput, read_deflection, read_number
 from handsteer.dashboard.viewers import LeaseStatus
 from handsteer.errors import TransportError
 from handsteer.messages import STEERING_CMD_VEL
-from handsteer.types import Velocity
+from handsteer.types import ZERO, Velocity
 
-_LONGEST = 200
-
-
-class TopicBox:
-    """The steering topic's name, and its consequences.
-
-    Args:
-        choose: Called with another name; raises TransportError if it is rejected. None if there is no choice.
-    """
-
-    def __init__(self, choose: Callable[[str], None] | None) -> None:
-        self._choose = choose
-        self._shown = ""
-        with box("topic"):
-            self._name = ui.input("topic", value=STEERING_CMD_VEL.name).props(f"dense outlined maxlength={_LONGEST}")
-            self._name.props("spellcheck=false autocapitalize=off")
-            if choose is None:
-                self._name.props("readonly")
-            else:
-                self._name.on("keydown.enter", self._use)
-                button("Use", 'aria-label="Steer on this topic"').on("click", self._use)
-        self._words = text("topic-words", "")
-        self._trouble = text("trouble", "").props('role="alert"')
-
-    def update(self, state: PageState) -> None:
-        """Show ``state``."""
-        topic = state.viewers.topic
-        shown = topic or STEERING_CMD_VEL.name
-        if shown == self._shown:
-            return
-        self._shown = shown
-        self._name.set_value(shown)
-        self._words.set_text(
-            f"Past the control: signs may drive meanwhile. Stop holds here too. {STEERING_CMD_VEL.name} goes back."
-            if topic
-            else "Goes through the control, before the signs."
-        )
-        switch(self._words, "direct", on=bool(topic))
-
-    def _use(self) -> None:
-        if self._choose is None:
-            return
-        try:
-            self._choose(str(self._name.value)[:_LONGEST].strip())
-        except TransportError as error:
-            self._trouble.set_text(str(error))
-        else:
-            self._trouble.set_text("")
-
-
-@dataclass(frozen=True)
-class Entry:
-    """One input of the twist mux.
-
-    Attributes:
-        name: Its display name.
-        holds: Whether it is active.
-        whose: The viewer whose input it is, while active; empty if unknown.
-    """
-
-    name: str
-    holds: bool
-    whose: str = ""
-
-
-def entries(state: PageState) -> tuple[Entry, ...]:
-    """Return the inputs in order of priority; at most one is active."""
-    directly = bool(state.viewers.topic and state.viewers.steers)
-    by_hand = not state.stopped and (directly or state.driver == "steering")
-    by_signs = not state.stopped and not by_hand and state.driver == "signs"
-    return (
-        Entry("Stop", state.stopped, state.viewers.stopped),
-        Entry("By hand", by_hand, state.viewers.steers or "another node"),
-        Entry("Signs", by_signs),
-    )
-
-
-class MuxPanel:
-    """The inputs in a row, with the active one highlighted."""
-
-    def __init__(self) -> None:
-        self._shown: tuple[Entry, ...] = ()
-        with box("mux").props('role="group" aria-label="Who drives; the first goes before the others"'):
-            text("name", "Who drives")
-            self._chips = [text("source chip", name) for name in ("Stop", "By hand", "Signs")]
-
-    def update(self, state: PageState) -> None:
-        """Show ``state``."""
-        shown = entries(state)
-        if shown == self._shown:
-            return
-        self._shown = shown
-        for chip, entry in zip(self._chips, shown, strict=True):
-            chip.set_text(f"{entry.name}: {entry.whose}" if entry.holds and entry.whose else entry.name)
-            chip.props('aria-current="true"' if entry.holds else "", remove="" if entry.holds else "aria-current")
-            switch(chip, "holds", on=entry.holds)
-
-
+_LONGEST_TOPIC = 200
+_SLIDER_MPS, _SLIDER_RADPS, _SLIDER_STEP = 0.5, 1.0, 0.1
+_TURN_PER_SPEED = 2.0  # of the pad: rad/s to the left at full deflection for each m/s of top speed
 _HINTS = {
     "free": "Hold the pad, or its arrow keys. Sliders stay, until you leave this page.",
     "driver": "Hold the pad, or W A S D anywhere. Sliders stay, until you leave this page.",
@@ -124,27 +30,15 @@ class SteerPanel:
     """A pad that drives while it is held, and sliders that drive while the page is in front.
 
     Args:
-        steer: Called repeatedly with m/s forward and rad/s to the left while the robot is to move.
-        release: Called to stop.
-        now: Returns seconds of a monotonic clock.
-        choose_topic: Called with the name of another topic to steer on; None if there is no choice.
+        page: Shows the panel.
+        has_topics: Whether the viewer may choose another topic to steer on.
     """
 
-    _TURN_PER_SPEED = 2.0  # rad/s to the left at full deflection for each m/s of top speed
-
-    def __init__(
-        self,
-        steer: Callable[[float, float], None],
-        release: Callable[[], None],
-        now: Callable[[], float],
-        choose_topic: Callable[[str], None] | None,
-    ) -> None:
-        self._steer = steer
-        self._release = release
-        self._now = now
-        self._manual = PadInput()
+    def __init__(self, page: Page, *, has_topics: bool) -> None:
+        self._page = page
+        self._input = SteeringInput()
         with card("Steer by hand", "panel steer") as self._card:
-            self._mux = MuxPanel()
+            self._mux = _MuxRow()
             with box("row"):
                 with box("pad-side"):
                     with box("pad").props(
@@ -156,79 +50,251 @@ class SteerPanel:
                     self._label = text("speed", "")
                     self._speed = ui.slider(min=0.1, max=1.0, step=0.1, value=0.5, on_change=self._show_speed)
                     self._speed.props('aria-label="Top speed of the pad in metres a second"')
-                self._sliders = Sliders(self._slide)
-                with self._sliders.across:
-                    self._topic = TopicBox(choose_topic)
+                with box("sliders") as self._sliders:
+                    self._linear = _Slider("Linear", "m/s", _SLIDER_MPS, self._slide, upright=True)
+                    with box("across"):
+                        self._angular = _Slider("Angular", "rad/s", _SLIDER_RADPS, self._slide, upright=False)
+                        self._topic = _TopicBox(self._steer_on if has_topics else None)
             with box("last"):
-                button("Both to 0", "").on("click", self.let_go)
+                button("Both to 0", "").on("click", self._release)
                 self._hint = text("hint", _HINTS["free"])
         self._show_speed()
-        ui.on("pad_held", lambda event: self._hold(event.args))
-        ui.on("sliders_held", lambda event: self._keep_on(event.args))
-        ui.on("let_go", self.let_go)
+        ui.on("pad_held", lambda event: self._hold_pad(event.args))
+        ui.on(
+            "sliders_held", lambda event: self._steer(self._input.keep_sliders(_sent_ms(event.args), time.monotonic()))
+        )
+        ui.on("let_go", self._release)
 
-    def update(self, state: PageState, place: LeaseStatus) -> None:
-        """Show ``state`` to a viewer with ``place``; sliders of others, and of a stopped robot, are at 0."""
+    def update(self, state: PageState, lease: LeaseStatus) -> None:
+        """Show ``state`` to a viewer with ``lease``; sliders of others, and of a stopped robot, are at 0."""
         self._mux.update(state)
         self._topic.update(state)
-        watches = place.role == "watcher"
-        self._manual.end_if_silent(self._now())
-        if watches or state.stopped:
-            self._manual.let_go()
-        self._sliders.show(self._manual.sliders)
-        self._sliders.enable(on=not (watches or state.stopped))
-        if state.max_linear_mps and state.max_angular_radps:
-            self._sliders.limit(state.max_linear_mps, state.max_angular_radps)
-        self._hint.set_text(_LATE if self._manual.is_late else _HINTS[place.role])
-        switch(self._hint, "late", on=self._manual.is_late)
-        switch(self._card, "yours", on=place.role == "driver")
+        self._input.end_if_silent(time.monotonic())
+        can_steer = lease.role != "watcher" and not state.stopped
+        if not can_steer:
+            self._input.sliders = ZERO
+        self._show_sliders()
+        limits = (state.max_linear_mps, state.max_angular_radps)
+        for slider, limit in zip((self._linear, self._angular), limits, strict=True):
+            slider.enable(on=can_steer)
+            if all(limits) and limit:
+                slider.restrict(limit)
+        self._hint.set_text(_LATE if self._input.is_late else _HINTS[lease.role])
+        switch(self._hint, "late", on=self._input.is_late)
+        switch(self._card, "yours", on=lease.role == "driver")
 
-    def let_go(self) -> None:
+    def _release(self) -> None:
         """Stop steering from this page and set the sliders to zero."""
-        self._manual.let_go()
-        self._sliders.show(self._manual.sliders)
-        self._release()
+        self._input.sliders = ZERO
+        self._show_sliders()
+        self._page.do(lambda node, viewer: node.release(viewer))
 
-    def _hold(self, sent: object) -> None:
+    def _hold_pad(self, sent: object) -> None:
         x, y = read_deflection(sent)
-        top = self._top_mps
-        wanted = Velocity(y * top, -x * top * self._TURN_PER_SPEED)
-        self._follow(self._manual.hold_pad(wanted, _sent_ms(sent), self._now()))
+        wanted = Velocity(y * self._top_mps, -x * self._top_mps * _TURN_PER_SPEED)
+        self._steer(self._input.hold_pad(wanted, _sent_ms(sent), time.monotonic()))
 
-    def _slide(self, wanted: Velocity) -> None:
+    def _slide(self) -> None:
+        wanted = Velocity(self._linear.value, self._angular.value)
+        if wanted == self._input.sliders:
+            return
         if wanted.is_zero:
-            self.let_go()
+            self._release()
         else:
-            self._manual.slide(wanted, self._now())
+            self._input.slide(wanted, time.monotonic())
+            self._show_sliders()
 
-    def _keep_on(self, sent: object) -> None:
-        self._follow(self._manual.keep_on(_sent_ms(sent), self._now()))
-
-    def _follow(self, wanted: Velocity | None) -> None:
-        self._sliders.show(self._manual.sliders)
+    def _steer(self, wanted: Velocity | None) -> None:
+        self._show_sliders()
         if wanted is not None:
-            self._steer(wanted.linear_mps, wanted.angular_radps)
+            self._page.do(lambda node, viewer: node.steer(viewer, wanted.linear_mps, wanted.angular_radps))
+
+    def _steer_on(self, topic: str) -> None:
+        self._release()
+        self._page.do(lambda node, viewer: node.steer_on(viewer, topic))
+
+    def _show_sliders(self) -> None:
+        self._linear.show(self._input.sliders.linear_mps)
+        self._angular.show(self._input.sliders.angular_radps)
+        switch(self._sliders, "set", on=not self._input.sliders.is_zero)
 
     def _show_speed(self) -> None:
         self._label.set_text(f"Top speed {self._top_mps:.1f} m/s")
 
     @property
     def _top_mps(self) -> float:
-        return read_limit(self._speed.value, 0.0, 1.0, 0.0)
-
-
-def read_deflection(sent: object) -> tuple[float, float]:
-    """Return the pad's x (right) and y (forward), -1 to 1, as sent by a browser; 0 for invalid values."""
-    values = sent if isinstance(sent, dict) else {}
-    x, y = (_within_one(values.get(name)) for name in ("x", "y"))
-    return x, y
-
-
-def _within_one(value: object) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= 1:
-        return 0.0
-    return float(value)
+        return read_number(self._speed.value, 0.0, 1.0, 0.0)
 
 
 def _sent_ms(sent: object) -> object:
     return sent.get("at") if isinstance(sent, dict) else None
+
+
+class _Slider:
+    """A slider that stays where it is set, as in rqt_robot_steering, with editable limits and step buttons.
+
+    Positive is up or left (REP 103).
+
+    Args:
+        name: Its heading.
+        unit: Of its value.
+        bound: Its limits are within plus and minus this value.
+        change: Called when the viewer has moved it.
+        upright: Whether it is vertical, for the linear velocity.
+    """
+
+    def __init__(self, name: str, unit: str, bound: float, change: Callable[[], None], *, upright: bool) -> None:
+        self.value = 0.0
+        self._change = change
+        self._bound, self._low, self._high = bound, -bound, bound
+        high, low = ("max", "min") if upright else ("left", "right")
+        more, less = ("+", "\u2212") if upright else ("\u2039", "\u203a")
+        up, down = ("faster forward", "slower, then backward") if upright else ("more to the left", "more to the right")
+        with box(f"slider {name.lower()}"):
+            with box("line"):
+                text("name", name)
+                self._label = text("value", "0.00")
+                text("unit", unit)
+            self._slider = ui.slider(min=-bound, max=bound, step=0.05, value=0.0, on_change=self._on_slide)
+            way = "vertical reverse" if upright else "reverse"
+            self._slider.props(f'{way} aria-label="{name} velocity, in {unit}" selection-color="transparent"')
+            with box("ends"):
+                self._highest = self._limit(f"{name}: {high}", high, bound)
+                self._buttons = [
+                    button(more, f'aria-label="{up}"').on("click", lambda: self._take(self.value + _SLIDER_STEP)),
+                    button("0", f'aria-label="{name} to 0"').on("click", lambda: self._take(0.0)),
+                    button(less, f'aria-label="{down}"').on("click", lambda: self._take(self.value - _SLIDER_STEP)),
+                ]
+                self._lowest = self._limit(f"{name}: {low}", low, -bound)
+        self._show_bound()
+
+    def show(self, value: float) -> None:
+        """Set the slider to ``value`` without calling back."""
+        self.value = value
+        self._slider.set_value(value)
+        self._label.set_text(f"{value + 0.0:.2f}")
+
+    def restrict(self, bound: float) -> None:
+        """Restrict the limits to ``bound``, which is positive."""
+        if bound != self._bound:
+            self._bound = bound
+            self._show_bound()
+            self._read_limits()
+
+    def enable(self, *, on: bool) -> None:
+        """Enable or disable the slider and its step buttons."""
+        if self._slider.enabled != on:
+            self._slider.set_enabled(on)
+            for each in self._buttons:
+                each.props("" if on else "disabled", remove="disabled" if on else "")
+
+    def _limit(self, label: str, name: str, value: float) -> ui.number:
+        number = ui.number(name, value=value, step=_SLIDER_STEP, format="%.2f", on_change=self._read_limits)
+        return number.props(f'dense outlined aria-label="{label}"').classes("limit")
+
+    def _show_bound(self) -> None:
+        self._highest.min, self._highest.max = 0.0, self._bound
+        self._lowest.min, self._lowest.max = -self._bound, 0.0
+
+    def _read_limits(self) -> None:
+        self._high = read_number(self._highest.value, 0.0, self._bound, self._high)
+        self._low = read_number(self._lowest.value, -self._bound, 0.0, self._low)
+        self._slider.props["max"], self._slider.props["min"] = self._high, self._low
+        self._take(self.value)
+
+    def _on_slide(self) -> None:
+        value = round(read_number(self._slider.value, self._low, self._high, 0.0), 2)
+        if value != self.value:  # moved by the viewer, not by show()
+            self._take(value)
+
+    def _take(self, value: float) -> None:
+        self.show(round(max(self._low, min(value, self._high)), 2))
+        self._change()
+
+
+class _TopicBox:
+    """The steering topic's name, and its consequences.
+
+    Args:
+        choose: Called with another name; raises TransportError if it is rejected. None if there is no choice.
+    """
+
+    def __init__(self, choose: Callable[[str], None] | None) -> None:
+        self._choose = choose
+        self._shown = ""
+        with box("topic"):
+            self._name = ui.input("topic", value=STEERING_CMD_VEL.name).props("dense outlined")
+            self._name.props(f"maxlength={_LONGEST_TOPIC} spellcheck=false autocapitalize=off")
+            if choose is None:
+                self._name.props("readonly")
+            else:
+                self._name.on("keydown.enter", self._use)
+                button("Use", 'aria-label="Steer on this topic"').on("click", self._use)
+        self._note = text("topic-words", "")
+        self._error = text("trouble", "").props('role="alert"')
+
+    def update(self, state: PageState) -> None:
+        """Show ``state``."""
+        topic = state.viewers.topic
+        shown = topic or STEERING_CMD_VEL.name
+        if shown == self._shown:
+            return  # or it would replace what the viewer is typing
+        self._shown = shown
+        self._name.set_value(shown)
+        self._note.set_text(
+            f"Past the control: signs may drive meanwhile. Stop holds here too. {STEERING_CMD_VEL.name} goes back."
+            if topic
+            else "Goes through the control, before the signs."
+        )
+        switch(self._note, "direct", on=bool(topic))
+
+    def _use(self) -> None:
+        if self._choose is not None:
+            self._error.set_text("")
+            try:
+                self._choose(str(self._name.value)[:_LONGEST_TOPIC].strip())
+            except TransportError as error:
+                self._error.set_text(str(error))
+
+
+@dataclass(frozen=True)
+class MuxInput:
+    """One input of the twist mux.
+
+    Attributes:
+        name: Its display name.
+        is_active: Whether it drives the robot, or stops it.
+        viewer: The viewer whose input it is, while active; empty if unknown.
+    """
+
+    name: str
+    is_active: bool
+    viewer: str = ""
+
+
+def mux_inputs(state: PageState) -> tuple[MuxInput, ...]:
+    """Return the inputs in order of priority; at most one is active."""
+    directly = bool(state.viewers.topic and state.viewers.steers)
+    by_hand = not state.stopped and (directly or state.driver == "steering")
+    by_signs = not state.stopped and not by_hand and state.driver == "signs"
+    return (
+        MuxInput("Stop", state.stopped, state.viewers.stopped),
+        MuxInput("By hand", by_hand, state.viewers.steers or "another node"),
+        MuxInput("Signs", by_signs),
+    )
+
+
+class _MuxRow:
+    """The inputs in a row, with the active one highlighted."""
+
+    def __init__(self) -> None:
+        with box("mux").props('role="group" aria-label="Who drives; the first goes before the others"'):
+            text("name", "Who drives")
+            self._chips = [text("source chip", name) for name in ("Stop", "By hand", "Signs")]
+
+    def update(self, state: PageState) -> None:
+        """Show ``state``."""
+        for chip, each in zip(self._chips, mux_inputs(state), strict=True):
+            chip.set_text(f"{each.name}: {each.viewer}" if each.is_active and each.viewer else each.name)
+            chip.props('aria-current="true"' if each.is_active else "", remove="" if each.is_active else "aria-current")
+            switch(chip, "holds", on=each.is_active)

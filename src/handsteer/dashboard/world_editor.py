@@ -4,141 +4,30 @@ import asyncio
 import math
 from collections.abc import Awaitable, Callable
 from concurrent.futures import Future
-from dataclasses import dataclass
 from functools import partial
 from typing import Any, get_args
 
 from nicegui import ui
-from nicegui.events import GenericEventArguments, ValueChangeEventArguments
 
 from handsteer.dashboard.elements import box, button, switch, tag, text
-from handsteer.dashboard.joined import RobotInWorld
+from handsteer.dashboard.page import Page
+from handsteer.dashboard.remote_graph import RemoteGraph
 from handsteer.dashboard.scene import WorldView
 from handsteer.errors import WorldError
-from handsteer.robots.editing import MOST_OBSTACLES, Change, add, edit, remove
+from handsteer.robots.editing import MOST_OBSTACLES, Change, add, edit, figures, remove
 from handsteer.robots.protocol import Shape
-from handsteer.robots.world import (
-    Box,
-    Cylinder,
-    Sphere,
-    Thing,
-    World,
-    load_world,
-    parse_world,
-    shipped_worlds,
-    write_world,
-)
+from handsteer.robots.world import Thing, World, load_world, parse_world, shipped_worlds, write_world
 from handsteer.types import Pose2D
-
-_DEBOUNCE_MS = 600
-_DIGITS = 3
-
-
-@dataclass(frozen=True)
-class Figure:
-    """One numeric property of a thing.
-
-    Attributes:
-        name: With its unit.
-        value: Current value.
-        step: Increment of the input's arrows.
-        fields: Returns the fields of the world file that set another value.
-    """
-
-    name: str
-    value: float
-    step: float
-    fields: Callable[[float], dict[str, Any]]
-
-
-def figures(thing: Thing) -> list[Figure]:
-    """Return all editable figures of ``thing``."""
-    x, y = thing.position
-    found = [
-        Figure("x [m]", x, 0.1, lambda value: {"position": (value, y)}),
-        Figure("y [m]", y, 0.1, lambda value: {"position": (x, value)}),
-    ]
-    match thing:
-        case Box(size=(length, width, height)):
-            found += [
-                Figure("length [m]", length, 0.1, lambda value: {"size": (value, width, height)}),
-                Figure("width [m]", width, 0.1, lambda value: {"size": (length, value, height)}),
-                Figure("height [m]", height, 0.1, lambda value: {"size": (length, width, value)}),
-                Figure("turn [°]", math.degrees(thing.yaw), 15.0, lambda value: {"yaw": math.radians(value)}),
-            ]
-        case Cylinder():
-            found += [
-                Figure("radius [m]", thing.radius, 0.05, lambda value: {"radius": value}),
-                Figure("height [m]", thing.height, 0.1, lambda value: {"height": value}),
-            ]
-        case Sphere():
-            found.append(Figure("radius [m]", thing.radius, 0.05, lambda value: {"radius": value}))
-    return [*found, Figure("mass [kg]", thing.mass, 0.1, lambda value: {"mass": value})]
-
-
-class ThingForm:
-    """Inputs for one thing; calls ``edit`` with its name and the changed fields immediately."""
-
-    def __init__(self, edit: Callable[[str, dict[str, Any]], Awaitable[None]]) -> None:
-        self._edit = edit
-        self._shown: Thing | None = None
-        self._numbers: list[ui.number] = []
-        self._box = box("row form")
-
-    def show(self, thing: Thing | None) -> None:
-        """Show the current figures of ``thing``, replacing rejected input; nothing for None."""
-        before, self._shown = self._shown, thing
-        if thing is None:
-            self._box.clear()
-        elif before is None or (before.name, before.shape) != (thing.name, thing.shape):
-            self._build(thing)
-        else:  # The inputs are reused, so that the focused one keeps the focus.
-            for number, figure in zip(self._numbers, figures(thing), strict=True):
-                number.set_value(round(figure.value, _DIGITS))
-            self._movable.set_value(thing.movable)
-        if thing is not None:
-            switch(self._numbers[-1], "off", on=not thing.movable)  # a fixed thing's mass has no effect
-
-    def _build(self, thing: Thing) -> None:
-        self._box.clear()
-        with self._box:
-            self._numbers = [self._number(index, figure) for index, figure in enumerate(figures(thing))]
-            with ui.element("label").classes("field"):
-                ui.label("colour")
-                # An attribute, not a property, which would be set again while the viewer chooses a colour.
-                colour = ui.element("input").props(f'type="color" ^value="{thing.colour}"')
-                colour.on("change", self._on_colour, js_handler="(event) => emit(event.target.value)")
-            self._movable = ui.checkbox("can be pushed", value=thing.movable, on_change=self._on_movable)
-
-    def _number(self, index: int, figure: Figure) -> ui.number:
-        async def on_change(event: ValueChangeEventArguments[float | None]) -> None:
-            await self._on_number(index, event.value)
-
-        number = ui.number(figure.name, value=round(figure.value, _DIGITS), step=figure.step, on_change=on_change)
-        return number.props(f"outlined dense debounce={_DEBOUNCE_MS}")
-
-    async def _on_number(self, index: int, value: float | None) -> None:
-        if self._shown is None or value is None:
-            return
-        figure = figures(self._shown)[index]
-        if round(value, _DIGITS) != round(figure.value, _DIGITS):
-            await self._edit(self._shown.name, figure.fields(value))
-
-    async def _on_colour(self, event: GenericEventArguments) -> None:
-        if self._shown is not None:
-            await self._edit(self._shown.name, {"colour": event.args})
-
-    async def _on_movable(self, event: ValueChangeEventArguments[bool | None]) -> None:
-        if self._shown is not None and bool(event.value) != self._shown.movable:
-            await self._edit(self._shown.name, {"movable": bool(event.value)})
-
 
 LARGEST_FILE_BYTES = 64 * 1024
 """Largest world file accepted from a browser; 200 things need half of it."""
 
-_PATIENCE_S = 5.0
-_STILL_M = 0.02
+_ANSWER_TIMEOUT_S = 5.0
+_LEAST_MOVE_M = 0.02
 _FARTHEST_M = 1000
+_DEBOUNCE_MS = 600
+_DIGITS = 3
+_SELECT = "outlined dense options-dense"
 
 _READ_FILE = f"""async (event) => {{
     const file = event.target.files[0];
@@ -151,63 +40,55 @@ class WorldEditor:
     """Edits the world of a simulated robot, for the driver.
 
     Args:
-        robot: The robot, if its world can be accessed.
-        may: Returns whether this viewer drives.
+        page: Shows the editor.
+        graph: The robot's graph; None if it cannot be accessed.
         view: Shows the world.
 
     Attributes:
         is_open: Whether the world is being edited.
-        place: Pose of the robot; new things are placed near it.
+        robot: Pose of the robot; new things are placed near it.
     """
 
-    def __init__(self, robot: RobotInWorld | None, may: Callable[[], bool], view: WorldView) -> None:
-        self._robot = robot
-        self._may = may
-        self._view = view
+    def __init__(self, page: Page, graph: RemoteGraph | None, view: WorldView) -> None:
+        self._page, self._graph, self._view = page, graph, view
         self._chosen: str | None = None
         self.is_open = False
-        self.place = Pose2D(0.0, 0.0, 0.0)
+        self.robot = Pose2D(0.0, 0.0, 0.0)
         with box("editor off") as self._box:
             with box("row"):
                 tag("h2", "", "Add")
                 for shape in get_args(Shape):
-                    button(shape.capitalize(), f'aria-label="Add a {shape}"').on(
-                        "click", lambda shape=shape: self._add(shape)
-                    )
+                    add_shape = button(shape.capitalize(), f'aria-label="Add a {shape}"')
+                    add_shape.on("click", lambda shape=shape: self._add(shape))
             with box("row"):
                 tag("h2", "", "Thing")
-                self._things = ui.select([], on_change=self._on_choice).props(
-                    'outlined dense options-dense aria-label="Which thing to change"'
-                )
+                self._things = ui.select([], on_change=self._on_choice)
+                self._things.props(f'{_SELECT} aria-label="Which thing to change"')
                 self._delete = button("Delete", 'aria-label="Delete the chosen thing"').on("click", self._remove)
-            self._form = ThingForm(self._edit)
+            self._form = _ThingForm(self._edit)
             with box("row"):
                 tag("h2", "", "World")
-                self._worlds = ui.select(shipped_worlds(), value=shipped_worlds()[0]).props(
-                    'outlined dense options-dense aria-label="Which world to load"'
-                )
+                self._worlds = ui.select(shipped_worlds(), value=shipped_worlds()[0])
+                self._worlds.props(f'{_SELECT} aria-label="Which world to load"')
                 button("Load", 'aria-label="Load the chosen world"').on("click", self._load)
-                file = ui.element("input").props(
-                    'type="file" accept=".yaml,.yml" aria-label="World file" tabindex="-1"'
-                )
-                file.classes("file").on("change", lambda event: self._open_file(event.args), js_handler=_READ_FILE)
+                file = ui.element("input").classes("file")
+                file.props('type="file" accept=".yaml,.yml" aria-label="World file" tabindex="-1"')
+                file.on("change", lambda event: self._open_file(event.args), js_handler=_READ_FILE)
                 button("Open file", "").on("click", js_handler=f"() => getHtmlElement({file.id}).click()")
                 button("Save file", "").on("click", self._save)
         self._message = text("message", "").props('role="status"')
 
     def open(self) -> bool:
         """Start editing; return False and show why if that is not possible."""
-        if self._world() is None or not self._allowed():
+        if self._world() is None or not self._may_change():
             return False
-        self._set_open(on=True)
-        self._say("Drag things where you want them, or choose one and change its figures.")
+        self._set_open("Drag things where you want them, or choose one and change its figures.", on=True)
         self._refresh()
         return True
 
     def close(self, why: str) -> None:
         """Stop editing, and show ``why``."""
-        self._set_open(on=False)
-        self._say(why)
+        self._set_open(why, on=False)
 
     def pick(self, index: int) -> None:
         """Select the obstacle with this index."""
@@ -223,43 +104,46 @@ class WorldEditor:
         if world is None or index >= len(world.obstacles) or not is_place:
             return
         thing = world.obstacles[index]
-        if math.dist(thing.position, (x, y)) > _STILL_M:
+        if math.dist(thing.position, (x, y)) > _LEAST_MOVE_M:
             await self._edit(thing.name, {"position": (round(x, 2), round(y, 2))})
 
     async def restart(self) -> None:
         """Move the robot and all things to their start positions."""
-        if self._world() is not None and self._robot and self._allowed():
-            await self._wait_for(self._robot.reset(), "The robot and all things are where they started.")
+        if self._graph and self._world() is not None and self._may_change():
+            await self._wait_for(self._graph.reset(), "The robot and all things are where they started.")
 
-    def _set_open(self, *, on: bool) -> None:
+    def _set_open(self, message: str, *, on: bool) -> None:
         self.is_open = on
         switch(self._box, "off", on=not on)
         self._view.edit(on=on)
+        self._message.set_text(message)
 
     def _world(self) -> World | None:
         """Return the robot's world; show an error if there is none."""
-        world = self._robot.world if self._robot else None
-        if self._robot is None:
-            self._say("The robot runs in another process; its world can be edited on the page of `handsteer run` only.")
+        world = self._graph.state.world if self._graph else None
+        if self._graph is None:
+            self._message.set_text(
+                "The robot runs in another process; its world can be edited on the page of `handsteer run` only."
+            )
         elif world is None:
-            self._say("This is a real robot: its world cannot be edited, nor can it be put back by a button.")
+            self._message.set_text(
+                "This is a real robot: its world cannot be edited, nor can it be put back by a button."
+            )
         return world
 
-    def _allowed(self) -> bool:
-        if self._may():
-            return True
-        self._say("Somebody else drives: ask to drive before you change the world.")
-        return False
+    def _may_change(self) -> bool:
+        may = self._page.drives()
+        if not may:
+            self._message.set_text("Somebody else drives: ask to drive before you change the world.")
+        return may
 
     async def _add(self, shape: Shape) -> None:
-        if (robot := self._robot) is None or (before := self._world()) is None:
-            return
-        if await self._change(partial(add, shape=shape, robot=self.place), ""):
+        before = self._world()
+        if before is not None and await self._change(partial(add, shape=shape, robot=self.robot), ""):
             known = {thing.name for thing in before.obstacles}
-            world = robot.world or before
-            new = [thing.name for thing in world.obstacles if thing.name not in known]
+            new = [thing.name for thing in (self._world() or before).obstacles if thing.name not in known]
             self._things.set_value(new[-1] if new else None)
-            self._say(f"Added {new[-1]}." if new else "")
+            self._message.set_text(f"Added {new[-1]}." if new else "")
 
     async def _edit(self, name: str, fields: dict[str, Any]) -> None:
         await self._change(partial(edit, name=name, fields=fields), "")
@@ -274,46 +158,46 @@ class WorldEditor:
             await self._enter(load_world(name), name)
 
     async def _open_file(self, sent: object) -> None:
-        if not self._allowed():
+        if not self._may_change():
             return
         try:
-            name, words = read_file(sent)
-            world = await asyncio.to_thread(parse_world, words, name)
+            name, content = read_file(sent)
+            world = await asyncio.to_thread(parse_world, content, name)
             if len(world.obstacles) > MOST_OBSTACLES:
                 raise WorldError(f"{name}: has {len(world.obstacles)} things; the page takes {MOST_OBSTACLES} at most")
         except WorldError as error:
-            self._say(str(error))
-            return
-        await self._enter(world, name)
+            self._message.set_text(str(error))
+        else:
+            await self._enter(world, name)
 
     def _save(self) -> None:
         if world := self._world():
             ui.download.content(write_world(world), "world.yaml", "application/yaml")
 
     async def _enter(self, world: World, name: str) -> None:
-        if self._robot and self._allowed():
-            await self._wait_for(self._robot.enter_world(world), f"Loaded {name}; the robot is at the start.")
+        if self._graph and self._may_change():
+            await self._wait_for(self._graph.enter_world(world), f"Loaded {name}; the robot is at the start.")
 
     async def _change(self, change: Change, done: str) -> bool:
-        return bool(self._robot and self._allowed() and await self._wait_for(self._robot.change_world(change), done))
+        graph = self._graph
+        return bool(graph and self._may_change() and await self._wait_for(graph.change_world(change), done))
 
     async def _wait_for(self, change: Future[None], done: str) -> bool:
         """Return whether ``change`` succeeded; show ``done``, or the error."""
         try:
-            await asyncio.wait_for(asyncio.wrap_future(change), _PATIENCE_S)
+            await asyncio.wait_for(asyncio.wrap_future(change), _ANSWER_TIMEOUT_S)
         except WorldError as error:
-            self._say(str(error))
-            return False
+            done, succeeded = str(error), False
         except TimeoutError:
-            self._say("The robot does not answer; nothing has changed.")
-            return False
-        finally:
-            self._refresh()
-        self._say(done)
-        return True
+            done, succeeded = "The robot does not answer; nothing has changed.", False
+        else:
+            succeeded = True
+        self._refresh()
+        self._message.set_text(done)
+        return succeeded
 
     def _refresh(self) -> None:
-        world = self._robot.world if self._robot else None
+        world = self._graph.state.world if self._graph else None
         names = [thing.name for thing in world.obstacles] if world else []
         value = self._chosen if self._chosen in names else None
         if names != self._things.options or value != self._things.value:
@@ -325,18 +209,13 @@ class WorldEditor:
         self._show_choice()
 
     def _show_choice(self) -> None:
-        world = self._robot.world if self._robot else None
-        things: list[tuple[int, Thing]] = [
-            (index, thing) for index, thing in enumerate(world.obstacles if world else ()) if thing.name == self._chosen
-        ]
-        index, thing = things[0] if things else (None, None)
-        self._form.show(thing)
-        switch(self._delete, "hidden", on=thing is None)
+        world = self._graph.state.world if self._graph else None
+        things = [thing.name for thing in world.obstacles] if world else []
+        index = things.index(self._chosen) if self._chosen in things else None
+        self._form.show(None if world is None or index is None else world.obstacles[index])
+        switch(self._delete, "hidden", on=index is None)
         if self.is_open:
             self._view.choose(index)
-
-    def _say(self, words: str) -> None:
-        self._message.set_text(words)
 
 
 def read_file(sent: object) -> tuple[str, str]:
@@ -346,10 +225,64 @@ def read_file(sent: object) -> tuple[str, str]:
         WorldError: It is too large, or not a file.
     """
     values = sent if isinstance(sent, dict) else {}
-    name, words = values.get("name"), values.get("text")
-    if not isinstance(name, str) or not isinstance(words, str | None):
+    name, content = values.get("name"), values.get("text")
+    if not isinstance(name, str) or not isinstance(content, str | None):
         raise WorldError("that was no file")
     name = name[:60]
-    if words is None or len(words.encode(errors="replace")) > LARGEST_FILE_BYTES:
+    if content is None or len(content.encode(errors="replace")) > LARGEST_FILE_BYTES:
         raise WorldError(f"{name}: is larger than {LARGEST_FILE_BYTES // 1024} kB, which no world should be")
-    return name, words
+    return name, content
+
+
+class _ThingForm:
+    """Inputs for one thing; calls ``edit`` with its name and the changed fields immediately."""
+
+    def __init__(self, edit: Callable[[str, dict[str, Any]], Awaitable[None]]) -> None:
+        self._edit = edit
+        self._shown: Thing | None = None
+        self._numbers: list[ui.number] = []
+        self._box = box("row form")
+
+    def show(self, thing: Thing | None) -> None:
+        """Show the current figures of ``thing``, replacing rejected input; nothing for None."""
+        before, self._shown = self._shown, thing
+        if thing is None:
+            self._box.clear()
+            return
+        if before is None or (before.name, before.shape) != (thing.name, thing.shape):
+            self._build(thing)
+        else:  # The inputs are reused, so that the focused one keeps the focus.
+            for number, figure in zip(self._numbers, figures(thing), strict=True):
+                number.set_value(round(figure.value, _DIGITS))
+            self._movable.set_value(thing.movable)
+        switch(self._numbers[-1], "off", on=not thing.movable)  # a fixed thing's mass has no effect
+
+    def _build(self, thing: Thing) -> None:
+        self._box.clear()
+        with self._box:
+            self._numbers = []
+            for index, figure in enumerate(figures(thing)):
+                number = ui.number(figure.name, value=round(figure.value, _DIGITS), step=figure.step)
+                number.on_value_change(lambda event, index=index: self._on_number(index, event.value))
+                self._numbers.append(number.props(f"outlined dense debounce={_DEBOUNCE_MS}"))
+            with ui.element("label").classes("field"):
+                ui.label("colour")
+                # An attribute, not a property, which would be set again while the viewer chooses a colour.
+                colour = ui.element("input").props(f'type="color" ^value="{thing.colour}"')
+                colour.on("change", lambda event: self._on_field("colour", event.args), js_handler=_EMIT_VALUE)
+            self._movable = ui.checkbox("can be pushed", value=thing.movable)
+            self._movable.on_value_change(lambda event: self._on_field("movable", bool(event.value)))
+
+    async def _on_number(self, index: int, value: float | None) -> None:
+        if self._shown is None or value is None:
+            return
+        figure = figures(self._shown)[index]
+        if round(value, _DIGITS) != round(figure.value, _DIGITS):
+            await self._edit(self._shown.name, figure.fields(value))
+
+    async def _on_field(self, name: str, value: object) -> None:
+        if self._shown is not None and value != getattr(self._shown, name):
+            await self._edit(self._shown.name, {name: value})
+
+
+_EMIT_VALUE = "(event) => emit(event.target.value)"

@@ -1,4 +1,4 @@
-"""Pictures for browsers, as MJPEG in a plain ``<img>``, and pictures of a browser's own webcam."""
+"""The camera on the page: its pictures, those of a browser's own webcam, and the choice between them."""
 
 import asyncio
 import math
@@ -10,20 +10,25 @@ from contextlib import suppress
 
 import cv2
 import numpy as np
+from nicegui import ui
 from numpy.typing import NDArray
 from starlette.responses import Response
 from starlette.types import Receive, Scope, Send
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from handsteer.clock import Clock
-from handsteer.dashboard.joined import Cameras
+from handsteer.dashboard.elements import box, button, switch, text
+from handsteer.dashboard.page import PICTURE_PATH, Page
+from handsteer.dashboard.remote_graph import RemoteGraph
 from handsteer.dashboard.socket_events import is_page_of
+from handsteer.dashboard.state import PageState
 from handsteer.dashboard.viewers import OnDemandNode
 from handsteer.errors import FrameError
 from handsteer.images import bgr_image, encode_jpeg
 from handsteer.messages import IMAGE_ANNOTATED, Image
 from handsteer.nodes.node import Node
 from handsteer.transports.protocol import Received, Transport
+from handsteer.types import NONE
 
 FRAMES_PER_S = 30.0
 """Maximum frame rate of a browser."""
@@ -38,12 +43,12 @@ class FrameSocket:
     """The websocket by which the driver's browser sends its webcam's frames; one at a time.
 
     Args:
-        camera: Receives the frames; None if the camera cannot be accessed.
+        graph: Receives the frames; None if the camera cannot be accessed.
         drives: Returns whether the viewer with this id has the control lease; a free lease is given to it.
     """
 
-    def __init__(self, camera: Cameras | None, drives: Callable[[str], bool]) -> None:
-        self._camera = camera
+    def __init__(self, graph: RemoteGraph | None, drives: Callable[[str], bool]) -> None:
+        self._graph = graph
         self._drives = drives
         self._in_use = threading.Lock()
 
@@ -51,7 +56,7 @@ class FrameSocket:
         """Receive frames until the browser leaves; close with a reason if it cannot be served."""
         await socket.accept()
         viewer = socket.query_params.get("viewer", "")
-        if self._camera is None:
+        if self._graph is None:
             await socket.close(_NO_CAMERA_HERE, "the camera is not where the page is")
         elif not (is_page_of(viewer, socket.scope) and self._drives(viewer)):
             await socket.close(_NOT_THE_DRIVER, "only who drives may give a camera: ask to drive first")
@@ -59,18 +64,18 @@ class FrameSocket:
             await socket.close(_BUSY, "another browser gives its camera already")
         else:
             try:
-                await self._take(socket, self._camera, viewer)
+                await self._receive(socket, self._graph, viewer)
             finally:
-                self._camera.browser.forget()
+                self._graph.forget_browser()
                 self._in_use.release()
 
-    async def _take(self, socket: WebSocket, camera: Cameras, viewer: str) -> None:
-        camera.choose("browser")
+    async def _receive(self, socket: WebSocket, graph: RemoteGraph, viewer: str) -> None:
+        graph.choose_camera("browser")
         loop = asyncio.get_running_loop()
         try:
             while self._drives(viewer):
                 began_s = loop.time()
-                camera.browser.offer(await socket.receive_bytes())
+                graph.offer_frame(await socket.receive_bytes())
                 await asyncio.sleep(max(0.0, began_s + 1 / FRAMES_PER_S - loop.time()))
                 await socket.send_text(NEXT)
             await socket.close(_NOT_THE_DRIVER, "somebody else drives now")
@@ -197,3 +202,73 @@ async def _wait_for_disconnect(receive: Receive) -> None:
 def _resolve(future: "asyncio.Future[bytes]", jpeg: bytes) -> None:
     if not future.done():
         future.set_result(jpeg)
+
+
+_LONGEST_STATUS = 200
+
+
+class CameraPanel:
+    """The mirrored picture, the recognised sign, and the choice of camera.
+
+    Args:
+        page: Shows the panel.
+        graph: The graph whose camera can be chosen; None if there is no choice.
+
+    Attributes:
+        stage: Holds the picture and its overlays.
+    """
+
+    def __init__(self, page: Page, graph: RemoteGraph | None) -> None:
+        self._page, self._graph = page, graph
+        with ui.element("section").classes("card viewer camera"):
+            with box("stage") as self.stage:
+                # Lazy, because otherwise the page would count as loaded only with its first picture.
+                picture = ui.element("img").props('loading="lazy" alt="What the camera sees, mirrored"')
+                picture.props(f'src="{PICTURE_PATH}"')
+                with box("veil") as self._veil:
+                    self._no_picture = text("", "waiting for the first picture")
+                text("caption", "as in a mirror")
+            with box("foot"):
+                self._ring = box("ring").props('role="progressbar" aria-label="Confirmed" aria-valuemax="100"')
+                self._sign = text("sign", "No sign")
+                with box("meter"):
+                    self._confidence = box("")
+                self._percent = text("percent", "")
+                self._hand = text("hand", "")
+            if graph is not None:
+                with box("foot choice"):
+                    browser = f'data-camera="browser" data-viewer="{page.client.id}"'
+                    self._browser = button("Use this device's camera", browser)
+                    self._own = button("Use the robot's camera", 'data-camera="own"').on("click", self._use_own)
+                    self._status = text("trouble", "").props('role="alert"')
+                ui.on("webcam", lambda event: self._status.set_text(read_status(event.args)))
+
+    def update(self, state: PageState) -> None:
+        """Show ``state``."""
+        # A confirmed sign stays active for a moment when it is not seen.
+        shown = state.sign if state.seen == NONE else state.seen
+        self._sign.set_text("No sign" if shown == NONE else shown)
+        switch(self._sign, "pending", on=shown != state.sign)
+        confirmed = round(100 * state.confirmed)
+        self._ring.style(f"--confirmed: {confirmed}%").props(f"aria-valuenow={confirmed}")
+        switch(self._ring, "whole", on=confirmed == 100)
+        self._hand.set_text(f"{state.handedness} hand" if state.handedness else "No hand")
+        percent = round(100 * state.confidence) if state.seen != NONE else 0
+        self._percent.set_text(f"{percent} %" if percent else "")
+        self._confidence.style(f"width: {percent}%")
+        self._no_picture.set_text(state.no_picture)
+        switch(self._veil, "off", on=not state.no_picture)
+        if self._graph is not None:
+            source = self._graph.state.camera_source
+            switch(self._browser, "hidden", on=source == "browser" and self._graph.state.has_browser)
+            switch(self._own, "hidden", on=source == "own")
+
+    def _use_own(self) -> None:
+        if self._graph is not None and self._page.drives():
+            self._graph.choose_camera("own")
+
+
+def read_status(sent: object) -> str:
+    """Return the camera status sent by a browser, for its own page; empty if it is invalid."""
+    words = sent.get("words") if isinstance(sent, dict) else None
+    return words[:_LONGEST_STATUS] if isinstance(words, str) else ""
