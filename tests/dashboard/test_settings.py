@@ -2,178 +2,245 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
+from handsteer.clock import SteppedClock
 from handsteer.config import Config, load
-from handsteer.dashboard.settings_form import LONGEST_TEXT, MASK, FormField, form, mask
+from handsteer.dashboard.settings import Settings, SettingsFile, changed, defaults, loaded
+from handsteer.dashboard.settings_fields import FIELDS, FORM
 from handsteer.errors import ConfigError
-from handsteer.types import ACTIONS
-
-FIELDS = {field.path: field for fields in form().values() for field in fields}
-
-
-def test_there_is_a_field_for_every_parameter() -> None:
-    parameters = set()
-    for section, model in Config.model_fields.items():
-        assert model.annotation is not None, section
-        parameters |= {f"{section}.{name}" for name in model.annotation.model_fields}
-    assert set(FIELDS) == parameters
+from handsteer.graph import Graph
+from handsteer.messages import CMD_VEL, HAND_SIGN, String
+from handsteer.presets import PRESETS
 
 
-@pytest.mark.parametrize("field", FIELDS.values(), ids=FIELDS)
-def test_every_default_is_shown_as_a_text_that_means_it(field: FormField) -> None:
-    default = field.value_in(Config())
-    assert field.parse(field.show(default)) == default
-    assert field.text
-    assert not field.text.endswith("]")
+class Bench:
+    """Settings of nodes that only note what they are given."""
+
+    def __init__(self, folder: Path, given: dict[str, Any] | None = None, text: str | None = None) -> None:
+        self.path = folder / "my.yaml"
+        if text is not None:
+            self.path.write_text(text)
+        self.running = load(self.path if text is not None else None, None, given or {})
+        self.applied: list[Config] = []
+        self.settings = Settings(lambda: self.running, self._apply, SettingsFile(self.path, is_read=text is not None))
+
+    def _apply(self, config: Config) -> None:
+        self.running = config
+        self.applied.append(config)
+
+    def set(self, path: str, text: str) -> None:
+        self.settings.set(FIELDS[path], text)
+
+    def shown(self, path: str) -> object:
+        return FIELDS[path].value_in(self.settings.wanted)
 
 
-def test_fields_say_unit_range_choices_and_when_they_take_effect() -> None:
-    speed = FIELDS["control.max_linear"]
-    assert (speed.unit, speed.allowed, speed.kind, speed.live) == ("m/s", "above 0, at most 10", "number", True)
-    assert FIELDS["camera.width"].allowed == "64 to 4096"
-    assert FIELDS["control.ramp"].choices == ("per_message", "per_second")
-    assert (FIELDS["robot.preset"].kind, FIELDS["robot.preset"].optional) == ("choice", True)
-    assert "turtlebot4" in FIELDS["robot.preset"].choices
-    assert not FIELDS["camera.source"].live
-    assert {field.kind for field in FIELDS.values()} == {"switch", "choice", "number", "text", "list", "table"}
+@pytest.fixture
+def bench(tmp_path: Path) -> Bench:
+    return Bench(tmp_path)
 
 
-def message(of: Any, *given: Any) -> str:
-    with pytest.raises(ConfigError) as caught:
-        of(*given)
-    return str(caught.value)
-
-
-@pytest.mark.parametrize(
-    ("path", "text"),
-    [
-        ("control.linear_step", "7"),
-        ("control.linear_step", "fast"),
-        ("control.linear_step", ""),
-        ("camera.fps", ".nan"),
-        ("camera.width", "63"),
-        ("camera.width", "64.5"),
-        ("landmarks.max_hands", "3"),
-        ("landmarks.refine_new_hands", "perhaps"),
-        ("control.ramp", "quickly"),
-        ("robot.preset", "roomba"),
-        ("dashboard.host", "''"),
-    ],
-)
-def test_what_is_wrong_is_said_in_the_words_for_a_file(tmp_path: Path, path: str, text: str) -> None:
-    file = tmp_path / "wrong.yaml"
-    section, name = path.split(".")
-    file.write_text(f"{section}: {{{name}: {text or repr('')}}}\n")
-    of_file = message(load, file).removesuffix(f" (also read: {file})")
-    assert message(FIELDS[path].parse, text.strip("'")) == of_file
-
-
-def outcome(field: FormField, text: str) -> Any:
-    """Return the value, which is shown as a text that means it, or the words that refuse it."""
-    try:
-        value = field.parse(text)
-    except ConfigError as error:
-        return str(error)
-    assert field.parse(field.show(value), value) == value
-    return value
-
-
-NUMBERS = [field for field in FIELDS.values() if field.kind == "number"]
-
-
-@given(st.sampled_from(NUMBERS), st.integers(-(10**9), 10**9) | st.floats(allow_nan=False, allow_infinity=False))
-def test_a_number_is_taken_or_refused_as_in_a_file(field: FormField, number: float) -> None:
-    text = yaml.safe_dump(number).partition("\n")[0]
-    try:
-        expected: object = field.value_in(load(None, None, {field.section: {field.name: number}}))
-    except ConfigError as error:
-        expected = str(error)
-    assert outcome(field, text) == expected
-
-
-NAMES = st.text(st.characters(codec="utf-8", exclude_categories=("Cs", "Cc", "Zl", "Zp")), min_size=1, max_size=9)
-
-
-@given(st.dictionaries(NAMES, st.sampled_from(ACTIONS), max_size=4))
-def test_a_table_with_whatever_names_is_shown_as_a_text_that_means_it(actions: dict[str, str]) -> None:
-    field = FIELDS["control.actions"]
-    try:
-        value = load(None, None, {"control": {"actions": actions}}).control.actions
-    except ConfigError:
-        return
-    assert field.parse(field.show(value)) == value
-
-
-def test_lists_and_tables_are_written_with_commas() -> None:
-    assert FIELDS["control.robots"].parse("r1, r2") == ("r1", "r2")
-    assert FIELDS["control.actions"].parse("Peace: turbo, no: stop") == {"Peace": "turbo", "no": "stop"}
-    assert message(FIELDS["control.actions"].parse, "Peace: fly").startswith("control.actions.Peace: 'fly' should be")
-
-
-@pytest.mark.parametrize("text", ["a: {b: c}", "&x a: *x", "a: stop} {", "a: stop}\n---\n{b: stop", "{" * 1500, "a: ["])
-def test_what_is_no_table_is_refused(text: str) -> None:
-    assert "should be written as in: Peace: turbo" in message(FIELDS["control.actions"].parse, text)
-
-
-@given(st.sampled_from(sorted(FIELDS)), st.text(max_size=40) | st.text("[]{}:,&*!#'\"-?0aé\n ", max_size=20))
-def test_any_text_is_a_value_or_refused_in_one_line(path: str, text: str) -> None:
-    said = outcome(FIELDS[path], text)
-    assert not isinstance(said, str) or "\n" not in said or said == text
-
-
-def test_a_search_finds_names_and_meanings() -> None:
-    def found(words: str) -> list[str]:
-        return [path for path, field in FIELDS.items() if field.matches(words)]
-
-    assert len(found("")) == len(FIELDS)
-    assert found("MAX linear") == [
+def test_what_is_live_is_applied_at_once_and_the_rest_waits_for_the_next_start(bench: Bench) -> None:
+    bench.set("control.max_linear", "0.4")
+    assert bench.running.control.max_linear == 0.4
+    bench.set("camera.fps", "15")
+    assert bench.running.camera.fps == 30
+    assert len(bench.applied) == 1
+    assert bench.settings.waits(FIELDS["camera.fps"])
+    assert not bench.settings.waits(FIELDS["control.max_linear"])
+    assert [path for path, field in FIELDS.items() if bench.settings.is_changed(field)] == [
+        "camera.fps",
         "control.max_linear",
-        "control.max_linear_acceleration",
-        "control.max_linear_jerk",
-        "robot.max_linear",
-        "robot.max_linear_acceleration",
     ]
-    assert "signs.confirm_time" in found("seen before it counts")
-    assert found("nothing is called so") == []
-
-
-def test_a_text_that_is_too_long_is_refused() -> None:
-    assert f"at most {LONGEST_TEXT} characters" in message(FIELDS["camera.source"].parse, "a" * (LONGEST_TEXT + 1))
+    bench.settings.reset(*FIELDS.values())
+    assert bench.settings.wanted == bench.running == Config()
 
 
 @pytest.mark.parametrize(
-    ("address", "shown"),
+    ("path", "text", "said"),
     [
-        ("rtsp://me:pa55@10.0.0.5/stream", f"rtsp://me:{MASK}@10.0.0.5/stream"),
-        ("rtsp://me:p@ss:w@10.0.0.5/stream", f"rtsp://me:{MASK}@10.0.0.5/stream"),
-        ("http://cam/video?user=me&pwd=x1&size=2", f"http://cam/video?user=me&pwd={MASK}&size=2"),
-        ("http://:secret@cam", f"http://:{MASK}@cam"),
-        ("rtsp://10.0.0.5:554/stream", "rtsp://10.0.0.5:554/stream"),
-        ("C:/me:you@here.mp4", "C:/me:you@here.mp4"),
+        ("control.max_linear", "11", r"^control.max_linear: 11 should be less than or equal to 10$"),
+        ("dashboard.private_key", "key.pem", r"^dashboard.private_key: is of no use without dashboard.certificate"),
+        ("control.robots", "r1, r2", r"^control.robots: is for `handsteer control`"),
+        ("virtual_hand.script", "Forward", r"^virtual_hand.script: "),
+        ("robot.world", "nowhere", r"^robot.world: "),
+        ("control.actions", "Stop: go", r"^control.actions: .* should leave Stop at 'stop'"),
     ],
 )
-def test_passwords_are_never_shown_and_stay_when_the_rest_changes(address: str, shown: str) -> None:
-    field = FIELDS["camera.source"]
-    assert mask(address) == field.show(address) == shown
-    assert field.parse(shown, address) == address
-    if shown != address:
-        assert field.parse(f"{shown}/2", address) == f"{address}/2"
+def test_what_the_next_start_would_refuse_is_refused_and_changes_nothing(
+    bench: Bench, path: str, text: str, said: str
+) -> None:
+    before = bench.settings.revision
+    with pytest.raises(ConfigError, match=said):
+        bench.set(path, text)
+    assert bench.settings.wanted == bench.running == Config()
+    assert bench.settings.revision == before
 
 
-@pytest.mark.parametrize(
-    "text", [f"rtsp://me:{MASK}@evil.example/", f"http://me:{MASK}@10.0.0.5/", f"rtsp://{MASK}:{MASK}@10.0.0.5/", MASK]
-)
-def test_a_password_goes_to_no_other_host(text: str) -> None:
-    said = message(FIELDS["camera.source"].parse, text, "rtsp://me:pa55@10.0.0.5/")
-    assert "this is another address" in said
-    assert "pa55" not in said
+def test_both_ends_of_cmd_vel_are_checked_together(tmp_path: Path) -> None:
+    bench = Bench(tmp_path, {"robot": {"kind": "dds", "preset": "turtlebot4", "cmd_vel_type": "twist"}})
+    with pytest.raises(ConfigError, match="should be the same"):
+        bench.set("control.cmd_vel_type", "twist_stamped")
 
 
-def test_paths_of_keys_are_for_the_driver() -> None:
-    field = FIELDS["dashboard.private_key"]
-    assert field.show(Path("key.pem")) == "key.pem"
-    assert field.show(Path("key.pem"), to_driver=False) == MASK
-    assert field.show(None, to_driver=False) == ""
+def test_another_robot_brings_its_own_defaults_at_the_next_start_only(bench: Bench) -> None:
+    bench.set("control.max_angular", "1.5")
+    bench.set("robot.preset", "turtlesim")
+    assert (bench.shown("control.max_linear"), bench.running.control.max_linear) == (2.0, 1.0)
+    assert bench.settings.waits(FIELDS["control.max_linear"])
+    assert not bench.settings.is_changed(FIELDS["control.max_linear"])
+    assert bench.shown("control.max_angular") == 1.5
+    bench.settings.reset(FIELDS["control.max_linear"])
+    assert bench.running.control.max_linear == 1.0  # no reset makes the robot that runs faster than its own limits
+    bench.set("control.max_linear", "1.8")
+    assert bench.running.control.max_linear == 1.8
+
+
+def test_what_a_node_cannot_take_changes_nothing(bench: Bench) -> None:
+    def refuse(_config: Config) -> None:
+        raise ConfigError("signs.model: no such file")
+
+    settings = Settings(lambda: bench.running, refuse, SettingsFile(bench.path, is_read=False))
+    with pytest.raises(ConfigError, match="no such file"):
+        settings.set(FIELDS["control.max_linear"], "0.5")
+    assert settings.wanted == Config()
+
+
+def test_what_is_changed_elsewhere_is_taken_over(bench: Bench) -> None:
+    bench.set("camera.fps", "15")
+    bench.running = load(None, None, {"control": {"actions": {"Peace": "turbo"}}})
+    bench.settings.follow()
+    assert bench.shown("control.actions") == {"Peace": "turbo"}
+    assert bench.shown("camera.fps") == 15
+
+
+SECTIONS = {
+    "control": st.fixed_dictionaries(
+        {},
+        optional={
+            "max_linear": st.floats(0.1, 10),
+            "cmd_vel_type": st.sampled_from(["auto", "twist", "twist_stamped"]),
+            "actions": st.dictionaries(st.sampled_from(["Peace", "Hi"]), st.sampled_from(["go", "turbo"])),
+        },
+    ),
+    "robot": st.fixed_dictionaries(
+        {},
+        optional={
+            "kind": st.sampled_from(["sim", "auto", "ros2", "dds", "ros1"]),
+            "preset": st.sampled_from([None, *PRESETS]),
+            "max_linear": st.floats(0.1, 10),
+            "cmd_vel_type": st.sampled_from(["auto", "twist", "twist_stamped"]),
+        },
+    ),
+    "dashboard": st.fixed_dictionaries({}, optional={"certificate": st.just("a.pem"), "port": st.integers(0, 65535)}),
+}
+
+
+@given(st.fixed_dictionaries({}, optional=SECTIONS))
+def test_what_differs_from_the_defaults_is_all_that_is_needed(values: dict[str, Any]) -> None:
+    config = load(None, None, values)
+    differences = changed(config)
+    assert loaded(differences) == config
+    base = defaults(config)
+    for field in differences:
+        is_robot = field.path in {"robot.kind", "robot.preset"}
+        assert is_robot or field.value_in(base) != field.value_in(config)
+
+
+def test_saves_what_differs_and_the_next_start_has_it(bench: Bench) -> None:
+    was_saved = bench.settings.is_saved
+    assert was_saved
+    bench.set("control.actions", "Peace: turbo")
+    bench.set("camera.source", "rtsp://me:pa55@cam/1")
+    was_saved = bench.settings.is_saved
+    assert not was_saved
+    bench.settings.save()
+    assert bench.settings.is_saved
+    assert load(bench.path) == bench.settings.wanted
+    assert bench.path.read_text() == "camera:\n  source: rtsp://me:pa55@cam/1\ncontrol:\n  actions:\n    Peace: turbo\n"
+    assert bench.path.stat().st_mode & 0o077 == 0
+    assert list(bench.path.parent.iterdir()) == [bench.path]
+
+
+def test_keeps_the_order_of_the_file_and_a_copy_of_its_comments(tmp_path: Path) -> None:
+    text = "# mine\ncontrol: {max_linear: 0.5, linear_step: 0.02}\ncamera: {fps: 15}\n"
+    bench = Bench(tmp_path, text=text)
+    bench.path.chmod(0o640)
+    bench.set("camera.fps", "20")
+    bench.set("control.ramp", "per_second")
+    assert bench.settings.save() == "saved to my.yaml; the old one, with its comments, is my.yaml.bak"
+    assert (tmp_path / "my.yaml.bak").read_text() == text
+    saved = " ".join(bench.path.read_text().split())
+    assert saved == "control: max_linear: 0.5 linear_step: 0.02 ramp: per_second camera: fps: 20.0"
+    assert bench.path.stat().st_mode & 0o777 == 0o640
+    assert bench.settings.save() == "saved to my.yaml"
+
+
+def test_options_that_the_file_does_not_have_are_not_saved_yet(tmp_path: Path) -> None:
+    bench = Bench(tmp_path, {"camera": {"source": "virtual"}}, "control: {max_linear: 0.5}\n")
+    assert not bench.settings.is_saved
+
+
+def test_never_writes_over_what_somebody_else_wrote(bench: Bench) -> None:
+    bench.set("control.max_linear", "0.4")
+    bench.path.write_text("control: {max_linear: 0.3}\ncamera: {fps: 10}\n")
+    with pytest.raises(ConfigError, match=r"my.yaml exists, and was not read: load it first"):
+        bench.settings.save()
+    bench.settings.load()
+    assert (bench.running.control.max_linear, bench.shown("camera.fps")) == (0.3, 10)
+    bench.set("camera.fps", "12")
+    bench.path.write_text("camera: {fps: 11}\n")
+    with pytest.raises(ConfigError, match=r"my.yaml was changed by somebody else"):
+        bench.settings.save()
+    assert bench.path.read_text() == "camera: {fps: 11}\n"
+    bench.path.unlink()
+    with pytest.raises(ConfigError, match=r"my.yaml was changed by somebody else"):
+        bench.settings.save()
+
+
+def test_a_file_that_cannot_be_used_changes_nothing(bench: Bench) -> None:
+    with pytest.raises(ConfigError, match="cannot read the configuration"):
+        bench.settings.load()
+    bench.path.write_text("control: {max_linear: 99}\n")
+    with pytest.raises(ConfigError, match=r"control.max_linear: 99 should be"):
+        bench.settings.load()
+    assert bench.settings.wanted == bench.running == Config()
+    with pytest.raises(ConfigError, match="was not read"):
+        bench.settings.save()
+
+
+def test_what_cannot_be_written_is_said(tmp_path: Path) -> None:
+    settings = Settings(Config, lambda _: None, SettingsFile(tmp_path / "gone" / "my.yaml", is_read=False))
+    with pytest.raises(ConfigError, match=r"cannot write .*my.yaml: No such file"):
+        settings.save()
+
+
+def test_a_graph_drives_on_by_what_is_set(tmp_path: Path) -> None:
+    given = {"camera": {"source": "virtual", "width": 64, "height": 48}, "robot": {"world": "empty"}}
+    with Graph(load(None, None, given), SteppedClock()) as graph:
+        settings = Settings(lambda: graph.config, graph.reconfigure, SettingsFile(tmp_path / "my.yaml", is_read=False))
+        speeds: list[float] = []
+        graph.transport.subscribe("test", CMD_VEL, lambda received: speeds.append(received.message.linear.x))
+        sign = graph.transport.advertise("test", HAND_SIGN)
+
+        def show(name: str) -> float:
+            sign.publish(String(data=name), graph.clock.now())
+            graph.control.spin_once()
+            return speeds[-1]
+
+        show("Forward")
+        assert show("Forward") == pytest.approx(0.02)
+        settings.set(FIELDS["control.linear_step"], "0.2")
+        settings.set(FIELDS["control.actions"], "Peace: forward")
+        assert show("Go") == pytest.approx(0.02)
+        assert show("Peace") == pytest.approx(0.22)
+        settings.set(FIELDS["control.max_linear"], "0.1")
+        assert show("Go") == pytest.approx(0.1)
+        settings.set(FIELDS["control.max_linear"], "1")
+        assert show("Go") == pytest.approx(0.1)  # another limit alone makes nothing faster
+
+
+def test_every_section_has_its_fields() -> None:
+    assert list(FORM) == list(Config.model_fields)

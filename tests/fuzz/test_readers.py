@@ -18,7 +18,7 @@ from handsteer.cameras.files import read_photo
 from handsteer.clock import SteppedClock
 from handsteer.config import Config, ControlConfig, load
 from handsteer.dashboard.camera import read_status
-from handsteer.dashboard.settings_form import form
+from handsteer.dashboard.settings_fields import FIELDS
 from handsteer.dashboard.steering_input import SteeringInput, read_deflection, read_number
 from handsteer.dashboard.world_editor import read_file
 from handsteer.errors import FrameError, HandsteerError, TransportError
@@ -147,7 +147,7 @@ def test_configurations(tmp_path: Path) -> None:
 
 
 def test_fields_of_the_settings() -> None:
-    fields = [field for section in form().values() for field in section]
+    fields = list(FIELDS.values())
     config = Config()
     cases = enumerate(mutants([b"0.5", b"true", b"Peace: turbo, Hi: stop", b"r1, r2", b"rtsp://me:pw@h/", *ODD_YAML]))
 

@@ -12,7 +12,7 @@ from handsteer.dashboard.elements import box, button, switch, text
 from handsteer.dashboard.lessons import Lessons
 from handsteer.dashboard.node import DashboardNode
 from handsteer.dashboard.remote_graph import RemoteGraph
-from handsteer.dashboard.settings_store import Settings
+from handsteer.dashboard.settings import Settings
 from handsteer.dashboard.state import PageState
 from handsteer.dashboard.viewers import LeaseStatus, OnDemandNode, Role
 

@@ -31,9 +31,8 @@ from handsteer.dashboard.limits import Doors, Unjoined, keep_short
 from handsteer.dashboard.node import DashboardNode
 from handsteer.dashboard.page import ASSETS_PATH, ICON, PICTURE_PATH, WEBCAM_PATH, GraphAccess, PageContext
 from handsteer.dashboard.remote_graph import RemoteGraph
-from handsteer.dashboard.settings_file import DEFAULT_FILE, SettingsFile
-from handsteer.dashboard.settings_panel import SettingsPage
-from handsteer.dashboard.settings_store import Settings
+from handsteer.dashboard.settings import DEFAULT_FILE, Settings, SettingsFile
+from handsteer.dashboard.settings_page import SettingsPage
 from handsteer.dashboard.socket_events import SocketEvents
 from handsteer.dashboard.viewers import OnDemandNode
 from handsteer.errors import DashboardError
@@ -96,7 +95,7 @@ class Dashboard:
         """Return the page of a whole graph.
 
         Settings are saved to ``file``, the YAML file that the graph's parameters were read from; by default
-        :data:`~handsteer.dashboard.settings_file.DEFAULT_FILE`.
+        :data:`~handsteer.dashboard.settings.DEFAULT_FILE`.
 
         Raises:
             ConfigError: The file can no longer be read.

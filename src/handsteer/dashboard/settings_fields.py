@@ -1,7 +1,8 @@
 """The fields of the settings page, derived from the configuration's models, without page or files."""
 
 import re
-from dataclasses import dataclass
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any, Literal, get_args, get_origin
 from urllib.parse import urlsplit
 
@@ -10,7 +11,7 @@ import yaml
 from handsteer import plain_yaml
 from handsteer.config import Config, validate
 from handsteer.errors import ConfigError
-from handsteer.parameters import Description, describe, section_model
+from handsteer.parameters import Description, describe, plain, section_model
 
 FieldKind = Literal["switch", "choice", "number", "text", "list", "table"]
 """How a field is edited; the items of a list or table are separated by commas."""
@@ -21,22 +22,21 @@ LONGEST_TEXT = 2000
 MASK = "•••"
 """Replaces hidden parts: passwords in the address of a camera."""
 
-_FOR_THE_DRIVER = frozenset({("dashboard", "certificate"), ("dashboard", "private_key")})
-_UNIT = re.compile(r" \[([^\]]+)\]$")
-_SCALAR = re.compile(r"[-+.\w]+")
+_FOR_THE_DRIVER = frozenset({"dashboard.certificate", "dashboard.private_key"})
+_WITH_UNIT = re.compile(r"(.*?)(?: \[([^\]]+)\])?")
 _PASSWORD = re.compile(
     r"(?<=://)[^/@:\s]*:(?P<user>[^/\s]*)(?=@)|[?&][^=&]*(?:pass|pwd|token|secret|key|auth)[^=&]*=(?P<query>[^&\s]+)",
     re.IGNORECASE,
 )
 
 
-@dataclass(frozen=True)
-class FormField:
-    """One parameter in the form.
+class Field:
+    """One parameter in the form, derived from its model.
 
     Attributes:
         section: Its section of the configuration.
         name: Its name in the section.
+        path: The full name, such as ``control.max_linear``.
         text: A one-line description.
         unit: The unit of its values; empty if none.
         allowed: Its range or choices in words; empty if unrestricted.
@@ -46,25 +46,24 @@ class FormField:
         live: Whether it can change while the nodes run; otherwise it is read at the next start.
     """
 
-    section: str
-    name: str
-    text: str
-    unit: str
-    allowed: str
-    kind: FieldKind
-    choices: tuple[str, ...]
-    optional: bool
-    live: bool
-
-    @property
-    def path(self) -> str:
-        """The full name, such as ``control.max_linear``."""
-        return f"{self.section}.{self.name}"
+    def __init__(self, section: str, name: str) -> None:
+        model = section_model(section)
+        annotation = model.model_fields[name].annotation
+        known = describe(model, name)
+        described = _WITH_UNIT.fullmatch(known.text)
+        assert described is not None
+        self.section, self.name, self.path = section, name, f"{section}.{name}"
+        self.text, self.unit = described.group(1), described.group(2) or ""
+        self.allowed = _allowed(known)
+        self.kind = _kind(annotation, known)
+        self.choices = known.choices
+        self.optional = type(None) in get_args(annotation)
+        self.live = known.why_fixed is None
 
     def matches(self, words: str) -> bool:
         """Return whether its name or description contains each of ``words``, ignoring case."""
-        said = f"{self.path} {self.path.replace('_', ' ')} {self.text} {self.unit}".casefold()
-        return all(word in said for word in words.casefold().split())
+        content = f"{self.path} {self.path.replace('_', ' ')} {self.text} {self.unit}".casefold()
+        return all(word in content for word in words.casefold().split())
 
     def value_in(self, config: Config) -> Any:
         """Return its value in ``config``."""
@@ -74,15 +73,18 @@ class FormField:
         """Return ``value`` as text for editing; masks passwords, and paths of keys unless ``to_driver``."""
         if value is None:
             return ""
-        if (self.section, self.name) in _FOR_THE_DRIVER and not to_driver:
+        if self.path in _FOR_THE_DRIVER and not to_driver:
             return MASK
         if isinstance(value, bool):
             return str(value).lower()
         if isinstance(value, float):
             return repr(value).removesuffix(".0")
         if isinstance(value, tuple | dict):
-            return _flow(list(value) if isinstance(value, tuple) else value)
-        return mask(str(value)) if self.kind == "text" else str(value)
+            text: str = yaml.safe_dump(
+                plain(value), default_flow_style=True, allow_unicode=True, sort_keys=False, width=float("inf")
+            )
+            return text.strip()[1:-1]
+        return MASK.join(_split(str(value))[0]) if self.kind == "text" else str(value)
 
     def parse(self, text: str, current: Any = None) -> Any:
         """Return the value of ``text``, validated like a value in a YAML file.
@@ -96,8 +98,7 @@ class FormField:
         """
         if len(text) > LONGEST_TEXT:
             raise ConfigError(f"{self.path}: should have at most {LONGEST_TEXT} characters, and has {len(text)}")
-        checked = validate(Config, {self.section: {self.name: self._read(text, current)}})
-        return self.value_in(checked)
+        return self.value_in(validate(Config, {self.section: {self.name: self._read(text, current)}}))
 
     def _read(self, text: str, current: Any) -> Any:
         if not text and self.optional:
@@ -109,7 +110,7 @@ class FormField:
         if self.kind == "table":
             pairs = iter(self._scalars(f"{{{text}}}"))
             return dict(zip(pairs, pairs, strict=True))
-        return self._unmasked(text, current) if MASK in text else text
+        return self._unmasked(text, str(current or "")) if MASK in text else text
 
     def _scalars(self, flow: str) -> list[str]:
         # Parsed by events, because a loader would follow aliases and nesting to any depth.
@@ -117,51 +118,18 @@ class FormField:
             events = list(yaml.parse(flow, yaml.BaseLoader))
         except yaml.YAMLError:
             events = []
-        inner = events[3:-3]
-        if not events or not all(isinstance(event, yaml.ScalarEvent) for event in inner):
+        scalars = [event.value for event in events[3:-3] if isinstance(event, yaml.ScalarEvent)]
+        if not events or len(scalars) < len(events) - 6:
             example = "Peace: turbo, Hi: stop" if self.kind == "table" else "r1, r2"
             raise ConfigError(f"{self.path}: {flow[1:-1]!r} should be written as in: {example}")
-        return [event.value for event in inner if isinstance(event, yaml.ScalarEvent)]
+        return scalars
 
-    def _unmasked(self, text: str, current: Any) -> str:
-        hidden = _passwords(str(current or ""))
+    def _unmasked(self, text: str, current: str) -> str:
+        shown, passwords = _split(current)
         parts = text.split(MASK)
-        if len(parts) != len(hidden) + 1 or _host(text) != _host(mask(str(current or ""))):
+        if len(parts) != len(shown) or _host(text) != _host(MASK.join(shown)):
             raise ConfigError(f"{self.path}: this is another address, so {MASK} should be its password")
-        return "".join(part + secret for part, secret in zip(parts, [*hidden, ""], strict=True))
-
-
-def mask(address: str) -> str:
-    """Return ``address`` with :data:`MASK` instead of passwords: ``rtsp://me:•••@10.0.0.5/``."""
-    shown, at = "", 0
-    for begin, end in _spans(address):
-        shown, at = shown + address[at:begin] + MASK, end
-    return shown + address[at:]
-
-
-def form() -> dict[str, tuple[FormField, ...]]:
-    """Return the fields of every section, in the order of the configuration."""
-    return {
-        name: tuple(_field(name, field) for field in section_model(name).model_fields) for name in Config.model_fields
-    }
-
-
-def _field(section: str, name: str) -> FormField:
-    model = section_model(section)
-    field = model.model_fields[name]
-    known = describe(model, name)
-    unit = _UNIT.search(known.text)
-    return FormField(
-        section=section,
-        name=name,
-        text=_UNIT.sub("", known.text),
-        unit=unit.group(1) if unit else "",
-        allowed=_allowed(known),
-        kind=_kind(field.annotation, known),
-        choices=known.choices,
-        optional=type(None) in get_args(field.annotation),
-        live=known.why_fixed is None,
-    )
+        return "".join(part + password for part, password in zip(parts, [*passwords, ""], strict=True))
 
 
 def _kind(annotation: Any, known: Description) -> FieldKind:
@@ -176,37 +144,31 @@ def _kind(annotation: Any, known: Description) -> FieldKind:
 def _allowed(known: Description) -> str:
     if known.kind not in ("integer", "double"):
         return known.constraint
+    if known.minimum is not None and known.maximum is not None and not known.constraint:
+        return f"{known.minimum:g} to {known.maximum:g}"
     lowest = known.constraint or ("" if known.minimum is None else f"at least {known.minimum:g}")
     highest = "" if known.maximum is None else f"at most {known.maximum:g}"
-    if lowest.startswith("at least") and highest:
-        return f"{known.minimum:g} to {known.maximum:g}"
     return ", ".join(part for part in (lowest, highest) if part)
 
 
-def _flow(value: Any) -> str:
-    text: str = yaml.safe_dump(value, default_flow_style=True, allow_unicode=True, sort_keys=False, width=float("inf"))
-    return text.strip()[1:-1]
-
-
 def _number_or_switch(text: str) -> Any:
-    """Return the number or boolean that YAML reads in ``text``, else ``text``."""
-    if not _SCALAR.fullmatch(text.strip()):
-        return text
+    """Return the value that YAML reads in ``text``, else ``text``."""
     try:
         value = plain_yaml.parse(text, "", ConfigError)
-    except ConfigError:  # such as 0b_
+    except ConfigError:
         return text
-    return value if isinstance(value, bool | int | float) else text
+    return text if value is None else value
 
 
-def _spans(address: str) -> list[tuple[int, int]]:
-    if "://" not in address:
-        return []
-    return [match.span(match.lastgroup or 0) for match in _PASSWORD.finditer(address)]
-
-
-def _passwords(address: str) -> list[str]:
-    return [address[begin:end] for begin, end in _spans(address)]
+def _split(address: str) -> tuple[list[str], list[str]]:
+    """Return the parts of ``address`` around its passwords, and the passwords."""
+    shown, passwords, at = [], [], 0
+    for match in _PASSWORD.finditer(address) if "://" in address else ():
+        begin, end = match.span(match.lastgroup or 0)
+        shown.append(address[at:begin])
+        passwords.append(address[begin:end])
+        at = end
+    return [*shown, address[at:]], passwords
 
 
 def _host(address: str) -> tuple[str, str]:
@@ -216,3 +178,15 @@ def _host(address: str) -> tuple[str, str]:
     except ValueError:
         return "", ""
     return parts.scheme, parts.netloc
+
+
+FORM: Mapping[str, tuple[Field, ...]] = MappingProxyType(
+    {
+        section: tuple(Field(section, name) for name in section_model(section).model_fields)
+        for section in Config.model_fields
+    }
+)
+"""The fields by section, in the order of the configuration."""
+
+FIELDS: Mapping[str, Field] = MappingProxyType({field.path: field for fields in FORM.values() for field in fields})
+"""All fields by full name."""
