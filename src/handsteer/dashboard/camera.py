@@ -5,20 +5,19 @@ import math
 import threading
 import uuid
 from collections import deque
-from collections.abc import Callable
+from collections.abc import AsyncIterator, Callable
 from contextlib import suppress
 
 import cv2
 import numpy as np
 from nicegui import ui
 from numpy.typing import NDArray
-from starlette.responses import Response
+from starlette.responses import StreamingResponse
 from starlette.types import Receive, Scope, Send
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from handsteer.clock import Clock
-from handsteer.dashboard.elements import box, button, switch, text
-from handsteer.dashboard.page import PICTURE_PATH, Page
+from handsteer.dashboard.page import PICTURE_PATH, Page, box, button, switch, text
 from handsteer.dashboard.remote_graph import RemoteGraph
 from handsteer.dashboard.socket_events import is_page_of
 from handsteer.dashboard.state import PageState
@@ -94,8 +93,6 @@ _BEST_QUALITY, _WORST_QUALITY = 80, 40
 _TOO_LARGE, _SMALL = 60_000, 45_000
 
 _BOUNDARY = b"frame"
-# Maximum delay until a viewer learns that the pictures have ended.
-_END_PERIOD_S = 0.1
 
 
 class PictureNode(Node):
@@ -103,16 +100,22 @@ class PictureNode(Node):
 
     def __init__(self, transport: Transport, clock: Clock) -> None:
         super().__init__("dashboard_picture", transport, clock)
-        self._waiting: deque[asyncio.Future[bytes]] = deque()
+        self._waiting: deque[asyncio.Future[bytes | None]] = deque()
+        self._has_ended = False
         self._quality = _BEST_QUALITY
         self._not_before_s = -math.inf
         self.subscribe(IMAGE_ANNOTATED, self._on_image)
 
-    async def next_jpeg(self) -> bytes:
-        """Return the next picture as a JPEG file."""
-        future: asyncio.Future[bytes] = asyncio.get_running_loop().create_future()
+    async def next_jpeg(self) -> bytes | None:
+        """Return the next picture as a JPEG file; None once the node has been stopped."""
+        future: asyncio.Future[bytes | None] = asyncio.get_running_loop().create_future()
         self._waiting.append(future)
-        return await future
+        return None if self._has_ended else await future
+
+    def on_stop(self) -> None:
+        """End the pictures of all viewers."""
+        self._has_ended = True
+        self._answer(None)
 
     def _on_image(self, received: Received[Image]) -> None:
         now = self.clock.now()
@@ -121,6 +124,9 @@ class PictureNode(Node):
         jpeg = encode_jpeg(shrink(bgr_image(received.message)), self._quality).tobytes()
         self._quality = next_quality(self._quality, len(jpeg))
         self._not_before_s = now + len(jpeg) / BYTES_PER_S
+        self._answer(jpeg)
+
+    def _answer(self, jpeg: bytes | None) -> None:
         # A deque, because the server's thread appends concurrently.
         while self._waiting:
             future = self._waiting.popleft()
@@ -128,43 +134,32 @@ class PictureNode(Node):
                 future.get_loop().call_soon_threadsafe(_resolve, future, jpeg)
 
 
-class PictureResponse(Response):
+class PictureResponse(StreamingResponse):
     """Streams pictures to one viewer until it leaves; a slow reader gets fewer pictures, always the newest."""
 
     def __init__(self, pictures: OnDemandNode[PictureNode]) -> None:
         super().__init__(
+            self._parts(),
             media_type=f"multipart/x-mixed-replace; boundary={_BOUNDARY.decode()}",
             headers={"Cache-Control": "no-store"},
         )
-        # The stream has no end, so its length is unknown.
-        del self.headers["content-length"]
         self._pictures = pictures
+        self._viewer = uuid.uuid4()
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Send pictures; return when the viewer has left or the pictures have ended."""
-        viewer = uuid.uuid4()
-        node = self._pictures.join(viewer)
-        if node is None:
-            await Response(status_code=503)(scope, receive, send)
-            return
-        sending = asyncio.create_task(self._send_pictures(node, send))
-        leaving = asyncio.create_task(_wait_for_disconnect(receive))
         try:
-            while self._pictures.is_watched_by(viewer) and not (sending.done() or leaving.done()):
-                await asyncio.wait((sending, leaving), timeout=_END_PERIOD_S, return_when=asyncio.FIRST_COMPLETED)
+            await super().__call__(scope, receive, send)
         finally:
-            self._pictures.leave(viewer)
-            for task in (sending, leaving):
-                task.cancel()
-            await asyncio.gather(sending, leaving, return_exceptions=True)
-        with suppress(TimeoutError, OSError):  # the viewer no longer reads
-            await asyncio.wait_for(_send_body(send, b"", more=False), _END_PERIOD_S)
+            self._pictures.leave(self._viewer)
 
-    async def _send_pictures(self, node: PictureNode, send: Send) -> None:
-        await send({"type": "http.response.start", "status": self.status_code, "headers": self.raw_headers})
-        await _send_body(send, b"--" + _BOUNDARY + b"\r\n")
-        while True:
-            await _send_body(send, _part(await node.next_jpeg()))
+    async def _parts(self) -> AsyncIterator[bytes]:
+        node = self._pictures.join(self._viewer)
+        # The boundary directly follows each picture: browsers show a picture only when they see its end.
+        yield b"--" + _BOUNDARY + b"\r\n"
+        while node is not None and (jpeg := await node.next_jpeg()) is not None:
+            header = b"Content-Type: image/jpeg\r\nContent-Length: %d\r\n\r\n" % len(jpeg)
+            yield header + jpeg + b"\r\n--" + _BOUNDARY + b"\r\n"
 
 
 def shrink(bgr: NDArray[np.uint8]) -> NDArray[np.uint8]:
@@ -184,22 +179,7 @@ def next_quality(quality: int, size: int) -> int:
     return min(_BEST_QUALITY, quality + 1) if size < _SMALL else quality
 
 
-def _part(jpeg: bytes) -> bytes:
-    # The boundary directly follows the picture: browsers show a picture only when they see its end.
-    header = b"Content-Type: image/jpeg\r\nContent-Length: %d\r\n\r\n" % len(jpeg)
-    return header + jpeg + b"\r\n--" + _BOUNDARY + b"\r\n"
-
-
-async def _send_body(send: Send, body: bytes, *, more: bool = True) -> None:
-    await send({"type": "http.response.body", "body": body, "more_body": more})
-
-
-async def _wait_for_disconnect(receive: Receive) -> None:
-    while (await receive())["type"] != "http.disconnect":
-        pass
-
-
-def _resolve(future: "asyncio.Future[bytes]", jpeg: bytes) -> None:
+def _resolve(future: "asyncio.Future[bytes | None]", jpeg: bytes | None) -> None:
     if not future.done():
         future.set_result(jpeg)
 
@@ -238,8 +218,8 @@ class CameraPanel:
             if graph is not None:
                 with box("foot choice"):
                     browser = f'data-camera="browser" data-viewer="{page.client.id}"'
-                    self._browser = button("Use this device's camera", browser)
-                    self._own = button("Use the robot's camera", 'data-camera="own"').on("click", self._use_own)
+                    self._browser = button("Use this device's camera").props(browser)
+                    self._own = button("Use the robot's camera", self._use_own).props('data-camera="own"')
                     self._status = text("trouble", "").props('role="alert"')
                 ui.on("webcam", lambda event: self._status.set_text(read_status(event.args)))
 

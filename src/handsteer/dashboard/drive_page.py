@@ -8,10 +8,9 @@ from nicegui import ui
 from handsteer.config import ControlConfig
 from handsteer.control.effects import figures_of
 from handsteer.dashboard.camera import CameraPanel
-from handsteer.dashboard.elements import STATIC, UNKNOWN, box, card, switch, tag, text
 from handsteer.dashboard.history import SPAN_S, Sample, VelocityHistory
 from handsteer.dashboard.node import DashboardNode
-from handsteer.dashboard.page import Page, PageContext
+from handsteer.dashboard.page import STATIC, UNKNOWN, Page, PageContext, box, card, switch, tag, text
 from handsteer.dashboard.state import PageState
 from handsteer.dashboard.steer_panel import SteerPanel
 from handsteer.dashboard.world_panel import WorldPanel

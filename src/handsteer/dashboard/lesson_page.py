@@ -5,10 +5,9 @@ from typing import Final
 from nicegui import ui
 
 from handsteer.dashboard.camera import CameraPanel
-from handsteer.dashboard.elements import box, card, switch, text
+from handsteer.dashboard.lesson import LessonState, instruction
 from handsteer.dashboard.lesson_panels import (
     CollectPanel,
-    Countdown,
     LearntPanel,
     NamePanel,
     ResultPanel,
@@ -16,7 +15,7 @@ from handsteer.dashboard.lesson_panels import (
     ViewerLesson,
 )
 from handsteer.dashboard.node import DashboardNode
-from handsteer.dashboard.page import Page, PageContext
+from handsteer.dashboard.page import Page, PageContext, box, card, switch, text
 from handsteer.dashboard.state import PageState
 
 _ELSEWHERE: Final = (
@@ -41,7 +40,7 @@ class LessonPage(Page):
         self._lesson = lesson = ViewerLesson(self, context.access.lessons)
         self._camera = CameraPanel(self, context.access.graph)
         self._card = _LessonCard(lesson)
-        self._countdown = Countdown(self._camera.stage)
+        self._countdown = _Countdown(self._camera.stage)
         self.client.on_disconnect(self._pause)
         self.client.on_delete(lesson.leave)
 
@@ -132,6 +131,25 @@ class _LessonCard:
     async def _again(self) -> None:
         self._lesson.learnt = None
         await self._name.fill()
+
+
+class _Countdown:
+    """The current instruction in large letters on the camera's picture, readable from a distance."""
+
+    def __init__(self, stage: ui.element) -> None:
+        self._stage = stage
+        with stage, box("countdown hidden") as self._box:
+            self._number = text("number", "")
+            self._words = text("words", "")
+
+    def update(self, state: LessonState | None) -> None:
+        """Show ``state``."""
+        switch(self._box, "hidden", on=state is None or not state.recording)
+        switch(self._stage, "recording", on=state is not None and state.status.phase == "recording")
+        if state is not None and state.recording:
+            number, words = instruction(state)
+            self._number.set_text(number)
+            self._words.set_text(words)
 
 
 def _mark(name: str) -> ui.element:

@@ -6,11 +6,10 @@ from collections.abc import Callable, Sequence
 
 from nicegui import ui
 
-from handsteer.dashboard.elements import box, button, switch, tag, text
-from handsteer.dashboard.lesson import LessonState, counted, instruction, outcome
+from handsteer.dashboard.lesson import LessonState, counted, outcome
 from handsteer.dashboard.lesson_node import LessonNode
 from handsteer.dashboard.lessons import LearntSign, Lessons
-from handsteer.dashboard.page import Page
+from handsteer.dashboard.page import Page, box, button, switch, tag, text
 from handsteer.errors import HandsteerError
 from handsteer.training.custom.dataset import Dataset, summarise
 from handsteer.training.custom.report import TrainingReport, false_hands, how_it_was_tried, mistakes
@@ -18,7 +17,7 @@ from handsteer.types import EFFECTS, NONE, Action
 
 _DISCARDED = "The lesson is over, and nothing of it was kept. The robot stands until you press Reset."
 _LONGEST = 200
-_DISCARD = 'aria-label="Discard: end the lesson and keep nothing"'
+_DISCARD = "Discard: end the lesson and keep nothing"
 
 
 class ViewerLesson:
@@ -108,7 +107,7 @@ class NamePanel:
             self._known = box("picks")
             self._name.on("keydown.enter", self._begin)
             with box("buttons"):
-                button("Begin", "").classes("primary").on("click", self._begin)
+                button("Begin", self._begin).classes("primary")
             text("faint", "The robot is stopped while you teach. Pictures are not stored, only the hand's landmarks.")
 
     async def fill(self) -> None:
@@ -123,29 +122,10 @@ class NamePanel:
                 self._pick(NONE, "No sign: what shall not count")
 
     def _pick(self, label: str, words: str) -> None:
-        button(words, "").on("click", lambda: self._name.set_value(label))
+        button(words, lambda: self._name.set_value(label))
 
     async def _begin(self) -> None:
         await self._lesson.begin(*(str(each.value or "")[:_LONGEST] for each in (self._name, self._person)))
-
-
-class Countdown:
-    """The current instruction in large letters on the camera's picture, readable from a distance."""
-
-    def __init__(self, stage: ui.element) -> None:
-        self._stage = stage
-        with stage, box("countdown hidden") as self._box:
-            self._number = text("number", "")
-            self._words = text("words", "")
-
-    def update(self, state: LessonState | None) -> None:
-        """Show ``state``."""
-        switch(self._box, "hidden", on=state is None or not state.recording)
-        switch(self._stage, "recording", on=state is not None and state.status.phase == "recording")
-        if state is not None and state.recording:
-            number, words = instruction(state)
-            self._number.set_text(number)
-            self._words.set_text(words)
 
 
 class CollectPanel:
@@ -158,11 +138,10 @@ class CollectPanel:
             self._count = text("count", "").props('role="status"')
             self._hint = text("hint", "").props('role="status"')
             with box("buttons"):
-                self._record = button("Record", "").classes("primary")
-                self._record.on("click", lambda: lesson.do(LessonNode.record))
-                self._pause = button("Pause", "").on("click", lambda: lesson.do(LessonNode.pause))
-                self._train = button("Train", "").on("click", lambda: lesson.do(LessonNode.train))
-                button("Discard", _DISCARD).on("click", lesson.discard)
+                self._record = button("Record", lambda: lesson.do(LessonNode.record)).classes("primary")
+                self._pause = button("Pause", lambda: lesson.do(LessonNode.pause))
+                self._train = button("Train", lambda: lesson.do(LessonNode.train))
+                button("Discard", lesson.discard, _DISCARD)
             self._takes = ui.element("ul").classes("takes").props('aria-label="Takes"')
             text(
                 "faint",
@@ -193,8 +172,7 @@ class CollectPanel:
         with ui.element("li").classes("take"):
             ui.element("img").props(f'src="data:image/jpeg;base64,{data}" alt="A frame of take {number}"')
             text("faint", f"{number}: {hands} hands")
-            delete = button("Delete", f'aria-label="Delete take {number}"')
-            delete.on("click", lambda: self._lesson.do(lambda node: node.delete(number)))
+            button("Delete", lambda: self._lesson.do(lambda node: node.delete(number)), f"Delete take {number}")
 
 
 class TrainPanel:
@@ -206,8 +184,7 @@ class TrainPanel:
             with box("meter progress").props('role="progressbar" aria-label="Training"') as self._meter:
                 self._fill = box("")
             with box("buttons"):
-                cancel = button("Cancel", 'aria-label="Cancel the training"')
-                cancel.on("click", lambda: lesson.do(LessonNode.go_back))
+                button("Cancel", lambda: lesson.do(LessonNode.go_back), "Cancel the training")
 
     def update(self, state: LessonState) -> None:
         """Show ``state``."""
@@ -231,9 +208,9 @@ class ResultPanel:
                 self._effect = text("faint", "")
             self._action = ui.select(actions, label="What it does", value="go").props("outlined dense")
             with box("buttons"):
-                button("Keep", "").classes("primary").on("click", lambda: lesson.save(str(self._action.value)))
-                button("More takes", "").on("click", lambda: lesson.do(LessonNode.go_back))
-                button("Discard", _DISCARD).on("click", lesson.discard)
+                button("Keep", lambda: lesson.save(str(self._action.value))).classes("primary")
+                button("More takes", lambda: lesson.do(LessonNode.go_back))
+                button("Discard", lesson.discard, _DISCARD)
             self._lost = text("trouble", "")
             tag("h3", "", "How well it was learnt")
             self._figures = box("figures")
@@ -278,7 +255,7 @@ class LearntPanel:
             self._yaml = tag("pre", "lines", "").props("tabindex=0")
             self._files = text("faint", "")
             with box("buttons"):
-                button("Teach another sign", "").classes("primary").on("click", again)
+                button("Teach another sign", again).classes("primary")
                 ui.link("Drive", "/").classes("text-button")
 
     def fill(self, learnt: LearntSign) -> None:

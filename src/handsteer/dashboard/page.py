@@ -1,20 +1,66 @@
-"""Common parts of all pages: the head with links to the others, the banner with the Stop button, and the lease."""
+"""What all pages share: basic elements, the head with links, the control lease, and the banner with the Stop button."""
 
 import re
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 from typing import ClassVar
 
 from nicegui import ui
 
-from handsteer.dashboard.elements import box, button, switch, text
 from handsteer.dashboard.lessons import Lessons
 from handsteer.dashboard.node import DashboardNode
 from handsteer.dashboard.remote_graph import RemoteGraph
 from handsteer.dashboard.settings import Settings
 from handsteer.dashboard.state import PageState
 from handsteer.dashboard.viewers import LeaseStatus, OnDemandNode, Role
+
+STATIC = Path(__file__).parent / "static"
+"""Scripts and styles of the pages."""
+
+UNKNOWN = "--"
+"""Shown for an unknown value."""
+
+
+@contextmanager
+def card(title: str, classes: str) -> Iterator[ui.element]:
+    """Put the elements created within into a card with a heading; yield the card."""
+    with ui.element("section").classes(f"card {classes}") as element:
+        tag("h2", "", title)
+        yield element
+
+
+def box(classes: str) -> ui.element:
+    """Return an empty ``div``."""
+    return ui.element("div").classes(classes)
+
+
+def text(classes: str, words: str) -> ui.label:
+    """Return a ``div`` with ``words``."""
+    return ui.label(words).classes(classes)
+
+
+def tag(name: str, classes: str, words: str) -> ui.label:
+    """Return an element of the tag ``name`` with ``words``."""
+    label = ui.label(words).classes(classes)
+    label.tag = name
+    return label
+
+
+def button(words: str, on_click: Callable[[], object] | None = None, label: str = "") -> ui.element:
+    """Return a button with ``words``, and an ``aria-label`` for screen readers if they need more."""
+    with ui.element("button").classes("text-button").props('type="button"') as element:
+        ui.label(words).style("display: inline")
+    if label:
+        element.props(f'aria-label="{label}"')
+    return element.on("click", on_click) if on_click else element
+
+
+def switch(element: ui.element, name: str, *, on: bool) -> None:
+    """Add the class ``name`` to ``element``, or remove it."""
+    element.classes(add=name if on else "", remove="" if on else name)
 
 
 class LeasePanel:
@@ -31,9 +77,9 @@ class LeasePanel:
         with box("lease"):
             self._question = text("question", "")
             self._words = text("role chip", "")
-            self._ask = button("Ask to drive", "").on("click", ask)
-            self._yes = button("Hand over", "").on("click", lambda: answer(True))
-            self._no = button("Keep", "").on("click", lambda: answer(False))
+            self._ask = button("Ask to drive", ask)
+            self._yes = button("Hand over", lambda: answer(True))
+            self._no = button("Keep", lambda: answer(False))
 
     def update(self, place: LeaseStatus) -> None:
         """Show the lease as this viewer sees it."""
@@ -66,9 +112,9 @@ class Banner:
             self._reason = text("reason", "waiting for the first report")
             self._warning = text("warning hidden", "")
             with box("buttons"):
-                self._reset = button("Reset", 'aria-label="Reset: let the robot be driven again"').on("click", reset)
-                self._stop = button("Stop", 'aria-label="Stop the robot (space key)" aria-keyshortcuts="Space"')
-                self._stop.classes("stop").on("click", halt)
+                self._reset = button("Reset", reset, "Reset: let the robot be driven again")
+                stop = button("Stop", halt, "Stop the robot (space key)").classes("stop")
+                stop.props('aria-keyshortcuts="Space"')
         ui.on("space", halt)
         self._mood = ""
 

@@ -23,13 +23,12 @@ from handsteer.config import DashboardConfig
 from handsteer.dashboard.access import HEADERS, Access, AccessMiddleware
 from handsteer.dashboard.camera import FrameSocket, PictureNode, PictureResponse
 from handsteer.dashboard.drive_page import DrivePage
-from handsteer.dashboard.elements import STATIC
 from handsteer.dashboard.history import VelocityHistory
 from handsteer.dashboard.lesson_page import LessonPage
 from handsteer.dashboard.lessons import Lessons
 from handsteer.dashboard.limits import Doors, Unjoined, keep_short
 from handsteer.dashboard.node import DashboardNode
-from handsteer.dashboard.page import ASSETS_PATH, ICON, PICTURE_PATH, WEBCAM_PATH, GraphAccess, PageContext
+from handsteer.dashboard.page import ASSETS_PATH, ICON, PICTURE_PATH, STATIC, WEBCAM_PATH, GraphAccess, PageContext
 from handsteer.dashboard.remote_graph import RemoteGraph
 from handsteer.dashboard.settings import DEFAULT_FILE, Settings, SettingsFile
 from handsteer.dashboard.settings_page import SettingsPage

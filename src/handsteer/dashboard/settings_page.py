@@ -4,9 +4,8 @@ from collections.abc import Callable
 
 from nicegui import ui
 
-from handsteer.dashboard.elements import box, button, card, switch, tag, text
 from handsteer.dashboard.node import DashboardNode
-from handsteer.dashboard.page import Page, PageContext
+from handsteer.dashboard.page import Page, PageContext, box, button, card, switch, tag, text
 from handsteer.dashboard.settings import Settings
 from handsteer.dashboard.settings_fields import FORM, Field
 from handsteer.dashboard.state import PageState
@@ -84,23 +83,22 @@ class SettingsPanel:
         self._filter()
 
     def _toolbar(self) -> None:
+        with ui.dialog() as dialog, box("card panel question"):
+            text("", "Set all parameters to their defaults? The file stays as it is until you save.")
+            with box("row"):
+                button("Set all to default", dialog.close).on("click", self._reset_all)
+                button("Keep", dialog.close)
         with ui.element("section").classes("card panel tools"):
             with box("row"):
                 self._search = ui.input(placeholder="Search", on_change=self._filter).classes("search")
                 self._search.props('outlined dense clearable type="search" aria-label="Search the parameters"')
                 self._only = ui.switch("changed only", on_change=self._filter)
                 self._state = text("state", "")
-                self._save = button("Save", "").classes("save").on("click", self._save_file)
-                self._load = button("Load", 'aria-label="Load what the file says"').on("click", self._load_file)
-                self._reset = button("Reset all", 'aria-label="Set all parameters to their defaults"')
+                self._save = button("Save", self._save_file).classes("save")
+                self._load = button("Load", self._load_file, "Load what the file says")
+                self._reset = button("Reset all", dialog.open, "Set all parameters to their defaults")
             self._place = text("place", "")
             self._message = text("said", "").props('role="status"')
-        with ui.dialog() as dialog, box("card panel question"):
-            text("", "Set all parameters to their defaults? The file stays as it is until you save.")
-            with box("row"):
-                button("Set all to default", "").on("click", dialog.close).on("click", self._reset_all)
-                button("Keep", "").on("click", dialog.close)
-        self._reset.on("click", dialog.open)
 
     def _change(self, change: Callable[[], object], done: str = "") -> str | None:
         """Make a change if this viewer may, and show ``done`` or the error message; return the latter, if any."""
@@ -170,8 +168,7 @@ class _Row:
                 self._input = self._make_input()
                 if field.unit:
                     text("unit", field.unit)
-                self._reset = button("Default", f'aria-label="Set {field.path} to its default"')
-                self._reset.on("click", self._to_default)
+                self._reset = button("Default", self._to_default, f"Set {field.path} to its default")
 
     @property
     def is_due(self) -> bool:

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 
 from nicegui import ui
 
-from handsteer.dashboard.elements import box, button, card, switch, text
-from handsteer.dashboard.page import Page
+from handsteer.dashboard.page import Page, box, button, card, switch, text
 from handsteer.dashboard.state import PageState
 from handsteer.dashboard.steering_input import SteeringInput, read_deflection, read_number
 from handsteer.dashboard.viewers import LeaseStatus
@@ -56,7 +55,7 @@ class SteerPanel:
                         self._angular = _Slider("Angular", "rad/s", _SLIDER_RADPS, self._slide, upright=False)
                         self._topic = _TopicBox(self._steer_on if has_topics else None)
             with box("last"):
-                button("Both to 0", "").on("click", self._release)
+                button("Both to 0", self._release)
                 self._hint = text("hint", _HINTS["free"])
         self._show_speed()
         ui.on("pad_held", lambda event: self._hold_pad(event.args))
@@ -161,9 +160,9 @@ class _Slider:
             with box("ends"):
                 self._highest = self._limit(f"{name}: {high}", high, bound)
                 self._buttons = [
-                    button(more, f'aria-label="{up}"').on("click", lambda: self._take(self.value + _SLIDER_STEP)),
-                    button("0", f'aria-label="{name} to 0"').on("click", lambda: self._take(0.0)),
-                    button(less, f'aria-label="{down}"').on("click", lambda: self._take(self.value - _SLIDER_STEP)),
+                    button(more, lambda: self._take(self.value + _SLIDER_STEP), up),
+                    button("0", lambda: self._take(0.0), f"{name} to 0"),
+                    button(less, lambda: self._take(self.value - _SLIDER_STEP), down),
                 ]
                 self._lowest = self._limit(f"{name}: {low}", low, -bound)
         self._show_bound()
@@ -229,7 +228,7 @@ class _TopicBox:
                 self._name.props("readonly")
             else:
                 self._name.on("keydown.enter", self._use)
-                button("Use", 'aria-label="Steer on this topic"').on("click", self._use)
+                button("Use", self._use, "Steer on this topic")
         self._note = text("topic-words", "")
         self._error = text("trouble", "").props('role="alert"')
 

@@ -9,8 +9,7 @@ from typing import Any, get_args
 
 from nicegui import ui
 
-from handsteer.dashboard.elements import box, button, switch, tag, text
-from handsteer.dashboard.page import Page
+from handsteer.dashboard.page import Page, box, button, switch, tag, text
 from handsteer.dashboard.remote_graph import RemoteGraph
 from handsteer.dashboard.scene import WorldView
 from handsteer.errors import WorldError
@@ -58,24 +57,23 @@ class WorldEditor:
             with box("row"):
                 tag("h2", "", "Add")
                 for shape in get_args(Shape):
-                    add_shape = button(shape.capitalize(), f'aria-label="Add a {shape}"')
-                    add_shape.on("click", lambda shape=shape: self._add(shape))
+                    button(shape.capitalize(), partial(self._add, shape), f"Add a {shape}")
             with box("row"):
                 tag("h2", "", "Thing")
                 self._things = ui.select([], on_change=self._on_choice)
                 self._things.props(f'{_SELECT} aria-label="Which thing to change"')
-                self._delete = button("Delete", 'aria-label="Delete the chosen thing"').on("click", self._remove)
+                self._delete = button("Delete", self._remove, "Delete the chosen thing")
             self._form = _ThingForm(self._edit)
             with box("row"):
                 tag("h2", "", "World")
                 self._worlds = ui.select(shipped_worlds(), value=shipped_worlds()[0])
                 self._worlds.props(f'{_SELECT} aria-label="Which world to load"')
-                button("Load", 'aria-label="Load the chosen world"').on("click", self._load)
+                button("Load", self._load, "Load the chosen world")
                 file = ui.element("input").classes("file")
                 file.props('type="file" accept=".yaml,.yml" aria-label="World file" tabindex="-1"')
                 file.on("change", lambda event: self._open_file(event.args), js_handler=_READ_FILE)
-                button("Open file", "").on("click", js_handler=f"() => getHtmlElement({file.id}).click()")
-                button("Save file", "").on("click", self._save)
+                button("Open file").on("click", js_handler=f"() => getHtmlElement({file.id}).click()")
+                button("Save file", self._save)
         self._message = text("message", "").props('role="status"')
 
     def open(self) -> bool:

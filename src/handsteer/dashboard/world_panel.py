@@ -1,9 +1,10 @@
 """The world card: the 3D view with its controls, the course, and the editor."""
 
+from functools import partial
+
 from nicegui import ui
 
-from handsteer.dashboard.elements import UNKNOWN, box, button, switch, tag, text
-from handsteer.dashboard.page import Page
+from handsteer.dashboard.page import UNKNOWN, Page, box, button, switch, tag, text
 from handsteer.dashboard.remote_graph import RemoteGraph
 from handsteer.dashboard.scene import View, WorldView
 from handsteer.dashboard.state import PageState
@@ -39,18 +40,18 @@ class WorldPanel:
                 self._caption = text("caption", "")
                 with box("views").props('role="group" aria-label="View"'):
                     for view, name, _ in _VIEWS:
-                        self._views[view] = button(name, "").on("click", lambda view=view: self._look(view))
+                        self._views[view] = button(name, partial(self._look, view))
                 self._course = _CourseLine()
                 with box("tools"):
-                    restart = button("Back to start", "")
-                    self._edit = button("Edit world", 'aria-expanded="false"').on("click", self._toggle)
+                    restart = button("Back to start")
+                    self._edit = button("Edit world", self._toggle).props('aria-expanded="false"')
             with box("foot"):
                 self._driver = _fact("driven by")
                 self._path = _fact("path")
                 self._bumps = _fact("bumps")
             self._editor = WorldEditor(page, graph, self._view)
-            self._view.on_drag(self._editor.pick, self._editor.drop)
             restart.on("click", self._editor.restart)
+            self._view.on_drag(self._editor.pick, self._editor.drop)
         self._look("orbit")
 
     def update(self, state: PageState, world: WorldState) -> None:
