@@ -1,8 +1,8 @@
-"""Limits the connections of the page's server, so that strangers cannot lock out the user who stops the robot.
+"""Limits of what clients can cost the page's server: connections, pages, and lines of the log.
 
-A connection is known once a request on it has shown a session (:mod:`handsteer.dashboard.access`). Few unknown
-connections are kept: a new one replaces the oldest idle one. So viewers keep their page, and can reload it, regardless
-of what strangers do.
+So strangers cannot lock out the user who stops the robot. A connection is known once a request on it has shown a
+session (:mod:`handsteer.dashboard.access`). Few unknown connections are kept open: a new one replaces the oldest idle
+one. So viewers keep their page, and can reload it, regardless of what strangers do.
 """
 
 import asyncio
@@ -19,7 +19,7 @@ from typing import Any, Final, cast
 from nicegui import Client
 from uvicorn.protocols.http.auto import AutoHTTPProtocol
 
-MOST_STRANGERS: Final = 128
+MOST_UNKNOWN: Final = 128
 MOST_OF_ONE_ADDRESS: Final = 32
 """A browser opens six connections until it has its session."""
 
@@ -37,29 +37,32 @@ class Connection:
     Attributes:
         transport: The connection's transport.
         address: Of the other end; for IPv6, its network.
-        heard: Whether it has sent a complete request.
+        has_requested: Whether it has sent a complete request.
         is_known: Whether a request on it has shown a session.
-        served: Number of requests being answered.
+        answering: Number of requests being answered.
     """
 
     transport: asyncio.Transport
     address: str
-    heard: bool = False
+    has_requested: bool = False
     is_known: bool = False
-    served: int = 0
+    answering: int = 0
+
+    def close_if_silent(self) -> None:
+        """Close it if it has not sent a complete request."""
+        if not self.has_requested:
+            self.transport.abort()
 
 
-class Doors:
+class Connections:
     """Accepts and limits connections; runs on the server's thread only.
 
     Args:
         certificate: For secure connections; None for plain ones.
-        first_request_s: Seconds until the first complete request, see :data:`FIRST_REQUEST_S`.
     """
 
-    def __init__(self, certificate: ssl.SSLContext | None = None, first_request_s: float = FIRST_REQUEST_S) -> None:
+    def __init__(self, certificate: ssl.SSLContext | None = None) -> None:
         self._certificate = certificate
-        self._first_request_s = first_request_s
         self._open: dict[object, Connection] = {}  # by address and port of the other end, in order of arrival
 
     @property
@@ -69,23 +72,21 @@ class Doors:
 
     def protocol(self, **uvicorns: Any) -> asyncio.Protocol:
         """Return the protocol for a new connection; takes the arguments of uvicorn's own protocols."""
-        return _Lobby(self, lambda: AutoHTTPProtocol(**uvicorns), self._certificate)
+        return _Accepting(self, lambda: AutoHTTPProtocol(**uvicorns), self._certificate)
 
-    def enter(self, transport: asyncio.Transport) -> None:
+    def add(self, transport: asyncio.Transport) -> None:
         """Register a connection; closes another one if there are too many unknown ones."""
         peer = _peer(transport)
         self._open = {key: each for key, each in self._open.items() if not each.transport.is_closing()}
-        newcomer = Connection(transport, _network(peer[0]))
-        strangers = [each for each in self._open.values() if not each.is_known]
-        for crowd, most in (
-            ([each for each in strangers if each.address == newcomer.address], MOST_OF_ONE_ADDRESS),
-            (strangers, MOST_STRANGERS),
-        ):
-            present = [each for each in crowd if not each.transport.is_closing()]
+        new = Connection(transport, _network(peer[0]))
+        unknown = [each for each in self._open.values() if not each.is_known]
+        of_address = [each for each in unknown if each.address == new.address]
+        for group, most in ((of_address, MOST_OF_ONE_ADDRESS), (unknown, MOST_UNKNOWN)):
+            present = [each for each in group if not each.transport.is_closing()]
             if len(present) >= most:
-                min(present, key=_is_busy).transport.abort()  # min returns the oldest of equals
-        self._open[peer] = newcomer
-        asyncio.get_running_loop().call_later(self._first_request_s, _close_if_silent, newcomer)
+                min(present, key=lambda each: each.answering > 0).transport.abort()  # the oldest of equals
+        self._open[peer] = new
+        asyncio.get_running_loop().call_later(FIRST_REQUEST_S, new.close_if_silent)
 
     @contextmanager
     def serving(self, peer: Sequence[object] | None, *, is_known: bool) -> Iterator[None]:
@@ -94,23 +95,23 @@ class Doors:
         if connection is None:
             yield
             return
-        connection.heard = True
+        connection.has_requested = True
         if is_known and sum(each.is_known for each in self._open.values()) < MOST_KNOWN:
             connection.is_known = True
-        connection.served += 1
+        connection.answering += 1
         try:
             yield
         finally:
-            connection.served -= 1
+            connection.answering -= 1
 
 
-class _Lobby(asyncio.Protocol):
+class _Accepting(asyncio.Protocol):
     """Hands a connection over to uvicorn's protocol; a secure one after its handshake, which has a time limit."""
 
     def __init__(
-        self, doors: Doors, protocol: Callable[[], asyncio.Protocol], certificate: ssl.SSLContext | None
+        self, connections: Connections, protocol: Callable[[], asyncio.Protocol], certificate: ssl.SSLContext | None
     ) -> None:
-        self._doors = doors
+        self._connections = connections
         self._protocol = protocol
         self._certificate = certificate
         self._task: asyncio.Task[None] | None = None
@@ -118,7 +119,7 @@ class _Lobby(asyncio.Protocol):
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         stream = cast(asyncio.Transport, transport)  # uvloop's has another type
-        self._doors.enter(stream)
+        self._connections.add(stream)
         if self._certificate is None:
             self._hand_over(stream)
         else:
@@ -147,15 +148,6 @@ class _Lobby(asyncio.Protocol):
             transport.abort()
 
 
-def _is_busy(connection: Connection) -> bool:
-    return connection.served > 0
-
-
-def _close_if_silent(connection: Connection) -> None:
-    if not connection.heard:
-        connection.transport.abort()
-
-
 def _peer(transport: asyncio.Transport) -> tuple[str, int]:
     address = transport.get_extra_info("peername")
     return (str(address[0]), int(address[1])) if isinstance(address, tuple) else ("", id(transport))
@@ -170,34 +162,33 @@ def _network(host: str) -> str:
     return host if address.version == 4 else str(ipaddress.ip_network((address, 64), strict=False))
 
 
-MOST_UNJOINED: Final = 64
+MOST_UNCONNECTED_PAGES: Final = 64
 """Each takes half a megabyte or more; NiceGUI keeps it for a minute."""
 
 
-class Unjoined:
-    """Deletes the oldest page without a websocket beyond ``most`` of them; runs on the server's thread.
+class UnconnectedPages:
+    """Deletes the oldest page without a websocket if there are too many; runs on the server's thread.
 
     A browser whose page is deleted before its websocket connects reloads it. Without this limit, clients that fetch
     pages but run no scripts or keep no cookies would fill the memory.
     """
 
-    def __init__(self, most: int = MOST_UNJOINED) -> None:
-        self._most = most
+    def __init__(self) -> None:
         self._pages: dict[str, Client] = {}  # in the order in which they were served
 
     def add(self, page: Client) -> None:
         """Register a page that is being served."""
         self._pages[page.id] = page
-        page.on_connect(lambda: self._forget(page.id))
-        page.on_delete(lambda: self._forget(page.id))
-        if len(self._pages) > self._most:
+        page.on_connect(lambda: self._remove(page.id))
+        page.on_delete(lambda: self._remove(page.id))
+        if len(self._pages) > MOST_UNCONNECTED_PAGES:
             next(iter(self._pages.values())).delete()
 
-    def _forget(self, page: str) -> None:
+    def _remove(self, page: str) -> None:
         self._pages.pop(page, None)
 
 
-SAID_EVERY_S: Final = 10.0
+LOG_PERIOD_S: Final = 10.0
 
 _LONGEST: Final = 300
 _THREAD: Final = "dashboard"
@@ -213,15 +204,15 @@ _LOGGERS: Final = (
 )
 
 
-class OneLineAKind(logging.Filter):
-    """Passes one record per kind every :data:`SAID_EVERY_S`, as one line, with the number of suppressed ones.
+class LogLimit(logging.Filter):
+    """Passes one record per kind every :data:`LOG_PERIOD_S`, as one line, with the number of suppressed ones.
 
     An exception is reduced to its last line. With ``logging.DEBUG``, all records pass unchanged.
     """
 
     def __init__(self) -> None:
         super().__init__()
-        self._said: dict[tuple[object, ...], tuple[float, int]] = {}
+        self._logged: dict[tuple[object, ...], tuple[float, int]] = {}
 
     def filter(self, record: logging.LogRecord) -> bool:
         """Return whether to log ``record``; shortens it."""
@@ -229,12 +220,12 @@ class OneLineAKind(logging.Filter):
             return True
         error = record.exc_info[1] if record.exc_info else None
         kind = (record.name, record.pathname, record.lineno, record.levelno, type(error))
-        said_s, left_out = self._said.get(kind, (-float("inf"), 0))
+        logged_s, left_out = self._logged.get(kind, (-float("inf"), 0))
         now_s = time.monotonic()
-        if now_s - said_s < SAID_EVERY_S:
-            self._said[kind] = (said_s, left_out + 1)
+        if now_s - logged_s < LOG_PERIOD_S:
+            self._logged[kind] = (logged_s, left_out + 1)
             return False
-        self._said[kind] = (now_s, 0)
+        self._logged[kind] = (now_s, 0)
         _shorten(record, error, left_out)
         return True
 
@@ -250,8 +241,8 @@ def _shorten(record: logging.LogRecord, error: BaseException | None, left_out: i
 
 
 @functools.cache
-def keep_short() -> None:
+def limit_log() -> None:
     """Shorten the logs of the server's libraries that come from the page's thread."""
-    one_line = OneLineAKind()
+    limit = LogLimit()
     for name in _LOGGERS:
-        logging.getLogger(name).addFilter(one_line)
+        logging.getLogger(name).addFilter(limit)

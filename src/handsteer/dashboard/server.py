@@ -26,7 +26,7 @@ from handsteer.dashboard.drive_page import DrivePage
 from handsteer.dashboard.history import VelocityHistory
 from handsteer.dashboard.lesson_page import LessonPage
 from handsteer.dashboard.lessons import Lessons
-from handsteer.dashboard.limits import Doors, Unjoined, keep_short
+from handsteer.dashboard.limits import Connections, UnconnectedPages, limit_log
 from handsteer.dashboard.node import DashboardNode
 from handsteer.dashboard.page import ASSETS_PATH, ICON, PICTURE_PATH, STATIC, WEBCAM_PATH, GraphAccess, PageContext
 from handsteer.dashboard.remote_graph import RemoteGraph
@@ -125,7 +125,7 @@ class Dashboard:
         application = _application()
         application.state.dashboard = self
         application.state.access = access
-        application.state.doors = Doors(certificate)
+        application.state.connections = Connections(certificate)
         self._server = uvicorn.Server(_settings(application))
         self._thread = threading.Thread(target=self._server.run, args=([listener],), name="dashboard", daemon=True)
         self._thread.start()
@@ -201,12 +201,12 @@ def _settings(application: FastAPI) -> uvicorn.Config:
     settings = uvicorn.Config(
         # Outermost, so that it covers everything, errors included.
         AccessMiddleware(application, application.state),
-        http=application.state.doors.protocol,
+        http=application.state.connections.protocol,
         headers=list(HEADERS),
         server_header=False,
         proxy_headers=False,  # other users of this machine could forge the header
         # uvloop keeps reading for a protocol that has paused it before TLS begins.
-        loop="asyncio" if application.state.doors.is_secure else "auto",
+        loop="asyncio" if application.state.connections.is_secure else "auto",
         log_config=None,
         access_log=False,
         lifespan="on",
@@ -244,19 +244,19 @@ def _application() -> FastAPI:
     async def webcam(socket: WebSocket) -> None:
         await application.state.dashboard.webcam.serve(socket)
 
-    unjoined = Unjoined()
+    unconnected = UnconnectedPages()
 
     @ui.page("/")
     def index() -> None:
-        unjoined.add(DrivePage(application.state.dashboard.context).client)
+        unconnected.add(DrivePage(application.state.dashboard.context).client)
 
     @ui.page("/settings")
     def settings() -> None:
-        unjoined.add(SettingsPage(application.state.dashboard.context).client)
+        unconnected.add(SettingsPage(application.state.dashboard.context).client)
 
     @ui.page("/teach")
     def teach() -> None:
-        unjoined.add(LessonPage(application.state.dashboard.context).client)
+        unconnected.add(LessonPage(application.state.dashboard.context).client)
 
     ui.run_with(
         application,
@@ -275,5 +275,5 @@ def _application() -> FastAPI:
     # Otherwise state of each tab is kept for 30 days; no page here stores anything in it.
     app.storage.max_tab_storage_age = 0.0
     SocketEvents(core.sio)
-    keep_short()
+    limit_log()
     return application
