@@ -213,20 +213,20 @@ class ResultPanel:
                 button("Discard", lesson.discard, _DISCARD)
             self._lost = text("trouble", "")
             tag("h3", "", "How well it was learnt")
-            self._figures = box("figures")
+            self._report = box("figures")
 
     def fill(self, state: LessonState) -> None:
-        """Show the figures of ``state``, the sign's current action, and the signs that would be lost."""
+        """Show the report of ``state``, the sign's current action, and the signs that would be lost."""
         lost = ", ".join(self._lessons.lost())
         self._action.set_value(self._lessons.action_of(state.label))
         switch(self._action, "hidden", on=state.label == NONE)
         self._lost.set_text(
             f"There are no takes of {lost}: what was learnt before of it would be lost." if lost else ""
         )
-        self._figures.clear()
+        self._report.clear()
         if state.report is not None:
-            with self._figures:
-                _figures(state.report)
+            with self._report:
+                _show_report(state.report)
 
     def update(self, state: LessonState) -> None:
         """Show ``state``."""
@@ -268,7 +268,7 @@ class LearntPanel:
         self._files.set_text(f"The takes are in {learnt.dataset}, what was learnt from them in {learnt.model}.")
 
 
-def _figures(report: TrainingReport) -> None:
+def _show_report(report: TrainingReport) -> None:
     labels, counts = report.confusion.labels, report.confusion.counts
     with box("scroll").props('tabindex=0 role="region" aria-label="Confusion matrix"'), ui.element("table"):
         tag("caption", "", "A row for each sign that was shown, a column for each that came out, in hands")

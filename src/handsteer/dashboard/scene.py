@@ -276,15 +276,15 @@ def css_colour(rgb: Iterable[float]) -> str:
 
 
 def parents_first(joints: Iterable[Joint]) -> Iterator[Joint]:
-    """Yield each joint after the one that holds its parent link; joints in a loop are left out."""
+    """Yield each joint after its parent's joint; joints in a loop are left out."""
     waiting = list(joints)
     while waiting:
-        held = {joint.child for joint in waiting}
-        ready = [joint for joint in waiting if joint.parent not in held]
+        children = {joint.child for joint in waiting}
+        ready = [joint for joint in waiting if joint.parent not in children]
         if not ready:
             return
         yield from ready
-        waiting = [joint for joint in waiting if joint.parent in held]
+        waiting = [joint for joint in waiting if joint.parent in children]
 
 
 # A cylinder's axis is y in three.js, and z in ROS.

@@ -13,7 +13,7 @@ from handsteer.dashboard.page import Page, box, button, switch, tag, text
 from handsteer.dashboard.remote_graph import RemoteGraph
 from handsteer.dashboard.scene import WorldView
 from handsteer.errors import WorldError
-from handsteer.robots.editing import MOST_OBSTACLES, Change, add, edit, figures, remove
+from handsteer.robots.editing import MOST_OBSTACLES, Change, add, edit, numeric_properties, remove
 from handsteer.robots.protocol import Shape
 from handsteer.robots.world import Thing, World, load_world, parse_world, shipped_worlds, write_world
 from handsteer.types import Pose2D
@@ -242,7 +242,7 @@ class _ThingForm:
         self._box = box("row form")
 
     def show(self, thing: Thing | None) -> None:
-        """Show the current figures of ``thing``, replacing rejected input; nothing for None."""
+        """Show the current values of ``thing``, replacing rejected input; nothing for None."""
         before, self._shown = self._shown, thing
         if thing is None:
             self._box.clear()
@@ -250,8 +250,8 @@ class _ThingForm:
         if before is None or (before.name, before.shape) != (thing.name, thing.shape):
             self._build(thing)
         else:  # The inputs are reused, so that the focused one keeps the focus.
-            for number, figure in zip(self._numbers, figures(thing), strict=True):
-                number.set_value(round(figure.value, _DIGITS))
+            for number, each in zip(self._numbers, numeric_properties(thing), strict=True):
+                number.set_value(round(each.value, _DIGITS))
             self._movable.set_value(thing.movable)
         switch(self._numbers[-1], "off", on=not thing.movable)  # a fixed thing's mass has no effect
 
@@ -259,8 +259,8 @@ class _ThingForm:
         self._box.clear()
         with self._box:
             self._numbers = []
-            for index, figure in enumerate(figures(thing)):
-                number = ui.number(figure.name, value=round(figure.value, _DIGITS), step=figure.step)
+            for index, each in enumerate(numeric_properties(thing)):
+                number = ui.number(each.name, value=round(each.value, _DIGITS), step=each.step)
                 number.on_value_change(lambda event, index=index: self._on_number(index, event.value))
                 self._numbers.append(number.props(f"outlined dense debounce={_DEBOUNCE_MS}"))
             with ui.element("label").classes("field"):
@@ -274,9 +274,9 @@ class _ThingForm:
     async def _on_number(self, index: int, value: float | None) -> None:
         if self._shown is None or value is None:
             return
-        figure = figures(self._shown)[index]
-        if round(value, _DIGITS) != round(figure.value, _DIGITS):
-            await self._edit(self._shown.name, figure.fields(value))
+        each = numeric_properties(self._shown)[index]
+        if round(value, _DIGITS) != round(each.value, _DIGITS):
+            await self._edit(self._shown.name, each.fields(value))
 
     async def _on_field(self, name: str, value: object) -> None:
         if self._shown is not None and value != getattr(self._shown, name):

@@ -97,7 +97,7 @@ def remove(world: World, name: str) -> World:
 
 
 @dataclass(frozen=True)
-class Figure:
+class NumericProperty:
     """One numeric property of a thing.
 
     Attributes:
@@ -113,29 +113,29 @@ class Figure:
     fields: Callable[[float], dict[str, Any]]
 
 
-def figures(thing: Thing) -> list[Figure]:
-    """Return all editable figures of ``thing``."""
+def numeric_properties(thing: Thing) -> list[NumericProperty]:
+    """Return all numeric properties of ``thing``."""
     x, y = thing.position
     found = [
-        Figure("x [m]", x, 0.1, lambda value: {"position": (value, y)}),
-        Figure("y [m]", y, 0.1, lambda value: {"position": (x, value)}),
+        NumericProperty("x [m]", x, 0.1, lambda value: {"position": (value, y)}),
+        NumericProperty("y [m]", y, 0.1, lambda value: {"position": (x, value)}),
     ]
     match thing:
         case Box(size=(length, width, height)):
             found += [
-                Figure("length [m]", length, 0.1, lambda value: {"size": (value, width, height)}),
-                Figure("width [m]", width, 0.1, lambda value: {"size": (length, value, height)}),
-                Figure("height [m]", height, 0.1, lambda value: {"size": (length, width, value)}),
-                Figure("turn [°]", math.degrees(thing.yaw), 15.0, lambda value: {"yaw": math.radians(value)}),
+                NumericProperty("length [m]", length, 0.1, lambda value: {"size": (value, width, height)}),
+                NumericProperty("width [m]", width, 0.1, lambda value: {"size": (length, value, height)}),
+                NumericProperty("height [m]", height, 0.1, lambda value: {"size": (length, width, value)}),
+                NumericProperty("turn [°]", math.degrees(thing.yaw), 15.0, lambda value: {"yaw": math.radians(value)}),
             ]
         case Cylinder():
             found += [
-                Figure("radius [m]", thing.radius, 0.05, lambda value: {"radius": value}),
-                Figure("height [m]", thing.height, 0.1, lambda value: {"height": value}),
+                NumericProperty("radius [m]", thing.radius, 0.05, lambda value: {"radius": value}),
+                NumericProperty("height [m]", thing.height, 0.1, lambda value: {"height": value}),
             ]
         case Sphere():
-            found.append(Figure("radius [m]", thing.radius, 0.05, lambda value: {"radius": value}))
-    return [*found, Figure("mass [kg]", thing.mass, 0.1, lambda value: {"mass": value})]
+            found.append(NumericProperty("radius [m]", thing.radius, 0.05, lambda value: {"radius": value}))
+    return [*found, NumericProperty("mass [kg]", thing.mass, 0.1, lambda value: {"mass": value})]
 
 
 def unique_name(world: World, word: str) -> str:
