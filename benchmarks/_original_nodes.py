@@ -1,8 +1,8 @@
-"""The course's own recognition and control, as commands to start: fetched where there is a network, else a stand-in.
+"""Commands that start the course's own recognition and control: fetched, or replaced by stand-ins without a network.
 
-Nothing of theirs is kept here. The originals get the environment of ``tutorial.py``, which has MediaPipe, and rospy and
-LiteRT of ours behind it. LiteRT stands in for TensorFlow, whose interpreter it is, and some lines for ``cv_bridge``, so
-both are spared the seconds in which TensorFlow is loaded.
+Nothing of theirs is stored here. The originals run in the environment of ``tutorial.py``, which has MediaPipe, with our
+rospy and LiteRT added. LiteRT replaces TensorFlow, whose interpreter it is, and a few lines replace ``cv_bridge``, so
+that the seconds in which TensorFlow is imported do not count.
 """
 
 import shutil
@@ -59,31 +59,31 @@ from cv_bridge import CvBridge
 from sensor_msgs.msg import Image
 from std_msgs.msg import String
 
-told = "hand_sign_recognition/"
+prefix = "hand_sign_recognition/"
 rospy.init_node("hand_sign_recognition", anonymous=True)
-publisher = rospy.Publisher(rospy.get_param(told + "publish_gesture_topic"), String, queue_size=10)
+publisher = rospy.Publisher(rospy.get_param(prefix + "publish_gesture_topic"), String, queue_size=10)
 pipeline, bridge = TutorialPipeline(), CvBridge()
 
 
 def recognise(image):
     publisher.publish("Forward" if pipeline.step(bridge.imgmsg_to_cv2(image), 0.0) else "NONE")
-    rospy.get_param(told + "show_image")
+    rospy.get_param(prefix + "show_image")
 
 
-rospy.Subscriber(rospy.get_param(told + "subscribe_image_topic"), Image, recognise)
+rospy.Subscriber(rospy.get_param(prefix + "subscribe_image_topic"), Image, recognise)
 rospy.spin()
 """
 
 
 @dataclass(frozen=True)
 class OriginalNodes:
-    """How to start them.
+    """Commands that start the nodes.
 
     Attributes:
-        what: What they are, in words.
-        recognition: Command of the recognition; None where there is no MediaPipe for it.
+        what: Description of the nodes.
+        recognition: Command of the recognition; None without MediaPipe.
         control: Command of the control.
-        parameters: What its launch file sets for the recognition.
+        parameters: Parameters that the launch file sets for the recognition.
     """
 
     what: str
@@ -93,7 +93,7 @@ class OriginalNodes:
 
 
 def original_nodes(folder: Path, clone: Path | None) -> OriginalNodes:
-    """Return the course's nodes, of ``clone`` or fetched, or what stands in for them; ``folder`` is for files."""
+    """Return the course's nodes, from ``clone`` or fetched, or stand-ins; ``folder`` is for temporary files."""
     without_mediapipe = make_environment()
     problem = None if clone else fetch()
     sources = (clone or CLONE) / "src"
@@ -121,7 +121,7 @@ def original_nodes(folder: Path, clone: Path | None) -> OriginalNodes:
 
 
 def fetch() -> str | None:
-    """Fetch the course's repository into the user's cache, unless it is there; return why that cannot be done."""
+    """Fetch the course's repository into the user's cache if missing; return the reason for a failure."""
     if CLONE.is_dir():
         return None
     new = CLONE.with_suffix(".new")
@@ -136,7 +136,7 @@ def fetch() -> str | None:
 
 
 def _launcher(folder: Path) -> tuple[str, ...]:
-    """Return the command that runs a script of theirs, behind which the script's name goes."""
+    """Return the command that runs one of their scripts; the caller appends its name."""
     import rospy  # noqa: PLC0415 - the benchmark says which packages it lacks before
 
     shims = folder / "shims"

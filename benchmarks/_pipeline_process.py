@@ -1,15 +1,15 @@
-"""One of the pipelines that ``tutorial.py`` compares, as a process of its own.
+"""One of the pipelines that ``tutorial.py`` compares, in its own process.
 
-``python _pipeline_process.py NAME`` reads jobs from its standard input, one JSON object a line, and answers each by one
+``python _pipeline_process.py NAME`` reads jobs from standard input, one JSON object per line, and answers each with one
 or two lines of JSON. A job names a file of raw frames (``frames``; uint8, BGR, of ``shape`` [n, height, width, 3]), the
-seconds from one to the next (``dt_s``), and its ``kind``:
+seconds between frames (``dt_s``), and its ``kind``:
 
-* ``start``: the first answer has the process's CPU seconds from its own start to the end of the first frame
-  (``cpu_s``); the second, after all frames, its peak memory in MB (``peak_mb``). One frame is in memory at a time.
-* ``run``: the CPU milliseconds of each frame, all threads of the process together (``cpu_ms``), and in how many frames
-  a hand was seen (``hands``).
+* ``start``: the first answer has the process's CPU seconds from its start to the end of the first frame (``cpu_s``);
+  the second, after all frames, its peak memory in MB (``peak_mb``). One frame is in memory at a time.
+* ``run``: the CPU milliseconds of each frame, over all threads of the process (``cpu_ms``), and the number of frames
+  with a hand (``hands``).
 
-Nothing is loaded here that a pipeline does not need itself.
+This module imports only what a pipeline needs itself.
 """
 
 import itertools
@@ -49,7 +49,7 @@ def _run(step: Step, job: dict[str, Any]) -> None:
     hands, marks = 0, [time.process_time()]
     for frame in frames:
         hands += step(frame, job["dt_s"])
-        # What threads of a pipeline do between two frames counts too.
+        # Includes the work of a pipeline's threads between two frames.
         marks.append(time.process_time())
     _answer(cpu_ms=[(after - before) * 1000 for before, after in itertools.pairwise(marks)], hands=hands)
 
@@ -59,8 +59,8 @@ def _answer(**values: Any) -> None:
 
 
 def _peak_mb() -> float:
-    """Return the most resident memory that this process has had, in MB, libraries included."""
-    # Not by resource.getrusage: that begins with the memory of the process that started this one.
+    """Return the peak resident memory of this process in MB, including libraries."""
+    # Not from resource.getrusage, which includes the memory of the parent process.
     status = Path("/proc/self/status").read_text(encoding="ascii")
     (line,) = (line for line in status.splitlines() if line.startswith("VmHWM:"))
     return int(line.split()[1]) * 1024 / 1e6

@@ -1,8 +1,7 @@
-"""What the course's node does with a frame, in words of our own: mirror, landmarks, dense net, drawing.
+"""Our reimplementation of the course's processing of a frame: mirror, landmarks, dense net, drawing.
 
-It runs where MediaPipe is installed, and knows nothing of handsteer. Where the course's own code takes longer ways than
-it needs to, this one takes the short ones; and a dense net of the same size in NumPy, with numbers by chance, stands in
-for the course's TensorFlow model, which is slower to load.
+It needs MediaPipe, and is independent of handsteer. It avoids detours that the course's own code makes, and a dense net
+of the same size in NumPy with random weights replaces the course's TensorFlow model, which is slower to load.
 """
 
 import itertools
@@ -33,7 +32,7 @@ class TutorialPipeline:
         self._layers = [(random.normal(size=size).astype(np.float32), np.zeros(size[1], np.float32)) for size in sizes]
 
     def step(self, image: np.ndarray, _dt_s: float) -> bool:
-        """Take the next frame, BGR and not mirrored; return whether there is a hand in it."""
+        """Process the next frame, BGR and not mirrored; return whether it contains a hand."""
         mirrored = cv2.flip(image, 1)
         picture = mirrored.copy()
         rgb = cv2.cvtColor(mirrored, cv2.COLOR_BGR2RGB)

@@ -1,10 +1,10 @@
-"""How late Stop and commands are while the page's process is held up.
+"""Delay of Stop and of commands while the page's process is blocked.
 
-Run ``python benchmarks/blocked.py``. The whole graph runs as in ``handsteer run``, in real time, with the page in a
-process of its own: the virtual hand shows Forward and is taken away, by turns; nobody looks at the page. Each trial
-waits until the robot is driven, publishes ``true`` on ``/stop`` at a planned moment, and waits for the first zero on
-``cmd_vel``. The time counts from the plan, so that what holds up the benchmark itself is counted too. The last row
-holds the interpreter of the graph's own process, which nothing in handsteer does, to show what that would cost.
+Run ``python benchmarks/blocked.py``. The whole graph runs as in ``handsteer run``, in real time, with the page in its
+own process and no viewers; the virtual hand alternates between Forward and no hand. Each trial waits until the robot is
+driven, publishes ``true`` on ``/stop`` at a planned time, and waits for the first zero on ``cmd_vel``. The delay is
+measured from the planned time, so that it includes delays of the benchmark itself. The last row blocks the interpreter
+of the graph's own process, which nothing in handsteer does, for comparison.
 """
 
 import argparse
@@ -27,17 +27,17 @@ from handsteer.messages import CMD_VEL, STOP, Bool, Twist
 from handsteer.transports.protocol import Received
 
 BLOCKED_S, HELD_S, FREE_S = 5.0, 0.3, 0.05
-# Every node says on /stopped what it has heard; a reset that comes before the last of them has is undone by it.
+# Every node publishes its state on /stopped; one that is published after a reset would undo it.
 HEARD_S = 0.5
 DRIVEN_TIMEOUT_S, STOPPED_TIMEOUT_S = 6.0, 5.0
 
 
 class Commands:
-    """The commands that come, and when."""
+    """Received commands and their times."""
 
     def __init__(self) -> None:
         self._news = threading.Condition()
-        self.came: list[tuple[float, bool]] = []  # when, and whether it moves the robot
+        self.came: list[tuple[float, bool]] = []  # time, and whether it moves the robot
 
     def take(self, received: Received[Twist]) -> None:
         with self._news:
@@ -46,7 +46,7 @@ class Commands:
             self._news.notify_all()
 
     def wait_for(self, moving: bool, since_s: float, timeout_s: float) -> float | None:
-        """Return when the first command came that does, or does not, move the robot; None when none comes in time."""
+        """Return the time of the first command that does, or does not, move the robot; None if none arrives in time."""
 
         def found() -> float | None:
             return next((at_s for at_s, moves in self.came if at_s >= since_s and moves is moving), None)
@@ -60,7 +60,7 @@ def undisturbed() -> Iterator[None]:
     yield
 
 
-# Python runs this in the page's process at its start.
+# Python runs this at the start of the page's process.
 HINDERED = f"""
 import ctypes, signal, threading, time
 
@@ -93,7 +93,7 @@ def page_that_can_be_held() -> PageProcess:
 
 @contextmanager
 def held_interpreter() -> Iterator[None]:
-    """Hold the interpreter again and again, as a library does that does not let go of it."""
+    """Hold the interpreter repeatedly, like a library that does not release the GIL."""
     ended = threading.Event()
     usleep = ctypes.PyDLL(None).usleep
 
@@ -111,7 +111,7 @@ def held_interpreter() -> Iterator[None]:
 def measure(
     graph: Graph, commands: Commands, disturbance: Callable[[], AbstractContextManager[None]], trials: int
 ) -> tuple[list[float], list[float], int]:
-    """Return milliseconds from each planned Stop to the first zero, and between commands, and undriven trials."""
+    """Return milliseconds from each planned Stop to the first zero, those between commands, and undriven trials."""
     stop = graph.transport.advertise("benchmark", STOP)
     random = np.random.default_rng(0)
     late_ms: list[float] = []
@@ -123,7 +123,7 @@ def measure(
             began_s = time.perf_counter()
             stop.publish(Bool(data=False))
             driven = commands.wait_for(True, began_s, DRIVEN_TIMEOUT_S)
-            if driven is None:  # what is standing already tells nothing
+            if driven is None:  # a robot at rest shows nothing
                 undriven += 1
                 continue
             planned_s = time.perf_counter() + random.uniform(0.1, 0.6)
@@ -137,7 +137,7 @@ def measure(
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description="Tell how late Stop is while something stands still.")
+    parser = argparse.ArgumentParser(description="Measure the delay of Stop while a process is blocked.")
     parser.add_argument("--trials", type=int, default=20, help="of each kind")
     options = parser.parse_args()
     page = page_that_can_be_held()
@@ -161,15 +161,15 @@ def main() -> None:
         graph.start()
         kinds = {
             "nothing": undisturbed,
-            "the page's event loop stands still": lambda: after(signal.SIGUSR2),
+            "the page's event loop is blocked": lambda: after(signal.SIGUSR2),
             f"a thread there also holds the interpreter, {HELD_S:g} s of {HELD_S + FREE_S:g}": lambda: after(
                 signal.SIGUSR1
             ),
             "the page's process is stopped": lambda: after(signal.SIGSTOP),
             f"the interpreter of the graph's process is held, {HELD_S:g} s of {HELD_S + FREE_S:g}": held_interpreter,
         }
-        print("what disturbs                                                Stop to zero, ms    between commands, ms")
-        print("                                                             median     most     median     most")
+        print("disturbance                                                  Stop to zero, ms    between commands, ms")
+        print("                                                             median      max     median      max")
         for name, disturbance in kinds.items():
             late, apart, undriven = measure(graph, commands, disturbance, options.trials)
             between = f"{np.median(apart):10.1f} {max(apart):8.1f}" if apart else f"{'-':>10} {'-':>8}"

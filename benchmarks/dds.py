@@ -1,9 +1,9 @@
-"""What a wire of ROS 2 costs: the way of a Twist and an image between two processes, and the time to the first command.
+"""Cost of a ROS 2 transport: latency of a Twist and an image between two processes, and time to the first command.
 
 Run ``python benchmarks/dds.py`` with cyclonedds installed; with ``--transport zenoh`` and eclipse-zenoh, whose router
-runs beside; or, after ``make ros2``, ``.venv/ros2/bin/python benchmarks/dds.py --transport ros2`` for rclpy. A second
-process listens and tells how old each message was when a node's callback got it; both read the same monotonic clock.
-The same is measured within one process, message by message in turn, as what the nodes themselves cost.
+it starts; or, after ``make ros2``, ``.venv/ros2/bin/python benchmarks/dds.py --transport ros2`` for rclpy. A second
+process subscribes and reports the age of each message in a node's callback; both read the same monotonic clock. The
+same is measured within one process, alternating message by message, as the cost of the nodes themselves.
 """
 
 import argparse
@@ -42,9 +42,9 @@ SESSIONS = {
     "zenoh": "handsteer.transports.zenoh.session",
     "ros2": "handsteer.transports.rclpy.session",
 }
-# A Twist's own stamp would change its size; what the robot would do with the time in it does not matter here.
+# A Twist carries its send time in a field, because a stamp would change its size.
 TWISTS = Topic("/benchmark/twist", Twist, depth=10)
-# Deep enough that one is missing only if it was lost on the way; in a graph a newer one takes its place.
+# Deep enough that only lost messages are missing; in a graph, a newer one replaces them.
 IMAGES = Topic("/benchmark/image", Image, depth=10)
 
 
@@ -55,13 +55,13 @@ def sent_s(message: Any) -> float:
 
 @dataclass(frozen=True)
 class Figures:
-    """What one run came to.
+    """Results of one run.
 
     Attributes:
-        here: How old each message was within one process, in milliseconds.
-        there: Likewise over DDS.
-        sender: CPU of the publishing itself, in percent of a core.
-        listener: CPU of the whole other process, likewise.
+        here: Age of each message within one process, in milliseconds.
+        there: The same over the transport.
+        sender: CPU time of publishing, in percent of a core.
+        listener: CPU time of the whole other process, in percent of a core.
     """
 
     here: np.ndarray
@@ -71,7 +71,7 @@ class Figures:
 
 
 class Listener(Node):
-    """Notes how old each message is when the callback gets it, in seconds."""
+    """Records the age of each message in its callback, in seconds."""
 
     def __init__(self, transport: Transport, topic: Topic[Any]) -> None:
         super().__init__("listener", transport, WallClock())
@@ -90,7 +90,7 @@ def cpu_s() -> float:
 
 
 def listen(topic: Topic[Any], transport: str) -> None:
-    """Be the second process: listen until the input ends, then tell what came."""
+    """Run the second process: subscribe until the input ends, then report the ages."""
     session = join(transport, "listener", [])
     listener = Listener(session.transport, topic)
     print("ready", flush=True)
@@ -103,7 +103,7 @@ def listen(topic: Topic[Any], transport: str) -> None:
 
 @contextmanager
 def network(transport: str) -> Iterator[None]:
-    """Give this process and those that it starts a network of their own, by their environment."""
+    """Isolate this process and its children from other networks, by environment variables."""
     os.environ |= {"ROS_DOMAIN_ID": str(free_domain()), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
     if transport != "zenoh":
         yield
@@ -120,10 +120,10 @@ def network(transport: str) -> Iterator[None]:
 
 
 def send(publishers: Sequence[Publisher[Any]], topic: Topic[Any], count: int, rate: float) -> list[float]:
-    """Send ``count`` messages by each publisher, in turn, so that whatever else the machine does meets all alike.
+    """Send ``count`` messages with each publisher, alternating, so that other load affects all alike.
 
     Returns:
-        The CPU seconds that each took.
+        CPU seconds of each publisher.
     """
     picture = np.random.default_rng(0).integers(0, 255, (HEIGHT, WIDTH, 3), np.uint8)
     spent_s, due_s = [0.0] * len(publishers), time.monotonic()
@@ -142,7 +142,7 @@ def send(publishers: Sequence[Publisher[Any]], topic: Topic[Any], count: int, ra
 
 
 def measure(wire: str, topic: Topic[Any], count: int, rate: float) -> Figures:
-    """Return what came over ``wire`` from this process to another, and within this process."""
+    """Return the results over ``wire`` from this process to another, and within this process."""
     command = [sys.executable, __file__, "--listen", topic.name, "--transport", wire]
     session = join(wire, "talker", [])
     transport = InProcessTransport()
@@ -169,11 +169,11 @@ def measure(wire: str, topic: Topic[Any], count: int, rate: float) -> Figures:
 def wait_for(publisher: Publisher[Any]) -> None:
     while not publisher.has_subscribers:
         time.sleep(0.01)
-    time.sleep(SETTLE_S)  # the other end has to see this one, too
+    time.sleep(SETTLE_S)  # the other end must have discovered this one, too
 
 
 def first_command_s(wire: str) -> float:
-    """Return the seconds from the start of the control's process to its first Twist, signs being shown all the time."""
+    """Return the seconds from the start of the control's process to its first Twist, with a sign always shown."""
     session = join(wire, "talker", [])
     came = threading.Event()
     session.transport.subscribe("robot", CMD_VEL, lambda _: came.set())
@@ -189,18 +189,18 @@ def first_command_s(wire: str) -> float:
 
 
 def loading_s(wire: str) -> float:
-    """Return the seconds that it takes a new process to load what the control needs, and to end."""
+    """Return the seconds in which a new process imports the control's modules and ends."""
     began_s = time.monotonic()
     subprocess.run([sys.executable, "-c", f"import {', '.join((*MODULES, SESSIONS[wire]))}"], check=True)
     return time.monotonic() - began_s
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description="Measure what a wire of ROS 2 costs.")
+    parser = argparse.ArgumentParser(description="Measure the cost of a ROS 2 transport.")
     parser.add_argument("--transport", choices=("dds", "zenoh", "ros2"), default="dds")
-    parser.add_argument("--twists", type=int, default=2000, help="Twists to send, 200 a second")
-    parser.add_argument("--images", type=int, default=300, help="images to send, 30 a second")
-    parser.add_argument("--runs", type=int, default=3, help="how often all is measured")
+    parser.add_argument("--twists", type=int, default=2000, help="Twists to send, 200 per second")
+    parser.add_argument("--images", type=int, default=300, help="images to send, 30 per second")
+    parser.add_argument("--runs", type=int, default=3, help="number of runs")
     parser.add_argument("--listen", help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.listen:

@@ -1,8 +1,8 @@
-"""What a link between two machines costs: how soon a cut stops the robot, how late a sign is, which images arrive.
+"""Effects of a link between two machines: time to stop after a cut, delay of signs, share of images received.
 
 Run ``python benchmarks/distributed.py`` as root, with cyclonedds and iproute2 installed. Camera and robot run in one
-network namespace, recognition and control in another, as processes of their own over DDS; the link between delays,
-loses and is cut. Times are from one machine's clock, for both namespaces have the same.
+network namespace, recognition and control in another, each in its own process over DDS; the link between them delays
+and loses packets, and is cut. Both namespaces share one clock.
 """
 
 import argparse
@@ -43,7 +43,7 @@ def percentiles(name: str, values: list[float], unit: str = "ms") -> str:
 
 
 def cuts(trials: int) -> None:
-    """Cut the link again and again while the robot drives."""
+    """Cut the link repeatedly while the robot drives."""
     brakes, stands, again = [], [], []
     with machines() as both:
         both.link.shape(0.02, 0.005, 0.01)
@@ -63,18 +63,18 @@ def cuts(trials: int) -> None:
     print(f"link cut at {SPEED_MPS} m/s, {trials} times ({both.link.kind}, 20 ± 5 ms, 1 % loss)")
     print(percentiles(f"  brakes after (limit {LIMIT_MS})", brakes))
     print(percentiles("  stands after", stands))
-    print(percentiles("  moves again after the link is back", again))
+    print(percentiles("  moves again after the link is restored", again))
 
 
 def latencies(seconds: float) -> None:
-    """Tell how long it takes from a frame's capture to the Twist at the robot."""
+    """Print the time from a frame's capture to the Twist at the robot."""
     print(
         "from a frame's capture to its Twist at the robot's machine (there and back over the link), 5 frames a second"
     )
     for delay_s in (0.0, 0.02, 0.05):
         with machines() as both:
             both.link.shape(delay_s)
-            # So few frames that there is no doubt which one a Twist comes from.
+            # So few frames that each Twist belongs to exactly one.
             drive = both.start(camera=("--camera.fps", "5"))
             peer = drive.peer
             peer.ask("record", topic=CMD_VEL, type="Twist", fields=["linear.x"])
@@ -91,7 +91,7 @@ def latencies(seconds: float) -> None:
 
 
 def images(count: int) -> None:
-    """Tell how many images of 640x480 arrive where one frame of Ethernet in a hundred is lost."""
+    """Print the share of 640x480 images received if one Ethernet frame in a hundred is lost."""
     print(f"640x480 images that arrive of {count}, sent best effort")
     for loss in (0.0, 0.01):
         for name, (topic, kind, data) in IMAGES.items():
@@ -121,15 +121,15 @@ def images(count: int) -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--trials", type=int, default=20, help="how often the link is cut")
-    parser.add_argument("--seconds", type=float, default=15.0, help="how long each latency is measured")
-    parser.add_argument("--images", type=int, default=300, help="how many images are sent")
+    parser.add_argument("--trials", type=int, default=20, help="number of cuts of the link")
+    parser.add_argument("--seconds", type=float, default=15.0, help="duration of each latency measurement")
+    parser.add_argument("--images", type=int, default=300, help="number of images")
     options = parser.parse_args()
     try:
         with machines():
             pass
     except NoNamespacesError as why:
-        print(f"network namespaces cannot be made here: {why}")
+        print(f"cannot create network namespaces: {why}")
         return
     print(f"load {os.getloadavg()[0]:.1f}, {os.cpu_count()} cores")
     cuts(options.trials)

@@ -1,9 +1,9 @@
-"""How alike the hands that the sign model is trained on and those of people are: a classifier tries to tell them apart.
+"""Similarity of the synthetic hands that the sign model is trained on to those of people, judged by a classifier.
 
-Run ``python benchmarks/hands.py``. The photos are not part of the repository (docs/signs.md); those of the part to
-report on are looked at. An area under the ROC curve of 0.5 means that made hands cannot be told from real ones, 1.0
-that they always can. The hands of one shape are compared, by the features that the sign model gets; half of them teach
-the classifier, which is judged by the other half.
+Run ``python benchmarks/hands.py``. The photos are not part of the repository (docs/signs.md); those of the report part
+are used. An area under the ROC curve of 0.5 means that synthetic and real hands cannot be distinguished, 1.0 that they
+always can. Hands of one shape are compared, by the features that the sign model gets; the classifier is trained on half
+of them and evaluated on the other half.
 """
 
 import argparse
@@ -24,11 +24,13 @@ Array = NDArray[np.float64]
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description="Compare made hands with those of people.")
-    parser.add_argument("--data", type=Path, default=DATA, help="folder with the folders hagrid-dev and photos")
+    parser = argparse.ArgumentParser(description="Compare synthetic hands with those of people.")
+    parser.add_argument(
+        "--data", type=Path, default=DATA, help="folder that contains the folders hagrid-dev and photos"
+    )
     folders = [folder for name in FOLDERS if (folder := parser.parse_args().data / name).is_dir()]
     if not folders:
-        raise SystemExit(f"none of the folders {', '.join(FOLDERS)} is there; name where they are with --data")
+        raise SystemExit(f"none of the folders {', '.join(FOLDERS)} exists; set their parent folder with --data")
     real: dict[str, list[Array]] = {}
     for folder in folders:
         for kind, coordinates in seen_hands(folder, "report"):
@@ -46,7 +48,7 @@ def main() -> None:
 
 
 def separability(real: Array, made: Array) -> float:
-    """Return the area under the ROC curve of a network that learns to tell the rows of both apart."""
+    """Return the area under the ROC curve of a network trained to distinguish the rows of both."""
     random = np.random.default_rng(1)
     made = made[random.permutation(len(made))[: 4 * len(real)]]
     rows = np.concatenate([real, made])
@@ -61,7 +63,7 @@ def separability(real: Array, made: Array) -> float:
 
 
 def area_under_roc(lower: Array, higher: Array) -> float:
-    """Return how often one of ``higher`` is above one of ``lower``, 0 to 1 (Mann and Whitney's U over all pairs)."""
+    """Return the share of pairs in which ``higher`` is above ``lower``, 0 to 1 (Mann-Whitney U)."""
     above = higher[:, None] > lower[None, :]
     return float(above.mean() + 0.5 * (higher[:, None] == lower[None, :]).mean())
 

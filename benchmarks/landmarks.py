@@ -1,7 +1,7 @@
-"""How long it takes from a JPEG to the landmarks of a hand, beside the parts of it that cannot be saved.
+"""Time from a JPEG to the landmarks of a hand, compared with the parts that cannot be avoided.
 
-Run ``python benchmarks/landmarks.py``, if you like with your own clip of a hand. All parts are timed in turn on each
-frame, so that a busy machine slows them alike, and the ratio is the median of each frame's own. One thread.
+Run ``python benchmarks/landmarks.py``, optionally with your own clip of a hand. All parts are timed in turn on each
+frame, so that a busy machine slows them alike; the ratio is the median over frames. One thread.
 """
 
 import argparse
@@ -17,11 +17,11 @@ from handsteer.recognition.landmark_models import find_pair
 from handsteer.recognition.landmarker import MediaPipeLandmarker
 
 CLIP = Path(__file__).parents[2] / "shared" / "data" / "videos" / "dex-retargeting_human_hand_video_1280x720.mp4"
-PARTS = ("JPEG decode", "landmark model", "palm model", "JPEG to landmarks, hand followed")
+PARTS = ("JPEG decode", "landmark model", "palm model", "JPEG to landmarks, hand tracked")
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description="Time the way from a 640x480 JPEG to the landmarks of a hand.")
+    parser = argparse.ArgumentParser(description="Measure the time from a 640x480 JPEG to the landmarks of a hand.")
     parser.add_argument("--clip", type=Path, default=CLIP, help="a video of one hand that stays in view")
     parser.add_argument("--frames", type=int, default=300)
     parser.add_argument("--model", choices=["fast", "full", "lite"], default="fast")
@@ -37,12 +37,12 @@ def read_jpegs(clip: Path, count: int) -> list[np.ndarray]:
     while len(files) < count and (image := capture.read()[1]) is not None:
         files.append(cv2.imencode(".jpg", cv2.resize(image, (640, 480), interpolation=cv2.INTER_AREA))[1])
     if not files:
-        raise SystemExit(f"{clip}: no frames to read; name a video with --clip")
+        raise SystemExit(f"{clip}: no frames; name a video with --clip")
     return files
 
 
 def measure(files: list[np.ndarray], model: str) -> np.ndarray:
-    """Return the (n, 4) seconds of each part, for the n frames that found the hand followed."""
+    """Return the (n, 4) seconds of each part, for the n frames with a tracked hand."""
     landmarker = MediaPipeLandmarker(LandmarksConfig(model=model))
     palm, landmark = (load(path) for path in find_pair(model))
     following = False
@@ -55,7 +55,7 @@ def measure(files: list[np.ndarray], model: str) -> np.ndarray:
         marks.append(time.perf_counter())
         palm.invoke()
         marks.append(time.perf_counter())
-        # As the recogniser does while a sign is given.
+        # As in the recogniser while a sign is shown.
         hands = landmarker.detect(decode(file), search=False)
         marks.append(time.perf_counter())
         if following:
@@ -78,7 +78,7 @@ def load(path: Path) -> Interpreter:
 
 def report(seconds: np.ndarray) -> None:
     if not len(seconds):
-        raise SystemExit("no hand was followed in this clip; name another with --clip")
+        raise SystemExit("no hand was tracked in this clip; name another with --clip")
     milliseconds = seconds * 1000
     print(f"{f'{len(seconds)} frames of 640x480':34} median     p99")
     for name, values in zip(PARTS, milliseconds.T, strict=True):

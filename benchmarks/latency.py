@@ -1,6 +1,6 @@
-"""How long it takes from the capture of a frame to the Twist that it leads to, beside the landmark models' own time.
+"""Time from the capture of a frame to the resulting Twist, compared with the landmark models' own time.
 
-Run ``python benchmarks/latency.py``, if you like with your own clip. The whole graph runs as in ``handsteer run
+Run ``python benchmarks/latency.py``, optionally with your own clip. The whole graph runs as in ``handsteer run
 --headless``, in real time; the models are timed within it, frame by frame, so that a busy machine slows both alike.
 """
 
@@ -22,7 +22,7 @@ FACTOR, ALLOWANCE_MS = 1.5, 5.0
 
 
 class TimedInterpreter(Interpreter):  # type: ignore[misc]
-    """Adds up how long the models take."""
+    """Adds up the models' time."""
 
     spent_s = 0.0
 
@@ -53,12 +53,12 @@ def measure(source: str, duration_s: float) -> np.ndarray:
         graph.start()
         graph.wait(duration_s)
     both = [(models[key], twists[key]) for key in models if key in twists]
-    return np.array(both[10:]) * 1000  # the first frames warm the models up
+    return np.array(both[10:]) * 1000  # the first frames warm up the models
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description="Time the way from the capture of a frame to the Twist.")
-    parser.add_argument("--camera", default=str(CLIP), help="a video, or any other camera")
+    parser = argparse.ArgumentParser(description="Measure the time from the capture of a frame to the Twist.")
+    parser.add_argument("--camera", default=str(CLIP), help="video, or any other camera")
     parser.add_argument("--duration", type=float, default=30.0, help="seconds")
     options = parser.parse_args()
     times = measure(options.camera, options.duration)

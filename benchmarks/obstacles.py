@@ -1,8 +1,8 @@
-"""How often a robot that is steered at random touches something, with the collision monitor and without.
+"""Number of collisions of a randomly steered robot, with and without the collision monitor.
 
-Run ``python benchmarks/obstacles.py``. Each drive is 60 commands of up to 1 m/s and 2 rad/s, of 0.2 to 2 s each, among
-eight posts within four walls; in every second one the scans come 0.1 s late and do not say so. Also what a command
-costs.
+Run ``python benchmarks/obstacles.py``. Each drive has 60 commands of up to 1 m/s and 2 rad/s, of 0.2 to 2 s each, among
+eight posts within four walls; in every second drive the scans are 0.1 s late with newer stamps. It also measures the
+CPU time of a command.
 """
 
 import time
@@ -32,7 +32,7 @@ WALLS = [
 
 
 class LateRobot(SimulatedRobot):
-    """Says what it saw one scan ago, as if it were new."""
+    """Returns the previous scan as if it were new."""
 
     _before: RangeScan | None = None
 
@@ -42,7 +42,7 @@ class LateRobot(SimulatedRobot):
 
 
 class TimedLimiter(ObstacleLimiter):
-    """Notes how much of the processor each command takes, in seconds."""
+    """Records the CPU time of each command, in seconds."""
 
     spent_s: list[float] = []  # noqa: RUF012 - for all of them
 
@@ -103,7 +103,7 @@ def main() -> None:
         touched = sum(one[0] > 0 for one in drives)
         print(f"| {str(enabled).lower()} | {touches} | {touched} of {DRIVES} | {metres:.0f} | {seconds:.0f} |")
     median, high = np.percentile(TimedLimiter.spent_s, [50, 99]) * 1000
-    print(f"\na command takes {median:.2f} ms (median), {high:.2f} ms (99 of 100) of the processor")
+    print(f"\na command takes {median:.2f} ms (median), {high:.2f} ms (99th percentile) of CPU time")
 
 
 if __name__ == "__main__":

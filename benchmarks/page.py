@@ -1,11 +1,11 @@
-"""What the page costs, and how soon a robot stands whose driver is gone.
+"""Cost of the page, and the time in which the robot stops after its driver is gone.
 
-Run ``python benchmarks/page.py``; parts by name: ``bytes``, ``viewers``, ``deaf``, ``gone``. The whole graph runs in
-this process, its page in another, at 640x480 and 30 frames a second. One real Chromium tells the bytes and the stopping
-times. What viewers cost is told with plain ones, in a process of their own, who take the pictures, the figures, the 3D
-view and the plots as a browser does but draw nothing: a browser that draws on the same processors would only tell what
-drawing costs. For the same reason the camera is a film of the virtual hand then, as a webcam does not draw either;
-``--camera virtual`` draws it. Rounds with none, one and four of them alternate, so that a busy machine slows all alike.
+Run ``python benchmarks/page.py``, optionally with the names of parts: ``bytes``, ``viewers``, ``deaf``, ``gone``. The
+whole graph runs in this process, its page in another, at 640x480 and 30 frames per second. A real Chromium measures
+bytes and stopping times. The cost of viewers is measured with simple clients in their own process, which receive
+pictures, metrics, the 3D view and the plots like a browser but draw nothing, because drawing on the same processors
+would dominate. For the same reason the camera is then a film of the virtual hand; ``--camera virtual`` draws it live.
+Rounds without, with one and with four viewers alternate, so that a busy machine slows all alike.
 """
 
 import argparse
@@ -49,14 +49,14 @@ PATIENCE_S = 60.0
 SETTLED_S = 1.0
 DRIVE = "Forward:3 Turn Left:3 Stop:2"
 FILM_S, FILM_FPS = 8, 30
-ACK_PERIOD_S = 3.0  # as NiceGUI's own script does it
+ACK_PERIOD_S = 3.0  # as NiceGUI's own script does
 
 
 class ServedPage:
-    """A graph and its page, and what its nodes were seen to do.
+    """A graph and its page, with a record of its messages.
 
     Args:
-        script: What the virtual hand shows.
+        script: Signs of the virtual hand.
         camera: A film of it, or ``virtual``.
     """
 
@@ -83,13 +83,13 @@ class ServedPage:
         self.commands.append((time.monotonic(), received.message.linear.x))
 
     def stands_since_s(self) -> float:
-        """Return when zero was commanded last after something else; infinity while the robot is to move."""
+        """Return the time of the last change to zero commands; infinity while the robot is commanded to move."""
         commands = list(self.commands)
         moves = [number for number, (_, speed) in enumerate(commands) if speed]
         return commands[moves[-1] + 1][0] if moves[-1] + 1 < len(commands) else math.inf
 
     def recognise(self, duration_s: float) -> tuple[float, float]:
-        """Return frames recognised a second, and the median time of one in ms, over ``duration_s``."""
+        """Return recognised frames per second, and the median time per frame in ms, over ``duration_s``."""
         recognition = self.graph.recognition
         recognition.processing = processing = LatencyLog()
         began_s, before = time.monotonic(), sum(recognition.counts.values())
@@ -108,7 +108,7 @@ def served(script: str, camera: str = "virtual") -> Iterator[ServedPage]:
 
 
 def film(path: Path, script: str, fps: int = FILM_FPS) -> None:
-    """Film the virtual hand going through ``script``."""
+    """Record a film of the virtual hand with ``script``."""
     clock = SteppedClock()
     config = load(None, None, {"virtual_hand": {"script": script, "background": "cluttered"}}).virtual_hand
     hand = VirtualHandCamera(config, width=640, height=480, fps=fps, clock=clock)
@@ -142,13 +142,13 @@ def load_now() -> str:
 
 
 def count_bytes(duration_s: float) -> None:
-    """Print what one viewer is sent: a real browser, and a plain one who takes every picture however busy all is."""
+    """Print the bytes sent to a real browser, and to a simple client that takes every picture under any load."""
     with served(DRIVE) as page, Relay(page.port) as relay:
         with browser() as chrome:
             visit(chrome, relay.port)
             print_bytes("a browser", page, relay, duration_s)
         with plain_viewers(relay.port, 1):
-            print_bytes("a plain viewer", page, relay, duration_s)
+            print_bytes("a simple client", page, relay, duration_s)
 
 
 def print_bytes(who: str, page: ServedPage, relay: Relay, duration_s: float) -> None:
@@ -164,7 +164,7 @@ def print_bytes(who: str, page: ServedPage, relay: Relay, duration_s: float) -> 
 
 @contextmanager
 def plain_viewers(port: int, count: int) -> Iterator[None]:
-    """Let ``count`` viewers look in a process of their own."""
+    """Run ``count`` viewers in their own process."""
     if not count:
         yield
         return
@@ -205,7 +205,7 @@ def resident_mb(process: str = "self") -> float:
 
 
 def count_deaf(rounds: int, duration_s: float, camera: str) -> None:
-    """Print what viewers cost who do not read, beside one who does."""
+    """Print the cost of viewers that do not read, next to one that does."""
     figures: dict[bool, list[tuple[float, float]]] = {False: [], True: []}
     with served(DRIVE, camera) as page, plain_viewers(page.port, 1):
         time.sleep(5.0)
@@ -228,7 +228,7 @@ def count_deaf(rounds: int, duration_s: float, camera: str) -> None:
 
 
 def count_gone(trials: int) -> None:
-    """Print how long after the driver has gone zero is commanded."""
+    """Print the time from the loss of the driver to the first zero command."""
     times: dict[str, list[float]] = {"tab closed": [], "network lost": []}
     with served("NONE:3600") as served_page, browser() as chrome:
         for _ in range(trials):
@@ -245,13 +245,13 @@ def count_gone(trials: int) -> None:
 
 
 def stop_ms(graph: ServedPage, chrome: Browser, how: str) -> float | None:
-    """Return how long after the driver was gone zero was commanded; None if the robot did not drive then."""
+    """Return the time from the loss of the driver to the first zero command; None if the robot did not drive."""
     with Relay(graph.port) as relay:
         page = visit(chrome, relay.port)
         page.locator(".pad").focus()
         page.keyboard.down("ArrowUp")
         if not comes_true(lambda: bool(graph.commands) and graph.commands[-1][1] > 0.1):
-            page.close()  # the browser was too busy to hold the key
+            page.close()  # the browser was too busy to repeat the key
             return None
         page.wait_for_timeout(float(np.random.default_rng().uniform(300, 800)))
         gone_s, was_moving = time.monotonic(), graph.commands[-1][1] > 0
@@ -260,7 +260,7 @@ def stop_ms(graph: ServedPage, chrome: Browser, how: str) -> float | None:
         else:
             relay.freeze()
         if not comes_true(lambda: graph.stands_since_s() < time.monotonic() - SETTLED_S):
-            sys.exit("the robot goes on without its driver")
+            sys.exit("the robot drives on without its driver")
         zero_s = graph.stands_since_s()
         if not page.is_closed():
             page.close()
@@ -278,7 +278,7 @@ def comes_true(condition: Callable[[], bool], within_s: float = 15.0) -> bool:
 
 
 def look(port: int, count: int) -> None:
-    """Look at the page ``count`` times until the input ends."""
+    """View the page ``count`` times until the input ends."""
     joined = threading.Semaphore(0)
     for _ in range(count):
         threading.Thread(target=read_pictures, args=(port,), daemon=True).start()
@@ -297,7 +297,7 @@ def read_pictures(port: int) -> None:
 
 
 async def read_page(port: int, joined: threading.Semaphore) -> None:
-    """Join the page as its own script does, and take what it sends."""
+    """Connect to the page as its own script does, and receive its messages."""
     address = f"http://127.0.0.1:{port}"
     with urllib.request.urlopen(address) as answer:
         html, cookies = answer.read().decode(), cookies_of(answer)
@@ -326,13 +326,15 @@ async def read_page(port: int, joined: threading.Semaphore) -> None:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description="Tell what the page costs.")
+    parser = argparse.ArgumentParser(description="Measure the cost of the page.")
     parser.add_argument("parts", nargs="*", help="bytes, viewers, deaf, gone; all of them by default")
-    parser.add_argument("--rounds", type=int, default=5, help="of each number of viewers")
-    parser.add_argument("--duration", type=float, default=10.0, help="seconds of each measurement")
-    parser.add_argument("--trials", type=int, default=20, help="of each way to be gone")
+    parser.add_argument("--rounds", type=int, default=5, help="rounds per number of viewers")
+    parser.add_argument("--duration", type=float, default=10.0, help="seconds per measurement")
+    parser.add_argument("--trials", type=int, default=20, help="trials per kind of loss")
     parser.add_argument("--look", nargs=2, type=int, metavar=("PORT", "COUNT"), help=argparse.SUPPRESS)
-    parser.add_argument("--camera", choices=("film", "virtual"), default="film", help="what viewers and deaf ones see")
+    parser.add_argument(
+        "--camera", choices=("film", "virtual"), default="film", help="camera for the parts viewers and deaf"
+    )
     options = parser.parse_args()
     if options.look:
         look(*options.look)

@@ -1,8 +1,8 @@
-"""How many simulated robots a core carries: N processes in N namespaces over DDS, each at 50 Hz.
+"""Number of simulated robots per core: N processes in N namespaces over DDS, each at 50 Hz.
 
-Run ``python benchmarks/robots.py`` with cyclonedds installed. Each robot is driven by a command 30 times a second, and
-its odometry is received, as it would be. ``in time`` says how many of the 50 odometry messages a second came: robots
-that a core cannot carry fall behind.
+Run ``python benchmarks/robots.py`` with cyclonedds installed. Each robot receives 30 commands per second, and its
+odometry is received. ``in time`` is the share of the 50 odometry messages per second that arrived; overloaded robots
+fall behind.
 """
 
 import argparse
@@ -36,13 +36,13 @@ def cpu_s(process: subprocess.Popen[bytes]) -> float:
 
 
 def memory_mb(process: subprocess.Popen[bytes]) -> float:
-    """Return the resident memory of ``process`` in MB, libraries that it shares with others included."""
+    """Return the resident memory of ``process`` in MB, including shared libraries."""
     pages = int(Path(f"/proc/{process.pid}/statm").read_text().split()[1])
     return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
 
 
 def measure(count: int, seconds: float) -> tuple[float, float, float]:
-    """Return CPU seconds a second and MB of one robot, and the share of its odometry that came, with ``count``."""
+    """Return CPU seconds per second and MB of one of ``count`` robots, and the share of its odometry that arrived."""
     os.environ["ROS_DOMAIN_ID"] = str(free_domain())
     names = [f"/r{number}" for number in range(1, count + 1)]
     session = join("dds", "benchmark", [])
@@ -82,7 +82,7 @@ def _wait_until(condition: Callable[[], bool]) -> None:
 
 
 def _drive(commands: list[Publisher[Twist]], seconds: float) -> float:
-    """Drive all robots in circles for ``seconds``; return how long it took."""
+    """Drive all robots in circles for ``seconds``; return the elapsed time."""
     began_s = time.monotonic()
     while (passed_s := time.monotonic() - began_s) < seconds:
         for command in commands:
@@ -97,7 +97,7 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=10.0)
     arguments = parser.parse_args()
     print(f"Robots at {_ODOMETRY_HZ} Hz over DDS, {os.cpu_count()} cores; load {os.getloadavg()[0]:.1f} before")
-    print(f"{'robots':>6} {'% of a core each':>17} {'robots a core':>14} {'MB each':>8} {'in time':>8}")
+    print(f"{'robots':>6} {'% of a core each':>17} {'robots per core':>14} {'MB each':>8} {'in time':>8}")
     for count in arguments.counts:
         each, memory, share = measure(count, arguments.seconds)
         print(f"{count:>6} {100 * each:>17.1f} {1 / each:>14.1f} {memory:>8.0f} {100 * share:>7.0f}%")

@@ -1,9 +1,9 @@
-"""How long it takes over ROS 1 from an image to the Twist that it leads to, and what each node needs.
+"""Time over ROS 1 from an image to the resulting Twist, and CPU and memory of each node.
 
 Run ``python benchmarks/ros1.py`` after ``make ros1``. Recognition, control and robot run as processes, with a real
-roscore; another process publishes pictures of the virtual hand, stamped when they are sent. Which image a Twist came
-from is told by /gesture/image_annotated, which carries the image's stamp and comes right after its sign; CPU and memory
-are taken in a second run, in which nobody looks at it.
+roscore; another process publishes pictures of the virtual hand, stamped when they are sent. A Twist is assigned to its
+image by /gesture/image_annotated, which carries the image's stamp and follows its sign; CPU and memory are measured in
+a second run, without subscribers of that topic.
 """
 
 import argparse
@@ -30,7 +30,7 @@ NODES = {"recognition": "/hand_sign_recognition", "control": "/hand_sign_control
 WIDTH, HEIGHT = 640, 480
 WARM_UP_S = 3.0
 THEIRS = """The original's nodes, measured in the same way: median 12 to 31 ms, recogniser 290 MB;
-at 120 images a second 374 ms in the median, 1 s at the worst."""
+at 120 images per second median 374 ms, maximum 1 s."""
 
 
 def pictures(folder: Path) -> Path:
@@ -46,7 +46,7 @@ def pictures(folder: Path) -> Path:
 
 
 def feed(path: str, rate: float) -> None:
-    """Publish the pictures of a file, over and over; the process that does nothing else."""
+    """Publish the pictures of a file in a loop, in its own process."""
     import rospy  # noqa: PLC0415
     from sensor_msgs.msg import Image  # noqa: PLC0415
 
@@ -71,7 +71,7 @@ def used(process: Process) -> tuple[float, float]:
 
 
 def latencies_ms(peer: Peer, wall_offset_s: float) -> np.ndarray:
-    """Return (n,) milliseconds from an image's stamp to its Twist, which comes just before the picture with it."""
+    """Return (n,) milliseconds from an image's stamp to its Twist, which precedes the annotated image."""
     twists = np.array([at_s for at_s, _ in peer.ask("get", topic=CMD_VEL)])
     found = []
     for at_s, (stamp_s,) in peer.ask("get", topic=ANNOTATED):
@@ -82,12 +82,12 @@ def latencies_ms(peer: Peer, wall_offset_s: float) -> np.ndarray:
 
 
 def processing_ms(peer: Peer) -> tuple[float, float]:
-    """Return the time that recognition takes for a frame, as it says itself: median and p99."""
+    """Return the time per frame as reported by the recognition: median and p99."""
     for _, (statuses,) in reversed(peer.ask("get", topic="/diagnostics")):
         for name, values in statuses:
             if name.endswith("hand_sign_recognition") and "processing_ms" in values:
                 return float(values["processing_ms"]), float(values["processing_p99_ms"])
-    raise SystemExit("hand_sign_recognition has not told how long a frame takes")
+    raise SystemExit("hand_sign_recognition has not reported its time per frame")
 
 
 def measure(graph: Ros1Graph, frames: Path, rate: float, duration_s: float) -> None:
@@ -119,9 +119,9 @@ def measure(graph: Ros1Graph, frames: Path, rate: float, duration_s: float) -> N
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description="Time the way from an image to its Twist over ROS 1.")
-    parser.add_argument("--duration", type=float, default=15.0, help="seconds of each run")
-    parser.add_argument("--rate", type=float, help="images a second; 30 and 120 unless told")
+    parser = argparse.ArgumentParser(description="Measure the time from an image to its Twist over ROS 1.")
+    parser.add_argument("--duration", type=float, default=15.0, help="seconds per run")
+    parser.add_argument("--rate", type=float, help="images per second; by default 30 and 120")
     parser.add_argument("--feed", help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.feed:

@@ -1,13 +1,13 @@
-"""Our recognition and control over ROS 1 beside the course's own: processor time, time to sign and Twist, start-up.
+"""Our recognition and control over ROS 1 compared with the course's: CPU time, time to sign and Twist, start-up.
 
-Run ``python benchmarks/ros1_nodes.py`` after ``make ros1``. On one roscore, each chain of recognition and control takes
-the same frames of a film of a hand (the virtual hand where there are no films), 30 a second, in turn, for some rounds.
-Counted are the processor time of each process, all threads, and when sign and Twist of each image come. Then each node
-is started some times, in turn, with images or signs coming: until its first sign or Twist.
+Run ``python benchmarks/ros1_nodes.py`` after ``make ros1``. On one roscore, each chain of recognition and control gets
+the same frames of a film of a hand (the virtual hand without films), 30 per second, in alternating rounds. Measured are
+the CPU time of each process, over all threads, and the times of sign and Twist of each image. Then each node is started
+several times, alternating, with images or signs being published, until its first sign or Twist.
 
-The course's nodes are fetched from their public address, at a fixed commit, where there is a network; else stand-ins of
-ours with the same libraries and calls are measured, and the output says so (``_original_nodes.py``). Theirs have no
-limits, watchdog, Stop or arming; all this is on in ours. Nobody looks at the annotated picture of either. Needs Linux.
+The course's nodes are fetched from their public address, at a fixed commit; without a network, stand-ins of ours with
+the same libraries and calls are measured, and the output reports it (``_original_nodes.py``). Theirs have no limits,
+watchdog, Stop or arming, all of which ours use. The annotated pictures have no subscribers. Needs Linux.
 """
 
 import argparse
@@ -44,7 +44,7 @@ _PROCESSOR_CLOCK = 2
 
 @dataclass
 class Figures:
-    """What one chain needed in one round; times in ms."""
+    """Measurements of one chain in one round; times in ms."""
 
     recognition: float
     control: float
@@ -53,12 +53,12 @@ class Figures:
 
 
 class Chain:
-    """Recognition and control of one kind, in a namespace of their own, and this process at both of its ends.
+    """Recognition and control of one kind in their own namespace, with this process at both ends.
 
     Args:
         name: ``course`` or ``ours``.
         graph: The ROS graph.
-        nodes: How to start the course's.
+        nodes: Commands of the course's nodes.
     """
 
     def __init__(self, name: str, graph: Ros1Graph, nodes: OriginalNodes) -> None:
@@ -71,7 +71,7 @@ class Chain:
         self._graph, self._nodes = graph, nodes
         self._image = Image(encoding="bgr8")
         self._images = rospy.Publisher(f"/{name}/image_raw", Image, queue_size=1, tcp_nodelay=True)
-        # Apart from those of the recognition: a control is started without one.
+        # Separate from the recognition's, because a control is started without one.
         self._words = rospy.Publisher(f"/{name}/gesture/hand_sign", String, queue_size=1, tcp_nodelay=True)
         self.sent_s: list[float] = []
         self.signs_s: list[float] = []
@@ -92,7 +92,7 @@ class Chain:
         return self._graph.run(*environment, *command, f"{_CMD_VEL}:=/{self.name}{_CMD_VEL}")
 
     def send(self, image: np.ndarray) -> None:
-        """Publish a picture that was captured now."""
+        """Publish a picture, stamped now."""
         import rospy  # noqa: PLC0415
 
         height, width, _ = image.shape
@@ -117,12 +117,12 @@ def at_rate(rate_hz: float, seconds: float = _FIRST_S) -> Iterator[int]:
 
 
 def processor_s(process: Process) -> float:
-    """Return the processor time of all threads of a process so far, in seconds."""
+    """Return the CPU time of all threads of a process so far, in seconds."""
     return time.clock_gettime(~process.popen.pid << 3 | _PROCESSOR_CLOCK)
 
 
 def play(chain: Chain, nodes: dict[str, Process], film: list[np.ndarray], rate_hz: float, seconds: float) -> Figures:
-    """Send the film for ``seconds``, after a second that does not count; return what the chain needed."""
+    """Send the film for ``seconds``, after an uncounted second; return the measurements."""
     warm = round(rate_hz * _WARM_UP_S)
     before = {verb: 0.0 for verb in nodes}
     for number in at_rate(rate_hz, _WARM_UP_S + seconds):
@@ -143,7 +143,7 @@ def play(chain: Chain, nodes: dict[str, Process], film: list[np.ndarray], rate_h
 
 
 def since_image_ms(sent_s: list[float], came_s: list[float]) -> list[float]:
-    """Return how long before each sign or Twist the newest image was sent: its own, unless images queue."""
+    """Return the age of the newest image at each sign or Twist: its own, unless images queue."""
     newest = np.searchsorted(sent_s, came_s) - 1
     return [1000 * (at_s - sent_s[index]) for at_s, index in zip(came_s, newest, strict=True) if index >= 0]
 
@@ -170,14 +170,14 @@ def measure_rounds(chains: list[Chain], films: dict[str, list[np.ndarray]], opti
 
 def report_rounds(film: str, figures: dict[str, list[Figures]]) -> None:
     print(f"\n{film}, load {os.getloadavg()[0]:.1f}")
-    print(f"{'':34} {'course':>9} {'ours':>9}   ratio of rounds, median (least to most)")
+    print(f"{'':34} {'course':>9} {'ours':>9}   ratio of rounds, median (min to max)")
     for title, value in (
-        ("recognition, CPU an image", lambda each: each.recognition),
-        ("control, CPU a sign", lambda each: each.control),
+        ("recognition, CPU per image", lambda each: each.recognition),
+        ("control, CPU per sign", lambda each: each.control),
         ("image to sign, median", lambda each: statistics.median(each.to_sign)),
-        ("image to sign, 99 of 100", lambda each: float(np.percentile(each.to_sign, 99))),
+        ("image to sign, p99", lambda each: float(np.percentile(each.to_sign, 99))),
         ("image to Twist, median", lambda each: statistics.median(each.to_twist)),
-        ("image to Twist, 99 of 100", lambda each: float(np.percentile(each.to_twist, 99))),
+        ("image to Twist, p99", lambda each: float(np.percentile(each.to_twist, 99))),
     ):
         report(title, "ms", *([value(each) for each in figures[name]] for name in (COURSE, OURS)))
 
@@ -196,7 +196,7 @@ def measure_starts(verb: str, chains: list[Chain], film: list[np.ndarray], start
     for number in range(starts + 1):
         for chain in chains[:: 1 if number % 2 else -1]:
             wall_s, processor_time_s = start_s(verb, chain, film)
-            # The first start compiles Python's modules and fills the machine's caches.
+            # The first start compiles Python modules and fills the caches.
             if number:
                 wall[chain.name].append(wall_s)
                 processor[chain.name].append(processor_time_s)
@@ -206,7 +206,7 @@ def measure_starts(verb: str, chains: list[Chain], film: list[np.ndarray], start
 
 
 def start_s(verb: str, chain: Chain, film: list[np.ndarray]) -> tuple[float, float]:
-    """Return the wall and processor seconds from the start of a node to the first message that it publishes."""
+    """Return the wall and CPU seconds from the start of a node to its first message."""
     feeds_images = verb == "recognition"
     came = chain.signs_s if feeds_images else chain.twists_s
     came.clear()
@@ -227,12 +227,12 @@ def start_s(verb: str, chain: Chain, film: list[np.ndarray]) -> tuple[float, flo
 def until_first(
     came: list[float], feed: Callable[[int], None], rate_hz: float, process: Process | None = None
 ) -> float:
-    """Feed until something comes; return the processor time of ``process`` by then, in seconds."""
+    """Send input until there is output; return the CPU time of ``process`` so far, in seconds."""
     for number in at_rate(rate_hz):
         feed(number)
         if came:
             return processor_s(process) if process else 0.0
-    raise SystemExit(f"nothing came within {_FIRST_S:.0f} s" + (f":\n{process.text}" if process else ""))
+    raise SystemExit(f"no message within {_FIRST_S:.0f} s" + (f":\n{process.text}" if process else ""))
 
 
 def end(process: Process) -> None:
@@ -241,7 +241,7 @@ def end(process: Process) -> None:
 
 
 def load_films(folder: Path, videos: Path, longest: int) -> dict[str, list[np.ndarray]]:
-    """Return frames by the name of their film; each goes forth and back, so that it can be repeated."""
+    """Return frames by the name of their film, each forwards and then backwards, so that it can be looped."""
     names = [name for name in list(CLIPS)[:2] if (videos / CLIPS[name]).is_file()]
     films = {name: list(clip_frames(videos / CLIPS[name], longest)) for name in names}
     if not films:
@@ -261,18 +261,18 @@ def joined(graph: Ros1Graph) -> Iterator[None]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description="Compare our nodes over ROS 1 with the course's own.")
+    parser = argparse.ArgumentParser(description="Compare our nodes over ROS 1 with the course's.")
     parser.add_argument("--original", type=Path, help="a clone of the course's ros_hand_gesture_recognition")
     parser.add_argument("--videos", type=Path, default=VIDEOS, help="folder with the clips of hands")
     parser.add_argument("--rounds", type=int, default=5)
-    parser.add_argument("--seconds", type=float, default=8.0, help="of each round")
-    parser.add_argument("--rate", type=float, default=30.0, help="images a second")
-    parser.add_argument("--starts", type=int, default=7, help="how often each node is started")
+    parser.add_argument("--seconds", type=float, default=8.0, help="seconds per round")
+    parser.add_argument("--rate", type=float, default=30.0, help="images per second")
+    parser.add_argument("--starts", type=int, default=7, help="starts of each node")
     parser.add_argument("--only", choices=("rounds", "starts"))
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as home, ros1_graph(Path(home)) as graph, joined(graph):
         nodes = original_nodes(Path(home), options.original)
-        print(f"beside ours: {nodes.what}")
+        print(f"compared with: {nodes.what}")
         for name, value in nodes.parameters.items():
             graph.set_parameter(f"/{COURSE}/hand_sign_recognition/{name}", value)
         chains = [Chain(name, graph, nodes) for name in (COURSE, OURS)]

@@ -1,8 +1,8 @@
-"""How soon the robot is stopped over ROS 1 when a node, or the master, dies by kill -9 while it drives.
+"""Time to stop the robot over ROS 1 after a node, or the master, is killed with kill -9 while it drives.
 
 Run ``python benchmarks/ros1_stop.py`` after ``make ros1``. All nodes run as processes, with a real roscore, and the
-virtual hand shows ``Forward``. Counted is the time from the kill to the first zero on the robot's topic; where no node
-is left that could send one, to the moment when the robot's wheels have become slower than they were told.
+virtual hand shows ``Forward``. Measured is the time from the kill to the first zero on the robot's topic; if no node is
+left to send one, to the time at which the robot's wheels are slower than commanded.
 """
 
 import argparse
@@ -36,7 +36,7 @@ def noted(peer: Peer, topic: str, since_s: float = 0.0) -> list[tuple[float, flo
 
 
 def stop_ms(graph: Ros1Graph, victim: str) -> float:
-    """Let the robot drive, kill ``victim``, and return how long it took until the robot was stopped."""
+    """Let the robot drive, kill ``victim``, and return the time until the robot was stopped."""
     peer = graph.peer()
     peer.ask("record", topic=CMD_VEL, package="geometry_msgs", type="Twist", fields=["linear.x"])
     peer.ask("record", topic=ODOM, package="nav_msgs", type="Odometry", fields=["twist.twist.linear.x"])
@@ -56,9 +56,11 @@ def stop_ms(graph: Ros1Graph, victim: str) -> float:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description="Time how soon the robot is stopped when a node or the master dies.")
-    parser.add_argument("--times", type=int, default=5, help="how often each is killed")
-    parser.add_argument("--only", choices=VICTIMS, help="kill nothing else")
+    parser = argparse.ArgumentParser(
+        description="Measure the time to stop the robot after a node or the master is killed."
+    )
+    parser.add_argument("--times", type=int, default=5, help="number of kills of each")
+    parser.add_argument("--only", choices=VICTIMS, help="kill only this one")
     options = parser.parse_args()
     for victim in VICTIMS if options.only is None else [options.only]:
         times = []
@@ -66,8 +68,8 @@ def main() -> None:
             with tempfile.TemporaryDirectory() as home, ros1_graph(Path(home)) as graph:
                 times.append(stop_ms(graph, victim))
         print(
-            f"kill -9 of {victim:12s} {len(times)} times: robot stopped after {np.median(times):.0f} ms in the median, "
-            f"{max(times):.0f} ms at the worst (limit {LIMIT_MS})"
+            f"kill -9 of {victim:12s} {len(times)} times: robot stopped after {np.median(times):.0f} ms (median), "
+            f"{max(times):.0f} ms (maximum; limit {LIMIT_MS})"
         )
 
 

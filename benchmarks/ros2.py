@@ -1,4 +1,4 @@
-"""What reaches a real ROS 2: Twists and pictures from this process to rclpy on Fast DDS, with its default buffers.
+"""Messages received by a real ROS 2: Twists and pictures from this process to rclpy on Fast DDS, default buffers.
 
 Run ``make ros2`` once, then ``python benchmarks/ros2.py``. Both ends read the same monotonic clock.
 """
@@ -32,7 +32,7 @@ SETTLE_S = 1.0
 
 
 def message(topic: Topic[Any], picture: Any) -> Any:
-    """Return a message that says when it was made."""
+    """Return a message that contains its creation time."""
     if topic is TWISTS:
         return twist(time.monotonic(), 0.0)
     header = Header(stamp=WallClock().stamp(time.monotonic()), frame_id=repr(time.monotonic()))
@@ -54,18 +54,18 @@ def measure(session: Session, peer: Any, topic: Topic[Any], count: int, rate: fl
     peer.ask("record", topic=topic.name, type=kind, fields=FIELDS[topic], reliable=reliable, depth=10)
     publisher = session.transport.advertise("talker", topic)
     eventually(lambda: publisher.has_subscribers)
-    time.sleep(SETTLE_S)  # the other end has to see this one, too
+    time.sleep(SETTLE_S)  # the other end must have discovered this one, too
     send(publisher, topic, count, rate)
     time.sleep(SETTLE_S)
     came = peer.ask("get", topic=topic.name)
     ages = np.array([1000 * (at_s - float(sent)) for at_s, (sent,) in came])
     figures = f"median {np.median(ages):6.2f} ms, p99 {np.percentile(ages, 99):6.2f} ms" if len(ages) else ""
-    print(f"  {kind:16s} {rate:5.0f} a second: {len(came):4d} of {count:4d} came; {figures}")
+    print(f"  {kind:16s} {rate:5.0f} per second: {len(came):4d} of {count:4d} received; {figures}")
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description="Measure what reaches a real ROS 2.")
-    parser.add_argument("--images", type=int, default=300, help="pictures of each kind to send, 30 a second")
+    parser = argparse.ArgumentParser(description="Measure the messages received by a real ROS 2.")
+    parser.add_argument("--images", type=int, default=300, help="pictures of each kind to send, 30 per second")
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as home, ros2_graph(Path(home)) as graph:
         os.environ.update({name: value for name, value in graph.env.items() if name.startswith("ROS_")})

@@ -1,10 +1,9 @@
-"""How well signs are recognised on photos of people, by source, with 95 % intervals.
+"""Recognition of signs on photos of people, by source, with 95 % intervals.
 
-Run ``python benchmarks/signs.py`` (``make bench-signs``). The photos are not part of the repository; docs/signs.md says
-what a folder of them looks like. Those of the part to report on are looked at, which nothing was tuned on; look at the
-others (``--part tune``) while you change something. Each is looked at raw and flipped, with ``--tilt`` turned too;
-forward photos turned by 180 degrees give Backward, thumbs up and down turned by 90 degrees give turns. Misses count as
-wrong.
+Run ``python benchmarks/signs.py`` (``make bench-signs``). The photos are not part of the repository; docs/signs.md
+describes their folders. By default the report part is used, on which nothing was tuned; use the other part (``--part
+tune``) during development. Each photo is evaluated raw and flipped, with ``--tilt`` also rotated; forward photos
+rotated by 180 degrees give Backward, thumbs up and down rotated by 90 degrees give turns. Misses count as wrong.
 """
 
 import argparse
@@ -32,17 +31,21 @@ TURNS = (TURN_LEFT, TURN_RIGHT)
 
 def main() -> None:
     parser = argparse.ArgumentParser(description="Measure the signs on photos of people.")
-    parser.add_argument("--data", type=Path, default=DATA, help="folder with the folders hagrid-dev and photos")
-    parser.add_argument("--part", choices=("report", "tune"), default="report", help="which photos to look at")
-    parser.add_argument("--tilt", type=float, nargs="+", default=[0.0], help="degrees to turn them by, each in turn")
-    parser.add_argument("--mistakes", action="store_true", help="also list each photo that was recognised wrong")
+    parser.add_argument(
+        "--data", type=Path, default=DATA, help="folder that contains the folders hagrid-dev and photos"
+    )
+    parser.add_argument("--part", choices=("report", "tune"), default="report", help="part of the photos")
+    parser.add_argument(
+        "--tilt", type=float, nargs="+", default=[0.0], help="degrees to rotate them by, one after the other"
+    )
+    parser.add_argument("--mistakes", action="store_true", help="also list each wrongly recognised photo")
     options = parser.parse_args()
     photos = [photo for folder in FOLDERS for photo in read_photos(options.data / folder, options.part)]
     if not photos:
-        raise SystemExit(f"{options.data}: none of the folders {', '.join(FOLDERS)} is in it; name another with --data")
+        raise SystemExit(f"{options.data} contains none of the folders {', '.join(FOLDERS)}; set another with --data")
     cv2.setNumThreads(1)
     results = list(look_at(photos, options.tilt))
-    print(f"the part to {options.part}, {len(photos)} photos, looked at {len(results)} times")
+    print(f"the part to {options.part}, {len(photos)} photos, {len(results)} views")
     print(f"{'':36}{'right, %':>24}{'of the hands found':>26}{'moved by mistake':>26}")
     groups = defaultdict(list)
     for group, result in results:
@@ -58,7 +61,7 @@ def main() -> None:
 
 
 def read_photos(folder: Path, part: str) -> list[LabelledPhoto]:
-    """Return the photos of one part of a folder; none where there is no such folder."""
+    """Return the photos of one part of a folder; none if it does not exist."""
     if not folder.is_dir():
         return []
     return [photo for photo in read_photo_labels(folder, SIGNS) if part_of(photo.path, photo.person_set) == part]
@@ -76,16 +79,16 @@ def look_at(photos: list[LabelledPhoto], tilts: list[float]) -> Iterator[tuple[s
 
 
 def group_of(result: PhotoResult, turn: float) -> str:
-    """Return the row of a result in a view that is turned by ``turn`` degrees."""
+    """Return the row of a result in a view that is rotated by ``turn`` degrees."""
     if result.truth == NONE:
         return f"no sign: {result.kind}"
     if result.truth in TURNS:
-        return "Turn, thumbs turned by 90" if turn else "Turn"
+        return "Turn, thumbs rotated by 90" if turn else "Turn"
     return result.truth
 
 
 def print_row(name: str, results: list[PhotoResult]) -> None:
-    """Print how many were right, of all and of those with a hand, and how many moved the robot by mistake."""
+    """Print how many were right, of all and of those with a hand, and how many moved the robot wrongly."""
     found = [result for result in results if result.hand_px is not None]
     shares = (right(results), right(found), moved(results))
     print(f"{name:36}{cell(shares[0]):>24}{cell(shares[1]):>26}{cell(shares[2]):>26}")

@@ -1,6 +1,6 @@
-"""How much faster than real time the robot is simulated: one row for each world that comes with handsteer.
+"""Speed of the simulation relative to real time, for each shipped world.
 
-Run it with ``python benchmarks/simulation.py``; it takes some seconds, on one core.
+Run ``python benchmarks/simulation.py``; it takes some seconds, on one core.
 """
 
 import time
@@ -14,7 +14,7 @@ _PERIOD_S = 0.02
 _ROUNDS = 3
 
 _DRIVES = {"standing": (0.0, 0.0), "straight": (0.05, 0.0), "circling": (0.5, 1.0), "fast ahead": (2.0, 0.0)}
-"""Forward m/s and turning rad/s; fast ahead, it soon pushes against the island of the obstacles."""
+"""Linear m/s and angular rad/s; going straight, it soon pushes against the island of the world obstacles."""
 
 
 def real_time_factor(world: str, linear_mps: float, angular_radps: float) -> float:

@@ -1,9 +1,9 @@
-"""Whether anything grows, or drifts, when handsteer runs for long.
+"""Growth and drift in long runs of handsteer.
 
-Run ``python benchmarks/soak.py``; parts by name: ``page``, ``hours``. ``page`` runs the whole graph in this process,
-and its page in another, on a film of the virtual hand at 640x480 and 60 frames a second, with one viewer of the page,
-while others come and go; all of them are in processes of their own. ``hours`` drives for hours of stepped time, all
-nodes in turn, with a painted hand in place of the camera and the landmark models, and the simulated robot.
+Run ``python benchmarks/soak.py``, optionally with the names of parts: ``page``, ``hours``. ``page`` runs the graph in
+this process and its page in another, on a film of the virtual hand at 640x480 and 60 frames per second, with one
+permanent viewer of the page and others that come and go, in their own processes. ``hours`` drives for hours of stepped
+time, all nodes in turn, with a painted hand instead of the camera and the landmark models, and the simulated robot.
 """
 
 import argparse
@@ -46,7 +46,7 @@ CYCLE_S = sum(seconds for _, seconds in CYCLE)
 
 @dataclass(frozen=True)
 class Holdings:
-    """What processes hold: resident memory in MB, open files and sockets, threads."""
+    """Resources of processes: resident memory in MB, open files and sockets, threads."""
 
     memory_mb: tuple[float, ...]
     files: int
@@ -54,7 +54,7 @@ class Holdings:
 
     @classmethod
     def now(cls, *others: str) -> "Holdings":
-        """Look at this process, and at ``others`` by their numbers."""
+        """Measure this process and ``others``, by process ID."""
         gc.collect()
         each = ("self", *others)
         files, threads = (sum(len(list(Path(f"/proc/{one}/{what}").iterdir())) for one in each) for what in _COUNTED)
@@ -72,7 +72,7 @@ class Holdings:
 
 
 def soak_page(duration_s: float, visits: int) -> None:
-    """Print what the process holds after a minute, and at the end of ``duration_s``, with ``visits`` visits in all."""
+    """Print the resources after a minute and at the end of ``duration_s``, with ``visits`` visits in total."""
     with tempfile.TemporaryDirectory() as folder:
         camera = Path(folder) / "film.avi"
         film(camera, DRIVE, FPS)
@@ -89,33 +89,33 @@ def soak_page(duration_s: float, visits: int) -> None:
                 while visitors.poll() is None:
                     time.sleep(min(60.0, visiting_s / 4))
                     print(f"  {time.monotonic() - began_s:4.0f} s: {Holdings.now(page.process)}", flush=True)
-                    page.commands.clear()  # the benchmark's own notes
-                assert visitors.returncode == 0, "the visitors did not get in"
+                    page.commands.clear()  # the benchmark's own records
+                assert visitors.returncode == 0, "the visitors could not connect"
             elapsed_s = time.monotonic() - warm_s
             frames = sum(page.graph.recognition.counts.values()) - frames
-            time.sleep(SETTLE_S)  # a page that is closed is kept for a moment, for who comes back
+            time.sleep(SETTLE_S)  # a closed page is kept for a moment, in case its viewer reconnects
             end = Holdings.now(page.process)
     print(f"after {duration_s:.0f} s and {visits} visits: {end}; {frames / elapsed_s:.1f} frames/s, {load_now()}")
     print(end.growth_since(after_a_minute))
 
 
 def visit(port: int, count: int, duration_s: float) -> None:
-    """Come and go ``count`` times within ``duration_s``."""
+    """Connect and disconnect ``count`` times within ``duration_s``."""
 
     async def come_and_go() -> None:
         began_s = time.monotonic()
         for number in range(count):
             try:
                 await one_visit(port)
-            except (OSError, socketio.exceptions.ConnectionError) as why:  # a busy machine, or one that is full
-                print(f"  a visitor did not get in: {why}", flush=True)
+            except (OSError, socketio.exceptions.ConnectionError) as why:  # the machine or the page is overloaded
+                print(f"  a visitor could not connect: {why}", flush=True)
             await asyncio.sleep(max(0.0, began_s + (number + 1) * duration_s / count - time.monotonic()))
 
     asyncio.run(come_and_go())
 
 
 async def one_visit(port: int) -> None:
-    """Fetch the page, join it as its script does, take a picture, look on for a moment, and leave."""
+    """Fetch the page, connect as its script does, receive a picture, stay for a moment, and leave."""
     address = f"http://127.0.0.1:{port}"
     with urllib.request.urlopen(address) as answer:
         html, cookies = answer.read().decode(), {"Cookie": cookies_of(answer)}
@@ -135,7 +135,7 @@ async def one_visit(port: int) -> None:
 
 
 class Driven(Chain):
-    """The chain with the simulated robot, and figures that do not grow."""
+    """The chain with the simulated robot, and records of constant size."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -147,7 +147,7 @@ class Driven(Chain):
         self.faults.subscribe("soak", CMD_VEL, self._on_command)
 
     def cycle(self) -> list[tuple[float, float]]:
-        """Show each sign once; return what was commanded."""
+        """Show each sign once; return the commands."""
         self.commands.clear()
         for sign, seconds in CYCLE:
             self.show(sign)
@@ -168,9 +168,9 @@ class Driven(Chain):
 
 
 def soak_hours(hours: float) -> None:
-    """Print what has grown, and what has drifted, after ``hours`` of stepped time."""
+    """Print growth and drift after ``hours`` of stepped time."""
     chain, began_s = Driven(), time.monotonic()
-    chain.run(0.5 / CAMERA_FPS)  # signs change between two frames, so that no rounding decides
+    chain.run(0.5 / CAMERA_FPS)  # signs change between two frames, so that rounding has no effect
     chain.cycle()
     cycles = round(hours * 3600 / CYCLE_S)
     first, begin_s = chain.cycle(), chain.clock.now()
@@ -198,11 +198,11 @@ def failed(chain: Chain) -> int:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description="Tell whether anything grows or drifts.")
+    parser = argparse.ArgumentParser(description="Measure growth and drift in long runs.")
     parser.add_argument("parts", nargs="*", help="page, hours; both by default")
-    parser.add_argument("--duration", type=float, default=600.0, help="seconds of page")
-    parser.add_argument("--visits", type=int, default=500, help="who come and go meanwhile")
-    parser.add_argument("--hours", type=float, default=4.0, help="hours of stepped time")
+    parser.add_argument("--duration", type=float, default=600.0, help="seconds of the part page")
+    parser.add_argument("--visits", type=int, default=500, help="visits during the part page")
+    parser.add_argument("--hours", type=float, default=4.0, help="hours of stepped time of the part hours")
     parser.add_argument("--visit", nargs=3, metavar=("PORT", "COUNT", "SECONDS"), help=argparse.SUPPRESS)
     parser.add_argument("--look", nargs=2, type=int, metavar=("PORT", "COUNT"), help=argparse.SUPPRESS)
     options = parser.parse_args()

@@ -1,7 +1,7 @@
-"""What teaching on the page costs the recognition of a running graph, and how long the training takes.
+"""Effect of teaching on the page on the recognition of a running graph, and duration of the training.
 
-Run ``python benchmarks/teach.py``. A whole graph sees the virtual hand, 640x480 at 30 frames a second, and nobody looks
-at a page. The frames that are recognised in a second are compared with those of the graph alone, right before. The last
+Run ``python benchmarks/teach.py``. A graph with the virtual hand runs at 640x480 and 30 frames per second, without
+viewers of the page. The recognised frames per second are compared with those of the graph alone, just before. The last
 row trains in the graph's own process instead, as the command line does.
 """
 
@@ -25,7 +25,7 @@ TRY_S = 8.0
 
 
 class Rate:
-    """Frames a second that are recognised, and how long each takes."""
+    """Recognised frames per second, and the time per frame."""
 
     def __init__(self, graph: Graph) -> None:
         self._graph = graph
@@ -57,7 +57,7 @@ def row(what: str, before: float, during: float, took_s: float) -> None:
 
 def main() -> None:
     print(f"{os.cpu_count()} processors, load before {os.getloadavg()[0]:.1f}, NumPy {np.__version__}\n")
-    print(f"{'frames recognised in a second':<34} {'alone':>6} {'then':>6} {'ratio':>8} {'took [s]':>8}")
+    print(f"{'recognised frames per second':<34} {'alone':>6} {'then':>6} {'ratio':>8} {'took [s]':>8}")
     with tempfile.TemporaryDirectory() as folder:
         files = {"dataset": Path(folder) / "signs.npz", "model": Path(folder) / "mine.npz"}
         base = {"camera": {"source": "virtual"}, "virtual_hand": {"script": "Peace:600"}}
@@ -77,16 +77,16 @@ def main() -> None:
             rate, began_s = Rate(graph), time.monotonic()
             lesson.train()
             wait_until(lambda: lesson.state.step != "train", lessons)
-            row("trained in a process of its own", before, rate.fps(), time.monotonic() - began_s)
+            row("training in its own process", before, rate.fps(), time.monotonic() - began_s)
             rate, began_s = Rate(graph), time.monotonic()
             time.sleep(TRY_S)
-            row("what was learnt is tried", before, rate.fps(), time.monotonic() - began_s)
+            row("learnt signs are tried", before, rate.fps(), time.monotonic() - began_s)
             lessons.close()
             time.sleep(1.0)
             before = alone(graph)
             rate, began_s = Rate(graph), time.monotonic()
             train_signs(takes, open_classifier(SignsConfig()))
-            row("trained in the graph's process", before, rate.fps(), time.monotonic() - began_s)
+            row("training in the graph's process", before, rate.fps(), time.monotonic() - began_s)
 
 
 if __name__ == "__main__":

@@ -1,13 +1,13 @@
-"""Our recognition beside the tutorial's pipeline: CPU a frame, start and memory, measured in one run that alternates.
+"""Our recognition compared with the tutorial's pipeline: CPU per frame, start-up and memory, in alternating runs.
 
 Run ``python benchmarks/tutorial.py``. The tutorial's pipeline is that of the ROS 101 course's node: MediaPipe 0.10.21,
-one hand, both confidences 0.7, a dense net, and drawing (``_tutorial_pipeline.py``). It gets an environment of its own
-in the user's cache, made the first time, from ``tutorial-requirements.txt``. Ours is the default configuration, once
-with and once without the annotated picture, which the node draws only while somebody looks.
+one hand, both confidences 0.7, a dense net, and drawing (``_tutorial_pipeline.py``). It runs in its own environment in
+the user's cache, created on first use from ``tutorial-requirements.txt``. Ours is the default configuration, with and
+without the annotated picture, which the node draws only for subscribers.
 
-All are processes of their own that take the same decoded frames, some dozens at a time, in turn. CPU is that of all
-threads. Every library may use one thread; MediaPipe decides by itself. Python's modules are compiled beforehand for
-all. Needs Linux, and the clips of hands.
+Each pipeline is a process that gets the same decoded frames, some dozens at a time, in turn. CPU time is that of all
+threads. Every library may use one thread; MediaPipe decides on its own. Python modules are compiled beforehand for all.
+Needs Linux, and the clips of hands.
 """
 
 import argparse
@@ -36,9 +36,9 @@ CACHE = platformdirs.user_cache_path("handsteer", appauthor=False) / "tutorial-m
 REQUIREMENTS = HERE / "tutorial-requirements.txt"
 SLIDESHOW = "slideshow_emre_MIT_640x480.mp4"
 CLIPS = {
-    "hand followed, clip 1": "dex-retargeting_human_hand_video_1280x720.mp4",
-    "hand followed, clip 2": "CoderEnko007_hand_544x960.mp4",
-    "slide show, hands searched for": SLIDESHOW,
+    "hand tracked, clip 1": "dex-retargeting_human_hand_video_1280x720.mp4",
+    "hand tracked, clip 2": "CoderEnko007_hand_544x960.mp4",
+    "slide show, hands searched": SLIDESHOW,
 }
 NOBODY = "no hand, a room"
 TUTORIAL, OURS, UNDRAWN = "tutorial", "handsteer", "handsteer, nothing drawn"
@@ -46,7 +46,7 @@ _PIPELINES = (TUTORIAL, OURS, UNDRAWN)
 _LONGER_SIDE = 640
 _CHUNK = 30
 _FIRST_WITH_HAND = 30
-"""The slide show shows nobody before."""
+"""First frame of the slide show with a hand."""
 _THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 
 
@@ -57,7 +57,7 @@ class Frames:
     Attributes:
         file: The raw pixels.
         shape: (n, height, width, 3), uint8, BGR.
-        dt_s: Seconds from one to the next.
+        dt_s: Seconds between frames.
     """
 
     file: Path
@@ -65,17 +65,17 @@ class Frames:
     dt_s: float
 
     def job(self, kind: str) -> str:
-        """Return the line that asks a pipeline's process to take them."""
+        """Return the job for a pipeline's process."""
         return json.dumps({"kind": kind, "frames": str(self.file), "shape": self.shape, "dt_s": self.dt_s})
 
 
 class Pipeline:
-    """One of the pipelines, in a process of its own.
+    """One of the pipelines, in its own process.
 
     Args:
-        name: One of those that ``_pipeline_process.py`` knows.
+        name: Name of the pipeline in ``_pipeline_process.py``.
         python: The interpreter of its environment.
-        log: File for what it says besides.
+        log: File for its log.
     """
 
     def __init__(self, name: str, python: Path, log: Path) -> None:
@@ -108,19 +108,19 @@ class Pipeline:
         return self.next_answer()
 
     def next_answer(self) -> dict[str, Any]:
-        """Return what it answers next."""
+        """Return its next answer."""
         assert self._process.stdout
         line = self._process.stdout.readline()
         if not line:
-            raise SystemExit(f"the pipeline {self._name} has ended by itself:\n{self._log.read_text()[-2000:]}")
+            raise SystemExit(f"the pipeline {self._name} has ended unexpectedly:\n{self._log.read_text()[-2000:]}")
         return dict(json.loads(line))
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description="Compare our recognition with the tutorial's MediaPipe pipeline.")
-    parser.add_argument("--videos", type=Path, default=VIDEOS, help="folder with the clips of hands")
-    parser.add_argument("--frames", type=int, default=240, help="how many frames of each clip")
-    parser.add_argument("--starts", type=int, default=7, help="how often each pipeline is started")
+    parser.add_argument("--videos", type=Path, default=VIDEOS, help="folder of the clips of hands")
+    parser.add_argument("--frames", type=int, default=240, help="frames per clip")
+    parser.add_argument("--starts", type=int, default=7, help="starts of each pipeline")
     options = parser.parse_args()
     reason = why_not(options.videos)
     if reason:
@@ -132,21 +132,21 @@ def main() -> None:
 
 
 def why_not(videos: Path) -> str | None:
-    """Return why nothing can be measured here; None when all is there, the tutorial's environment included."""
+    """Return why nothing can be measured here; None if everything, including the tutorial's environment, exists."""
     if sys.platform != "linux":
-        return "the memory of a process is read from /proc, which only Linux has"
+        return "the memory of a process is read from /proc, which needs Linux"
     missing = [name for name in CLIPS.values() if not (videos / name).is_file()]
     if missing:
-        return f"there is no {videos / missing[0]}: name the folder of the clips with --videos"
+        return f"{videos / missing[0]} does not exist: set the folder of the clips with --videos"
     return make_environment()
 
 
 def make_environment() -> str | None:
-    """Make the environment with the tutorial's packages, unless it is there; return why that cannot be done."""
+    """Create the environment with the tutorial's packages if missing; return the reason for a failure."""
     stamp = CACHE / "requirements.txt"
     if stamp.is_file() and stamp.read_text() == REQUIREMENTS.read_text():
         return None
-    print(f"making an environment with MediaPipe in {CACHE}", file=sys.stderr)
+    print(f"creating an environment with MediaPipe in {CACHE}", file=sys.stderr)
     shutil.rmtree(CACHE, ignore_errors=True)
     install = [str(tutorial_python()), "-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--no-input"]
     for command in (
@@ -180,13 +180,13 @@ def measure_start(videos: Path, folder: Path, starts: int) -> dict[str, np.ndarr
                 cpu_s = pipeline.ask(frames.job("start"))["cpu_s"]
                 wall_s = time.perf_counter() - pipeline.began_s
                 measured.append((wall_s, cpu_s, pipeline.next_answer()["peak_mb"]))
-    # The first start compiles Python's modules and fills the machine's caches.
+    # The first start compiles Python modules and fills the caches.
     return {name: np.array(measured[1:]) for name, measured in rows.items()}
 
 
 def report_start(measured: dict[str, np.ndarray]) -> None:
     starts = len(measured[OURS])
-    print(f"{f'{starts} starts each, median':34} {TUTORIAL:>10} {OURS:>10}   ratio (least to most)")
+    print(f"{f'{starts} starts each, median':34} {TUTORIAL:>10} {OURS:>10}   ratio (min to max)")
     for column, (title, unit) in enumerate(
         [("start to first result, wall", "s"), ("start to first result, CPU", "s"), ("peak memory", "MB")]
     ):
@@ -200,18 +200,18 @@ def report_start(measured: dict[str, np.ndarray]) -> None:
 
 
 def measure_cpu(videos: Path, folder: Path, count: int) -> dict[str, dict[str, list[dict[str, Any]]]]:
-    """Return for each workload and each pipeline its answers, one a round."""
+    """Return the answers of each pipeline for each workload, one per round."""
     workloads: dict[str, dict[str, list[dict[str, Any]]]] = {}
     for workload in (*CLIPS, NOBODY):
         answers: dict[str, list[dict[str, Any]]] = {name: [] for name in _PIPELINES}
         with ExitStack() as stack:
             pipelines = {name: stack.enter_context(start(name, folder)) for name in _PIPELINES}
             for number, frames in enumerate(chunks(workload, videos, folder, count)):
-                # Whoever goes first finds the machine as the others left it: that shall be each in its turn.
+                # The order rotates, because the first one finds the caches as the others left them.
                 turn = number % len(_PIPELINES)
                 for name in (*_PIPELINES[turn:], *_PIPELINES[:turn]):
                     answers[name].append(pipelines[name].ask(frames.job("run")))
-        # The first round has the start of the models in it.
+        # The first round includes loading the models.
         workloads[workload] = {name: each[1:] for name, each in answers.items()}
     return workloads
 
@@ -230,7 +230,7 @@ def chunks(workload: str, videos: Path, folder: Path, count: int) -> Iterator[Fr
 
 
 def clip_frames(clip: Path, count: int) -> Iterator[np.ndarray]:
-    """Yield up to ``count`` frames of a clip, the longer side as long as that of a webcam's picture."""
+    """Yield up to ``count`` frames of a clip, scaled so that the longer side equals a webcam's."""
     capture = cv2.VideoCapture(str(clip))
     for _ in range(count):
         done, image = capture.read()
@@ -241,7 +241,7 @@ def clip_frames(clip: Path, count: int) -> Iterator[np.ndarray]:
 
 
 def rooms(count: int) -> Iterator[np.ndarray]:
-    """Yield pictures of rooms that nobody is in, with a camera's noise."""
+    """Yield pictures of empty rooms, with a camera's noise."""
     random = np.random.default_rng(0)
     for number in range(count):
         if number % _CHUNK == 0:
@@ -257,7 +257,7 @@ def written(images: list[np.ndarray], file: Path, dt_s: float) -> Frames:
 
 def report_cpu(workloads: dict[str, dict[str, list[dict[str, Any]]]]) -> None:
     print(
-        f"\n{'CPU a frame':32} {'pipeline':25} {'mean':>6} {'median':>7} {'hands':>6}   ratio of rounds (least to most)"
+        f"\n{'CPU per frame':32} {'pipeline':25} {'mean':>6} {'median':>7} {'hands':>6}   ratio of rounds (min to max)"
     )
     for workload, answers in workloads.items():
         theirs = round_means(answers[TUTORIAL])
@@ -273,7 +273,7 @@ def report_cpu(workloads: dict[str, dict[str, list[dict[str, Any]]]]) -> None:
 
 
 def round_means(rounds: list[dict[str, Any]]) -> np.ndarray:
-    """Return the mean CPU milliseconds a frame of each round."""
+    """Return the mean CPU milliseconds per frame of each round."""
     return np.array([np.mean(each["cpu_ms"]) for each in rounds])
 
 

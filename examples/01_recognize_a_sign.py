@@ -1,4 +1,4 @@
-"""Tell which sign a picture shows.
+"""Recognise the sign in a picture.
 
 Run ``python examples/01_recognize_a_sign.py photo.jpg``; without a photo, a virtual hand is drawn.
 """
@@ -15,7 +15,7 @@ from handsteer.config import VirtualHandConfig
 
 def main() -> None:
     if len(sys.argv) > 1:
-        image = read_photo(Path(sys.argv[1]))  # as cv2.imread, with a clear error, and turned as the photo says
+        image = read_photo(Path(sys.argv[1]))  # like cv2.imread, but with clear errors, and rotated as in its EXIF data
     else:
         clock = SteppedClock()
         camera = VirtualHandCamera(VirtualHandConfig(script="Turn Left:5"), width=640, height=480, fps=30, clock=clock)

@@ -1,4 +1,4 @@
-"""Run the whole graph from Python, faster than real time, and look at where the robot ends."""
+"""Run the whole graph from Python, faster than real time, and print where the robot ends."""
 
 from handsteer.clock import SteppedClock
 from handsteer.config import CameraConfig, Config, ControlConfig, VirtualHandConfig

@@ -1,4 +1,4 @@
-"""Add a node of your own: it listens to the signs and to the odometry, and says what happens."""
+"""Add your own node, which subscribes to the signs and the odometry."""
 
 from handsteer.clock import SteppedClock
 from handsteer.config import CameraConfig, Config, VirtualHandConfig

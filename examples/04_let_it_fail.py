@@ -1,4 +1,4 @@
-"""What does the robot do when something fails? The whole graph in stepped time, on a transport that fails when told to.
+"""Test what the robot does when something fails: the whole graph in stepped time, on a transport with injected faults.
 
 Run ``python examples/04_let_it_fail.py``. Put your own nodes on the same transport to see what they do.
 """
@@ -20,8 +20,8 @@ SETTINGS = {
     "control": {"arming": "on", "linear_step": 0.05, "max_linear": 0.3},
 }
 FAULTS: dict[str, tuple[Topic[Any], LinkFault]] = {
-    "pictures are cut off": (IMAGE_RAW, CUT),
-    "signs stand still": (HAND_SIGN, FROZEN),
+    "no pictures arrive": (IMAGE_RAW, CUT),
+    "signs are frozen": (HAND_SIGN, FROZEN),
     "a fifth of the commands is lost": (CMD_VEL, LinkFault(drop=0.2)),
 }
 
@@ -40,8 +40,8 @@ def main() -> None:
             transport.heal(topic)
             graph.run_stepped(1.0)
             moved_m = graph.robot.state.truth.x - before_m
-            goes_on = any(command != (0.0, 0.0) for command in trace.commands[-10:])
-            print(f"{name} for 2 s: the robot {'goes on' if goes_on else 'stands'}, {moved_m:.2f} m further")
+            drives_on = any(command != (0.0, 0.0) for command in trace.commands[-10:])
+            print(f"{name} for 2 s: the robot {'drives on' if drives_on else 'stops'}, {moved_m:.2f} m further")
 
 
 if __name__ == "__main__":

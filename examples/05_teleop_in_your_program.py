@@ -1,7 +1,7 @@
-"""Drive by signs in a program of your own: an image in, a velocity out, with no nodes and no ROS.
+"""Drive by signs in your own program: images in, velocities out, without nodes or ROS.
 
-Run ``python examples/05_teleop_in_your_program.py``; put your camera and your robot where the drawn hand and the
-position are.
+Run ``python examples/05_teleop_in_your_program.py``; replace the virtual hand by your camera, and the position by your
+robot.
 """
 
 import math

@@ -1,4 +1,4 @@
-"""Chromium without a window, for the browser tests and the README's picture."""
+"""Headless Chromium for the browser tests and the README's pictures."""
 
 import ctypes
 import shutil
@@ -16,7 +16,7 @@ _FLAGS = (
     "--disable-background-networking",
     "--disable-component-update",
     "--disable-sync",
-    # WebGL without a graphics card.
+    # WebGL in software.
     "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader",
 )
@@ -24,7 +24,7 @@ _PR_CAPBSET_DROP, _CAP_SYS_NICE = 24, 23
 
 
 def find() -> str | None:
-    """Return the path of a Chromium on this machine; None when there is none."""
+    """Return the path of Chromium on this machine; None if it is not installed."""
     return next((path for name in NAMES if (path := shutil.which(name))), None)
 
 
@@ -33,17 +33,16 @@ def launch(playwright: Playwright, webcam: Path | None = None) -> Browser:
 
     Args:
         playwright: Starts it.
-        webcam: A file of JPEG pictures, one behind the other (``.mjpeg``), that its webcam shows over and over; without
-            one it has no webcam.
+        webcam: Motion JPEG file (``.mjpeg``) that its webcam plays in a loop; no webcam without it.
 
     Raises:
-        FileNotFoundError: There is none on this machine.
+        FileNotFoundError: It is not installed.
     """
     path = find()
     if path is None:
         raise FileNotFoundError(f"no browser found: install one of {', '.join(NAMES)}")
     if sys.platform == "linux":
-        # As root, Chromium gives its drawing, which here takes all processors, the right of way before the graph.
+        # As root, Chromium raises the priority of its rendering, which takes all processors here, above the graph's.
         ctypes.CDLL(None).prctl(_PR_CAPBSET_DROP, _CAP_SYS_NICE)
     flags = [*_FLAGS]
     if webcam is not None:

@@ -1,4 +1,4 @@
-"""Writes docs/configuration.md from the configuration models: every parameter with its default, range and meaning."""
+"""Writes docs/configuration.md from the configuration models: each parameter with its default, range and meaning."""
 
 import sys
 from pathlib import Path
@@ -21,16 +21,16 @@ camera:
   source: /dev/video2
 ```
 
-and run `handsteer run --config my.yaml`. On the command line each parameter is an option, as
-`--control.max-linear 0.5`; an option goes before the file, the file before the default. A node in a
-ROS graph takes ROS's own parameters too, as `_max_linear:=0.5` (ROS 1) or `--ros-args -p max_linear:=0.5` (ROS 2);
-they go before the file, and options before them. A name that does not exist and a value out of range are refused with
-exit code 2, before anything moves.
+and run `handsteer run --config my.yaml`. Each parameter is also a command line option, such as
+`--control.max-linear 0.5`; options override the file, and the file overrides the defaults. A node in a ROS graph also
+accepts ROS parameters, such as `_max_linear:=0.5` (ROS 1) or `--ros-args -p max_linear:=0.5` (ROS 2); they override the
+file, and options override them. Unknown names and values out of range are rejected with exit code 2, before anything
+moves.
 
-Parameters with a star can change while a node runs ([ros2.md](ros2.md#parameters-of-a-running-node)); the others are
-read when it starts.
+Parameters marked with * can change while a node runs ([ros2.md](ros2.md#parameters-of-a-running-node)); the others are
+read at start-up.
 
-This page is made from `src/handsteer/config.py` by `make docs`.
+This page is generated from `src/handsteer/config` by `make docs`.
 """
 
 

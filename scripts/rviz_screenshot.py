@@ -1,4 +1,4 @@
-"""Makes the picture of RViz in docs/ros1.md: both launches of the course on a screen that nobody sees.
+"""Makes the picture of RViz in docs/ros1.md: both launch files of the course, on a virtual screen.
 
 Usage: python scripts/rviz_screenshot.py [file.png]; needs ROS 1 (make ros1), rviz, xvfb and imagemagick.
 """
@@ -58,13 +58,13 @@ def main(path: Path) -> None:
         subprocess.run(["import", "-window", "root", "+dither", "-colors", "255", str(path)], env=env, check=True)
     size = path.stat().st_size
     if size > LARGEST_BYTES:
-        sys.exit(f"{path} has {size} bytes, it should have at most {LARGEST_BYTES}")
+        sys.exit(f"{path} has {size} bytes, more than {LARGEST_BYTES}")
     print(f"{path}: {size} bytes")
 
 
 @contextmanager
 def screen() -> Iterator[str]:
-    """A screen in memory; yields its name."""
+    """Start a virtual screen; yield its name."""
     read, write = os.pipe()
     command = ["Xvfb", "-displayfd", str(write), "-screen", "0", f"{SIZE}x24", "-nolisten", "tcp"]
     with process(command, dict(os.environ), pass_fds=(write,)):
@@ -75,7 +75,7 @@ def screen() -> Iterator[str]:
 
 @contextmanager
 def process(command: list[str], env: dict[str, str], pass_fds: tuple[int, ...] = ()) -> Iterator[None]:
-    """Run ``command`` for the length of the block."""
+    """Run ``command`` during the block."""
     running = subprocess.Popen(
         command, env=env, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, pass_fds=pass_fds
     )
@@ -91,18 +91,18 @@ def until(condition: Callable[[], bool]) -> None:
     end_s = time.monotonic() + PATIENCE_S
     while not condition():
         if time.monotonic() > end_s:
-            sys.exit(f"nothing to take a picture of within {PATIENCE_S:g} s")
+            sys.exit(f"not ready after {PATIENCE_S:g} s")
         time.sleep(0.2)
 
 
 def subscribers(topic: str, env: dict[str, str]) -> str:
-    """Return what rostopic says of those who listen to ``topic``."""
+    """Return the subscribers of ``topic``, as printed by rostopic."""
     said = subprocess.run(["rostopic", "info", topic], env=env, capture_output=True, text=True, check=False).stdout
     return said.partition("Subscribers:")[2]
 
 
 def driven_m(env: dict[str, str]) -> float:
-    """Return how far forward the robot is."""
+    """Return the x coordinate of the robot, in metres."""
     command = ["rostopic", "echo", "-n", "1", f"{ODOM}/pose/pose/position/x"]
     said = subprocess.run(command, env=env, capture_output=True, text=True, check=False).stdout.split()
     return float(said[0]) if said else 0.0

@@ -1,4 +1,4 @@
-"""Makes the README's pictures of the page: the virtual hand drives the robot, headless Chromium looks at it."""
+"""Makes the README's pictures of the page in headless Chromium, while the virtual hand drives the robot."""
 
 import base64
 import sys
@@ -41,7 +41,7 @@ def main() -> None:
     for path, largest in LARGEST_BYTES.items():
         size = path.stat().st_size
         if size > largest:
-            sys.exit(f"{path} has {size} bytes, it should have at most {largest}")
+            sys.exit(f"{path} has {size} bytes, more than {largest}")
         print(f"{path}: {size} bytes")
 
 
@@ -65,7 +65,7 @@ def opened(script: str) -> Iterator[Page]:
 
 
 def take(page: Page, path: Path) -> None:
-    """Save a picture of ``page`` once the robot has driven a while and drives on, with a hand in view."""
+    """Save a picture of ``page`` while the robot drives, some metres from its start, with a hand in view."""
     path.parent.mkdir(parents=True, exist_ok=True)
     page.wait_for_function(
         """metres => {
@@ -82,7 +82,7 @@ def take(page: Page, path: Path) -> None:
 
 
 def record(page: Page, path: Path) -> None:
-    """Save what ``page`` shows from the first sign on as an animation in real time."""
+    """Save ``page`` from the first sign on as an animation in real time."""
     page.wait_for_function("document.querySelector('.camera .sign').textContent === 'Stop'", timeout=PATIENCE_MS)
     frames: list[tuple[float, bytes]] = []
     end_s = time.monotonic() + SHOWN_S
@@ -103,7 +103,7 @@ def record(page: Page, path: Path) -> None:
 
 
 def thinned(frames: list[tuple[float, bytes]]) -> list[tuple[float, bytes]]:
-    """Return those of ``frames``, each with its time in seconds, that are far enough from one another."""
+    """Return ``frames``, each with its time in seconds, without those that follow another too soon."""
     kept = frames[:1]
     for frame in frames:
         if frame[0] - kept[-1][0] >= 1 / FRAMES_PER_S:
@@ -121,7 +121,7 @@ def animate(frames: list[tuple[float, bytes]], path: Path) -> None:
 
 
 def small(jpeg: bytes) -> np.ndarray:
-    """Return a JPEG file's picture at the animation's size, with the alpha that the format wants."""
+    """Return a JPEG file's picture at the animation's size, with the alpha channel that the format requires."""
     picture = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR)
     assert picture is not None
     height = round(picture.shape[0] * SHOWN_WIDTH / picture.shape[1])

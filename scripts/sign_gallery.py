@@ -1,4 +1,4 @@
-"""Draws the pictures of docs/signs.md: the virtual hand showing each sign, and shapes that are none."""
+"""Draws the pictures of docs/signs.md: the virtual hand with each sign, and shapes that are no sign."""
 
 from pathlib import Path
 
@@ -26,7 +26,7 @@ HALF = {"mcp": 42, "pip": 68, "dip": 38}
 
 
 def shape(*straight: str, thumb: dict[str, int], roll: float = 0.0, **fingers: dict[str, int]) -> HandPose:
-    """Return a right hand, palm to the camera; fingers that are not named are closed."""
+    """Return a right hand with its palm to the camera; fingers that are not given are closed."""
     degrees = {f"thumb_{joint}": angle for joint, angle in thumb.items()}
     for finger in FINGERS:
         joints = fingers.get(finger, STRAIGHT if finger in straight else CLOSED)
@@ -60,7 +60,7 @@ def main() -> None:
 
 
 def tile(label: str, pose: HandPose) -> np.ndarray:
-    """Return a mirrored picture of a hand, as people see themselves, with what it is and what is seen in it."""
+    """Return a mirrored picture of a hand, with its true and its recognised sign."""
     camera = Pinhole.webcam(640, 480)
     placement = pose.view.placement("Right")
     picture = render(pose_skeleton(pose.angles), placement, camera, Look(), make_background("plain", 640, 480))

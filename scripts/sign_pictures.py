@@ -1,4 +1,4 @@
-"""Draws the six signs, as you see yourself in a mirror, for the README: ``python scripts/sign_pictures.py``."""
+"""Draws the six signs, mirrored, for the README: ``python scripts/sign_pictures.py``."""
 
 from pathlib import Path
 
@@ -16,7 +16,7 @@ SIGNS = (FORWARD, BACKWARD, TURN_LEFT, TURN_RIGHT, GO, STOP)
 
 
 def picture(sign: str) -> np.ndarray:
-    """Return one sign of the right hand, (SIDE + LABEL, SIDE, 3) uint8, BGR, mirrored, its name below."""
+    """Return a mirrored picture of a sign and its name below, (SIDE + LABEL, SIDE, 3) uint8, BGR."""
     clock = SteppedClock()
     camera = VirtualHandCamera(VirtualHandConfig(script=f"{sign}:5"), width=640, height=480, fps=30, clock=clock)
     clock.advance(1.0)

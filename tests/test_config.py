@@ -5,8 +5,8 @@ import pytest
 
 from handsteer import config
 from handsteer.config import Config, cmd_vel_type, load
+from handsteer.config.presets import PRESETS
 from handsteer.errors import ConfigError
-from handsteer.presets import PRESETS
 
 
 def sections() -> list[tuple[str, Any]]:
@@ -56,7 +56,7 @@ def test_an_empty_file_is_the_defaults(tmp_path: Path) -> None:
         ("control: {actions: {Hi: fly}}", r"control.actions.Hi: 'fly' should be 'forward', .* or 'next_robot'"),
         ("control: {actions: {Stop: go}}", r"control.actions: {'Stop': 'go'} should leave Stop at 'stop'"),
         ("control: {actions: {none: turbo}}", r"control.actions: {'none': 'turbo'} should leave NONE at 'stop'"),
-        ("control: {actions: {Go: stop, GO: go}}", r"control.actions: .*should name each sign once, and 'GO' does not"),
+        ("control: {actions: {Go: stop, GO: go}}", r"control.actions: .*should name each sign once; 'GO' does not"),
         ("control: {actions: {' ': go}}", r"control.actions: .*should name each sign once"),
         ("- 1", r"expected sections such as 'control:' at the top, found list"),
         ("control: {", r"line 1: not valid YAML"),
@@ -108,7 +108,7 @@ def test_robots_have_names_that_differ(robots: list[str]) -> None:
 def test_old_names_still_count_with_one_warning(
     tmp_path: Path, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(config, "_OLD_NAMES_SEEN", set())
+    monkeypatch.setattr("handsteer.config.section._OLD_NAMES_SEEN", set())
     path = tmp_path / "old.yaml"
     path.write_text("signs: {bridge_time: 0.3, keep_confidence: 0.6}\nlandmarks: {second_look: false}")
     settings = load(path)
@@ -117,4 +117,4 @@ def test_old_names_still_count_with_one_warning(
     assert load(path, None, {"signs": {"dropout_hold": 0.4}}).signs.dropout_hold == 0.4
     assert load(None, {"signs": {"dropout_hold": 0.4}}, {"signs": {"bridge_time": 0.5}}).signs.dropout_hold == 0.5
     said = [record.getMessage() for record in caplog.records if "bridge_time" in record.getMessage()]
-    assert said == ["the parameter bridge_time is called dropout_hold now; the old name still counts"]
+    assert said == ["parameter bridge_time is deprecated: use dropout_hold"]

@@ -9,8 +9,8 @@ SAYS = {
     "02_drive_from_code": ["'Forward'", "the robot is at x"],
     "03_add_a_node": ["Forward", "Backward", "m/s"],
     "04_let_it_fail": [
-        "pictures are cut off for 2 s: the robot stands",
-        "a fifth of the commands is lost for 2 s: the robot goes on",
+        "no pictures arrive for 2 s: the robot stops",
+        "a fifth of the commands is lost for 2 s: the robot drives on",
     ],
     "05_teleop_in_your_program": ["disarmed", "driving: Forward", "the robot is at x"],
 }

@@ -34,7 +34,7 @@ def test_without_apt_it_refuses(tmp_path: Path) -> None:
     done = run(SCRIPT, str(tmp_path))
     assert done.returncode == 2
     assert done.stderr.splitlines() == [
-        "ROS 1 set-up: this needs apt: ROS 1 is packaged for Debian 12 and Ubuntu 22.04, and their relatives"
+        "ROS 1 set-up: this needs apt: ROS 1 is packaged for Debian 12 and Ubuntu 22.04, and their derivatives"
     ]
 
 
@@ -44,7 +44,7 @@ def test_without_an_environment_it_says_what_makes_one(tmp_path: Path) -> None:
     script = shutil.copy(SCRIPT, tmp_path / "scripts")
     done = run(Path(script), os.environ["PATH"])
     assert done.returncode == 2
-    assert done.stderr.splitlines() == ["ROS 1 set-up: there is no .venv yet: run make ros1, which makes it"]
+    assert done.stderr.splitlines() == ["ROS 1 set-up: there is no .venv yet: run make ros1, which creates it"]
 
 
 def test_it_waits_while_another_apt_is_at_work(tmp_path: Path) -> None:
@@ -74,5 +74,5 @@ def test_it_waits_while_another_apt_is_at_work(tmp_path: Path) -> None:
     assert "install" in said[3]
     for package in ("rosservice", "rosmsg", "roswtf", "rosbag"):
         assert f"python3-{package}" in said[3]
-    assert done.stderr.count("another apt is at work") == 1
+    assert done.stderr.count("waiting for another apt process") == 1
     assert done.returncode == 2

@@ -1,4 +1,4 @@
-"""The documentation is in plain technical English: words that were removed from it do not return."""
+"""Documentation and help texts are in plain technical English: words that were removed from them do not return."""
 
 import re
 from collections.abc import Iterator
@@ -7,11 +7,22 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
-GENERATED = {"configuration.md"}
 PAGES = [
     ROOT / "README.md",
     ROOT / "CONTRIBUTING.md",
-    *sorted(page for page in (ROOT / "docs").glob("*.md") if page.name not in GENERATED),
+    ROOT / "CHANGELOG.md",
+    *sorted((ROOT / "docs").glob("*.md")),
+]
+SOURCES = [
+    ROOT / "Makefile",
+    ROOT / "pyproject.toml",
+    ROOT / ".ci" / "run",
+    *sorted(
+        path
+        for folder in (*(f"src/handsteer/{each}" for each in ("cli", "config", "doctor")), "examples", "ros", "scripts")
+        for path in (ROOT / folder).rglob("*")
+        if path.is_file() and path.suffix != ".pyc"
+    ),
 ]
 
 BETTER = {
@@ -23,29 +34,47 @@ BETTER = {
     "beside": "next to, in addition to, compared with",
     "by itself": "automatically, alone",
     "by themselves": "automatically, alone",
+    "for ever": "forever, repeatedly",
     "for want of": "without",
     "goes before": "overrides, precedes",
     "go before": "override, precede",
+    "hands are told": "hands are recognised",
     "held up": "stalled, delayed",
     "hold up": "stall, delay",
     "holds up": "stalls, delays",
+    "if you like": "optionally",
+    "in step": "synchronised",
+    "in the place of": "instead of",
+    "in words of": "as",
     "lets go": "releases",
     "let go": "release",
     "looking on": "observing",
     "looks on": "observes",
     "mends": "fixes",
     "newcomers": "new nodes, new viewers",
+    "nobody": "no person, no node, no viewer",
     "nobody's word": "the condition itself",
     "onlooker": "observer",
+    "own accord": "automatically",
+    "said once": "published once",
     "says so": "reports it",
     "say so": "report it",
+    "signs are told": "signs are recognised",
     "so wished": "configured, requested",
+    "somebody": "another viewer, a node",
     "takes its leave": "leaves",
     "takes leave": "leaves",
+    "the same again": "repeated",
     "the same wish": "the same command",
     "told apart": "distinguished",
     "told as": "recognised as",
+    "told badly": "recognised poorly",
+    "told to stand": "stopped",
     "are told on": "are published on",
+    "unless said": "by default",
+    "unless told": "by default",
+    "what becomes of": "the effect on",
+    "what there is": "what exists",
     "what there is to know": "what you need to know",
     "who drives": "the driver, the active input",
     "whoever": "anyone who, the node that",
@@ -73,7 +102,7 @@ def unwanted(text: str) -> Iterator[tuple[int, str]]:
         yield prose.count("\n", 0, found.start()) + 1, " ".join(found[0].lower().split())
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+@pytest.mark.parametrize("page", [*PAGES, *SOURCES], ids=lambda page: str(page.relative_to(ROOT)))
 def test_a_page_has_no_unwanted_words(page: Path) -> None:
     places = [
         f'{page.relative_to(ROOT)}:{line}: "{word}"; better: {BETTER[word]}'

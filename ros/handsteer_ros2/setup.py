@@ -1,4 +1,4 @@
-"""Installs the package as colcon's ament_python has it."""
+"""Installs the package, as colcon expects of ament_python."""
 
 from pathlib import Path
 
@@ -9,7 +9,7 @@ NODES = ("camera", "recognition", "control", "robot", "steering")
 
 
 def files(folder: str, pattern: str) -> list[str]:
-    """Return the files of ``folder`` that fit ``pattern``."""
+    """Return the files of ``folder`` that match ``pattern``."""
     return sorted(str(path) for path in Path(folder).glob(pattern))
 
 

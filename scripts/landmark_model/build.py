@@ -1,7 +1,7 @@
-"""Makes the shipped ``hand_landmark_fast.tflite`` of MediaPipe's full model: ``make landmark-model``.
+"""Builds the shipped ``hand_landmark_fast.tflite`` from MediaPipe's full model: ``make landmark-model``.
 
-Most of it then computes with 8-bit integers. It is made of the model and of ``ranges.json`` (see ``ranges.py``) alone,
-and the same versions of the packages give the same bytes. Needs ai-edge-quantizer, which handsteer itself does not.
+Most of its operations use 8-bit integers. The result depends only on the model and ``ranges.json`` (see ``ranges.py``),
+and is reproducible with the same package versions. Needs ai-edge-quantizer, which handsteer itself does not.
 """
 
 import argparse
@@ -20,11 +20,11 @@ HERE: Final = Path(__file__).parent
 RANGES: Final = HERE / "ranges.json"
 TARGET: Final = HERE.parents[1] / "src" / "handsteer" / "recognition" / "hand_landmark_fast.tflite"
 
-# Which operations were left in float, and why, stands in docs/performance.md.
+# docs/performance.md explains which operations stay in float.
 WHOLLY_INTEGER: Final = range(5, 42)
 """Operations on 8-bit integers, scaled by the measured ranges, from the first layer of 56x56 to the last of 14x14."""
 INTEGER_INSIDE: Final = range(42, 56)
-"""Here only the convolutions are, which scale each picture by itself: what goes from one to the next stays float."""
+"""Only the convolutions are integer here, scaled for each picture; the values between them stay float."""
 
 
 def main() -> None:
@@ -39,15 +39,15 @@ def main() -> None:
 
 
 def quantized(model: bytes, ranges: dict[str, list[float]]) -> bytes:
-    """Return the folded ``model`` with most of its operations on integers.
+    """Return the folded ``model`` with most of its operations quantised.
 
     Args:
         model: As :func:`folded.folded` returns it.
-        ranges: The least and the largest number that each operation gives, by its name.
+        ranges: Smallest and largest output of each operation, by its name.
     """
     maker = quantizer.Quantizer(bytearray(model))
     for number, (kind, name, _) in enumerate(operations(model)):
-        # The quantiser knows an operation by the name of what it gives, with a semicolon after it.
+        # The quantiser identifies an operation by the name of its output, followed by a semicolon.
         if number in WHOLLY_INTEGER:
             maker.add_static_config(f"^{name};", TFLOperationName(kind), activation_num_bits=8, weight_num_bits=8)
         elif number in INTEGER_INSIDE and kind == "CONV_2D":

@@ -1,4 +1,4 @@
-"""The hands in folders of photos as the landmark model is given them, in two halves: to choose by, and to judge by."""
+"""Crops of hands in photos, as the landmark model gets them, in two halves: for calibration and for evaluation."""
 
 import csv
 import hashlib
@@ -21,12 +21,12 @@ Half = Literal["choose", "judge"]
 def photos(folders: list[Path], half: Half) -> Iterator[tuple[str, np.ndarray]]:
     """Yield the name and the picture, BGR, of each photo of one half.
 
-    Nobody is in both: the few people of the set ``emre`` judge, the students of ``sld`` choose, and where each photo
-    is of somebody else, a hash of its name decides.
+    No person is in both: the few people of the set ``emre`` are for evaluation, the students of ``sld`` for
+    calibration; where each photo shows another person, a hash of its name decides.
 
     Args:
-        folders: Each has an ``index.csv`` with the columns ``path`` and ``person_set``.
-        half: Which half.
+        folders: Each contains an ``index.csv`` with the columns ``path`` and ``person_set``.
+        half: The half to yield.
     """
     for folder in folders:
         with (folder / "index.csv").open(encoding="utf-8") as file:
@@ -41,7 +41,7 @@ def photos(folders: list[Path], half: Half) -> Iterator[tuple[str, np.ndarray]]:
 
 
 def crops(folders: list[Path], half: Half) -> Iterator[np.ndarray]:
-    """Yield a (224, 224, 3) uint8 RGB picture of each hand in the photos of one half, as a followed hand is seen."""
+    """Yield a (224, 224, 3) uint8 RGB crop of each hand in the photos of one half, as for a tracked hand."""
     landmarker = MediaPipeLandmarker(LandmarksConfig(model="full"))
     for _, photo in photos(folders, half):
         landmarker.reset()

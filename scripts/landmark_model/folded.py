@@ -1,7 +1,7 @@
-"""The hand landmark model with plain float32 weights, which is what a quantiser takes, and without idle channels.
+"""The hand landmark model with float32 weights, which the quantiser needs, and without constant channels.
 
-MediaPipe ships the weights as float16, each behind an operation that makes float32 of it when the model is loaded.
-Nearly half of the inner channels of its late layers have no weights at all: they give the same number for any picture.
+MediaPipe ships float16 weights, each followed by an operation that converts it to float32 when the model is loaded.
+Nearly half of the inner channels of its late layers have no weights: their output is the same for any picture.
 """
 
 from typing import Any, Final
@@ -15,10 +15,10 @@ _KINDS: Final = {number: kind for kind, number in vars(schema.BuiltinOperator).i
 
 
 def folded(content: bytes) -> bytes:
-    """Return the model ``content`` without float16 and idle channels; it computes the same numbers but for rounding.
+    """Return the model ``content`` without float16 and constant channels; its results are the same up to rounding.
 
-    Operations are numbered from 0 in the order in which they run, and what one gives is called as :func:`operations`
-    says, but for the model's own outputs.
+    Operations are numbered from 0 in the order in which they run; their outputs are named as in :func:`operations`,
+    except the model's own.
 
     Args:
         content: ``hand_landmark_full.tflite`` of MediaPipe.
@@ -40,7 +40,7 @@ def folded(content: bytes) -> bytes:
 
 
 def operations(content: bytes) -> list[tuple[str, str, int]]:
-    """Return kind, name and index of the output of each operation of the model ``content``, in their order."""
+    """Return kind, name and index of the output of each operation of the model ``content``, in order."""
     model = schema.ModelT.InitFromObj(schema.Model.GetRootAsModel(content, 0))
     (graph,) = model.subgraphs
     return [
@@ -72,9 +72,9 @@ def _make_weights_float32(model: Any) -> None:
 
 
 def _drop_idle_channels(model: Any) -> None:
-    """Leave out the channels that a depthwise convolution without weights makes constant.
+    """Remove the channels that are constant because a depthwise convolution has no weights for them.
 
-    What they add to the layer behind it becomes part of that one's bias.
+    Their contribution is added to the bias of the next layer.
     """
     (graph,) = model.subgraphs
     for middle in graph.operators:
@@ -106,7 +106,7 @@ def _readers(graph: Any, operation: Any) -> list[Any]:
 
 
 class _Array:
-    """The numbers of a constant tensor, which nothing else may share."""
+    """Return the values of a constant tensor, whose buffer must not be shared."""
 
     def __init__(self, model: Any, index: int) -> None:
         self._tensor = model.subgraphs[0].tensors[index]
@@ -132,7 +132,7 @@ def _drop_unused_tensors(graph: Any) -> None:
 
 
 def _drop_unused_buffers(model: Any) -> None:
-    buffers = model.buffers[:1]  # The format wants an empty one first.
+    buffers = model.buffers[:1]  # The format requires an empty one first.
     for tensor in model.subgraphs[0].tensors:
         data = model.buffers[tensor.buffer].data
         if data is not None and len(data):
@@ -141,7 +141,7 @@ def _drop_unused_buffers(model: Any) -> None:
         else:
             tensor.buffer = 0
     model.buffers = buffers
-    # It pointed at buffers, and describes the file that this is made from.
+    # The metadata refers to buffers, and describes the original file.
     model.metadata = model.metadataBuffer = None
 
 

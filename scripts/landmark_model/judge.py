@@ -1,7 +1,7 @@
-"""Compares the shipped 8-bit hand landmark model with MediaPipe's, on hands that it was not chosen by.
+"""Compares the shipped 8-bit hand landmark model with MediaPipe's, on hands that it was not calibrated with.
 
 Run ``python scripts/landmark_model/judge.py FOLDER...`` in the environment of handsteer, with folders of photos as
-``crops.photos`` takes them. One thread; the times are CPU times, of both models in turn.
+for ``crops.photos``. Uses one thread; the times are CPU times of both models, measured in turn.
 """
 
 import argparse
@@ -51,7 +51,7 @@ def report_landmarks(folders: list[Path], half: Half) -> None:
     print(f"world landmarks, mm:                   {spread(np.linalg.norm(off_mm, axis=-1))}")
     print(f"presence:                              {spread(np.abs(np.diff(presence[..., 0])))}")
     lost, flipped = ((value[:, 0, 0] > 0.5) != (value[:, 1, 0] > 0.5) for value in (presence, rightness))
-    print(f"no hand any more or newly: {lost.sum()}; the other hand: {flipped.sum()}")
+    print(f"hands lost or found: {lost.sum()}; the other hand: {flipped.sum()}")
 
 
 def load(model: str) -> Interpreter:
@@ -73,17 +73,17 @@ def spread(values: np.ndarray) -> str:
 
 def report_signs(folders: list[Path], half: Half) -> None:
     recognizers = [Recognizer(Config.model_validate({"landmarks": {"model": model}})) for model in MODELS]
-    told = []
+    results = []
     for name, photo in photos(folders, half):
         both = []
         for recognizer in recognizers:
             recognizer.reset()
             recognition = recognizer.step(photo, 0.0)
             both.append((recognition.seen, recognition.hand is not None))
-        told.append((name, both))
-    changed = [(name, both) for name, both in told if both[0][0] != both[1][0]]
-    found = np.array([[hand for _, hand in both] for _, both in told])
-    print(f"{len(told)} photos: another sign {len(changed)} ({100 * len(changed) / len(told):.2f} %); ", end="")
+        results.append((name, both))
+    changed = [(name, both) for name, both in results if both[0][0] != both[1][0]]
+    found = np.array([[hand for _, hand in both] for _, both in results])
+    print(f"{len(results)} photos: different sign {len(changed)} ({100 * len(changed) / len(results):.2f} %); ", end="")
     print(f"a hand is found in {found[:, 0].sum()} and {found[:, 1].sum()}")
     for name, ((full, _), (fast, _)) in changed:
         print(f"  {name}: full {full}, fast {fast}")

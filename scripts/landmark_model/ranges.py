@@ -1,7 +1,7 @@
-"""Measures the numbers that the hand landmark model's operations give on pictures of hands, into ``ranges.json``.
+"""Measures the output ranges of the hand landmark model's operations on pictures of hands, into ``ranges.json``.
 
 Run ``python scripts/landmark_model/ranges.py FOLDER...`` in the environment of handsteer, with folders of photos as
-``crops.photos`` takes them. Only the ranges are kept; nobody can be told by them.
+for ``crops.photos``. Only the ranges are stored; they identify no person.
 """
 
 import argparse
@@ -17,17 +17,17 @@ from handsteer.recognition.landmark_models import find_model
 
 TARGET = Path(__file__).with_name("ranges.json")
 OPERATIONS = range(4, 42)
-"""Those that ``build.py`` makes integer, and the one that gives them their input."""
+"""The operations that ``build.py`` quantises, and the one that provides their input."""
 KEPT_PERCENT = 99.9
-"""Numbers beyond are cut off: a few large ones would cost all others their resolution."""
+"""Outliers are clipped: a few large values would reduce the resolution of all others."""
 SAMPLES = 2000
-"""Numbers looked at of each operation and picture."""
+"""Values sampled per operation and picture."""
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description="Measure the ranges that the 8-bit hand landmark model is made with.")
+    parser = argparse.ArgumentParser(description="Measure the ranges for the 8-bit hand landmark model.")
     parser.add_argument("folders", type=Path, nargs="+", help="photos of people, with an index.csv")
-    parser.add_argument("--crops", type=int, default=600, help="how many pictures of hands are looked at")
+    parser.add_argument("--crops", type=int, default=600, help="number of pictures of hands")
     options = parser.parse_args()
     pictures = list(crops(options.folders, "choose"))
     if not pictures:
@@ -41,7 +41,7 @@ def main() -> None:
 
 
 def measured(pictures: list[np.ndarray]) -> dict[str, tuple[float, float]]:
-    """Return what all but a few of each operation's numbers lie between, by the operation's name.
+    """Return the range of nearly all outputs of each operation, by the operation's name.
 
     Args:
         pictures: (224, 224, 3) uint8 RGB each.

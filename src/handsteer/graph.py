@@ -81,7 +81,7 @@ class Graph:
             ConfigError: The graph was constructed without it.
         """
         if self._steering is None:
-            raise ConfigError("this graph was made without the node steering")
+            raise ConfigError("this graph was constructed without the node steering")
         return self._steering
 
     @property
@@ -203,7 +203,7 @@ class Summary:
         path_length_m: Distance driven.
         contacts: How often it has begun to touch an obstacle; None for a real one.
         course: Gates, bumps and time on its world's course, with the score in seconds; None if there is no course.
-        trouble: What was wrong with the robot at the end, as ``is not there: …``; empty if nothing was.
+        trouble: What was wrong with the robot at the end, such as ``is not there: …``; empty if nothing.
         callback_errors: Number of failed callbacks.
     """
 

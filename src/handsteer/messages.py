@@ -44,8 +44,8 @@ from rosbags.typesys.stores.ros2_jazzy import visualization_msgs__msg__Marker as
 from rosbags.typesys.stores.ros2_jazzy import visualization_msgs__msg__MarkerArray as MarkerArray
 from rosbags.typesys.stores.ros2_jazzy import visualization_msgs__msg__MeshFile as MeshFile
 
-from handsteer.presets import CmdVelType
 from handsteer.timeouts import STALE_S
+from handsteer.types import CmdVelType
 
 __all__ = [
     "Bool",

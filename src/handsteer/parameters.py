@@ -44,7 +44,7 @@ _WORDS: dict[Kind, str] = {
     "strings": "a list of texts",
 }
 _USED_TOGETHER = {"camera": ("virtual_hand",), "signs": ("landmarks",), "control": ("collision_monitor",)}
-_AT_START = "it is read when the node starts: give it then"
+_AT_START = "it is only read when the node starts"
 
 log = logging.getLogger(__name__)
 
@@ -73,9 +73,11 @@ def from_parameters(parameters: Mapping[str, Any], section: str, node: str) -> d
                 if inner in _fields(name):
                     values.setdefault(name, {})[inner] = _checked(name, inner, of, f"{node}/{name}/{inner}")
                 else:
-                    _say_unknown(f"{node}/{name}/{inner}", inner, {field: f"{name}/{field}" for field in _fields(name)})
+                    _warn_unknown(
+                        f"{node}/{name}/{inner}", inner, {field: f"{name}/{field}" for field in _fields(name)}
+                    )
         else:
-            _say_unknown(f"{node}/{name}", name, _names(section))
+            _warn_unknown(f"{node}/{name}", name, _names(section))
     return values
 
 
@@ -86,10 +88,10 @@ def _names(section: str) -> dict[str, str]:
     return others | nested | {name: name for name in _fields(section)}
 
 
-def _say_unknown(full_name: str, name: str, known: Mapping[str, str]) -> None:
+def _warn_unknown(full_name: str, name: str, known: Mapping[str, str]) -> None:
     near = difflib.get_close_matches(str(name), known, n=1)
     hint = f": did you mean {known[near[0]]}?" if near else ""
-    log.warning("ROS parameter %s does nothing, for there is no such parameter%s", full_name, hint)
+    log.warning("ignoring unknown ROS parameter %s%s", full_name, hint)
 
 
 def _checked(section: str, name: str, value: Any, full_name: str) -> Any:
@@ -226,13 +228,13 @@ class NodeParameters:
         if name in self._fixed or (place is not None and place.field not in place.model.live):
             raise ConfigError(f"{name} cannot be set: {_AT_START}")
         if place is None:
-            raise ConfigError(f"{name}: there is no such parameter; there are {', '.join(self.values())}")
+            raise ConfigError(f"{name}: there is no such parameter; the parameters are {', '.join(self.values())}")
         table = nested[place.section]
         key = place.field
         if place.entry is not None:
             table, key = table[place.field], place.entry
         if value is None and place.entry is None:
-            raise ConfigError(f"{name} cannot be taken away, only set to another value")
+            raise ConfigError(f"{name} cannot be removed, only set to another value")
         if value is None:
             table.pop(key, None)
             return

@@ -16,7 +16,7 @@ LARGEST_BYTES: Final = 1_000_000
 """Size of a text; the largest that is shipped has 4 kB."""
 
 MOST_VALUES: Final = 20_000
-"""Keys, values, lists and tables together; a thing of a world has some 20."""
+"""Keys, values, lists and tables together; an object of a world has some 20."""
 
 DEEPEST: Final = 32
 """Depth of nested lists and tables."""

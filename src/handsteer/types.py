@@ -12,6 +12,9 @@ from typing import Literal, get_args
 Handedness = Literal["Left", "Right"]
 """The person's hand."""
 
+CmdVelType = Literal["auto", "twist", "twist_stamped"]
+"""Type of velocity commands: geometry_msgs/Twist, geometry_msgs/TwistStamped, or the one the robot subscribes to."""
+
 STOP = "Stop"
 FORWARD = "Forward"
 BACKWARD = "Backward"

@@ -155,7 +155,7 @@ def test_a_signal_ends_within_two_seconds_with_the_robot_stopped(number: signal.
     shell = ["env", f"--{'ignore' if in_background else 'default'}-signal=INT"]
     code, out, err, took_s = interrupted_run(number, through=shell)
     assert code == 0, err
-    assert "the robot is told to stand" in err
+    assert "stopping the robot" in err
     assert json.loads(out)["frames"] > 5
     assert took_s < 2.0
 
@@ -203,7 +203,7 @@ def test_help_says_what_each_verb_does(capsys: pytest.CaptureFixture[str], argum
     [
         (["--robot", "hal"], "robot.kind: 'hal' should be 'sim', 'auto', 'ros2', 'dds', 'zenoh' or 'ros1'"),
         (["--robot", "dds", "--fast"], "--fast runs on simulated time, which a real robot (robot.kind dds) does not"),
-        (["--ros-args", "-r", "a:=b"], "'--ros-args': a simulated robot has no graph to take it"),
+        (["--ros-args", "-r", "a:=b"], "'--ros-args': ROS arguments need a real robot"),
         (["--control.cmd-vel-type=twist", "--robot.cmd-vel-type=twist_stamped"], "control.cmd_vel_type is twist and"),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else None,

@@ -50,7 +50,7 @@ def clip(tmp_path: Path) -> Path:
 def test_evaluate_prints_tables(capsys: pytest.CaptureFixture[str], few: Path) -> None:
     png = few / "confusion.png"
     text = prints(capsys, "signs", "evaluate", str(few), "--png", str(png))
-    assert "7 photos, and 0 that are not scored" in text
+    assert "7 photos, 0 not scored" in text
     for part in ("Recall", "False commands", "thumb_up", "Confusion", "Turn Left"):
         assert part in text
     assert shorter_side(png) > 200
@@ -170,10 +170,10 @@ def test_what_is_a_false_command_depends_on_the_actions(
 @pytest.mark.slow
 def test_evaluate_a_video(capsys: pytest.CaptureFixture[str], slideshow: Path, data_dir: Path) -> None:
     text = prints(capsys, "signs", "evaluate", str(slideshow))
-    assert "False commands: 0 in 22.5 s, 0.0 a minute (0.0-9.8)" in text
+    assert "False commands: 0 in 22.5 s, 0.0 per minute (0.0-9.8)" in text
     assert "slowest s" in text
     unlabelled = sorted((data_dir / "videos").glob("Coder*"))[0]
-    assert "There are no labels to compare with." in prints(capsys, "signs", "evaluate", str(unlabelled))
+    assert "No labels to compare with." in prints(capsys, "signs", "evaluate", str(unlabelled))
 
 
 @pytest.mark.parametrize(
@@ -184,17 +184,20 @@ def test_evaluate_a_video(capsys: pytest.CaptureFixture[str], slideshow: Path, d
         (["photo.jpg"], "photo.jpg is a photo: give the folder"),
         (["clip.mp4"], "clip.mp4 is not a video that can be decoded"),
         (["clip.avi", "--png", "x.png"], "--png: there are no labels for clip.avi"),
-        (["clip.avi", "--sweep"], "--sweep: it takes photos or a dataset; here are only videos"),
-        (["clip.avi", "--reliability", "x.png"], "--reliability: it takes photos or a dataset"),
+        (["clip.avi", "--sweep"], "--sweep needs photos or a dataset, not only videos"),
+        (["clip.avi", "--reliability", "x.png"], "--reliability needs photos or a dataset"),
         (["clip.avi", "--reliability", "x.jpg"], "--reliability: x.jpg should be a file name that ends in .png"),
         ([], "there is nothing to evaluate: give folders of labelled photos, videos, or datasets"),
-        ([".", "--rotate", "1;2"], "--rotate: '1;2' should be degrees, or several with commas, as -15,0,15"),
+        ([".", "--rotate", "1;2"], "--rotate: '1;2' should be degrees, or several separated by commas, as -15,0,15"),
         ([".", "--rotate", "0,400"], "--rotate: 400 should be from -360 to 360 degrees"),
         ([".", "--rotate", "400"], "--rotate: 400 should be from -360 to 360 degrees"),
         ([".", "--rotate", "nan"], "--rotate: nan should be from -360 to 360 degrees"),
         ([".", "--grace", "-1"], "--grace: -1 should be from 0 to 10 seconds"),
         ([".", "--png", "x.jpg"], "--png: x.jpg should be a file name that ends in .png"),
-        ([".", "--png", "gone/x.png"], "--png: gone/x.png should be a file name that ends in .png, in a folder"),
+        (
+            [".", "--png", "gone/x.png"],
+            "--png: gone/x.png should be a file name that ends in .png, in an existing folder",
+        ),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else None,
 )
@@ -227,7 +230,10 @@ def test_list_says_what_each_sign_does(capsys: pytest.CaptureFixture[str]) -> No
     }
     assert [sign for sign, entry in listed.items() if not entry["known"]] == ["Peace"]
     text = prints(capsys, "signs", "list", *actions)
-    assert "Peace       turbo       twice as fast while shown, within the limits (up to 1 m/s) (but the model" in text
+    assert (
+        "Peace       turbo       twice as fast while shown, within the limits (up to 1 m/s) (unknown to the model)"
+        in text
+    )
 
 
 def test_list_needs_no_landmark_models(

@@ -89,7 +89,7 @@ def test_a_dataset_is_evaluated(capsys: pytest.CaptureFixture[str]) -> None:
     )
     turned = json.loads(prints(capsys, "signs", "evaluate", "some.npz", "--json", "--rotate", "180"))
     assert turned["recall"]["Backward"]["rate"] > 0.95
-    assert "270 hands, and 0 that are not scored" in prints(capsys, "signs", "evaluate", "some.npz")
+    assert "270 hands, 0 not scored" in prints(capsys, "signs", "evaluate", "some.npz")
 
 
 def test_rows_of_others_are_imported(capsys: pytest.CaptureFixture[str]) -> None:
@@ -108,7 +108,7 @@ def test_rows_of_others_are_imported(capsys: pytest.CaptureFixture[str]) -> None
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["collect"], "--label is missing: say which sign is shown, as --label Hi"),
+        (["collect"], "--label is missing: name the sign, as in --label Hi"),
         (["collect", "--label", ""], "'' is no name for a sign"),
         (["collect", "--label", "Hi", "--takes", "0"], "--takes: 0 should be from 1 to 1000"),
         (["collect", "--label", "Hi", "--take-time", "nan"], "--take-time: nan should be from 0.2 to 60 seconds"),

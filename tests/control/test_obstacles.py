@@ -8,9 +8,8 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from handsteer.config import CollisionMonitorConfig
-from handsteer.control.footprint import gaps, on_a_circle, seen_from
+from handsteer.control.footprint import Points, gaps, on_a_circle, seen_from
 from handsteer.control.obstacles import ObstacleLimiter, limit
-from handsteer.control.scan_points import Points
 from handsteer.types import ZERO, Velocity
 
 RULE = CollisionMonitorConfig(enabled=True)

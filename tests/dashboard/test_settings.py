@@ -7,12 +7,12 @@ from hypothesis import strategies as st
 
 from handsteer.clock import SteppedClock
 from handsteer.config import Config, load
+from handsteer.config.presets import PRESETS
 from handsteer.dashboard.settings import Settings, SettingsFile, changed, defaults, loaded
 from handsteer.dashboard.settings_fields import FIELDS, FORM
 from handsteer.errors import ConfigError
 from handsteer.graph import Graph
 from handsteer.messages import CMD_VEL, HAND_SIGN, String
-from handsteer.presets import PRESETS
 
 
 class Bench:

@@ -134,7 +134,7 @@ def test_a_search_finds_names_and_meanings() -> None:
         "robot.max_linear",
         "robot.max_linear_acceleration",
     ]
-    assert "signs.confirm_time" in found("seen before it counts")
+    assert "signs.confirm_time" in found("recognised before it counts")
     assert found("nothing is called so") == []
 
 

@@ -65,7 +65,7 @@ def test_the_driver_sets_what_the_robot_does_and_saves_it(tmp_path: Path, monkey
         expect(row(page, "control.cmd_vel_type")).to_contain_text("they should be the same")
         expect(of(page, "control.cmd_vel_type")).to_have_value("auto")
 
-        search(page, "highest turning", 1)
+        search(page, "keep tracking", 1)
         page.get_by_label("Search the parameters").fill("")
         expect(page.locator(".state")).to_have_text("not saved yet")
         page.get_by_role("button", name="Save").click()

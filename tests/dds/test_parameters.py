@@ -44,7 +44,7 @@ def test_the_parameters_of_a_node_are_listed_read_and_described(dds: DdsGraph) -
     assert (value["type"], value["double_value"]) == (DOUBLE, 0.5)
     assert ask(dds, node, "get_parameter_types", "GetParameterTypes", names=["ramp"])["types"] in ([STRING], [4])
     (about,) = ask(dds, node, "describe_parameters", "DescribeParameters", names=["max_linear"])["descriptors"]
-    assert about["description"] == "Highest forward and backward speed [m/s]"
+    assert about["description"] == "Maximum linear speed [m/s]"
     assert about["floating_point_range"] == [{"from_value": 0.0, "to_value": 10.0, "step": 0.0}]
 
 

@@ -194,7 +194,7 @@ def test_nobody_listens_or_to_another_type(robots: Robots) -> None:
     robots.add("/cmd_vel", "/odom", stamped=True)
     process = robots.run("--robot", "dds", "--robot.cmd-vel-type", "twist", "--duration", "4")
     summary = summary_of(process)
-    line = "nobody listens on /cmd_vel for geometry_msgs/msg/Twist; is it on, are topic and type right"
+    line = "no node subscribes to /cmd_vel with geometry_msgs/msg/Twist; is it on, are topic and type right"
     assert f"handsteer: the robot is not there: {line}" in process.text
     assert line in summary["trouble"]
     assert summary["final_pose"]["x"] == 0.0

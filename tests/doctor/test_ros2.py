@@ -102,8 +102,8 @@ def controls(doctor: Doctor, home: Path, *names: str, **ours: str) -> Iterator[N
 def test_wrong_domain(alone: Doctor, tmp_path: Path) -> None:
     with controls(alone, tmp_path, "far", ROS_DOMAIN_ID="42"):
         words = (
-            "wrong: domain 5, this machine: nobody else; but domain 42 has /far. To meet them, set ROS_DOMAIN_ID=42 "
-            "here, or 5 there"
+            "wrong: domain 5, this machine: no other nodes; but domain 42 has /far. To reach them, set "
+            "ROS_DOMAIN_ID=42 here, or 5 there"
         )
         eventually(lambda: alone.says(ROS_DOMAIN_ID="5") == words, what=words)
         eventually(
@@ -119,13 +119,13 @@ def test_somebody_in_the_domain_looks_elsewhere(alone: Doctor, tmp_path: Path) -
         eventually(lambda: "ok: domain 0, the subnet: /far" in alone.says(**SUBNET), what="the node to start")
         eventually(lambda: "ok: domain 0, this machine: /far" in alone.says(), what="the node to be seen")
         (line,) = alone.says(ROS_LOCALHOST_ONLY="1").splitlines()
-        assert line.startswith("wrong: domain 0, this machine: somebody is in this domain on this machine, but is not")
+        assert line.startswith("wrong: domain 0, this machine: another node on this machine is in this domain, but was")
         assert "unset ROS_LOCALHOST_ONLY" in line
 
 
 @pytest.mark.slow
 def test_no_multicast(alone: Doctor) -> None:
-    assert "wrong: no multicast, by which nodes on the subnet are found: no network interface has it" in alone.says(
+    assert "wrong: no multicast, which finds the nodes on the subnet: no network interface supports it" in alone.says(
         **SUBNET
     )
     assert "multicast" not in alone.says()  # which needs none
@@ -165,7 +165,7 @@ def test_all_ports_of_a_domain_are_taken(here: Doctor) -> None:
 )
 def test_a_configuration_that_cannot_be_used(here: Doctor, uri: str, why: str) -> None:
     said = here.says(CYCLONEDDS_URI=uri, ROS_DOMAIN_ID=str(free_domain()))
-    assert re.fullmatch(rf"wrong: CYCLONEDDS_URI cannot be used: .*{re.escape(why)}.*; mend or unset it", said)
+    assert re.fullmatch(rf"wrong: CYCLONEDDS_URI cannot be used: .*{re.escape(why)}.*; fix or unset it", said)
 
 
 @pytest.mark.slow
@@ -177,7 +177,10 @@ def test_the_pages_port_is_taken(here: Doctor) -> None:
         findings = here.findings("--port", str(port), ROS_DOMAIN_ID=str(free_domain()))
     (said,) = [finding for finding in findings if finding["name"] == "port"]
     assert said["verdict"] == "missing"
-    assert said["detail"] == f"port {port}: Address already in use; end who has it, or choose another with --port"
+    assert (
+        said["detail"]
+        == f"port {port}: Address already in use; end the program that uses it, or choose another port with --port"
+    )
 
 
 @pytest.fixture
@@ -203,13 +206,13 @@ def test_without_cyclonedds(monkeypatch: pytest.MonkeyPatch) -> None:
     [
         ({"ROS_DOMAIN_ID": "x"}, "ROS_DOMAIN_ID is 'x': it should be a whole number from 0 to 232"),
         ({"ROS_LOCALHOST_ONLY": "yes"}, "ROS_LOCALHOST_ONLY is 'yes': it should be 0 or 1"),
-        ({"ROS_DOMAIN_ID": "150"}, "ROS_DOMAIN_ID is 150: above 101 the system may have given"),
-        ({"ROS_LOCALHOST_ONLY": "1", **SUBNET}, "so ROS_AUTOMATIC_DISCOVERY_RANGE=SUBNET does not count"),
-        ({"ROS_LOCALHOST_ONLY": "1", "ROS_STATIC_PEERS": "10.0.0.1"}, "ROS_STATIC_PEERS does not count"),
-        ({"ROS_DISCOVERY_SERVER": "10.0.0.1:11811"}, "nodes that are found by a server only are not seen"),
+        ({"ROS_DOMAIN_ID": "150"}, "ROS_DOMAIN_ID is 150: above 101 other programs may be using"),
+        ({"ROS_LOCALHOST_ONLY": "1", **SUBNET}, "so ROS_AUTOMATIC_DISCOVERY_RANGE=SUBNET is ignored"),
+        ({"ROS_LOCALHOST_ONLY": "1", "ROS_STATIC_PEERS": "10.0.0.1"}, "ROS_STATIC_PEERS is ignored"),
+        ({"ROS_DISCOVERY_SERVER": "10.0.0.1:11811"}, "nodes that use only a discovery server are not found"),
         (
             {"RMW_IMPLEMENTATION": "rmw_zenoh_cpp"},
-            "RMW_IMPLEMENTATION is rmw_zenoh_cpp: ROS 2's nodes do not speak DDS",
+            "RMW_IMPLEMENTATION is rmw_zenoh_cpp: ROS 2 nodes then do not use DDS",
         ),
     ],
     ids=lambda value: next(iter(value)) if isinstance(value, dict) else None,

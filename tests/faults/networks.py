@@ -17,9 +17,9 @@ FAULT_S, AFTER_S = 2.0, 1.5
 BRAKES_S = 0.6
 MOVES_MPS = 0.02
 LAYOUTS = {
-    "camera and robot, the others beyond the link": ("camera",),
-    "robot, the others beyond the link": (),
-    "camera, control and robot, recognition beyond the link": ("camera", "control"),
+    "camera and robot, the others across the link": ("camera",),
+    "robot, the others across the link": (),
+    "camera, control and robot, recognition across the link": ("camera", "control"),
 }
 """What is on the robot's machine, in words, and which nodes these are beside it."""
 
@@ -51,7 +51,7 @@ def rows() -> list[Row]:
         for words, begin, lasts_s in (
             ("the link is cut", Link.cut, FAULT_S),
             ("the link is cut", Link.cut, 0.7),
-            ("all comes 0.8 s late", _slow, FAULT_S),
+            ("all messages are delayed by 0.8 s", _slow, FAULT_S),
         )
     ]
 

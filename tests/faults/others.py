@@ -40,8 +40,10 @@ def _values() -> Iterator[Row]:
             chain.freeze("control")
             publish_for_ever(chain, CMD_VEL, lambda: twist(SPEED_MPS, number))
 
-        yield Row("/steering/cmd_vel", f"{word}, by another; then the hand is lowered", steer, lower_and_silence)
-        yield Row(CMD_VEL.name, f"{word} in a part, by another; the control is frozen", command, unfrozen("control"))
+        yield Row("/steering/cmd_vel", f"{word}, from another node; then the hand is lowered", steer, lower_and_silence)
+        yield Row(
+            CMD_VEL.name, f"{word} in one field, from another node; the control is frozen", command, unfrozen("control")
+        )
     for words, text in (
         ("an unknown word", "Dance"),
         ("an empty text", ""),
@@ -55,7 +57,7 @@ def _values() -> Iterator[Row]:
 
         yield Row(
             HAND_SIGN.name,
-            f"{words}, by another, without an end; the recognition is frozen; then it ends",
+            f"{words}, repeated by another node; the recognition is frozen; then it ends",
             sign,
             unfrozen("recognition"),
             silence,
@@ -64,7 +66,7 @@ def _values() -> Iterator[Row]:
     whole = image_message(np.zeros((48, 64, 3), np.uint8), header)
     for words, image in (
         ("has no size", Image(header, 0, 0, "bgr8", 0, 0, np.zeros(0, np.uint8))),
-        ("is cut short", Image(header, 48, 64, "bgr8", 0, 192, whole.data[:99])),
+        ("is truncated", Image(header, 48, 64, "bgr8", 0, 192, whole.data[:99])),
         ("has an unknown encoding", Image(header, 48, 64, "purple8", 0, 192, whole.data)),
     ):
 
@@ -86,9 +88,7 @@ def _seconds() -> Iterator[Row]:
         publish_for_ever(chain, CMD_VEL, lambda: twist(SPEED_MPS, 0.0))
         chain.run(0.5)
 
-    yield Row(
-        CMD_VEL.name, "a second publisher drives, the hand is lowered; then it falls silent", drive, end_reason=silence
-    )
+    yield Row(CMD_VEL.name, "a second publisher drives, the hand is lowered; then it stops", drive, end_reason=silence)
 
     def show(chain: Chain) -> None:
         chain.show()
@@ -96,7 +96,7 @@ def _seconds() -> Iterator[Row]:
 
     yield Row(
         HAND_SIGN.name,
-        "a second publisher says Forward, the hand is lowered; then it falls silent",
+        "a second publisher sends Forward, the hand is lowered; then it stops",
         show,
         end_reason=silence,
     )
@@ -109,7 +109,7 @@ def _seconds() -> Iterator[Row]:
 
     yield Row(
         IMAGE_RAW.name,
-        "a second camera shows one picture of Forward for ever, the hand is lowered",
+        "a second camera repeats one picture of Forward, the hand is lowered",
         frozen_beside,
         silence,
     )
@@ -122,4 +122,4 @@ def _seconds() -> Iterator[Row]:
         silence(chain)
         chain.steering.reset()
 
-    yield Row(STOP.name, "Stop by the page; another says false again and again", contradict, over)
+    yield Row(STOP.name, "Stop from the page; another node repeats false", contradict, over)

@@ -222,7 +222,7 @@ def _memory() -> Iterator[Row]:
             pid = rig.nodes[verb].popen.pid
             resource.prlimit(pid, resource.RLIMIT_AS, (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
 
-        yield Row(verb, "gets no more memory; then the driver lets go", by, starve, feed, leaves_reason=True)
+        yield Row(verb, "cannot allocate memory; then the driver stops", by, starve, feed, leaves_reason=True)
 
 
 def _clocks() -> Iterator[Row]:
@@ -254,7 +254,7 @@ def _clocks() -> Iterator[Row]:
                 rig.more_env.pop(verb)
                 rig.end(verb)
 
-            fault = f"its wall clock is set {words} by an hour; then the driver lets go"
+            fault = f"its wall clock is set {words} by an hour; then the driver stops"
             yield Row(verb, fault, by, jump, over, leaves_reason=True, prepare=prepare)
 
 
@@ -276,7 +276,7 @@ def _disk() -> Iterator[Row]:
     def over(rig: Rig) -> None:
         rig.end("control")
 
-    fault = "its log is on a disk that is full; then the driver lets go"
+    fault = "its log is on a full disk; then the driver stops"
     yield Row("control", fault, "signs", shout, over, leaves_reason=True, prepare=prepare)
 
 

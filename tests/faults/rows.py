@@ -19,10 +19,10 @@ def rows() -> list[Row]:
 
 _CAMERA: dict[CameraFault, tuple[str, bool]] = {
     "black": ("gives black pictures", False),
-    "frozen": ("gives one picture for ever", False),
-    "torn": ("gives pictures that are cut short somewhere; then the hand is lowered", True),
+    "frozen": ("repeats one picture", False),
+    "torn": ("gives truncated pictures; then the hand is lowered", True),
     "slow": ("gives one picture a second", False),
-    "stuttering": ("stops for a second, goes on for a second", False),
+    "stuttering": ("gives pictures for a second, none for a second", False),
     "silent": ("gives no pictures", False),
     "vanishing": ("is unplugged", False),
     "in_the_future": ("stamps pictures 5 s ahead", False),
@@ -44,13 +44,13 @@ def _cameras() -> Iterator[Row]:
 
 
 _LINKS: dict[str, tuple[LinkFault, bool]] = {
-    "nothing comes": (CUT, False),
-    "half is lost": (LinkFault(drop=0.5), True),
-    "comes 1 s late": (LinkFault(delay_s=1.0), False),
-    "comes 0 to 0.3 s late": (LinkFault(jitter_s=0.3), True),
-    "comes twice": (LinkFault(duplicate=1.0), True),
-    "comes in another order": (LinkFault(reorder=0.5), True),
-    "stands still, then all comes at once": (FROZEN, False),
+    "no messages": (CUT, False),
+    "half the messages are lost": (LinkFault(drop=0.5), True),
+    "delayed by 1 s": (LinkFault(delay_s=1.0), False),
+    "delayed by 0 to 0.3 s": (LinkFault(jitter_s=0.3), True),
+    "duplicated": (LinkFault(duplicate=1.0), True),
+    "reordered": (LinkFault(reorder=0.5), True),
+    "frozen, then all messages at once": (FROZEN, False),
 }
 _TOPICS: tuple[Topic[Any], ...] = (IMAGE_RAW, HAND_SIGN, CMD_VEL, STEERING_CMD_VEL)
 
@@ -65,7 +65,7 @@ def _links() -> Iterator[Row]:
             def end(chain: Chain, topic: Topic[Any] = topic) -> None:
                 chain.faults.heal(topic)
 
-            words_too = f"{words}; then the driver lets go" if leaves else words
+            words_too = f"{words}; then the driver stops" if leaves else words
             ends = lower_the_hand if leaves else nothing
             by_stick = topic is STEERING_CMD_VEL
             yield Row(topic.name, words_too, begin, end, ends, by_stick=by_stick)
@@ -77,7 +77,7 @@ def _nodes() -> Iterator[Row]:
     for name in ("camera", "recognition", "control", "robot", "steering"):
         by_stick = name == "steering"
         # Whoever steered has to take the wheel again on the new page.
-        anew = "; its page comes anew" if by_stick else ""
+        anew = "; its page reloads" if by_stick else ""
         soon = "killed, started again 0.3 s later"
         lets_go = name == "camera"
 
@@ -90,7 +90,7 @@ def _nodes() -> Iterator[Row]:
         yield Row(name, f"killed, started again 2 s later{anew}", killed(name), made(name), by_stick=by_stick)
         yield Row(
             name,
-            f"{soon}; then the driver lets go" if lets_go else f"{soon}{anew}",
+            f"{soon}; then the driver stops" if lets_go else f"{soon}{anew}",
             kill_and_make,
             end_reason=lower_the_hand if lets_go else nothing,
             by_stick=by_stick,
@@ -107,10 +107,10 @@ def _clocks() -> Iterator[Row]:
 
 def _stops() -> Iterator[Row]:
     for words, fault in (
-        ("half is lost", LinkFault(drop=0.5)),
-        ("comes twice", LinkFault(duplicate=1.0)),
-        ("comes in another order", LinkFault(reorder=0.5)),
-        ("comes 0 to 0.3 s late", LinkFault(jitter_s=0.3)),
+        ("half the messages are lost", LinkFault(drop=0.5)),
+        ("duplicated", LinkFault(duplicate=1.0)),
+        ("reordered", LinkFault(reorder=0.5)),
+        ("delayed by 0 to 0.3 s", LinkFault(jitter_s=0.3)),
     ):
 
         def halt(chain: Chain, fault: LinkFault = fault) -> None:
@@ -122,7 +122,7 @@ def _stops() -> Iterator[Row]:
             chain.run(0.4)  # what is under way says Stop, too
             chain.steering.reset()
 
-        yield Row(STOP.name, f"Stop by the page; {words}", halt, reset)
+        yield Row(STOP.name, f"Stop from the page; {words}", halt, reset)
     for name in ("control", "recognition", "camera", "robot", "steering"):
 
         def stop_and_kill(chain: Chain, name: str = name) -> None:
@@ -134,7 +134,11 @@ def _stops() -> Iterator[Row]:
             chain.make(name)
 
         yield Row(
-            STOP.name, f"Stop, said once; the {name} is killed and started again", stop_and_kill, make, is_for_good=True
+            STOP.name,
+            f"Stop, published once; the {name} is killed and started again",
+            stop_and_kill,
+            make,
+            is_for_good=True,
         )
 
 
@@ -165,7 +169,7 @@ def _real_robots() -> Iterator[Row]:
         assert chain.real is not None
         chain.real.is_senseless = False
 
-    yield Row("real robot", "says NaN in its odometry", senseless, sensible, make=RemoteChain)
+    yield Row("real robot", "reports NaN in its odometry", senseless, sensible, make=RemoteChain)
     for words, begin, end in (
         ("the node in front of it is frozen", frozen("robot"), unfrozen("robot")),
         ("the node in front of it is killed, started again later", killed("robot"), made("robot")),

@@ -49,26 +49,26 @@ def scanners() -> Iterator[Row]:
     """Return all of them."""
     yield from _links()
     for words, sees, leaves in (
-        ("the scanner gives nothing any more", None, False),
+        ("the scanner stops", None, False),
         ("the scanner gives NaN", _with(math.nan), False),
         ("the scanner gives 0", _with(0.0), False),
         ("the scanner gives no rays", replace(FREE, ranges=FREE.ranges[:0]), False),
         ("the scanner's angles are NaN", replace(FREE, angle_increment=math.nan), False),
         ("the scanner stamps scans 5 s back", replace(FREE, age_s=5.0), False),
-        ("the scanner stamps scans 5 s ahead; then the driver lets go", replace(FREE, age_s=-5.0), True),
-        ("the scanner gives NaN but for a third of its rays; then the driver lets go", _with_gaps(), True),
+        ("the scanner stamps scans 5 s ahead; then the driver stops", replace(FREE, age_s=-5.0), True),
+        ("the scanner gives NaN for two thirds of its rays; then the driver stops", _with_gaps(), True),
     ):
         yield _row(words, _shows(sees), _shows(FREE), leaves=leaves)
 
 
 def _links() -> Iterator[Row]:
     for words, fault, leaves in (
-        ("nothing comes", CUT, False),
-        ("half is lost; then the driver lets go", LinkFault(drop=0.5), True),
-        ("comes 1 s late", LinkFault(delay_s=1.0), False),
-        ("comes 0 to 0.3 s late; then the driver lets go", LinkFault(jitter_s=0.3), True),
-        ("comes in another order; then the driver lets go", LinkFault(reorder=0.5), True),
-        ("stands still, then all comes at once", FROZEN, False),
+        ("no messages", CUT, False),
+        ("half the messages are lost; then the driver stops", LinkFault(drop=0.5), True),
+        ("delayed by 1 s", LinkFault(delay_s=1.0), False),
+        ("delayed by 0 to 0.3 s; then the driver stops", LinkFault(jitter_s=0.3), True),
+        ("reordered; then the driver stops", LinkFault(reorder=0.5), True),
+        ("frozen, then all messages at once", FROZEN, False),
     ):
 
         def begin(chain: Chain, fault: LinkFault = fault) -> None:

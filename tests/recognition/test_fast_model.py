@@ -58,7 +58,7 @@ def test_nothing_is_seen_in_an_empty_frame() -> None:
 
 
 @pytest.mark.skipif(not DATA.is_dir(), reason="the golden frames are not here: ../shared/data is absent")
-@pytest.mark.parametrize("kind", ["photos", "video"])
+@pytest.mark.parametrize("kind", [pytest.param("photos", marks=pytest.mark.slow), "video"])
 def test_people_are_seen_as_by_the_full_model(landmarkers: list[MediaPipeLandmarker], kind: str) -> None:
     frames = read_video() if kind == "video" else [read_photo(path) for path in photo_paths()]
     pairs: list[tuple[Hand, Hand]] = []

@@ -51,7 +51,7 @@ def test_the_parameters_of_a_node_are_listed_read_and_described(ros2: Ros2Graph)
     everything = ask(ros2, node, "describe_parameters", *names)["descriptors"]
     assert [one["name"] for one in everything] == names
     about = everything[names.index("max_linear")]
-    assert about["description"] == "Highest forward and backward speed [m/s]"
+    assert about["description"] == "Maximum linear speed [m/s]"
     assert about["floating_point_range"] == [{"from_value": 0.0, "to_value": 10.0, "step": 0.0}]
 
 
@@ -84,7 +84,7 @@ def test_a_limit_that_is_broken_and_a_change_too_late_are_refused_in_words(ros2:
     ros2.node("camera", *FORWARD, name=node, ros=("-r", "__ns:=/late"))
     ask(ros2, node, "list_parameters")
     (result,) = ask(ros2, node, "set_parameters", {"name": "fps", "value": 20.0})["results"]
-    assert result == {"successful": False, "reason": "fps cannot be set: it is read when the node starts: give it then"}
+    assert result == {"successful": False, "reason": "fps cannot be set: it is only read when the node starts"}
     (result,) = ask(ros2, node, "set_parameters", {"name": "use_sim_time", "value": True})["results"]
     assert not result["successful"]
     assert result["reason"].startswith("use_sim_time cannot be set")

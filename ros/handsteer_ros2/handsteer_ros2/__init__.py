@@ -1,1 +1,1 @@
-"""handsteer's nodes as executables of ROS 2."""
+"""handsteer's nodes as ROS 2 executables."""

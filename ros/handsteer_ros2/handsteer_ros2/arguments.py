@@ -1,4 +1,4 @@
-"""What the launch files share: their arguments, and how a node of handsteer is started."""
+"""Shared by the launch files: their arguments, and how to start a node of handsteer."""
 
 from typing import Any
 
@@ -13,34 +13,34 @@ CMD_VEL = "robot_diff_drive_controller/cmd_vel"
 
 
 def common(params_file: Any) -> list[Any]:
-    """Return the arguments of all launch files, and what they set.
+    """Return the actions that declare the arguments of all launch files and apply them.
 
     Args:
-        params_file: Where the parameters are unless another file is named.
+        params_file: Default file of parameters.
     """
     return [
-        DeclareLaunchArgument("namespace", default_value="", description="Namespace of all nodes, as r1"),
-        DeclareLaunchArgument("use_sim_time", default_value="false", description="Follow /clock"),
+        DeclareLaunchArgument("namespace", default_value="", description="Namespace of all nodes, such as r1"),
+        DeclareLaunchArgument("use_sim_time", default_value="false", description="Use the time of /clock"),
         DeclareLaunchArgument("params_file", default_value=params_file, description="YAML file with parameters"),
         DeclareLaunchArgument(
             "transport",
             default_value="auto",
             choices=["auto", "ros2", "dds", "zenoh"],
-            description="auto is rclpy (ros2) where Python has it, else Cyclone DDS (dds)",
+            description="auto is rclpy (ros2) if installed, else Cyclone DDS (dds)",
         ),
         DeclareLaunchArgument("cmd_vel", default_value=CMD_VEL, description="Topic of the commands"),
         DeclareLaunchArgument(
             "cmd_vel_type",
             default_value="auto",
             choices=["auto", "twist", "twist_stamped"],
-            description="Type of the commands; auto is what the robot takes, and for the simulated one twist",
+            description="Type of the commands; auto is the type the robot subscribes to, twist for the simulated one",
         ),
-        DeclareLaunchArgument("respawn", default_value="true", description="Start a node anew that has ended"),
+        DeclareLaunchArgument("respawn", default_value="true", description="Restart a node that has ended"),
         DeclareLaunchArgument(
             "discovery_range",
             default_value="",
             choices=["", "LOCALHOST", "SUBNET", "OFF", "SYSTEM_DEFAULT"],
-            description="ROS_AUTOMATIC_DISCOVERY_RANGE of all nodes; empty leaves the environment's",
+            description="ROS_AUTOMATIC_DISCOVERY_RANGE of all nodes; empty keeps the environment's",
         ),
         SetEnvironmentVariable(
             "ROS_AUTOMATIC_DISCOVERY_RANGE",
@@ -51,7 +51,7 @@ def common(params_file: Any) -> list[Any]:
 
 
 def text(argument: str) -> ParameterValue:
-    """Return an argument as a parameter that is a text, also where it looks like a number."""
+    """Return an argument as a string parameter, even if it looks like a number."""
     return ParameterValue(LaunchConfiguration(argument), value_type=str)
 
 
@@ -61,9 +61,9 @@ def node(verb: str, name: str, *words: Any, parameters: dict[str, Any] | None = 
     Args:
         verb: The executable.
         name: Its name in the graph.
-        words: Further words of its command line.
-        parameters: Parameters that go before those of the file.
-        more: As launch_ros has it.
+        words: Further arguments of its command line.
+        parameters: Parameters that override those of the file.
+        more: Passed to :class:`launch_ros.actions.Node`.
     """
     simulated = ParameterValue(LaunchConfiguration("use_sim_time"), value_type=bool)
     return Node(

@@ -1,7 +1,7 @@
-"""The executables: each is ``handsteer`` with a node's verb.
+"""The executables: each runs ``handsteer`` with a node's verb.
 
-Where ROS's own Python has handsteer, the node runs in it, and may be one of rclpy. Else, or where ``HANDSTEER`` names a
-program, that is run: handsteer in an environment of its own.
+If handsteer is installed for ROS's own Python, the node runs there and can use rclpy. Otherwise, or if ``HANDSTEER`` is
+set, the program of that name is run, such as handsteer in a virtual environment.
 """
 
 import importlib.util
@@ -41,7 +41,7 @@ def _run(verb: str) -> None:
     transport = [] if "--transport" in words else ["--transport", "auto"]
     named = os.environ.get("HANDSTEER", "")
     if not named and importlib.util.find_spec("handsteer") is not None:
-        from handsteer.cli import main  # noqa: PLC0415 - it is not everywhere
+        from handsteer.cli import main  # noqa: PLC0415 - may not be installed
 
         main([verb, *transport, *words])
         return
@@ -49,7 +49,7 @@ def _run(verb: str) -> None:
     program = shutil.which(wanted)
     if program is None:
         sys.exit(f"handsteer_ros2: there is no program {wanted}: install handsteer, or set HANDSTEER to its path")
-    # In place of this process, so that signals of ``ros2 launch`` reach the node itself.
-    # Ctrl-C waits until handsteer can end in order: a new program inherits what is blocked.
+    # Replace this process, so that signals of ``ros2 launch`` reach the node itself. They stay blocked until handsteer
+    # can shut down cleanly: a new program inherits the mask.
     signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT, signal.SIGTERM))
     os.execv(program, [program, verb, *transport, *words])

@@ -1,4 +1,4 @@
-"""The simulated robot with its transforms, the page that shows it and steers it, and RViz if asked for.
+"""Starts the simulated robot with its transforms, the page, and optionally RViz.
 
 ros2 launch handsteer_ros2 drive_robot.launch.py namespace:=r1 world:=empty port:=8081 rviz:=true
 """
@@ -25,7 +25,7 @@ def generate_launch_description() -> LaunchDescription:
             *common(PARAMETERS),
             DeclareLaunchArgument("world", default_value="obstacles", description="Name of a world, or a YAML file"),
             DeclareLaunchArgument("page", default_value="true", description="Serve the page"),
-            DeclareLaunchArgument("port", default_value="8080", description="Port of the page; 0 takes a free one"),
+            DeclareLaunchArgument("port", default_value="8080", description="Port of the page; 0 picks a free one"),
             DeclareLaunchArgument("rviz", default_value="false", description="Show the robot in RViz"),
             node("robot", "robot", parameters={**kind, "world": text("world")}),
             node(
@@ -41,13 +41,13 @@ def generate_launch_description() -> LaunchDescription:
 
 
 def _prefix(context: LaunchContext) -> str:
-    """Return what stands before the names of frames: the namespace, as the robot itself has it."""
+    """Return the prefix of coordinate frames: the namespace, as for the robot itself."""
     namespace = LaunchConfiguration("namespace").perform(context).strip("/")
     return f"{namespace}/" if namespace else ""
 
 
 def _transforms(context: LaunchContext) -> list[Node | LogInfo]:
-    """Return what tells where the wheels and the scanner are, from base_link, if it is installed."""
+    """Return robot_state_publisher, which publishes the transforms of wheels and scanner, if it is installed."""
     try:
         get_package_share_directory("robot_state_publisher")
     except PackageNotFoundError:

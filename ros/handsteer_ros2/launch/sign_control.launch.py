@@ -1,4 +1,4 @@
-"""Camera, recognition and control: what turns hand signs into velocities.
+"""Starts camera, recognition and control, which convert hand signs to velocities.
 
 ros2 launch handsteer_ros2 sign_control.launch.py camera:=/dev/video0 cmd_vel:=/cmd_vel
 ros2 launch handsteer_ros2 sign_control.launch.py camera:=none image:=/front/image_raw namespace:=r1
@@ -25,10 +25,10 @@ def generate_launch_description() -> LaunchDescription:
                 "camera",
                 default_value="auto",
                 description="auto, virtual, a webcam's index or /dev/videoN, an address (rtsp, http), a video file or "
-                "a folder; none where another node publishes the images",
+                "a folder; none if another node publishes the images",
             ),
             DeclareLaunchArgument(
-                "image", default_value="image_raw", description="Topic of the images; compressed ones are beneath it"
+                "image", default_value="image_raw", description="Topic of the images; compressed ones are below it"
             ),
             node("camera", "my_camera", parameters={"source": text("camera")}, remappings=images, condition=has_camera),
             node("recognition", "hand_sign_recognition", remappings=images),

@@ -1,7 +1,7 @@
 #!/usr/bin/python3
-"""Says once a second what images come (chapter 8 of the course): plain rospy, an example to copy from.
+"""Logs the received images once a second (chapter 8 of the course): an example in plain rospy.
 
-Needs neither handsteer nor cv_bridge; Debian's own Python has all of it.
+Needs neither handsteer nor cv_bridge, only Debian's own Python packages.
 """
 
 import rospy
@@ -14,17 +14,17 @@ class ImageSubscriber:
     def __init__(self) -> None:
         self.count = 0
         self.newest = None
-        # The subscriber's own buffer would hold images back while a callback is busy: see docs/ros1.md.
+        # The default buffer would delay images while a callback is busy: see docs/ros1.md.
         rospy.Subscriber("image_raw", Image, self.on_image, queue_size=1, buff_size=2**24)
         rospy.Timer(rospy.Duration(1), self.report)
 
     def on_image(self, image: Image) -> None:
-        """Take an image; keep it short, the next one waits."""
+        """Store an image; this must be fast, as the next image waits."""
         self.count += 1
         self.newest = image
 
     def report(self, _event: rospy.timer.TimerEvent) -> None:
-        """Log what has come since the last report."""
+        """Log what was received since the last report."""
         count, self.count = self.count, 0
         image = self.newest
         if not count or image is None:

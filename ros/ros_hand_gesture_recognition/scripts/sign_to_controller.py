@@ -1,5 +1,5 @@
 #!/usr/bin/env -S python3 -S
-"""Turns signs into velocities (chapter 12 of the course): ``handsteer control`` as a ROS node."""
+"""Converts signs to velocities (chapter 12 of the course): ``handsteer control`` as a ROS node."""
 
 try:
     import os
@@ -7,13 +7,13 @@ try:
     import sys
     from pathlib import Path
 
-    # Ctrl-C waits until handsteer can end in order: a new program inherits what is blocked.
+    # Signals stay blocked until handsteer can shut down cleanly: a new program inherits the mask.
     signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT, signal.SIGTERM))
     node = Path(__file__).resolve().parents[2] / "handsteer_node"
-    # In the course each word gives its twist from the first on. The parameter ~arming goes before this file.
+    # In the course each word gives a twist from the start, without arming. The parameter ~arming overrides this file.
     course = Path(__file__).resolve().with_name("course.yaml")
     given = sys.argv[1:]
     file = [] if any(word.startswith("--config") for word in given) else ["--config", str(course)]
     os.execv(node, [str(node), "control", *file, *given])
 except KeyboardInterrupt:
-    pass  # nothing has begun yet
+    pass  # nothing has started yet

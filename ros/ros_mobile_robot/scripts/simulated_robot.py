@@ -1,5 +1,5 @@
 #!/usr/bin/env -S python3 -S
-"""Simulates the robot, in Gazebo's place (chapter 11 of the course): ``handsteer robot`` as a ROS node."""
+"""Simulates the robot, instead of Gazebo (chapter 11 of the course): ``handsteer robot`` as a ROS node."""
 
 try:
     import os
@@ -7,9 +7,9 @@ try:
     import sys
     from pathlib import Path
 
-    # Ctrl-C waits until handsteer can end in order: a new program inherits what is blocked.
+    # Signals stay blocked until handsteer can shut down cleanly: a new program inherits the mask.
     signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT, signal.SIGTERM))
     node = Path(__file__).resolve().parents[2] / "handsteer_node"
     os.execv(node, [str(node), "robot", *sys.argv[1:]])
 except KeyboardInterrupt:
-    pass  # nothing has begun yet
+    pass  # nothing has started yet

@@ -22,6 +22,8 @@ _WAIT_S = 0.2
 # Assumed clock drift between two machines, in seconds per second.
 _LEAK = 0.001
 
+HEADER_BYTES = _HEADER.size
+
 
 class BrowserCamera:
     """Keeps the newest frame that a browser has sent.
@@ -152,9 +154,6 @@ class ChoiceOfCameras:
     def close(self) -> None:
         """Release the devices; may be called twice."""
         self._own.close()
-
-
-HEADER_BYTES = _HEADER.size
 
 
 def check_frame(data: bytes) -> float:

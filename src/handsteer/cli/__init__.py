@@ -1,4 +1,4 @@
-"""The command ``handsteer``: one file a verb. Only this package prints and exits."""
+"""The command ``handsteer``: one file per verb. Only this package prints and exits."""
 
 from handsteer.cli.main import main
 

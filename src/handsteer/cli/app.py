@@ -1,4 +1,4 @@
-"""The command line as a whole: its verbs, the options that they share, and how errors are reported."""
+"""The command line: its verbs, the options that they share, and how errors are reported."""
 
 from pathlib import Path
 from typing import Annotated
@@ -20,9 +20,9 @@ _EXAMPLES = """Examples:
   handsteer run                                  drive, and open the page
   handsteer run --headless --duration 30 --json  no page, one summary at the end
   handsteer recognize photo.jpg                  which sign is it?
-  handsteer signs evaluate photos/               how well are signs told?
+  handsteer signs evaluate photos/               how well are signs recognised?
   handsteer camera --transport ros1              one node, in a ROS 1 graph
-  handsteer camera --transport auto              one node, in a ROS 2 graph; or ros2, dds, zenoh
+  handsteer camera --transport auto              one node, in a ROS 2 graph
   handsteer doctor                               what works on this machine
 """
 
@@ -51,7 +51,7 @@ app.command("handsteer.cli.robots:robots", name="robots", group="One node of a g
 
 
 def run(words: list[str]) -> int:
-    """Run the verb that ``words`` name; return the exit code, 0 when all went well, 2 when the input was wrong."""
+    """Run the verb that ``words`` name; return the exit code: 0 for success, 2 for wrong input."""
     set_up_logging()
     words = [_by_new_name(word) for word in _ros_words_last(words)]
     _load_what_help_lists(app, words)
@@ -65,15 +65,15 @@ def _run(words: list[str]) -> int:
             from handsteer.cli.one_node import load  # noqa: PLC0415 - no other verb needs it
 
             load(words[0])
-        # The verb is loaded now. What it begins is to be left in order.
-        signals.end_in_order()
+        # The verb is loaded; from here on, an interrupt must clean up what it started.
+        signals.interrupt_on_signals()
         return int(verb(*given.args, **given.kwargs) or 0)
     except CycloptsError as error:
         return fail(_problem(error))
 
 
 def _load_what_help_lists(group: App, arguments: list[str]) -> None:
-    """Load the verbs of a group that is asked for help or named alone: their descriptions are listed then."""
+    """Load the verbs of a group whose help will be printed, because it lists their descriptions."""
     if not arguments or arguments[0] in group.help_flags:
         for verb in group:
             group[verb]
@@ -82,7 +82,7 @@ def _load_what_help_lists(group: App, arguments: list[str]) -> None:
 
 
 def _by_new_name(word: str) -> str:
-    """Return an option of an old name, as ``--signs.bridge-time=0.2``, under its new one."""
+    """Return an option that has an old name, such as ``--signs.bridge-time=0.2``, with its new name."""
     option, equals, value = word.partition("=")
     section, _, name = option.removeprefix("--").partition(".")
     if not word.startswith("--") or section not in config.Config.model_fields:
@@ -92,7 +92,7 @@ def _by_new_name(word: str) -> str:
 
 
 def _ros_words_last(arguments: list[str]) -> list[str]:
-    """Return ``arguments`` with what stands between ``--ros-args`` and ``--`` moved to the end, where options end.
+    """Return ``arguments`` with those between ``--ros-args`` and ``--`` moved to the end, after all options.
 
     ROS 2 allows them anywhere, and ``ros2 launch`` appends its own.
     """

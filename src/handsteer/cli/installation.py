@@ -1,4 +1,4 @@
-"""``handsteer doctor``, ``models`` and ``ros``: what this machine has."""
+"""``handsteer doctor``, ``models`` and ``ros``: the installation on this machine."""
 
 import json as json_format
 from pathlib import Path
@@ -12,14 +12,14 @@ from handsteer.recognition.landmark_models import fetch_models
 
 
 def doctor(*, port: int = 8080, json: Flag = False) -> int:
-    """Say what works on this machine; exit code 1 if something that is needed is missing.
+    """Check what works on this machine; exit code 1 if something required is missing.
 
     Example: handsteer doctor
 
     Parameters
     ----------
     port
-        Where the page would be.
+        Port of the page.
     json
         Print one JSON list.
     """
@@ -41,7 +41,7 @@ def models() -> int:
 
     Example: handsteer models
 
-    On a machine without network, set HANDSTEER_MODELS to a folder that has them.
+    On a machine without network, set HANDSTEER_MODELS to a folder that contains them.
     """
     bar: tqdm[Any] | None = None
 
@@ -61,7 +61,7 @@ _PACKAGE = Path(__file__).parents[1]
 
 
 def ros() -> int:
-    """Print the folder of the ROS packages: the course's for ROS 1, and handsteer_ros2.
+    """Print the folder of the ROS packages: the tutorial's for ROS 1, and handsteer_ros2.
 
     Example: . "$(handsteer ros)/setup.sh"
     """

@@ -1,4 +1,4 @@
-"""Where the command line starts: signals end it in order from the first moment on, then all else is loaded."""
+"""Entry point of the command line: handles signals first, then loads the rest."""
 
 import gc
 import os
@@ -6,45 +6,45 @@ import sys
 
 from handsteer.cli import signals
 
-# An interrupt is the ordinary end of these, also before they have begun: what starts them is not to call it a failure.
+# These run until they are interrupted, so exit code 0 also if that comes early: a launcher must not see a failure.
 _UNTIL_INTERRUPTED = frozenset(
     ("run", "camera", "recognition", "control", "robot", "robots", "steering", "zenoh-router")
 )
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Run the command line; exit code 0 when all went well, 2 when the input was wrong, 130 when it was interrupted.
+    """Run the command line; exit code 0 for success, 2 for wrong input, 130 if interrupted.
 
-    What runs until it is interrupted ends with 0 then.
+    Verbs that run until they are interrupted end with 0.
     """
     words = sys.argv[1:] if arguments is None else arguments
     interrupted = 0 if words and words[0] in _UNTIL_INTERRUPTED else 130
-    signals.end_at_once(interrupted)
+    signals.exit_on_signals(interrupted)
     try:
         code = _run(words)
     except KeyboardInterrupt:
         code = interrupted
     except Exception:
-        # What is loaded late in the start may turn the interrupt into an error of its own.
+        # A library that is being imported may convert the interrupt to an error of its own.
         if not signals.were_raised():
             raise
         code = interrupted
     finally:
-        signals.end_in_order()
+        signals.interrupt_on_signals()
     sys.exit(code)
 
 
 def _run(words: list[str]) -> int:
-    # Both take some tenths of a second to load, the one with all our own options 0.1 s more.
-    if _is_of_ros_alone(words):
-        # Nothing of what is loaded is garbage, and looking for some takes a tenth of the start.
+    # The full command line takes 0.1 s more to load.
+    if _has_only_ros1_arguments(words):
+        # Imports leave no garbage, and searching for it takes a tenth of the start.
         gc.disable()
-        # Nor is any plugin wanted for the parameters, for which all packages that are installed would be searched.
+        # pydantic would search all installed packages for plugins.
         os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
         try:
-            from handsteer.cli.one_node import run_of_ros  # noqa: PLC0415
+            from handsteer.cli.one_node import run_ros1  # noqa: PLC0415
 
-            return run_of_ros(words[0], words[3:])
+            return run_ros1(words[0], words[3:])
         finally:
             gc.enable()
     from handsteer.cli.app import run  # noqa: PLC0415
@@ -52,7 +52,7 @@ def _run(words: list[str]) -> int:
     return run(words)
 
 
-def _is_of_ros_alone(words: list[str]) -> bool:
-    """Return whether there is nothing but a node and the words of ROS 1, as in what launch files start."""
+def _has_only_ros1_arguments(words: list[str]) -> bool:
+    """Return whether ``words`` are a node and ROS 1 arguments only, as launch files start it."""
     is_node = words[1:3] == ["--transport", "ros1"] and words[0] in ("camera", "recognition", "control", "robot")
     return is_node and all(":=" in word and not word.startswith("-") for word in words[3:])

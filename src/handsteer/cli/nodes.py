@@ -13,7 +13,7 @@ from handsteer.errors import needing
 
 
 def camera(
-    *words: str,
+    *ros_args: str,
     transport: str,
     camera: str | None = None,
     config_file: ConfigFile = None,
@@ -25,91 +25,87 @@ def camera(
 
     Parameters
     ----------
-    words
-        In the transport's own words. ROS 1: topic:=other, __name:=name, __ns:=namespace, _parameter:=value.
+    ros_args
+        ROS arguments. ROS 1: topic:=other, __name:=name, __ns:=namespace, _parameter:=value.
         ROS 2: --ros-args -r topic:=other -r __node:=name -r __ns:=/namespace -p parameter:=value --params-file file.
     transport
-        What joins the nodes: ros2 (by rclpy), dds or zenoh (ROS 2 without ROS here), auto (ros2 where it is, else dds),
-        or ros1.
+        ros2 (rclpy), dds or zenoh (ROS 2 without a ROS installation), auto (ros2 if installed, else dds), or ros1.
     camera
         auto, virtual, a webcam's index or /dev/videoN, an address (rtsp, http), a video file or a folder of photos.
     config_file
-        YAML file with parameters; ROS parameters go before it, options before both.
+        YAML file with parameters; ROS parameters override it, and options override both.
     """
     job = Job("my_camera", "camera", making.make_camera, config_file, parameters, {"camera": {"source": camera}})
-    return run(job, transport, words)
+    return run(job, transport, ros_args)
 
 
-def recognition(*words: str, transport: str, config_file: ConfigFile = None, parameters: Parameters = None) -> int:
-    """Tell the sign of each frame of image_raw, and publish it on gesture/hand_sign.
+def recognition(*ros_args: str, transport: str, config_file: ConfigFile = None, parameters: Parameters = None) -> int:
+    """Recognise the sign in each frame of image_raw, and publish it on gesture/hand_sign.
 
     Example: handsteer recognition --transport ros1 image_raw:=/front/image_raw
 
     Parameters
     ----------
-    words
-        In the transport's own words. ROS 1: topic:=other, __name:=name, __ns:=namespace, _parameter:=value.
+    ros_args
+        ROS arguments. ROS 1: topic:=other, __name:=name, __ns:=namespace, _parameter:=value.
         ROS 2: --ros-args -r topic:=other -r __node:=name -r __ns:=/namespace -p parameter:=value --params-file file.
     transport
-        What joins the nodes: ros2 (by rclpy), dds or zenoh (ROS 2 without ROS here), auto (ros2 where it is, else dds),
-        or ros1.
+        ros2 (rclpy), dds or zenoh (ROS 2 without a ROS installation), auto (ros2 if installed, else dds), or ros1.
     config_file
-        YAML file with parameters; ROS parameters go before it, options before both.
+        YAML file with parameters; ROS parameters override it, and options override both.
     """
     job = Job("hand_sign_recognition", "signs", making.make_recognition, config_file, parameters)
-    return run(job, transport, words)
+    return run(job, transport, ros_args)
 
 
-def control(*words: str, transport: str, config_file: ConfigFile = None, parameters: Parameters = None) -> int:
-    """Turn the signs of gesture/hand_sign into velocities on robot_diff_drive_controller/cmd_vel.
+def control(*ros_args: str, transport: str, config_file: ConfigFile = None, parameters: Parameters = None) -> int:
+    """Convert the signs on gesture/hand_sign to velocities on robot_diff_drive_controller/cmd_vel.
 
     Example: handsteer control --transport ros1 robot_diff_drive_controller/cmd_vel:=/cmd_vel _max_linear:=0.5
 
     Parameters
     ----------
-    words
-        In the transport's own words. ROS 1: topic:=other, __name:=name, __ns:=namespace, _parameter:=value.
+    ros_args
+        ROS arguments. ROS 1: topic:=other, __name:=name, __ns:=namespace, _parameter:=value.
         ROS 2: --ros-args -r topic:=other -r __node:=name -r __ns:=/namespace -p parameter:=value --params-file file.
     transport
-        What joins the nodes: ros2 (by rclpy), dds or zenoh (ROS 2 without ROS here), auto (ros2 where it is, else dds),
-        or ros1.
+        ros2 (rclpy), dds or zenoh (ROS 2 without a ROS installation), auto (ros2 if installed, else dds), or ros1.
     config_file
-        YAML file with parameters; ROS parameters go before it, options before both.
+        YAML file with parameters; ROS parameters override it, and options override both.
     """
     job = Job("hand_sign_control", "control", making.make_control, config_file, parameters)
-    return run(job, transport, words)
+    return run(job, transport, ros_args)
 
 
 def robot(
-    *words: str,
+    *ros_args: str,
     transport: str,
     world: str | None = None,
     config_file: ConfigFile = None,
     parameters: Parameters = None,
 ) -> int:
-    """Simulate the robot that follows robot_diff_drive_controller/cmd_vel.
+    """Simulate a robot that follows robot_diff_drive_controller/cmd_vel.
 
     Example: handsteer robot --transport ros1 --world obstacles
 
     Parameters
     ----------
-    words
-        In the transport's own words. ROS 1: topic:=other, __name:=name, __ns:=namespace, _parameter:=value.
+    ros_args
+        ROS arguments. ROS 1: topic:=other, __name:=name, __ns:=namespace, _parameter:=value.
         ROS 2: --ros-args -r topic:=other -r __node:=name -r __ns:=/namespace -p parameter:=value --params-file file.
     transport
-        What joins the nodes: ros2 (by rclpy), dds or zenoh (ROS 2 without ROS here), auto (ros2 where it is, else dds),
-        or ros1.
+        ros2 (rclpy), dds or zenoh (ROS 2 without a ROS installation), auto (ros2 if installed, else dds), or ros1.
     world
         Name of a shipped world, or a YAML file.
     config_file
-        YAML file with parameters; ROS parameters go before it, options before both.
+        YAML file with parameters; ROS parameters override it, and options override both.
     """
     job = Job("robot", "robot", making.make_robot, config_file, parameters, {"robot": {"world": world}})
-    return run(job, transport, words)
+    return run(job, transport, ros_args)
 
 
 def steering(
-    *words: str,
+    *ros_args: str,
     transport: str,
     host: str | None = None,
     port: int | None = None,
@@ -117,35 +113,34 @@ def steering(
     config_file: ConfigFile = None,
     parameters: Parameters = None,
 ) -> int:
-    """Serve the page: it shows what the graph does, and steers the robot on steering/cmd_vel.
+    """Serve the page, which shows the state of the graph and steers the robot on steering/cmd_vel.
 
     Example: handsteer steering --transport ros1 --port 8080
 
     Parameters
     ----------
-    words
-        In the transport's own words. ROS 1: topic:=other, __name:=name, __ns:=namespace, _parameter:=value.
+    ros_args
+        ROS arguments. ROS 1: topic:=other, __name:=name, __ns:=namespace, _parameter:=value.
         ROS 2: --ros-args -r topic:=other -r __node:=name -r __ns:=/namespace -p parameter:=value --params-file file.
     transport
-        What joins the nodes: ros2 (by rclpy), dds or zenoh (ROS 2 without ROS here), auto (ros2 where it is, else dds),
-        or ros1.
+        ros2 (rclpy), dds or zenoh (ROS 2 without a ROS installation), auto (ros2 if installed, else dds), or ros1.
     host
-        Address of this machine that the page is served on; 0.0.0.0 lets other machines in, with a token.
+        Address that the page is served on; 0.0.0.0 makes it reachable from other machines, with a token.
     port
-        Port of the page; 0 takes a free one.
+        Port of the page; 0 picks a free one.
     token
-        Ask everybody for the token in the printed address, on this machine too: for machines that several people use.
+        Require the token in the printed address from this machine too; for machines with several users.
     config_file
-        YAML file with parameters; ROS parameters go before it, options before both.
+        YAML file with parameters; ROS parameters override it, and options override both.
     """
     shorthand = {"dashboard": {"host": host, "port": port, "token": "always" if token else None}}
     job = Job("steering", "dashboard", making.make_steering, config_file, parameters, shorthand, _served)
-    return run(job, transport, words)
+    return run(job, transport, ros_args)
 
 
 @contextmanager
 def _served(node: Any, config: Config) -> Iterator[None]:
-    # The page's libraries take a second to load, which the other nodes need not wait for.
+    # The page's libraries take a second to load, which the other nodes do not need.
     with needing("the page", "page", "nicegui"):
         from handsteer.dashboard.server import Dashboard  # noqa: PLC0415
 

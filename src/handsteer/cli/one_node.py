@@ -1,4 +1,4 @@
-"""One node of a graph of several processes: how it is made, joins, and ends."""
+"""One node of a graph of several processes: how it is constructed, joins, and ends."""
 
 import importlib
 import logging
@@ -10,7 +10,7 @@ from typing import Any
 
 from handsteer import making
 from handsteer.cli import signals
-from handsteer.cli.running import exit_code, keep_what_is_loaded, set_up_logging, settings, uninterrupted
+from handsteer.cli.running import exit_code, freeze_loaded_objects, set_up_logging, settings, signals_ignored
 from handsteer.clock import Clock
 from handsteer.config import Config
 from handsteer.nodes.node import Node
@@ -32,13 +32,13 @@ class Job:
     """One node, as a process.
 
     Attributes:
-        node: Name of the node, unless it is renamed.
+        node: Default name of the node.
         section: Its own section of the configuration.
-        make: Makes the node.
+        make: Constructs the node.
         file: YAML file with parameters.
-        given: Options by full name.
-        shorthand: Options by short name.
-        beside: What runs beside the node.
+        given: Options with a full name.
+        shorthand: Options with a short name.
+        companion: Runs alongside the node.
     """
 
     node: str
@@ -47,14 +47,14 @@ class Job:
     file: Path | None = None
     given: Config | None = None
     shorthand: dict[str, Any] | None = None
-    beside: Callable[[Any, Config], AbstractContextManager[None]] = _alone
+    companion: Callable[[Any, Config], AbstractContextManager[None]] = _alone
 
     def settings(self, service: dict[str, Any] | None = None) -> Config:
-        """Return the parameters; ``service`` has those of the graph."""
+        """Return the parameters; ``service`` are those from the graph."""
         return settings(self.file, self.given, self.shorthand, service=service)
 
 
-_OF_ROS = {
+_ROS1_JOBS = {
     "camera": Job("my_camera", "camera", making.make_camera),
     "recognition": Job("hand_sign_recognition", "signs", making.make_recognition),
     "control": Job("hand_sign_control", "control", making.make_control),
@@ -63,21 +63,21 @@ _OF_ROS = {
 
 
 def load(verb: str) -> None:
-    """Load what a node needs, before signals surface in the midst of it."""
+    """Import a node's module, before signals can interrupt the import."""
     importlib.import_module(f"handsteer.nodes.{verb}")
 
 
-def run_of_ros(verb: str, words: Sequence[str]) -> int:
-    """Run one of these nodes with ROS 1's own ``words`` alone; return the exit code."""
+def run_ros1(verb: str, words: Sequence[str]) -> int:
+    """Run a node with ROS 1 arguments only; return the exit code."""
     set_up_logging()
     load(verb)
-    signals.end_in_order()
-    return exit_code(lambda: run(_OF_ROS[verb], "ros1", tuple(words)))
+    signals.interrupt_on_signals()
+    return exit_code(lambda: run(_ROS1_JOBS[verb], "ros1", tuple(words)))
 
 
 def run(job: Job, transport: str, words: tuple[str, ...]) -> int:
-    """Run a node until it ends, or is ended; return the exit code."""
-    job.settings()  # what is wrong already is said before others see this node
+    """Run a node until it ends or is interrupted; return the exit code."""
+    job.settings()  # report wrong input before joining the graph
     session: Session | None = None
     try:
         session = join(transport, job.node, words)
@@ -85,24 +85,24 @@ def run(job: Job, transport: str, words: tuple[str, ...]) -> int:
         node = job.make(config, session.transport, session.clock)
         session.serve(NodeParameters(config, job.section, node.reconfigure, node.check))
         session.offer(node.services)
-        _run_until_end(node, session, job.beside(node, config))
+        _run_until_end(node, session, job.companion(node, config))
     except KeyboardInterrupt:
-        pass  # the ordinary end of a node
+        pass  # the usual end of a node
     finally:
         if session is not None:
-            with uninterrupted():
+            with signals_ignored():
                 session.close()
     return 0
 
 
-def _run_until_end(node: Node, session: Session, beside: AbstractContextManager[None]) -> None:
+def _run_until_end(node: Node, session: Session, companion: AbstractContextManager[None]) -> None:
     try:
-        with beside:
-            keep_what_is_loaded()
+        with companion:
+            freeze_loaded_objects()
             node.start()
             log.info("%s is ready: %s", session.name, node.topics)
             while not (node.ended.is_set() or session.wait(_LOOK_PERIOD_S) or signals.were_raised()):
                 pass
     finally:
-        with uninterrupted():
+        with signals_ignored():
             node.stop()

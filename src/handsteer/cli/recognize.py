@@ -17,7 +17,7 @@ def recognize(
 ) -> int:
     """Print which sign each frame of a photo, a folder of photos or a video shows.
 
-    Photos are independent of each other; the frames of a video are processed like a camera's.
+    Photos are processed independently, the frames of a video like those of a camera.
 
     Example: handsteer recognize drive.mp4 --json
 
@@ -26,7 +26,7 @@ def recognize(
     source
         A photo, a folder of photos or a video file.
     json
-        Print one JSON object a line, with the landmarks.
+        Print one JSON object per line, with the landmarks.
     config_file
         YAML file with parameters; options override it.
     """
@@ -41,7 +41,7 @@ def recognize(
 
 @dataclass(frozen=True)
 class _Result:
-    """What is printed of a frame: ``time_s`` is 0 for a photo, ``landmarks`` are image-normalised x, y and z."""
+    """The output for a frame: ``time_s`` is 0 for a photo, ``landmarks`` are image-normalised x, y and z."""
 
     source: str
     frame: int

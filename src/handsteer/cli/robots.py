@@ -1,4 +1,4 @@
-"""``handsteer robots``: several simulated robots on one machine, each in a namespace of its own."""
+"""``handsteer robots``: several simulated robots on one machine, each in its own namespace."""
 
 import subprocess
 import sys
@@ -6,7 +6,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from handsteer.cli.running import say, uninterrupted
+from handsteer.cli.running import say, signals_ignored
 from handsteer.errors import ConfigError
 from handsteer.transports import TRANSPORTS
 
@@ -16,18 +16,18 @@ _END_TIMEOUT_S = 3.0
 
 
 def robots(count: int, /, *, transport: str, world: str | None = None) -> int:
-    """Simulate several robots, /r1, /r2 and so on, each in a process and a world of its own.
+    """Simulate several robots, /r1, /r2 and so on, each in its own process and world.
 
     Example: handsteer robots 3 --transport dds
 
-    Drive them in turn by one hand: handsteer control --transport dds --ros-args -p "robots:=[r1, r2, r3]"
+    To drive them in turn with one hand: handsteer control --transport dds --ros-args -p "robots:=[r1, r2, r3]"
 
     Parameters
     ----------
     count
-        How many.
+        Number of robots.
     transport
-        What joins the nodes: ros2, dds or zenoh (ROS 2), auto, or ros1.
+        ros2, dds or zenoh (ROS 2), auto, or ros1.
     world
         Name of a shipped world, or a YAML file.
     """
@@ -41,13 +41,13 @@ def robots(count: int, /, *, transport: str, world: str | None = None) -> int:
             say(f"simulating {', '.join(names)}; Ctrl-C ends")
             name, code = _wait_for_the_first(processes)
     except KeyboardInterrupt:
-        return 0  # the ordinary end
+        return 0  # the usual end
     say(f"the robot {name} has ended with exit code {code}, so the others end too")
     return 2
 
 
 def _wait_for_the_first(processes: dict[str, subprocess.Popen[bytes]]) -> tuple[str, int]:
-    """Return which process has ended, and its exit code."""
+    """Return the name of the first process that ends, and its exit code."""
     while True:
         for name, process in processes.items():
             code = process.poll()
@@ -71,7 +71,7 @@ def _started(commands: dict[str, list[str]]) -> Iterator[dict[str, subprocess.Po
             processes[name] = subprocess.Popen(command)
         yield processes
     finally:
-        with uninterrupted():
+        with signals_ignored():
             _end(list(processes.values()))
 
 

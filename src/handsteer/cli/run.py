@@ -9,15 +9,15 @@ from typing import Any
 
 from handsteer.cli import signals
 from handsteer.cli.app import ConfigFile, Flag, Parameters
-from handsteer.cli.running import keep_what_is_loaded, say, uninterrupted
+from handsteer.cli.running import freeze_loaded_objects, say, signals_ignored
 from handsteer.cli.running import settings as make_settings
 from handsteer.clock import RealClock, SteppedClock
 from handsteer.config import Config
+from handsteer.config.presets import PRESETS
 from handsteer.dashboard.page_process import PageProcess
 from handsteer.errors import ConfigError
 from handsteer.graph import Graph, Summary
 from handsteer.parameters import from_parameters
-from handsteer.presets import PRESETS
 from handsteer.transports import join
 from handsteer.transports.protocol import Session
 
@@ -25,7 +25,7 @@ _NODE = "handsteer"
 
 
 def run(
-    *words: str,
+    *ros_args: str,
     camera: str | None = None,
     robot: str | None = None,
     world: str | None = None,
@@ -45,34 +45,34 @@ def run(
 
     Parameters
     ----------
-    words
-        For a real robot, in the words of its graph. ROS 2: --ros-args -r cmd_vel:=/base/cmd_vel -r __ns:=/r1.
+    ros_args
+        ROS arguments, for a real robot. ROS 2: --ros-args -r cmd_vel:=/base/cmd_vel -r __ns:=/r1.
         ROS 1: cmd_vel:=/base/cmd_vel.
     camera
-        auto, virtual, browser (that of whoever looks at the page), a webcam's index or /dev/videoN, an address (rtsp,
+        auto, virtual, browser (of the device that shows the page), a webcam's index or /dev/videoN, an address (rtsp,
         http), a video file or a folder of photos.
     robot
-        sim, the simulated one. Or a real one, whatever listens to cmd_vel there: ros2 (by rclpy), dds or zenoh (ROS 2
-        without ROS here), auto (ros2 where it is, else dds) or ros1. Or, by auto, turtlebot3_burger,
-        turtlebot3_waffle, turtlebot4 or turtlesim, whose topics and limits are known.
+        sim, the simulated robot. For a real one that subscribes to cmd_vel: ros2 (rclpy), dds or zenoh (ROS 2 without
+        a ROS installation), auto (ros2 if installed, else dds) or ros1. Or a preset of topics and limits, with auto:
+        turtlebot3_burger, turtlebot3_waffle, turtlebot4 or turtlesim.
     world
         Name of a shipped world, or a YAML file.
     host
-        Address of this machine that the page is served on; 0.0.0.0 lets other machines in, with a token.
+        Address that the page is served on; 0.0.0.0 makes it reachable from other machines, with a token.
     port
-        Port of the page; 0 takes a free one.
+        Port of the page; 0 picks a free one.
     token
-        Ask everybody for the token in the printed address, on this machine too: for machines that several people use.
+        Require the token in the printed address from this machine too; for machines with several users.
     headless
-        Without the page.
+        Run without the page.
     duration
-        End after so many seconds.
+        End after this many seconds.
     fast
-        As fast as the machine goes, on simulated time, without the page; the same input gives the same commands.
+        Run as fast as possible on simulated time, without the page; the same input gives the same commands.
     json
-        Print one JSON summary at the end, and nothing else.
+        Print a summary in JSON at the end, and nothing else.
     config_file
-        YAML file with parameters; those given here go before it.
+        YAML file with parameters; options override it.
     """
     headless = headless or fast
     shorthand = {
@@ -89,59 +89,59 @@ def run(
         raise ConfigError("--camera browser needs the page, which --headless and --fast leave out")
     if duration is not None and not duration > 0:
         raise ConfigError(f"--duration: {duration:g} should be greater than 0 seconds")
-    with _linked(settle, words, fast=fast) as (settings, link):
+    with _linked(settle, ros_args, fast=fast) as (settings, link):
         summary = _drive(settings, link, duration, config_file, headless=headless, fast=fast)
     print(json_format.dumps(summary.as_dict()) if json else _summary_text(summary))
     return 0
 
 
 def _robot(name: str | None) -> dict[str, str | None]:
-    """Return the parameters that ``--robot name`` is short for: the kind of robot, or one that is known."""
+    """Return the parameters that ``--robot name`` stands for: the kind of the robot, or a preset."""
     return {"kind": "auto", "preset": name} if name in PRESETS else {"kind": name}
 
 
 @contextmanager
 def _linked(
-    settle: Callable[[dict[str, Any]], Config], words: tuple[str, ...], *, fast: bool
+    settle: Callable[[dict[str, Any]], Config], ros_args: tuple[str, ...], *, fast: bool
 ) -> Iterator[tuple[Config, Session | None]]:
-    """Join the graph of a real robot; yield the parameters, those that were given there included, and the link."""
+    """Join the graph of a real robot; yield the parameters, including those from the graph, and the link."""
     settings = settle({})
     kind = settings.robot.kind
     if settings.control.robots:
         raise ConfigError("control.robots is for `handsteer control`: a run drives one robot")
     if kind == "sim":
-        if words:
-            raise ConfigError(f"{words[0]!r}: a simulated robot has no graph to take it; choose one by --robot auto")
+        if ros_args:
+            raise ConfigError(f"{ros_args[0]!r}: ROS arguments need a real robot, such as --robot auto")
         yield settings, None
         return
     if fast:
         raise ConfigError(f"--fast runs on simulated time, which a real robot (robot.kind {kind}) does not follow")
-    link = join(kind, _NODE, words)
+    link = join(kind, _NODE, ros_args)
     try:
         yield settle(from_parameters(link.parameters, "robot", link.name)), link
     finally:
-        with uninterrupted():
+        with signals_ignored():
             link.close()
 
 
 def _drive(
     settings: Config, link: Session | None, duration: float | None, file: Path | None, *, headless: bool, fast: bool
 ) -> Summary:
-    # It loads its libraries while this process loads the models.
+    # Started first: it loads its libraries while this process loads the models.
     page = None if headless else PageProcess()
     try:
         with Graph(settings, SteppedClock() if fast else RealClock(), link=link, steering=page is None) as graph:
             try:
                 _run_until_end(graph, duration, file, page, fast=fast)
             except KeyboardInterrupt:
-                say("stopping: the robot is told to stand")
+                say("stopping the robot")
             finally:
-                with uninterrupted():
+                with signals_ignored():
                     graph.stop()
             return graph.summary()
     finally:
         if page is not None:
-            with uninterrupted():
+            with signals_ignored():
                 page.stop()
 
 
@@ -151,7 +151,7 @@ def _run_until_end(
     if fast:
         graph.run_stepped(*([] if duration is None else [duration]))
         return
-    keep_what_is_loaded()
+    freeze_loaded_objects()
     if page is None:
         graph.start()
         graph.wait(duration, until=signals.were_raised)
@@ -171,22 +171,24 @@ def _summary_text(summary: Summary) -> str:
     lines = [
         f"ran for {summary.duration_s:.1f} s: {summary.frames} frames, {summary.fps:.1f} frames/s",
         f"signs: {signs or 'none'}",
-        _way_text(summary),
+        _path_text(summary),
     ]
     if summary.course:
         lines.append(f"course: {summary.course}")
     if summary.trouble:
         lines.append(f"at the end, the robot {summary.trouble}")
     if summary.latency_median_ms is not None and summary.latency_p99_ms is not None:
-        lines.append(
-            f"capture to Twist: {summary.latency_median_ms:.1f} ms, 99 of 100 below {summary.latency_p99_ms:.1f} ms"
+        median, p99 = (
+            f"{summary.latency_median_ms:.1f} ms (median)",
+            f"{summary.latency_p99_ms:.1f} ms (99th percentile)",
         )
+        lines.append(f"capture to Twist: {median}, {p99}")
     return "\n".join(lines)
 
 
-def _way_text(summary: Summary) -> str:
+def _path_text(summary: Summary) -> str:
     pose = summary.final_pose
     if pose is None:
-        return "the robot has not said where it is"
-    way = f"the robot went {summary.path_length_m:.2f} m to x {pose.x:.2f} m, y {pose.y:.2f} m, yaw {pose.yaw:.2f} rad"
-    return way if summary.contacts is None else f"{way}, with {summary.contacts} contacts"
+        return "the robot's position is unknown"
+    path = f"the robot went {summary.path_length_m:.2f} m to x {pose.x:.2f} m, y {pose.y:.2f} m, yaw {pose.yaw:.2f} rad"
+    return path if summary.contacts is None else f"{path}, with {summary.contacts} contacts"

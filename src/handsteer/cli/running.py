@@ -1,4 +1,4 @@
-"""What the verbs share besides their options: logging, settings, messages and exit codes."""
+"""Shared by the verbs: logging, settings, messages and exit codes."""
 
 import gc
 import logging
@@ -15,25 +15,25 @@ from handsteer.errors import HandsteerError
 
 
 def set_up_logging() -> None:
-    """Let what is logged go to the standard error, without the chatter of libraries."""
+    """Log to standard error; from libraries, warnings only."""
     logging.basicConfig(level=logging.INFO, format="handsteer: %(message)s", stream=sys.stderr)
     for noisy in ("uvicorn", "asyncio", "httpx", "watchfiles", "rospy"):
         logging.getLogger(noisy).setLevel(logging.WARNING)
 
 
 def exit_code(call: Callable[[], int | None]) -> int:
-    """Call; return the exit code, 2 when the input was wrong, which is said."""
+    """Return the exit code of ``call``; 2, with a message, if the input was wrong."""
     try:
         return call() or 0
     except HandsteerError as error:
         return fail(str(error))
-    except BrokenPipeError:  # the reader of our output has left, as `head` does
+    except BrokenPipeError:  # the reader of the output has ended, as `head` does
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
 
 
 def fail(message: str) -> int:
-    """Say what was wrong with the input; return the exit code."""
+    """Print what was wrong with the input; return the exit code."""
     say(" ".join(message.split()))
     return 2
 
@@ -47,8 +47,8 @@ def settings(
 ) -> config.Config:
     """Return the parameters.
 
-    They come from the defaults, then ``base``, the file, a graph's parameter ``service``, the shorthand options, and
-    the options by full name.
+    Each overrides the ones before: the defaults, ``base``, the file, a graph's parameter ``service``, the shorthand
+    options, and the options with a full name.
     """
     short = {
         section: {name: value for name, value in values.items() if value is not None}
@@ -59,20 +59,19 @@ def settings(
 
 
 def say(message: str) -> None:
-    """Tell people something, apart from the output."""
+    """Print a message to standard error."""
     print(f"handsteer: {message}", file=sys.stderr, flush=True)
 
 
-def keep_what_is_loaded() -> None:
-    """Let the garbage collector leave alone what was loaded until now; looking at all of it holds up every thread."""
-    # The little garbage that is kept so costs less than looking for it.
+def freeze_loaded_objects() -> None:
+    """Exclude everything loaded so far from garbage collection, which would pause all threads to search it."""
     gc.freeze()
     gc.enable()
 
 
 @contextmanager
-def uninterrupted() -> Iterator[None]:
-    """Ignore Ctrl-C and SIGTERM in this block: pressing Ctrl-C twice must not keep the robot from stopping."""
+def signals_ignored() -> Iterator[None]:
+    """Ignore Ctrl-C and SIGTERM in this block: a second Ctrl-C must not keep the robot from stopping."""
     handlers = {number: signal.signal(number, signal.SIG_IGN) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
         yield

@@ -1,6 +1,6 @@
-"""What becomes of signals: they end the program in order, whatever it is just doing.
+"""Signal handlers: each signal ends the program cleanly.
 
-It loads next to nothing itself, for a signal may come while the rest is loaded.
+This module imports little, because a signal may arrive while the rest is loaded.
 """
 
 import math
@@ -11,14 +11,14 @@ import time
 from collections.abc import Callable
 from types import FrameType
 
-# Another signal so soon after one means the same; it must not interrupt the orderly end that the first one began.
-_SAME_WISH_S = 1.0
+# Another signal this soon is ignored: it must not interrupt the shutdown that the first one started.
+_REPEAT_S = 1.0
 
 _ENDING = (
     *("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT", "SIGABRT", "SIGTSTP", "SIGTTIN", "SIGTTOU", "SIGUSR1", "SIGUSR2"),
     *("SIGALRM", "SIGVTALRM", "SIGPROF", "SIGXCPU", "SIGIO", "SIGPWR", "SIGSTKFLT", "SIGSYS", "SIGBREAK"),
 )
-"""Signals whose default is to end a program, or to hold it, as Ctrl-Z does; the robot would hear nothing of it."""
+"""Signals that by default end or suspend a program, as Ctrl-Z does, without a last command to the robot."""
 
 _raised: list[int] = []
 
@@ -26,14 +26,14 @@ Handler = Callable[[int, FrameType | None], None]
 
 
 def were_raised() -> bool:
-    """Return whether a signal has asked the program to end in order; a library in between may swallow the exception."""
+    """Return whether a signal was raised since :func:`interrupt_on_signals`; a library may swallow the exception."""
     return bool(_raised)
 
 
-def end_at_once(code: int) -> None:
-    """Let signals end the program with exit code ``code``, while there is nothing yet to be left in order.
+def exit_on_signals(code: int) -> None:
+    """Exit with ``code`` on a signal, while there is nothing to clean up.
 
-    An exception would surface in the midst of whatever is being loaded, which prints it or swallows it.
+    An exception would interrupt an import, which may print or swallow it.
     """
 
     def end(_signal: int, _frame: FrameType | None) -> None:
@@ -42,10 +42,10 @@ def end_at_once(code: int) -> None:
     _handle(end)
 
 
-def end_in_order() -> None:
-    """Let each signal that would end or hold the program raise KeyboardInterrupt, which leaves the robot standing.
+def interrupt_on_signals() -> None:
+    """Raise KeyboardInterrupt on each signal that would end or suspend the program, so that the robot is stopped.
 
-    SIGKILL and SIGSTOP cannot be caught, and after a crash (SIGSEGV and its like) nothing can be said any more.
+    SIGKILL and SIGSTOP cannot be caught; after a crash, such as SIGSEGV, no command can be sent.
     """
     raised_s = -math.inf
     _raised.clear()
@@ -54,7 +54,7 @@ def end_in_order() -> None:
         nonlocal raised_s
         _raised.append(number)
         now_s = time.monotonic()
-        if now_s - raised_s >= _SAME_WISH_S:
+        if now_s - raised_s >= _REPEAT_S:
             raised_s = now_s
             raise KeyboardInterrupt
 
@@ -67,12 +67,12 @@ def _handle(handler: Handler) -> None:
         number = getattr(signal, name, None)
         if number is None:
             continue  # not on this system
-        # A program started by nohup is to outlive the terminal. SIGINT is taken even so: a shell lets its
-        # background jobs ignore it, and a robot must be stopped all the same.
+        # A program started with nohup must outlive the terminal. SIGINT is handled even if ignored, as it is in a
+        # shell's background jobs, because the robot must be stopped.
         if name == "SIGHUP" and signal.getsignal(number) == signal.SIG_IGN:
             continue
         signal.signal(number, handler)
         numbers.append(number)
     if sys.platform != "win32":
-        # The parent process may have blocked them until now, when they can be handled.
+        # The parent process may have blocked them until they could be handled.
         signal.pthread_sigmask(signal.SIG_UNBLOCK, numbers)

@@ -1,4 +1,4 @@
-"""A picture in the terminal, and keys from it: for programs that run where there is no other screen."""
+"""Pictures in a terminal, and single keys from it, for machines without a screen."""
 
 import shutil
 import sys
@@ -37,7 +37,7 @@ class TerminalPicture:
     def draw(self, picture: NDArray[np.uint8], *text: str) -> None:
         """Draw ``picture``, (height, width, 3) uint8, BGR, and lines of ``text``, over what was drawn before.
 
-        Pictures that come too fast for a terminal far away are left out.
+        Pictures that come too fast for a remote terminal are skipped.
         """
         now_s = time.monotonic()
         if now_s - self._drawn_s < _PERIOD_S:
@@ -65,7 +65,7 @@ def half_blocks(picture: NDArray[np.uint8], width: int) -> list[str]:
     pairs = np.stack([small[0::2], small[1::2]], axis=2).tolist()
     lines = []
     for line in pairs:
-        # Neighbours of the same colours need not be told again, which is most of them.
+        # Most neighbours have the same colours: those are not sent again.
         parts = [_colours(*pair) if at == 0 or pair != line[at - 1] else "▀" for at, pair in enumerate(line)]
         lines.append("".join(parts) + "\x1b[0m\x1b[K")
     return lines
@@ -77,7 +77,7 @@ def _colours(upper: list[int], lower: list[int]) -> str:
 
 
 class Keys:
-    """Single keys from the terminal, without Enter; there are none where there is no terminal."""
+    """Single keys from the terminal, without Enter; none without a terminal."""
 
     def __init__(self) -> None:
         self._before: list[Any] | None = None
@@ -86,7 +86,7 @@ class Keys:
 
     @staticmethod
     def possible() -> bool:
-        """Return whether there is a terminal that gives single keys."""
+        """Return whether single keys can be read from a terminal."""
         return termios is not None and sys.stdin.isatty()
 
     def __enter__(self) -> "Keys":
@@ -101,7 +101,7 @@ class Keys:
             self._before = None
 
     def pressed(self, key: str) -> bool:
-        """Return whether ``key`` was pressed since this was last asked."""
+        """Return whether ``key`` was pressed since the last call."""
         self._read()
         if key not in self._pressed:
             return False
@@ -109,7 +109,7 @@ class Keys:
         return True
 
     def space_age_s(self) -> float:
-        """Return how long ago the space key was last sent, in seconds; infinity when it never was."""
+        """Return how long ago the space key was last sent, in seconds; infinity if never."""
         self._read()
         return time.monotonic() - self._space_s
 

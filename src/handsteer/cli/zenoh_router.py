@@ -1,4 +1,4 @@
-"""``handsteer zenoh-router``: where nodes over Zenoh find each other."""
+"""``handsteer zenoh-router``: the router through which nodes over Zenoh find each other."""
 
 import os
 import threading
@@ -9,23 +9,24 @@ from handsteer.errors import needing
 
 
 def zenoh_router(*, listen: str | None = None) -> int:
-    """Be the router by which nodes over Zenoh find each other, until you press Ctrl-C.
+    """Run the router through which nodes over Zenoh find each other, until you press Ctrl-C.
 
-    ROS 2's own, ros2 run rmw_zenoh_cpp rmw_zenohd, does the same; one of them is enough for a machine.
+    ROS 2's own does the same (ros2 run rmw_zenoh_cpp rmw_zenohd); each machine
+    needs only one of them.
 
     Example: handsteer zenoh-router
 
     Parameters
     ----------
     listen
-        Where to listen: tcp/localhost:7447, for this machine only, unless given. tcp/[::]:7447 lets others in.
+        Endpoint, by default tcp/localhost:7447, for this machine only; tcp/[::]:7447 accepts other machines.
     """
     router = _open(listen)
     try:
         say(f"the Zenoh router listens at {' and '.join(router.endpoints)}")
         threading.Event().wait()
     except KeyboardInterrupt:
-        pass  # the ordinary end of a router
+        pass  # the usual end of a router
     finally:
         router.close()
     return 0

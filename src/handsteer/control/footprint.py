@@ -1,4 +1,4 @@
-"""The robot's footprint, a rectangle around its base frame, and the poses it passes through while moving."""
+"""The robot's footprint, a rectangle around its base frame: its poses while moving, and points of a scan near it."""
 
 import math
 
@@ -6,9 +6,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handsteer.config import CollisionMonitorConfig
+from handsteer.messages import LaserScan
 from handsteer.types import Velocity
 
 Array = NDArray[np.float64]
+Points = NDArray[np.float64]
+"""(N, 2): x forward and y left in the robot's base frame, in metres."""
+
+MOST_POINTS = 1440
+"""Limit for one scan; of a longer one, the nearest of each few neighbouring rays is kept."""
+
+# A reading deeper inside the footprint is a part of the robot, such as a post in view of the scanner.
+_SKIN_M = 0.05
 
 _STRAIGHT_RADPS = 1e-9
 
@@ -68,26 +77,26 @@ def on_a_circle(velocity: Velocity, times_s: Array) -> Array:
     return poses
 
 
-def braking(moving: Velocity, told: Velocity, rule: CollisionMonitorConfig, delay_s: float, times_s: Array) -> Array:
-    """Return the poses of a robot that is commanded ``told``, and zero after ``delay_s`` seconds: (K, 3) x, y and yaw.
+def braking(moving: Velocity, target: Velocity, rule: CollisionMonitorConfig, delay_s: float, times_s: Array) -> Array:
+    """Return the poses of a robot commanded ``target``, and zero after ``delay_s`` seconds: (K, 3) x, y and yaw.
 
     Args:
         moving: Its current velocity, which changes at the deceleration of ``rule``.
-        told: The velocity commanded now.
+        target: The velocity commanded now.
         rule: Decelerations.
         delay_s: When zero is commanded.
         times_s: (K,), at equal intervals from 0.
     """
     early_s = np.minimum(times_s, delay_s)
     late_s = times_s - early_s
-    v = _speeds(moving.linear_mps, told.linear_mps, rule.deceleration, early_s, late_s)
+    v = _speeds(moving.linear_mps, target.linear_mps, rule.deceleration, early_s, late_s)
     poses = np.zeros((len(times_s), 3))
     half_step_s = times_s[1] / 2
     way = (v[1:] + v[:-1]) * half_step_s
-    if not (moving.angular_radps or told.angular_radps):
+    if not (moving.angular_radps or target.angular_radps):
         way.cumsum(out=poses[1:, 0])
         return poses
-    w = _speeds(moving.angular_radps, told.angular_radps, rule.angular_deceleration, early_s, late_s)
+    w = _speeds(moving.angular_radps, target.angular_radps, rule.angular_deceleration, early_s, late_s)
     turned = (w[1:] + w[:-1]) * half_step_s
     yaw = turned.cumsum(out=poses[1:, 2])
     middle = yaw - turned / 2
@@ -120,9 +129,62 @@ def after(velocity: Velocity, seconds: float, points: Array) -> Array:
     return seen
 
 
-def _speeds(moving: float, told: float, most: float, early_s: Array, late_s: Array) -> Array:
-    """Return the speeds on the way to ``told`` for ``early_s``, then braking for ``late_s``, both at rate ``most``."""
-    gap, sign = abs(told - moving), math.copysign(most, told - moving)
-    speeds: Array = moving + np.minimum(early_s, gap / most) * sign if gap else np.full(len(early_s), told)
+def _speeds(moving: float, target: float, most: float, early_s: Array, late_s: Array) -> Array:
+    """Return the speeds on the way to ``target`` for ``early_s``, then braking for ``late_s``, at rate ``most``."""
+    gap, sign = abs(target - moving), math.copysign(most, target - moving)
+    speeds: Array = moving + np.minimum(early_s, gap / most) * sign if gap else np.full(len(early_s), target)
     brakes = late_s * most
     return speeds - np.minimum(np.maximum(speeds, -brakes), brakes)
+
+
+def points_of(scan: LaserScan, rule: CollisionMonitorConfig) -> Points | None:
+    """Return the points that the scanner measured; None if the scan is invalid or empty.
+
+    Ranges follow REP 117 and ``sensor_msgs/LaserScan``: beyond ``range_max`` and +inf is free; -inf is too near to be
+    measured, so it counts as touching the robot; NaN and values below ``range_min`` are no readings.
+
+    Args:
+        scan: The message, of any size.
+        rule: Pose of the scanner on the robot, and size of the footprint.
+    """
+    ranges = np.asarray(scan.ranges, dtype=np.float64).reshape(-1)
+    figures = (scan.angle_min, scan.angle_increment, scan.range_min, scan.range_max)
+    if not all(map(math.isfinite, figures)) or not scan.angle_increment or scan.range_max <= 0:
+        return None
+    touches = np.isneginf(ranges)
+    found = (ranges >= max(0.0, scan.range_min)) & (ranges <= scan.range_max) & (ranges > 0)
+    if not (touches | found | (ranges > scan.range_max)).any():
+        return None
+    kept, distances = _thinned(np.where(touches, 0.0, np.where(found, ranges, np.inf)))
+    angles = rule.scan_yaw + scan.angle_min + kept * scan.angle_increment
+    points = _along(angles, distances) + np.array([rule.scan_x, rule.scan_y])
+    gap = gaps(points[:, 0], points[:, 1], rule)
+    is_touch = distances == 0.0
+    seen = points[~is_touch & (gap > -_SKIN_M)]
+    return np.concatenate([seen, _on_the_edge(angles[is_touch], rule)])
+
+
+def _thinned(ranges: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the indices of rays that hit something, at most :data:`MOST_POINTS`, and their ranges."""
+    if len(ranges) > MOST_POINTS:
+        each = math.ceil(len(ranges) / MOST_POINTS)
+        groups = np.pad(ranges, (0, -len(ranges) % each), constant_values=np.inf).reshape(-1, each)
+        nearest = groups.argmin(axis=1)
+        numbers, ranges = np.arange(len(groups)) * each + nearest, groups[np.arange(len(groups)), nearest]
+    else:
+        numbers = np.arange(len(ranges))
+    meets = np.isfinite(ranges)
+    return numbers[meets].astype(np.float64), ranges[meets]
+
+
+def _along(angles: NDArray[np.float64], distances: NDArray[np.float64]) -> Points:
+    return np.stack([distances * np.cos(angles), distances * np.sin(angles)], axis=1)
+
+
+def _on_the_edge(angles: NDArray[np.float64], rule: CollisionMonitorConfig) -> Points:
+    """Return where rays from the base frame leave the footprint, slightly inside."""
+    cos, sin = np.cos(angles), np.sin(angles)
+    with np.errstate(divide="ignore"):
+        ahead = np.where(cos >= 0, rule.front, rule.back) / np.abs(cos)
+        aside = rule.side / np.abs(sin)
+    return _along(angles, np.minimum(ahead, aside) * (1 - 1e-6))

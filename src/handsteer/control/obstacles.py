@@ -13,8 +13,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handsteer.config import CollisionMonitorConfig
-from handsteer.control.footprint import after, braking, fastest_mps, gaps, least_gaps, on_a_circle, reach_m, seen_from
-from handsteer.control.scan_points import Points
+from handsteer.control.footprint import (
+    Points,
+    after,
+    braking,
+    fastest_mps,
+    gaps,
+    least_gaps,
+    on_a_circle,
+    reach_m,
+    seen_from,
+)
 from handsteer.types import ZERO, Velocity
 
 _PAD_M = 0.02
@@ -163,11 +172,12 @@ def first_hit(velocity: Velocity, points: Points, rule: CollisionMonitorConfig, 
     return hit if hit and hit.time_s <= horizon_s else None
 
 
-def _met_while_braking(moving: Velocity, told: Velocity, points: Points, rule: CollisionMonitorConfig) -> Hit | None:
-    """Return the first obstacle hit if ``told`` is commanded now and zero one reaction time later, or None."""
+def _met_while_braking(moving: Velocity, target: Velocity, points: Points, rule: CollisionMonitorConfig) -> Hit | None:
+    """Return the first obstacle hit if ``target`` is commanded now and zero one reaction time later, or None."""
     fastest = fastest_mps(
         Velocity(
-            max(abs(moving.linear_mps), abs(told.linear_mps)), max(abs(moving.angular_radps), abs(told.angular_radps))
+            max(abs(moving.linear_mps), abs(target.linear_mps)),
+            max(abs(moving.angular_radps), abs(target.angular_radps)),
         ),
         rule,
     )
@@ -175,11 +185,11 @@ def _met_while_braking(moving: Velocity, told: Velocity, points: Points, rule: C
         return None
     # A robot that reverses its direction stops on the way, and has to stop again.
     stop_s = max(
-        max(abs(moving.linear_mps), abs(told.linear_mps)) / rule.deceleration,
-        max(abs(moving.angular_radps), abs(told.angular_radps)) / rule.angular_deceleration,
+        max(abs(moving.linear_mps), abs(target.linear_mps)) / rule.deceleration,
+        max(abs(moving.angular_radps), abs(target.angular_radps)) / rule.angular_deceleration,
     )
     times_s = _times(fastest, rule.reaction_time + stop_s)
-    poses = braking(moving, told, rule, rule.reaction_time, times_s)
+    poses = braking(moving, target, rule, rule.reaction_time, times_s)
     return _met(poses, times_s, points, rule, pad_m=_PAD_M + _PAD_S * fastest, fastest_mps=fastest)
 
 
@@ -241,8 +251,8 @@ class ObstacleLimiter:
         self.rule = rule
         self._points: Points | None = None
         self._measured_s = -math.inf
-        self._moving = self._told = ZERO
-        self._moving_s = self._told_s = -math.inf
+        self._moving = self._commanded = ZERO
+        self._moving_s = self._commanded_s = -math.inf
         self.hit: Hit | None = None
 
     def see(self, points: Points, measured_s: float) -> None:
@@ -271,21 +281,23 @@ class ObstacleLimiter:
         The points are moved by the robot's estimated motion since the scan.
         """
         self._moving, self._moving_s = self._followed(now_s), now_s
-        self.hit, said = None, ZERO
+        self.hit, velocity = None, ZERO
         if self._points is not None and not self.is_blind(now_s):
             points = after(self._moving, self.silence_s(now_s), self._points)
-            said, self.hit = limit(wanted, points, self.rule, self._moving)
-        self._told, self._told_s = said, now_s
-        return said
+            velocity, self.hit = limit(wanted, points, self.rule, self._moving)
+        self._commanded, self._commanded_s = velocity, now_s
+        return velocity
 
     def _followed(self, now_s: float) -> Velocity:
         """Return the velocity at ``now_s`` of a robot that follows the last command at the configured decelerations."""
-        elapsed_s = max(0.0, now_s - max(self._moving_s, self._told_s))
+        elapsed_s = max(0.0, now_s - max(self._moving_s, self._commanded_s))
         if not math.isfinite(elapsed_s):
             return ZERO
         return Velocity(
-            _towards(self._moving.linear_mps, self._told.linear_mps, self.rule.deceleration * elapsed_s),
-            _towards(self._moving.angular_radps, self._told.angular_radps, self.rule.angular_deceleration * elapsed_s),
+            _towards(self._moving.linear_mps, self._commanded.linear_mps, self.rule.deceleration * elapsed_s),
+            _towards(
+                self._moving.angular_radps, self._commanded.angular_radps, self.rule.angular_deceleration * elapsed_s
+            ),
         )
 
 

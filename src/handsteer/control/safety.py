@@ -172,7 +172,7 @@ class Following:
             return None
         self._refuses_s = 0.0
         self._follows = None
-        return "the robot stood though it was told to move"
+        return "the robot did not follow its commands"
 
 
 class Allowance:

@@ -39,7 +39,7 @@ def _models() -> Finding:
 def _cameras() -> list[Finding]:
     sources = webcams()
     if not sources:
-        return [Finding("camera", "optional", "no webcam: the virtual hand stands in (--camera virtual)")]
+        return [Finding("camera", "optional", "no webcam: the virtual hand is used instead (--camera virtual)")]
     return [_camera(source) for source in sources]
 
 
@@ -66,7 +66,9 @@ def _port(port: int) -> Finding:
             probe.bind(("127.0.0.1", port))
         except OSError as error:
             return Finding(
-                "port", "missing", f"port {port}: {error.strerror}; end who has it, or choose another with --port"
+                "port",
+                "missing",
+                f"port {port}: {error.strerror}; end the program that uses it, or choose another port with --port",
             )
     return Finding("port", "ok", f"port {port} is free for the page")
 

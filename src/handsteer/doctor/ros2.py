@@ -135,8 +135,8 @@ def _sight(process: subprocess.Popen[str]) -> Sight:
         return Sight(None, f"there was no answer within {_TIMEOUT_S:.0f} s")
     if process.returncode == 0:
         return Sight(json.loads(out))
-    said = _ENGINE_LINE.findall(words) or words.strip().splitlines()[-1:] or [f"exit code {process.returncode}"]
-    return Sight(None, "; ".join(said))
+    problems = _ENGINE_LINE.findall(words) or words.strip().splitlines()[-1:] or [f"exit code {process.returncode}"]
+    return Sight(None, "; ".join(problems))
 
 
 _NAME = "dds"
@@ -151,8 +151,8 @@ def examine_ros2(environment: Mapping[str, str]) -> list[Finding]:
     try:
         here = network(environment)
     except TransportError as error:
-        return [_wrong(f"{error}; nothing joins ROS 2 over DDS before that")]
-    odd = [_wrong(words) for words in _oddities(environment, here)]
+        return [_wrong(f"{error}; ROS 2 cannot be joined over DDS until this is fixed")]
+    odd = [_wrong(words) for words in _unusual_settings(environment, here)]
     if importlib.util.find_spec("cyclonedds") is None:
         return [*odd, Finding(_NAME, "optional", _no_engine())]
     return [*odd, *_multicast(here), *_domain(environment, here)]
@@ -173,26 +173,28 @@ def _no_engine() -> str:
     return "no cyclonedds, which --transport dds needs: pip install 'handsteer[dds]'"
 
 
-def _oddities(environment: Mapping[str, str], here: Network) -> list[str]:
-    said = []
+def _unusual_settings(environment: Mapping[str, str], here: Network) -> list[str]:
+    problems = []
     if here.domain > _LARGEST_SAFE_DOMAIN:
-        said.append(
-            f"ROS_DOMAIN_ID is {here.domain}: above {_LARGEST_SAFE_DOMAIN} the system may have given a domain's ports "
-            "to others; choose a smaller one"
+        problems.append(
+            f"ROS_DOMAIN_ID is {here.domain}: above {_LARGEST_SAFE_DOMAIN} other programs may be using "
+            "the domain's ports; choose a smaller one"
         )
     reach = environment.get("ROS_AUTOMATIC_DISCOVERY_RANGE", "")
     if environment.get("ROS_LOCALHOST_ONLY") == "1" and reach.upper() not in {"", "LOCALHOST"}:
-        said.append(f"ROS_LOCALHOST_ONLY is 1, so ROS_AUTOMATIC_DISCOVERY_RANGE={reach} does not count: unset one")
+        problems.append(f"ROS_LOCALHOST_ONLY is 1, so ROS_AUTOMATIC_DISCOVERY_RANGE={reach} is ignored: unset one")
     if environment.get("ROS_STATIC_PEERS") and here.reach in {"LOCALHOST", "OFF"}:
-        said.append(
-            "ROS_STATIC_PEERS does not count, as only this machine is looked at: unset ROS_LOCALHOST_ONLY or OFF"
+        problems.append(
+            "ROS_STATIC_PEERS is ignored, as discovery is limited to this machine: unset ROS_LOCALHOST_ONLY or OFF"
         )
     if environment.get("ROS_DISCOVERY_SERVER"):
-        said.append("ROS_DISCOVERY_SERVER is set: nodes that are found by a server only are not seen; unset it there")
+        problems.append(
+            "ROS_DISCOVERY_SERVER is set: nodes that use only a discovery server are not found; unset it there"
+        )
     middleware = environment.get("RMW_IMPLEMENTATION", "")
     if middleware and not middleware.startswith(("rmw_cyclonedds", "rmw_fastrtps", "rmw_connextdds")):
-        said.append(f"RMW_IMPLEMENTATION is {middleware}: ROS 2's nodes do not speak DDS then, and are not seen by it")
-    return said
+        problems.append(f"RMW_IMPLEMENTATION is {middleware}: ROS 2 nodes then do not use DDS, and are not found")
+    return problems
 
 
 def _multicast(here: Network) -> list[Finding]:
@@ -201,11 +203,11 @@ def _multicast(here: Network) -> list[Finding]:
     works = multicast_interfaces()
     if any(works.values()):
         heard = ", ".join(name for name, does in works.items() if does)
-        return [Finding(_NAME, "ok", f"multicast works on {heard}, as far as can be told from one machine")]
-    why = f"{', '.join(works)} lets none through (a firewall?)" if works else "no network interface has it"
+        return [Finding(_NAME, "ok", f"multicast works on {heard}, as far as one machine can check")]
+    why = f"{', '.join(works)} blocks it (a firewall?)" if works else "no network interface supports it"
     return [
         _wrong(
-            f"no multicast, by which nodes on the subnet are found: {why}; name the other machines in "
+            f"no multicast, which finds the nodes on the subnet: {why}; name the other machines in "
             "ROS_STATIC_PEERS instead, with ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST"
         )
     ]
@@ -224,12 +226,12 @@ def _domain(environment: Mapping[str, str], here: Network) -> list[Finding]:
     found = [_wrong(warning) for warning in ours.graph["warnings"]]
     if ours.others:
         return [Finding(_NAME, "ok", f"{here.place}: {_some(ours.others)}"), *found]
-    return [_nobody(here, here.domain in in_use, sights)]
+    return [_no_others(here, here.domain in in_use, sights)]
 
 
 def _not_joined(problem: str, here: Network, taken: set[int]) -> str:
     if here.reach == "CYCLONEDDS_URI":
-        return f"CYCLONEDDS_URI cannot be used: {problem}; mend or unset it"
+        return f"CYCLONEDDS_URI cannot be used: {problem}; fix or unset it"
     if here.places and taken and not places_left(here.domain, taken, here.places):
         first = 7410 + 250 * here.domain
         return (
@@ -239,21 +241,20 @@ def _not_joined(problem: str, here: Network, taken: set[int]) -> str:
     return f"{here.place} cannot be joined: {problem}"
 
 
-def _nobody(here: Network, is_inhabited: bool, elsewhere: Mapping[int, Sight]) -> Finding:
+def _no_others(here: Network, is_inhabited: bool, elsewhere: Mapping[int, Sight]) -> Finding:
     seen = {domain: sight.others for domain, sight in elsewhere.items() if sight.others}
     if is_inhabited and here.reach != "SUBNET":
         return _wrong(
-            f"{here.place}: somebody is in this domain on this machine, but is not seen; it may look at another "
-            "network card, or at none: unset ROS_LOCALHOST_ONLY, and set ROS_AUTOMATIC_DISCOVERY_RANGE=SUBNET on both "
-            "sides"
+            f"{here.place}: another node on this machine is in this domain, but was not found; it may use another "
+            "network interface, or none: unset ROS_LOCALHOST_ONLY, and set ROS_AUTOMATIC_DISCOVERY_RANGE=SUBNET in both"
         )
     if seen:
         others = "; ".join(f"domain {domain} has {_some(nodes)}" for domain, nodes in seen.items())
         return _wrong(
-            f"{here.place}: nobody else; but {others}. To meet them, set ROS_DOMAIN_ID={next(iter(seen))} here, or "
+            f"{here.place}: no other nodes; but {others}. To reach them, set ROS_DOMAIN_ID={next(iter(seen))} here, or "
             f"{here.domain} there"
         )
-    return Finding(_NAME, "ok", f"{here.place}: nobody else is there yet")
+    return Finding(_NAME, "ok", f"{here.place}: no other nodes yet")
 
 
 def _some(nodes: list[str], most: int = 4) -> str:

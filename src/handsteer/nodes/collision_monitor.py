@@ -5,8 +5,8 @@ import math
 from collections.abc import Callable
 
 from handsteer.config import CollisionMonitorConfig
+from handsteer.control.footprint import points_of
 from handsteer.control.obstacles import ObstacleLimiter
-from handsteer.control.scan_points import points_of
 from handsteer.messages import ODOM, SCAN, LaserScan, Odometry
 from handsteer.nodes.node import Node
 from handsteer.nodes.odometry import MeasuredVelocity

@@ -41,6 +41,20 @@ FEATURE_COUNTS: Final[dict[Depth, int]] = {
 }
 """Number of features."""
 
+FORMAT: Final = 1
+"""Version of the file format and of the features."""
+
+_LONGEST_NAME: Final = 40
+_FILE: Final = NpzFormat(
+    "model of taught signs",
+    FORMAT,
+    missing=ModelMissing,
+    corrupt=ModelCorrupt,
+    remedy="give one that `handsteer signs train` has written, or train it again",
+)
+
+_DEPTHS: Final[dict[str, Depth]] = {"full": "full", "flat": "flat"}
+
 
 def custom_features(pixels: Array, world: Array, depth: Depth) -> Array:
     """Return the (n, features) of n hands.
@@ -64,22 +78,6 @@ def custom_features(pixels: Array, world: Array, depth: Depth) -> Array:
 def _unit(vectors: NDArray[np.floating]) -> Array:
     lengths = np.linalg.norm(vectors, axis=1, keepdims=True)
     return np.asarray(vectors / np.maximum(lengths, 1e-9), np.float64)
-
-
-FORMAT: Final = 1
-"""Version of the file format and of the features."""
-
-_LONGEST_NAME: Final = 40
-_FILE: Final = NpzFormat(
-    "model of taught signs",
-    FORMAT,
-    missing=ModelMissing,
-    corrupt=ModelCorrupt,
-    remedy="give one that `handsteer signs train` has written, or train it again",
-)
-
-
-_DEPTHS: Final[dict[str, Depth]] = {"full": "full", "flat": "flat"}
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,9 @@ _FRAMES: Final = 12
 _STILL: Final = 0.25
 """Largest movement of a still hand during the confirmation, in hand sizes; chosen, not measured."""
 
+# The stamps of periodic frames jitter: without slack, rounding would decide about a whole frame.
+_SLACK_S = 0.001
+
 
 @dataclass(frozen=True)
 class _Seen:
@@ -69,10 +72,6 @@ class Evidence:
             last.append(each)
             age_s += each.dt_s
         return last
-
-
-# The stamps of periodic frames jitter: without slack, rounding would decide about a whole frame.
-_SLACK_S = 0.001
 
 
 class Debouncer:

@@ -31,6 +31,18 @@ _DEPTH_SCALE: Final = 0.4
 
 Array = NDArray[np.floating]
 
+_SAME_HAND_OVERLAP: Final = 0.5
+_PART: Final = 0.7
+_SECOND_LOOK: Final = 1.15
+"""Factor on MediaPipe's region in the second pass: of 57 misread hands of people, it corrects 12 more."""
+_SEARCH: Final = Pace(change=6, settle_s=0.12, period_s=0.2)
+"""How often to search without a hand: when settled, each of the four main ways has had its frame at 30 Hz."""
+_SEARCH_BESIDE_A_HAND: Final = Pace(change=6, settle_s=0.2, period_s=1.0, least_s=0.2)
+_FOLLOW: Final = Pace(change=3, settle_s=0.08, period_s=0.1)
+"""How often to process tracked hands: below three levels, landmarks deviate by at most 0.03 of the hand."""
+_MAX_SIDE: Final = 32766
+"""Maximum side of a picture that OpenCV can sample, in pixels."""
+
 
 @dataclass(frozen=True)
 class Estimate:
@@ -77,19 +89,6 @@ class HandLandmarkModel:
             rightness=float(rightness[0]),
             presence=float(presence[0]),
         )
-
-
-_SAME_HAND_OVERLAP: Final = 0.5
-_PART: Final = 0.7
-_SECOND_LOOK: Final = 1.15
-"""Factor on MediaPipe's region in the second pass: of 57 misread hands of people, it corrects 12 more."""
-_SEARCH: Final = Pace(change=6, settle_s=0.12, period_s=0.2)
-"""How often to search without a hand: when settled, each of the four main ways has had its frame at 30 Hz."""
-_SEARCH_BESIDE_A_HAND: Final = Pace(change=6, settle_s=0.2, period_s=1.0, least_s=0.2)
-_FOLLOW: Final = Pace(change=3, settle_s=0.08, period_s=0.1)
-"""How often to process tracked hands: below three levels, landmarks deviate by at most 0.03 of the hand."""
-_MAX_SIDE: Final = 32766
-"""Maximum side of a picture that OpenCV can sample, in pixels."""
 
 
 class MediaPipeLandmarker:

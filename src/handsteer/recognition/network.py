@@ -10,6 +10,8 @@ from handsteer.recognition.npz import Arrays
 
 Array = NDArray[np.float64]
 
+_LARGEST = 1e9  # trained values are far smaller; products of larger ones could be infinite
+
 
 @dataclass(frozen=True)
 class Network:
@@ -74,9 +76,6 @@ class Novelty:
         gaps = ((features - self.mean) * self.scale - self.centres[classes]) @ self.whitening
         distances: Array = np.sqrt((gaps**2).mean(axis=1))
         return distances
-
-
-_LARGEST = 1e9  # trained values are far smaller; products of larger ones could be infinite
 
 
 def to_arrays(network: Network, novelty: Novelty) -> dict[str, NDArray[np.float32]]:

@@ -114,7 +114,7 @@ def _array(file: zipfile.ZipFile, entry: zipfile.ZipInfo) -> NDArray[Any]:
     if kind.kind not in _KINDS:
         raise _RefusedError(f"its array {entry.filename[:60]!r} is neither of numbers nor of text")
     if math.prod(shape) * kind.itemsize > entry.file_size:
-        raise _RefusedError(f"its array {entry.filename[:60]!r} says that it is larger than it is")
+        raise _RefusedError(f"its array {entry.filename[:60]!r} claims to be larger than it is")
     with file.open(entry) as stream:
         array: NDArray[Any] = np.lib.format.read_array(stream, allow_pickle=False)
     if kind.kind == "U" and not _is_text(array):

@@ -16,6 +16,8 @@ from handsteer.recognition.landmarker import MediaPipeLandmarker
 from handsteer.recognition.shipped_signs import ShippedClassifier, load_model
 from handsteer.types import NONE
 
+_NOTHING = SignGuess(NONE, 0.0)
+
 
 def open_landmarker(config: Config) -> Landmarker:
     """Return the hand landmarker.
@@ -34,9 +36,6 @@ def open_classifier(config: SignsConfig) -> Classifier:
     """
     shipped = ShippedClassifier(load_model())
     return CustomClassifier(shipped, load_custom_model(config.model.expanduser())) if config.model else shipped
-
-
-_NOTHING = SignGuess(NONE, 0.0)
 
 
 @dataclass(frozen=True)
@@ -132,11 +131,11 @@ class Recognizer:
         # A hand whose sign is being confirmed is effectively selected.
         search = self._selector.wants_search() and self._filter.candidate == NONE
         hands = self._landmarker.detect(image, search=search, dt_s=dt_s)
-        told = [self._classifier.classify(hand) for hand in hands]
-        guesses = [self._seen(guess) for guess in told]
+        classified = [self._classifier.classify(hand) for hand in hands]
+        guesses = [self._seen(guess) for guess in classified]
         chosen = self._selector.choose(hands, guesses, dt_s)
         hand, guess = (hands[chosen], guesses[chosen]) if chosen is not None else (None, _NOTHING)
-        likelihoods = told[chosen].likelihoods if chosen is not None else {}
+        likelihoods = classified[chosen].likelihoods if chosen is not None else {}
         self._evidence.add(HandPosition.of_palm(hand) if hand else None, likelihoods, dt_s)
         since_s = self._filter.candidate_s + dt_s
         guess = self._bridged(guess, since_s)

@@ -42,6 +42,52 @@ _FILE: Final = NpzFormat(
     remedy="train it again, or use the one that is shipped",
 )
 
+_DOUBT: Final = 1.5
+"""Width of the soft limits below, in degrees."""
+_POINTING: Final = 52.0
+"""Largest angle of an index finger to its axis, in degrees.
+
+People tilt their hands by up to 30 degrees, and their fingers relative to the hand.
+"""
+_SIDEWAYS: Final = 49.0
+"""Largest angle of a thumb to the horizontal, in degrees: about half-way to a thumb up or down."""
+_UPRIGHT: Final = 55.0
+"""Largest angle of an open hand to upwards: beyond it, hands hang or rest."""
+_RAISED: Final = 120.0
+"""Likewise, of a fist."""
+_HANGING: Final = 145.0
+"""Smallest angle of a hanging hand's palm to upwards: 156 to 178 degrees for people at rest."""
+_HANGING_TRUST: Final = 0.82
+"""Factor on the thumb's likelihood for a hanging hand: next to the fingers, it may seem to point sideways."""
+_AWAY: Final = 0.06
+_AWAY_DOUBT: Final = 0.01
+"""Depth of a resting index finger's tip beyond its base, in palm lengths, and the width of that limit.
+
+0.08 to 0.18 for people at rest; of people who point, 99 of 100 point towards the camera.
+"""
+_HALF_OPEN: Final = 0.56
+_HALF_OPEN_DOUBT: Final = 0.012
+"""Likewise, the distance of the middle finger's tip from its base: 0.55 to 0.68 at rest; 0.45 in a pointing hand."""
+
+_PRESENT: Final = 0.7
+_PRESENT_DOUBT: Final = 0.05
+"""Presence at which a hand and none are equally likely, and the width of that limit.
+
+The landmark model reports above 0.85 for 99 of 100 hands, and less than the limit for half of the faces it mistakes for
+one.
+"""
+_SMALL_PX: Final = 17.0
+_SMALL_DOUBT_PX: Final = 4.0
+"""Longer side of a hand at which likelihoods are halved, in pixels, and the width of that limit.
+
+At 35 pixels they lose a hundredth; a fist 3 m from a webcam of 640x480 has some 17.
+"""
+
+_THRESHOLDS: Final = {STOP: 0.5, GO: 0.6, FORWARD: 0.7, BACKWARD: 0.9, TURN_LEFT: 0.65, TURN_RIGHT: 0.65}
+"""Likelihood thresholds of the signs; docs/signs.md has the false rates that they were chosen for."""
+SURE: Final = 0.8
+"""The confidence of a sign whose likelihood equals its threshold."""
+
 
 @dataclass(frozen=True)
 class SignModel:
@@ -99,53 +145,6 @@ def _built(arrays: Arrays) -> SignModel:
     if not (len(shapes) == len(set(shapes)) == classes == len(novelty.centres)) or "other" not in shapes:
         raise ValueError("its parts do not fit together")
     return SignModel(shapes, network, novelty, dict(json.loads(str(arrays["trained_on"]))))
-
-
-_DOUBT: Final = 1.5
-"""Width of the soft limits below, in degrees."""
-_POINTING: Final = 52.0
-"""Largest angle of an index finger to its axis, in degrees.
-
-People tilt their hands by up to 30 degrees, and their fingers relative to the hand.
-"""
-_SIDEWAYS: Final = 49.0
-"""Largest angle of a thumb to the horizontal, in degrees: about half-way to a thumb up or down."""
-_UPRIGHT: Final = 55.0
-"""Largest angle of an open hand to upwards: beyond it, hands hang or rest."""
-_RAISED: Final = 120.0
-"""Likewise, of a fist."""
-_HANGING: Final = 145.0
-"""Smallest angle of a hanging hand's palm to upwards: 156 to 178 degrees for people at rest."""
-_HANGING_TRUST: Final = 0.82
-"""Factor on the thumb's likelihood for a hanging hand: next to the fingers, it may seem to point sideways."""
-_AWAY: Final = 0.06
-_AWAY_DOUBT: Final = 0.01
-"""Depth of a resting index finger's tip beyond its base, in palm lengths, and the width of that limit.
-
-0.08 to 0.18 for people at rest; of people who point, 99 of 100 point towards the camera.
-"""
-_HALF_OPEN: Final = 0.56
-_HALF_OPEN_DOUBT: Final = 0.012
-"""Likewise, the distance of the middle finger's tip from its base: 0.55 to 0.68 at rest; 0.45 in a pointing hand."""
-
-_PRESENT: Final = 0.7
-_PRESENT_DOUBT: Final = 0.05
-"""Presence at which a hand and none are equally likely, and the width of that limit.
-
-The landmark model reports above 0.85 for 99 of 100 hands, and less than the limit for half of the faces it mistakes for
-one.
-"""
-_SMALL_PX: Final = 17.0
-_SMALL_DOUBT_PX: Final = 4.0
-"""Longer side of a hand at which likelihoods are halved, in pixels, and the width of that limit.
-
-At 35 pixels they lose a hundredth; a fist 3 m from a webcam of 640x480 has some 17.
-"""
-
-_THRESHOLDS: Final = {STOP: 0.5, GO: 0.6, FORWARD: 0.7, BACKWARD: 0.9, TURN_LEFT: 0.65, TURN_RIGHT: 0.65}
-"""Likelihood thresholds of the signs; docs/signs.md has the false rates that they were chosen for."""
-SURE: Final = 0.8
-"""The confidence of a sign whose likelihood equals its threshold."""
 
 
 class ShippedClassifier:

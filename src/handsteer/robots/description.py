@@ -18,6 +18,8 @@ _xacro_lock = threading.Lock()
 
 Vector = tuple[float, float, float]
 
+_LONGEST, _LONGEST_SHOWN = 5_000_000, 100
+
 
 @dataclass(frozen=True)
 class Visual:
@@ -61,9 +63,6 @@ class Joint:
     xyz: Vector
     rpy: Vector
     axis: Vector
-
-
-_LONGEST, _LONGEST_SHOWN = 5_000_000, 100
 
 
 @cache

@@ -179,7 +179,7 @@ class RemoteRobot:
         if self._senseless:
             return f"sends odometry on {self._odom_topic} that is no number; it is not used"
         if is_silent:
-            return f"is silent: {self._odom_topic} has stopped, and the robot is told to stand"
+            return f"is silent: {self._odom_topic} has stopped, so the robot is commanded to stop"
         if self._seen is None and self._config.odom_topic and self._linked_s > _ODOMETRY_DUE_S:
             return f"does not say where it is: nothing comes on {self._odom_topic} (robot.odom_topic)"
         return "waits until Stop is shown, or no hand" if self._limiter.waits else ""
@@ -188,7 +188,7 @@ class RemoteRobot:
         name = _full_name(self._session, self._config.cmd_vel_topic)
         kind = " or ".join(type_name(kind) for kind in (self._topic.type, self._topic.or_type) if kind)
         advice = _ADVICE.get(self._config.kind, _IN_ROS2)
-        return f"nobody listens on {name} for {kind}; is it on, are topic and type right, {advice}"
+        return f"no node subscribes to {name} with {kind}; is it on, are topic and type right, {advice}"
 
 
 def _topic(name: str, kind: type[Any], depth: int) -> Topic[Any]:

@@ -11,11 +11,18 @@ from handsteer.errors import WorldError
 from handsteer.robots import diff_drive
 from handsteer.robots.description import robot_description
 from handsteer.robots.diff_drive import DriveState, Velocity
-from handsteer.robots.lidar import Lidar
-from handsteer.robots.physics import ROBOT_JOINT, TIMESTEP_S, WHEEL_JOINTS, compile_model, thing_name
+from handsteer.robots.physics import ROBOT_JOINT, TIMESTEP_S, WHEEL_JOINTS, Lidar, compile_model, thing_name
 from handsteer.robots.protocol import Obstacle, RangeScan, RobotState
 from handsteer.robots.world import World, load_world
 from handsteer.types import Pose2D
+
+_log = logging.getLogger(__name__)
+
+# A touch lasts this long after the last contact, because pushing loses contact now and then.
+_TOUCH_S = 0.2
+
+# No valid simulation comes near it: a wheel at the limits of the configuration's defaults turns at 63 rad/s.
+_WILD_SPEED = 1e5
 
 
 class Contacts:
@@ -40,15 +47,6 @@ class Contacts:
         geoms = data.contact.geom
         touched = self._thing_of_geom[geoms[:, ::-1]][self._is_robot_geom[geoms]]
         return [self._names[index] for index in sorted(set(touched.tolist())) if index >= 0]
-
-
-_log = logging.getLogger(__name__)
-
-# A touch lasts this long after the last contact, because pushing loses contact now and then.
-_TOUCH_S = 0.2
-
-# No valid simulation comes near it: a wheel at the limits of the configuration's defaults turns at 63 rad/s.
-_WILD_SPEED = 1e5
 
 
 class SimulatedRobot:

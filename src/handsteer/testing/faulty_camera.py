@@ -137,7 +137,7 @@ class SpoiltCamera:
         """
         frame = self._camera.read()
         if self.fault == "vanishing":
-            raise CameraLost(f"{self.name} has vanished, as it was told to")
+            raise CameraLost(f"{self.name} has vanished, as requested")
         if frame is None or self.fault is None:
             self._last = frame or self._last
             return frame

@@ -121,7 +121,7 @@ def test_landmarks_without_depth_are_learnt_from_the_image_and_sides_are_kept() 
             "too little of Hi: 2 takes with 8 hands, and at least 2 takes with 10 hands",
         ),
         (Dataset((*takes("Hi", "Peace", count=2), *takes("hi", "Call", count=2))), "'Hi' and 'hi' mean the same"),
-        (Dataset(tuple(takes("Hi", "Stop", count=2))), r"Hi looks like Stop: \d+% of its hands are told as that"),
+        (Dataset(tuple(takes("Hi", "Stop", count=2))), r"Hi looks like Stop: \d+% of its hands are recognised as that"),
     ],
     ids=["nothing", "no new one", "one take", "few hands", "same name", "shipped"],
 )

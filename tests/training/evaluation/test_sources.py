@@ -61,7 +61,7 @@ def test_signs_that_were_taught_without_depth_are_told_without_it(tmp_path: Path
     path = dataset(tmp_path / "x.npz", Hi=[flat(GO)] * 3, Stop=[flat(STOP)], NONE=[flat(GO)])
     found = run(path, CustomClassifier(SHIPPED, model(hi=0.95, depth="flat")))
     assert [(result.truth, result.seen) for result in found.results] == [("Hi", "Hi")] * 3
-    assert found.without_depth == 2, "a shipped sign cannot be told without depth, so neither can that it is none"
+    assert found.without_depth == 2, "a shipped sign cannot be recognised without depth, nor that it is none"
     with pytest.raises(EvaluationError, match="none of its 5 hands has depth"):
         open_source(path, CustomClassifier(SHIPPED, model()))
 

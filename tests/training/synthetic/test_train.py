@@ -69,6 +69,7 @@ def test_a_network_learns_classes_that_no_line_separates() -> None:
     assert epochs == list(range(1, 301))
 
 
+@pytest.mark.slow
 def test_training_twice_gives_the_same_bytes_and_a_model_that_tells_shapes(tmp_path: Path) -> None:
     for name in ("one.npz", "other.npz"):
         model = train_default(lambda _: None, chunks=1, epochs=3)

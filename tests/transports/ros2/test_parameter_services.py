@@ -97,14 +97,14 @@ def test_one_unknown_name_leaves_the_answer_empty() -> None:
 
 def test_descriptions_have_ranges_and_say_what_is_fixed() -> None:
     speed = Client().describe("max_linear")
-    assert (speed.type, speed.read_only, speed.description) == (3, False, "Highest forward and backward speed [m/s]")
+    assert (speed.type, speed.read_only, speed.description) == (3, False, "Maximum linear speed [m/s]")
     assert [(one.from_value, one.to_value) for one in speed.floating_point_range] == [(0.0, 10.0)]
     assert speed.additional_constraints == "above 0"
     assert Client().describe("ramp").additional_constraints == "one of per_message, per_second"
     threads = Client("signs").describe("landmarks.threads")
     assert (threads.type, threads.read_only) == (2, True)
     assert [(one.from_value, one.to_value, one.step) for one in threads.integer_range] == [(1, 64, 1)]
-    assert threads.additional_constraints == "it is read when the node starts: give it then"
+    assert threads.additional_constraints == "it is only read when the node starts"
 
 
 def test_a_set_is_checked_applied_and_told() -> None:
@@ -127,10 +127,10 @@ def test_a_set_is_checked_applied_and_told() -> None:
         ("max_linear", "fast", "max_linear: 'fast' should be a number"),
         ("max_linear", True, "max_linear: True should be a number"),
         ("max_linear", [], "max_linear: [] should be a number"),
-        ("max_linear", None, "max_linear cannot be taken away, only set to another value"),
+        ("max_linear", None, "max_linear cannot be removed, only set to another value"),
         ("ramp", "steep", "ramp: 'steep' should be 'per_message' or 'per_second'"),
-        ("max_liner", 0.3, "max_liner: there is no such parameter; there are ramp, linear_step"),
-        ("use_sim_time", False, "use_sim_time cannot be set: it is read when the node starts: give it then"),
+        ("max_liner", 0.3, "max_liner: there is no such parameter; the parameters are ramp, linear_step"),
+        ("use_sim_time", False, "use_sim_time cannot be set: it is only read when the node starts"),
         ("actions.Stop", "forward", "actions: {'Peace': 'turbo', 'Stop': 'forward'} should leave Stop at 'stop'"),
     ],
 )

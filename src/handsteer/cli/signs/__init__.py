@@ -1,4 +1,4 @@
-"""``handsteer signs``: the signs themselves. One file a verb."""
+"""``handsteer signs``: the signs themselves. One file per verb."""
 
 from cyclopts import App
 
@@ -6,12 +6,12 @@ _EXAMPLES = """Examples:
   handsteer signs list                 the signs, and what each does
   handsteer signs collect --label Hi   show a new sign to the camera
   handsteer signs train                learn it
-  handsteer signs evaluate photos/     how well signs are told
+  handsteer signs evaluate photos/     how well signs are recognised
 """
 
 app = App(
     name="signs",
-    help="The signs: what each does, how well they are told, and how to teach further ones.",
+    help="List, evaluate and teach signs.",
     help_epilogue=_EXAMPLES,
     help_format="plaintext",
     result_action="return_value",

@@ -1,4 +1,4 @@
-"""``handsteer signs collect``: show a sign, to teach it."""
+"""``handsteer signs collect`` and ``import``: examples of a sign to be learnt."""
 
 import datetime
 import math
@@ -43,50 +43,51 @@ def collect(
     config_file: ConfigFile = None,
     parameters: Parameters = None,
 ) -> int:
-    """Collect takes of a sign that shall be taught, in front of a camera or from a recording.
+    """Collect examples (takes) of a new sign, from a camera or a recording.
 
     Example: handsteer signs collect --label Hi
 
-    Before each take there is a countdown, so both hands are free. In the terminal, u undoes the last take and q ends.
-    Takes are in the file as soon as they end. Show the sign as you will when you drive, and move the hand a little:
-    nearer, farther, tilted. The label NONE collects what shall be no sign.
+    A countdown precedes each take, and each is saved as soon as it ends.
+    In the terminal, u undoes the last take and q ends.
+    Show the sign as you will when driving, and move the hand a little: nearer,
+    farther, tilted. With the label NONE, collect hands that show no sign.
 
     Parameters
     ----------
     label
-        The sign, as Hi.
+        Name of the sign, such as Hi.
     dataset
-        File that the takes are added to; it is made when it is not there.
+        File to add the takes to; created if missing.
     camera
-        auto, virtual, a webcam's index or /dev/videoN, an address, a video file or a folder of photos. A video is cut
-        into takes; each photo is one.
+        auto, virtual, a webcam's index or /dev/videoN, an address, a video file or a folder of photos. A video is
+        divided into takes; each photo is a take.
     person
-        Who shows it. Where several show a sign, nobody is both learnt from and tested on.
+        Who shows it. With several persons, the signs are tested on persons that they were not learnt from.
     session
-        When or where it is; by default the date and time.
+        Name of the session; by default the date and time.
     takes
-        How many to collect; a recording is taken as a whole.
+        Number of takes; a recording is used as a whole.
     take_time
-        How long each is, in seconds.
+        Duration of each take, in seconds.
     countdown
-        How long to wait before each, in seconds.
+        Countdown before each take, in seconds.
     hold
-        No countdown: a take is as long as the space key is held.
+        Record while the space key is held, without a countdown.
     undo
-        Take the last take out of the file again.
+        Remove the last take from the file.
     config_file
-        YAML file with parameters; those given here go before it.
+        YAML file with parameters; options override it.
     """
     config = settings(config_file, parameters, {"camera": {"source": camera}})
     known = load_dataset(dataset) if dataset.exists() else Dataset()
     if undo:
         gone = known.takes[-1:]
         save_dataset(known.without_last(), dataset)
-        say(f"took out the last take: {len(gone[0].hands)} hands of {gone[0].label}")
+        say(f"removed the last take: {len(gone[0].hands)} hands of {gone[0].label}")
         print(dataset_table(known.without_last()))
         return 0
     if label is None:
-        raise DatasetError("--label is missing: say which sign is shown, as --label Hi")
+        raise DatasetError("--label is missing: name the sign, as in --label Hi")
     _check(takes, take_time, countdown, dataset)
     when = session or f"{datetime.datetime.now():%Y-%m-%d %H:%M}"
     facts = Facts(label_for(label, known.labels), person, when, _source_name(config.camera.source))
@@ -97,9 +98,7 @@ def collect(
         save_dataset(known, dataset)
     else:
         if hold and not Keys.possible():
-            raise DatasetError(
-                "--hold needs a terminal to read keys from: leave it out, and a countdown takes its place"
-            )
+            raise DatasetError("--hold needs a terminal to read keys from; without it, a countdown starts each take")
         collector = Collector(facts, takes=takes, take_s=take_time, countdown_s=countdown, hold=hold)
         known = _live(config, collector, known, dataset, facts.label)
     print(dataset_table(known))
@@ -136,7 +135,7 @@ def _live(config: Config, collector: Collector, known: Dataset, path: Path, labe
 
 
 class _View:
-    """Shows how far the collecting is: the picture where there is a terminal, else a line for each change."""
+    """Shows the progress of collecting: a picture in a terminal, otherwise a line for each change."""
 
     def __init__(self, label: str) -> None:
         self._label = label
@@ -157,9 +156,9 @@ class _View:
 def _sentence(status: Status, label: str, hand: Hand | None) -> str:
     seen = "" if hand else " - no hand is in view"
     if status.failed:
-        return "too few hands were seen: this take is done again"
+        return "too few hands were seen: this take is repeated"
     if status.finished:
-        return f"a take of {len(status.finished.hands)} hands is done"
+        return f"take finished: {len(status.finished.hands)} hands"
     return {
         "ready": f"hold the space key while you show {label}{seen}",
         "countdown": f"show {label} in {math.ceil(status.left_s)} s{seen}",
@@ -179,7 +178,7 @@ def _check(takes: int, take_s: float, countdown_s: float, path: Path) -> None:
         raise DatasetError(f"--take-time: {take_s:g} should be from 0.2 to 60 seconds")
     if not 0 <= countdown_s <= 60:
         raise DatasetError(f"--countdown: {countdown_s:g} should be from 0 to 60 seconds")
-    # Before the work, not after it.
+    # Checked before the work, not after it.
     if not path.absolute().parent.is_dir():
         raise DatasetError(f"--dataset: there is no folder {path.absolute().parent} for {path.name}")
 
@@ -193,26 +192,26 @@ def import_keypoints(
     person: str | None = None,
     not_mirrored: Flag = False,
 ) -> int:
-    """Add landmark rows to a dataset: a CSV file with a class number, then x and y of the 21 landmarks, in each line.
+    """Add rows of landmarks to a dataset, from a CSV file: a class number, then x and y of the 21 landmarks.
 
     Example: handsteer signs import keypoint.csv --labels 2=Pointer 3=OK
 
-    The numbers count from the wrist and are divided by the largest of them, as projects that recognise hand signs write
-    them. There is no depth in them, so what is learnt with them is learnt from the image alone.
+    Coordinates are relative to the wrist and divided by the largest of them, as
+    several hand sign projects write them. They have no depth, so signs learnt
+    with them use the image coordinates only.
 
     Parameters
     ----------
     source
-        The CSV file; one that ends in .gz is unpacked.
+        CSV file, or gzipped (.csv.gz).
     labels
-        The sign of each class, as 3=OK; other classes are left out. Or a file with the name of class 0 in its first
-        line, and so on.
+        The sign of each class, as 3=OK; other classes are skipped. Or a file with one name per line, from class 0.
     dataset
-        File that the rows are added to; it is made when it is not there.
+        File to add the rows to; created if missing.
     person
         Who showed them; by default the name of the file.
     not_mirrored
-        The rows come from images as the camera saw them; such projects usually mirror them first.
+        The rows come from unmirrored images; most such projects mirror them first.
     """
     known = load_dataset(dataset) if dataset.exists() else Dataset()
     names = {number: label_for(name, known.labels) for number, name in _names(labels).items()}

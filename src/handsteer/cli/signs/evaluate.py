@@ -1,12 +1,11 @@
-"""``handsteer signs evaluate``: how well are the signs told?"""
+"""``handsteer signs evaluate``: how well are the signs recognised?"""
 
 import json as json_format
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-import cv2
 from cyclopts import Parameter
 from tqdm import tqdm
 
@@ -14,11 +13,10 @@ from handsteer.cli.app import ConfigFile, Flag, Parameters
 from handsteer.cli.running import settings
 from handsteer.cli.signs.tables import evaluation_tables
 from handsteer.config import Config
-from handsteer.errors import EvaluationError
+from handsteer.errors import EvaluationError, needing
 from handsteer.recognition.classifier import Classifier
 from handsteer.recognition.recognizer import Recognizer, open_classifier
 from handsteer.training.evaluation.labels import labels_of
-from handsteer.training.evaluation.plots import Picture, draw_confusion, draw_reliability, draw_sweep
 from handsteer.training.evaluation.report import Evaluation
 from handsteer.training.evaluation.sources import (
     LabelledFolder,
@@ -30,6 +28,9 @@ from handsteer.training.evaluation.sources import (
 )
 from handsteer.training.evaluation.views import View
 from handsteer.types import motion_signs
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 def evaluate(
@@ -46,40 +47,39 @@ def evaluate(
     config_file: ConfigFile = None,
     parameters: Parameters = None,
 ) -> int:
-    """Print how well the signs are recognised in labelled photos, in videos, or in datasets of landmarks.
+    """Print how well the signs are recognised in labelled photos, videos, or datasets of landmarks.
 
     Example: handsteer signs evaluate photos/ more/ a.mp4 --flip --rotate -15,0,15
 
-    A folder has an index.csv (columns path and sign, and kind and person_set if wanted), or a subfolder for each sign
-    and one called negatives. A video may have a file VIDEO.labels.csv beside it (columns frame, sign), VIDEO without
-    its ending.
+    A folder contains an index.csv (columns path, sign, and optionally kind and
+    person_set), or a subfolder for each sign and one named negatives.
+    The labels of NAME.mp4, if any, are in NAME.labels.csv (columns frame, sign).
 
     Parameters
     ----------
     sources
         Folders of labelled photos, video files, and datasets (.npz) of `signs collect`.
     json
-        Print one JSON object, with what was seen in each photo and how likely each sign was.
+        Print one JSON object, with the result and the likelihood of each sign for each photo.
     png
-        Write the confusion matrix as a picture to this file.
+        Plot the confusion matrix to this file.
     reliability
-        Print how far likelihoods can be trusted, and write it as a picture to this file.
+        Print the reliability of the likelihoods, and plot it to this file.
     sweep
-        Print what other thresholds of the confidence would give.
+        Print the results for other confidence thresholds.
     sweep_png
-        Write that as a picture to this file.
+        Plot the results for other confidence thresholds to this file.
     flip
-        Look at everything flipped left to right: the other hand, and left for right. With several angles, both raw
-        and flipped at each of them.
+        Flip everything left to right: the other hand, and left for right. With several angles, evaluate each both
+        unflipped and flipped.
     rotate
-        Turn everything clockwise by so many degrees; by 180, Forward is Backward. Or several angles, as -15,0,15:
-        each is looked at, and compared.
+        Rotate everything clockwise by this many degrees; by 180, Forward is Backward. Several (-15,0,15) are compared.
     as_is
-        Don't pad and enlarge photos below 400 px.
+        Do not pad and enlarge photos below 400 px.
     grace
-        In a video, how many seconds a sign may go on to count when it is no longer shown.
+        In a video, for how many seconds a sign may still count after it is no longer shown.
     config_file
-        YAML file with parameters; those given here go before it.
+        YAML file with parameters; options override it.
     """
     config = settings(config_file, parameters)
     pictures = {"--png": png, "--reliability": reliability, "--sweep-png": sweep_png}
@@ -93,7 +93,7 @@ def evaluate(
     names = ", ".join(dict.fromkeys(Path(run.source).resolve().name for run in runs))
     for option, path in pictures.items():
         if path is not None:
-            _write_picture(option, path, _picture(option, evaluation, names))
+            _write_plot(option, path, _plot(option, evaluation, names))
     with_sweep = sweep or sweep_png is not None
     if json:
         print(json_format.dumps(evaluation.as_dict(with_sweep=with_sweep)))
@@ -103,13 +103,13 @@ def evaluate(
 
 
 def _views(rotate: str, *, flip: bool, enlarge: bool) -> list[View]:
-    """Return how to look: one angle gives one view; with several, each is looked at, and with ``flip`` also flipped."""
+    """Return the views: one for a single angle; for several, one for each, and with ``flip`` also each flipped."""
     try:
         angles = [float(angle) for angle in rotate.split(",") if angle.strip()]
     except ValueError:
         angles = []
     if not angles:
-        raise EvaluationError(f"--rotate: {rotate!r} should be degrees, or several with commas, as -15,0,15")
+        raise EvaluationError(f"--rotate: {rotate!r} should be degrees, or several separated by commas, as -15,0,15")
     for angle in angles:
         if not -360 <= angle <= 360:
             raise EvaluationError(f"--rotate: {angle:g} should be from -360 to 360 degrees")
@@ -118,7 +118,7 @@ def _views(rotate: str, *, flip: bool, enlarge: bool) -> list[View]:
 
 
 def _open(paths: Iterable[Path], classifier: Classifier) -> list[Source]:
-    """Return all sources, checked as far as that goes before the work, which takes a while."""
+    """Return all sources, checked as far as possible before the evaluation, which takes a while."""
     unique = list(dict.fromkeys(paths))
     if not unique:
         raise EvaluationError("there is nothing to evaluate: give folders of labelled photos, videos, or datasets")
@@ -134,7 +134,7 @@ def _evaluate(
     least = config.signs.min_confidence
     hands = [data.run(classifier, least, view, _with_progress) for data in datasets for view in views]
     _check_scored(hands)
-    # Hands are found already: no landmark models are needed for those.
+    # Datasets contain landmarks, so the landmark models are not needed for them.
     recognizer = Recognizer(config) if folders or videos else None
     photos = [folder.run(recognizer, view, _with_progress) for folder in folders for view in views if recognizer]
     _check_scored(photos)
@@ -152,7 +152,7 @@ def _check_scored(runs: Sequence[PhotoRun]) -> None:
     for source in dict.fromkeys(run.source for run in runs):
         if not any(run.results for run in runs if run.source == source):
             raise EvaluationError(
-                f"{source}: nothing in it shows a sign or NONE when it is turned so; try another --rotate"
+                f"{source}: nothing in it shows a sign or NONE at this rotation; try another --rotate"
             )
 
 
@@ -163,14 +163,17 @@ def _with_progress(things: Iterable[Any], unit: str) -> Iterable[Any]:
 def _check(grace_s: float, pictures: Mapping[str, Path | None]) -> None:
     if not 0 <= grace_s <= 10:
         raise EvaluationError(f"--grace: {grace_s:g} should be from 0 to 10 seconds")
-    # Before the work, which takes a while, not after it.
+    # Checked before the evaluation, which takes a while.
     for option, png in pictures.items():
         if png is not None and (png.suffix.lower() != ".png" or not png.parent.is_dir()):
-            raise EvaluationError(f"{option}: {png} should be a file name that ends in .png, in a folder that is there")
+            raise EvaluationError(f"{option}: {png} should be a file name that ends in .png, in an existing folder")
+    if any(pictures.values()):
+        with needing("a plot", "plots", "matplotlib"):
+            pass
 
 
 def _check_figures(sources: Sequence[Source], wanted: Mapping[str, object]) -> None:
-    """Refuse what cannot be had from videos alone."""
+    """Refuse options that need more than videos."""
     videos = [source for source in sources if isinstance(source, LabelledVideo)]
     if len(videos) < len(sources):
         return
@@ -181,21 +184,23 @@ def _check_figures(sources: Sequence[Source], wanted: Mapping[str, object]) -> N
         )
     for option in ("--reliability", "--sweep", "--sweep-png"):
         if wanted[option]:
-            raise EvaluationError(f"{option}: it takes photos or a dataset; here are only videos")
+            raise EvaluationError(f"{option} needs photos or a dataset, not only videos")
 
 
-def _picture(option: str, evaluation: Evaluation, names: str) -> Picture:
+def _plot(option: str, evaluation: Evaluation, names: str) -> "Figure":
+    # Loaded only when asked for: it is an extra.
+    from handsteer.training.evaluation.plots import draw_confusion, draw_reliability, draw_sweep  # noqa: PLC0415
+
     if option == "--reliability":
-        return draw_reliability(evaluation.calibration, f"{names}: how far likelihoods can be trusted")
+        return draw_reliability(evaluation.calibration, f"{names}: reliability of likelihoods")
     if option == "--sweep-png":
         return draw_sweep(evaluation.sweep, f"{names}: thresholds")
     assert evaluation.confusion is not None
     return draw_confusion(evaluation.confusion, f"{names}: signs shown and seen")
 
 
-def _write_picture(option: str, path: Path, picture: Picture) -> None:
-    _, data = cv2.imencode(".png", picture)
+def _write_plot(option: str, path: Path, plot: "Figure") -> None:
     try:
-        path.write_bytes(data.tobytes())
+        plot.savefig(path)
     except OSError as error:
         raise EvaluationError(f"{option}: cannot write {path}: {error.strerror}") from None

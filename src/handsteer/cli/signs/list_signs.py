@@ -1,4 +1,4 @@
-"""``handsteer signs list``: the signs, and what each does."""
+"""``handsteer signs list``: the signs and their actions."""
 
 import json as json_format
 
@@ -20,7 +20,7 @@ def list_signs(*, json: Flag = False, config_file: ConfigFile = None, parameters
     json
         Print one JSON list.
     config_file
-        YAML file with parameters; those given here go before it.
+        YAML file with parameters; options override it.
     """
     config = settings(config_file, parameters)
     actions = config.control.actions
@@ -40,4 +40,4 @@ def list_signs(*, json: Flag = False, config_file: ConfigFile = None, parameters
 
 
 def _effect(sign: dict[str, object]) -> str:
-    return f"{sign['effect']}{'' if sign['known'] else ' (but the model does not know this sign)'}"
+    return f"{sign['effect']}{'' if sign['known'] else ' (unknown to the model)'}"

@@ -15,6 +15,11 @@ from handsteer.training.evaluation.sources import PhotoRun
 from handsteer.training.evaluation.video_metrics import Event, LabelledFigures, VideoReport
 from handsteer.types import NONE
 
+_WIDEST = 10_000
+_PHOTOS_AGAIN = (
+    "Each counts once per view, though it shows the same person: intervals over several views are too narrow."
+)
+
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]], text_columns: int = 1) -> str:
     """Return a table as text; columns after the first ``text_columns`` are aligned to the right."""
@@ -23,7 +28,7 @@ def table(head: Sequence[str], rows: Sequence[Sequence[str]], text_columns: int 
         grid.add_column(Text(name), justify="left" if column < text_columns else "right", no_wrap=True)
     for row in rows:
         grid.add_row(*map(Text, row))
-    # As wide as it needs to be: its lines may be read by another program.
+    # Wide enough never to wrap: another program may read the lines.
     console = Console(width=_WIDEST, color_system=None, force_terminal=False)
     with console.capture() as text:
         console.print(grid)
@@ -31,7 +36,7 @@ def table(head: Sequence[str], rows: Sequence[Sequence[str]], text_columns: int 
 
 
 def dataset_table(dataset: Dataset) -> str:
-    """Return how much there is of each sign, as text."""
+    """Return the number of takes, hands and persons of each sign, as text."""
     rows = [[each.label, str(each.takes), str(each.rows), str(each.persons)] for each in summarise(dataset)]
     return table(["sign", "takes", "hands", "persons"], rows)
 
@@ -62,7 +67,7 @@ def confusion_table(what: str, confusion: Confusion) -> list[str]:
         for label, counts in zip(confusion.labels, confusion.counts, strict=True)
         if any(counts)
     ]
-    head = f"Confusion, in {what}: a row for each sign that is shown, a column for each that came out"
+    head = f"Confusion, in {what}: a row for each sign shown, a column for each recognised"
     return [head, table(["shown", *confusion.labels], rows)]
 
 
@@ -80,19 +85,13 @@ def rate(share: Share) -> str:
     return f"{share.rate:.1%} ({100 * low:.{digits}f}-{100 * high:.{digits}f})"
 
 
-_WIDEST = 10_000
-_PHOTOS_AGAIN = (
-    "Each is counted once for each view, and is no further person: intervals over several views are too narrow."
-)
-
-
 def evaluation_tables(evaluation: Evaluation, *, with_reliability: bool = False, with_sweep: bool = False) -> str:
-    """Return the figures of ``evaluation`` as text.
+    """Return the metrics of ``evaluation`` as text.
 
     Args:
-        evaluation: What was found.
-        with_reliability: Also how far likelihoods can be trusted.
-        with_sweep: Also what other thresholds would give.
+        evaluation: The results.
+        with_reliability: Whether to add the reliability of the likelihoods.
+        with_sweep: Whether to add the results for other thresholds.
     """
     parts: list[str] = []
     for what, runs in (("photos", evaluation.photos), ("hands", evaluation.hands)):
@@ -109,11 +108,11 @@ def _stills(evaluation: Evaluation, what: str, runs: Sequence[PhotoRun]) -> list
     parts = []
     if len(views) > 1:
         rows = {view: evaluation.of_photos([run for run in runs if run.view.name == view]) for view in views}
-        parts += [f"Recall, and motion that was not asked for, by how the {what} are seen", _comparison("view", rows)]
+        parts += [f"Recall and unintended motion, by how the {what} are seen", _comparison("view", rows)]
     if len(sources) > 1:
         by_source = {name: evaluation.of_photos([run for run in runs if run.source == name]) for name in sources}
         parts += [
-            "Recall, and motion that was not asked for, by source",
+            "Recall and unintended motion, by source",
             _comparison("source", {**by_source, "all": together}),
         ]
     parts += [f"{', '.join(sources)}: {_counted(together, what)}"]
@@ -122,8 +121,8 @@ def _stills(evaluation: Evaluation, what: str, runs: Sequence[PhotoRun]) -> list
 
 
 def _counted(report: PhotoReport, what: str) -> str:
-    text = f"{report.photos} {what}, and {report.unscored} that are not scored"
-    return f"{text}; {report.without_depth} more are not scored: no depth" if report.without_depth else text
+    text = f"{report.photos} {what}, {report.unscored} not scored"
+    return f"{text}; {report.without_depth} more not scored: no depth" if report.without_depth else text
 
 
 def _photo_tables(report: PhotoReport, what: str) -> list[str]:
@@ -139,21 +138,21 @@ def _photo_tables(report: PhotoReport, what: str) -> list[str]:
     ]
     sizes = [[sign, *(rate(shares[size]) for size in SIZES[:3])] for sign, shares in report.recall_by_size.items()]
     parts = [
-        f"Recall with its 95 % interval; how many hands were not found (they are wrong), recall of those that were;\n"
-        f"and how many {what} gave another sign that moves the robot",
+        f"Recall with its 95 % interval; hands not found (they count as wrong), and recall of the found ones;\n"
+        f"and the {what} recognised as another sign that moves the robot",
         table(["sign", "right", "of", "recall", "no hand", "of the found", "moves"], recall),
         "Recall by the longer side of the hand that was found",
         table(["sign", *SIZES[:3]], sizes),
     ]
     if report.by_person_set:
         parts += [
-            "Recall, and motion that was not asked for, by who shows it (person_set)",
+            "Recall and unintended motion, by who shows it (person_set)",
             _comparison("person_set", report.by_person_set),
         ]
     if report.false_commands.of:
         kinds = {**report.false_commands_by_kind, "all": report.false_commands}
         parts += [
-            f"False commands: {what} that show no sign and gave one that moves the robot",
+            f"False commands: {what} of no sign that were recognised as one that moves the robot",
             table(["kind", "false", "of", "rate"], [[kind or "(no kind)", *cells(kinds[kind])] for kind in kinds]),
         ]
     return [*parts, *confusion_table(what, report.confusion)]
@@ -187,7 +186,7 @@ def _reliability(figures: Calibration) -> list[str]:
     ]
     error = "-" if figures.expected_error is None else f"{figures.expected_error:.1%}"
     return [
-        f"Reliability: how likely the likeliest sign was, and how often it is shown.\n"
+        f"Reliability: the likelihood of the likeliest sign, and how often that sign is shown.\n"
         f"Expected calibration error: {error}",
         table(["likelihood", "hands", "mean", "shown"], rows),
     ]
@@ -200,9 +199,9 @@ def _sweep(evaluation: Evaluation) -> list[str]:
         for threshold, row in rows.items()
     ]
     return [
-        "Thresholds: recall, and motion that was not asked for, if a sign were seen from this likelihood on",
+        "Thresholds: recall and unintended motion if a sign were recognised from this likelihood on",
         _comparison("threshold", {f"{threshold:.2f}": row for threshold, row in rows.items()}),
-        "Likewise, of those that don't show the sign, how many gave it",
+        "False alarms: the share of pictures without the sign in which it was recognised",
         table(["threshold", *evaluation.signs], alarms),
     ]
 
@@ -217,8 +216,8 @@ def _videos(evaluation: Evaluation) -> list[str]:
         return [part for name, report in reports.items() for part in _video_tables(name, report)]
     together = {**reports, "all": evaluation.of_videos(runs)}
     parts = [
-        "A minute, with its 95 % interval: how often a sign began to count that moves the robot; false commands",
-        table(["video", "s", "motion", "a minute", "labelled s", "false", "a minute"], _rates(together.items())),
+        "Per minute, with its 95 % interval: onsets of signs that move the robot, and false commands",
+        table(["video", "s", "motion", "per minute", "labelled s", "false", "per minute"], _rates(together.items())),
     ]
     return [*parts, *(part for name, report in reports.items() for part in _video_tables(name, report))]
 
@@ -248,23 +247,23 @@ def _video_tables(name: str, report: VideoReport) -> list[str]:
     parts = [
         f"{name}: {report.frames} frames, {report.duration_s:.1f} s",
         table(["sign that counted", "seconds"], [[sign, f"{time_s:.1f}"] for sign, time_s in report.counted_s.items()]),
-        f"Times at which a sign began to count that moves the robot: {len(report.motion_events)}, "
-        f"{_per_minute(report.motion_rate, ' a minute')}",
-        f"Behind another sign {_per_minute(report.engaged_rate, ' a minute')} of the time with a sign, "
-        f"behind none {_per_minute(report.idle_rate, ' a minute')} of the time without one",
+        f"Onsets of signs that move the robot: {len(report.motion_events)}, "
+        f"{_per_minute(report.motion_rate, ' per minute')}",
+        f"After another sign {_per_minute(report.engaged_rate, ' per minute')} of the time with a sign, "
+        f"after none {_per_minute(report.idle_rate, ' per minute')} of the time without one",
     ]
     if report.labels is None:
-        return [*parts, *_events(report.motion_events), "There are no labels to compare with."]
+        return [*parts, *_events(report.motion_events), "No labels to compare with."]
     return [*parts, *_labelled(report.labels)]
 
 
 def _labelled(labels: LabelledFigures) -> list[str]:
     rows = [_frames_row(labels, sign) for sign in labels.counted_right]
     return [
-        "By the labels: in how many frames the sign was seen and for how many it counted, and how soon it counted",
+        "By the labels: frames in which the sign was seen and in which it counted, and its reaction time",
         table(["sign", "frames", "seen", "counted", "shown", "missed", "median s", "slowest s"], rows),
         f"False commands: {len(labels.false_commands)} in {labels.scored_s:.1f} s, "
-        f"{_per_minute(labels.false_rate, ' a minute')}",
+        f"{_per_minute(labels.false_rate, ' per minute')}",
         *_events(labels.false_commands),
         *confusion_table("frames", labels.confusion),
     ]

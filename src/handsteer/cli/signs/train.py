@@ -1,4 +1,4 @@
-"""``handsteer signs train``: learn signs from what was collected."""
+"""``handsteer signs train``: learn signs from datasets."""
 
 import json as json_format
 import sys
@@ -28,23 +28,22 @@ def train(
     sided: Annotated[list[str] | None, Parameter(consume_multiple=True)] = None,
     json: Flag = False,
 ) -> int:
-    """Learn the signs of datasets, and print how well they are told from each other and from all other hands.
+    """Learn the signs of datasets, and print how well they are distinguished from each other and from other hands.
 
     Example: handsteer signs train signs.npz --output my-signs.npz
 
-    The shipped signs are known already, and stay as they are; what a dataset has of them, and of NONE, is taken as
-    examples of other hands. Drive with what was learnt by --signs.model my-signs.npz, and say what a sign does by
-    --control.actions.Hi stop.
+    The shipped signs do not change; a dataset's rows of them, and of NONE, are
+    used as examples of other hands. Use the learnt signs with --signs.model
+    my-signs.npz, and set what each does with --control.actions.Hi stop.
 
     Parameters
     ----------
     datasets
-        Files that `signs collect` and `signs import` have written; by default signs.npz.
+        Files written by `signs collect` and `signs import`; by default signs.npz.
     output
-        File to write what was learnt to.
+        File to write the learnt signs to.
     sided
-        Signs that are not to be told when they are mirrored, as the other hand would show them; those that point to a
-        side never are.
+        Signs that do not count when mirrored, as the other hand shows them; signs that point to a side never do.
     json
         Print one JSON object.
     """
@@ -63,6 +62,6 @@ def train(
     print(json_format.dumps({"model": str(output), **report.as_dict()}) if json else teaching_tables(report))
     for sign in report.signs:
         if sign.recall is not None and (sign.recall.rate or 0) < _LOW_RECALL:
-            say(f"{sign.summary.label} is told badly: collect further takes, in all the ways in which it shall count")
-    say(f"what was learnt is in {output}: drive with --signs.model {output}")
+            say(f"{sign.summary.label} is recognised poorly: collect more takes, in every way you will show it")
+    say(f"the learnt signs are in {output}: drive with --signs.model {output}")
     return 0

@@ -57,16 +57,16 @@ class BackgroundTraining:
             self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=environment)
         with self._process as process:
             try:
-                said = _follow(process, self._work, progress)
+                answer = _follow(process, self._work, progress)
             finally:
                 process.kill()
         if self._cancelled.is_set():
             return None
-        if isinstance(said, TrainingError):
-            raise said
-        if said is None:
+        if isinstance(answer, TrainingError):
+            raise answer
+        if answer is None:
             raise TrainingError(f"the training ended before it was done, with exit code {process.returncode}")
-        learnt: tuple[CustomModel, TrainingReport] = said
+        learnt: tuple[CustomModel, TrainingReport] = answer
         return learnt
 
     def cancel(self) -> None:
@@ -87,10 +87,10 @@ def _follow(process: "subprocess.Popen[bytes]", work: object, progress: Progress
         process.stdin.close()
     with contextlib.suppress(EOFError, pickle.UnpicklingError):
         while True:
-            kind, said = pickle.load(process.stdout)
+            kind, answer = pickle.load(process.stdout)
             if kind == "done":
-                return said
-            progress(*said)
+                return answer
+            progress(*answer)
     return None
 
 
@@ -99,16 +99,16 @@ def _main() -> None:
     # Other output must not mix with the messages.
     out, sys.stdout = sys.stdout.buffer, sys.stderr
 
-    def tell(kind: str, said: object) -> None:
-        pickle.dump((kind, said), out)
+    def send(kind: str, answer: object) -> None:
+        pickle.dump((kind, answer), out)
         out.flush()
 
     dataset, sided = pickle.load(sys.stdin.buffer)
     shipped = ShippedClassifier(load_model())
     try:
-        tell("done", train_signs(dataset, shipped, sided=sided, progress=lambda *steps: tell("progress", steps)))
+        send("done", train_signs(dataset, shipped, sided=sided, progress=lambda *steps: send("progress", steps)))
     except TrainingError as error:
-        tell("done", error)
+        send("done", error)
 
 
 if __name__ == "__main__":

@@ -17,6 +17,8 @@ _LEAST_ROWS: Final = 10
 _KNOWN_SHARE: Final = 0.3
 _CONFUSED_SHARE: Final = 0.2
 
+_FOLDS: Final = 3
+
 
 def custom_labels(dataset: Dataset, sided: Sequence[str]) -> tuple[str, ...]:
     """Return the labels of ``dataset`` that are new signs.
@@ -61,13 +63,13 @@ def lookalikes(dataset: Dataset, labels: Sequence[str], shipped: Classifier) -> 
     """Return which of ``labels`` the classifier ``shipped`` already recognises as a sign, and how often."""
     found = []
     for label in labels:
-        told = [
+        seen = [
             guess.sign if guess.confidence >= SURE else NONE
             for take in dataset.of(label)
             if not take.is_flat
             for guess in map(shipped.classify, take.hands)
         ]
-        found += [Lookalike(label, sign, Share(told.count(sign), len(told))) for sign in shipped.signs if sign in told]
+        found += [Lookalike(label, sign, Share(seen.count(sign), len(seen))) for sign in shipped.signs if sign in seen]
     return tuple(found)
 
 
@@ -77,7 +79,7 @@ def check_not_known(found: Sequence[Lookalike]) -> None:
         share = each.hands.rate or 0.0
         if share > _KNOWN_SHARE:
             raise TrainingError(
-                f"{each.label} looks like {each.sign}: {share:.0%} of its hands are told as that already; "
+                f"{each.label} looks like {each.sign}: {share:.0%} of its hands are recognised as that already; "
                 f"teach another shape, or give {each.sign} another action"
             )
 
@@ -97,9 +99,6 @@ def check_distinguished(likeliest: Confusion) -> None:
                     f"{label} looks like {other}: {share:.0%} of its hands that were held out are likelier to be that; "
                     f"teach shapes that differ more, or name both by --sided if one is the mirror image of the other"
                 )
-
-
-_FOLDS: Final = 3
 
 
 @dataclass(frozen=True)

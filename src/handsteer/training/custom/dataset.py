@@ -31,6 +31,8 @@ _FARTHEST_PX: Final = 4 * _LARGEST_PX
 _FARTHEST_M: Final = 10.0
 _LONGEST_S: Final = 1e7
 
+_FACTS: Final = ("label", "person", "session", "source")
+
 
 @dataclass(frozen=True, eq=False)
 class Take:
@@ -134,9 +136,6 @@ def save_dataset(dataset: Dataset, path: Path) -> None:
         _FILE.write(path, arrays)
     except OSError as error:
         raise DatasetError(f"cannot write the dataset {path}: {error.strerror}") from None
-
-
-_FACTS: Final = ("label", "person", "session", "source")
 
 
 def _stacked(points: list[NDArray[np.float32]]) -> NDArray[np.float32]:

@@ -64,31 +64,32 @@ class TrainingReport:
 
 def how_it_was_tried(report: TrainingReport) -> str:
     """Return how the figures were measured, without a full stop."""
-    tried = f"How well hands are told that were held out, one {report.held_out} after the other"
-    return tried if report.held_out == "person" else f"{tried}; how well those of others are told, nobody knows yet"
+    tried = f"Recognition of held-out hands, one {report.held_out} at a time"
+    return tried if report.held_out == "person" else f"{tried}; not yet tested on other persons"
 
 
 def false_hands(report: TrainingReport) -> str:
     """Return how many hands of any shape are recognised as one of the signs."""
     rate = f"{report.made.rate or 0.0:.1%}"
-    return f"Of made hands of all shapes, {rate} are told as one of these signs; some of them do show it."
+    return f"Of synthetic hands of all shapes, {rate} are recognised as one of these signs; some do show it."
 
 
 def mistakes(report: TrainingReport) -> list[str]:
     """Return the confusions of signs, the most frequent first; may be empty."""
     labels, counts = report.confusion.labels, report.confusion.counts
     found = [
-        (count / sum(row), f"{shown} is taken for {_sign(told)} {count} of {sum(row)} times")
+        (count / sum(row), f"{shown} is mistaken for {_sign(seen)} {count} of {sum(row)} times")
         for shown, row in zip(labels, counts, strict=True)
-        for told, count in zip(labels, row, strict=True)
-        if count and shown != told
+        for seen, count in zip(labels, row, strict=True)
+        if count and shown != seen
     ]
     found += [
-        (each.hands.rate or 0.0, f"{each.label} is taken for {each.sign} {each.hands.count} of {each.hands.of} times")
+        (hands.rate or 0.0, f"{each.label} is mistaken for {each.sign} {hands.count} of {hands.of} times")
         for each in report.known
+        for hands in [each.hands]
     ]
     return [words for _, words in sorted(found, key=lambda item: -item[0])]
 
 
-def _sign(told: str) -> str:
-    return "no sign" if told == NONE else told
+def _sign(seen: str) -> str:
+    return "no sign" if seen == NONE else seen

@@ -217,7 +217,7 @@ def _confusion(truths: NDArray[np.int64], chances: Array, thresholds: Array, lab
     sure = (highest > 0) & (highest >= thresholds[best])
     names = (*labels, NONE)
     seen = np.where(sure, best, len(labels))
-    return Confusion.of(((names[truth], names[told]) for truth, told in zip(truths, seen, strict=True)), labels)
+    return Confusion.of(((names[truth], names[guess]) for truth, guess in zip(truths, seen, strict=True)), labels)
 
 
 def _pointing_sideways(dataset: Dataset, labels: Sequence[str]) -> frozenset[str]:

@@ -21,6 +21,9 @@ from handsteer.training.evaluation.video_metrics import FrameVerdict
 from handsteer.training.evaluation.views import View
 from handsteer.types import NONE
 
+Watch = Callable[[Iterable[Any], str], Iterable[Any]]
+"""Passes items through, given their unit; may show the progress."""
+
 
 def evaluate_photos(photos: Iterable[LabelledPhoto], recognizer: Recognizer, view: View) -> Iterator[PhotoResult]:
     """Yield the recognition of each photo, independently of the others.
@@ -121,10 +124,6 @@ def lacks_depth(hand: Hand, label: str, classifier: Classifier) -> bool:
     if np.isfinite(hand.world).all():
         return False
     return not (isinstance(classifier, CustomClassifier) and label in classifier.signs_without_depth)
-
-
-Watch = Callable[[Iterable[Any], str], Iterable[Any]]
-"""Passes items through, given their unit; may show the progress."""
 
 
 @dataclass(frozen=True)
@@ -243,7 +242,7 @@ def _open_dataset(path: Path, classifier: Classifier) -> LabelledHands:
     if all(lacks_depth(hand, label, classifier) for label, hand in hands):
         raise EvaluationError(
             f"{path}: none of its {len(hands)} hands has depth, and without it {', '.join(dataset.labels)} cannot be "
-            "told: give hands of `handsteer signs collect`, or photos; only signs that were taught from rows without "
-            "depth are told from such rows (--signs.model)"
+            "recognised: give hands of `handsteer signs collect`, or photos; only signs that were taught from rows "
+            "without depth can be recognised in such rows (--signs.model)"
         )
     return LabelledHands(path, dataset)

@@ -45,20 +45,6 @@ Part = Literal["tune", "report"]
 _WHOLE_SETS: Final[dict[str, Part]] = {"emre": "tune", "sld": "report"}
 """Sets of few people, or of people who cannot be distinguished: each is in one part as a whole."""
 
-
-def part_of(path: PurePath | str, person_set: str = "") -> Part:
-    """Return the part of a photo.
-
-    Args:
-        path: The photo; only its file name matters, so that folders may be moved.
-        person_set: The column ``person_set`` of an ``index.csv``.
-    """
-    if person_set in _WHOLE_SETS:
-        return _WHOLE_SETS[person_set]
-    digest = hashlib.sha256(PurePath(path).name.encode()).digest()
-    return "report" if digest[0] % 3 == 0 else "tune"
-
-
 _SHAPES: Final = {"Stop": OPEN, "Forward": POINTING, "Go": FIST, "Turn Right": THUMB, "Turn Left": THUMB}
 _KINDS: Final = {
     **dict.fromkeys(("like", "dislike", "thumb_up", "thumb_down"), THUMB),
@@ -84,6 +70,19 @@ _CLUSTERS: Final = {REST: 8, THUMB: 6, "digits": 4}
 _DIRECTIONS: Final = 12
 _RAISED: Final = 0.6
 """Of several hands the highest is the one with the sign, unless it is smaller than this fraction of the largest."""
+
+
+def part_of(path: PurePath | str, person_set: str = "") -> Part:
+    """Return the part of a photo.
+
+    Args:
+        path: The photo; only its file name matters, so that folders may be moved.
+        person_set: The column ``person_set`` of an ``index.csv``.
+    """
+    if person_set in _WHOLE_SETS:
+        return _WHOLE_SETS[person_set]
+    digest = hashlib.sha256(PurePath(path).name.encode()).digest()
+    return "report" if digest[0] % 3 == 0 else "tune"
 
 
 def main() -> None:

@@ -18,6 +18,30 @@ Flags = NDArray[np.bool_]
 _UNSURE: Final = -1
 _FIRST_FINGER: Final = ANGLES.index("index_spread")
 
+BONES_M: Final = 0.096 * np.array(
+    [
+        *(0.43, 0.33, 0.36, 0.29),
+        *(1.03, 0.305, 0.225, 0.275),
+        *(1.00, 0.38, 0.28, 0.26),
+        *(0.96, 0.32, 0.255, 0.25),
+        *(0.87, 0.23, 0.21, 0.19),
+    ]
+)
+"""(20,) bone lengths in metres: medians over photos, rounded, of MediaPipe's world landmarks.
+
+Their knuckles are nearer to the fingertips than the joints are.
+"""
+
+# Standard deviations of the landmark model's errors, in metres at the scale of its world landmarks.
+_IMAGE_ERROR_M: Final = 0.0022
+_WORLD_ERROR_M: Final = 0.0022
+_DEPTH_ERROR_M: Final = 0.005
+_SHARED_ERROR_M: Final = 0.0025
+_BEND_ERROR_RAD: Final = np.radians(8.0)
+
+MCP: Final = [ANGLES.index(f"{finger}_mcp") for finger in FINGERS]
+PIP: Final = [ANGLES.index(f"{finger}_pip") for finger in FINGERS]
+
 
 def name_shapes(angles: Array, joints: Array, elevations: Array, facing: Array) -> NDArray[np.int64]:
     """Return (n,) indices into :data:`SHAPES`, -1 if ambiguous.
@@ -99,32 +123,6 @@ def _degrees(angles: Array) -> Array:
     fingers = angles[:, _FIRST_FINGER:].reshape(-1, 4, 4)
     degrees: Array = np.degrees(np.moveaxis(fingers[:, :, 1:], 2, 0))
     return degrees
-
-
-BONES_M: Final = 0.096 * np.array(
-    [
-        *(0.43, 0.33, 0.36, 0.29),
-        *(1.03, 0.305, 0.225, 0.275),
-        *(1.00, 0.38, 0.28, 0.26),
-        *(0.96, 0.32, 0.255, 0.25),
-        *(0.87, 0.23, 0.21, 0.19),
-    ]
-)
-"""(20,) bone lengths in metres: medians over photos, rounded, of MediaPipe's world landmarks.
-
-Their knuckles are nearer to the fingertips than the joints are.
-"""
-
-# Standard deviations of the landmark model's errors, in metres at the scale of its world landmarks.
-_IMAGE_ERROR_M: Final = 0.0022
-_WORLD_ERROR_M: Final = 0.0022
-_DEPTH_ERROR_M: Final = 0.005
-_SHARED_ERROR_M: Final = 0.0025
-_BEND_ERROR_RAD: Final = np.radians(8.0)
-
-
-MCP: Final = [ANGLES.index(f"{finger}_mcp") for finger in FINGERS]
-PIP: Final = [ANGLES.index(f"{finger}_pip") for finger in FINGERS]
 
 
 @dataclass(frozen=True)

@@ -42,6 +42,32 @@ _THUMB_STATES: Final = np.array(
 )
 OUT, BESIDE, FOLDED, ACROSS, OPPOSITE = range(5)
 
+_S, _C, _H = STRAIGHT, CURLED, HALF
+_KNOWN: Final = (
+    (_S, _S, _C, _C, ACROSS),  # peace
+    (_S, _S, _C, _C, BESIDE),
+    (_S, _S, _S, _C, ACROSS),  # three
+    (_S, _S, _C, _C, OUT),  # three with the thumb
+    (_C, _S, _S, _S, OPPOSITE),  # three of OK
+    (_S, _S, _S, _S, ACROSS),  # four
+    (_S, _S, _S, _S, FOLDED),
+    (_S, _C, _C, _S, FOLDED),  # horns
+    (_S, _C, _C, _S, OUT),
+    (_C, _C, _C, _S, OUT),  # call
+    (_C, _C, _C, _S, FOLDED),  # little finger
+    (_S, _C, _C, _C, OUT),  # L
+    (_C, _S, _C, _C, FOLDED),  # middle finger
+    (_C, _C, _S, _S, FOLDED),
+    (_C, _S, _S, _S, FOLDED),
+    (_H, _C, _C, _C, OPPOSITE),  # pinch
+    (_H, _C, _C, _C, FOLDED),  # beckoning
+    (_H, _H, _S, _S, OPPOSITE),
+    (_H, _S, _S, _S, OPPOSITE),  # OK
+    (_H, _H, _H, _H, OPPOSITE),  # holding something
+    (_H, _H, _H, _H, OUT),  # claw
+    (_H, _H, _H, _H, BESIDE),
+)
+
 
 def open_hand(count: int, random: Random) -> Array:
     """Return (count, 23) angles of an open hand, fingers together or apart, the thumb along them or extended."""
@@ -89,33 +115,6 @@ def known_others(count: int, random: Random) -> Array:
     fingers = np.array(_KNOWN)
     which = random.integers(0, len(fingers), count)
     return _posed(fingers[which, :4], fingers[which, 4], random)
-
-
-_S, _C, _H = STRAIGHT, CURLED, HALF
-_KNOWN: Final = (
-    (_S, _S, _C, _C, ACROSS),  # peace
-    (_S, _S, _C, _C, BESIDE),
-    (_S, _S, _S, _C, ACROSS),  # three
-    (_S, _S, _C, _C, OUT),  # three with the thumb
-    (_C, _S, _S, _S, OPPOSITE),  # three of OK
-    (_S, _S, _S, _S, ACROSS),  # four
-    (_S, _S, _S, _S, FOLDED),
-    (_S, _C, _C, _S, FOLDED),  # horns
-    (_S, _C, _C, _S, OUT),
-    (_C, _C, _C, _S, OUT),  # call
-    (_C, _C, _C, _S, FOLDED),  # little finger
-    (_S, _C, _C, _C, OUT),  # L
-    (_C, _S, _C, _C, FOLDED),  # middle finger
-    (_C, _C, _S, _S, FOLDED),
-    (_C, _S, _S, _S, FOLDED),
-    (_H, _C, _C, _C, OPPOSITE),  # pinch
-    (_H, _C, _C, _C, FOLDED),  # beckoning
-    (_H, _H, _S, _S, OPPOSITE),
-    (_H, _S, _S, _S, OPPOSITE),  # OK
-    (_H, _H, _H, _H, OPPOSITE),  # holding something
-    (_H, _H, _H, _H, OUT),  # claw
-    (_H, _H, _H, _H, BESIDE),
-)
 
 
 def relaxed(count: int, random: Random) -> Array:

@@ -95,7 +95,7 @@ class ParameterLink:
         for one in wanted:
             is_set = _is_of_ros(one.name) and self._node.has_parameter(one.name)
             if is_set and self._node.get_parameter(one.name).value != one.value:
-                raise ConfigError(f"{one.name} cannot be set: it is read when the node starts: give it then")
+                raise ConfigError(f"{one.name} cannot be set: it is only read when the node starts")
 
 
 def _is_of_ros(name: str) -> bool:

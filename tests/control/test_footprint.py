@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from handsteer.config import CollisionMonitorConfig
-from handsteer.control.scan_points import MOST_POINTS, points_of
+from handsteer.control.footprint import MOST_POINTS, points_of
 from handsteer.messages import Header, LaserScan, Time
 
 RULE = CollisionMonitorConfig(enabled=True)

@@ -13,9 +13,6 @@ Sources, by robot:
 
 from typing import Any, Literal, get_args
 
-CmdVelType = Literal["auto", "twist", "twist_stamped"]
-"""Type of velocity commands: geometry_msgs/Twist, geometry_msgs/TwistStamped, or the one the robot subscribes to."""
-
 Preset = Literal["generic", "turtlebot3_burger", "turtlebot3_waffle", "turtlebot4", "turtlesim"]
 PRESETS: tuple[Preset, ...] = get_args(Preset)
 

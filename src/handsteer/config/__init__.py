@@ -1,0 +1,197 @@
+"""Every parameter of handsteer: type, unit, range, default and a one-line description.
+
+The YAML file, the command line and the settings of the page are generated from these models. Names are as in ROS nodes,
+units are SI (REP 103), in brackets in each description.
+"""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Literal, TypeVar
+
+from pydantic import Field, ValidationError, model_validator
+
+from handsteer.config.driving import CollisionMonitorConfig, ControlConfig, RobotConfig, RobotKind
+from handsteer.config.presets import preset
+from handsteer.config.recognition import CameraConfig, LandmarksConfig, Recorded, SignsConfig, VirtualHandConfig
+from handsteer.config.section import Section
+from handsteer.errors import ConfigError
+from handsteer.types import CmdVelType
+
+__all__ = [
+    "CameraConfig",
+    "CollisionMonitorConfig",
+    "Config",
+    "ControlConfig",
+    "DashboardConfig",
+    "LandmarksConfig",
+    "Recorded",
+    "RobotConfig",
+    "RobotKind",
+    "Section",
+    "SignsConfig",
+    "TeachConfig",
+    "VirtualHandConfig",
+    "cmd_vel_type",
+    "describe",
+    "load",
+    "validate",
+]
+
+S = TypeVar("S", bound=Section)
+_LONGEST_SHOWN = 200
+
+
+class TeachConfig(Section):
+    """Teaching of signs on the page."""
+
+    dataset: Path = Field(Path("signs.npz"), description="File to add takes to, as with `handsteer signs collect`")
+    model: Path = Field(
+        Path("my-signs.npz"),
+        description="File to write the learnt signs to, as with `handsteer signs train`; signs.model overrides it",
+    )
+    takes: int = Field(5, ge=2, le=50, description="Number of takes of a sign")
+    take_time: float = Field(3.0, ge=0.2, le=60, description="Duration of each take [s]")
+    countdown: float = Field(3.0, ge=0, le=60, description="Countdown before each take [s]")
+
+
+class DashboardConfig(Section):
+    """The web page."""
+
+    host: str = Field(
+        "127.0.0.1",
+        min_length=1,
+        description="Address that the page is served on; any other than 127.0.0.1 makes it reachable from other "
+        "machines, which need the token in the printed address",
+    )
+    port: int = Field(8080, ge=0, le=65535, description="Port of the page; 0 picks a free one")
+    certificate: Path | None = Field(
+        None, description="PEM file with the certificate for https, without which browsers do not share a camera"
+    )
+    private_key: Path | None = Field(None, description="PEM file with its key, if not in the certificate's file")
+    token: Literal["auto", "always"] = Field(
+        "auto",
+        description="When the page needs the token: auto if other machines can reach it, or always, for machines with "
+        "several users",
+    )
+    open_browser: bool = Field(
+        True,
+        description="Whether run opens the page in a browser; never with token: always, as command lines are public",
+    )
+
+    @property
+    def opens_browser(self) -> bool:
+        """Whether to open the page in a browser; not with ``token: always``, because command lines are public."""
+        return self.open_browser and self.token == "auto"
+
+
+class Config(Section):
+    """All parameters, by section."""
+
+    camera: CameraConfig = CameraConfig()
+    virtual_hand: VirtualHandConfig = VirtualHandConfig()
+    landmarks: LandmarksConfig = LandmarksConfig()
+    signs: SignsConfig = SignsConfig()
+    control: ControlConfig = ControlConfig()
+    collision_monitor: CollisionMonitorConfig = CollisionMonitorConfig()
+    robot: RobotConfig = RobotConfig()
+    teach: TeachConfig = TeachConfig()
+    dashboard: DashboardConfig = DashboardConfig()
+
+    @model_validator(mode="after")
+    def _monitors_one_robot(self) -> "Config":
+        if self.collision_monitor.enabled and self.control.robots:
+            raise ValueError("collision_monitor.enabled should be false with control.robots: it is for one robot")
+        return self
+
+
+def load(path: Path | None = None, base: dict[str, Any] | None = None, *overrides: dict[str, Any]) -> Config:
+    """Return the parameters from the defaults, ``base``, ``path`` and ``overrides``, each overriding the ones before.
+
+    Args:
+        path: A YAML file with some of the fields of :class:`Config`, or None; it overrides ``base``.
+        base: Nested dictionary of fields, such as ``{"control": {"linear_step": 0.02}}``; overrides the defaults.
+        overrides: Further dictionaries; they override the file.
+
+    Raises:
+        ConfigError: The file cannot be read, or a field is unknown or out of range; the message names it.
+    """
+    values: dict[str, Any] = {}
+    for changes in (base or {}, _read_yaml(path) if path else {}, *overrides):
+        values = _merge(values, _with_new_names(changes))
+    return validate(Config, _merge(_preset(values), values), f" (also read: {path})" if path else "")
+
+
+def cmd_vel_type(config: Config) -> CmdVelType:
+    """Return the message type for both ends of ``cmd_vel``: if only one has it configured, it applies to the other too.
+
+    Raises:
+        ConfigError: They are configured differently.
+    """
+    control, robot = config.control.cmd_vel_type, config.robot.cmd_vel_type
+    if "auto" not in {control, robot} and control != robot:
+        raise ConfigError(
+            f"control.cmd_vel_type is {control} and robot.cmd_vel_type {robot}: "
+            "they should be the same, or the robot receives no command"
+        )
+    return robot if control == "auto" else control
+
+
+def validate(section: type[S], values: Any, where: str = "") -> S:
+    """Return ``section`` built from ``values``; ``where`` is added to the message of an error.
+
+    Raises:
+        ConfigError: A field is unknown, of a wrong type or out of range.
+    """
+    try:
+        return section.model_validate(values)
+    except ValidationError as error:
+        raise ConfigError(describe(error) + where) from None
+
+
+def describe(error: ValidationError) -> str:
+    """Return the first problem of ``error`` in one line: the field, the value, what is allowed."""
+    problem = error.errors(include_url=False)[0]
+    field = ".".join(str(part) for part in problem["loc"]) or "configuration"
+    if problem["type"] == "extra_forbidden":
+        return f"{field}: there is no such parameter"
+    reason = problem["msg"].removeprefix("Input ").removeprefix("Value error, ")
+    given = repr(problem["input"])
+    return f"{field}: {given if len(given) <= _LONGEST_SHOWN else given[:_LONGEST_SHOWN] + '...'} {reason}"
+
+
+def _preset(values: dict[str, Any]) -> dict[str, Any]:
+    """Return the preset of the robot that ``values`` name; it overrides only the defaults."""
+    robot = values["robot"] if isinstance(values.get("robot"), dict) else {}
+    name, kind = robot.get("preset"), robot.get("kind", "sim")
+    if name is None and kind != "sim":
+        name = "generic"
+    return preset(name)
+
+
+def _read_yaml(path: Path) -> dict[str, Any]:
+    # Imported late: programs without a file, such as those that only recognise signs, load faster.
+    from handsteer import plain_yaml  # noqa: PLC0415
+
+    values = plain_yaml.read(path, str(path), ConfigError, f"cannot read the configuration {path}")
+    if values is None:
+        return {}
+    if not isinstance(values, dict):
+        raise ConfigError(f"{path}: expected sections such as 'control:' at the top, found {type(values).__name__}")
+    return values
+
+
+def _with_new_names(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the sections of ``values`` with new names only, so that an old name in a later source takes effect."""
+    models = {name: field.annotation for name, field in Config.model_fields.items()}
+    return {
+        name: models[name].by_new_names(of) if name in models else of  # type: ignore[union-attr]
+        for name, of in values.items()
+    }
+
+
+def _merge(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
+    merged = dict(base)
+    for key, value in changes.items():
+        below = merged.get(key)
+        merged[key] = _merge(below, value) if isinstance(value, dict) and isinstance(below, dict) else value
+    return merged

@@ -1,0 +1,195 @@
+"""Parameters of the control and of the robot."""
+
+import re
+from typing import Literal
+
+from pydantic import Field, field_validator
+
+from handsteer.config.presets import Preset
+from handsteer.config.section import Section, live
+from handsteer.timeouts import ODOMETRY_S, ROBOT_S, STALE_S
+from handsteer.types import ALWAYS_STOP, BUILT_IN, Action, CmdVelType, find_sign
+
+RobotKind = Literal["sim", "auto", "ros2", "dds", "zenoh", "ros1"]
+_NAMESPACE = re.compile(r"[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)
+
+
+class ControlConfig(Section):
+    """Conversion of signs to velocities."""
+
+    ramp: Literal["per_message", "per_second"] = live(
+        "per_message",
+        description="per_message adds a step per message, as in the tutorial; per_second is independent of frame rate",
+    )
+    linear_step: float = live(0.01, gt=0, le=1, description="Change of linear speed per message [m/s]")
+    angular_step: float = live(0.1, gt=0, le=5, description="Change of angular speed per message [rad/s]")
+    linear_acceleration: float = live(0.3, gt=0, le=10, description="Change of linear speed with per_second [m/s²]")
+    angular_acceleration: float = live(3.0, gt=0, le=50, description="Change of angular speed with per_second [rad/s²]")
+    max_sign_rate: float = live(
+        60.0,
+        gt=0,
+        le=1000,
+        description="Signs above this rate do not speed the robot up further, with per_message [1/s]",
+    )
+    max_linear: float = live(1.0, gt=0, le=10, description="Maximum linear speed [m/s]")
+    max_angular: float = live(2.0, gt=0, le=20, description="Maximum angular speed [rad/s]")
+    max_linear_acceleration: float = live(
+        0.0,
+        ge=0,
+        le=1000,
+        description="Maximum linear acceleration of commands from any input when speeding up; 0 is unlimited [m/s²]",
+    )
+    max_angular_acceleration: float = live(
+        0.0,
+        ge=0,
+        le=1000,
+        description="Maximum angular acceleration of commands from any input when speeding up; 0 is unlimited [rad/s²]",
+    )
+    max_linear_jerk: float = live(
+        0.0,
+        ge=0,
+        le=1000,
+        description="Maximum linear jerk of commands from any input when speeding up; 0 is unlimited [m/s³]",
+    )
+    max_angular_jerk: float = live(
+        0.0,
+        ge=0,
+        le=1000,
+        description="Maximum angular jerk of commands from any input when speeding up; 0 is unlimited [rad/s³]",
+    )
+    sign_timeout: float = live(
+        STALE_S, gt=0, le=5, description="The robot is stopped after this long without a sign [s]"
+    )
+    steering_timeout: float = live(
+        STALE_S,
+        gt=0,
+        le=5,
+        description="Manual steering overrides the signs until this long after its last command [s]",
+    )
+    actions: dict[str, Action] = live(
+        {}, description="Actions of signs, such as {Hi: stop, Peace: turbo}; Stop and NONE always stop"
+    )
+    arming: Literal["auto", "on", "off"] = Field(
+        "auto",
+        description="Whether the robot moves only after neutral (Stop, or no hand) at start-up and after each fault; "
+        "auto is on unless the robot is simulated in the same process",
+    )
+    cmd_vel_type: CmdVelType = Field(
+        "auto",
+        description="Type of commands to send: geometry_msgs/Twist or TwistStamped; auto follows robot.cmd_vel_type, "
+        "in ROS 2 also the robot's subscriber, and is otherwise twist",
+    )
+    cmd_vel_frame_id: str = Field("base_link", description="Coordinate frame in the header of TwistStamped commands")
+    robots: tuple[str, ...] = Field(
+        (),
+        max_length=32,
+        description="Namespaces of robots that one hand drives in turn, such as [r1, r2]; empty for a single robot",
+    )
+
+    @field_validator("arming", mode="before")
+    @classmethod
+    def _from_yaml(cls, arming: object) -> object:
+        # YAML, and so ROS, converts on and off to true and false.
+        return {True: "on", False: "off"}[arming] if isinstance(arming, bool) else arming
+
+    @field_validator("robots")
+    @classmethod
+    def _names_of_robots(cls, robots: tuple[str, ...]) -> tuple[str, ...]:
+        wrong = [name for name in robots if not _NAMESPACE.fullmatch(name) or robots.count(name) > 1]
+        if wrong:
+            raise ValueError(f"should name each robot once, with letters, digits and _; {wrong[0]!r} does not")
+        return robots
+
+    @field_validator("actions")
+    @classmethod
+    def _known_names_and_a_way_to_stop(cls, actions: dict[str, Action]) -> dict[str, Action]:
+        named: dict[str, Action] = {}
+        for name, action in actions.items():
+            sign = find_sign(name, BUILT_IN) or name.strip()
+            if not sign or sign in named:
+                raise ValueError(f"should name each sign once; {name!r} does not")
+            if sign in ALWAYS_STOP and action != "stop":
+                raise ValueError(f"should leave {sign} at 'stop', so that the robot can always be stopped")
+            named[sign] = action
+        return named
+
+
+class CollisionMonitorConfig(Section):
+    """Slows and stops the robot before obstacles that a laser scanner sees in its path."""
+
+    enabled: bool = live(False, description="Whether to slow commands before obstacles; needs the topic `scan`")
+    source_timeout: float = live(
+        0.45, gt=0, le=5, description="The robot is stopped after this long without a scan, or if the scan is older [s]"
+    )
+    margin: float = live(
+        0.15, ge=0, le=5, description="Distance to an obstacle in its path at which the robot stops [m]"
+    )
+    deceleration: float = live(0.7, gt=0, le=20, description="Guaranteed linear deceleration of the robot [m/s²]")
+    angular_deceleration: float = live(
+        1.5, gt=0, le=50, description="Guaranteed angular deceleration of the robot [rad/s²]"
+    )
+    reaction_time: float = live(
+        0.25, ge=0, le=5, description="Delay until a command takes effect, including the wait for the next scan [s]"
+    )
+    front: float = live(0.26, gt=0, le=10, description="Extent of the robot ahead of its base frame [m]")
+    back: float = live(0.26, gt=0, le=10, description="Extent of the robot behind its base frame [m]")
+    side: float = live(0.245, gt=0, le=10, description="Extent of the robot to either side [m]")
+    scan_x: float = live(0.0, ge=-10, le=10, description="Position of the scanner ahead of the base frame [m]")
+    scan_y: float = live(0.0, ge=-10, le=10, description="Position of the scanner to the left of the base frame [m]")
+    scan_yaw: float = live(0.0, ge=-7, le=7, description="Rotation of the scanner to the left [rad]")
+
+
+class RobotConfig(Section):
+    """The robot: simulated in a world, or a real one with its topics."""
+
+    kind: RobotKind = Field(
+        "sim",
+        description="sim is the simulated robot; ros2, dds, zenoh and ros1 drive a real one, auto uses ros2 if "
+        "installed, else dds",
+    )
+    preset: Preset | None = Field(
+        None, description="A robot with known topics, types and limits; the default for a real robot is generic"
+    )
+    cmd_vel_type: CmdVelType = Field(
+        "auto",
+        description="Type of commands it subscribes to: geometry_msgs/Twist or TwistStamped; auto follows "
+        "control.cmd_vel_type, for a real ROS 2 robot its subscriber, and is otherwise twist",
+    )
+    cmd_vel_topic: str = Field("cmd_vel", min_length=1, description="Topic of a real robot's commands")
+    odom_topic: str = Field("odom", description="Topic of a real robot's odometry; empty for none")
+    odom_type: Literal["odometry", "turtlesim_pose"] = Field(
+        "odometry", description="Type of the odometry: nav_msgs/Odometry or turtlesim/Pose"
+    )
+    odom_timeout: float = Field(
+        ODOMETRY_S, gt=0, le=10, description="A real robot is stopped if its odometry stops for this long [s]"
+    )
+    scan_topic: str = Field("scan", description="Topic of a real robot's laser scanner; empty for none")
+    command_rate: float = Field(
+        20.0, ge=5, le=50, description="Rate at which commands to a real robot are repeated [1/s]"
+    )
+    world: str = Field("obstacles", description="Name of a shipped world, or a YAML file")
+    wheel_separation: float = Field(0.45, gt=0, le=10, description="Distance between the left and right wheels [m]")
+    wheel_radius: float = Field(0.06, gt=0, le=2, description="Radius of the wheels [m]")
+    max_linear: float = Field(2.0, gt=0, le=20, description="Maximum linear speed of the controller [m/s]")
+    max_linear_acceleration: float = Field(
+        1.0, gt=0, le=50, description="Maximum linear acceleration of the controller [m/s²]"
+    )
+    max_angular: float = Field(8.0, gt=0, le=50, description="Maximum angular speed of the controller [rad/s]")
+    max_angular_acceleration: float = Field(
+        2.0, gt=0, le=50, description="Maximum angular acceleration of the controller [rad/s²]"
+    )
+    cmd_vel_timeout: float = Field(
+        ROBOT_S,
+        gt=0,
+        le=10,
+        description="It brakes after this long without a command, or if a stamped one is older [s]",
+    )
+    odom_frame_id: str = Field("odom", description="Coordinate frame of the odometry")
+    base_frame_id: str = Field("base_link", description="Coordinate frame of the robot")
+    scan_frame_id: str = Field("base_scan", description="Coordinate frame of the laser scanner")
+    frame_prefix: str = Field(
+        "auto",
+        description="Prefix of these coordinate frames, as in robot_state_publisher; auto is the node's namespace, "
+        "such as r1/, or empty if /tf is remapped",
+    )
+    publish_clock: bool = Field(False, description="Whether to publish /clock; the robot itself then runs on real time")

@@ -1,0 +1,126 @@
+"""Parameters of the camera and of recognition."""
+
+from collections.abc import Mapping
+from typing import ClassVar, Literal
+
+from pydantic import ConfigDict, Field
+
+from handsteer.config.section import OptionalPath, Section, live
+from handsteer.timeouts import STALE_S
+from handsteer.types import Handedness
+
+Recorded = Literal["auto", "always", "never"]
+
+
+class CameraConfig(Section):
+    """Where frames come from."""
+
+    # A webcam's number is a number in YAML and on ROS's parameter server.
+    model_config = ConfigDict(coerce_numbers_to_str=True)
+
+    source: str = Field(
+        "auto",
+        description="auto, virtual, browser (of the device that shows the page), a webcam's index or /dev/videoN, "
+        "an address (rtsp, http), a video file or a folder of photos",
+    )
+    width: int = Field(
+        640, ge=64, le=4096, description="Width requested from a webcam, or of the virtual hand's picture [px]"
+    )
+    height: int = Field(
+        480, ge=48, le=4096, description="Height requested from a webcam, or of the virtual hand's picture [px]"
+    )
+    fps: float = Field(
+        30.0, gt=0, le=240, description="Frame rate requested from a webcam, or of the virtual hand [1/s]"
+    )
+    at_end: Literal["loop", "hold", "end"] = Field(
+        "loop",
+        description="At the end of a file: start again, hold (no frames, so NONE), or end (default if headless)",
+    )
+    photo_duration: float = Field(1.0, gt=0, le=3600, description="How long each photo of a folder is shown [s]")
+    frame_id: str = Field(
+        "camera_optical_frame",
+        description="Coordinate frame in the header of each image, optical as in REP 103: z forward, x right; the "
+        "default in a namespace that shares /tf, such as /r1, is r1/camera_optical_frame",
+    )
+    calibration: OptionalPath = Field(
+        None,
+        description="YAML file of ROS's camera_calibration, for camera_info; without it, camera_info is all zeros "
+        "(uncalibrated)",
+    )
+
+
+class VirtualHandConfig(Section):
+    """The rendered hand that replaces a webcam."""
+
+    script: str = Field(
+        "Forward:3 Turn Left:2 Forward:2 Turn Right:2 Go:1 Backward:3 Stop:2 NONE:1",
+        description="Signs to show, with their durations in seconds, repeated; NONE lowers the hand; "
+        "Peace, Three, Four, Horns, Call and OK are for teaching",
+    )
+    handedness: Handedness = Field("Right", description="Left or right hand")
+    skin: Literal["light", "medium", "dark"] = Field("medium", description="Skin tone")
+    background: Literal["plain", "cluttered"] = Field("plain", description="Background of the picture")
+    sleeve: bool = Field(True, description="Whether the forearm wears a sleeve")
+    seed: int = Field(0, ge=0, description="Random seed of the background and of the hand's small movements")
+
+
+class LandmarksConfig(Section):
+    """Detection and tracking of hands in a frame."""
+
+    renamed: ClassVar[Mapping[str, str]] = {"second_look": "refine_new_hands"}
+
+    model: Literal["fast", "full", "lite"] = Field(
+        "fast",
+        description="full is MediaPipe's own; fast is full in 8-bit integers, takes half the time and differs by up "
+        "to a quarter of a pixel; lite is as fast, but less accurate",
+    )
+    max_hands: int = Field(
+        2,
+        ge=1,
+        le=2,
+        description="Maximum number of hands in a frame, from which the one that shows a sign is selected",
+    )
+    min_detection_confidence: float = Field(0.3, ge=0, le=1, description="Minimum score to accept a detected palm")
+    refine_new_hands: bool = Field(True, description="Run the landmark model twice on a new hand, for better landmarks")
+    wide_search: bool = Field(
+        True,
+        description="Also search a widened frame, where hands are smaller, and its middle; finds more close hands",
+    )
+    min_presence: float = Field(0.5, ge=0, le=1, description="Minimum score to keep tracking a hand")
+    threads: int = Field(1, ge=1, le=64, description="CPU threads of the landmark model")
+
+
+class SignsConfig(Section):
+    """Recognition of signs from the landmarks, and when a sign counts."""
+
+    renamed: ClassVar[Mapping[str, str]] = {"bridge_time": "dropout_hold", "keep_confidence": "release_confidence"}
+
+    model: OptionalPath = live(
+        None,
+        description="File of taught signs, written by `handsteer signs train`; none for the shipped signs only",
+    )
+    min_confidence: float = live(0.8, ge=0, le=1, description="Minimum confidence to recognise a sign")
+    release_confidence: float = live(
+        0.5, ge=0, le=1, description="Minimum confidence to keep the sign that already counts"
+    )
+    confirm_time: float = live(
+        0.1, ge=0, le=2, description="How long a sign must be recognised before it counts; Stop counts at once [s]"
+    )
+    dropout_hold: float = live(0.1, ge=0, le=2, description="How long a sign still counts after its hand is lost [s]")
+    switch_time: float = live(
+        0.5,
+        ge=0,
+        le=10,
+        description="How long the selected hand must show no sign before another hand with a sign is selected [s]",
+    )
+    max_frame_age: float = live(STALE_S, gt=0, le=10, description="Older frames are ignored [s]")
+    recorded: Recorded = Field(
+        "auto",
+        description="Whether to accept frames with old stamps, as in recordings: auto accepts those of rosbag play; "
+        "always accepts all that are stamped more than 5 s ago, so use it for recordings only",
+    )
+    image_transport: Literal["auto", "raw", "compressed"] = Field(
+        "auto",
+        description="Images to subscribe to: raw is /image_raw, compressed is /image_raw/compressed; auto is "
+        "compressed if nodes may be on other machines (DDS beyond localhost), or the one that is published",
+    )

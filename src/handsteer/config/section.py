@@ -1,0 +1,59 @@
+"""The base of all sections of the configuration."""
+
+import logging
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, ClassVar, Final
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, JsonValue, model_validator
+
+log = logging.getLogger(__name__)
+
+# ROS parameters have no null.
+OptionalPath = Annotated[Path | None, BeforeValidator(lambda path: None if path == "" else path)]
+
+_LIVE: Final[dict[str, JsonValue]] = {"live": True}
+_OLD_NAMES_SEEN: set[str] = set()
+
+
+class Section(BaseModel):
+    """A group of parameters; unknown names and values out of range are rejected.
+
+    Attributes:
+        live: Those that can change while a node runs; the others are read at start-up.
+        renamed: New names of parameters by their old ones, which are still accepted.
+    """
+
+    live: ClassVar[frozenset[str]] = frozenset()
+    renamed: ClassVar[Mapping[str, str]] = {}
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, validate_default=True)
+
+    @classmethod
+    def new_name(cls, name: str) -> str:
+        """Return the current name of the parameter ``name``, and warn once of an old name."""
+        new = cls.renamed.get(name, name)
+        if new != name and name not in _OLD_NAMES_SEEN:
+            _OLD_NAMES_SEEN.add(name)
+            log.warning("parameter %s is deprecated: use %s", name, new)
+        return new
+
+    @model_validator(mode="before")
+    @classmethod
+    def by_new_names(cls, values: Any) -> Any:
+        """Return ``values`` with old names of parameters replaced by new ones, unless the new one is given too."""
+        if not (isinstance(values, dict) and cls.renamed.keys() & values.keys()):
+            return values
+        renamed = {name: value for name, value in values.items() if name not in cls.renamed}
+        for old in cls.renamed.keys() & values.keys():
+            renamed.setdefault(cls.new_name(old), values[old])
+        return renamed
+
+    @classmethod
+    def __pydantic_init_subclass__(cls, **_: Any) -> None:
+        """Collect the fields made by :func:`live`."""
+        cls.live = frozenset(name for name, field in cls.model_fields.items() if field.json_schema_extra == _LIVE)
+
+
+def live(default: Any, **constraints: Any) -> Any:
+    """Return a pydantic ``Field`` of a parameter that can change while its node runs."""
+    return Field(default, json_schema_extra=_LIVE, **constraints)
