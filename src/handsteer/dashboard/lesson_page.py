@@ -33,12 +33,12 @@ class LessonPage(Page):
     def __init__(self, context: PageContext) -> None:
         super().__init__(context, "/teach", "drive.css", "teach.css", "webcam.js")
         self._lesson: ViewerLesson | None = None
-        if context.access is None:
+        if context.lessons is None:
             with card("Teach a sign", "lesson panel"):
                 ui.label(_ELSEWHERE)
             return
-        self._lesson = lesson = ViewerLesson(self, context.access.lessons)
-        self._camera = CameraPanel(self, context.access.graph)
+        self._lesson = lesson = ViewerLesson(self, context.lessons)
+        self._camera = CameraPanel(self, context.graph)
         self._card = _LessonCard(lesson)
         self._countdown = _Countdown(self._camera.stage)
         self.client.on_disconnect(self._pause)

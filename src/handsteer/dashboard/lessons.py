@@ -49,18 +49,9 @@ class LearntSign:
 
 @dataclass
 class _Current:
-    """The current lesson.
-
-    Attributes:
-        viewer: The viewer who teaches.
-        node: Runs it.
-        lost: Signs of the current model that cannot be trained again, because there are no takes of them.
-        takes_are_saved: Whether its takes are in the file.
-    """
-
     viewer: str
     node: LessonNode
-    lost: tuple[str, ...]
+    lost: tuple[str, ...]  # see Lessons.lost
     takes_are_saved: bool = False
 
 

@@ -154,36 +154,20 @@ _THEME_ICON = (
 
 
 @dataclass(frozen=True)
-class GraphAccess:
-    """What the page of a whole graph can do in addition to its topics.
-
-    Attributes:
-        graph: The graph.
-        settings: Its parameters.
-        lessons: Teaches it signs.
-    """
-
-    graph: RemoteGraph
-    settings: Settings
-    lessons: Lessons
-
-
-@dataclass(frozen=True)
 class PageContext:
     """What all pages share.
 
     Attributes:
         node: Joined while a browser shows a page.
-        access: What they can do in addition to topics; None if the nodes run elsewhere.
+        graph: The graph, for what pages do in addition to its topics; None if its nodes run elsewhere.
+        settings: The graph's parameters, likewise.
+        lessons: Teaches the graph signs, likewise.
     """
 
     node: OnDemandNode[DashboardNode]
-    access: GraphAccess | None
-
-    @property
-    def graph(self) -> RemoteGraph | None:
-        """The graph, if it can be accessed."""
-        return self.access.graph if self.access else None
+    graph: RemoteGraph | None = None
+    settings: Settings | None = None
+    lessons: Lessons | None = None
 
 
 class Page:

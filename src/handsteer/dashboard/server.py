@@ -28,7 +28,7 @@ from handsteer.dashboard.lesson_page import LessonPage
 from handsteer.dashboard.lessons import Lessons
 from handsteer.dashboard.limits import Connections, UnconnectedPages, limit_log
 from handsteer.dashboard.node import DashboardNode
-from handsteer.dashboard.page import ASSETS_PATH, ICON, PICTURE_PATH, STATIC, WEBCAM_PATH, GraphAccess, PageContext
+from handsteer.dashboard.page import ASSETS_PATH, ICON, PICTURE_PATH, STATIC, WEBCAM_PATH, PageContext
 from handsteer.dashboard.remote_graph import RemoteGraph
 from handsteer.dashboard.settings import DEFAULT_FILE, Settings, SettingsFile
 from handsteer.dashboard.settings_page import SettingsPage
@@ -61,7 +61,12 @@ class Dashboard:
         steering: Drives when a viewer steers on the page.
         config: Address and options of the page.
         cmd_vel: The topic of the displayed commands.
-        access: What pages can do in addition to topics; nothing by default.
+        graph: What pages can change in addition to topics; nothing by default.
+        file: The YAML file that the graph's parameters were read from, which settings are saved to; by default
+            :data:`~handsteer.dashboard.settings.DEFAULT_FILE`.
+
+    Raises:
+        ConfigError: The file can no longer be read.
 
     Attributes:
         node: Subscribes and steers for the browsers that show the page.
@@ -78,13 +83,18 @@ class Dashboard:
         config: DashboardConfig,
         *,
         cmd_vel: Topic[Any] = CMD_VEL,
-        access: GraphAccess | None = None,
+        graph: RemoteGraph | None = None,
+        file: Path | None = None,
     ) -> None:
         history = VelocityHistory()  # outlives the node, so that a reloaded page shows it
         self.node = OnDemandNode(lambda: DashboardNode(transport, clock, steering, cmd_vel, history))
         self.pictures = OnDemandNode(lambda: PictureNode(transport, clock))
-        self.context = PageContext(self.node, access)
-        self.webcam = FrameSocket(self.context.graph, self._drives)
+        self.context = PageContext(self.node)
+        if graph is not None:
+            settings_file = SettingsFile(file or DEFAULT_FILE, is_read=file is not None)
+            settings = Settings(lambda: graph.config, graph.reconfigure, settings_file)
+            self.context = PageContext(self.node, graph, settings, Lessons.of(graph))
+        self.webcam = FrameSocket(graph, self._drives)
         self._config = config
         self._server: uvicorn.Server | None = None
         self._thread: threading.Thread | None = None
@@ -93,17 +103,11 @@ class Dashboard:
     def of(cls, graph: RemoteGraph, file: Path | None = None) -> "Dashboard":
         """Return the page of a whole graph.
 
-        Settings are saved to ``file``, the YAML file that the graph's parameters were read from; by default
-        :data:`~handsteer.dashboard.settings.DEFAULT_FILE`.
-
         Raises:
             ConfigError: The file can no longer be read.
         """
-        settings_file = SettingsFile(file or DEFAULT_FILE, is_read=file is not None)
-        settings = Settings(lambda: graph.config, graph.reconfigure, settings_file)
-        access = GraphAccess(graph, settings, Lessons.of(graph))
         config, topic = graph.config.dashboard, cmd_vel_topic(graph.config)
-        return cls(graph.transport, graph.clock, graph.steering, config, cmd_vel=topic, access=access)
+        return cls(graph.transport, graph.clock, graph.steering, config, cmd_vel=topic, graph=graph, file=file)
 
     def start(self) -> str:
         """Serve the page and return its address once it answers; it contains the token if one is needed.
@@ -138,8 +142,8 @@ class Dashboard:
         """Close the page and all connections; may be called more than once."""
         self.node.close()
         self.pictures.close()
-        if self.context.access is not None:
-            self.context.access.lessons.close()
+        if self.context.lessons is not None:
+            self.context.lessons.close()
         if self._server is not None and self._thread is not None:
             self._server.should_exit = True
             self._thread.join(_STOP_TIMEOUT_S)

@@ -27,11 +27,11 @@ class SettingsPage(Page):
     def __init__(self, context: PageContext) -> None:
         super().__init__(context, "/settings", "settings.css")
         self._panel: SettingsPanel | None = None
-        if context.access is None:
+        if context.settings is None:
             with ui.element("section").classes("card panel"):
                 text("elsewhere", _ELSEWHERE)
         else:
-            self._panel = SettingsPanel(context.access.settings, self.drives)
+            self._panel = SettingsPanel(context.settings, self.drives)
 
     def show(self, node: DashboardNode, state: PageState) -> None:
         """Show changes."""
@@ -141,13 +141,7 @@ class SettingsPanel:
 
 
 class _Row:
-    """One parameter: its meaning, its value, and a reset to its default.
-
-    Args:
-        field: The parameter.
-        settings: Stores its value.
-        change: Called with a change to make; returns an error message if it is refused.
-    """
+    """One parameter: its meaning, its value, and a reset to its default."""
 
     def __init__(self, field: Field, settings: Settings, change: Callable[[Callable[[], object]], str | None]) -> None:
         self.field = field

@@ -132,14 +132,7 @@ def _sent_ms(sent: object) -> object:
 class _Slider:
     """A slider that stays where it is set, as in rqt_robot_steering, with editable limits and step buttons.
 
-    Positive is up or left (REP 103).
-
-    Args:
-        name: Its heading.
-        unit: Of its value.
-        bound: Its limits are within plus and minus this value.
-        change: Called when the viewer has moved it.
-        upright: Whether it is vertical, for the linear velocity.
+    Positive is up or left (REP 103). Its limits are within plus and minus ``bound``.
     """
 
     def __init__(self, name: str, unit: str, bound: float, change: Callable[[], None], *, upright: bool) -> None:
@@ -212,11 +205,7 @@ class _Slider:
 
 
 class _TopicBox:
-    """The steering topic's name, and its consequences.
-
-    Args:
-        choose: Called with another name; raises TransportError if it is rejected. None if there is no choice.
-    """
+    """The steering topic's name, and its consequences; without ``choose``, there is no choice."""
 
     def __init__(self, choose: Callable[[str], None] | None) -> None:
         self._choose = choose
