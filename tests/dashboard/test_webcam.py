@@ -156,7 +156,10 @@ def test_a_browser_that_does_not_tell_of_new_pictures_sends_each_once_too(url: s
         page.evaluate("setInterval(() => window.sent || takePicture('red'), 100)")  # until it is listened to
         page.get_by_text("Use this device's camera").click()
         page.wait_for_function("window.sent > 0")
-        page.wait_for_timeout(500)  # what was painted meanwhile has come
+        sent = -1
+        while sent != page.evaluate("window.sent"):  # until what was painted meanwhile has come
+            sent = page.evaluate("window.sent")
+            page.wait_for_timeout(1000)
         for colour in ("green", "blue"):
             before = page.evaluate("window.sent")
             page.wait_for_timeout(1000)  # thirty times as long as a picture takes
