@@ -117,7 +117,7 @@ def _check_chunks(data: bytes) -> None:
     for _ in range(_MOST_CHUNKS):
         length, name = int.from_bytes(data[at : at + 4], "big"), data[at + 4 : at + 8]
         if name in _ANIMATION:
-            raise FrameError("an animated PNG picture, of which there is no size to know")
+            raise FrameError("an animated PNG picture, whose size is unknown")
         at += length + _AROUND_A_CHUNK
         if at > len(data):
             break

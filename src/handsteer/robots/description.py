@@ -104,7 +104,7 @@ def _parse(urdf: str) -> ET.Element:
     if len(urdf) > _LONGEST:
         raise WorldError(f"robot description: has {len(urdf)} characters, and should have at most {_LONGEST}")
     if "<!DOCTYPE" in urdf:  # its entities may expand to gigabytes
-        raise WorldError("robot description: a document type is not read here: leave <!DOCTYPE out")
+        raise WorldError("robot description: document types are not supported: remove <!DOCTYPE")
     try:
         robot = ET.fromstring(urdf)
     except (ET.ParseError, ValueError) as error:

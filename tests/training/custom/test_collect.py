@@ -142,7 +142,7 @@ def test_each_photo_is_a_take(tmp_path: Path, pictures: list[np.ndarray]) -> Non
 def test_recordings_without_a_hand_are_refused(tmp_path: Path, pictures: list[np.ndarray]) -> None:
     landmarker = open_landmarker(Config())
     cv2.imwrite(str(tmp_path / "empty.png"), pictures[0] * 0)
-    with pytest.raises(DatasetError, match="there is no hand to be found in it"):
+    with pytest.raises(DatasetError, match="no hand was found in it"):
         collect_recorded(tmp_path, landmarker, FACTS, 1.0)
     with pytest.raises(CameraNotFound):
         collect_recorded(tmp_path / "gone.mp4", landmarker, FACTS, 1.0)

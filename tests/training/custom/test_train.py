@@ -115,10 +115,10 @@ def test_landmarks_without_depth_are_learnt_from_the_image_and_sides_are_kept() 
     [
         (Dataset(), "there is no new sign to learn, only nothing at all"),
         (Dataset((take(NONE, "Go"), take("Stop"))), "there is no new sign to learn, only NONE, Stop"),
-        (Dataset((take("Hi", "Peace"),)), "too little of Hi: 1 takes with 90 hands, and at least 2 takes"),
+        (Dataset((take("Hi", "Peace"),)), "too little data for Hi: 1 takes with 90 hands; at least 2 takes"),
         (
             Dataset((take("Hi", "Peace", hands=4), take("Hi", "Peace", hands=4))),
-            "too little of Hi: 2 takes with 8 hands, and at least 2 takes with 10 hands",
+            "too little data for Hi: 2 takes with 8 hands; at least 2 takes with 10 hands",
         ),
         (Dataset((*takes("Hi", "Peace", count=2), *takes("hi", "Call", count=2))), "'Hi' and 'hi' mean the same"),
         (Dataset(tuple(takes("Hi", "Stop", count=2))), r"Hi looks like Stop: \d+% of its hands are recognised as that"),

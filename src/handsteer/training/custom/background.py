@@ -65,7 +65,7 @@ class BackgroundTraining:
         if isinstance(answer, TrainingError):
             raise answer
         if answer is None:
-            raise TrainingError(f"the training ended before it was done, with exit code {process.returncode}")
+            raise TrainingError(f"the training ended early, with exit code {process.returncode}")
         learnt: tuple[CustomModel, TrainingReport] = answer
         return learnt
 

@@ -45,7 +45,7 @@ def check_enough(dataset: Dataset, labels: Sequence[str]) -> None:
     for summary in summarise(dataset):
         if summary.label in labels and (summary.takes < _LEAST_TAKES or summary.rows < _LEAST_ROWS):
             raise TrainingError(
-                f"too little of {summary.label}: {summary.takes} takes with {summary.rows} hands, and at least "
+                f"too little data for {summary.label}: {summary.takes} takes with {summary.rows} hands; at least "
                 f"{_LEAST_TAKES} takes with {_LEAST_ROWS} hands are needed; five takes of 3 s are good"
             )
 
@@ -96,7 +96,7 @@ def check_distinguished(likeliest: Confusion) -> None:
             share = likeliest.counts[row][column] / shown if shown else 0.0
             if row != column and share > _CONFUSED_SHARE:
                 raise TrainingError(
-                    f"{label} looks like {other}: {share:.0%} of its hands that were held out are likelier to be that; "
+                    f"{label} looks like {other}: {share:.0%} of its held-out hands look more like that; "
                     f"teach shapes that differ more, or name both by --sided if one is the mirror image of the other"
                 )
 

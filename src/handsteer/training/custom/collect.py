@@ -195,7 +195,7 @@ def collect_recorded(source: Path, landmarker: Landmarker, facts: Facts, take_s:
     else:
         takes = list(_video_takes(source, landmarker, facts, take_s))
     if not takes:
-        raise DatasetError(f"{source}: there is no hand to be found in it, so there is nothing to learn from")
+        raise DatasetError(f"{source}: no hand was found in it")
     return takes
 
 

@@ -64,7 +64,7 @@ def read_class_names(path: Path) -> dict[str, str]:
     except (OSError, UnicodeDecodeError) as error:
         raise DatasetError(f"cannot read the names of the classes {path}: {error}") from None
     if not names or not all(name.strip() for name in names):
-        raise DatasetError(f"{path}: expected the name of one class a line, found an empty line")
+        raise DatasetError(f"{path}: expected the name of one class per line, found an empty line")
     return {str(number): name.strip() for number, name in enumerate(names)}
 
 

@@ -88,9 +88,7 @@ def part_of(path: PurePath | str, person_set: str = "") -> Part:
 def main() -> None:
     """Write the statistics of the photos in the folders given on the command line."""
     if len(sys.argv) < 2:
-        raise SystemExit(
-            "name the folders of labelled photos to fit to: without any, the statistics would be of no people"
-        )
+        raise SystemExit("name the folders of labelled photos to fit to")
     hands = defaultdict(list)
     for folder in map(Path, sys.argv[1:]):
         for kind, coordinates in seen_hands(folder):
