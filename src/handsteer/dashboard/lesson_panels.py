@@ -3,6 +3,7 @@
 import asyncio
 import base64
 from collections.abc import Callable, Sequence
+from typing import TypeVar
 
 from nicegui import ui
 
@@ -14,6 +15,8 @@ from handsteer.errors import HandsteerError
 from handsteer.training.custom.dataset import Dataset, summarise
 from handsteer.training.custom.report import TrainingReport, false_hands, how_it_was_tried, mistakes
 from handsteer.types import EFFECTS, NONE, Action
+
+T = TypeVar("T")
 
 _DISCARDED = "The lesson is over, and nothing of it was kept. The robot stands until you press Reset."
 _LONGEST = 200
@@ -55,29 +58,17 @@ class ViewerLesson:
             self.message = "Somebody else drives: ask to drive first, then teach."
             return
         node.halt()
-        self.message = ""
-        try:
-            await asyncio.to_thread(self.lessons.begin, self._viewer, name, person)
-        except HandsteerError as error:
-            self.message = f"{error}."
+        await self._run(self.lessons.begin, self._viewer, name, person)
         if self._is_over:  # the page was left meanwhile
             self.lessons.end(self._viewer)
 
     async def save(self, action: str) -> None:
         """Save what was learnt, with this action."""
-        self.message = ""
-        try:
-            self.learnt = await asyncio.to_thread(self.lessons.save, self._viewer, action)
-        except HandsteerError as error:
-            self.message = f"{error}."
+        self.learnt = await self._run(self.lessons.save, self._viewer, action)
 
     async def known(self) -> Dataset:
         """Return the takes of earlier lessons; none if they cannot be read."""
-        try:
-            return await asyncio.to_thread(self.lessons.known)
-        except HandsteerError as error:
-            self.message = f"{error}."
-            return Dataset()
+        return await self._run(self.lessons.known) or Dataset()
 
     def discard(self) -> None:
         """End the lesson without saving anything."""
@@ -92,6 +83,15 @@ class ViewerLesson:
         """End the lesson, because the page is left."""
         self._is_over = True
         self.lessons.end(self._viewer)
+
+    async def _run(self, action: Callable[..., T], *arguments: object) -> T | None:
+        """Return the result of ``action``, which reads or writes files; show an error instead."""
+        self.message = ""
+        try:
+            return await asyncio.to_thread(action, *arguments)
+        except HandsteerError as error:
+            self.message = f"{error}."
+            return None
 
 
 class NamePanel:

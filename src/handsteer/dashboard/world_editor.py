@@ -78,7 +78,7 @@ class WorldEditor:
 
     def open(self) -> bool:
         """Start editing; return False and show why if that is not possible."""
-        if self._world() is None or not self._may_change():
+        if self._changeable() is None:
             return False
         self._set_open("Drag things where you want them, or choose one and change its figures.", on=True)
         self._refresh()
@@ -90,13 +90,12 @@ class WorldEditor:
 
     def pick(self, index: int) -> None:
         """Select the obstacle with this index."""
-        world = self._world()
-        if world and index < len(world.obstacles):
+        if (world := self._world) and index < len(world.obstacles):
             self._things.set_value(world.obstacles[index].name)
 
     async def drop(self, index: int, x: float, y: float) -> None:
         """Move the obstacle with this index to x and y in metres, unless it is already there."""
-        world = self._world()
+        world = self._world
         # A browser may send anything.
         is_place = all(isinstance(value, int | float) and abs(value) <= _FARTHEST_M for value in (x, y))
         if world is None or index >= len(world.obstacles) or not is_place:
@@ -107,8 +106,8 @@ class WorldEditor:
 
     async def restart(self) -> None:
         """Move the robot and all things to their start positions."""
-        if self._graph and self._world() is not None and self._may_change():
-            await self._wait_for(self._graph.reset(), "The robot and all things are where they started.")
+        if graph := self._changeable():
+            await self._wait_for(graph.reset(), "The robot and all things are where they started.")
 
     def _set_open(self, message: str, *, on: bool) -> None:
         self.is_open = on
@@ -116,30 +115,27 @@ class WorldEditor:
         self._view.edit(on=on)
         self._message.set_text(message)
 
+    @property
     def _world(self) -> World | None:
-        """Return the robot's world; show an error if there is none."""
-        world = self._graph.state.world if self._graph else None
-        if self._graph is None:
-            self._message.set_text(
-                "The robot runs in another process; its world can be edited on the page of `handsteer run` only."
-            )
-        elif world is None:
-            self._message.set_text(
-                "This is a real robot: its world cannot be edited, nor can it be put back by a button."
-            )
-        return world
+        return self._graph.state.world if self._graph else None
 
-    def _may_change(self) -> bool:
-        may = self._page.drives()
-        if not may:
-            self._message.set_text("Somebody else drives: ask to drive before you change the world.")
-        return may
+    def _changeable(self) -> RemoteGraph | None:
+        """Return the graph if this viewer may change its world; show why not otherwise."""
+        if self._graph is None:
+            why = "The robot runs in another process; its world can be edited on the page of `handsteer run` only."
+        elif self._world is None:
+            why = "This is a real robot: its world cannot be edited, nor can it be put back by a button."
+        elif not self._page.drives():
+            why = "Somebody else drives: ask to drive before you change the world."
+        else:
+            return self._graph
+        self._message.set_text(why)
+        return None
 
     async def _add(self, shape: Shape) -> None:
-        before = self._world()
-        if before is not None and await self._change(partial(add, shape=shape, robot=self.robot), ""):
-            known = {thing.name for thing in before.obstacles}
-            new = [thing.name for thing in (self._world() or before).obstacles if thing.name not in known]
+        known = {thing.name for thing in self._world.obstacles} if self._world else set()
+        if await self._change(partial(add, shape=shape, robot=self.robot), "") and self._world is not None:
+            new = [thing.name for thing in self._world.obstacles if thing.name not in known]
             self._things.set_value(new[-1] if new else None)
             self._message.set_text(f"Added {new[-1]}." if new else "")
 
@@ -156,7 +152,7 @@ class WorldEditor:
             await self._enter(load_world(name), name)
 
     async def _open_file(self, sent: object) -> None:
-        if not self._may_change():
+        if self._changeable() is None:
             return
         try:
             name, content = read_file(sent)
@@ -169,16 +165,16 @@ class WorldEditor:
             await self._enter(world, name)
 
     def _save(self) -> None:
-        if world := self._world():
+        if world := self._world:
             ui.download.content(write_world(world), "world.yaml", "application/yaml")
 
     async def _enter(self, world: World, name: str) -> None:
-        if self._graph and self._may_change():
-            await self._wait_for(self._graph.enter_world(world), f"Loaded {name}; the robot is at the start.")
+        if graph := self._changeable():
+            await self._wait_for(graph.enter_world(world), f"Loaded {name}; the robot is at the start.")
 
     async def _change(self, change: Change, done: str) -> bool:
-        graph = self._graph
-        return bool(graph and self._may_change() and await self._wait_for(graph.change_world(change), done))
+        graph = self._changeable()
+        return graph is not None and await self._wait_for(graph.change_world(change), done)
 
     async def _wait_for(self, change: Future[None], done: str) -> bool:
         """Return whether ``change`` succeeded; show ``done``, or the error."""
@@ -195,8 +191,7 @@ class WorldEditor:
         return succeeded
 
     def _refresh(self) -> None:
-        world = self._graph.state.world if self._graph else None
-        names = [thing.name for thing in world.obstacles] if world else []
+        names = [thing.name for thing in self._world.obstacles] if self._world else []
         value = self._chosen if self._chosen in names else None
         if names != self._things.options or value != self._things.value:
             self._things.set_options(names, value=value)
@@ -207,10 +202,9 @@ class WorldEditor:
         self._show_choice()
 
     def _show_choice(self) -> None:
-        world = self._graph.state.world if self._graph else None
-        things = [thing.name for thing in world.obstacles] if world else []
-        index = things.index(self._chosen) if self._chosen in things else None
-        self._form.show(None if world is None or index is None else world.obstacles[index])
+        things = self._world.obstacles if self._world else ()
+        index = next((at for at, thing in enumerate(things) if thing.name == self._chosen), None)
+        self._form.show(None if index is None else things[index])
         switch(self._delete, "hidden", on=index is None)
         if self.is_open:
             self._view.choose(index)
