@@ -223,8 +223,7 @@ class ChainContract:
     def running(self, chain: Running) -> Running:
         """The chain while it drives at full speed.
 
-        Over Fast DDS, nodes that were started after a ``kill -9`` were seen twice that never drove again, for a reason
-        not found yet; then all start again, and a warning has what each node logged.
+        If they do not drive again after a kill, all start again, and a warning has what each node logged.
         """
         try:
             return chain.revive().expect_full_speed()
