@@ -24,7 +24,7 @@ from handsteer.config import load
 from handsteer.dashboard.page_process import PageProcess
 from handsteer.graph import Graph
 from handsteer.messages import CMD_VEL, STOP, Bool, Twist
-from handsteer.transports.protocol import Received
+from handsteer.transports.base import Received
 
 BLOCKED_S, HELD_S, FREE_S = 5.0, 0.3, 0.05
 # Every node publishes its state on /stopped; one that is published after a reset would undo it.

@@ -31,15 +31,15 @@ from handsteer.images import image_message
 from handsteer.messages import CMD_VEL, HAND_SIGN, Header, Image, String, Topic, Twist, twist
 from handsteer.nodes.node import Node
 from handsteer.transports import join
+from handsteer.transports.base import Publisher, Received, Transport
 from handsteer.transports.in_process import InProcessTransport
-from handsteer.transports.protocol import Publisher, Received, Transport
 
 WIDTH, HEIGHT = 640, 480
 SETTLE_S = 0.5
 MODULES = ("handsteer.cli.app", "handsteer.cli.nodes")
 SESSIONS = {
     "dds": "handsteer.transports.dds.transport",
-    "zenoh": "handsteer.transports.zenoh.session",
+    "zenoh": "handsteer.transports.zenoh.transport",
     "ros2": "handsteer.transports.rclpy.session",
 }
 # A Twist carries its send time in a field, because a stamp would change its size.

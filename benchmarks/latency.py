@@ -15,7 +15,7 @@ from handsteer.config import CameraConfig, Config
 from handsteer.graph import Graph
 from handsteer.messages import CMD_VEL, HAND_SIGN, String, Twist
 from handsteer.recognition import tflite
-from handsteer.transports.protocol import Received
+from handsteer.transports.base import Received
 
 CLIP = Path(__file__).parents[2] / "shared" / "data" / "videos" / "dex-retargeting_human_hand_video_1280x720.mp4"
 FACTOR, ALLOWANCE_MS = 1.5, 5.0

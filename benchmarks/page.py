@@ -40,7 +40,7 @@ from handsteer.dashboard.page_process import PageProcess
 from handsteer.graph import Graph
 from handsteer.messages import CMD_VEL, Twist
 from handsteer.nodes.latency import LatencyLog
-from handsteer.transports.protocol import Received
+from handsteer.transports.base import Received
 
 LIMIT_BYTES_PER_S = 2_000_000
 LIMIT_SLOWER = 0.10

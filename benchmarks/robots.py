@@ -21,7 +21,7 @@ from tests.dds.graph import free_domain
 
 from handsteer.messages import CMD_VEL, ODOM, Twist, twist
 from handsteer.transports import join
-from handsteer.transports.protocol import Publisher
+from handsteer.transports.base import Publisher
 
 _TICKS_PER_S = os.sysconf("SC_CLK_TCK")
 _ODOMETRY_HZ = 50

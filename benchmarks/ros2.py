@@ -24,7 +24,7 @@ from handsteer.config import VirtualHandConfig
 from handsteer.images import image_message, jpeg_message
 from handsteer.messages import IMAGE_COMPRESSED, IMAGE_RAW, Header, Image, Topic, Twist, twist
 from handsteer.transports import join
-from handsteer.transports.protocol import Publisher, Session
+from handsteer.transports.base import Publisher, Session
 
 TWISTS = Topic("/benchmark/twist", Twist, depth=10)
 FIELDS = {TWISTS: ["linear.x"], IMAGE_COMPRESSED: ["header.frame_id"], IMAGE_RAW: ["header.frame_id"]}

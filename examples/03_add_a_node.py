@@ -5,7 +5,7 @@ from handsteer.config import CameraConfig, Config, VirtualHandConfig
 from handsteer.graph import Graph
 from handsteer.messages import HAND_SIGN, ODOM, Odometry, String
 from handsteer.nodes.node import Node
-from handsteer.transports.protocol import Received
+from handsteer.transports.base import Received
 
 
 class Reporter(Node):

@@ -24,8 +24,8 @@ from handsteer.making import make_camera, make_control, make_recognition, make_r
 from handsteer.nodes.node import Node
 from handsteer.nodes.steering import SteeringNode
 from handsteer.robots.course import CourseState
+from handsteer.transports.base import Session, Transport
 from handsteer.transports.in_process import InProcessTransport
-from handsteer.transports.protocol import Session, Transport
 from handsteer.types import Pose2D
 
 log = logging.getLogger(__name__)

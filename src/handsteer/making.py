@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from handsteer.clock import Clock, SimulatedClock, WallClock
 from handsteer.config import Config, RobotConfig, cmd_vel_type
 from handsteer.messages import TF, Topic, cmd_vel
-from handsteer.transports.protocol import Session, Transport
+from handsteer.transports.base import Session, Transport
 from handsteer.types import NONE, find_sign
 
 if TYPE_CHECKING:

@@ -27,7 +27,7 @@ from handsteer.messages import (
 )
 from handsteer.nodes.node import Node
 from handsteer.nodes.reporters import split_reporter
-from handsteer.transports.protocol import Publisher, Received, Transport
+from handsteer.transports.base import Publisher, Received, Transport
 
 M = TypeVar("M")
 WAIT_S = 10.0

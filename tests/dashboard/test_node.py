@@ -39,8 +39,8 @@ from handsteer.nodes.control import HandSignControlNode
 from handsteer.nodes.steering import SteeringNode
 from handsteer.robots.course import CourseState
 from handsteer.robots.description import robot_description
+from handsteer.transports.base import Publisher, Received
 from handsteer.transports.in_process import InProcessTransport
-from handsteer.transports.protocol import Publisher, Received
 from handsteer.types import Pose2D, Velocity
 from tests.about import about
 

@@ -25,7 +25,7 @@ from handsteer.graph import Graph
 from handsteer.messages import CMD_VEL, STOP, Bool, Twist
 from handsteer.robots.editing import add, remove
 from handsteer.robots.world import load_world
-from handsteer.transports.protocol import Received
+from handsteer.transports.base import Received
 from handsteer.types import Pose2D
 from tests.contracts.transport_contract import eventually
 from tests.dashboard.served import remote

@@ -15,7 +15,7 @@ from handsteer.dashboard.scene import about_axis, from_rpy
 from handsteer.messages import JOINT_STATES, JointState
 from handsteer.robots.description import joints, robot_description
 from handsteer.robots.world import load_world, read_world
-from handsteer.transports.protocol import Received
+from handsteer.transports.base import Received
 from tests.dashboard.browsers import a_browser
 from tests.dashboard.served import Site
 from tests.dashboard.visits import NEEDS_A_BROWSER, PATIENCE_MS, Visit, visiting

@@ -17,7 +17,7 @@ DRIVEN = "robot_diff_drive_controller/cmd_vel:=/robot_diff_drive_controller/cmd_
 
 
 def look(domain: DdsGraph) -> dict[str, Any]:
-    command = [sys.executable, "-m", "handsteer.transports.look"]
+    command = [sys.executable, "-m", "handsteer.transports.dds.look"]
     done = subprocess.run(command, env=domain.env, capture_output=True, text=True, timeout=120, check=False)
     assert done.returncode == 0, done.stderr
     return dict(json.loads(done.stdout))

@@ -39,7 +39,7 @@ from handsteer.robots.protocol import Robot
 from handsteer.robots.remote import RemoteRobot
 from handsteer.testing.fault_transport import FaultTransport
 from handsteer.testing.faulty_camera import SpoiltCamera
-from handsteer.transports.protocol import Call, Received
+from handsteer.transports.base import Call, Received
 from handsteer.types import NONE
 from tests.faults.base import Base
 from tests.faults.domain import Domain

@@ -5,8 +5,8 @@ from functools import partial
 from typing import Any
 
 from handsteer.messages import Topic
-from handsteer.transports.channels import TopicTypes, check_type
-from handsteer.transports.protocol import Received
+from handsteer.transports.base import Received
+from handsteer.transports.in_process import TopicTypes, check_type
 
 Deliver = Callable[[Received[Any]], None]
 

@@ -23,7 +23,7 @@ from handsteer.recognition.drawing import annotate
 from handsteer.recognition.recognizer import open_classifier
 from handsteer.robots.command_limiter import CommandLimiter
 from handsteer.robots.diff_drive import Velocity
-from handsteer.transports.protocol import Received
+from handsteer.transports.base import Received
 from tests.faults.domain import Domain
 from tests.faults.painted import FPS, PaintedCamera, painted_recognizer
 from tests.faults.rules import Rules

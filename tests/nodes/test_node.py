@@ -10,8 +10,8 @@ from handsteer.clock import RealClock, SteppedClock
 from handsteer.config import Config
 from handsteer.messages import DIAGNOSTICS, HAND_SIGN, DiagnosticArray, String, Topic
 from handsteer.nodes.node import OK, WARN, Node
+from handsteer.transports.base import Received
 from handsteer.transports.in_process import InProcessTransport
-from handsteer.transports.protocol import Received
 from tests.nodes.stepping import Bench
 from tests.processes import eventually
 

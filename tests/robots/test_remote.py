@@ -9,8 +9,8 @@ from handsteer.clock import SteppedClock
 from handsteer.config import RobotConfig
 from handsteer.messages import CMD_VEL, Header, LaserScan, Topic, Twist
 from handsteer.robots.remote import RemoteRobot
+from handsteer.transports.base import Publisher
 from handsteer.transports.in_process import InProcessTransport
-from handsteer.transports.protocol import Publisher
 
 
 class Link:

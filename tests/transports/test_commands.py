@@ -11,10 +11,9 @@ from handsteer.config import ControlConfig
 from handsteer.messages import CMD_VEL, STEERING_CMD_VEL, Topic, Twist, TwistStamped, cmd_vel, twist, twist_in
 from handsteer.nodes.control import HandSignControlNode
 from handsteer.nodes.steering import SteeringNode
-from handsteer.transports.channels import TopicTypes
+from handsteer.transports.base import KnowsTypes
 from handsteer.transports.commands import Commands
-from handsteer.transports.in_process import InProcessTransport
-from handsteer.transports.protocol import TellsTypes
+from handsteer.transports.in_process import InProcessTransport, TopicTypes
 
 TWIST, STAMPED = "geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped"
 FORWARD = (TWIST, 0.2)
@@ -61,7 +60,7 @@ class Bench:
     def __init__(self) -> None:
         self.clock = SteppedClock()
         self.transport = TellingTransport()
-        assert isinstance(self.transport, TellsTypes)
+        assert isinstance(self.transport, KnowsTypes)
 
     def commands(self, kind: str = "auto") -> Commands:
         advertise = partial(self.transport.advertise, "test")

@@ -2,8 +2,8 @@ from collections.abc import Iterator
 
 import pytest
 
+from handsteer.transports.base import Transport
 from handsteer.transports.in_process import InProcessTransport
-from handsteer.transports.protocol import Transport
 from tests.contracts.transport_contract import TransportContract
 
 

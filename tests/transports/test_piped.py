@@ -23,9 +23,9 @@ from handsteer.messages import (
     Twist,
     twist,
 )
+from handsteer.transports.base import Received, Transport
 from handsteer.transports.in_process import InProcessTransport
 from handsteer.transports.piped import Gateway, Pipe, PipedTransport
-from handsteer.transports.protocol import Received, Transport
 from tests.contracts.transport_contract import TransportContract, eventually
 
 TOPICS = [value for value in vars(messages).values() if isinstance(value, Topic)]
@@ -190,7 +190,7 @@ def test_what_cannot_be_told_ends_the_pipe_and_is_logged(caplog: pytest.LogCaptu
     far.say("function", lambda: None)
     assert far.ended.wait(10)
     assert near.ended.wait(10)
-    assert "cannot be told" in caplog.text
+    assert "cannot be sent" in caplog.text
 
 
 @pytest.mark.parametrize("topic", TOPICS, ids=lambda topic: topic.name)
@@ -211,5 +211,5 @@ def test_a_handler_that_fails_is_logged_and_the_next_one_called(caplog: pytest.L
     far.say("number", 0)
     far.say("number", 1)
     assert eventually(lambda: heard == [1])
-    assert "number has failed" in caplog.text
+    assert "about number could not be handled" in caplog.text
     far.close()

@@ -16,7 +16,7 @@ from handsteer.config import Config
 from handsteer.nodes.node import Node
 from handsteer.parameters import NodeParameters, from_parameters
 from handsteer.transports import join
-from handsteer.transports.protocol import Session, Transport
+from handsteer.transports.base import Session, Transport
 
 _LOOK_PERIOD_S = 0.5
 

@@ -19,7 +19,7 @@ from handsteer.errors import ConfigError
 from handsteer.graph import Graph, Summary
 from handsteer.parameters import from_parameters
 from handsteer.transports import join
-from handsteer.transports.protocol import Session
+from handsteer.transports.base import Session
 
 _NODE = "handsteer"
 

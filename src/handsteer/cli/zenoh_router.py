@@ -34,5 +34,5 @@ def zenoh_router(*, listen: str | None = None) -> int:
 
 def _open(listen: str | None) -> Any:
     with needing("the Zenoh router", "zenoh", "zenoh", "xxhash"):
-        from handsteer.transports.zenoh.router import Router  # noqa: PLC0415
+        from handsteer.transports.zenoh.configuration import Router  # noqa: PLC0415
     return Router(os.environ, listen)

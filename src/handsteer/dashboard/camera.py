@@ -26,7 +26,7 @@ from handsteer.errors import FrameError
 from handsteer.images import bgr_image, encode_jpeg
 from handsteer.messages import IMAGE_ANNOTATED, Image
 from handsteer.nodes.node import Node
-from handsteer.transports.protocol import Received, Transport
+from handsteer.transports.base import Received, Transport
 from handsteer.types import NONE
 
 FRAMES_PER_S = 30.0

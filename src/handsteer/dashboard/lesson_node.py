@@ -24,7 +24,7 @@ from handsteer.recognition.recognizer import Recognizer
 from handsteer.training.custom.background import BackgroundTraining
 from handsteer.training.custom.collect import largest
 from handsteer.training.custom.dataset import Dataset
-from handsteer.transports.protocol import Received, Transport
+from handsteer.transports.base import Received, Transport
 from handsteer.types import NONE
 
 log = logging.getLogger(__name__)

@@ -22,7 +22,7 @@ from handsteer.recognition.hand import Landmarker
 from handsteer.recognition.recognizer import open_classifier, open_landmarker
 from handsteer.training.custom.collect import Facts
 from handsteer.training.custom.dataset import Dataset, load_dataset, save_dataset
-from handsteer.transports.protocol import Transport
+from handsteer.transports.base import Transport
 from handsteer.types import ACTIONS, NONE, SIGNS, Action, action_of, find_sign
 
 _LONGEST_PERSON: Final = 40

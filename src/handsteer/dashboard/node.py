@@ -46,7 +46,7 @@ from handsteer.messages import (
 from handsteer.nodes.node import Node
 from handsteer.nodes.reporters import split_reporter
 from handsteer.nodes.steering import SteeringNode
-from handsteer.transports.protocol import Received, TellsTypes, Transport
+from handsteer.transports.base import KnowsTypes, Received, Transport
 from handsteer.types import Pose2D, Velocity
 
 HOLD_TIMEOUT_S = 0.3
@@ -101,7 +101,7 @@ class DashboardNode(Node):
         self._odometry_came_s = self._scan_came_s = -math.inf
         self.subscribe(DIAGNOSTICS, self._on_diagnostics, key=_reporter)
         # A subscriber would count as a robot that takes a Twist, so the control's report is used.
-        self._believes_control = cmd_vel.or_type is not None and isinstance(transport, TellsTypes)
+        self._believes_control = cmd_vel.or_type is not None and isinstance(transport, KnowsTypes)
         if not self._believes_control:
             self.subscribe(cmd_vel, self._on_command)
         self.subscribe(ODOM, self._on_odometry)

@@ -38,7 +38,7 @@ from handsteer.errors import DashboardError
 from handsteer.making import cmd_vel_topic
 from handsteer.messages import CMD_VEL, Topic
 from handsteer.nodes.steering import SteeringNode
-from handsteer.transports.protocol import Transport
+from handsteer.transports.base import Transport
 
 _START_TIMEOUT_S = 20.0
 _STOP_TIMEOUT_S = 3.0

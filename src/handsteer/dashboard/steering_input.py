@@ -2,7 +2,7 @@
 
 import math
 
-from handsteer.transports.stale_messages import StaleMessageFilter
+from handsteer.transports.timing import StaleMessageFilter
 from handsteer.types import ZERO, Velocity
 
 SLIDERS_TIMEOUT_S = 0.5

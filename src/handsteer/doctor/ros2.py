@@ -15,8 +15,7 @@ from typing import Any
 
 from handsteer.doctor.finding import Finding
 from handsteer.errors import TransportError
-from handsteer.transports.dds.interfaces import multicast_addresses
-from handsteer.transports.dds.network import PLACES_BY_MULTICAST, Network, network
+from handsteer.transports.dds.network import PLACES_BY_MULTICAST, Network, multicast_addresses, network
 
 # RTPS 2.3, section 9.6.1.1: ports of a domain, and of a participant in it.
 _BASE, _PER_DOMAIN, _PER_PARTICIPANT, _OWN, _LARGEST_DOMAIN = 7400, 250, 2, 10, 232
@@ -97,7 +96,7 @@ class Sight:
     """What was observed in a domain.
 
     Attributes:
-        graph: As returned by :meth:`~handsteer.transports.observed.ObservedGraph.as_dict`; None if it cannot be joined.
+        graph: As returned by :meth:`~handsteer.transports.dds.look.ObservedGraph.as_dict`; None if it cannot be joined.
         problem: Why it cannot be joined: the engine's message, or else ours.
     """
 
@@ -115,7 +114,7 @@ def look(environments: Mapping[int, Mapping[str, str]]) -> dict[int, Sight]:
     """Return what is observed in each domain, looked at simultaneously with its environment variables."""
     processes = {
         domain: subprocess.Popen(
-            [sys.executable, "-m", "handsteer.transports.look"],
+            [sys.executable, "-m", "handsteer.transports.dds.look"],
             env={**environment, "ROS_DOMAIN_ID": str(domain)},
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,

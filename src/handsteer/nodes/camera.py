@@ -13,7 +13,7 @@ from handsteer.messages import CAMERA_INFO, IMAGE_COMPRESSED, IMAGE_RAW, CameraI
 from handsteer.nodes.node import ERROR, OK, Node
 from handsteer.nodes.stop_keeper import StopKeeper
 from handsteer.timeouts import STALE_S
-from handsteer.transports.protocol import Transport
+from handsteer.transports.base import Transport
 
 _DIAGNOSE_PERIOD_S = 0.5
 _SILENT_AFTER_S = 1.0

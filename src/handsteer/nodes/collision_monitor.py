@@ -10,7 +10,7 @@ from handsteer.control.obstacles import ObstacleLimiter
 from handsteer.messages import ODOM, SCAN, LaserScan, Odometry
 from handsteer.nodes.node import Node
 from handsteer.nodes.odometry import MeasuredVelocity
-from handsteer.transports.protocol import Received
+from handsteer.transports.base import Received
 from handsteer.types import Velocity
 
 log = logging.getLogger(__name__)

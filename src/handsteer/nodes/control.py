@@ -29,8 +29,8 @@ from handsteer.nodes.rivals import Rivals
 from handsteer.nodes.selection import Selection
 from handsteer.nodes.stall_guard import CALM_S, StallGuard
 from handsteer.nodes.stop_keeper import StopKeeper
+from handsteer.transports.base import Call, Received, Transport
 from handsteer.transports.commands import Commands
-from handsteer.transports.protocol import Call, Received, Transport
 from handsteer.types import NONE, ZERO, Velocity, action_of
 
 log = logging.getLogger(__name__)

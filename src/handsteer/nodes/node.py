@@ -11,7 +11,7 @@ from typing import Any, Generic, TypeVar
 from handsteer.clock import Clock
 from handsteer.config import Config
 from handsteer.messages import DIAGNOSTICS, DiagnosticArray, DiagnosticStatus, Header, KeyValue, Topic
-from handsteer.transports.protocol import Call, Publisher, Received, Subscription, Transport
+from handsteer.transports.base import Call, Publisher, Received, Subscription, Transport
 
 M = TypeVar("M")
 log = logging.getLogger(__name__)

@@ -24,7 +24,7 @@ from handsteer.nodes.stall_guard import CALM_S, StallGuard
 from handsteer.nodes.stop_keeper import StopKeeper
 from handsteer.recognition.classifier import Classifier
 from handsteer.recognition.recognizer import Recognition, Recognizer
-from handsteer.transports.protocol import Received, Subscription, Transport
+from handsteer.transports.base import Received, Subscription, Transport
 from handsteer.types import NONE
 
 _WATCH_PERIOD_S = 0.02

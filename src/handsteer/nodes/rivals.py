@@ -6,7 +6,7 @@ from typing import Any
 
 from handsteer.messages import Topic
 from handsteer.nodes.node import Node
-from handsteer.transports.observed import UNNAMED, many_voices
+from handsteer.transports.base import UNNAMED, many_publishers
 
 log = logging.getLogger(__name__)
 
@@ -55,4 +55,4 @@ class Rivals:
             return ""
         self._seen[topic] = self._seen.get(topic, 0) + 1
         is_sure = self._seen[topic] >= (_LOOKS_FOR_NAMES if UNNAMED in publishers else _LOOKS)
-        return many_voices(topic, publishers) if is_sure else ""
+        return many_publishers(topic, publishers) if is_sure else ""

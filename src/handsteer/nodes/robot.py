@@ -53,7 +53,7 @@ from handsteer.robots.diff_drive import Velocity
 from handsteer.robots.editing import Change, InWorld
 from handsteer.robots.protocol import Robot, RobotState
 from handsteer.robots.world import World
-from handsteer.transports.protocol import Call, Received, Transport
+from handsteer.transports.base import Call, Received, Transport
 from handsteer.types import Pose2D
 
 log = logging.getLogger(__name__)

@@ -8,8 +8,8 @@ from typing import Any
 from handsteer.control.fleet import Fleet
 from handsteer.messages import SELECT_ROBOT, SELECTED_ROBOT, String, Topic
 from handsteer.nodes.node import Node
+from handsteer.transports.base import Received
 from handsteer.transports.commands import Commands
-from handsteer.transports.protocol import Received
 
 log = logging.getLogger(__name__)
 

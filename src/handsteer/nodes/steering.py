@@ -14,8 +14,8 @@ from handsteer.nodes.node import Node
 from handsteer.nodes.stall_guard import StallGuard
 from handsteer.nodes.stop_keeper import StopKeeper
 from handsteer.timeouts import STALE_S
+from handsteer.transports.base import Received, Transport
 from handsteer.transports.commands import Commands
-from handsteer.transports.protocol import Received, Transport
 from handsteer.types import ZERO, Velocity
 
 _PERIOD_S = 0.1

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 from handsteer.messages import STOP, STOPPED, Bool
 from handsteer.nodes.node import Node
-from handsteer.transports.protocol import Received
+from handsteer.transports.base import Received
 
 
 class StopKeeper:

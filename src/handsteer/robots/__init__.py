@@ -6,7 +6,7 @@ from handsteer.config import RobotConfig
 from handsteer.errors import ConfigError, needing
 from handsteer.messages import CMD_VEL, Topic
 from handsteer.robots.protocol import Robot
-from handsteer.transports.protocol import Session
+from handsteer.transports.base import Session
 
 
 def open_robot(

@@ -13,8 +13,8 @@ from handsteer.robots.command_limiter import ZERO, CommandLimiter
 from handsteer.robots.description import robot_description
 from handsteer.robots.diff_drive import Velocity
 from handsteer.robots.protocol import Obstacle, RangeScan, RobotState
+from handsteer.transports.base import Received, Session
 from handsteer.transports.commands import Commands
-from handsteer.transports.protocol import Received, Session
 from handsteer.types import Pose2D
 
 log = logging.getLogger(__name__)

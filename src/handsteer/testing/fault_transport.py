@@ -11,10 +11,9 @@ from typing import Any, Generic, TypeVar
 from handsteer.clock import Clock
 from handsteer.messages import Topic
 from handsteer.nodes.node import Node
-from handsteer.transports.channels import check_type
-from handsteer.transports.protocol import Publisher, Received, Subscription, Transport
-from handsteer.transports.stale_messages import StaleMessageFilter
-from handsteer.transports.stamps import capture_time
+from handsteer.transports.base import Publisher, Received, Subscription, Transport
+from handsteer.transports.in_process import check_type
+from handsteer.transports.timing import StaleMessageFilter, capture_time
 
 M = TypeVar("M")
 _Link = tuple[str, str]
@@ -50,7 +49,7 @@ FROZEN = LinkFault(frozen=True)
 
 
 class FaultTransport:
-    """A :class:`~handsteer.transports.protocol.Transport` around another one, with a fault on any of its topics.
+    """A :class:`~handsteer.transports.base.Transport` around another one, with a fault on any of its topics.
 
     ::
 

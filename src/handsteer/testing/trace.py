@@ -5,7 +5,7 @@ from bisect import bisect_right
 
 from handsteer.graph import Graph
 from handsteer.messages import CMD_VEL, ODOM, Odometry, Twist
-from handsteer.transports.protocol import Received
+from handsteer.transports.base import Received
 from handsteer.types import Pose2D
 
 

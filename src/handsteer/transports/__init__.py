@@ -3,9 +3,10 @@
 import importlib.util
 import sys
 from collections.abc import Callable, Sequence
+from typing import Any
 
 from handsteer.errors import TransportError, needing
-from handsteer.transports.protocol import Session
+from handsteer.transports.base import Session
 
 
 def join(transport: str, node: str, arguments: Sequence[str]) -> Session:
@@ -35,14 +36,21 @@ def _ros1(node: str, arguments: Sequence[str]) -> Session:
 def _dds(node: str, arguments: Sequence[str]) -> Session:
     # There is no wheel of cyclonedds for Python 3.14 and newer, nor for Linux on ARM.
     with needing("the transport dds (zenoh works on every system)", "dds", "cyclonedds"):
-        from handsteer.transports.dds.transport import DdsSession  # noqa: PLC0415
-    return DdsSession(node, arguments)
+        from handsteer.transports.dds.transport import DdsTransport  # noqa: PLC0415
+    return _wire(node, arguments, DdsTransport)
 
 
 def _zenoh(node: str, arguments: Sequence[str]) -> Session:
     with needing("the transport zenoh", "zenoh", "zenoh", "xxhash"):
-        from handsteer.transports.zenoh.session import ZenohSession  # noqa: PLC0415
-    return ZenohSession(node, arguments)
+        from handsteer.transports.zenoh.transport import ZenohTransport  # noqa: PLC0415
+    return _wire(node, arguments, ZenohTransport)
+
+
+def _wire(node: str, arguments: Sequence[str], connect: Any) -> Session:
+    # It loads all types of ROS 2.
+    from handsteer.transports.ros2.base_session import Ros2Session  # noqa: PLC0415
+
+    return Ros2Session(node, arguments, connect)
 
 
 def _ros2(node: str, arguments: Sequence[str]) -> Session:

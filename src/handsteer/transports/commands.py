@@ -8,7 +8,7 @@ from typing import Any
 
 from handsteer.clock import Clock
 from handsteer.messages import Topic, command, type_name
-from handsteer.transports.protocol import Publisher, TellsTypes, Transport
+from handsteer.transports.base import KnowsTypes, Publisher, Transport
 
 _LOOK_PERIOD_S = 0.25
 
@@ -45,7 +45,7 @@ class Commands:
         self._topic = topic
         # In order of preference.
         self._types = {type_name(kind): kind for kind in (topic.or_type, topic.type) if kind is not None}
-        self._graph = transport if isinstance(transport, TellsTypes) and topic.or_type else None
+        self._graph = transport if isinstance(transport, KnowsTypes) and topic.or_type else None
         self._looked_s = -math.inf
         self._warned = False
         self._publisher = advertise(topic)
@@ -87,7 +87,7 @@ class Commands:
         self._warned = len(taken) > 1
         return changes
 
-    def _change(self, graph: TellsTypes, kind: type[Any]) -> None:
+    def _change(self, graph: KnowsTypes, kind: type[Any]) -> None:
         self.send(0.0, 0.0)
         # Only one publisher at a time: not every middleware lets a process have two types on one topic, and no tool
         # displays it.

@@ -14,12 +14,12 @@ import time
 import weakref
 from collections import deque
 from collections.abc import Callable, Hashable
-from typing import IO, Any, Generic, TypeVar
+from typing import IO, Any, TypeVar
 
 from handsteer.errors import TransportError
 from handsteer.messages import CompressedImage, Image, Topic
-from handsteer.transports.channels import Deliver, Fanout, FanoutSubscription, TopicTypes, check_type
-from handsteer.transports.protocol import Publisher, Received, Subscription, Transport
+from handsteer.transports.base import Deliver, Publisher, Received, Subscription, Transport
+from handsteer.transports.in_process import BasePublisher, BaseTransport, Receive
 
 M = TypeVar("M")
 log = logging.getLogger(__name__)
@@ -99,25 +99,25 @@ class Pipe:
         try:
             while True:
                 kind, *what = pickle.load(self._source)
-                self._take(kind, what)
+                self._handle(kind, what)
         except (EOFError, OSError, ValueError, pickle.UnpicklingError):
             self.close()
 
-    def _take(self, kind: str, what: list[Any]) -> None:
+    def _handle(self, kind: str, what: list[Any]) -> None:
         try:
             self._handlers[kind](*what)
         except Exception:
-            log.exception("what another process said of %s has failed", kind)
+            log.exception("a message of another process about %s could not be handled", kind)
 
     def _write(self) -> None:
         try:
-            while (said := self._next()) is not None:
-                pickle.dump(said, self._sink, protocol=5)
+            while (message := self._next()) is not None:
+                pickle.dump(message, self._sink, protocol=5)
                 self._sink.flush()
         except (OSError, ValueError):
             pass  # the other end is closed
         except Exception:
-            log.exception("what another process was to hear cannot be told")
+            log.exception("a message to another process cannot be sent")
         # Nothing can be sent any more, so the other end must be informed.
         self.ended.set()
         with contextlib.suppress(OSError):
@@ -129,73 +129,34 @@ class Pipe:
             if not self._order:
                 return None
             key = self._order.popleft()
-            said = self._queues[key].popleft()
+            message = self._queues[key].popleft()
             if not self._queues[key]:
                 del self._queues[key]
-            return said
+            return message
 
 
-class PipedTransport:
-    """A :class:`~handsteer.transports.protocol.Transport` for nodes whose graph is at the other end of a pipe.
+class PipedTransport(BaseTransport):
+    """A transport for nodes whose graph is at the other end of a pipe; topics and nodes have their names in that graph.
 
     Args:
         pipe: Not started yet; a :class:`Gateway` is at its other end.
     """
 
-    crosses_network = False
-
     def __init__(self, pipe: Pipe) -> None:
+        super().__init__(weakref.WeakSet())
         self._pipe = pipe
-        self._types = TopicTypes()
-        self._lock = threading.Lock()
         self._numbers = itertools.count()
-        self._fanouts: dict[str, Fanout[Any]] = {}
-        self._publishers: weakref.WeakSet[PipedPublisher[Any]] = weakref.WeakSet()
         pipe.on("message", self._on_message)
 
-    def advertise(self, node: str, topic: Topic[M]) -> "PipedPublisher[M]":
-        """Return a publisher of ``topic`` for the node named ``node``."""
-        self._types.claim(topic.name, topic)
-        publisher = PipedPublisher(self._pipe, next(self._numbers), topic, node)
-        with self._lock:
-            self._publishers.add(publisher)
-        return publisher
+    def _open_publisher(self, node: str, name: str, topic: Topic[M]) -> BasePublisher[M]:
+        return _PipedPublisher(node, name, topic, self._pipe, next(self._numbers))
 
-    def subscribe(self, node: str, topic: Topic[M], deliver: Deliver[M]) -> FanoutSubscription[M]:
-        """Call ``deliver`` for each message on ``topic`` from now on, on the reading thread."""
-        self._types.claim(topic.name, topic)
-
+    def _reception(self, node: str, name: str, topic: Topic[M]) -> Receive[M]:
         def receive(_send: Deliver[M]) -> Callable[[], None]:
             self._pipe.say("subscribe", node, topic)
-            return lambda: self._pipe.say("unsubscribe", topic.name)
+            return lambda: self._pipe.say("unsubscribe", name)
 
-        with self._lock:
-            fanout = self._fanouts.setdefault(topic.name, Fanout(latched=topic.latched, receive=receive))
-        return fanout.add(deliver)
-
-    def publishers_of(self, topic: Topic[Any]) -> list[str]:
-        """Return the names of the nodes of this process that have a publisher of ``topic``."""
-        with self._lock:
-            return sorted(publisher.node for publisher in self._publishers if publisher.topic == topic.name)
-
-    def topic_name(self, topic: Topic[Any]) -> str:
-        """Return its name in the graph of the other process."""
-        return topic.name
-
-    def full_name(self, node: str) -> str:
-        """Return ``node``, which belongs to the graph of the other process."""
-        return node
-
-    def close(self) -> None:
-        """End all publishing and receiving; may be called twice."""
-        with self._lock:
-            fanouts, self._fanouts = self._fanouts, {}
-            publishers = list(self._publishers)
-            self._publishers.clear()
-        for fanout in fanouts.values():
-            fanout.close()
-        for publisher in publishers:
-            publisher.close()
+        return receive
 
     def _on_message(self, name: str, received: Received[Any]) -> None:
         fanout = self._fanouts.get(name)
@@ -203,36 +164,23 @@ class PipedTransport:
             fanout.send(received)
 
 
-class PipedPublisher(Generic[M]):
-    """Publisher of a topic.
+class _PipedPublisher(BasePublisher[M]):
+    has_subscribers = True  # they are in the other process
 
-    Attributes:
-        node: Name of its node.
-        topic: Name of the topic.
-    """
-
-    has_subscribers = True
-    """The subscribers are in the other process."""
-
-    def __init__(self, pipe: Pipe, number: int, topic: Topic[M], node: str) -> None:
-        self.node = node
-        self.topic = topic.name
-        self._topic = topic
+    def __init__(self, node: str, name: str, topic: Topic[M], pipe: Pipe, number: int) -> None:
+        super().__init__(node, name, topic)
         self._pipe = pipe
         self._number = number
         pipe.say("advertise", number, node, topic)
         self._end = weakref.finalize(self, pipe.say, "unadvertise", number)
 
-    def publish(self, message: M, captured_s: float | None = None) -> None:
-        """Send ``message`` to the other process."""
-        check_type(self._topic, message)
+    def _send(self, message: M, captured_s: float | None) -> None:
         if self._end.alive:
             # All processes of a machine share one monotonic clock.
             sent = (self._number, Received(message, captured_s), time.monotonic())
-            self._pipe.say("publish", *sent, key=self._number, keep=_kept(self._topic))
+            self._pipe.say("publish", *sent, key=self._number, keep=_kept(self.topic))
 
     def close(self) -> None:
-        """Stop publishing; may be called twice."""
         self._end()
 
 

@@ -26,8 +26,8 @@ from handsteer.messages import (
     Topic,
 )
 from handsteer.transports import join
-from handsteer.transports.protocol import Session, Transport
-from handsteer.transports.rclpy.transport import publisher_qos, subscription_qos
+from handsteer.transports.base import Session, Transport
+from handsteer.transports.rclpy.topics import publisher_qos, subscription_qos
 from tests.contracts.transport_contract import TransportContract, eventually, heard
 from tests.dds.graph import free_domain
 
@@ -135,7 +135,7 @@ def test_parameters_come_from_files_and_words_and_those_of_ros_are_left_to_it(jo
     # rclpy's own classes show what became of it.
     transport = session.transport
     publisher = transport.advertise("talker", HAND_SIGN)
-    assert publisher._publisher.qos_profile.depth == 3  # type: ignore[attr-defined]
+    assert publisher._writer._publisher.qos_profile.depth == 3  # type: ignore[attr-defined]
 
 
 def test_commands_live_for_less_than_the_robot_waits_and_what_is_latched_stays() -> None:

@@ -5,7 +5,7 @@ import pytest
 from handsteer.config import Config
 from handsteer.messages import Time
 from handsteer.parameters import NodeParameters
-from handsteer.transports.ros2.encoding import decode, encode, types
+from handsteer.transports.ros2.encoding import decode, encode, reply_type, request_type, types
 from handsteer.transports.ros2.parameter_services import ParameterServices, list_names
 
 NODE = "/r1/hand_sign_control"
@@ -25,9 +25,9 @@ class Client:
 
     def call(self, service: str, **fields: Any) -> Any:
         kind, answer = self._services[service]
-        request = types().types[kind.request](**fields)
-        reply = answer(decode(encode(request), kind.request))
-        return decode(encode(reply), kind.reply)
+        request = types().types[request_type(kind)](**fields)
+        reply = answer(decode(encode(request), request_type(kind)))
+        return decode(encode(reply), reply_type(kind))
 
     def get(self, *names: str) -> list[Any]:
         values = self.call("get_parameters", names=list(names)).values

@@ -6,7 +6,7 @@ import pytest
 
 from handsteer.clock import Clock, WallClock
 from handsteer.transports import join
-from handsteer.transports.protocol import Session, Transport
+from handsteer.transports.base import Session, Transport
 from tests.contracts.transport_contract import TransportContract
 from tests.processes import free_port
 

@@ -1,13 +1,22 @@
-"""Selects the DDS domain and the network from ROS 2's environment variables."""
+"""Selects the DDS domain and the network from ROS 2's environment variables; needs no package for DDS."""
 
+import contextlib
 import re
+import socket
+import struct
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from handsteer.errors import TransportError
-from handsteer.transports.dds.interfaces import multicast_addresses
 from handsteer.transports.ros2.names import domain_id
 
+try:
+    import fcntl
+except ModuleNotFoundError:  # Windows
+    fcntl = None  # type: ignore[assignment]
+
+_UP, _LOOPBACK, _POINT_TO_POINT, _MULTICAST = 0x1, 0x8, 0x10, 0x1000
+_GET_FLAGS, _GET_ADDRESS = 0x8913, 0x8915
 _RANGES = ("LOCALHOST", "SUBNET", "OFF", "SYSTEM_DEFAULT")
 _ADDRESS = re.compile(r"[A-Za-z0-9_.:%\[\]-]+")
 # How soon others find us if they cannot reach us by their own announcements, or again after a loss of connection;
@@ -102,8 +111,8 @@ def _range(environment: Mapping[str, str]) -> str:
         raise TransportError(f"ROS_LOCALHOST_ONLY is {only!r}: it should be 0 or 1")
     if only == "1":
         return "LOCALHOST"
-    unsaid = "SUBNET" if only == "0" else "LOCALHOST"
-    reach = environment.get("ROS_AUTOMATIC_DISCOVERY_RANGE") or unsaid
+    default = "SUBNET" if only == "0" else "LOCALHOST"
+    reach = environment.get("ROS_AUTOMATIC_DISCOVERY_RANGE") or default
     if reach.upper() not in _RANGES:
         raise TransportError(f"ROS_AUTOMATIC_DISCOVERY_RANGE is {reach!r}: it should be {' or '.join(_RANGES)}")
     return reach.upper()
@@ -143,3 +152,20 @@ def _interfaces(own: Sequence[str]) -> str:
     """
     card = '<NetworkInterface autodetermine="true"/>' if own else ""
     return f'<Interfaces>{card}<NetworkInterface address="127.0.0.1"/></Interfaces>'
+
+
+def multicast_addresses() -> dict[str, str]:
+    """Return the IPv4 address of each network interface that is up and has multicast, without loopback and tunnels.
+
+    Empty where the system does not provide them (Windows).
+    """
+    found = {}
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as asking:
+        for _, name in socket.if_nameindex() if fcntl else ():
+            request = struct.pack("256s", name.encode()[:15])
+            with contextlib.suppress(OSError):
+                (flags,) = struct.unpack_from("H", fcntl.ioctl(asking, _GET_FLAGS, request), 16)
+                address = socket.inet_ntoa(fcntl.ioctl(asking, _GET_ADDRESS, request)[20:24])
+                if flags & _UP and flags & _MULTICAST and not flags & (_LOOPBACK | _POINT_TO_POINT):
+                    found[name] = address
+    return found

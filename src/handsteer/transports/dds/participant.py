@@ -1,11 +1,22 @@
 """This process as a participant of a DDS domain and a node of ROS 2, with its publishers and subscribers."""
 
 import itertools
+import logging
 import threading
 from collections.abc import Callable
-from typing import Any
+from typing import Any, TypeVar
 
-from cyclonedds.core import DDSException, Policy, Qos
+from cyclonedds.core import (
+    DDSException,
+    GuardCondition,
+    InstanceState,
+    Policy,
+    Qos,
+    ReadCondition,
+    SampleState,
+    ViewState,
+    WaitSet,
+)
 from cyclonedds.domain import Domain, DomainParticipant
 from cyclonedds.pub import DataWriter
 from cyclonedds.sub import DataReader
@@ -13,18 +24,23 @@ from cyclonedds.topic import Topic as DdsTopic
 
 from handsteer.errors import TransportError
 from handsteer.messages import Topic, type_name
-from handsteer.transports.dds.discovery import RosGraph
-from handsteer.transports.dds.dispatcher import Dispatcher
-from handsteer.transports.dds.matching import Endpoint, Matching
+from handsteer.transports.base import UNNAMED
+from handsteer.transports.dds.discovery import Endpoint, Matching, RosGraph
 from handsteer.transports.dds.network import Network
-from handsteer.transports.dds.qos import reader_qos, service_qos, writer_qos
-from handsteer.transports.dds.types import dds_type, opaque_type, service_dds_type
-from handsteer.transports.observed import UNNAMED
-from handsteer.transports.ros2.encoding import dds_type_name, ros_type_name
+from handsteer.transports.dds.topics import dds_type, opaque_type, reader_qos, service_dds_type, service_qos, writer_qos
+from handsteer.transports.ros2.encoding import dds_type_name, reply_type, request_type, ros_type_name
 from handsteer.transports.ros2.names import NodeName
-from handsteer.transports.ros2.service_types import Service
 
 _USER_DATA = b"enclave=/;"
+_TICK_S = 0.25
+_NS_PER_S = 1_000_000_000
+_AFTER_FAILURE_S = 0.05
+_LEAVE_TIMEOUT_S = 2.0
+_ANY = SampleState.Any | ViewState.Any | InstanceState.Any
+
+E = TypeVar("E", DataWriter[Any], DataReader[Any])
+
+log = logging.getLogger(__name__)
 
 
 class Participant:
@@ -33,15 +49,16 @@ class Participant:
     Attributes:
         name: The node's name.
         is_local: Whether all others are certainly on this machine.
+        dispatcher: The thread that serves readers, until they are released.
 
     Args:
-        looks_on: Whether it only observes, and announces no node.
+        is_observer: Whether it only observes, and announces no node.
 
     Raises:
         TransportError: The domain cannot be joined.
     """
 
-    def __init__(self, network: Network, name: NodeName, *, looks_on: bool = False) -> None:
+    def __init__(self, network: Network, name: NodeName, *, is_observer: bool = False) -> None:
         self.name = name
         self.is_local = network.is_local
         try:
@@ -53,99 +70,157 @@ class Participant:
                 f"process, are there more than 32 others on this machine, is CYCLONEDDS_URI wrong?"
             ) from None
         self._lock = threading.Lock()
-        self._topics: dict[tuple[str, type], Any] = {}
+        self._topics: dict[tuple[str, str], Any] = {}
         self._service_numbers = itertools.count(1)
-        self._graph = RosGraph(self._participant, None if looks_on else name, network.distribution)
+        self._graph = RosGraph(self._participant, None if is_observer else name, network.distribution)
         self._matching = Matching(self._participant, self._graph)
-        self._dispatcher = Dispatcher(self._participant)
-        self._dispatcher.tick(self._matching.tick)
-        self._dispatcher.add(self._graph.reader, self._graph.serve)
-        self._dispatcher.add(self._matching.publications, self._matching.serve_publications)
-        self._dispatcher.add(self._matching.subscriptions, self._matching.serve_subscriptions)
-        self._dispatcher.start()
+        self.dispatcher = Dispatcher(self._participant)
+        self.dispatcher.tick(self._matching.tick)
+        self.dispatcher.add(self._graph.reader, self._graph.serve)
+        for reader, serve in self._matching.readers:
+            self.dispatcher.add(reader, serve)
+        self.dispatcher.start()
 
     def writer(self, topic: Topic[Any]) -> DataWriter[Any]:
         """Return a new writer of ``topic``; its messages are instances of its ``data_type``."""
-        qos = writer_qos(topic)
-        writer: DataWriter[Any] = DataWriter(self._participant, self._topic(topic), qos=qos)
-        self._graph.add(writer)
-        self._matching.add(self._endpoint(topic, qos, publishes=True))
-        return writer
+        return self._open(DataWriter, topic, writer_qos(topic), publishes=True)
 
     def reader(self, topic: Topic[Any]) -> DataReader[Any]:
         """Return a new reader of ``topic``."""
-        qos = reader_qos(topic)
-        reader: DataReader[Any] = DataReader(self._participant, self._topic(topic), qos=qos)
-        self._graph.add(reader)
-        self._matching.add(self._endpoint(topic, qos, publishes=False))
-        return reader
+        return self._open(DataReader, topic, reader_qos(topic), publishes=False)
 
-    def service(self, name: str, service: Service) -> tuple[DataReader[Any], DataWriter[Any]]:
-        """Return a reader of the requests and a writer of the replies of the service of this full name."""
+    def service(self, name: str, kind: str) -> tuple[DataReader[Any], DataWriter[Any]]:
+        """Return a reader of the requests and a writer of the replies of the service of this full name and type."""
+        request, reply = request_type(kind), reply_type(kind)
         # As in ROS 2: the participant's part of an identifier, and a number.
         number = next(self._service_numbers).to_bytes(4, "big")
         identity = ".".join(f"{byte:x}" for byte in self._participant.guid.bytes[:12] + number)
         # Cyclone DDS checks received messages, and prints a warning for each request of a client on Fast DDS.
-        requests = DdsTopic(self._participant, f"rq{name}Request", opaque_type(dds_type_name(service.request)))
-        replies = DdsTopic(self._participant, f"rr{name}Reply", service_dds_type(service.reply))
-        reader: DataReader[Any] = DataReader(self._participant, requests, qos=service_qos(service.request, identity))
-        writer: DataWriter[Any] = DataWriter(self._participant, replies, qos=service_qos(service.reply, identity))
+        requests = DdsTopic(self._participant, f"rq{name}Request", opaque_type(dds_type_name(request)))
+        replies = DdsTopic(self._participant, f"rr{name}Reply", service_dds_type(reply))
+        reader: DataReader[Any] = DataReader(self._participant, requests, qos=service_qos(request, identity))
+        writer: DataWriter[Any] = DataWriter(self._participant, replies, qos=service_qos(reply, identity))
         self._graph.add(reader)
         self._graph.add(writer)
         return reader, writer
-
-    def tick(self, call: Callable[[], None]) -> None:
-        """Call ``call`` on the DDS thread, four times a second and whenever something was received."""
-        self._dispatcher.tick(call)
-
-    def serve(self, reader: DataReader[Any], serve: Callable[[], None]) -> None:
-        """Call ``serve`` on the DDS thread whenever ``reader`` has messages, until it is released."""
-        self._dispatcher.add(reader, serve)
 
     def others(self) -> tuple[list[str], list[tuple[Endpoint, str | None]]]:
         """Return the nodes of other processes, and their publishers and subscribers with the node of each, if known."""
         return self._graph.nodes(), [(end, self._graph.node_of(key)) for key, end in self._matching.others().items()]
 
-    def publishers_of(self, topic: Topic[Any]) -> list[str]:
-        """Return the node of each publisher of ``topic`` in other processes, as far as names are known."""
-        name = self._dds_name(topic)
-        return [
-            self._graph.node_of(key) or UNNAMED
-            for key, end in self._matching.others().items()
-            if end.publishes and end.topic == name
-        ]
+    def publishers_of(self, name: str) -> list[str]:
+        """Return the node of each publisher of the topic of this full name in other processes.
 
-    def subscribed_types(self, topic: Topic[Any]) -> set[str]:
-        """Return the types of the subscribers of ``topic`` in other processes."""
-        name, others = self._dds_name(topic), self._matching.others().values()
-        return {ros_type_name(end.type) for end in others if not end.publishes and end.topic == name}
+        Names of nodes come up to three seconds late.
+        """
+        ends = self._matching.others().items()
+        return [self._graph.node_of(key) or UNNAMED for key, end in ends if end.publishes and end.topic == f"rt{name}"]
+
+    def subscribed_types(self, name: str) -> set[str]:
+        """Return the types of the subscribers of the topic of this full name in other processes."""
+        others = self._matching.others().values()
+        return {ros_type_name(end.type) for end in others if not end.publishes and end.topic == f"rt{name}"}
 
     def release(self, endpoint: DataWriter[Any] | DataReader[Any]) -> None:
         """Release a writer or reader; it is deleted when the caller drops its reference too."""
         if isinstance(endpoint, DataReader):
-            self._dispatcher.remove(endpoint)
+            self.dispatcher.remove(endpoint)
         self._graph.remove(endpoint)
 
     def close(self) -> None:
         """Leave the domain; may be called twice."""
-        self._dispatcher.close()
+        self.dispatcher.close()
         self._matching.close()
         self._graph.close()
         self._topics.clear()
         self._participant = self._domain = None
 
-    def _topic(self, topic: Topic[Any]) -> DdsTopic[Any]:
-        name = self._dds_name(topic)
-        key = name, topic.type
+    def _open(self, kind: Callable[..., E], topic: Topic[Any], qos: Qos, *, publishes: bool) -> E:
+        name, message = f"rt{self.name.topic(topic)}", type_name(topic.type)
         with self._lock:
-            if key not in self._topics:
-                self._topics[key] = DdsTopic(self._participant, name, dds_type(type_name(topic.type)))
-            known: DdsTopic[Any] = self._topics[key]
-        return known
-
-    def _endpoint(self, topic: Topic[Any], qos: Qos, *, publishes: bool) -> Endpoint:
+            if (name, message) not in self._topics:
+                self._topics[name, message] = DdsTopic(self._participant, name, dds_type(message))
+            dds_topic = self._topics[name, message]
+        endpoint = kind(self._participant, dds_topic, qos=qos)
+        self._graph.add(endpoint)
         or_type = dds_type_name(type_name(topic.or_type)) if publishes and topic.or_type else None
-        return Endpoint(self._dds_name(topic), dds_type_name(type_name(topic.type)), qos, publishes, or_type)
+        self._matching.add(Endpoint(name, dds_type_name(message), qos, publishes, or_type))
+        return endpoint
 
-    def _dds_name(self, topic: Topic[Any]) -> str:
-        return f"rt{self.name.topic(topic)}"
+
+class Dispatcher:
+    """The thread that processes everything received: calls a function for each reader that has messages.
+
+    Listeners would run on the threads of Cyclone DDS, which hold its locks while they wait for Python's.
+    """
+
+    def __init__(self, participant: DomainParticipant) -> None:
+        # Referenced while the thread runs: a start interrupted by a signal drops the participant without closing it.
+        self._participant: DomainParticipant | None = participant
+        self._waitset = WaitSet(participant)
+        self._guard = GuardCondition(participant)
+        self._waitset.attach(self._guard)
+        self._ticks: tuple[Callable[[], None], ...] = ()
+        self._lock = threading.Lock()
+        self._served: dict[DataReader[Any], tuple[ReadCondition, Callable[[], None]]] = {}
+        self._closing = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="dds", daemon=True)
+
+    def start(self) -> None:
+        """Start the thread."""
+        self._thread.start()
+
+    def add(self, reader: DataReader[Any], serve: Callable[[], None]) -> None:
+        """Call ``serve``, which must take all messages, whenever ``reader`` has some."""
+        condition = ReadCondition(reader, _ANY)
+        with self._lock:
+            self._served[reader] = (condition, serve)
+            self._waitset.attach(condition)
+
+    def tick(self, call: Callable[[], None]) -> None:
+        """Call ``call`` four times a second, and whenever something was received."""
+        with self._lock:
+            self._ticks = (*self._ticks, call)
+
+    def remove(self, reader: DataReader[Any]) -> None:
+        """Stop calling for ``reader``; one call may still be running."""
+        with self._lock:
+            condition, _ = self._served.pop(reader)
+            self._waitset.detach(condition)
+
+    def close(self) -> None:
+        """End the thread; may be called twice."""
+        if not self._closing.is_set():
+            self._closing.set()
+            self._guard.set(True)
+            if self._thread.is_alive() and self._thread is not threading.current_thread():
+                self._thread.join(_LEAVE_TIMEOUT_S)
+            for reader in list(self._served):
+                self.remove(reader)
+            self._participant = None
+
+    def _run(self) -> None:
+        while not self._closing.is_set():
+            self._guarded(self._wait)
+            self._serve_all()
+            for call in self._ticks:
+                self._guarded(call)
+
+    def _wait(self) -> None:
+        self._waitset.wait(round(_TICK_S * _NS_PER_S))
+
+    def _serve_all(self) -> None:
+        with self._lock:
+            served = list(self._served.values())
+        for condition, serve in served:
+            # Checking is cheaper than an empty take, and usually only one reader has messages.
+            if condition.triggered:
+                self._guarded(serve)
+
+    def _guarded(self, call: Callable[[], None]) -> None:
+        try:
+            call()
+        except Exception:
+            if not self._closing.is_set():
+                log.exception("DDS: a message could not be served")
+                self._closing.wait(_AFTER_FAILURE_S)  # repeated failures must not use up the processor

@@ -2,90 +2,88 @@
 
 import logging
 import threading
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
 from functools import partial
 from typing import Any
 
 import rclpy
+from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
 from rclpy.clock import JumpThreshold
 from rclpy.duration import Duration
 from rclpy.exceptions import NameValidationException
 from rclpy.executors import ExternalShutdownException, ShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.parameter_service import ParameterService
+from rclpy.serialization import deserialize_message
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 
 from handsteer.clock import Clock, SimulatedClock, WallClock
-from handsteer.errors import HandsteerError, TransportError
-from handsteer.parameters import NodeParameters
-from handsteer.transports.protocol import Call
-from handsteer.transports.rclpy.parameters import ParameterLink, take_given
-from handsteer.transports.rclpy.transport import RclpyTransport
-from handsteer.transports.rclpy.types import ros_class
+from handsteer.errors import ConfigError, HandsteerError, TransportError
+from handsteer.parameters import Description, NodeParameters, Value
+from handsteer.transports.base import Call
+from handsteer.transports.rclpy.topics import RclpyTransport, ros_class
+from handsteer.transports.ros2.arguments import nested
+from handsteer.transports.ros2.encoding import encode
+from handsteer.transports.ros2.parameter_services import TYPES, descriptor
+from handsteer.transports.timing import ClockMonitor
 
-_OURS = "handsteer"
+_DELIVER_S = 0.2
+_LEAVE_S = 2.0
+_AFTER_FAILURE_S = 0.05
+_ANY_JUMP = JumpThreshold(min_forward=Duration(nanoseconds=1), min_backward=Duration(nanoseconds=-1))
+_TRIGGER = "std_srvs/srv/Trigger"
+_QOS = "qos_overrides."
+_OF_ROS = ("use_sim_time", "start_type_description_service")
+_SCALARS = (Parameter.Type.BOOL, Parameter.Type.INTEGER, Parameter.Type.DOUBLE)
+_SWITCH = {True: "on", False: "off"}
+_ARRAYS = tuple(kind for kind in Parameter.Type if kind.name.endswith("_ARRAY"))
+# One function per level, because rclpy requires that a line of code always logs at the same level.
+_LOG_AS: dict[int, Callable[[Any, str], None]] = {
+    logging.CRITICAL: lambda logger, text: logger.fatal(text),
+    logging.ERROR: lambda logger, text: logger.error(text),
+    logging.WARNING: lambda logger, text: logger.warning(text),
+    logging.INFO: lambda logger, text: logger.info(text),
+    logging.NOTSET: lambda logger, text: logger.debug(text),
+}
+
+log = logging.getLogger(__name__)
 
 
-class RosLog:
-    """Forwards log records of handsteer to the logger of an rclpy node, until it is closed.
+class _RclpyHandler(logging.Handler):
+    """Forwards log records to the logger of an rclpy node."""
 
-    Args:
-        logger: The node's logger; its level is set by ``--log-level``.
-    """
-
-    def __init__(self, logger: Any) -> None:
-        ours = logging.getLogger(_OURS)
-        self._before = (ours.handlers, ours.level, ours.propagate)
-        ours.handlers = [_Handler(logger)]
-        ours.setLevel(int(logger.get_effective_level()))
-        # rclpy shows them on the screen already.
-        ours.propagate = False
-
-    def close(self) -> None:
-        """Restore the previous logging; may be called twice."""
-        ours = logging.getLogger(_OURS)
-        ours.handlers, level, ours.propagate = self._before
-        ours.setLevel(level)
-
-
-class _Handler(logging.Handler):
     def __init__(self, logger: Any) -> None:
         super().__init__()
         self._logger = logger
 
     def emit(self, record: logging.LogRecord) -> None:
         try:
-            _log(self._logger, record.levelno, self.format(record))
+            level = next(level for level in _LOG_AS if record.levelno >= level)
+            _LOG_AS[level](self._logger, self.format(record))
         except Exception:
             self.handleError(record)
 
 
-def _log(logger: Any, level: int, text: str) -> None:
-    # One call per level, because rclpy requires that a line of code always logs at the same level.
-    if level >= logging.CRITICAL:
-        logger.fatal(text)
-    elif level >= logging.ERROR:
-        logger.error(text)
-    elif level >= logging.WARNING:
-        logger.warning(text)
-    elif level >= logging.INFO:
-        logger.info(text)
-    else:
-        logger.debug(text)
-
-
-_CLOCK_SILENCE_S = 2.0
-_DELIVER_S = 0.2
-_LEAVE_S = 2.0
-_AFTER_FAILURE_S = 0.05
-_ANY_JUMP = JumpThreshold(min_forward=Duration(nanoseconds=1), min_backward=Duration(nanoseconds=-1))
-_TRIGGER = "std_srvs/srv/Trigger"
-
-log = logging.getLogger(__name__)
+@contextmanager
+def _logging_by(logger: Any) -> Iterator[None]:
+    """Forward log records of handsteer to a logger of rclpy, whose level is set by ``--log-level``."""
+    ours = logging.getLogger("handsteer")
+    before = (ours.handlers, ours.level, ours.propagate)
+    ours.handlers = [_RclpyHandler(logger)]
+    ours.setLevel(int(logger.get_effective_level()))
+    ours.propagate = False  # rclpy shows them on the screen already
+    try:
+        yield
+    finally:
+        ours.handlers, level, ours.propagate = before
+        ours.setLevel(level)
 
 
 class RclpySession:
-    """A :class:`~handsteer.transports.protocol.Session` of ROS 2, by a node of rclpy.
+    """A :class:`~handsteer.transports.base.Session` of ROS 2, by a node of rclpy.
 
     rclpy itself provides ROS 2's common features of nodes: arguments and remapping, parameters and ``qos_overrides``,
     ``use_sim_time``, the log, ``get_type_description``.
@@ -100,16 +98,16 @@ class RclpySession:
 
     def __init__(self, node: str, arguments: Sequence[str]) -> None:
         self._left = threading.Event()
-        self._was_silent = False
         self._context = rclpy.Context()
         self._executor: SingleThreadedExecutor | None = None
-        self._log: RosLog | None = None
+        self._log = ExitStack()
         self._node = _make_node(self._context, node, arguments)
         try:
-            self._log = RosLog(self._node.get_logger())
+            self._log.enter_context(_logging_by(self._node.get_logger()))
             self.name: str = self._node.get_fully_qualified_name()
             self.parameters: dict[str, Any] = take_given(self._node)
             self.clock = self._make_clock()
+            self._clock_monitor = ClockMonitor(self.clock)
             self.transport = RclpyTransport(self._node, self.clock)
             self._executor = SingleThreadedExecutor(context=self._context)
             self._executor.add_node(self._node)
@@ -134,10 +132,7 @@ class RclpySession:
 
     def wait(self, timeout_s: float) -> bool:
         """Wait for at most ``timeout_s`` seconds; return whether rclpy has been shut down, or this session closed."""
-        silent = isinstance(self.clock, SimulatedClock) and self.clock.silence_s > _CLOCK_SILENCE_S
-        if silent and not self._was_silent:
-            log.warning("use_sim_time is set, but /clock stands still: frames count as old, the robot stands")
-        self._was_silent = silent
+        self._clock_monitor.check()
         return self._left.wait(timeout_s) or not self._context.ok()
 
     def close(self) -> None:
@@ -150,8 +145,7 @@ class RclpySession:
             self.transport.close()
             self._executor.shutdown()
             self._thread.join(_LEAVE_S)
-        if self._log is not None:
-            self._log.close()
+        self._log.close()
         self._node.destroy_node()
         self._context.try_shutdown()
         self._context.destroy()
@@ -176,7 +170,7 @@ class RclpySession:
                 return
             except Exception:
                 if not self._left.is_set():
-                    log.exception("ROS 2: what has come could not be served")
+                    log.exception("ROS 2: a message could not be served")
                     self._left.wait(_AFTER_FAILURE_S)  # repeated failures must not use up the processor
 
 
@@ -208,3 +202,89 @@ def _make_node(context: Any, node: str, arguments: Sequence[str]) -> Node:
     except (RuntimeError, ValueError, NameValidationException) as error:
         context.try_shutdown()
         raise TransportError(f"cannot join ROS 2 as {node}: {' '.join(str(error).split())}") from None
+
+
+def take_given(node: Node) -> dict[str, Any]:
+    """Return the parameters given to a node at its start, nested at dots, without ROS 2's own.
+
+    They are removed from the node, which declares its parameters later.
+    """
+    found = {name: given for name, given in node.get_parameters_by_prefix("").items() if not _is_of_ros(name)}
+    for name in found:
+        node.undeclare_parameter(name)
+    return nested({name: _plain(given) for name, given in found.items()})
+
+
+class ParameterLink:
+    """Declares parameters to rclpy, and applies changes by others.
+
+    Args:
+        node: The node, without parameters of its own.
+    """
+
+    def __init__(self, node: Node, parameters: NodeParameters) -> None:
+        self._node = node
+        self._parameters = parameters
+        for name, value in parameters.values().items():
+            self._declare(name, value)
+        node.add_pre_set_parameters_callback(self._as_all_declared)
+        node.add_on_set_parameters_callback(self._set)
+        # Only now, because rclpy would accept values for parameters that are not declared yet.
+        self._services = ParameterService(node)
+
+    def _declare(self, name: str, value: Value) -> None:
+        description = self._parameters.describe(name)
+        assert description is not None
+        kind, theirs = Parameter.Type(TYPES[description.kind]), _descriptor(name, description)
+        if description.removable:
+            self._node.declare_parameter(name, value, theirs, ignore_override=True)
+            return
+        self._node.declare_parameter(name, kind, theirs, ignore_override=True)
+        typed = float(value) if kind is Parameter.Type.DOUBLE else value  # type: ignore[arg-type]
+        self._node.set_parameters([Parameter(name, kind, typed)])
+
+    def _as_all_declared(self, given: list[Parameter]) -> list[Parameter]:
+        """Return ``given`` with declared types: an empty list in YAML has no type, and ``off`` is not a text."""
+        return [self._as_declared(one) for one in given]
+
+    def _as_declared(self, one: Parameter) -> Parameter:
+        description = self._parameters.describe(one.name)
+        kind = None if description is None else Parameter.Type(TYPES[description.kind])
+        if kind is Parameter.Type.DOUBLE and one.type_ is Parameter.Type.INTEGER:
+            return Parameter(one.name, kind, float(one.value))
+        if kind is Parameter.Type.STRING_ARRAY and one.type_ in _ARRAYS and len(one.value) == 0:
+            return Parameter(one.name, kind, [])
+        if kind is Parameter.Type.STRING and one.type_ in _SCALARS:
+            text = _SWITCH[one.value] if one.type_ is Parameter.Type.BOOL else str(one.value)
+            return Parameter(one.name, kind, text)
+        return one
+
+    def _set(self, given: Sequence[Parameter]) -> SetParametersResult:
+        try:
+            self._refuse_ros_own(given)
+            self._parameters.set({one.name: _plain(one) for one in given if not _is_of_ros(one.name)})
+        except ConfigError as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        return SetParametersResult(successful=True)
+
+    def _refuse_ros_own(self, given: Sequence[Parameter]) -> None:
+        for one in given:
+            is_set = _is_of_ros(one.name) and self._node.has_parameter(one.name)
+            if is_set and self._node.get_parameter(one.name).value != one.value:
+                raise ConfigError(f"{one.name} cannot be set: it is only read when the node starts")
+
+
+def _is_of_ros(name: str) -> bool:
+    return name in _OF_ROS or name.startswith(_QOS)
+
+
+def _plain(parameter: Parameter) -> Any:
+    return list(parameter.value) if parameter.type_ in _ARRAYS else parameter.value
+
+
+def _descriptor(name: str, description: Description) -> ParameterDescriptor:
+    theirs = deserialize_message(encode(descriptor(name, description)), ParameterDescriptor)
+    # rclpy would refuse even the current value, which `ros2 param load` sets.
+    theirs.read_only = False
+    theirs.dynamic_typing = description.removable  # rclpy does not undeclare parameters of a static type
+    return theirs

@@ -1,162 +1,111 @@
-"""Converts between our message classes (ROS 2 Jazzy) and those of rospy (ROS 1 Noetic), field by field.
+"""Messages on ROS 1's wire: as bytes for rospy, and converted to and from our classes, which are those of ROS 2.
 
-Fields that only one of them has keep their defaults: the header's ``seq`` in ROS 1, textures of markers in ours.
+rosbags has the definitions of both, so no message package of ROS 1 is needed. Fields that only one of them has keep
+their defaults: the header's ``seq``, which is 0 in messages within others, and textures and mesh files of markers.
 """
 
-import dataclasses
 import functools
-import importlib
-from collections.abc import Callable
-from typing import Any
+import struct
+from typing import Any, ClassVar
 
+import genpy
 import numpy as np
 from rosbags.interfaces import Nodetype
-from rosbags.typesys.stores import ros2_jazzy
+from rosbags.typesys import Stores, get_typestore
+from rosbags.typesys.store import Typestore
 
-from handsteer.errors import TransportError
-from handsteer.messages import TurtlePose
+from handsteer.messages import CompressedImage, Header, Marker, MeshFile, Time, type_name
+from handsteer.transports.ros2.encoding import message_types
 
-_TIMES = ("builtin_interfaces/msg/Time", "builtin_interfaces/msg/Duration")
-_BYTES = ("uint8", "byte", "char", "octet")
-_FLOAT32 = (Nodetype.BASE, ("float32", 0))
-_EMPTY = {"string": "", "bool": False, "float32": 0.0, "float64": 0.0}
+_HEADER, _MARKER = "std_msgs/msg/Header", "visualization_msgs/msg/Marker"
+_SEQ_BYTES = 4
+_NO_BYTES = np.zeros(0, np.uint8)
+_NO_HEADER = Header(Time(0, 0), "")
 
-Convert = Callable[[Any], Any]
+
+class RawMessage(genpy.Message):  # type: ignore[misc]
+    """A message of rospy that consists of its bytes; :func:`ros1_type` returns the class of each type."""
+
+    _type: ClassVar[str]
+    _md5sum: ClassVar[str]
+    _full_text: ClassVar[str]
+    _slot_types: ClassVar[list[str]] = []
+    has_header: ClassVar[bool]
+    __slots__ = ("raw",)
+
+    def __init__(self, raw: bytes | memoryview = b"") -> None:
+        self.raw = raw
+
+    def serialize(self, buffer: Any) -> None:
+        """Write the message to a file-like object."""
+        buffer.write(self.raw)
+
+    def deserialize(self, raw: bytes) -> "RawMessage":
+        """Take the message from ``raw``."""
+        self.raw = raw
+        return self
 
 
 @functools.cache
-def ros1_type(name: str) -> Any:
-    """Return rospy's class for a message type such as ``std_msgs/msg/String``.
+def ros1_type(name: str) -> type[RawMessage]:
+    """Return rospy's class for a message type such as ``std_msgs/msg/String``."""
+    store = message_types(Stores.ROS1_NOETIC)
+    if name not in store.fielddefs:  # those that rosbags has for ROS 2 only are the same in ROS 1
+        store.register({name: _written_types().fielddefs[name]})
+    for used in (_written_types(), _read_types()):
+        used.get_msgdef(name)  # compiles it before the first message
+    definition, md5 = store.generate_msgdef(name)
+    package, _, message = name.split("/")
+    fields = store.fielddefs[name][1]
+    has_header = bool(fields) and fields[0][1] == (Nodetype.NAME, _HEADER)
+    attributes = {"_type": f"{package}/{message}", "_md5sum": md5, "_full_text": definition, "has_header": has_header}
+    return type(message, (RawMessage,), {**attributes, "__slots__": ()})
+
+
+def to_ros1(message: Any, number: int = 0) -> RawMessage:
+    """Return one of our messages for rospy; ``number`` is the ``seq`` of its header, if it has one."""
+    name, store = type_name(type(message)), _written_types()
+    raw = store.cdr_to_ros1(store.serialize_cdr(message, name), name)
+    kind = ros1_type(name)
+    return kind(b"".join((struct.pack("<I", number), raw[_SEQ_BYTES:])) if kind.has_header else raw)
+
+
+def from_ros1(message: RawMessage, name: str) -> Any:
+    """Return rospy's message as our type ``name``; its arrays are views of the bytes, and read-only.
 
     Raises:
-        TransportError: The package is not installed, or has no such message.
+        Exception: It is not such a message; the type depends on where rosbags fails.
     """
-    package, _, message = name.split("/")
-    try:
-        return getattr(importlib.import_module(f"{package}.msg"), message)
-    except (ImportError, AttributeError):
-        debian = package.replace("_", "-")
-        raise TransportError(
-            f"ROS 1 has no {package}/{message} here: install it (Debian, Ubuntu: python3-{debian})"
-        ) from None
-
-
-def to_ros1(message: Any) -> Any:
-    """Return one of our messages as rospy's."""
-    return _writer(message.__msgtype__)(message)
-
-
-def from_ros1(message: Any, name: str) -> Any:
-    """Return rospy's message as our type ``name``; an array of bytes is shared, and read-only."""
-    return _reader(name)(message)
+    return _read_types().deserialize_ros1(message.raw, name)
 
 
 @functools.cache
-def _writer(name: str) -> Convert:
-    there = ros1_type(name)
-    steps = [(field, named, _write_as(kind)) for field, kind in _fields(name) if (named := _there(field, there))]
-
-    def write(ours: Any) -> Any:
-        # With values for all fields it constructs no defaults, which take most of the time for nested messages.
-        return there(**{named: convert(getattr(ours, field)) for field, named, convert in steps})
-
-    return write
+def _written_types() -> Typestore:
+    """Return our types without the fields that ROS 1 does not have; rosbags adds ``seq`` to headers."""
+    store = message_types()
+    there = {field for field, _ in get_typestore(Stores.ROS1_NOETIC).fielddefs[_MARKER][1]}
+    constants, fields = store.fielddefs[_MARKER]
+    store.fielddefs[_MARKER] = (constants, [(field, kind) for field, kind in fields if field in there])
+    return store
 
 
 @functools.cache
-def _reader(name: str) -> Convert:
-    here, there = _ours(name), ros1_type(name)
-    steps = [(field, named, _read_as(kind)) for field, kind in _fields(name) if (named := _there(field, there))]
-    absent = [(field, kind) for field, kind in _fields(name) if not _there(field, there)]
-
-    def read(theirs: Any) -> Any:
-        values = {field: convert(getattr(theirs, named)) for field, named, convert in steps}
-        return here(**values, **{field: _default(kind) for field, kind in absent})
-
-    return read
+def _read_types() -> Typestore:
+    """Return types with the fields of ROS 1, whose messages are instances of our classes."""
+    store = message_types()
+    store.fielddefs[_MARKER] = _written_types().fielddefs[_MARKER]
+    store.fielddefs[_HEADER] = get_typestore(Stores.ROS1_NOETIC).fielddefs[_HEADER]
+    makers: dict[str, Any] = {_MARKER: _make_marker, _HEADER: lambda _seq, stamp, frame_id: Header(stamp, frame_id)}
+    store.types |= makers
+    return store
 
 
-def _there(field: str, kind: Any) -> str:
-    """Return the name of our ``field`` in rospy's class, where calibrations have upper case; empty if none."""
-    return next((name for name in (field, field.upper()) if name in kind.__slots__), "")
-
-
-def _fields(name: str) -> list[tuple[str, Any]]:
-    if name == TurtlePose.__msgtype__:
-        return [(part.name, _FLOAT32) for part in dataclasses.fields(TurtlePose)]
-    return list(ros2_jazzy.FIELDDEFS[name][1])
-
-
-def _ours(name: str) -> Any:
-    return TurtlePose if name == TurtlePose.__msgtype__ else getattr(ros2_jazzy, name.replace("/", "__"))
-
-
-def _write_as(kind: Any) -> Convert:
-    node, what = kind
-    if node == Nodetype.NAME:
-        return _write_time(what) if what in _TIMES else _writer(what)
-    if node == Nodetype.BASE:
-        return _same
-    element = what[0]
-    if element[0] == Nodetype.NAME:
-        return _each(_write_as(element))
-    return _to_bytes if element[1][0] in _BYTES else _to_list
-
-
-def _read_as(kind: Any) -> Convert:
-    node, what = kind
-    if node == Nodetype.NAME:
-        return _read_time(what) if what in _TIMES else _reader(what)
-    if node == Nodetype.BASE:
-        return _same
-    element = what[0]
-    if element[0] == Nodetype.NAME:
-        return _each(_read_as(element))
-    name = element[1][0]
-    if name in _BYTES:
-        return _from_bytes
-    return list if name == "string" else functools.partial(np.array, dtype=name)
-
-
-def _default(kind: Any) -> Any:
-    node, what = kind
-    if node == Nodetype.BASE:
-        return _EMPTY.get(what[0], 0)
-    if node == Nodetype.NAME:
-        here = _ours(what)
-        return here(**{field: _default(of) for field, of in _fields(what)})
-    element, length = what
-    if element[0] == Nodetype.NAME or element[1][0] == "string":
-        return [_default(element) for _ in range(length)]
-    return np.zeros(length, "uint8" if element[1][0] in _BYTES else element[1][0])
-
-
-def _write_time(name: str) -> Convert:
-    genpy = importlib.import_module("genpy")
-    there = genpy.Time if name == _TIMES[0] else genpy.Duration
-    return lambda ours: there(ours.sec, ours.nanosec)
-
-
-def _read_time(name: str) -> Convert:
-    here = _ours(name)
-    return lambda theirs: here(sec=theirs.secs, nanosec=theirs.nsecs)
-
-
-def _each(convert: Convert) -> Convert:
-    return lambda values: [convert(value) for value in values]
-
-
-def _same(value: Any) -> Any:
-    return value
-
-
-def _to_list(values: Any) -> list[Any]:
-    return values.tolist() if isinstance(values, np.ndarray) else list(values)
-
-
-def _to_bytes(values: Any) -> bytes:
-    return values.tobytes() if isinstance(values, np.ndarray) else bytes(values)
-
-
-def _from_bytes(values: Any) -> Any:
-    return np.frombuffer(values, np.uint8)
+def _make_marker(*values: Any) -> Marker:
+    names = [field for field, _ in _written_types().fielddefs[_MARKER][1]]
+    return Marker(
+        **dict(zip(names, values, strict=True)),
+        texture_resource="",
+        texture=CompressedImage(_NO_HEADER, "", _NO_BYTES),
+        uv_coordinates=[],
+        mesh_file=MeshFile("", _NO_BYTES),
+    )

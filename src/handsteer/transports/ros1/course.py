@@ -27,7 +27,7 @@ log = logging.getLogger(__name__)
 
 
 @dataclass
-class Told:
+class Translation:
     """The translated parameters of a node.
 
     Attributes:
@@ -39,7 +39,7 @@ class Told:
     topics: dict[str, str] = field(default_factory=dict)
 
 
-def translate(kind: str, node: str, parameters: Mapping[str, Any], read: Callable[[str], Any]) -> Told:
+def translate(kind: str, node: str, parameters: Mapping[str, Any], read: Callable[[str], Any]) -> Translation:
     """Return the translation of ``parameters``; each one that has no equivalent is logged.
 
     Args:
@@ -51,26 +51,26 @@ def translate(kind: str, node: str, parameters: Mapping[str, Any], read: Callabl
     Raises:
         ConfigError: A name of a topic or a file is invalid.
     """
-    told = Told(dict(parameters))
+    found = Translation(dict(parameters))
     for name, topic in _TOPICS.get(kind, {}).items():
-        if name in told.parameters:
-            told.topics[topic.name] = _topic_name(f"{node}/{name}", told.parameters.pop(name))
-    if kind == "my_camera" and "camera_name" in told.parameters:
-        camera = told.parameters.pop("camera_name")
-        told.parameters.setdefault("source", camera)
+        if name in found.parameters:
+            found.topics[topic.name] = _topic_name(f"{node}/{name}", found.parameters.pop(name))
+    if kind == "my_camera" and "camera_name" in found.parameters:
+        camera = found.parameters.pop("camera_name")
+        found.parameters.setdefault("source", camera)
     elif kind == "hand_sign_control":
-        _follow_the_recognition(told, node, read(_OF_THE_RECOGNITION))
+        _follow_the_recognition(found, node, read(_OF_THE_RECOGNITION))
     elif kind == "hand_sign_recognition":
-        _take_window(told.parameters, node)
-        _take_model(told.parameters, node)
-    return told
+        _take_window(found.parameters, node)
+        _take_model(found.parameters, node)
+    return found
 
 
-def _follow_the_recognition(told: Told, node: str, gesture_topic: Any) -> None:
+def _follow_the_recognition(found: Translation, node: str, gesture_topic: Any) -> None:
     if gesture_topic is None:
         return
-    theirs, mine = _topic_name(_OF_THE_RECOGNITION, gesture_topic), told.topics.get(HAND_SIGN.name)
-    told.topics[HAND_SIGN.name] = theirs
+    theirs, mine = _topic_name(_OF_THE_RECOGNITION, gesture_topic), found.topics.get(HAND_SIGN.name)
+    found.topics[HAND_SIGN.name] = theirs
     if mine is not None and mine.lstrip("/") != theirs.lstrip("/"):
         log.warning(
             "%s/%s is %s, but signs are read from %s, where %s has them published",
@@ -108,7 +108,7 @@ def _take_model(parameters: dict[str, Any], node: str) -> None:
     if model.endswith(_NETWORKS):
         log.warning(
             "keypoint_classifier_model %s cannot be used, for it takes every hand for one of its signs: the shipped "
-            "signs are told; `handsteer signs import` and `train` make a model of the course's keypoint.csv",
+            "signs are used; `handsteer signs import` and `train` make a model of the course's keypoint.csv",
             model,
         )
     elif model not in (_SHIPPED, ""):

@@ -11,7 +11,7 @@ from typing import Any
 from handsteer.clock import Clock, SimulatedClock, WallClock
 from handsteer.errors import TransportError
 from handsteer.parameters import NodeParameters
-from handsteer.transports.protocol import Call
+from handsteer.transports.base import Call
 
 try:
     import rosgraph
@@ -25,6 +25,7 @@ except ImportError as problem:
 from handsteer.transports.ros1 import course
 from handsteer.transports.ros1.master import Lifeline, Master, MasterGone
 from handsteer.transports.ros1.topics import Ros1Transport
+from handsteer.transports.timing import ClockMonitor
 
 # The end of the master is detected at once; this finds a lost machine, and costs as much as a hundred signs a minute.
 _PING_PERIOD_S = 2.0
@@ -33,16 +34,13 @@ _PING_AGAIN_S = 0.02
 # A master that replies slowly is busy, which is no reason to stop a robot.
 _PINGS_UNTIL_LOST = 3
 _SILENT_UNTIL_LOST_S = 1.5
-_CLOCK_SILENCE_S = 2.0
 # rospy sends on its own threads and does not report when they are done.
 _DELIVER_S = 0.1
 _LEAVE_TIMEOUT_S = 2.0
 
-log = logging.getLogger(__name__)
-
 
 class Ros1Session:
-    """A :class:`~handsteer.transports.protocol.Session` of ROS 1. rospy allows one name per process.
+    """A :class:`~handsteer.transports.base.Session` of ROS 1. rospy allows one name per process.
 
     Args:
         node: Name of the node, unless ``arguments`` rename it.
@@ -66,11 +64,13 @@ class Ros1Session:
         self._left = threading.Event()
         _initialise(node, arguments)
         self.name: str = rospy.get_name()
-        told = course.translate(node, self.name, rospy.get_param("~", {}), lambda name: rospy.get_param(name, None))
-        self.parameters: dict[str, Any] = told.parameters
+        translated = course.translate(
+            node, self.name, rospy.get_param("~", {}), lambda name: rospy.get_param(name, None)
+        )
+        self.parameters: dict[str, Any] = translated.parameters
         rospy.on_shutdown(self._on_shutdown)
         self.clock = self._make_clock()
-        self.transport = Ros1Transport(self.clock, told.topics)
+        self.transport = Ros1Transport(self.clock, translated.topics)
         self._watcher = threading.Thread(target=self._watch, name="ros1_session", daemon=True)
         self._watcher.start()
 
@@ -108,7 +108,7 @@ class Ros1Session:
         return clock
 
     def _watch(self) -> None:
-        was_silent = False
+        clock_monitor = ClockMonitor(self.clock)
         while not self._left.is_set():
             if not self._lifeline.wait(_PING_IN_DOUBT_S if self._failures else _PING_PERIOD_S):
                 self._left.wait(_PING_AGAIN_S)  # no continuous requests if the master drops the connection
@@ -116,10 +116,7 @@ class Ros1Session:
             if self._lost is not None:
                 self._asked_to_end.set()
                 return
-            silent = isinstance(self.clock, SimulatedClock) and self.clock.silence_s > _CLOCK_SILENCE_S
-            if silent and not was_silent:
-                log.warning("/use_sim_time is set, but /clock stands still: frames count as old, the robot stands")
-            was_silent = silent
+            clock_monitor.check()
 
     def _why_lost(self) -> str | None:
         """Return why the master is lost; None while it replies, or may only be busy."""

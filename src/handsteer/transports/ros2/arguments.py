@@ -30,7 +30,6 @@ _VALUES = {
 }
 _LONGEST_SHOWN = 100
 _LONG = {"--remap": "-r", "--param": "-p", "--enclave": "-e"}
-_UNUSED = ("-e", "--log-config-file")
 _LEVELS = ("debug", "info", "warn", "error", "fatal")
 
 

@@ -1,75 +1,114 @@
-"""This process as a node of a ROS 2 graph on any middleware: name, parameters and time."""
+"""This process as a node of a ROS 2 graph on any middleware: name, parameters, time and log."""
 
 import logging
 import threading
-from abc import ABC, abstractmethod
+from collections import deque
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Protocol
+from functools import partial
+from typing import Any
 
 from handsteer.clock import Clock, SimulatedClock, WallClock, to_seconds
-from handsteer.errors import TransportError
-from handsteer.messages import CLOCK, Log, Time
+from handsteer.errors import HandsteerError, TransportError
+from handsteer.messages import CLOCK, Log, Time, Topic
 from handsteer.parameters import NodeParameters
-from handsteer.transports.protocol import Call, Publisher, Transport
+from handsteer.transports.base import Call, Publisher
 from handsteer.transports.ros2.arguments import parse_arguments
+from handsteer.transports.ros2.base_transport import WireTransport
+from handsteer.transports.ros2.encoding import decode, encode, request_type
 from handsteer.transports.ros2.names import NodeName, identify
 from handsteer.transports.ros2.parameter_services import PARAMETER_EVENTS, ParameterServices
-from handsteer.transports.ros2.rosout import ROSOUT, RosoutHandler
-from handsteer.transports.ros2.service_types import Service
+from handsteer.transports.timing import ClockMonitor
 
-_CLOCK_SILENCE_S = 2.0
 _DELIVER_S = 0.2
 _LEVELS = {"debug": 10, "info": 20, "warn": 30, "error": 40, "fatal": 50}
+_WAITING = 100
 
 log = logging.getLogger(__name__)
 
-
-class Ros2Transport(Transport, Protocol):
-    """A transport that can be flushed."""
-
-    def flush(self, timeout_s: float) -> None:
-        """Wait until what was published is sent, for at most ``timeout_s`` seconds."""
-        ...
+ROSOUT = Topic("/rosout", Log, latched=True, is_global=True, depth=1000, lifespan_s=10.0)
+"""The log of all nodes; ``Log.level`` is 10, 20, 30, 40 or 50, as in Python."""
 
 
-class ServiceServer(Protocol):
-    """Replies to the requests of a service."""
+class RosoutHandler(logging.Handler):
+    """Keeps the newest hundred log records until they are sent, so that logging never waits for the network.
 
-    def close(self) -> None:
-        """Stop replying; may be called twice."""
-        ...
+    Args:
+        node: Full name of the node, such as ``/r1/my_camera``; its logger is called ``r1.my_camera``.
+        now: Returns the current ROS time.
+    """
+
+    def __init__(self, node: str, now: Callable[[], Time]) -> None:
+        super().__init__()
+        self._name = node.strip("/").replace("/", ".")
+        self._now = now
+        self._messages: deque[Log] = deque(maxlen=_WAITING)
+        self._sending: int | None = None
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Keep ``record``, unless it is about the sending itself."""
+        if self._sending == threading.get_ident():
+            return
+        try:
+            self._messages.append(self._message(record))
+        except Exception:
+            self.handleError(record)
+
+    def send(self, publish: Callable[[Log], None]) -> None:
+        """Call ``publish`` for each record, and drop those it refuses. Must be called on one thread only."""
+        self._sending = threading.get_ident()
+        try:
+            while self._messages:
+                publish(self._messages.popleft())
+        except HandsteerError:
+            self._messages.clear()
+        finally:
+            self._sending = None
+
+    def _message(self, record: logging.LogRecord) -> Log:
+        return Log(
+            stamp=self._now(),
+            level=max((level for level in _LEVELS.values() if level <= record.levelno), default=_LEVELS["debug"]),
+            name=self._name,
+            msg=self.format(record),
+            file=record.pathname,
+            function=record.funcName or "",
+            line=record.lineno,
+        )
 
 
-class Ros2Session(ABC):
-    """A :class:`~handsteer.transports.protocol.Session` of ROS 2; each middleware adds the abstract methods.
+Connect = Callable[[NodeName, Clock], WireTransport]
+
+
+class Ros2Session:
+    """A :class:`~handsteer.transports.base.Session` of ROS 2, on any middleware but rclpy.
 
     Args:
         node: Name of the node, unless ``arguments`` rename it.
         arguments: ROS 2's own: ``--ros-args -r topic:=other -r __node:=name -r __ns:=/r1 -p parameter:=value
             --params-file file.yaml``.
+        connect: Joins the graph as the node of a name, on the graph's clock.
 
     Raises:
         TransportError: The graph cannot be joined, or an argument or one of ROS 2's environment variables is wrong.
     """
 
-    def __init__(self, node: str, arguments: Sequence[str]) -> None:
-        said = parse_arguments(arguments)
-        name = identify(node, said.remaps)
+    def __init__(self, node: str, arguments: Sequence[str], connect: Connect) -> None:
+        given = parse_arguments(arguments)
+        name = identify(node, given.remaps)
         self.name = name.full
-        self.parameters: dict[str, Any] = said.parameters(self.name)
+        self.parameters: dict[str, Any] = given.parameters(self.name)
         simulated = self._switch("use_sim_time", default=False)
-        self._answers = self._switch("start_parameter_services", default=True)
-        if said.log_level:
-            logging.getLogger("handsteer").setLevel(_LEVELS[said.log_level])
+        self._serves_parameters = self._switch("start_parameter_services", default=True)
+        if given.log_level:
+            logging.getLogger("handsteer").setLevel(_LEVELS[given.log_level])
         self.clock: Clock = SimulatedClock() if simulated else WallClock()
-        self._servers: list[ServiceServer] = []
         self._rosout = RosoutHandler(self.name, self._stamp)
         self._logs: Publisher[Log] | None = None
-        self._was_silent = False
+        self._clock_monitor = ClockMonitor(self.clock)
         self._left = threading.Event()
-        self.transport: Ros2Transport = self._connect(name, self.clock)
+        self.transport = connect(name, self.clock)
         try:
-            self._logs = self._publish_logs() if said.rosout else None
+            self._logs = self._publish_logs() if given.rosout else None
             if isinstance(self.clock, SimulatedClock):
                 self._follow(self.clock)
         except BaseException:  # including interrupts: open resources would keep the process from ending
@@ -78,16 +117,16 @@ class Ros2Session(ABC):
 
     def serve(self, parameters: NodeParameters) -> None:
         """Serve ``ros2 param``, unless the parameter ``start_parameter_services`` is false."""
-        if not self._answers:
+        if not self._serves_parameters:
             return
         simulated = isinstance(self.clock, SimulatedClock)
         parameters.add_fixed("use_sim_time", simulated, "Whether the node's time is that of /clock")
         parameters.add_fixed("start_parameter_services", True, "Whether others may see and set the parameters")
         events = self.transport.advertise(self.name, PARAMETER_EVENTS)
-        answering = ParameterServices(self.name, parameters, self._stamp, events.publish)
-        self._servers += [self._answer(*service) for service in answering.services]
+        for name, kind, answer in ParameterServices(self.name, parameters, self._stamp, events.publish).services:
+            self.transport.serve(name, kind, partial(_respond, kind, answer))
 
-    def offer(self, services: Callable[[], Mapping[str, Call]]) -> None:  # noqa: B027 # one for all that lack them
+    def offer(self, services: Callable[[], Mapping[str, Call]]) -> None:
         """Do nothing: only rclpy has services of any type."""
 
     def wait(self, timeout_s: float) -> bool:
@@ -95,10 +134,8 @@ class Ros2Session(ABC):
 
         ROS 2 has no request to end a node.
         """
-        silent = isinstance(self.clock, SimulatedClock) and self.clock.silence_s > _CLOCK_SILENCE_S
-        if silent and not self._was_silent:
-            log.warning("use_sim_time is set, but /clock stands still: frames count as old, the robot stands")
-        self._was_silent = silent
+        self._clock_monitor.check()
+        self.transport.check()
         self._send_logs()
         return self._left.wait(timeout_s)
 
@@ -108,19 +145,9 @@ class Ros2Session(ABC):
             return
         self._left.set()
         logging.getLogger("handsteer").removeHandler(self._rosout)
-        for server in self._servers:
-            server.close()
         self._send_logs()
         self.transport.flush(_DELIVER_S)
         self.transport.close()
-
-    @abstractmethod
-    def _connect(self, name: NodeName, clock: Clock) -> Ros2Transport:
-        """Join the graph as the node of this name, on the graph's clock."""
-
-    @abstractmethod
-    def _answer(self, name: str, service: Service, answer: Callable[[Any], Any]) -> ServiceServer:
-        """Serve the service of this full name; ``answer`` converts a request to a reply."""
 
     def _switch(self, name: str, *, default: bool) -> bool:
         value = self.parameters.pop(name, default)
@@ -142,3 +169,7 @@ class Ros2Session(ABC):
 
     def _follow(self, clock: SimulatedClock) -> None:
         self.transport.subscribe("clock", CLOCK, lambda received: clock.tell(to_seconds(received.message.clock)))
+
+
+def _respond(kind: str, answer: Callable[[Any], Any], request: bytes) -> bytes:
+    return encode(answer(decode(request, request_type(kind))))

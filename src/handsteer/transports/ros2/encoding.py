@@ -5,16 +5,57 @@ import functools
 from typing import Any
 
 from rosbags.interfaces import Nodetype
-from rosbags.typesys import Stores, get_typestore
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
 from handsteer.messages import TurtlePose
-from handsteer.transports.ros2.service_types import register_services
 
 _FLOAT32: Any = (Nodetype.BASE, ("float32", 0))
 _DISCOVERY = "rmw_dds_common/msg/ParticipantEntitiesInfo"
 # It cannot be computed, because rosbags does not know that ROS 2 converts a char to uint8.
 _KNOWN_HASHES = {_DISCOVERY: "RIHS01_91a0593bacdcc50ea9bdcf849a938b128412cc1ea821245c663bcd26f83c295e"}
+_EVENT_INFO = "service_msgs/msg/ServiceEventInfo"
+_PARAMETER_SERVICES = {
+    "ListParameters": ("string[] prefixes\nuint64 depth", "rcl_interfaces/ListParametersResult result"),
+    "GetParameters": ("string[] names", "rcl_interfaces/ParameterValue[] values"),
+    "GetParameterTypes": ("string[] names", "uint8[] types"),
+    "DescribeParameters": ("string[] names", "rcl_interfaces/ParameterDescriptor[] descriptors"),
+    "SetParameters": ("rcl_interfaces/Parameter[] parameters", "rcl_interfaces/SetParametersResult[] results"),
+    "SetParametersAtomically": ("rcl_interfaces/Parameter[] parameters", "rcl_interfaces/SetParametersResult result"),
+}
+"""Requests and replies of ROS 2's parameter services, which rosbags does not have: package rcl_interfaces, ``srv/``."""
+
+
+def request_type(service: str) -> str:
+    """Return the name of the request's type of the service type ``service``."""
+    return f"{service}_Request"
+
+
+def reply_type(service: str) -> str:
+    """Return the name of the reply's type of the service type ``service``."""
+    return f"{service}_Response"
+
+
+def _register_services(store: Typestore) -> None:
+    """Add requests and replies of the parameter services, and what the hashes of the services depend on.
+
+    Since Iron, the hash of a service is that of a message with its request, its reply and its introspection event (REP
+    2016).
+    """
+    # A char of ROS 2 is a uint8, which the type's hash depends on.
+    constants, fields = store.fielddefs[_EVENT_INFO]
+    char_array: Any = (Nodetype.ARRAY, ((Nodetype.BASE, ("uint8", 0)), 16))
+    patched = [(name, char_array if name == "client_gid" else kind) for name, kind in fields]
+    store.fielddefs[_EVENT_INFO] = (constants, patched)
+    for name, definitions in _PARAMETER_SERVICES.items():
+        service = f"rcl_interfaces/srv/{name}"
+        ends = {"request": request_type(service), "response": reply_type(service)}
+        for kind, definition in zip(ends.values(), definitions, strict=True):
+            store.register({kind: next(iter(get_types_from_msg(definition, kind).values()))})
+        exchanged: list[Any] = [(end, (Nodetype.SEQUENCE, ((Nodetype.NAME, kind), 1))) for end, kind in ends.items()]
+        store.fielddefs[f"{service}_Event"] = ([], [("info", (Nodetype.NAME, _EVENT_INFO)), *exchanged])
+        parts = {**ends, "event": f"{service}_Event"}
+        store.fielddefs[service] = ([], [(f"{part}_message", (Nodetype.NAME, kind)) for part, kind in parts.items()])
 
 
 @functools.cache
@@ -23,10 +64,16 @@ def types(distribution: str = "jazzy") -> Typestore:
 
     The types of the parameter services are in ``jazzy``, and are the same in both.
     """
-    store = get_typestore(Stores.ROS2_HUMBLE if distribution == "humble" else Stores.ROS2_JAZZY)
-    store.register({TurtlePose.__msgtype__: ([], [(part.name, _FLOAT32) for part in dataclasses.fields(TurtlePose)])})
+    store = message_types(Stores.ROS2_HUMBLE if distribution == "humble" else Stores.ROS2_JAZZY)
     if distribution != "humble":
-        register_services(store)
+        _register_services(store)
+    return store
+
+
+def message_types(stores: Stores = Stores.ROS2_JAZZY) -> Typestore:
+    """Return a new copy of the message types of rosbags, with those that it lacks."""
+    store = get_typestore(stores)
+    store.register({TurtlePose.__msgtype__: ([], [(part.name, _FLOAT32) for part in dataclasses.fields(TurtlePose)])})
     return store
 
 

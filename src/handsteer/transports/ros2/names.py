@@ -19,13 +19,7 @@ _LONGEST = 255
 
 @dataclass(frozen=True)
 class Remap:
-    """One ``-r from:=to``.
-
-    Attributes:
-        source: Name to replace: that of a topic, ``__node`` or ``__ns``.
-        target: The new name.
-        node: The node to which the rule applies; None for all.
-    """
+    """A rule ``-r source:=target``, for one node or for all; the source is a topic, ``__node`` or ``__ns``."""
 
     source: str
     target: str
@@ -38,13 +32,7 @@ class Remap:
 
 @dataclass(frozen=True)
 class NodeName:
-    """A node's name and namespace, and the resolution of topic names for that node.
-
-    Attributes:
-        name: Such as ``my_camera``.
-        namespace: Such as ``/`` or ``/r1``.
-        remaps: Rules for topics; the first match applies.
-    """
+    """A node's name and namespace (such as ``/`` or ``/r1``), and its rules for topics, of which the first applies."""
 
     name: str
     namespace: str = "/"

@@ -13,26 +13,18 @@ import numpy as np
 from handsteer.errors import ConfigError
 from handsteer.messages import ParameterEvent, Time, Topic
 from handsteer.parameters import Description, NodeParameters, Value
-from handsteer.transports.ros2.encoding import types
-from handsteer.transports.ros2.service_types import (
-    DESCRIBE_PARAMETERS,
-    GET_PARAMETER_TYPES,
-    GET_PARAMETERS,
-    LIST_PARAMETERS,
-    SET_PARAMETERS,
-    SET_PARAMETERS_ATOMICALLY,
-    Service,
-)
+from handsteer.transports.ros2.encoding import reply_type, types
 
 PARAMETER_EVENTS = Topic("/parameter_events", ParameterEvent, is_global=True, depth=1000)
 """Changes of all nodes' parameters."""
 
 NOT_SET = 0
-_TYPES = {"bool": 1, "integer": 2, "double": 3, "string": 4, "strings": 9}
+TYPES = {"bool": 1, "integer": 2, "double": 3, "string": 4, "strings": 9}
+"""Numbers of ``rcl_interfaces/msg/ParameterType``, by our names of types."""
 _FIELDS = {1: "bool_value", 2: "integer_value", 3: "double_value", 4: "string_value", 9: "string_array_value"}
 _ARRAYS = ("byte_array_value", "bool_array_value", "integer_array_value", "double_array_value", "string_array_value")
 _EMPTY = dict(zip((5, 6, 7, 8, 9), _ARRAYS, strict=True))
-_INTERFACES = "rcl_interfaces/msg"
+_MESSAGES, _SERVICES = "rcl_interfaces/msg", "rcl_interfaces/srv"
 
 
 class ParameterServices:
@@ -42,7 +34,7 @@ class ParameterServices:
         node: Full name of the node, such as ``/r1/hand_sign_control``.
         parameters: Its parameters.
         now: Returns the current ROS time.
-        tell: Publishes an event on :data:`PARAMETER_EVENTS` after each change.
+        publish: Publishes an event on :data:`PARAMETER_EVENTS` after each change.
     """
 
     def __init__(
@@ -50,51 +42,49 @@ class ParameterServices:
         node: str,
         parameters: NodeParameters,
         now: Callable[[], Time],
-        tell: Callable[[ParameterEvent], None],
+        publish: Callable[[ParameterEvent], None],
     ) -> None:
         self._node = node
         self._parameters = parameters
         self._now = now
-        self._tell = tell
+        self._publish = publish
 
     @property
-    def services(self) -> list[tuple[str, Service, Callable[[Any], Any]]]:
+    def services(self) -> list[tuple[str, str, Callable[[Any], Any]]]:
         """Full name, type, and the function from a request to a reply, of each service."""
         return [
-            (f"{self._node}/list_parameters", LIST_PARAMETERS, self._list),
-            (f"{self._node}/get_parameters", GET_PARAMETERS, self._get),
-            (f"{self._node}/get_parameter_types", GET_PARAMETER_TYPES, self._get_types),
-            (f"{self._node}/describe_parameters", DESCRIBE_PARAMETERS, self._describe),
-            (f"{self._node}/set_parameters", SET_PARAMETERS, self._set),
-            (f"{self._node}/set_parameters_atomically", SET_PARAMETERS_ATOMICALLY, self._set_atomically),
+            (f"{self._node}/list_parameters", f"{_SERVICES}/ListParameters", self._list),
+            (f"{self._node}/get_parameters", f"{_SERVICES}/GetParameters", self._get),
+            (f"{self._node}/get_parameter_types", f"{_SERVICES}/GetParameterTypes", self._get_types),
+            (f"{self._node}/describe_parameters", f"{_SERVICES}/DescribeParameters", self._describe),
+            (f"{self._node}/set_parameters", f"{_SERVICES}/SetParameters", self._set),
+            (f"{self._node}/set_parameters_atomically", f"{_SERVICES}/SetParametersAtomically", self._set_atomically),
         ]
 
     def _list(self, request: Any) -> Any:
         names, prefixes = list_names(self._parameters.values(), request.prefixes, request.depth)
-        return _new(LIST_PARAMETERS.reply, result=_message("ListParametersResult", names=names, prefixes=prefixes))
+        return _reply("ListParameters", result=_message("ListParametersResult", names=names, prefixes=prefixes))
 
     def _get(self, request: Any) -> Any:
         values = self._parameters.values()
         known = all(name in values for name in request.names)
         found = [_value(self._kind(name), values[name]) for name in request.names] if known else []
-        return _new(GET_PARAMETERS.reply, values=found)
+        return _reply("GetParameters", values=found)
 
     def _get_types(self, request: Any) -> Any:
         descriptions = self._descriptions(request.names)
-        return _new(
-            GET_PARAMETER_TYPES.reply, types=np.array([_TYPES[each.kind] for each in descriptions], dtype=np.uint8)
-        )
+        return _reply("GetParameterTypes", types=np.array([TYPES[each.kind] for each in descriptions], np.uint8))
 
     def _describe(self, request: Any) -> Any:
         descriptions = self._descriptions(request.names)
-        descriptors = [_descriptor(name, each) for name, each in zip(request.names, descriptions, strict=False)]
-        return _new(DESCRIBE_PARAMETERS.reply, descriptors=descriptors)
+        descriptors = [descriptor(name, each) for name, each in zip(request.names, descriptions, strict=False)]
+        return _reply("DescribeParameters", descriptors=descriptors)
 
     def _set(self, request: Any) -> Any:
-        return _new(SET_PARAMETERS.reply, results=[self._change([one]) for one in request.parameters])
+        return _reply("SetParameters", results=[self._change([one]) for one in request.parameters])
 
     def _set_atomically(self, request: Any) -> Any:
-        return _new(SET_PARAMETERS_ATOMICALLY.reply, result=self._change(request.parameters))
+        return _reply("SetParametersAtomically", result=self._change(request.parameters))
 
     def _change(self, parameters: Sequence[Any]) -> Any:
         before = self._parameters.values()
@@ -102,7 +92,7 @@ class ParameterServices:
             self._parameters.set({one.name: _read(one) for one in parameters})
         except ConfigError as error:
             return _message("SetParametersResult", successful=False, reason=str(error))
-        self._tell(self._event(before, parameters))
+        self._publish(self._event(before, parameters))
         return _message("SetParametersResult", successful=True, reason="")
 
     def _event(self, before: dict[str, Value], parameters: Sequence[Any]) -> ParameterEvent:
@@ -162,7 +152,7 @@ def _read(parameter: Any) -> Any:
     if kind not in _FIELDS:
         raise ConfigError(f"{parameter.name}: a list of numbers should be a single value")
     value = getattr(parameter.value, _FIELDS[kind])
-    return list(value) if kind == _TYPES["strings"] else value
+    return list(value) if kind == TYPES["strings"] else value
 
 
 def _value(kind: str, value: Value) -> Any:
@@ -170,12 +160,13 @@ def _value(kind: str, value: Value) -> Any:
     fields |= {name: [] for name in _ARRAYS}
     fields |= {"byte_array_value": np.zeros(0, np.uint8), "bool_array_value": np.zeros(0, np.bool_)}
     fields |= {"integer_array_value": np.zeros(0, np.int64), "double_array_value": np.zeros(0, np.float64)}
-    number = _TYPES[kind]
+    number = TYPES[kind]
     fields[_FIELDS[number]] = float(value) if isinstance(value, int | float) and kind == "double" else value
     return _message("ParameterValue", type=number, **fields)
 
 
-def _descriptor(name: str, description: Description) -> Any:
+def descriptor(name: str, description: Description) -> Any:
+    """Return the ``ParameterDescriptor`` of the parameter ``name``."""
     low, high = description.minimum, description.maximum
     ranges: dict[str, list[Any]] = {"floating_point_range": [], "integer_range": []}
     if description.kind == "double" and low is not None and high is not None:
@@ -188,7 +179,7 @@ def _descriptor(name: str, description: Description) -> Any:
     return _message(
         "ParameterDescriptor",
         name=name,
-        type=_TYPES[description.kind],
+        type=TYPES[description.kind],
         description=description.text,
         additional_constraints="; ".join(constraints),
         read_only=description.why_fixed is not None,
@@ -198,8 +189,8 @@ def _descriptor(name: str, description: Description) -> Any:
 
 
 def _message(kind: str, /, **fields: Any) -> Any:
-    return _new(f"{_INTERFACES}/{kind}", **fields)
+    return types().types[f"{_MESSAGES}/{kind}"](**fields)
 
 
-def _new(kind: str, /, **fields: Any) -> Any:
-    return types().types[kind](**fields)
+def _reply(service: str, /, **fields: Any) -> Any:
+    return types().types[reply_type(f"{_SERVICES}/{service}")](**fields)

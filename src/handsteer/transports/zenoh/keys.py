@@ -9,9 +9,9 @@ from dataclasses import dataclass
 
 import xxhash
 
+from handsteer.transports.ros2.base_transport import Profile
 from handsteer.transports.ros2.encoding import dds_type_name, ros_type_name, type_hash
 from handsteer.transports.ros2.names import NodeName
-from handsteer.transports.ros2.profiles import Profile
 
 _ROOT = "@ros2_lv"
 _NODE = "NN"
@@ -21,7 +21,7 @@ _LETTERS = {words: letters for letters, words in _KINDS.items()}
 _DEFAULT_DEPTH = 42
 _ATTACHMENT = struct.Struct("<qqB16s")
 _GID_BYTES = 16
-_NODE_PARTS, _ENDPOINT_PARTS = 9, 13
+_ENDPOINT_PARTS = 13
 
 
 @dataclass(frozen=True)
@@ -43,13 +43,7 @@ class Endpoint:
 
 @dataclass(frozen=True)
 class Place:
-    """This process's node in the graph.
-
-    Attributes:
-        domain: The ROS 2 domain.
-        zid: Identifier of the Zenoh session.
-        node: The node's name.
-    """
+    """This process's node in the graph: the ROS 2 domain, the identifier of the Zenoh session, and the node's name."""
 
     domain: int
     zid: str
@@ -58,27 +52,15 @@ class Place:
 
 @dataclass(frozen=True)
 class Entity:
-    """A node, or an endpoint of one, announced by a liveliness token.
-
-    Attributes:
-        zid: Identifier of the Zenoh session.
-        node: Full name of the node.
-        endpoint: None if the token announces the node itself.
-    """
+    """An endpoint, the full name of its node, and the identifier of its Zenoh session."""
 
     zid: str
     node: str
-    endpoint: Endpoint | None = None
+    endpoint: Endpoint
 
 
 def topic_key(domain: int, name: str, type_name: str) -> str:
-    """Return the key expression of messages or requests.
-
-    Args:
-        domain: The ROS 2 domain.
-        name: Full name of the topic or service.
-        type_name: Its type, such as ``std_msgs/msg/String``.
-    """
+    """Return the key expression of the messages or requests of a topic or service, by its full name and its type."""
     return f"{domain}{name}/{dds_type_name(type_name)}/{type_hash(type_name)}"
 
 
@@ -93,32 +75,20 @@ def node_token(place: Place) -> str:
 
 
 def endpoint_token(place: Place, number: int, endpoint: Endpoint, profile: Profile) -> str:
-    """Return the liveliness token of an endpoint.
-
-    Args:
-        place: The node that has the endpoint.
-        number: Identifies the endpoint within its session; from 1.
-        endpoint: The endpoint.
-        profile: Its quality of service.
-    """
+    """Return the liveliness token of an endpoint of a node; ``number``, from 1, identifies it within its session."""
     who = f"{_ROOT}/{place.domain}/{place.zid}/0/{number}/{_LETTERS[endpoint.kind]}/{_name(place.node)}"
     what = (_mangled(endpoint.topic), dds_type_name(endpoint.type), endpoint.type_hash, _quality(profile))
     return f"{who}/{'/'.join(what)}"
 
 
 def read_token(token: str) -> Entity | None:
-    """Return the entity that a liveliness token announces; None if the token is not one of rmw_zenoh's."""
+    """Return the endpoint that a liveliness token announces; None if it announces something else."""
     parts = token.split("/")
-    if len(parts) < _NODE_PARTS or parts[0] != _ROOT:
+    if len(parts) < _ENDPOINT_PARTS or parts[0] != _ROOT or parts[5] not in _KINDS:
         return None
-    zid, kind, namespace, name = parts[2], parts[5], _demangled(parts[7]), parts[8]
-    node = f"{namespace.rstrip('/')}/{name}"
-    if kind == _NODE:
-        return Entity(zid, node)
-    if kind not in _KINDS or len(parts) < _ENDPOINT_PARTS:
-        return None
+    node = f"{_demangled(parts[7]).rstrip('/')}/{parts[8]}"
     topic, dds_type, digest = parts[9:12]
-    return Entity(zid, node, Endpoint(_KINDS[kind], _demangled(topic), ros_type_name(dds_type), digest))
+    return Entity(parts[2], node, Endpoint(_KINDS[parts[5]], _demangled(topic), ros_type_name(dds_type), digest))
 
 
 def gid(token: str) -> bytes:
@@ -129,10 +99,7 @@ def gid(token: str) -> bytes:
 def attachment(number: int, time_ns: int, source: bytes) -> bytes:
     """Return the attachment of a message, request or reply.
 
-    Args:
-        number: Sequence number, from 1.
-        time_ns: Time of sending, in nanoseconds of Unix time.
-        source: Identifier of the sender, 16 bytes.
+    It has a sequence number, from 1, the time of sending in nanoseconds of Unix time, and the sender's identifier.
     """
     return _ATTACHMENT.pack(number, time_ns, _GID_BYTES, source)
 

@@ -1,4 +1,4 @@
-"""This process as a Zenoh session and a node of ROS 2, with its publishers, subscribers and router."""
+"""This process as a Zenoh session and a node of ROS 2, its router, and the other nodes that it knows."""
 
 import itertools
 import logging
@@ -8,14 +8,23 @@ import time
 import zenoh
 
 from handsteer.errors import TransportError
+from handsteer.transports.ros2.base_transport import Profile
 from handsteer.transports.ros2.encoding import type_hash
 from handsteer.transports.ros2.names import NodeName
-from handsteer.transports.ros2.profiles import Profile
-from handsteer.transports.zenoh.keys import Endpoint, Place, endpoint_token, node_token, topic_key
-from handsteer.transports.zenoh.neighbours import Neighbours
-from handsteer.transports.zenoh.network import Network, reason, routers
+from handsteer.transports.zenoh.configuration import Network, reason, routers
+from handsteer.transports.zenoh.keys import (
+    Endpoint,
+    Entity,
+    Place,
+    all_tokens,
+    endpoint_token,
+    node_token,
+    read_token,
+    topic_key,
+)
 
 _LOOK_AGAIN_S = 1.0
+_OPPOSITE = {"publisher": "subscriber", "subscriber": "publisher"}
 
 log = logging.getLogger(__name__)
 
@@ -26,6 +35,7 @@ class Member:
     Attributes:
         name: The node's name.
         is_local: Whether this process connects to this machine only, as far as is known.
+        neighbours: The other nodes.
 
     Raises:
         TransportError: The network cannot be joined.
@@ -47,23 +57,16 @@ class Member:
         self._had_router = True
         self._place = Place(network.domain, str(self.session.zid()), name)
         self._numbers = itertools.count(1)
-        self._lock = threading.Lock()
-        self._neighbours: Neighbours | None = None
         try:
             self._look_for_router()
-            self._neighbours = Neighbours(self.session, network.domain)
+            self.neighbours = Neighbours(self.session, network.domain)
             self._token = self.session.liveliness().declare_token(node_token(self._place))
         except BaseException:  # including interrupts: an open session would keep the process from ending
-            self.close()
+            self.session.close()
             raise
 
     def key(self, name: str, type_name: str) -> str:
-        """Return the key expression of a topic or service.
-
-        Args:
-            name: Its full name, such as ``/r1/image_raw``.
-            type_name: Its type, such as ``sensor_msgs/msg/Image``.
-        """
+        """Return the key expression of the topic or service of this full name and type."""
         return topic_key(self._place.domain, name, type_name)
 
     def introduce(
@@ -79,21 +82,10 @@ class Member:
             or_type: Another type that it changes to if there is a subscriber of it.
         """
         endpoint = Endpoint(kind, name, type_name, type_hash(type_name))
-        with self._lock:
-            number = next(self._numbers)
-        text = endpoint_token(self._place, number, endpoint, profile)
+        text = endpoint_token(self._place, next(self._numbers), endpoint, profile)
         token = self.session.liveliness().declare_token(text)
-        if self._neighbours is not None:
-            self._neighbours.add(endpoint, or_type)
+        self.neighbours.add(endpoint, or_type)
         return token, text
-
-    def publishers_of(self, topic: str) -> list[str]:
-        """Return the node of each publisher of the topic of this full name in other processes."""
-        return [] if self._neighbours is None else self._neighbours.publishers_of(topic)
-
-    def subscribed_types(self, topic: str) -> set[str]:
-        """Return the types of the subscribers of the topic of this full name in other processes."""
-        return set() if self._neighbours is None else self._neighbours.subscribed_types(topic)
 
     def watch_router(self) -> None:
         """Log when the router is lost or found again; does nothing if none is used."""
@@ -104,14 +96,13 @@ class Member:
             if has_router:
                 log.info("the Zenoh router is there")
             else:
-                log.warning("%s", self._lonely("the Zenoh router has gone: those who come now are not found"))
+                log.warning("%s", self._without_router("the Zenoh router has gone: those who come now are not found"))
         self._had_router = has_router
 
     def close(self) -> None:
         """Leave the network; may be called twice."""
         if not self.session.is_closed():
-            if self._neighbours is not None:
-                self._neighbours.close()
+            self.neighbours.close()
             self.session.close()
 
     def _look_for_router(self) -> None:
@@ -122,7 +113,7 @@ class Member:
         if self._had_router:
             return
         waits = "it waits for one" if attempts == 0 else "until there is one, nobody is found"
-        log.warning("%s", self._lonely(f"no Zenoh router answers: {waits}"))
+        log.warning("%s", self._without_router(f"no Zenoh router answers: {waits}"))
         for tried in itertools.count(1):
             if tried == attempts:
                 return
@@ -131,7 +122,7 @@ class Member:
                 self.watch_router()
                 return
 
-    def _lonely(self, what: str) -> str:
+    def _without_router(self, what: str) -> str:
         return (
             f"{what} (looked at {routers(self._network.config)}); start one with handsteer zenoh-router, "
             "or where ROS 2 is installed, ros2 run rmw_zenoh_cpp rmw_zenohd"
@@ -139,3 +130,71 @@ class Member:
 
     def _has_router(self) -> bool:
         return bool(self.session.info.routers_zid())
+
+
+class Neighbours:
+    """Compares our publishers and subscribers with those of others, because Zenoh does not report mismatched types."""
+
+    def __init__(self, session: zenoh.Session, domain: int) -> None:
+        self._own = str(session.zid())
+        self._lock = threading.Lock()
+        self._ours: dict[tuple[str, str], tuple[Endpoint, str | None]] = {}
+        self._theirs: dict[str, Entity] = {}
+        self._watch = session.liveliness().declare_subscriber(all_tokens(domain), self._note, history=True)
+
+    def add(self, endpoint: Endpoint, or_type: str | None = None) -> None:
+        """Compare our publisher or subscriber, which may change to ``or_type``, with others, now and later."""
+        with self._lock:
+            self._ours[endpoint.topic, endpoint.kind] = endpoint, or_type
+            theirs = list(self._theirs.values())
+        for entity in theirs:
+            self._compare(entity)
+
+    def publishers_of(self, topic: str) -> list[str]:
+        """Return the node of each publisher of the topic of this full name in other processes."""
+        return [node for node, _ in self._others("publisher", topic)]
+
+    def subscribed_types(self, topic: str) -> set[str]:
+        """Return the types of the subscribers of the topic of this full name in other processes."""
+        return {end.type for _, end in self._others("subscriber", topic)}
+
+    def close(self) -> None:
+        """Stop comparing."""
+        self._watch.undeclare()
+
+    def _others(self, kind: str, topic: str) -> list[tuple[str, Endpoint]]:
+        with self._lock:
+            theirs = [(entity.node, entity.endpoint) for entity in self._theirs.values()]
+        return [(node, end) for node, end in theirs if (end.kind, end.topic) == (kind, topic)]
+
+    def _note(self, sample: zenoh.Sample) -> None:
+        token = str(sample.key_expr)
+        entity = read_token(token)
+        if entity is None or entity.zid == self._own:
+            return
+        with self._lock:
+            is_known = self._theirs.pop(token, None) is not None
+            is_there = sample.kind == zenoh.SampleKind.PUT
+            if is_there:
+                self._theirs[token] = entity
+        if is_there and not is_known:
+            self._compare(entity)
+
+    def _compare(self, entity: Entity) -> None:
+        theirs = entity.endpoint
+        with self._lock:
+            ours, or_type = self._ours.get((theirs.topic, _OPPOSITE.get(theirs.kind, "")), (None, None))
+        if ours is None or theirs.type == or_type:
+            return
+        if (ours.type, ours.type_hash) != (theirs.type, theirs.type_hash):
+            log.warning("%s", explain(ours, theirs, entity.node))
+
+
+def explain(ours: Endpoint, theirs: Endpoint, node: str) -> str:
+    """Return one line on why two endpoints of a topic exchange no messages."""
+    if ours.type != theirs.type:
+        why = f"ours has the type {ours.type}, theirs {theirs.type}"
+    else:
+        hashes = f"ours: {ours.type_hash}; theirs: {theirs.type_hash}"
+        why = f"both have the type {ours.type}, but it is defined differently ({hashes})"
+    return f"{ours.topic}: nothing passes between our {ours.kind} and the {theirs.kind} of {node}: {why}"

@@ -5,22 +5,22 @@ import pytest
 
 from handsteer.errors import ConfigError
 from handsteer.messages import CMD_VEL, HAND_SIGN, IMAGE_RAW
-from handsteer.transports.ros1.course import Told, translate
+from handsteer.transports.ros1.course import Translation, translate
 
 RECOGNITION, CONTROL = "hand_sign_recognition", "hand_sign_control"
 
 
-def told(kind: str, parameters: Mapping[str, Any], others: Mapping[str, Any] | None = None) -> Told:
+def told(kind: str, parameters: Mapping[str, Any], others: Mapping[str, Any] | None = None) -> Translation:
     return translate(kind, f"/r1/{kind}", parameters, (others or {}).get)
 
 
 def test_the_courses_names_become_topics_and_the_rest_is_left() -> None:
     given = {"subscribe_image_topic": "/usb/image", "publish_gesture_topic": "words", "min_confidence": 0.9}
-    assert told(RECOGNITION, given) == Told(
+    assert told(RECOGNITION, given) == Translation(
         {"min_confidence": 0.9}, {IMAGE_RAW.name: "/usb/image", HAND_SIGN.name: "words"}
     )
     given = {"publish_gesture_topic": "/words", "control_topic": "/cmd_vel"}
-    assert told(CONTROL, given) == Told({}, {HAND_SIGN.name: "/words", CMD_VEL.name: "/cmd_vel"})
+    assert told(CONTROL, given) == Translation({}, {HAND_SIGN.name: "/words", CMD_VEL.name: "/cmd_vel"})
 
 
 def test_a_camera_has_the_courses_name_and_ours() -> None:
@@ -54,7 +54,7 @@ def test_the_same_topic_twice_is_no_news(caplog: pytest.LogCaptureFixture) -> No
 def test_the_shipped_signs_are_no_parameter(caplog: pytest.LogCaptureFixture) -> None:
     given = {"keypoint_classifier_model": "shipped", "keypoint_classifier_label": "of_the_model", "show_image": False}
     with caplog.at_level("INFO"):
-        assert told(RECOGNITION, given) == Told({})
+        assert told(RECOGNITION, given) == Translation({})
     assert not caplog.messages
 
 
@@ -70,7 +70,7 @@ def test_what_cannot_be_as_in_the_course_is_said_in_a_line_each(caplog: pytest.L
         "show_image": True,
     }
     with caplog.at_level("INFO"):
-        assert told(RECOGNITION, given) == Told({})
+        assert told(RECOGNITION, given) == Translation({})
     said = "\n".join(caplog.messages)
     assert len(caplog.messages) == 3
     assert "keypoint_classifier.tflite cannot be used" in said

@@ -1,4 +1,8 @@
-from handsteer.transports.observed import ObservedTopic, amiss
+import pytest
+
+pytest.importorskip("cyclonedds")
+
+from handsteer.transports.dds.look import ObservedTopic, problems_of
 
 TWIST, STRING = "geometry_msgs/msg/Twist", "std_msgs/msg/String"
 
@@ -10,11 +14,11 @@ def topic(name: str, *types: str, publishers: tuple[str, ...] = ()) -> ObservedT
 def test_nothing_is_amiss() -> None:
     driven = topic("/cmd_vel", TWIST, publishers=("/a",))
     said = topic("/chatter", STRING, publishers=("/a", "/b"))
-    assert amiss(["/a", "/b"], [driven, said]) == []
+    assert problems_of(["/a", "/b"], [driven, said]) == []
 
 
 def test_two_drivers_two_types_and_two_nodes_of_one_name() -> None:
-    (named, driven, typed) = amiss(
+    (named, driven, typed) = problems_of(
         ["/a", "/a", "/b"], [topic("/cmd_vel", TWIST, publishers=("/a", "/b")), topic("/x", STRING, TWIST)]
     )
     assert named.startswith("2 nodes have the name /a: end one of them")

@@ -1,16 +1,23 @@
-"""Quality of service in DDS: conversion of our profiles, and the reasons why two endpoints do not match.
+"""ROS 2's topics and services in DDS: their types and quality of service, and why two endpoints do not match.
+
+DDS needs the definition of a type to match endpoints; the messages themselves are passed in encoded form, which is much
+faster than cyclonedds's own encoder for large ones.
 
 A writer never waits for a slow reader. Commands and signs have a lifespan, so that old ones are not delivered after a
 loss of connection; the log has one, so that a late subscriber gets recent records only.
 """
 
+import functools
 from typing import Any
 
+import cyclonedds.idl.types
 from cyclonedds.core import Policy, Qos
+from cyclonedds.idl import make_idl_struct
+from rosbags.interfaces import Nodetype
 
 from handsteer.messages import Topic, type_name
-from handsteer.transports.ros2.encoding import type_hash
-from handsteer.transports.ros2.profiles import Profile, offered, requested
+from handsteer.transports.ros2.base_transport import Profile, offered, requested
+from handsteer.transports.ros2.encoding import dds_type_name, type_hash, types
 
 _RELIABLE = Policy.Reliability.Reliable(0)
 _BEST_EFFORT = Policy.Reliability.BestEffort
@@ -43,22 +50,15 @@ def reader_qos(topic: Topic[Any]) -> Qos:
 
 
 def discovery_qos(name: str, depth: int) -> Qos:
-    """Return ROS 2's QoS for ``ros_discovery_info``; a writer keeps one message, a reader one per writer.
-
-    Args:
-        name: The message type.
-        depth: How many messages are kept.
-    """
+    """Return ROS 2's QoS for ``ros_discovery_info``, whose messages have the type ``name``; ``depth`` are kept."""
     history = Policy.History.KeepLast(depth)
     return Qos(_RELIABLE, _TRANSIENT_LOCAL, history, _CDR, Policy.IgnoreLocal.Participant, _user_data(name))
 
 
 def service_qos(name: str, service: str) -> Qos:
-    """Return ROS 2's QoS for both endpoints of a parameter service.
+    """Return ROS 2's QoS for the requests or replies of a parameter service, by their type.
 
-    Args:
-        name: Type of the request or the reply.
-        service: Identifies the service; the same for its reader and its writer.
+    ``service`` identifies it, and is the same for its reader and its writer.
     """
     data = Policy.Userdata(f"serviceid={service};typehash={type_hash(name)};".encode())
     return Qos(_RELIABLE, _VOLATILE, Policy.History.KeepLast(_REQUESTS), _CDR, data)
@@ -147,3 +147,84 @@ def _liveliness(qos: Qos) -> int:
 
 def _time_ns(qos: Qos, scope: str, attribute: str) -> int:
     return int(getattr(_find(qos, scope), attribute, _NEVER_NS))
+
+
+idl: Any = cyclonedds.idl.types
+
+_BASES: dict[str, Any] = {
+    "bool": bool,
+    "byte": idl.byte,
+    "char": idl.uint8,
+    "octet": idl.byte,
+    "float32": idl.float32,
+    "float64": idl.float64,
+    **{f"{sign}int{bits}": getattr(idl, f"{sign}int{bits}") for sign in ("", "u") for bits in (8, 16, 32, 64)},
+}
+
+
+@functools.cache
+def dds_type(name: str, distribution: str = "jazzy") -> Any:
+    """Return the DDS type for the message type ``name``; its instances hold encoded messages in ``raw``."""
+    return _struct(name, distribution, {})
+
+
+@functools.cache
+def service_dds_type(name: str) -> Any:
+    """Return the DDS type for ``name``, a request or a reply, including the 16 bytes of its header.
+
+    Cyclone DDS checks sent and received data, and rejects what does not fit the type.
+    """
+    return _struct(name, "jazzy", {"client": idl.uint64, "number": idl.int64})
+
+
+def _struct(name: str, distribution: str, before: dict[str, Any]) -> Any:
+    _, fields = types(distribution).fielddefs[name]
+    members = {**before, **{field: _idl(kind, distribution) for field, kind in fields}}
+    struct = make_idl_struct(name.rpartition("/")[2], dds_type_name(name), members, dataclassify=False)
+    return _passing(struct)
+
+
+def opaque_type(name: str) -> Any:
+    """Return a DDS type that accepts the bytes of any message; ``name`` is as ``std_msgs::msg::dds_::String_``."""
+    return _passing(make_idl_struct("Opaque", name, {"raw": idl.uint8}, dataclassify=False))
+
+
+def _passing(struct: Any) -> Any:
+    for method, passing in _PASSING.items():
+        setattr(struct, method, passing)
+    return struct
+
+
+def _idl(kind: Any, distribution: str) -> Any:
+    node, what = kind
+    if node == Nodetype.NAME:
+        return dds_type(what, distribution)
+    if node == Nodetype.BASE:
+        base, bound = what
+        if base == "string":
+            return idl.bounded_str[bound] if bound else str
+        return _BASES[base]
+    element, length = what
+    if node == Nodetype.ARRAY:
+        return idl.array[_idl(element, distribution), length]
+    return idl.sequence[_idl(element, distribution), length] if length else idl.sequence[_idl(element, distribution)]
+
+
+def _init(self: Any, raw: bytes) -> None:
+    self.raw = raw
+
+
+def _serialize(self: Any, *_: Any, **__: Any) -> bytes:
+    return self.raw  # type: ignore[no-any-return]
+
+
+def _deserialize(cls: Any, data: bytes, *_: Any, **__: Any) -> Any:
+    return cls(data)
+
+
+_PASSING = {
+    "__init__": _init,
+    "serialize": _serialize,
+    "deserialize": classmethod(_deserialize),
+    "deserialize_key": classmethod(_deserialize),
+}

@@ -1,7 +1,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from handsteer.transports.stale_messages import StaleMessageFilter
+from handsteer.transports.timing import StaleMessageFilter
 
 APART = st.floats(-1e9, 1e9)
 

@@ -1,4 +1,4 @@
-"""Configures the connection to a Zenoh network from rmw_zenoh's environment variables.
+"""Sessions and routers of Zenoh as configured by rmw_zenoh's environment variables.
 
 Source: ros2/rmw_zenoh, README.md and its default configurations of sessions and routers.
 """
@@ -111,8 +111,8 @@ def _endpoints(config: zenoh.Config, what: str) -> list[str]:
 
 def reason(error: zenoh.ZError) -> str:
     """Return Zenoh's error message without the locations in its source."""
-    said = re.search(r'msg: "(.*?)"[,}]', str(error))
-    return re.sub(r" at /[^\s\]]+", "", said[1] if said else str(error)).replace(".]", "]").rstrip(". ")
+    found = re.search(r'msg: "(.*?)"[,}]', str(error))
+    return re.sub(r" at /[^\s\]]+", "", found[1] if found else str(error)).replace(".]", "]").rstrip(". ")
 
 
 def _config(environment: Mapping[str, str], variable: str, settings: Mapping[str, Any]) -> zenoh.Config:
@@ -126,8 +126,8 @@ def _config(environment: Mapping[str, str], variable: str, settings: Mapping[str
         config = zenoh.Config()
         for name, value in settings.items():
             config.insert_json5(name, json.dumps(value))
-    for name, said in _overrides(environment.get(_OVERRIDE, "")):
-        _set(config, _OVERRIDE, name, said)
+    for name, value in _overrides(environment.get(_OVERRIDE, "")):
+        _set(config, _OVERRIDE, name, value)
     return config
 
 
@@ -157,3 +157,34 @@ def _attempts(environment: Mapping[str, str]) -> int | None:
             f"{_ATTEMPTS} is {text!r}: it should be a whole number, 0 to wait, -1 not to look"
         ) from None
     return None if number < 0 else number
+
+
+class Router:
+    """A Zenoh router in this process, by which nodes find each other if there is no ``rmw_zenohd`` of ROS 2.
+
+    The arguments are those of :func:`router_config`.
+
+    Raises:
+        TransportError: It cannot listen there, or a variable is wrong.
+    """
+
+    def __init__(self, environment: Mapping[str, str], endpoint: str | None = None) -> None:
+        zenoh.try_init_log_from_env()
+        config = router_config(environment, endpoint)
+        endpoints = json.loads(config.get_json("listen/endpoints"))
+        if isinstance(endpoints, dict):
+            endpoints = endpoints.get("router", [])
+        self.endpoints: list[str] = endpoints
+        """Addresses it listens on."""
+        try:
+            self._session = zenoh.open(config)
+        except zenoh.ZError as error:
+            raise TransportError(
+                f"no Zenoh router can be started at {' and '.join(endpoints)}: is there one already, or another "
+                f"program on that port? ({reason(error)})"
+            ) from None
+
+    def close(self) -> None:
+        """Stop the router; may be called twice."""
+        if not self._session.is_closed():
+            self._session.close()

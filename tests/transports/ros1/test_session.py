@@ -10,7 +10,7 @@ from handsteer.errors import TransportError
 from handsteer.messages import Image, Topic
 from handsteer.nodes.node import Node
 from handsteer.transports import join
-from handsteer.transports.protocol import Received, Session, Transport
+from handsteer.transports.base import Received, Session, Transport
 from tests.contracts.transport_contract import TransportContract, eventually
 from tests.ros1.graph import Ros1Graph, ros1_graph
 

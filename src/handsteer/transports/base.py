@@ -1,6 +1,6 @@
-"""The interface of all transports: publishing and subscribing to topics."""
+"""The interfaces of transports, which publish and subscribe to topics, and of sessions, which join a graph."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Generic, Protocol, TypeVar, runtime_checkable
 
@@ -11,6 +11,17 @@ from handsteer.parameters import NodeParameters
 M = TypeVar("M")
 M_contra = TypeVar("M_contra", contravariant=True)
 
+UNNAMED = "a node without a name"
+"""Name of a node that was not announced, for its publishers and subscribers."""
+
+
+def many_publishers(topic: str, publishers: Sequence[str]) -> str:
+    """Return a warning about a command topic that has several ``publishers``."""
+    return (
+        f"{topic} has {len(publishers)} publishers ({', '.join(publishers)}), and a robot "
+        "obeys all of them in turn: end all but one, or give each a topic of its own by remapping"
+    )
+
 
 @dataclass(frozen=True)
 class Received(Generic[M]):
@@ -18,10 +29,10 @@ class Received(Generic[M]):
 
     Attributes:
         message: The message; it is shared with other subscribers and must not be changed.
-        captured_s: Capture time of the frame that led to this message, in seconds of the graph's clock; None if there
-            was no frame, or if the transport cannot carry it.
+        captured_s: Capture time of the frame that led to it, in seconds of the graph's clock; None if there was no
+            frame, or if the transport cannot carry it.
         is_late: Whether it was delayed by more than its topic's lifespan. Only late messages that stop the robot
-            (``Topic.stops``) are delivered, and they do not show what is commanded now.
+            (``Topic.stops``) are delivered.
         by_player: Whether a player of recordings sent it; False if the transport does not know.
     """
 
@@ -31,6 +42,7 @@ class Received(Generic[M]):
     by_player: bool = False
 
 
+Deliver = Callable[[Received[M]], None]
 Call = Callable[[], str]
 """A service call: returns a sentence at once, on any thread, or raises a HandsteerError with the reason."""
 
@@ -80,7 +92,7 @@ class Transport(Protocol):
         """
         ...
 
-    def subscribe(self, node: str, topic: Topic[M], deliver: Callable[[Received[M]], None]) -> Subscription:
+    def subscribe(self, node: str, topic: Topic[M], deliver: Deliver[M]) -> Subscription:
         """Call ``deliver`` for each message on ``topic`` from now on; a latched topic delivers its last one at once.
 
         Raises:
@@ -89,10 +101,9 @@ class Transport(Protocol):
         ...
 
     def publishers_of(self, topic: Topic[Any]) -> list[str]:
-        """Return the names of the nodes that publish ``topic`` now, as far as they are known; returns at once.
+        """Return the name of the node of each publisher of ``topic``, as far as they are known; returns at once.
 
-        A node is listed once per publisher, and two nodes of one name are listed twice. Nodes of other processes may
-        appear late, and may remain for some seconds after they were killed.
+        Nodes of other processes may appear late, and may remain for some seconds after they were killed.
         """
         ...
 
@@ -110,7 +121,7 @@ class Transport(Protocol):
 
 
 @runtime_checkable
-class TellsTypes(Protocol):
+class KnowsTypes(Protocol):
     """Additional methods of a transport that knows the types of other processes' subscribers."""
 
     def subscribed_types(self, topic: Topic[Any]) -> set[str]:
@@ -126,26 +137,27 @@ class TellsTypes(Protocol):
 
 
 class Session(Protocol):
-    """A process's membership in a graph of several processes.
-
-    Attributes:
-        name: Full name of the process in the graph, with namespace, such as ``/r1/my_camera``.
-        parameters: Parameters of this process from the graph's own parameter service, as of the start.
-        clock: The graph's time.
-        transport: Carries the graph's messages.
-    """
+    """A process's membership in a graph of several processes."""
 
     @property
-    def name(self) -> str: ...  # noqa: D102
+    def name(self) -> str:
+        """Full name of the process in the graph, with namespace, such as ``/r1/my_camera``."""
+        ...
 
     @property
-    def parameters(self) -> Mapping[str, Any]: ...  # noqa: D102
+    def parameters(self) -> Mapping[str, Any]:
+        """Parameters of this process from the graph's own parameter service, as of the start."""
+        ...
 
     @property
-    def clock(self) -> Clock: ...  # noqa: D102
+    def clock(self) -> Clock:
+        """The graph's time."""
+        ...
 
     @property
-    def transport(self) -> Transport: ...  # noqa: D102
+    def transport(self) -> Transport:
+        """Carries the graph's messages."""
+        ...
 
     def serve(self, parameters: NodeParameters) -> None:
         """Let others get and set the parameters of this process's node, if the graph supports it."""

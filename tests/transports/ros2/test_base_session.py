@@ -5,8 +5,8 @@ import pytest
 
 from handsteer.errors import TransportError
 from handsteer.messages import Time
+from handsteer.transports.ros2.base_session import RosoutHandler
 from handsteer.transports.ros2.encoding import decode, encode
-from handsteer.transports.ros2.rosout import RosoutHandler
 
 
 @pytest.fixture
@@ -28,7 +28,7 @@ def test_a_record_becomes_a_message(handler: RosoutHandler, log: logging.Logger)
     (message,) = [decode(encode(one), "rcl_interfaces/msg/Log") for one in sent]
     assert (message.level, message.name, message.msg) == (30, "r1.my_camera", "the camera is lost")
     assert (message.stamp.sec, message.function) == (7, "test_a_record_becomes_a_message")
-    assert message.file.endswith("test_rosout.py")
+    assert message.file.endswith("test_base_session.py")
     handler.send(sent.append)
     assert len(sent) == 1
 

@@ -1,12 +1,31 @@
-"""Detects messages that were delayed: a link that was interrupted delivers old ones when it recovers."""
+"""Times of messages: their capture times, late ones after an interruption of the link, and a ``/clock`` that stops."""
 
+import logging
 from collections import OrderedDict
+from typing import Any
 
-from handsteer.clock import ClockWatch
+from handsteer.clock import Clock, ClockWatch, SimulatedClock
+from handsteer.messages import Time
+
+_NO_STAMP = Time(sec=0, nanosec=0)
 
 # A sender's clock that is set back by a second is trusted again after a minute and a half; delays are shorter.
 _LEAK = 0.01
 _SENDERS = 32
+_CLOCK_SILENCE_S = 2.0
+
+log = logging.getLogger(__name__)
+
+
+def capture_time(message: Any, clock: Clock) -> float | None:
+    """Return the stamp of ``message``, in seconds of ``clock``; None if it has no header or no stamp.
+
+    It is in the future if another machine's clock is ahead of ours.
+    """
+    header = getattr(message, "header", None)
+    if header is None or header.stamp == _NO_STAMP:
+        return None
+    return clock.time_of(header.stamp)
 
 
 class StaleMessageFilter:
@@ -41,3 +60,18 @@ class StaleMessageFilter:
         if len(self._least) > _SENDERS:
             self._least.popitem(last=False)
         return apart_s is None or apart_s - least_s > self._limit_s
+
+
+class ClockMonitor:
+    """Logs when ``/clock``, which a graph's clock follows, stops; does nothing for other clocks."""
+
+    def __init__(self, clock: Clock) -> None:
+        self._clock = clock
+        self._was_silent = False
+
+    def check(self) -> None:
+        """Look whether ``/clock`` has stopped."""
+        is_silent = isinstance(self._clock, SimulatedClock) and self._clock.silence_s > _CLOCK_SILENCE_S
+        if is_silent and not self._was_silent:
+            log.warning("use_sim_time is set, but /clock stands still: frames count as old, and the robot is stopped")
+        self._was_silent = is_silent

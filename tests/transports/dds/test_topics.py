@@ -4,9 +4,21 @@ pytest.importorskip("cyclonedds")
 
 from cyclonedds.core import Policy, Qos
 
+from handsteer import messages
 from handsteer.config import RobotConfig
-from handsteer.messages import CLOCK, CMD_VEL, HAND_SIGN, IMAGE_RAW, ODOM, ROBOT_DESCRIPTION, STEERING_CMD_VEL, Topic
-from handsteer.transports.dds.qos import describe, misfits, reader_qos, writer_qos
+from handsteer.messages import (
+    CLOCK,
+    CMD_VEL,
+    HAND_SIGN,
+    IMAGE_RAW,
+    ODOM,
+    ROBOT_DESCRIPTION,
+    STEERING_CMD_VEL,
+    Topic,
+    type_name,
+)
+from handsteer.transports.dds.topics import dds_type, describe, misfits, reader_qos, writer_qos
+from handsteer.transports.ros2.encoding import dds_type_name
 
 RELIABLE = Policy.Reliability.Reliable(0)
 
@@ -58,3 +70,16 @@ def test_what_does_not_fit_one_way_fits_the_other(offered: Qos, requested: Qos, 
     if word != "ownership":  # which has to be the same
         assert misfits(requested, offered) == []
     assert misfits(offered, offered) == []
+
+
+NAMES = sorted({type_name(topic.type) for topic in vars(messages).values() if isinstance(topic, Topic)})
+
+
+@pytest.mark.parametrize("name", [*NAMES, "rmw_dds_common/msg/ParticipantEntitiesInfo"])
+def test_every_type_of_the_graph_has_a_definition_and_lets_bytes_pass(name: str) -> None:
+    kind = dds_type(name)
+    kind.__idl__.populate()
+    kind.__idl__.fill_type_data()
+    assert kind.__idl_typename__ == dds_type_name(name)
+    assert kind(b"raw").serialize(use_version_2=False) == b"raw"
+    assert kind.deserialize(b"raw").raw == b"raw"

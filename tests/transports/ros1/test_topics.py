@@ -47,7 +47,7 @@ def ends() -> Iterator[tuple[socket.socket, socket.socket]]:
 
 
 def prompt(end: socket.socket) -> tuple[Any, Connection]:
-    from handsteer.transports.ros1.prompt import PromptConnection  # noqa: PLC0415 - rospy is not everywhere
+    from handsteer.transports.ros1.topics import PromptConnection  # noqa: PLC0415 - rospy is not everywhere
 
     connection = Connection(end)
     return PromptConnection(connection, DEPTH), connection

@@ -6,7 +6,7 @@ import pytest
 pytest.importorskip("zenoh")
 
 from handsteer.errors import TransportError
-from handsteer.transports.zenoh.network import network, router_config, routers
+from handsteer.transports.zenoh.configuration import network, router_config, routers
 
 
 def setting(name: str, **environment: str) -> object:
