@@ -1,5 +1,5 @@
 from handsteer.config import ControlConfig
-from handsteer.dashboard.panels.signs import legend
+from handsteer.dashboard.drive_page import legend
 from handsteer.types import SIGNS
 
 

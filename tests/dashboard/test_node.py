@@ -7,9 +7,8 @@ import pytest
 from handsteer.clock import SteppedClock
 from handsteer.config import ControlConfig
 from handsteer.control.explain import Reason
-from handsteer.dashboard.node import DashboardNode
-from handsteer.dashboard.on_demand import OnDemandNode
-from handsteer.dashboard.pad_input import HOLD_TIMEOUT_S
+from handsteer.dashboard.node import HOLD_TIMEOUT_S, DashboardNode
+from handsteer.dashboard.viewers import OnDemandNode
 from handsteer.errors import TransportError
 from handsteer.messages import (
     CMD_VEL,

@@ -10,8 +10,6 @@ from handsteer.config import ControlConfig
 from handsteer.control.explain import Reason
 from handsteer.control.twist_mux import Source
 from handsteer.dashboard.page import spoken
-from handsteer.dashboard.panels.sliders import read_limit
-from handsteer.dashboard.panels.steer import entries, read_deflection
 from handsteer.dashboard.state import (
     STALE_S,
     Observed,
@@ -23,6 +21,8 @@ from handsteer.dashboard.state import (
     frame_rate,
     place_in_world,
 )
+from handsteer.dashboard.steer_panel import mux_inputs
+from handsteer.dashboard.steering_input import read_deflection, read_number
 from handsteer.nodes.status import CameraStatus, ControlStatus, RecognitionStatus, RobotStatus, Status
 from handsteer.types import SIGNS, ZERO, Pose2D, Velocity
 
@@ -234,9 +234,9 @@ def test_a_stop_is_said_once_the_control_obeys_it_or_when_there_is_no_control() 
 def test_at_most_one_source_has_the_robot(
     *, stopped: bool, source: Source, viewers: Viewers, holds: str | None
 ) -> None:
-    shown = entries(compose(observed(ControlStatus(source=source, stopped=stopped)), 0.1, viewers))
+    shown = mux_inputs(compose(observed(ControlStatus(source=source, stopped=stopped)), 0.1, viewers))
     assert [entry.name for entry in shown] == ["Stop", "By hand", "Signs"]
-    holding = [entry.name + (f": {entry.whose}" if entry.whose else "") for entry in shown if entry.holds]
+    holding = [entry.name + (f": {entry.viewer}" if entry.viewer else "") for entry in shown if entry.is_active]
     assert holding == ([holds] if holds else [])
 
 
@@ -267,7 +267,7 @@ def test_knows_the_limits_of_the_control() -> None:
     high=st.floats(0, 5),
 )
 def test_a_number_of_a_browser_is_within_limits_whatever_was_sent(sent: object, low: float, high: float) -> None:
-    assert low <= read_limit(sent, low, high, 0.0) <= high
+    assert low <= read_number(sent, low, high, 0.0) <= high
 
 
 def test_the_legend_is_of_what_was_last_known() -> None:

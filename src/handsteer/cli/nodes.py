@@ -145,7 +145,7 @@ def _served(node: Any, config: Config) -> Iterator[None]:
         from handsteer.dashboard.server import Dashboard  # noqa: PLC0415
 
     wires = (node.transport, node.clock, node)
-    dashboard = Dashboard(*wires, config.dashboard, cmd_vel=making.cmd_vel_topic(config), topics=True)
+    dashboard = Dashboard(*wires, config.dashboard, cmd_vel=making.cmd_vel_topic(config))
     url = dashboard.start()
     try:
         say(f"the page is at {url}")

@@ -3,14 +3,11 @@
 import math
 import threading
 from collections import deque
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, cast
 
 from handsteer.clock import Clock, to_seconds
 from handsteer.dashboard.history import PERIOD_S, Sample, VelocityHistory
-from handsteer.dashboard.lease import ControlLease
-from handsteer.dashboard.pad_input import HOLD_TIMEOUT_S
-from handsteer.dashboard.scan import scan_points
 from handsteer.dashboard.state import (
     COMMAND_HOLDS_S,
     Observed,
@@ -21,7 +18,8 @@ from handsteer.dashboard.state import (
     compose,
     place_in_world,
 )
-from handsteer.dashboard.trail import Trail
+from handsteer.dashboard.viewers import ControlLease
+from handsteer.dashboard.world_state import WorldState, scan_points
 from handsteer.errors import TransportError
 from handsteer.messages import (
     CMD_VEL,
@@ -51,36 +49,14 @@ from handsteer.nodes.steering import SteeringNode
 from handsteer.transports.base import KnowsTypes, Received, Transport
 from handsteer.types import Pose2D, Velocity
 
+HOLD_TIMEOUT_S = 0.3
+"""Steering ends when the page has not repeated it for this long: the tab was closed, or the network lost."""
+
 _WATCH_PERIOD_S = 0.05
 _FRAME_COUNTS_KEPT = 6
 _ODOMETRY_KEPT = 16
 _ODOMETRY_HOLDS_S = 0.5
 _SCAN_HOLDS_S = 1.0
-
-
-_START = Pose2D(0.0, 0.0, 0.0)
-_NO_TRAIL = Trail()
-
-
-@dataclass(frozen=True)
-class WorldState:
-    """The contents of the 3D view.
-
-    Attributes:
-        robot: Pose of the robot in the world.
-        joints: Joint angles in rad by name.
-        markers: The obstacles by namespace and id.
-        description: The robot's URDF; empty until it is known.
-        trail: The robot's path while the page was viewed.
-        scan: Points of the laser scan: x and y in the world, in metres.
-    """
-
-    robot: Pose2D = _START
-    joints: tuple[tuple[str, float], ...] = ()
-    markers: tuple[Marker, ...] = ()
-    description: str = ""
-    trail: Trail = _NO_TRAIL
-    scan: tuple[tuple[float, float], ...] = ()
 
 
 class DashboardNode(Node):
