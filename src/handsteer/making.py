@@ -38,8 +38,7 @@ def make_camera(
     Raises:
         CameraError: The camera, or its calibration, cannot be used.
     """
-    from handsteer.cameras.calibration import read_calibration
-    from handsteer.cameras.choose import open_camera
+    from handsteer.cameras.choose import open_camera, read_calibration
     from handsteer.nodes.camera import CameraNode
 
     camera = camera or open_camera(config.camera, config.virtual_hand, clock)

@@ -4,8 +4,7 @@ import pytest
 
 from handsteer.config import TeachConfig
 from handsteer.dashboard.lesson import MOST_TAKES, NO_HAND, SMALL, STILL, Lesson, hint, is_still
-from handsteer.recognition.classifier import SignGuess
-from handsteer.recognition.hand import Hand
+from handsteer.recognition.hand import Hand, SignGuess
 from handsteer.recognition.recognizer import Recognition
 from handsteer.training.custom.collect import Facts
 from handsteer.types import NONE

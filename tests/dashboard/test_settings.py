@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from handsteer.clock import SteppedClock
 from handsteer.config import Config, load
-from handsteer.config.presets import PRESETS
+from handsteer.config.driving import PRESETS
 from handsteer.dashboard.settings import Settings, SettingsFile, changed, defaults, loaded
 from handsteer.dashboard.settings_fields import FIELDS, FORM
 from handsteer.errors import ConfigError

@@ -4,7 +4,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from handsteer.cameras.noise import SensorNoise
+from handsteer.cameras.files import SensorNoise
 from handsteer.config import Config, SignsConfig
 from handsteer.errors import ConfigError
 from handsteer.images import image_message, jpeg_message

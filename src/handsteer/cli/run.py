@@ -13,7 +13,7 @@ from handsteer.cli.running import freeze_loaded_objects, say, signals_ignored
 from handsteer.cli.running import settings as make_settings
 from handsteer.clock import RealClock, SteppedClock
 from handsteer.config import Config
-from handsteer.config.presets import PRESETS
+from handsteer.config.driving import PRESETS
 from handsteer.dashboard.page_process import PageProcess
 from handsteer.errors import ConfigError
 from handsteer.graph import Graph

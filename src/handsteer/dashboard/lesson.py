@@ -8,10 +8,9 @@ from typing import Any, Final, Literal
 import numpy as np
 
 from handsteer.config import TeachConfig
-from handsteer.recognition.classifier import SignGuess
 from handsteer.recognition.custom_signs import CustomModel
 from handsteer.recognition.features import KNUCKLES, WRIST
-from handsteer.recognition.hand import Hand
+from handsteer.recognition.hand import Hand, SignGuess
 from handsteer.recognition.recognizer import Recognition
 from handsteer.recognition.shipped_signs import SURE
 from handsteer.training.custom.collect import Collector, Facts, Status

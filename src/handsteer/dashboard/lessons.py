@@ -16,9 +16,8 @@ from handsteer.dashboard.lesson_node import LessonNode, OpenModels
 from handsteer.dashboard.remote_graph import RemoteGraph
 from handsteer.errors import ConfigError, DatasetError
 from handsteer.graph import Graph
-from handsteer.recognition.classifier import Classifier
 from handsteer.recognition.custom_signs import label_for, load_custom_model, save_custom_model
-from handsteer.recognition.hand import Landmarker
+from handsteer.recognition.hand import Classifier, Landmarker
 from handsteer.recognition.recognizer import open_classifier, open_landmarker
 from handsteer.training.custom.collect import Facts
 from handsteer.training.custom.dataset import Dataset, load_dataset, save_dataset

@@ -3,7 +3,7 @@
 import logging
 from dataclasses import replace
 
-from handsteer.cameras.calibration import uncalibrated
+from handsteer.cameras.choose import uncalibrated
 from handsteer.cameras.freshness import Freshness
 from handsteer.cameras.protocol import Camera, EndOfStream, Frame
 from handsteer.clock import Clock

@@ -28,7 +28,7 @@ from handsteer.nodes.base import Node
 from handsteer.nodes.status import RecognitionStatus
 from handsteer.nodes.supervision import StopKeeper
 from handsteer.nodes.timing import CALM_S, FrameAge, LatencyLog, Recording, StallGuard
-from handsteer.recognition.classifier import Classifier
+from handsteer.recognition.hand import Classifier
 from handsteer.recognition.recognizer import Recognition, Recognizer
 from handsteer.transports.base import Received, Subscription, Transport
 from handsteer.types import NONE

@@ -7,10 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handsteer.config import Config, SignsConfig
-from handsteer.recognition.classifier import Classifier, SignGuess
 from handsteer.recognition.custom_signs import CustomClassifier, load_custom_model
 from handsteer.recognition.debouncer import Debouncer, Evidence
-from handsteer.recognition.hand import Hand, Landmarker
+from handsteer.recognition.hand import Classifier, Hand, Landmarker, SignGuess
 from handsteer.recognition.hand_selector import HandPosition, HandSelector
 from handsteer.recognition.landmarker import MediaPipeLandmarker
 from handsteer.recognition.shipped_signs import ShippedClassifier, load_model
