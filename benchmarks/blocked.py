@@ -21,7 +21,7 @@ from pathlib import Path
 import numpy as np
 
 from handsteer.config import load
-from handsteer.dashboard.apart import PageApart
+from handsteer.dashboard.page_process import PageProcess
 from handsteer.graph import Graph
 from handsteer.messages import CMD_VEL, STOP, Bool, Twist
 from handsteer.transports.base import Received
@@ -83,12 +83,12 @@ signal.signal(signal.SIGUSR2, lambda *_: block_loop())
 """
 
 
-def page_that_can_be_held() -> PageApart:
+def page_that_can_be_held() -> PageProcess:
     """Return a page whose process holds its interpreter at SIGUSR1, and blocks its event loop at SIGUSR2."""
     folder = Path(tempfile.mkdtemp())
     (folder / "sitecustomize.py").write_text(HINDERED)
     os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, [str(folder), os.environ.get("PYTHONPATH")]))
-    return PageApart()
+    return PageProcess()
 
 
 @contextmanager

@@ -29,7 +29,7 @@ from tests.processes import free_port
 from handsteer.clock import WallClock
 from handsteer.images import image_message
 from handsteer.messages import CMD_VEL, HAND_SIGN, Header, Image, String, Topic, Twist, twist
-from handsteer.nodes.node import Node
+from handsteer.nodes.base import Node
 from handsteer.transports import join
 from handsteer.transports.base import Publisher, Received, Transport
 from handsteer.transports.in_process import InProcessTransport

@@ -14,7 +14,7 @@ from ai_edge_litert.interpreter import Interpreter
 from handsteer.config import CameraConfig, Config
 from handsteer.graph import Graph
 from handsteer.messages import CMD_VEL, HAND_SIGN, String, Twist
-from handsteer.recognition import tflite
+from handsteer.recognition import landmark_models
 from handsteer.transports.base import Received
 
 CLIP = Path(__file__).parents[2] / "shared" / "data" / "videos" / "dex-retargeting_human_hand_video_1280x720.mp4"
@@ -34,7 +34,7 @@ class TimedInterpreter(Interpreter):  # type: ignore[misc]
 
 def measure(source: str, duration_s: float) -> np.ndarray:
     """Return (n, 2) milliseconds: the models' own time, and capture to Twist, of each frame."""
-    tflite.Interpreter = TimedInterpreter  # type: ignore[attr-defined]
+    landmark_models.Interpreter = TimedInterpreter  # type: ignore[attr-defined]
     models: dict[float, float] = {}
     twists: dict[float, float] = {}
     with Graph(Config(camera=CameraConfig(source=source))) as graph:

@@ -12,8 +12,8 @@ import numpy as np
 from handsteer.clock import SteppedClock
 from handsteer.config import CollisionMonitorConfig, ControlConfig, RobotConfig
 from handsteer.control.obstacles import ObstacleLimiter
+from handsteer.nodes.base import Node
 from handsteer.nodes.control import HandSignControlNode
-from handsteer.nodes.node import Node
 from handsteer.nodes.robot import RobotNode
 from handsteer.nodes.steering import SteeringNode
 from handsteer.robots.protocol import RangeScan

@@ -36,10 +36,10 @@ from tests.dashboard.network import Relay, client_of, cookies_of, deaf, deaf_pag
 from handsteer.cameras.virtual import VirtualHandCamera
 from handsteer.clock import SteppedClock
 from handsteer.config import load
-from handsteer.dashboard.apart import PageApart
+from handsteer.dashboard.page_process import PageProcess
 from handsteer.graph import Graph
 from handsteer.messages import CMD_VEL, Twist
-from handsteer.nodes.latency import LatencyLog
+from handsteer.nodes.timing import LatencyLog
 from handsteer.transports.base import Received
 
 LIMIT_BYTES_PER_S = 2_000_000
@@ -69,7 +69,7 @@ class ServedPage:
         self.graph = Graph(load(None, None, settings), steering=False)
         self.commands: list[tuple[float, float]] = []
         self.graph.transport.subscribe("benchmark", CMD_VEL, self._on_command)
-        self._page = PageApart()
+        self._page = PageProcess()
         self.url = self._page.serve(self.graph)
         self.port = urlsplit(self.url).port or 0
         self.process = str(self._page.process.pid)

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from handsteer.config import SignsConfig, load
-from handsteer.dashboard.teaching.teaching import Teaching
+from handsteer.dashboard.lessons import Lessons
 from handsteer.graph import Graph
 from handsteer.recognition.recognizer import open_classifier
 from handsteer.training.custom.dataset import Dataset
@@ -44,9 +44,9 @@ def alone(graph: Graph) -> float:
     return rate.fps()
 
 
-def wait_until(condition: Callable[[], bool], teaching: Teaching) -> None:
+def wait_until(condition: Callable[[], bool], lessons: Lessons) -> None:
     while not condition():
-        if lesson := teaching.lesson("me"):
+        if lesson := lessons.node("me"):
             lesson.attend()
         time.sleep(0.05)
 
@@ -64,24 +64,24 @@ def main() -> None:
         with Graph(load(None, base, {"teach": {**files, "take_time": 1.5, "countdown": 0.0}})) as graph:
             graph.start()
             time.sleep(2.0)
-            teaching = Teaching.of(graph)
+            lessons = Lessons.of(graph)
             before = alone(graph)
-            teaching.begin("me", "Peace")
-            lesson = teaching.lesson("me")
+            lessons.begin("me", "Peace")
+            lesson = lessons.node("me")
             assert lesson is not None
             rate, began_s = Rate(graph), time.monotonic()
             lesson.record()
-            wait_until(lambda: not lesson.view.recording, teaching)
+            wait_until(lambda: not lesson.state.recording, lessons)
             row("takes are collected", before, rate.fps(), time.monotonic() - began_s)
-            takes = Dataset(tuple(each.take for each in lesson.view.takes))
+            takes = Dataset(tuple(each.take for each in lesson.state.takes))
             rate, began_s = Rate(graph), time.monotonic()
             lesson.train()
-            wait_until(lambda: lesson.view.step != "train", teaching)
+            wait_until(lambda: lesson.state.step != "train", lessons)
             row("training in its own process", before, rate.fps(), time.monotonic() - began_s)
             rate, began_s = Rate(graph), time.monotonic()
             time.sleep(TRY_S)
             row("learnt signs are tried", before, rate.fps(), time.monotonic() - began_s)
-            teaching.close()
+            lessons.close()
             time.sleep(1.0)
             before = alone(graph)
             rate, began_s = Rate(graph), time.monotonic()

@@ -4,7 +4,7 @@ from handsteer.clock import SteppedClock
 from handsteer.config import CameraConfig, Config, VirtualHandConfig
 from handsteer.graph import Graph
 from handsteer.messages import HAND_SIGN, ODOM, Odometry, String
-from handsteer.nodes.node import Node
+from handsteer.nodes.base import Node
 from handsteer.transports.base import Received
 
 

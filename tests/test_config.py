@@ -5,7 +5,7 @@ import pytest
 
 from handsteer import config
 from handsteer.config import Config, cmd_vel_type, load
-from handsteer.config.presets import PRESETS
+from handsteer.config.driving import PRESETS
 from handsteer.errors import ConfigError
 
 

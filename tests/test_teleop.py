@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from handsteer import Config, Recognizer, Teleop, Velocity
-from handsteer.cameras.noise import SensorNoise
+from handsteer.cameras.files import SensorNoise
 from handsteer.clock import SteppedClock
 from handsteer.config import CameraConfig, ControlConfig, VirtualHandConfig
 from handsteer.errors import FrameError

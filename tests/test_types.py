@@ -105,7 +105,7 @@ def test_the_reason_names_a_taught_sign_that_stops() -> None:
     driver = TwistMux(config(actions={"Hi": "stop"}))
     driver.step(DT, sign=FORWARD)
     driver.step(DT, sign="Hi")
-    assert driver.reason == "standing: the Hi sign is shown"
+    assert str(driver.reason) == "standing: the Hi sign is shown"
 
 
 def test_names_of_signs_may_be_written_in_other_ways() -> None:

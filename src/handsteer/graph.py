@@ -5,7 +5,9 @@
     my_camera ──/image_raw──▶ hand_sign_recognition ──/gesture/hand_sign──▶ hand_sign_control ──cmd_vel──▶ robot
                                                                  steering ──/steering/cmd_vel──▲
 
-Each box is a node (:mod:`handsteer.nodes`), each arrow a topic (:mod:`handsteer.messages`). The work is done in
+Each box is a node (:mod:`handsteer.nodes`), each arrow a topic (:mod:`handsteer.messages`). The topics that join nodes
+are arguments; beyond them, every node keeps the state of ``/stop``, and publishes what only people, pages and other
+programs subscribe to. The work is done in
 packages that do not depend on nodes: :mod:`handsteer.cameras` deliver frames, :mod:`handsteer.recognition` recognises
 the hand's sign, :mod:`handsteer.control` converts it to a velocity, and :mod:`handsteer.robots` follow it. A transport
 (:mod:`handsteer.transports`) carries the messages.
@@ -14,19 +16,25 @@ the hand's sign, :mod:`handsteer.control` converts it to a velocity, and :mod:`h
 import logging
 import math
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
-from typing import Any
 
 from handsteer.clock import Clock, RealClock, SteppedClock
 from handsteer.config import Config
 from handsteer.errors import ConfigError
-from handsteer.making import make_camera, make_control, make_recognition, make_robot, make_steering, open_cameras
-from handsteer.nodes.node import Node
+from handsteer.making import (
+    cmd_vel_topic,
+    make_camera,
+    make_control,
+    make_recognition,
+    make_robot,
+    make_steering,
+    open_cameras,
+)
+from handsteer.messages import HAND_SIGN, IMAGE_COMPRESSED, IMAGE_RAW, ODOM, SCAN, STEERING_CMD_VEL
+from handsteer.nodes.base import Node
 from handsteer.nodes.steering import SteeringNode
-from handsteer.robots.course import CourseState
+from handsteer.summary import Summary
 from handsteer.transports.base import Session, Transport
 from handsteer.transports.in_process import InProcessTransport
-from handsteer.types import Pose2D
 
 log = logging.getLogger(__name__)
 
@@ -63,12 +71,24 @@ class Graph:
         self.clock = clock or RealClock()
         self.transport = transport or InProcessTransport()
         wires = (self.transport, self.clock)
-        self.robot = make_robot(config, *wires, link)
-        self.recognition = make_recognition(config, *wires)
+        cmd_vel = cmd_vel_topic(config)
+        self.robot = make_robot(config, *wires, link, cmd_vel=cmd_vel, odom=ODOM, scan=SCAN)
+        self.recognition = make_recognition(
+            config, *wires, image=IMAGE_RAW, compressed=IMAGE_COMPRESSED, sign=HAND_SIGN
+        )
         self.cameras = open_cameras(config, self.clock)
-        self.camera = make_camera(config, *wires, self.cameras)
-        self.control = make_control(config, *wires, simulated=config.robot.kind == "sim")
-        self._steering = make_steering(config, *wires) if steering else None
+        self.camera = make_camera(config, *wires, self.cameras, image=IMAGE_RAW, compressed=IMAGE_COMPRESSED)
+        self.control = make_control(
+            config,
+            *wires,
+            simulated=config.robot.kind == "sim",
+            sign=HAND_SIGN,
+            steering=STEERING_CMD_VEL,
+            cmd_vel=cmd_vel,
+            odom=ODOM,
+            scan=SCAN,
+        )
+        self._steering = make_steering(config, *wires, steering=STEERING_CMD_VEL, cmd_vel=cmd_vel) if steering else None
         self._added: tuple[Node, ...] = ()
         self._link = link
         self._began_s = self.clock.now()
@@ -166,61 +186,6 @@ class Graph:
             while any([node.spin_once() for node in reversed(self.nodes)]):
                 pass
 
-    def summary(self) -> "Summary":
+    def summary(self) -> Summary:
         """Return the statistics of the run so far."""
-        duration_s = self.clock.now() - self._began_s
-        measured = isinstance(self.clock, RealClock) and len(self.control.latency) > 0
-        return Summary(
-            duration_s=duration_s,
-            frames=self.camera.frames,
-            fps=self.camera.frames / duration_s if duration_s else 0.0,
-            latency_median_ms=self.control.latency.percentile_ms(50) if measured else None,
-            latency_p99_ms=self.control.latency.percentile_ms(99) if measured else None,
-            signs=dict(self.recognition.counts),
-            final_pose=self.robot.state.truth if self.robot.was_located else None,
-            odometry=self.robot.state.odometry if self.robot.was_located else None,
-            path_length_m=self.robot.path_length_m,
-            contacts=self.robot.state.collisions,
-            course=self.robot.course,
-            trouble=self.robot.state.trouble,
-            callback_errors=sum(node.callback_errors for node in self.nodes),
-        )
-
-
-@dataclass(frozen=True)
-class Summary:
-    """Statistics of a run.
-
-    Attributes:
-        duration_s: Length of the run.
-        frames: Frames from the camera.
-        fps: Frames per second.
-        latency_median_ms: From the capture of a frame to the resulting Twist; None if the clock was stepped.
-        latency_p99_ms: The 99th percentile of the same.
-        signs: Number of frames per confirmed sign, including ``NONE``.
-        final_pose: The robot's actual pose in the world; a real one's odometry. None if unknown.
-        odometry: The robot's pose from odometry; None if unknown.
-        path_length_m: Distance driven.
-        contacts: How often it has begun to touch an obstacle; None for a real one.
-        course: Gates, bumps and time on its world's course, with the score in seconds; None if there is no course.
-        trouble: What was wrong with the robot at the end, such as ``is not there: …``; empty if nothing.
-        callback_errors: Number of failed callbacks.
-    """
-
-    duration_s: float
-    frames: int
-    fps: float
-    latency_median_ms: float | None
-    latency_p99_ms: float | None
-    signs: dict[str, int]
-    final_pose: Pose2D | None
-    odometry: Pose2D | None
-    path_length_m: float
-    contacts: int | None
-    course: CourseState | None
-    trouble: str
-    callback_errors: int
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the fields as plain values, for JSON."""
-        return {**asdict(self), "course": self.course and self.course.as_dict()}
+        return Summary.of(self, self.clock.now() - self._began_s)

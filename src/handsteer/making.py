@@ -1,6 +1,7 @@
-"""Constructs each node of the graph from a configuration.
+"""Constructs each node of the graph from a configuration, on the standard topics unless others are given.
 
-The imports are in the functions, so that a process with one node does not load what others need.
+``topics`` of each function are those of the node's constructor, such as ``image`` or ``cmd_vel``. The imports are in
+the functions, so that a process with one node does not load what others need.
 """
 # ruff: noqa: PLC0415
 
@@ -25,14 +26,19 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 
-def make_camera(config: Config, transport: Transport, clock: Clock, camera: "Camera | None" = None) -> "CameraNode":
+def make_camera(
+    config: Config,
+    transport: Transport,
+    clock: Clock,
+    camera: "Camera | None" = None,
+    **topics: Topic[Any],
+) -> "CameraNode":
     """Return the node ``my_camera``; without a ``camera``, it opens the one that ``config`` names.
 
     Raises:
         CameraError: The camera, or its calibration, cannot be used.
     """
-    from handsteer.cameras.calibration import read_calibration
-    from handsteer.cameras.choose import open_camera
+    from handsteer.cameras.choose import open_camera, read_calibration
     from handsteer.nodes.camera import CameraNode
 
     camera = camera or open_camera(config.camera, config.virtual_hand, clock)
@@ -42,7 +48,7 @@ def make_camera(config: Config, transport: Transport, clock: Clock, camera: "Cam
     frame_id = config.camera.frame_id
     if "frame_id" not in config.camera.model_fields_set:
         frame_id = frame_prefix(transport, "my_camera") + frame_id
-    return CameraNode(transport, clock, camera, frame_id, calibration)
+    return CameraNode(transport, clock, camera, frame_id, calibration, **topics)
 
 
 def open_cameras(config: Config, clock: Clock) -> "ChoiceOfCameras":
@@ -59,7 +65,9 @@ def open_cameras(config: Config, clock: Clock) -> "ChoiceOfCameras":
     return ChoiceOfCameras(open_camera(config.camera, config.virtual_hand, clock), BrowserCamera(clock))
 
 
-def make_recognition(config: Config, transport: Transport, clock: Clock) -> "HandSignRecognitionNode":
+def make_recognition(
+    config: Config, transport: Transport, clock: Clock, **topics: Topic[Any]
+) -> "HandSignRecognitionNode":
     """Return the node ``hand_sign_recognition``.
 
     Raises:
@@ -72,7 +80,7 @@ def make_recognition(config: Config, transport: Transport, clock: Clock) -> "Han
     recognizer = Recognizer(config)
     _warn_of_unknown_signs(config, recognizer.signs)
     return HandSignRecognitionNode(
-        transport, clock, recognizer, config.signs, annotate, open_classifier=open_classifier
+        transport, clock, recognizer, config.signs, annotate, open_classifier=open_classifier, **topics
     )
 
 
@@ -86,7 +94,7 @@ def cmd_vel_topic(config: Config) -> Topic[Any]:
 
 
 def make_control(
-    config: Config, transport: Transport, clock: Clock, *, simulated: bool = False
+    config: Config, transport: Transport, clock: Clock, *, simulated: bool = False, **topics: Topic[Any]
 ) -> "HandSignControlNode":
     """Return the node ``hand_sign_control``.
 
@@ -98,12 +106,15 @@ def make_control(
     from handsteer.nodes.control import HandSignControlNode
 
     arming = config.control.arming == "on" or (config.control.arming == "auto" and not simulated)
+    topics = {"cmd_vel": cmd_vel_topic(config), **topics}
     return HandSignControlNode(
-        transport, clock, config.control, cmd_vel_topic(config), config.collision_monitor, arming=arming
+        transport, clock, config.control, collision_monitor=config.collision_monitor, arming=arming, **topics
     )
 
 
-def make_robot(config: Config, transport: Transport, clock: Clock, link: Session | None = None) -> "RobotNode":
+def make_robot(
+    config: Config, transport: Transport, clock: Clock, link: Session | None = None, **topics: Topic[Any]
+) -> "RobotNode":
     """Return the node ``robot``; one that publishes ``/clock`` runs on real time, not on its own ``/clock``.
 
     ``link`` is this process in the graph of a real robot.
@@ -117,12 +128,12 @@ def make_robot(config: Config, transport: Transport, clock: Clock, link: Session
 
     if config.robot.publish_clock and isinstance(clock, SimulatedClock):
         clock = WallClock()
-    topic = cmd_vel_topic(config)
-    robot = open_robot(config.robot, link, topic, config.control.cmd_vel_frame_id)
-    return RobotNode(transport, clock, robot, prefixed(config.robot, transport), topic)
+    topics = {"cmd_vel": cmd_vel_topic(config), **topics}
+    robot = open_robot(config.robot, link, topics["cmd_vel"], config.control.cmd_vel_frame_id)
+    return RobotNode(transport, clock, robot, prefixed(config.robot, transport), **topics)
 
 
-def make_steering(config: Config, transport: Transport, clock: Clock) -> "SteeringNode":
+def make_steering(config: Config, transport: Transport, clock: Clock, **topics: Topic[Any]) -> "SteeringNode":
     """Return the node ``steering``, whose methods are called to steer by hand, as the page does.
 
     Raises:
@@ -130,7 +141,7 @@ def make_steering(config: Config, transport: Transport, clock: Clock) -> "Steeri
     """
     from handsteer.nodes.steering import SteeringNode
 
-    return SteeringNode(transport, clock, config.control, cmd_vel_topic(config))
+    return SteeringNode(transport, clock, config.control, **{"cmd_vel": cmd_vel_topic(config), **topics})
 
 
 def _warn_of_unknown_signs(config: Config, signs: tuple[str, ...]) -> None:

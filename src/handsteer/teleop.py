@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from handsteer.cameras.freshness import Freshness
 from handsteer.config import Config
-from handsteer.control.control import Control
+from handsteer.control import Control
+from handsteer.control.explain import Reason
 from handsteer.recognition.recognizer import Recognition, Recognizer
 from handsteer.types import ZERO, Velocity
 
@@ -88,13 +89,16 @@ class Teleop:
     @property
     def reason(self) -> str:
         """A sentence on what is commanded, and why the robot is stopped if it is."""
+        return str(self._reason())
+
+    def _reason(self) -> Reason:
         safety = self._control.safety
         if safety.is_stopped:
-            return "standing: stopped, until it is reset"
+            return Reason("stopped")
         if self._refused is not None and self._velocity.is_zero:
-            return f"standing: {self._refused}"
+            return Reason("no_image", self._refused)
         if safety.signs_wait is not None:
-            return f"standing: disarmed ({safety.signs_wait or 'reset'}), moves once Stop is shown, or no hand"
+            return Reason("disarmed", safety.signs_wait or "reset")
         return self._control.mux.reason
 
     def _sign_of(self, image: NDArray[np.uint8]) -> str | None:

@@ -31,7 +31,7 @@ ARMING_S: Final = 1.0
 STEERING_AT_START_S: Final = 2.0
 """Steering first received later than this after the start was not held before it."""
 
-HELD_UP_S: Final = 0.1
+DISTRUST_S: Final = 0.1
 """For this long after a stall of the process, messages may still come from sockets and queues, and are ignored."""
 
 RECORDED_S: Final = 5.0

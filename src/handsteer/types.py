@@ -41,6 +41,21 @@ def _bare(name: str) -> str:
     return "".join(letter for letter in name.casefold() if letter not in " _-\t")
 
 
+def describe_seen(sign: str, seen: str, *, is_hand_in_view: bool) -> str:
+    """Return in words what one frame shows, and whether it counts.
+
+    Args:
+        sign: The confirmed sign.
+        seen: The sign in this frame alone.
+        is_hand_in_view: Whether there is a hand.
+    """
+    if not is_hand_in_view:
+        return "no hand is in view"
+    if seen == NONE:
+        return "the hand shows none of the signs"
+    return f"{sign} is shown" if sign == seen else f"{seen} is not confirmed yet"
+
+
 Action = Literal["forward", "backward", "turn_left", "turn_right", "stop", "go", "turbo", "next_robot"]
 """All effects of a sign on the velocity."""
 

@@ -3,7 +3,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from handsteer.cameras.calibration import read_calibration, uncalibrated
+from handsteer.cameras.choose import read_calibration, uncalibrated
 from handsteer.errors import CameraError
 
 OST = """

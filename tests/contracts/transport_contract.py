@@ -25,8 +25,8 @@ from handsteer.messages import (
     Topic,
     twist,
 )
-from handsteer.nodes.node import Node
-from handsteer.nodes.reporters import split_reporter
+from handsteer.nodes.base import Node
+from handsteer.nodes.diagnostics import split_reporter
 from handsteer.transports.base import Publisher, Received, Transport
 
 M = TypeVar("M")

@@ -3,7 +3,7 @@ import math
 import pytest
 
 from handsteer.config import ControlConfig
-from handsteer.control.control import Control
+from handsteer.control import Control
 from handsteer.types import ZERO, Velocity
 
 DT = 1 / 30

@@ -51,13 +51,13 @@ def test_broken_time_stops_whoever_drives(dt_s: float) -> None:
 
 def test_reasons_say_why_the_robot_stands() -> None:
     driver = TwistMux(ControlConfig())
-    assert driver.reason == "standing: no sign has come for 0.35 s"
+    assert str(driver.reason) == "standing: no sign has come for 0.35 s"
     reasons = []
     for sign in (NONE, STOP, FORWARD):
         driver.step(DT, sign=sign)
-        reasons.append(driver.reason)
+        reasons.append(str(driver.reason))
     driver.step(DT, steering=Velocity(0.1, 0.0))
-    reasons.append(driver.reason)
+    reasons.append(str(driver.reason))
     assert reasons == [
         "standing: no sign is seen",
         "standing: the Stop sign is shown",

@@ -2,6 +2,8 @@
 
 import http.client
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -10,14 +12,34 @@ from numpy.typing import NDArray
 
 from handsteer.clock import RealClock
 from handsteer.config import DashboardConfig
+from handsteer.dashboard.remote_graph import GraphServer, RemoteGraph
 from handsteer.dashboard.server import Dashboard
+from handsteer.graph import Graph
 from handsteer.images import image_message
 from handsteer.messages import DIAGNOSTICS, IMAGE_ANNOTATED, Header
 from handsteer.nodes.steering import SteeringNode
 from handsteer.transports.in_process import InProcessTransport
 from tests.dashboard.network import cookies_of
+from tests.transports.test_piped import joined
 
 PATIENCE_S = 20.0
+
+
+@contextmanager
+def remote(graph: Graph) -> Iterator[RemoteGraph]:
+    """Give ``graph`` as a page in another process has it; here both ends of the pipe are in this one."""
+    here, there = joined()
+    server, page = GraphServer(here, graph), RemoteGraph(there)
+    here.start()
+    there.start()
+    page.join()
+    page.steering.start()
+    try:
+        yield page
+    finally:
+        page.steering.stop()
+        there.close()
+        server.close()
 
 
 class Site:

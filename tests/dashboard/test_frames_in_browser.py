@@ -8,7 +8,7 @@ import pytest
 from playwright.sync_api import Error, Frame
 
 from handsteer.config import load
-from handsteer.dashboard.server import Dashboard
+from handsteer.dashboard.page_process import PageProcess
 from handsteer.graph import Graph
 from tests.dashboard.browsers import a_browser
 from tests.dashboard.visits import NEEDS_A_BROWSER, PATIENCE_MS, WINDOW
@@ -30,13 +30,13 @@ def url() -> Iterator[str]:
             "dashboard": {"port": 0},
         }
     )
-    with Graph(config) as graph:
+    with Graph(config, steering=False) as graph:
         graph.start()
-        dashboard = Dashboard.of(graph)
+        page = PageProcess()
         try:
-            yield dashboard.start()
+            yield page.serve(graph)
         finally:
-            dashboard.stop()
+            page.stop()
 
 
 @pytest.fixture

@@ -1,14 +1,6 @@
-import json
-
-import pytest
-from hypothesis import given
-from hypothesis import strategies as st
-
-from handsteer.config import Config, ControlConfig
-from handsteer.control.effects import effect_of, rule_from_diagnostics, rule_to_diagnostics
-from handsteer.dashboard.panels.signs import legend
-from handsteer.dashboard.state import known_signs
-from handsteer.types import ACTIONS, SIGNS, action_of
+from handsteer.config import ControlConfig
+from handsteer.dashboard.drive_page import legend
+from handsteer.types import SIGNS
 
 
 def effects(signs: tuple[str, ...], rule: ControlConfig | None) -> dict[str, tuple[str, str]]:
@@ -42,38 +34,3 @@ def test_remapped_signs_say_what_they_really_do() -> None:
 
 def test_says_what_is_built_in_while_nothing_is_known() -> None:
     assert effects(SIGNS, None)["Turn Right"] == ("turns faster to the right", "")
-
-
-@given(
-    st.builds(
-        ControlConfig,
-        ramp=st.sampled_from(["per_message", "per_second"]),
-        max_linear=st.floats(0.1, 10),
-        actions=st.dictionaries(st.sampled_from(["Peace", "Hi", "Go"]), st.sampled_from(ACTIONS)),
-    )
-)
-def test_what_a_report_tells_is_what_decides(rule: ControlConfig) -> None:
-    heard = rule_from_diagnostics(rule_to_diagnostics(rule))
-    assert heard is not None
-    for sign in (*SIGNS, "Peace", "Hi"):
-        assert action_of(sign, heard.actions) == action_of(sign, rule.actions)
-    assert all(effect_of(action, heard) == effect_of(action, rule) for action in ACTIONS)
-
-
-@pytest.mark.parametrize("wrong", [{}, {"actions": "{"}, {"max_linear": "-1"}, {"actions": '{"Stop": "go"}'}])
-def test_a_report_that_does_not_hold_tells_nothing(wrong: dict[str, str]) -> None:
-    assert rule_from_diagnostics({**rule_to_diagnostics(Config().control), **wrong} if wrong else {}) is None
-
-
-@pytest.mark.parametrize(
-    ("said", "signs"),
-    [
-        (json.dumps(["Stop", "Peace"]), ("Stop", "Peace")),
-        ("[]", SIGNS),
-        ("Stop", SIGNS),
-        ("7", SIGNS),
-        (None, SIGNS),
-    ],
-)
-def test_the_recogniser_says_which_signs_it_can_tell(said: str | None, signs: tuple[str, ...]) -> None:
-    assert known_signs({} if said is None else {"signs": said}) == signs

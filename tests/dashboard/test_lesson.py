@@ -3,9 +3,8 @@
 import pytest
 
 from handsteer.config import TeachConfig
-from handsteer.dashboard.teaching.lesson import MOST_TAKES, NO_HAND, SMALL, STILL, Lesson, hint, is_still
-from handsteer.recognition.classifier import SignGuess
-from handsteer.recognition.hand import Hand
+from handsteer.dashboard.lesson import MOST_TAKES, NO_HAND, SMALL, STILL, Lesson, hint, is_still
+from handsteer.recognition.hand import Hand, SignGuess
 from handsteer.recognition.recognizer import Recognition
 from handsteer.training.custom.collect import Facts
 from handsteer.types import NONE
@@ -27,11 +26,11 @@ def show(lesson: Lesson, seconds: float, hand: Hand | None = HAND) -> None:
     for _ in range(round(seconds * 20)):
         status = lesson.see(hand, NOTHING, 0.05)
         if status.finished is not None:
-            lesson.keep(status.finished, b"jpeg")
+            lesson.add(status.finished, b"jpeg")
 
 
 def numbers(lesson: Lesson) -> list[int]:
-    return [each.number for each in lesson.view.takes]
+    return [each.number for each in lesson.state.takes]
 
 
 def taught(lesson: Lesson) -> Lesson:
@@ -44,15 +43,15 @@ def taught(lesson: Lesson) -> Lesson:
 
 def test_takes_are_collected_one_after_the_other_each_after_a_countdown(lesson: Lesson) -> None:
     show(lesson, 2.0)
-    assert (lesson.view.takes, lesson.view.recording) == ((), False), "nothing is recorded before it is asked for"
+    assert (lesson.state.takes, lesson.state.recording) == ((), False), "nothing is recorded before it is asked for"
     lesson.record()
     show(lesson, 0.9)
-    assert (lesson.view.status.phase, lesson.view.status.hands) == ("countdown", 0)
+    assert (lesson.state.status.phase, lesson.state.status.hands) == ("countdown", 0)
     show(lesson, 0.4)
-    assert (lesson.view.status.phase, lesson.view.status.hands) == ("recording", 7)
+    assert (lesson.state.status.phase, lesson.state.status.hands) == ("recording", 7)
     show(lesson, 6.0)
-    assert (numbers(lesson), lesson.view.recording, lesson.view.can_train) == ([1, 2, 3], False, True)
-    assert {len(take.hands) for take in lesson.takes} <= {10, 11}
+    assert (numbers(lesson), lesson.state.recording, lesson.state.can_train) == ([1, 2, 3], False, True)
+    assert {len(each.take.hands) for each in lesson.state.takes} <= {10, 11}
     lesson.record()
     show(lesson, 3.0)
     assert numbers(lesson) == [1, 2, 3, 4], "further ones come singly"
@@ -78,22 +77,22 @@ def test_a_pause_drops_the_take_that_is_under_way_only(lesson: Lesson) -> None:
     kept = numbers(lesson)
     lesson.pause()
     show(lesson, 3.0)
-    assert (numbers(lesson), lesson.view.status.phase) == (kept, "ready")
+    assert (numbers(lesson), lesson.state.status.phase) == (kept, "ready")
 
 
 def test_a_take_without_hands_is_done_again(lesson: Lesson) -> None:
     lesson.record()
     show(lesson, 1.7, hand=None)
-    assert lesson.view.trouble == "Too few hands were seen: this take is done again."
+    assert lesson.state.error == "Too few hands were seen: this take is done again."
     show(lesson, 6.0)
-    assert (numbers(lesson), lesson.view.trouble) == ([1, 2, 3], "")
+    assert (numbers(lesson), lesson.state.error) == ([1, 2, 3], "")
 
 
 def test_it_is_not_trained_from_too_little_or_while_takes_are_under_way(lesson: Lesson) -> None:
     assert not lesson.begin_training()
     lesson.record()
     show(lesson, 4.0)
-    assert len(lesson.takes) == 2
+    assert len(lesson.state.takes) == 2
     assert not lesson.begin_training()
     lesson.pause()
     assert lesson.begin_training()
@@ -101,18 +100,23 @@ def test_it_is_not_trained_from_too_little_or_while_takes_are_under_way(lesson: 
     lesson.delete(1)
     lesson.record()
     show(lesson, 3.0)
-    assert (len(lesson.takes), lesson.is_recording) == (2, False), "nothing changes while it is learnt from"
+    assert (len(lesson.state.takes), lesson.state.recording) == (2, False), "nothing changes while it is learnt from"
 
 
 def test_what_was_learnt_is_tried_and_more_can_be_collected(lesson: Lesson) -> None:
     lesson.learn(model(), REPORT)
-    assert lesson.step == "collect", "nothing is learnt before the training"
+    assert lesson.state.step == "collect", "nothing is learnt before the training"
     taught(lesson)
-    assert (lesson.step, lesson.view.report) == ("try", REPORT)
+    assert (lesson.state.step, lesson.state.report) == ("try", REPORT)
     lesson.try_out(Recognition("Hi", "Hi", 0.9, 1.0, HAND))
-    assert lesson.view.seen is not None
+    assert lesson.state.seen is not None
     lesson.go_back()
-    assert (lesson.step, lesson.model, lesson.view.report, len(lesson.takes)) == ("collect", None, None, 3)
+    assert (lesson.state.step, lesson.state.model, lesson.state.report, len(lesson.state.takes)) == (
+        "collect",
+        None,
+        None,
+        3,
+    )
 
 
 def test_a_training_that_fails_leaves_the_takes(lesson: Lesson) -> None:
@@ -120,9 +124,9 @@ def test_a_training_that_fails_leaves_the_takes(lesson: Lesson) -> None:
     show(lesson, 6.0)
     lesson.begin_training()
     lesson.advance(3, 12)
-    assert lesson.view.progress == 0.25
+    assert lesson.state.progress == 0.25
     lesson.go_back("Peace looks like Stop")
-    assert (lesson.step, lesson.view.trouble, numbers(lesson)) == ("collect", "Peace looks like Stop", [1, 2, 3])
+    assert (lesson.state.step, lesson.state.error, numbers(lesson)) == ("collect", "Peace looks like Stop", [1, 2, 3])
 
 
 def test_there_is_an_end_to_the_takes() -> None:
@@ -130,7 +134,7 @@ def test_there_is_an_end_to_the_takes() -> None:
     for _ in range(3):
         lesson.record()
         show(lesson, 60.0)
-    assert len(lesson.takes) == MOST_TAKES
+    assert len(lesson.state.takes) == MOST_TAKES
 
 
 @pytest.mark.parametrize(

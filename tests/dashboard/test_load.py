@@ -10,7 +10,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from handsteer.dashboard.picture import BYTES_PER_S
+from handsteer.dashboard.camera import BYTES_PER_S
 from handsteer.messages import DiagnosticArray, DiagnosticStatus, Header, KeyValue
 from tests.dashboard.network import Relay, client_of, deaf, deaf_page, send_frame
 from tests.dashboard.served import PATIENCE_S, Site

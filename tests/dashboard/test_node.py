@@ -6,9 +6,9 @@ import pytest
 
 from handsteer.clock import SteppedClock
 from handsteer.config import ControlConfig
-from handsteer.dashboard.node import DashboardNode
-from handsteer.dashboard.on_demand import OnDemandNode
-from handsteer.dashboard.pad_input import HOLD_TIMEOUT_S
+from handsteer.control.explain import Reason
+from handsteer.dashboard.node import HOLD_TIMEOUT_S, DashboardNode
+from handsteer.dashboard.viewers import OnDemandNode
 from handsteer.errors import TransportError
 from handsteer.messages import (
     CMD_VEL,
@@ -37,6 +37,8 @@ from handsteer.messages import (
     twist,
 )
 from handsteer.nodes.control import HandSignControlNode
+from handsteer.nodes.diagnostics import write_status
+from handsteer.nodes.status import CameraStatus, ControlStatus, RecognitionStatus, RobotStatus, Status
 from handsteer.nodes.steering import SteeringNode
 from handsteer.robots.course import CourseState
 from handsteer.robots.description import robot_description
@@ -66,10 +68,8 @@ class Bench:
         self.transport.advertise("test", topic).publish(message)
         self.node.spin_once()
 
-    def report(self, name: str, message: str = "", **values: str) -> None:
-        pairs = [KeyValue(key, value) for key, value in values.items()]
-        header = Header(self.clock.stamp(self.clock.now()), "")
-        self.publish(DIAGNOSTICS, DiagnosticArray(header, [DiagnosticStatus(0, name, message, "", pairs)]))
+    def report(self, status: Status, name: str = "") -> None:
+        self.publish(DIAGNOSTICS, write_status(status, name or status.node, self.clock.stamp(self.clock.now())))
 
     def odometry(self, x: float, yaw: float = 0.0, speed: float = 0.0) -> None:
         pose = Pose(Point(x, 0.0, 0.0), Quaternion(0.0, 0.0, math.sin(yaw / 2), math.cos(yaw / 2)))
@@ -95,16 +95,16 @@ def bench() -> Bench:
 
 
 def test_keeps_the_newest_report_of_every_node_that_reports(bench: Bench) -> None:
-    bench.report("hand_sign_recognition", "Go is shown", sign="Go", seen="Go", confidence="0.9")
-    bench.report("hand_sign_recognition", "Stop is shown", sign="Stop", seen="Stop", confidence="0.8")
-    bench.report("hand_sign_control", "standing: the Stop sign is shown", source="signs")
+    bench.report(RecognitionStatus("Go", seen="Go", confidence=0.9, handedness="Left"))
+    bench.report(RecognitionStatus("Stop", seen="Stop", confidence=0.8, handedness="Left"))
+    bench.report(ControlStatus(Reason("stop_sign", "Stop"), "signs"))
     state = bench.node.state()
     assert (state.sign, state.confidence, state.reason) == ("Stop", 0.8, "the Stop sign is shown")
 
 
 def test_tells_the_cameras_frames_a_second(bench: Bench) -> None:
     for frames in (0, 12, 24):
-        bench.report("my_camera", "a clip: delivers frames", frames=str(frames))
+        bench.report(CameraStatus("a clip", "delivers", frames=frames))
         bench.step(0.5)
     assert bench.node.state().fps == pytest.approx(24.0)
 
@@ -124,10 +124,10 @@ def test_where_a_subscriber_would_pass_for_a_robot_it_shows_what_the_control_say
     bench.transport = TellingTransport()
     bench.node = DashboardNode(bench.transport, bench.clock, bench.steering, cmd_vel("auto"))
     assert not bench.transport.advertise("test", cmd_vel("auto")).has_subscribers
-    bench.report("hand_sign_control", source="signs", linear_mps="0.500", angular_radps="0.250")
+    bench.report(ControlStatus(source="signs", linear_mps=0.5, angular_radps=0.25))
     assert bench.node.state().commanded == Velocity(0.5, 0.25)
     bench.step(1.0)
-    bench.report("hand_sign_control", source="nobody", linear_mps="0.500", angular_radps="0.250")
+    bench.report(ControlStatus(source="nobody", linear_mps=0.5, angular_radps=0.25))
     assert bench.node.state().commanded == Velocity()
 
 
@@ -147,7 +147,7 @@ def test_places_the_robot_by_odometry_when_no_truth_is_known(bench: Bench) -> No
 
 def test_places_the_robot_by_its_true_pose_and_odometry_since_then(bench: Bench) -> None:
     bench.odometry(1.0)
-    bench.report("robot", "moves freely", truth=f"5.0 2.0 {math.pi / 2}")
+    bench.report(RobotStatus(truth=Pose2D(5.0, 2.0, math.pi / 2)))
     bench.step(0.02)
     bench.odometry(1.5)
     assert bench.node.world.robot == Pose2D(
@@ -156,30 +156,30 @@ def test_places_the_robot_by_its_true_pose_and_odometry_since_then(bench: Bench)
 
 
 def test_keeps_the_way_until_the_robot_is_put_back(bench: Bench) -> None:
-    bench.report("robot", "moves freely", path_length_m="0.00")
+    bench.report(RobotStatus(path_length_m=0.0))
     for x in (0.0, 0.1, 0.2, 0.2):
         bench.odometry(x)
     points = bench.node.world.trail.points
     assert points == ((0.0, 0.0), (0.1, 0.0), (0.2, 0.0))
-    bench.report("robot", "moves freely", path_length_m="0.20")
+    bench.report(RobotStatus(path_length_m=0.2))
     points = bench.node.world.trail.points
     assert len(points) == 3
-    bench.report("robot", "moves freely", path_length_m="0.00")
+    bench.report(RobotStatus(path_length_m=0.0))
     bench.odometry(0.0)
     assert bench.node.world.trail.points == ((0.0, 0.0),)
 
 
 def test_knows_how_far_the_robot_is_on_its_course(bench: Bench) -> None:
-    bench.report("robot", "moves freely")
+    bench.report(RobotStatus())
     assert bench.node.state().course is None
     course = CourseState(8, 2, frozenset({1}), 3, 12.5, "running")
-    bench.report("robot", "moves freely", **course.as_values())
+    bench.report(RobotStatus(course=course))
     assert bench.node.state().course == course
 
 
 def test_a_truth_that_is_none_is_not_taken(bench: Bench) -> None:
     bench.odometry(1.0)
-    bench.report("robot", "moves freely", truth="somewhere")
+    bench.report(RobotStatus(truth=Pose2D(math.nan, 0.0, 0.0)))
     bench.odometry(2.0)
     assert bench.node.world.robot.x == 2.0
 
@@ -281,14 +281,14 @@ def test_a_node_runs_only_while_somebody_watches() -> None:
 
 
 def test_nodes_of_processes_are_known_by_their_role_and_those_of_other_namespaces_are_left_out(bench: Bench) -> None:
-    bench.report("left_camera: my_camera", "webcam 0: delivers frames")
+    bench.report(CameraStatus("webcam 0"), "left_camera: my_camera")
     assert bench.node.state().camera == "webcam 0"
-    bench.report("r2/my_camera: my_camera", "webcam 9: delivers frames")
+    bench.report(CameraStatus("webcam 9"), "r2/my_camera: my_camera")
     assert bench.node.state().camera == "webcam 0"
 
 
 def test_tells_each_viewer_who_steers_and_who_stopped(bench: Bench) -> None:
-    bench.report("hand_sign_control", "standing: stopped, until it is reset", stopped="True")
+    bench.report(ControlStatus(Reason("stopped"), stopped=True))
     bench.node.steer("me", 0.1, 0.0)
     assert [bench.node.state(who).viewers.steers for who in ("me", "you")] == ["you", "another viewer"]
     bench.node.halt("you")
@@ -313,10 +313,10 @@ def test_only_who_drives_chooses_the_topic_and_not_while_stopped(bench: Bench) -
     bench.node.steer("me", 0.1, 0.0)
     with pytest.raises(TransportError, match="only who drives"):
         bench.node.steer_on("you", "/cmd_vel")
-    bench.report("hand_sign_control", "standing: stopped, until it is reset", stopped="True")
+    bench.report(ControlStatus(Reason("stopped"), stopped=True))
     with pytest.raises(TransportError, match="is stopped"):
         bench.node.steer_on("me", "/cmd_vel")
-    bench.report("hand_sign_control", "standing: no sign is seen", stopped="False")
+    bench.report(ControlStatus(Reason("no_sign")))
     bench.node.steer_on("me", "/cmd_vel")
     assert bench.steered[-1] == (0.0, 0.0)
     assert bench.node.state("me").viewers.topic == "/cmd_vel"
@@ -346,7 +346,11 @@ def test_a_scanner_that_falls_silent_is_drawn_no_more(bench: Bench) -> None:
     assert bench.node.world.scan == ()
 
 
-def test_what_nodes_warn_of_is_told_once(bench: Bench) -> None:
-    for name in ("hand_sign_control", "robot"):
-        bench.report(name, "driving: Forward", warning="two nodes command the robot")
-    assert bench.node.state().warnings == ("two nodes command the robot",)
+def test_a_report_of_anything_does_not_break_the_page(bench: Bench) -> None:
+    header = Header(bench.clock.stamp(0.0), "")
+    values = [KeyValue("frames", "nan"), KeyValue("truth_x", ""), KeyValue("reason_code", "why"), KeyValue("", "x")]
+    for node in ("my_camera", "hand_sign_recognition", "hand_sign_control", "robot", "somebody", ""):
+        bench.publish(DIAGNOSTICS, DiagnosticArray(header, [DiagnosticStatus(7, node, "", "", values)]))
+    state = bench.node.state()
+    assert (state.headline, state.camera, state.course) == ("Standing", "", None)
+    assert bench.node.callback_errors == 0

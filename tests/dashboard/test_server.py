@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from handsteer.dashboard.picture import next_quality, shrink
+from handsteer.dashboard.camera import next_quality, shrink
 from handsteer.errors import DashboardError
 from tests.dashboard.served import PATIENCE_S, Site
 

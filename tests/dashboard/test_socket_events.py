@@ -17,7 +17,7 @@ def space(html: str, client: str) -> dict[str, object]:
 
 
 def stopped(site: Site) -> bool:
-    node = site.dashboard.served.node.join("test")
+    node = site.dashboard.context.node.join("test")
     assert node is not None
     return node.state().viewers.stands
 

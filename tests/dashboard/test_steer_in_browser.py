@@ -165,7 +165,7 @@ def test_another_topic_is_steered_past_the_control_and_stops_as_well() -> None:
     with Graph(config) as graph, a_browser() as browser:
         topic = cmd_vel_topic(config)
         wires = (graph.transport, graph.clock, graph.steering)
-        dashboard = Dashboard(*wires, config.dashboard, cmd_vel=topic, topics=True)
+        dashboard = Dashboard(*wires, config.dashboard, cmd_vel=topic)
         url = dashboard.start()
         visit = Visit(browser.new_page(), graph)
         try:

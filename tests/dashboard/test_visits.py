@@ -8,8 +8,8 @@ from collections import Counter
 import pytest
 from nicegui import Client
 
-from handsteer.dashboard.doors import MOST_UNJOINED
 from handsteer.dashboard.history import Sample
+from handsteer.dashboard.limits import MOST_UNCONNECTED_PAGES
 from tests.dashboard.network import client_of, join_query
 from tests.dashboard.served import Site
 from tests.dashboard.sockets import PageSocket
@@ -66,10 +66,10 @@ def test_a_visit_leaves_nothing_behind(site: Site, others: set[str]) -> None:
 def test_pages_that_nobody_joins_do_not_pile_up(site: Site, others: set[str]) -> None:
     html, cookies = site.page()
     with PageSocket(site, html, cookies) as page:
-        for _ in range(MOST_UNJOINED + 5):
+        for _ in range(MOST_UNCONNECTED_PAGES + 5):
             site.page()
         newest, cookies = site.page()
-        assert len(Client.instances.keys() - others) <= MOST_UNJOINED + 1
+        assert len(Client.instances.keys() - others) <= MOST_UNCONNECTED_PAGES + 1
         assert page.client in Client.instances, "who has joined stays"
         with PageSocket(site, newest, cookies) as other:
             assert other.joined

@@ -10,7 +10,7 @@ import pytest
 from playwright.sync_api import Browser, Page
 
 from handsteer.config import load
-from handsteer.dashboard.server import Dashboard
+from handsteer.dashboard.page_process import PageProcess
 from handsteer.graph import Graph
 from tests.dashboard.browsers import a_browser
 from tests.dashboard.visits import NEEDS_A_BROWSER, PATIENCE_MS, WINDOW
@@ -38,18 +38,18 @@ def graph() -> Iterator[Graph]:
         "virtual_hand": {"script": "NONE:60"},
     }
     config = load(base={**hand, "dashboard": {"port": 0}})
-    with Graph(config) as graph:
+    with Graph(config, steering=False) as graph:
         graph.start()
         yield graph
 
 
 @pytest.fixture
 def url(graph: Graph) -> Iterator[str]:
-    dashboard = Dashboard.of(graph)
+    page = PageProcess()
     try:
-        yield dashboard.start()
+        yield page.serve(graph)
     finally:
-        dashboard.stop()
+        page.stop()
 
 
 @pytest.fixture
@@ -156,7 +156,10 @@ def test_a_browser_that_does_not_tell_of_new_pictures_sends_each_once_too(url: s
         page.evaluate("setInterval(() => window.sent || takePicture('red'), 100)")  # until it is listened to
         page.get_by_text("Use this device's camera").click()
         page.wait_for_function("window.sent > 0")
-        page.wait_for_timeout(500)  # what was painted meanwhile has come
+        sent = -1
+        while sent != page.evaluate("window.sent"):  # until what was painted meanwhile has come
+            sent = page.evaluate("window.sent")
+            page.wait_for_timeout(1000)
         for colour in ("green", "blue"):
             before = page.evaluate("window.sent")
             page.wait_for_timeout(1000)  # thirty times as long as a picture takes

@@ -1,9 +1,8 @@
 import pytest
 
-from handsteer.dashboard.panels.thing_form import figures
-from handsteer.dashboard.panels.world_editor import LARGEST_FILE_BYTES, read_file
+from handsteer.dashboard.world_editor import LARGEST_FILE_BYTES, read_file
 from handsteer.errors import WorldError
-from handsteer.robots.editing import add, edit
+from handsteer.robots.editing import add, edit, numeric_properties
 from handsteer.robots.protocol import Shape
 from handsteer.robots.world import World
 from handsteer.types import Pose2D
@@ -29,9 +28,9 @@ def test_what_is_no_file_is_refused(sent: object) -> None:
 def test_each_figure_changes_itself_and_nothing_else(shape: Shape) -> None:
     world = add(World(), shape, Pose2D(0.0, 0.0, 0.0))
     thing = world.obstacles[0]
-    before = figures(thing)
-    for index, figure in enumerate(before):
-        changed = edit(world, thing.name, figure.fields(figure.value + 0.25))
-        after = [after.value for after in figures(changed.obstacles[0])]
+    before = numeric_properties(thing)
+    for index, number in enumerate(before):
+        changed = edit(world, thing.name, number.fields(number.value + 0.25))
+        after = [after.value for after in numeric_properties(changed.obstacles[0])]
         expected = [same.value + 0.25 * (at == index) for at, same in enumerate(before)]
         assert after == pytest.approx(expected)

@@ -14,7 +14,7 @@ from playwright.sync_api import ConsoleMessage, Page, Request, ViewportSize
 from scripts import chromium
 
 from handsteer.config import load
-from handsteer.dashboard.apart import PageApart
+from handsteer.dashboard.page_process import PageProcess
 from handsteer.graph import Graph
 from tests.dashboard.browsers import a_browser
 
@@ -109,7 +109,7 @@ def visiting(
         "dashboard": {"port": 0},
     }
     with Graph(load(None, base, sections), steering=steering) as graph, a_browser(webcam) as browser:
-        served = PageApart()
+        served = PageProcess()
         url = served.serve(graph)
         visit = Visit(browser.new_page(viewport=WINDOW), graph)
         try:

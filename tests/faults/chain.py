@@ -26,9 +26,9 @@ from handsteer.messages import (
     TwistWithCovariance,
     twist,
 )
+from handsteer.nodes.base import Node
 from handsteer.nodes.camera import CameraNode
 from handsteer.nodes.control import HandSignControlNode
-from handsteer.nodes.node import Node
 from handsteer.nodes.recognition import HandSignRecognitionNode
 from handsteer.nodes.robot import RobotNode
 from handsteer.nodes.steering import SteeringNode

@@ -8,8 +8,7 @@ from numpy.typing import NDArray
 from handsteer.cameras.protocol import Frame
 from handsteer.clock import Clock
 from handsteer.config import Config, SignsConfig
-from handsteer.recognition.classifier import SignGuess
-from handsteer.recognition.hand import Hand
+from handsteer.recognition.hand import Hand, SignGuess
 from handsteer.recognition.recognizer import Recognizer
 from handsteer.types import NONE
 from tests.recognition.hands import show_sign

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from handsteer.messages import Topic
-from handsteer.nodes.node import Node
+from handsteer.nodes.base import Node
 from tests.faults.chain import Chain
 
 Act = Callable[[Chain], None]

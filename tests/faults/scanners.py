@@ -8,8 +8,8 @@ import numpy as np
 
 from handsteer.config import CollisionMonitorConfig, RobotConfig
 from handsteer.messages import SCAN
+from handsteer.nodes.base import Node
 from handsteer.nodes.control import HandSignControlNode
-from handsteer.nodes.node import Node
 from handsteer.robots.protocol import RangeScan, Robot
 from handsteer.testing.fault_transport import CUT, FROZEN, LinkFault
 from tests.faults.base import Base

@@ -16,8 +16,8 @@ from handsteer.clock import SteppedClock
 from handsteer.config import ControlConfig, RobotConfig, SignsConfig
 from handsteer.images import image_message
 from handsteer.messages import CMD_VEL, IMAGE_RAW, STEERING_CMD_VEL, STOP, Bool, Header, Image, Twist, twist
+from handsteer.nodes.base import Node
 from handsteer.nodes.control import HandSignControlNode
-from handsteer.nodes.node import Node
 from handsteer.nodes.recognition import HandSignRecognitionNode
 from handsteer.recognition.drawing import annotate
 from handsteer.recognition.recognizer import open_classifier

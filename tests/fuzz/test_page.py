@@ -9,9 +9,10 @@ from collections.abc import Iterator
 import pytest
 
 from handsteer.config import load
+from handsteer.dashboard.remote_graph import RemoteGraph
 from handsteer.dashboard.server import Dashboard
 from handsteer.graph import Graph
-from tests.dashboard.served import PATIENCE_S, Site
+from tests.dashboard.served import PATIENCE_S, Site, remote
 from tests.dashboard.sockets import PageSocket, events_of
 from tests.fuzz import corpus
 from tests.fuzz.mutants import CASES, mutants
@@ -28,7 +29,7 @@ VALUES: tuple[object, ...] = (
 class Whole(Site):
     """The page of a whole graph, which does not run: what is done by hand is all that happens."""
 
-    def __init__(self, graph: Graph) -> None:
+    def __init__(self, graph: RemoteGraph) -> None:
         self.dashboard = Dashboard.of(graph)
         self.url = self.dashboard.start()
         self.port = int(self.url.rpartition(":")[2])
@@ -42,8 +43,8 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Whole]:
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(tmp_path_factory.mktemp("work"))
         config = load(base={"camera": {"source": "virtual"}, "dashboard": {"port": 0}, "teach": {}})
-        with Graph(config) as graph:
-            site = Whole(graph)
+        with Graph(config, steering=False) as graph, remote(graph) as page:
+            site = Whole(page)
             yield site
             site.close()
 
@@ -76,7 +77,7 @@ def test_nothing_that_is_said_keeps_the_page_from_stopping_the_robot(
                 page.say("event", event)
             else:
                 page.answered("event", event)
-        node = whole.dashboard.served.node.join("test")
+        node = whole.dashboard.context.node.join("test")
         assert node is not None
         node.reset(page.client)
         element, listener = events["space"][0]

@@ -17,12 +17,10 @@ from handsteer.cameras.browser import BrowserCamera
 from handsteer.cameras.files import read_photo
 from handsteer.clock import SteppedClock
 from handsteer.config import Config, ControlConfig, load
-from handsteer.dashboard.pad_input import PadInput
-from handsteer.dashboard.panels.camera import read_words
-from handsteer.dashboard.panels.sliders import read_limit
-from handsteer.dashboard.panels.steer import read_deflection
-from handsteer.dashboard.panels.world_editor import read_file
-from handsteer.dashboard.settings_form import form
+from handsteer.dashboard.camera import read_status
+from handsteer.dashboard.settings_fields import FIELDS
+from handsteer.dashboard.steering_input import SteeringInput, read_deflection, read_number
+from handsteer.dashboard.world_editor import read_file
 from handsteer.errors import FrameError, HandsteerError, TransportError
 from handsteer.images import bgr_image, jpeg_picture
 from handsteer.messages import (
@@ -136,10 +134,10 @@ def test_what_a_page_says_of_pad_sliders_and_camera() -> None:
         x, y = read_deflection(sent)
         assert abs(x) <= 1
         assert abs(y) <= 1
-        assert 0 <= read_limit(sent, 0.0, 1.0, 0.5) <= 1
-        assert len(read_words(sent)) <= 200
+        assert 0 <= read_number(sent, 0.0, 1.0, 0.5) <= 1
+        assert len(read_status(sent)) <= 200
         at = sent.get("at") if isinstance(sent, dict) else sent
-        PadInput().keep_on(at, 1.0)
+        SteeringInput().keep_sliders(at, 1.0)
 
     hold(read, mutants([*_JSONS, b'{"words": "no camera"}']))
 
@@ -149,7 +147,7 @@ def test_configurations(tmp_path: Path) -> None:
 
 
 def test_fields_of_the_settings() -> None:
-    fields = [field for section in form().values() for field in section]
+    fields = list(FIELDS.values())
     config = Config()
     cases = enumerate(mutants([b"0.5", b"true", b"Peace: turbo, Hi: stop", b"r1, r2", b"rtsp://me:pw@h/", *ODD_YAML]))
 

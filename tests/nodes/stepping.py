@@ -4,7 +4,7 @@ from typing import TypeVar
 
 from handsteer.clock import SteppedClock
 from handsteer.messages import Topic
-from handsteer.nodes.node import Node
+from handsteer.nodes.base import Node
 from handsteer.transports.in_process import InProcessTransport
 
 M = TypeVar("M")

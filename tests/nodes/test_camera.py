@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from handsteer.cameras.calibration import uncalibrated
+from handsteer.cameras.choose import uncalibrated
 from handsteer.clock import to_seconds
 from handsteer.errors import CameraLost
 from handsteer.images import bgr_image

@@ -26,8 +26,7 @@ from handsteer.messages import (
     twist,
 )
 from handsteer.nodes.control import HandSignControlNode
-from handsteer.nodes.robot import RobotNode
-from handsteer.nodes.scans import scan_message
+from handsteer.nodes.robot import RobotNode, scan_message
 from handsteer.nodes.steering import SteeringNode
 from handsteer.robots.protocol import RangeScan
 from handsteer.robots.simulated import SimulatedRobot
@@ -155,8 +154,8 @@ def test_scans_that_say_nothing_stop_the_robot(caplog: pytest.LogCaptureFixture)
     nothing = RangeScan(-math.pi, math.tau / 360, 0.05, 8.0, np.full(360, np.nan, np.float32))
     bench.show("Forward", 10, nothing)
     assert bench.command == (0.0, 0.0)
-    assert "the laser scans that come say nothing" in bench.report()[0]
-    assert caplog.text.count("laser scans say nothing") == 1
+    assert "the laser scans that come have no valid range" in bench.report()[0]
+    assert caplog.text.count("laser scans have no valid range") == 1
 
 
 def test_it_can_be_turned_on_and_off_while_it_runs() -> None:

@@ -303,7 +303,7 @@ def test_says_that_it_is_stopped_and_then_disarmed_and_how_it_moves_again(bench:
     bench.steering.steer(0.5, 0.0)
     stop(bench, True)
     stop(bench, False)
-    assert says() == "standing: disarmed, steers once the steering has been let go"
+    assert says() == "standing: disarmed, steers once the steering has been released"
     bench.steering.release()
     assert says() == "standing: steered by hand, at zero"
 
@@ -541,5 +541,24 @@ def test_a_robot_that_nobody_hears_is_not_driven_on() -> None:
         signs.publish(String(data=sign), bench.clock.now())
         bench.run(1 / 30)
     values = {value.key: value.value for value in statuses[-1].status[0].values}
-    assert values["linear_mps"] == "0.000"
+    assert values["linear_mps"] == "0.0"
     assert "no robot listens" in statuses[-1].status[0].message
+
+
+def test_topics_may_be_others() -> None:
+    bench = Bench()
+    sign, steering = replace(HAND_SIGN, name="/my_sign"), replace(STEERING_CMD_VEL, name="/my_steering")
+    topic = replace(CMD_VEL, name="/my_cmd_vel")
+    pad = SteeringNode(bench.transport, bench.clock, steering=steering)
+    bench.nodes = [
+        HandSignControlNode(bench.transport, bench.clock, ControlConfig(), topic, sign=sign, steering=steering),
+        pad,
+    ]
+    commands, steered = bench.record(topic), bench.record(steering)
+    bench.transport.advertise("recognition", sign).publish(String(data="Forward"))
+    bench.run(0.05)
+    assert [command.linear.x for command in commands] == [0.01]
+    pad.steer(0.2, 0.0)
+    bench.run(0.05)
+    assert not pad.is_direct
+    assert (steered[-1].linear.x, commands[-1].linear.x) == (0.2, 0.2)

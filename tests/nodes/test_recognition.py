@@ -4,7 +4,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from handsteer.cameras.noise import SensorNoise
+from handsteer.cameras.files import SensorNoise
 from handsteer.config import Config, SignsConfig
 from handsteer.errors import ConfigError
 from handsteer.images import image_message, jpeg_message
@@ -121,7 +121,7 @@ def test_a_camera_with_compressed_images_only_is_taken_by_itself(caplog: pytest.
         compressed.publish(jpeg_message(bench.picture(), HEADER), bench.clock.now())
         bench.run(1 / 30)
     assert bench.names[-1] == "Forward"
-    assert "nobody publishes /image_raw: images are taken from /image_raw/compressed, of camera" in caplog.text
+    assert "no node publishes /image_raw: images are taken from /image_raw/compressed, of camera" in caplog.text
 
 
 def test_a_broken_frame_is_no_frame(bench: RecognitionBench) -> None:

@@ -17,9 +17,11 @@ from handsteer.messages import (
     cmd_vel,
     twist,
 )
+from handsteer.nodes.diagnostics import read_status
 from handsteer.nodes.robot import RobotNode
+from handsteer.nodes.status import RobotStatus
 from handsteer.robots import open_robot
-from handsteer.robots.course import CourseState, read_course
+from handsteer.robots.course import CourseState
 from handsteer.robots.editing import add, edit, remove
 from handsteer.robots.world import load_world
 from handsteer.types import Pose2D
@@ -194,6 +196,7 @@ def test_another_world_brings_its_course() -> None:
     bench.run(0.3)
     assert robot.world == load_world("slalom")
     assert robot.course == CourseState(8)
-    values = {pair.key: pair.value for pair in reports[-1].status[0].values}
-    assert read_course(values) == CourseState(8)
+    status = read_status(reports[-1].status[0])
+    assert isinstance(status, RobotStatus)
+    assert status.course == CourseState(8)
     assert robot.state.truth.x == pytest.approx(0.0, abs=1e-3)

@@ -6,9 +6,8 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from handsteer.errors import ModelCorrupt, ModelError, ModelMissing
-from handsteer.recognition.classifier import SignGuess
 from handsteer.recognition.custom_signs import CustomClassifier, load_custom_model, save_custom_model
-from handsteer.recognition.hand import Hand
+from handsteer.recognition.hand import Hand, SignGuess
 from handsteer.recognition.shipped_signs import DEFAULT_MODEL, ShippedClassifier, legibility, load_model
 from handsteer.types import NONE, SIGNS
 from tests.recognition.hands import show_sign

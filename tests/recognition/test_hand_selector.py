@@ -1,6 +1,5 @@
 from handsteer.config import SignsConfig
-from handsteer.recognition.classifier import SignGuess
-from handsteer.recognition.hand import Hand
+from handsteer.recognition.hand import Hand, SignGuess
 from handsteer.recognition.hand_selector import HandSelector
 from handsteer.types import FORWARD, GO, NONE, STOP
 from tests.recognition.hands import moved, show_sign

@@ -7,7 +7,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from handsteer.config import RobotConfig
-from handsteer.robots.course import BUMP_S, LEAP_M, MISS_S, CourseState, Referee, crosses, read_course, stopwatch
+from handsteer.robots.course import BUMP_S, LEAP_M, MISS_S, CourseState, Referee, crosses, stopwatch
 from handsteer.robots.simulated import SimulatedRobot
 from handsteer.robots.world import Gate, load_world
 from handsteer.types import Pose2D
@@ -58,15 +58,6 @@ def test_a_gate_that_is_driven_around_is_missed_and_a_bump_costs() -> None:
     assert (state.phase, state.passed, state.missed) == ("finished", 3, frozenset({1}))
     assert state.score_s == pytest.approx(state.time_s + MISS_S)
     assert CourseState(4, bumps=3, time_s=10.0).score_s == 10.0 + 3 * BUMP_S
-
-
-def test_a_restart_forgets_all() -> None:
-    referee = Referee(COURSE)
-    walk(referee, (2.5, 0.0))
-    referee.restart()
-    assert referee.state == CourseState(4)
-    referee.step(Pose2D(0.9, 0.0, 0.0), 0, 50.0)
-    assert referee.step(Pose2D(1.1, 0.0, 0.0), 0, 50.1).time_s == 0.0
 
 
 def test_no_gates_are_no_course() -> None:
@@ -138,30 +129,6 @@ def test_the_shipped_slalom_can_be_driven_cleanly() -> None:
         seen = referee.step(state.truth, state.collisions or 0, state.time_s)
     assert (seen.phase, seen.passed, seen.missed, seen.bumps) == ("finished", 8, frozenset(), 0)
     assert 10 < seen.time_s < 60
-
-
-@given(
-    state=st.builds(
-        CourseState,
-        gates=st.integers(1, 20),
-        next_gate=st.integers(0, 20),
-        missed=st.frozensets(st.integers(0, 19)),
-        bumps=st.integers(0, 99),
-        time_s=st.integers(0, 99999).map(lambda hundredths: hundredths / 100),
-        phase=st.sampled_from(["ready", "running", "finished"]),
-    )
-)
-def test_a_state_travels_as_values(state: CourseState) -> None:
-    assert read_course(state.as_values()) == state
-
-
-@pytest.mark.parametrize(
-    "wrong",
-    [{"course_gates": "many"}, {"course_missed": "a"}, {"course_time_s": "nan"}, {"course_phase": "over"}],
-)
-def test_values_that_are_something_else_are_no_state(wrong: dict[str, str]) -> None:
-    assert read_course({}) is None
-    assert read_course({**CourseState(3).as_values(), **wrong}) is None
 
 
 @pytest.mark.parametrize(

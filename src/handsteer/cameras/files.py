@@ -8,7 +8,6 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from handsteer.cameras.noise import SensorNoise
 from handsteer.cameras.protocol import EndOfStream, Frame
 from handsteer.clock import Clock, SteppedClock
 from handsteer.errors import CameraNotFound, CameraUnreadable, FrameError
@@ -23,6 +22,9 @@ MOST_PHOTO_PIXELS = 8192 * 8192
 
 _DEFAULT_FPS = 30.0
 _HIGHEST_FPS = 240.0
+
+_SHIFTS = 256
+_TICKS_PER_S = 10_000
 
 
 class VideoFile:
@@ -203,3 +205,21 @@ def read_photo(path: Path) -> NDArray[np.uint8]:
         raise CameraUnreadable(
             f"{path} is not a photo that can be decoded ({error}): try another jpg or png file"
         ) from None
+
+
+class SensorNoise:
+    """Adds 0 to 2 grey levels to each pixel; the noise depends on the seed and the time only."""
+
+    def __init__(self, seed: int = 0) -> None:
+        self._seed = seed
+        self._grain = np.zeros((0, 0, 3), np.uint8)
+
+    def on(self, image: NDArray[np.uint8], time_s: float) -> NDArray[np.uint8]:
+        """Return a copy of ``image``, (height, width, 3) uint8, with the noise of ``time_s``; white stays white."""
+        height, width = image.shape[:2]
+        if self._grain.shape[:2] != (height + _SHIFTS, width + _SHIFTS):
+            shape = (height + _SHIFTS, width + _SHIFTS, 3)
+            self._grain = np.random.default_rng(self._seed).integers(0, 3, shape, dtype=np.uint8)
+        top, left = np.random.default_rng(round(time_s * _TICKS_PER_S)).integers(0, _SHIFTS, 2)
+        grain = self._grain[top : top + height, left : left + width]
+        return np.asarray(cv2.add(image, grain), np.uint8)

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from handsteer.cameras.noise import SensorNoise
+from handsteer.cameras.files import SensorNoise
 from handsteer.cameras.protocol import Frame
 from handsteer.clock import Clock
 from handsteer.config import VirtualHandConfig

@@ -44,10 +44,8 @@ for verb in ("models", "doctor", "ros"):
 app.command("handsteer.cli.signs:app", name="signs")
 for verb in _NODES:
     app.command(f"handsteer.cli.nodes:{verb}", name=verb, group="One node of a graph of several processes")
-app.command(
-    "handsteer.cli.zenoh_router:zenoh_router", name="zenoh-router", group="One node of a graph of several processes"
-)
-app.command("handsteer.cli.robots:robots", name="robots", group="One node of a graph of several processes")
+app.command("handsteer.cli.nodes:zenoh_router", name="zenoh-router", group="One node of a graph of several processes")
+app.command("handsteer.cli.nodes:robots", name="robots", group="One node of a graph of several processes")
 
 
 def run(words: list[str]) -> int:

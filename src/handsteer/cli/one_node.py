@@ -13,7 +13,7 @@ from handsteer.cli import signals
 from handsteer.cli.running import exit_code, freeze_loaded_objects, set_up_logging, settings, signals_ignored
 from handsteer.clock import Clock
 from handsteer.config import Config
-from handsteer.nodes.node import Node
+from handsteer.nodes.base import Node
 from handsteer.parameters import NodeParameters, from_parameters
 from handsteer.transports import join
 from handsteer.transports.base import Session, Transport

@@ -13,11 +13,12 @@ from handsteer.cli.running import freeze_loaded_objects, say, signals_ignored
 from handsteer.cli.running import settings as make_settings
 from handsteer.clock import RealClock, SteppedClock
 from handsteer.config import Config
-from handsteer.config.presets import PRESETS
-from handsteer.dashboard.apart import PageApart
+from handsteer.config.driving import PRESETS
+from handsteer.dashboard.page_process import PageProcess
 from handsteer.errors import ConfigError
-from handsteer.graph import Graph, Summary
+from handsteer.graph import Graph
 from handsteer.parameters import from_parameters
+from handsteer.summary import Summary
 from handsteer.transports import join
 from handsteer.transports.base import Session
 
@@ -128,7 +129,7 @@ def _drive(
     settings: Config, link: Session | None, duration: float | None, file: Path | None, *, headless: bool, fast: bool
 ) -> Summary:
     # Started first: it loads its libraries while this process loads the models.
-    page = None if headless else PageApart()
+    page = None if headless else PageProcess()
     try:
         with Graph(settings, SteppedClock() if fast else RealClock(), link=link, steering=page is None) as graph:
             try:
@@ -146,7 +147,7 @@ def _drive(
 
 
 def _run_until_end(
-    graph: Graph, duration: float | None, file: Path | None, page: PageApart | None, *, fast: bool
+    graph: Graph, duration: float | None, file: Path | None, page: PageProcess | None, *, fast: bool
 ) -> None:
     if fast:
         graph.run_stepped(*([] if duration is None else [duration]))

@@ -10,8 +10,7 @@ from typing import Any, Literal, TypeVar
 
 from pydantic import Field, ValidationError, model_validator
 
-from handsteer.config.driving import CollisionMonitorConfig, ControlConfig, RobotConfig, RobotKind
-from handsteer.config.presets import preset
+from handsteer.config.driving import CollisionMonitorConfig, ControlConfig, RobotConfig, RobotKind, preset
 from handsteer.config.recognition import CameraConfig, LandmarksConfig, Recorded, SignsConfig, VirtualHandConfig
 from handsteer.config.section import Section
 from handsteer.errors import ConfigError

@@ -1,1 +1,80 @@
-"""Sign control and safety as pure functions and ``step(input, dt)`` classes, without clock or I/O."""
+"""Sign control and safety as pure functions and ``step(input, dt)`` classes, without clock or I/O.
+
+:class:`Control` joins them: it converts signs and steering commands to safe velocities.
+"""
+
+import math
+
+from handsteer.config import ControlConfig
+from handsteer.control.safety import Ramp, Safety
+from handsteer.control.twist_mux import TwistMux
+from handsteer.types import NONE, ZERO, Velocity, action_of
+
+
+class Control:
+    """Combines sign control, twist mux, arming, Stop, and the limits of acceleration and jerk.
+
+    Args:
+        config: Limits, steps and timeouts.
+        arming: Whether neutral is required before the first movement (:mod:`handsteer.control.safety`).
+
+    Attributes:
+        safety: Decides whether signs and steering are followed; receives Stop, resets and faults.
+        mux: Selects the active input, and explains why the robot is stopped.
+    """
+
+    def __init__(self, config: ControlConfig, *, arming: bool) -> None:
+        self._config = config
+        self.safety = Safety(config, arming=arming)
+        self.mux = TwistMux(config)
+        self._ramp = Ramp(config)
+        self._since_command_s = 0.0
+
+    def step(self, dt_s: float, *, sign: str | None = None, steering: Velocity | None = None) -> Velocity | None:
+        """Advance time by ``dt_s``, then process the inputs.
+
+        Args:
+            dt_s: Seconds since the last step, >= 0; any other value is a fault and stops the robot.
+            sign: The sign of one frame, if one was received.
+            steering: A steering command, if one was received.
+
+        Returns:
+            The velocity to command now, or None to command nothing new.
+        """
+        if not (math.isfinite(dt_s) and dt_s >= 0):
+            self.safety.fault(f"{dt_s} s is no time between two steps")
+            return self.halt()
+        self.safety.step(dt_s)
+        self._since_command_s += dt_s
+        if sign is not None:
+            stops = action_of(sign, self._config.actions) == "stop"
+            sign = sign if self.safety.admits_sign(sign, stops=stops) else NONE
+        if steering is not None and not self.safety.admits_steering(is_zero=steering.is_zero):
+            steering = ZERO
+        return self._ramped(self.mux.step(dt_s, sign=sign, steering=steering))
+
+    def halt(self) -> Velocity | None:
+        """Stop the active input; return one zero, or None if there is none."""
+        return self._ramped(self.mux.halt())
+
+    def stop(self) -> Velocity | None:
+        """Stop until :meth:`reset`; return one zero, or None if no input is active."""
+        self.safety.stop()
+        return self.halt()
+
+    def reset(self) -> None:
+        """End a Stop; each input must show neutral before it is followed again."""
+        self.safety.reset()
+
+    def reconfigure(self, config: ControlConfig) -> Velocity | None:
+        """Change limits, steps and times; return the velocity to command now if the last one exceeds the new limits."""
+        self._config = config
+        self.safety.reconfigure(config)
+        self._ramp.reconfigure(config)
+        return self._ramped(self.mux.reconfigure(config))
+
+    def _ramped(self, velocity: Velocity | None) -> Velocity | None:
+        if velocity is None:
+            return None
+        since_s, self._since_command_s = self._since_command_s, 0.0
+        return self._ramp.step(velocity, min(since_s, self._config.sign_timeout))

@@ -4,6 +4,7 @@ import math
 from typing import Literal
 
 from handsteer.config import ControlConfig
+from handsteer.control.explain import Reason
 from handsteer.control.sign_control import SignControl
 from handsteer.types import NONE, ZERO, Velocity, action_of
 
@@ -55,7 +56,7 @@ class TwistMux:
         if sign is not None:
             self._last_sign = sign
         self.source = "nobody" if self._signs.silent else "signs"
-        return self._say(velocity)
+        return self._take(velocity)
 
     def reconfigure(self, config: ControlConfig) -> Velocity | None:
         """Change limits, steps, times and actions; no change makes the robot faster.
@@ -66,7 +67,7 @@ class TwistMux:
         self._config = config
         self._signs.reconfigure(config)
         within = self._velocity.clamped(config.max_linear, config.max_angular)
-        return self._say(within if self.source != "nobody" and within != self._velocity else None)
+        return self._take(within if self.source != "nobody" and within != self._velocity else None)
 
     def hold_back(self, velocity: Velocity) -> None:
         """Continue from ``velocity``, a slower one that was commanded instead of the last."""
@@ -78,35 +79,34 @@ class TwistMux:
         was_driving = self.source != "nobody"
         self._signs.halt()
         self.source = "nobody"
-        return self._say(ZERO if was_driving else None)
+        return self._take(ZERO if was_driving else None)
 
     @property
-    def reason(self) -> str:
-        """A sentence on what is commanded, and why the robot is stopped if it is."""
+    def reason(self) -> Reason:
+        """Why this velocity is commanded."""
         if self.source == "steering":
-            return "standing: steered by hand, at zero" if self._velocity.is_zero else "driving: steered by hand"
+            return Reason("steered_at_zero" if self._velocity.is_zero else "steered")
         if self.source == "nobody":
-            return f"standing: no sign has come for {self._config.sign_timeout:g} s"
-        if not self._velocity.is_zero:
-            return f"driving: {self._last_sign}"
+            return Reason("no_input", f"{self._config.sign_timeout:g}")
         sign = self._last_sign or NONE
+        if not self._velocity.is_zero:
+            return Reason("sign", sign)
         if sign == NONE:
-            return "standing: no sign is seen"
-        stops = action_of(sign, self._config.actions) == "stop"
-        return f"standing: the {sign} sign is shown" if stops else "standing: no sign has set it in motion yet"
+            return Reason("no_sign")
+        return Reason("stop_sign", sign) if action_of(sign, self._config.actions) == "stop" else Reason("not_started")
 
     def _steer(self, wanted: Velocity) -> Velocity | None:
         config = self._config
         self._signs.halt()
         self.source = "steering"
         self._since_steering_s = 0.0
-        return self._say(wanted.clamped(config.max_linear, config.max_angular) if wanted.is_finite else ZERO)
+        return self._take(wanted.clamped(config.max_linear, config.max_angular) if wanted.is_finite else ZERO)
 
     def _wait_for_steering(self, dt_s: float) -> Velocity | None:
         self._since_steering_s += dt_s
         return self.halt() if self._since_steering_s >= self._config.steering_timeout else None
 
-    def _say(self, velocity: Velocity | None) -> Velocity | None:
+    def _take(self, velocity: Velocity | None) -> Velocity | None:
         if velocity is not None:
             self._velocity = velocity
         return velocity

@@ -12,13 +12,13 @@ import secrets
 from dataclasses import dataclass, field
 from http.cookies import CookieError, SimpleCookie
 from typing import Final, Literal
-from urllib.parse import parse_qsl, urlencode, urlsplit
+from urllib.parse import SplitResult, parse_qsl, urlencode, urlsplit
 
 from starlette.datastructures import Headers, MutableHeaders, State
 from starlette.responses import PlainTextResponse, RedirectResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from handsteer.dashboard.doors import Doors
+from handsteer.dashboard.limits import Connections
 
 # NiceGUI's pages contain inline scripts and styles, and Vue compiles their templates.
 _CONTENT: Final = {
@@ -123,7 +123,7 @@ class AccessMiddleware:
 
     Args:
         app: Handles all other requests.
-        state: Has the current :class:`Access` as ``access``, and the :class:`Doors` as ``doors``.
+        state: Has the current :class:`Access` as ``access``, and the :class:`Connections` as ``connections``.
     """
 
     def __init__(self, app: ASGIApp, state: State) -> None:
@@ -136,11 +136,11 @@ class AccessMiddleware:
             await self._app(scope, receive, send)
             return
         access: Access = self._state.access
-        doors: Doors = self._state.doors
+        connections: Connections = self._state.connections
         answer = _answer(access, scope)
         session = _cookie(Headers(scope=scope), session_cookie_name(scope))
         is_known = answer is None and access.sessions.knows(session)
-        with doors.serving(scope.get("client"), is_known=is_known):
+        with connections.serving(scope.get("client"), is_known=is_known):
             if answer is not None:
                 await _refuse(answer, scope, receive, send)
                 return
@@ -169,7 +169,7 @@ async def _refuse(answer: Response, scope: Scope, receive: Receive, send: Send) 
 
 def _answer(access: Access, scope: Scope) -> Response | None:
     headers = Headers(scope=scope)
-    if access.is_local and _name(headers.get("host", "")) not in _LOOPBACK_NAMES:
+    if access.is_local and _parts(f"//{headers.get('host', '')}").hostname not in _LOOPBACK_NAMES:
         return PlainTextResponse("this page is served to this machine only", 400)
     if _is_of_another_site(headers):
         return PlainTextResponse("pages of other sites may not use this one", 403)
@@ -193,8 +193,7 @@ def _ask_for_token(access: Access, scope: Scope, headers: Headers) -> Response |
     rest = f"?{urlencode(query)}" if query else ""
     # One slash: a browser takes what follows two slashes for another site.
     answer = RedirectResponse(f"/{scope['path'].lstrip('/')}{rest}", 303)
-    is_secure = scope.get("scheme") == "https"
-    answer.set_cookie(cookie, access.token or "", httponly=True, samesite="lax", secure=is_secure)
+    _set_cookie(answer, scope, cookie, access.token or "")
     return answer
 
 
@@ -209,8 +208,7 @@ def _drop_token(scope: Scope) -> None:
 def _with_session(send: Send, scope: Scope, session: str) -> Send:
     """Return a ``send`` that sets ``session`` as a cookie in the browser."""
     cookie = Response()
-    is_secure = scope.get("scheme") == "https"
-    cookie.set_cookie(session_cookie_name(scope), session, httponly=True, samesite="lax", secure=is_secure)
+    _set_cookie(cookie, scope, session_cookie_name(scope), session)
 
     async def send_with_cookie(message: Message) -> None:
         if message["type"] == "http.response.start":
@@ -218,6 +216,10 @@ def _with_session(send: Send, scope: Scope, session: str) -> Send:
         await send(message)
 
     return send_with_cookie
+
+
+def _set_cookie(answer: Response, scope: Scope, name: str, value: str) -> None:
+    answer.set_cookie(name, value, httponly=True, samesite="lax", secure=scope.get("scheme") == "https")
 
 
 def cookie_name(scope: Scope) -> str:
@@ -233,7 +235,7 @@ def session_cookie_name(scope: Scope) -> str:
 
 def _is_of_another_site(headers: Headers) -> bool:
     origin = headers.get("origin")
-    if origin is not None and _place(origin) != headers.get("host"):
+    if origin is not None and _parts(origin).netloc != headers.get("host"):
         return True
     if headers.get("sec-fetch-dest") in _FRAMES:  # none of our pages has frames
         return True
@@ -243,19 +245,11 @@ def _is_of_another_site(headers: Headers) -> bool:
     return not is_ours and headers.get("sec-fetch-mode") != "navigate"
 
 
-def _place(origin: str) -> str | None:
+def _parts(address: str) -> SplitResult:
     try:
-        return urlsplit(origin).netloc
+        return urlsplit(address)
     except ValueError:
-        return None
-
-
-def _name(host: str) -> str:
-    """Return the name or address in a ``Host`` header, without its port."""
-    try:
-        return urlsplit(f"//{host}").hostname or ""
-    except ValueError:
-        return ""
+        return urlsplit("")
 
 
 def _cookie(headers: Headers, name: str) -> str | None:

@@ -3,14 +3,11 @@
 import math
 import threading
 from collections import deque
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, cast
 
 from handsteer.clock import Clock, to_seconds
 from handsteer.dashboard.history import PERIOD_S, Sample, VelocityHistory
-from handsteer.dashboard.lease import ControlLease
-from handsteer.dashboard.pad_input import HOLD_TIMEOUT_S
-from handsteer.dashboard.scan import scan_points
 from handsteer.dashboard.state import (
     COMMAND_HOLDS_S,
     Observed,
@@ -21,7 +18,8 @@ from handsteer.dashboard.state import (
     compose,
     place_in_world,
 )
-from handsteer.dashboard.trail import Trail
+from handsteer.dashboard.viewers import ControlLease
+from handsteer.dashboard.world_state import WorldState, scan_points
 from handsteer.errors import TransportError
 from handsteer.messages import (
     CMD_VEL,
@@ -32,7 +30,6 @@ from handsteer.messages import (
     SCAN,
     WORLD_MARKERS,
     DiagnosticArray,
-    DiagnosticStatus,
     JointState,
     LaserScan,
     Marker,
@@ -45,42 +42,21 @@ from handsteer.messages import (
     twist_in,
     yaw_of,
 )
-from handsteer.nodes.node import Node
-from handsteer.nodes.reporters import split_reporter
+from handsteer.nodes.base import Node
+from handsteer.nodes.diagnostics import read_status, split_reporter
+from handsteer.nodes.status import CameraStatus, ControlStatus, RobotStatus
 from handsteer.nodes.steering import SteeringNode
 from handsteer.transports.base import KnowsTypes, Received, Transport
 from handsteer.types import Pose2D, Velocity
+
+HOLD_TIMEOUT_S = 0.3
+"""Steering ends when the page has not repeated it for this long: the tab was closed, or the network lost."""
 
 _WATCH_PERIOD_S = 0.05
 _FRAME_COUNTS_KEPT = 6
 _ODOMETRY_KEPT = 16
 _ODOMETRY_HOLDS_S = 0.5
 _SCAN_HOLDS_S = 1.0
-
-
-_START = Pose2D(0.0, 0.0, 0.0)
-_NO_TRAIL = Trail()
-
-
-@dataclass(frozen=True)
-class WorldState:
-    """The contents of the 3D view.
-
-    Attributes:
-        robot: Pose of the robot in the world.
-        joints: Joint angles in rad by name.
-        markers: The obstacles by namespace and id.
-        description: The robot's URDF; empty until it is known.
-        trail: The robot's path while the page was viewed.
-        scan: Points of the laser scan: x and y in the world, in metres.
-    """
-
-    robot: Pose2D = _START
-    joints: tuple[tuple[str, float], ...] = ()
-    markers: tuple[Marker, ...] = ()
-    description: str = ""
-    trail: Trail = _NO_TRAIL
-    scan: tuple[tuple[float, float], ...] = ()
 
 
 class DashboardNode(Node):
@@ -223,38 +199,33 @@ class DashboardNode(Node):
     def _on_diagnostics(self, received: Received[DiagnosticArray]) -> None:
         now = self.clock.now()
         stamp_s = to_seconds(received.message.header.stamp)
-        for status in received.message.status:
-            namespace, name = split_reporter(status.name)
-            if namespace != self._namespace:
-                continue  # of another robot
-            report = _report(status, now)
-            self._observed = replace(self._observed, reports={**self._observed.reports, name: report})
-            if name == "my_camera":
-                self._count_frames(report)
-            if name == "hand_sign_control" and self._believes_control:
-                self._take_command(report)
-            if name == "robot":
-                self._take_truth(report, stamp_s)
-                self._notice_restart(report)
+        for message in received.message.status:
+            namespace, _ = split_reporter(message.name)
+            status = read_status(message) if namespace == self._namespace else None
+            if status is None:
+                continue  # of another robot, or another program
+            reports = {**self._observed.reports, type(status): Report(status, now)}
+            self._observed = replace(self._observed, reports=reports)
+            if isinstance(status, CameraStatus):
+                self._frame_counts.append((now, status.frames))
+                self._observed = replace(self._observed, frame_counts=tuple(self._frame_counts))
+            elif isinstance(status, ControlStatus):
+                self._take_command(status)
+            elif isinstance(status, RobotStatus):
+                self._take_truth(status, stamp_s)
+                self._notice_restart(status)
 
-    def _count_frames(self, report: Report) -> None:
-        frames = report.number("frames")
-        if frames is not None:
-            self._frame_counts.append((report.came_s, frames))
-            self._observed = replace(self._observed, frame_counts=tuple(self._frame_counts))
-
-    def _take_truth(self, report: Report, stamp_s: float) -> None:
-        truth = _pose(report.values.get("truth", ""))
+    def _take_truth(self, status: RobotStatus, stamp_s: float) -> None:
         then = self._odometry_at(stamp_s)
-        if truth is not None and then is not None:
-            self._truth = (truth, then)
+        if status.truth is not None and then is not None:
+            self._truth = (status.truth, then)
 
     def _odometry_at(self, stamp_s: float) -> Pose2D | None:
         then = [pose for at_s, pose in self._odometry if at_s <= stamp_s]
         return then[-1] if then else None
 
-    def _notice_restart(self, report: Report) -> None:
-        before_m, self._path_length_m = self._path_length_m, report.number("path_length_m") or 0.0
+    def _notice_restart(self, status: RobotStatus) -> None:
+        before_m, self._path_length_m = self._path_length_m, status.path_length_m or 0.0
         if self._path_length_m < before_m:
             self.world = replace(self.world, trail=self.world.trail.anew())
 
@@ -262,10 +233,9 @@ class DashboardNode(Node):
         twist = twist_in(received.message)
         self._note_command(Velocity(twist.linear.x, twist.angular.z))
 
-    def _take_command(self, report: Report) -> None:
-        linear_mps, angular_radps = report.number("linear_mps"), report.number("angular_radps")
-        if linear_mps is not None and angular_radps is not None and report.values.get("source") != "nobody":
-            self._note_command(Velocity(linear_mps, angular_radps))
+    def _take_command(self, status: ControlStatus) -> None:
+        if self._believes_control and status.source != "nobody":
+            self._note_command(Velocity(status.linear_mps, status.angular_radps))
 
     def _note_command(self, command: Velocity) -> None:
         self._observed = replace(self._observed, command=command, command_came_s=self.clock.now())
@@ -312,19 +282,6 @@ def _drawn(markers: tuple[Marker, ...]) -> list[tuple[object, ...]]:
 
 def _reporter(message: DiagnosticArray) -> tuple[str, ...]:
     return tuple(status.name for status in message.status)
-
-
-def _report(status: DiagnosticStatus, came_s: float) -> Report:
-    return Report(status.level, status.message, {pair.key: pair.value for pair in status.values}, came_s)
-
-
-def _pose(text: str) -> Pose2D | None:
-    """Return the pose in ``text``, as "x y yaw"; None if it is invalid."""
-    try:
-        x, y, yaw = (float(part) for part in text.split())
-    except ValueError:
-        return None
-    return Pose2D(x, y, yaw)
 
 
 def _pose_of(odometry: Odometry) -> Pose2D:

@@ -1,21 +1,66 @@
-"""Common parts of all pages: the head with links to the others, the banner with the Stop button, and the lease."""
+"""What all pages share: basic elements, the head with links, the control lease, and the banner with the Stop button."""
 
 import re
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 from typing import ClassVar
 
 from nicegui import ui
 
-from handsteer.dashboard.joined import Cameras, RobotInWorld
-from handsteer.dashboard.lease import LeaseStatus, Role
+from handsteer.dashboard.lessons import Lessons
 from handsteer.dashboard.node import DashboardNode
-from handsteer.dashboard.on_demand import OnDemandNode
-from handsteer.dashboard.panels.elements import box, button, switch, text
-from handsteer.dashboard.settings_store import Settings
+from handsteer.dashboard.remote_graph import RemoteGraph
+from handsteer.dashboard.settings import Settings
 from handsteer.dashboard.state import PageState
-from handsteer.dashboard.teaching.teaching import Teaching
+from handsteer.dashboard.viewers import LeaseStatus, OnDemandNode, Role
+
+STATIC = Path(__file__).parent / "static"
+"""Scripts and styles of the pages."""
+
+UNKNOWN = "--"
+"""Shown for an unknown value."""
+
+
+@contextmanager
+def card(title: str, classes: str) -> Iterator[ui.element]:
+    """Put the elements created within into a card with a heading; yield the card."""
+    with ui.element("section").classes(f"card {classes}") as element:
+        tag("h2", "", title)
+        yield element
+
+
+def box(classes: str) -> ui.element:
+    """Return an empty ``div``."""
+    return ui.element("div").classes(classes)
+
+
+def text(classes: str, words: str) -> ui.label:
+    """Return a ``div`` with ``words``."""
+    return ui.label(words).classes(classes)
+
+
+def tag(name: str, classes: str, words: str) -> ui.label:
+    """Return an element of the tag ``name`` with ``words``."""
+    label = ui.label(words).classes(classes)
+    label.tag = name
+    return label
+
+
+def button(words: str, on_click: Callable[[], object] | None = None, label: str = "") -> ui.element:
+    """Return a button with ``words``, and an ``aria-label`` for screen readers if they need more."""
+    with ui.element("button").classes("text-button").props('type="button"') as element:
+        ui.label(words).style("display: inline")
+    if label:
+        element.props(f'aria-label="{label}"')
+    return element.on("click", on_click) if on_click else element
+
+
+def switch(element: ui.element, name: str, *, on: bool) -> None:
+    """Add the class ``name`` to ``element``, or remove it."""
+    element.classes(add=name if on else "", remove="" if on else name)
 
 
 class LeasePanel:
@@ -32,9 +77,9 @@ class LeasePanel:
         with box("lease"):
             self._question = text("question", "")
             self._words = text("role chip", "")
-            self._ask = button("Ask to drive", "").on("click", ask)
-            self._yes = button("Hand over", "").on("click", lambda: answer(True))
-            self._no = button("Keep", "").on("click", lambda: answer(False))
+            self._ask = button("Ask to drive", ask)
+            self._yes = button("Hand over", lambda: answer(True))
+            self._no = button("Keep", lambda: answer(False))
 
     def update(self, place: LeaseStatus) -> None:
         """Show the lease as this viewer sees it."""
@@ -67,9 +112,9 @@ class Banner:
             self._reason = text("reason", "waiting for the first report")
             self._warning = text("warning hidden", "")
             with box("buttons"):
-                self._reset = button("Reset", 'aria-label="Reset: let the robot be driven again"').on("click", reset)
-                self._stop = button("Stop", 'aria-label="Stop the robot (space key)" aria-keyshortcuts="Space"')
-                self._stop.classes("stop").on("click", halt)
+                self._reset = button("Reset", reset, "Reset: let the robot be driven again")
+                stop = button("Stop", halt, "Stop the robot (space key)").classes("stop")
+                stop.props('aria-keyshortcuts="Space"')
         ui.on("space", halt)
         self._mood = ""
 
@@ -90,6 +135,7 @@ PICTURE_PATH = "/camera.mjpg"
 WEBCAM_PATH = "/camera"
 ASSETS_PATH = "/assets"
 
+_ASSET = {"css": '<link rel="stylesheet" href="{}">', "js": '<script src="{}" defer></script>'}
 _LINKS = (("/", "Drive"), ("/teach", "Teach"), ("/settings", "Settings"))
 _PERIOD_S = 0.1
 _ACK_PATIENCE_S = 5.0
@@ -108,53 +154,38 @@ _THEME_ICON = (
 
 
 @dataclass(frozen=True)
-class GraphAccess:
-    """What pages can access of the graph in addition to topics; None if not accessible.
-
-    Attributes:
-        cameras: The graph's camera, which a browser's camera can replace.
-        robot: The robot with an editable world.
-        settings: The graph's parameters.
-        teaching: Runs lessons.
-    """
-
-    cameras: Cameras | None = None
-    robot: RobotInWorld | None = None
-    settings: Settings | None = None
-    teaching: Teaching | None = None
-
-
-@dataclass(frozen=True)
 class PageContext:
     """What all pages share.
 
     Attributes:
         node: Joined while a browser shows a page.
-        local: What pages can access of the graph in addition to topics.
-        topics: Whether manual steering may use topics other than the control's.
+        graph: The graph, for what pages do in addition to its topics; None if its nodes run elsewhere.
+        settings: The graph's parameters, likewise.
+        lessons: Teaches the graph signs, likewise.
     """
 
     node: OnDemandNode[DashboardNode]
-    local: GraphAccess
-    topics: bool
+    graph: RemoteGraph | None = None
+    settings: Settings | None = None
+    lessons: Lessons | None = None
 
 
 class Page:
     """One browser's view; its timers run while the browser is connected.
 
     Args:
-        served: What all pages share.
+        context: What all pages share.
         path: The page's URL path, which its link in the head shows.
+        assets: Its stylesheets and scripts.
     """
 
-    def __init__(self, served: PageContext, path: str) -> None:
+    def __init__(self, context: PageContext, path: str, *assets: str) -> None:
         self.client = ui.context.client
-        self._served = served
+        self._context = context
         self.client.on_disconnect(self._leave)
         self.client.on_delete(self._leave)
-        ui.add_head_html(
-            f'<link rel="stylesheet" href="{ASSETS_PATH}/page.css"><script src="{ASSETS_PATH}/page.js" defer></script>'
-        )
+        for name in ("page.css", "page.js", *assets):
+            ui.add_head_html(_ASSET[name.rpartition(".")[2]].format(f"{ASSETS_PATH}/{name}"))
         self._top(path)
         self._banner = Banner(self._halt, self._reset)
         self._unread: tuple[int | None, float] = (None, 0.0)
@@ -162,28 +193,28 @@ class Page:
 
     def show(self, node: DashboardNode, state: PageState) -> None:
         """Show changes, ten times a second; pages extend this."""
-        self._driving.update(self.place(node))
+        self._driving.update(self.lease(node))
         self._source.set_text(state.camera)
         self._banner.update(state)
 
     @property
-    def joined(self) -> DashboardNode | None:
+    def node(self) -> DashboardNode | None:
         """The node while the browser is connected and the page is served, else None."""
-        return self._served.node.join(self.client.id) if self.client.has_socket_connection else None
+        return self._context.node.join(self.client.id) if self.client.has_socket_connection else None
+
+    def do(self, action: Callable[[DashboardNode, str], object]) -> None:
+        """Call ``action`` with the node and this viewer, if the page is in use."""
+        if node := self.node:
+            action(node, self.client.id)
 
     def drives(self) -> bool:
         """Return whether this viewer has the control lease; a free lease is given to it."""
-        node = self.joined
+        node = self.node
         return node is not None and node.lease.take(self.client.id, node.clock.now())
 
-    def place(self, node: DashboardNode) -> LeaseStatus:
+    def lease(self, node: DashboardNode) -> LeaseStatus:
         """Return the control lease as this viewer sees it."""
         return node.lease.status_of(self.client.id, node.clock.now())
-
-    def use_own_camera(self) -> None:
-        """Select the camera of the machine that handsteer runs on, if this viewer drives."""
-        if self._served.local.cameras and self.drives():
-            self._served.local.cameras.choose("own")
 
     def _top(self, path: str) -> None:
         with ui.element("header").classes("top"):
@@ -201,7 +232,7 @@ class Page:
                     ui.html(_THEME_ICON, sanitize=False)
 
     def _update(self) -> None:
-        node = self.joined
+        node = self.node
         if node is not None and self._reads():
             self.show(node, node.state(self.client.id))
 
@@ -215,23 +246,19 @@ class Page:
         return oldest is None or now_s - self._unread[1] < _ACK_PATIENCE_S
 
     def _halt(self) -> None:
-        if node := self.joined:
-            node.halt(self.client.id)
+        self.do(lambda node, viewer: node.halt(viewer))
 
     def _reset(self) -> None:
-        if node := self.joined:
-            node.reset(self.client.id)
+        self.do(lambda node, viewer: node.reset(viewer))
 
     def _ask(self) -> None:
-        if node := self.joined:
-            node.lease.ask(self.client.id, node.clock.now())
+        self.do(lambda node, viewer: node.lease.ask(viewer, node.clock.now()))
 
     def _answer(self, hand_over: bool) -> None:
-        if node := self.joined:
-            node.lease.answer(self.client.id, hand_over=hand_over)
+        self.do(lambda node, viewer: node.lease.answer(viewer, hand_over=hand_over))
 
     def _leave(self) -> None:
-        watched = self._served.node
-        if watched.is_watched_by(self.client.id) and (node := watched.join(self.client.id)):
-            node.leave(self.client.id)
-        watched.leave(self.client.id)
+        node = self._context.node
+        if node.is_watched_by(self.client.id) and (joined := node.join(self.client.id)):
+            joined.leave(self.client.id)
+        node.leave(self.client.id)

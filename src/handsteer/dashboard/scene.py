@@ -1,13 +1,14 @@
 """The 3D view: a fixed world, the robot that drives in it, and a camera that follows the robot.
 
 The world is fixed so that its things can be dragged. The camera moves in the browser, so that viewers can also turn and
-zoom it (:mod:`handsteer.dashboard.scene_objects`).
+zoom it.
 """
 
 import logging
 import math
 from collections import defaultdict
-from collections.abc import Awaitable, Callable, Iterable, Iterator
+from collections.abc import Awaitable, Callable, Iterable, Iterator, Mapping, Sequence
+from typing import Literal
 
 import numpy as np
 from nicegui import ui
@@ -15,13 +16,232 @@ from nicegui.elements.scene.scene_object3d import Object3D
 from nicegui.events import SceneDragEventArguments
 from numpy.typing import NDArray
 
-from handsteer.dashboard.node import WorldState
-from handsteer.dashboard.scene_objects import RobotRig, ScanDots, TrailLine, View
-from handsteer.dashboard.trail import MOST_POINTS, Trail
+from handsteer.dashboard.page import STATIC
+from handsteer.dashboard.world_state import TRAIL_POINTS, Point, Trail, WorldState
 from handsteer.errors import WorldError
 from handsteer.messages import Marker, Quaternion
 from handsteer.nodes.world_markers import OBSTACLES
-from handsteer.robots.description import Joint, Vector, Visual, joints, visuals
+from handsteer.robots.description import Joint, Vector, joints, visuals
+
+View = Literal["orbit", "follow", "top"]
+"""``orbit`` follows the robot's position; ``follow`` also turns with it; ``top`` looks down, north (+y) up."""
+
+_LINES = "#2b3c63"
+_FLOOR_RADIUS_M = 12
+_LINE_WIDTH_M = 0.015
+_RING_SCALE = 1.35
+_SMALLEST_RING_M = 0.3
+_TURNING = {"continuous", "revolute"}
+
+log = logging.getLogger(__name__)
+
+
+class WorldView:
+    """Shows a :class:`~handsteer.dashboard.world_state.WorldState`; updates only what has moved."""
+
+    def __init__(self) -> None:
+        camera = ui.scene.perspective_camera(fov=45, near=0.05, far=200)
+        self._scene = ui.scene(grid=False, camera=camera, background_color="#0d1424", fps=20, click_events=[])
+        self._shown = WorldState()
+        self._obstacles: dict[tuple[str, int], tuple[int, Object3D]] = {}
+        self._view: View = "orbit"
+        self._editable = False
+        self._chosen: int | None = None
+        with self._scene:
+            with self._scene.group() as self._floor:
+                _draw_floor(self._scene)
+            self._trail = TrailLine([], TRAIL_POINTS, 0.05).material("#7aa7ff", 0.75, "both").move(z=0.004)
+            self._scan = ScanDots([], 0.05, 0.16).material("#ff6a5e")
+            self._ring = self._scene.ring(0.44, 0.5, 48).material("#ffd24a", 1.0, "both").visible(False)
+            self._robot = RobotRig(self._scene)
+        # After the scene's own handler, which would move the camera.
+        self._scene.on("init", lambda: self._robot.look(self._view))
+
+    def update(self, world: WorldState) -> None:
+        """Show ``world``."""
+        shown, self._shown = self._shown, world
+        if world.description and world.description != shown.description:
+            self._draw_robot(world.description)
+        if world.robot != shown.robot or world.joints != shown.joints:
+            self._robot.go(world.robot.x, world.robot.y, world.robot.yaw, dict(world.joints))
+            self._floor.move(round(world.robot.x), round(world.robot.y))
+        if world.trail is not shown.trail:
+            self._trail.extend(shown.trail, world.trail)
+        if world.scan != shown.scan:
+            self._scan.show(world.scan)
+        if world.markers is not shown.markers:
+            self._show_obstacles(world.markers)
+            self._show_ring()
+
+    def look(self, view: View) -> None:
+        """Move the camera to the start of ``view``."""
+        self._view = view
+        self._robot.look(view)
+
+    def edit(self, *, on: bool) -> None:
+        """Enable or disable dragging of obstacles."""
+        self._editable = on
+        for (namespace, _), (_, shape) in self._obstacles.items():
+            shape.draggable(on and namespace == OBSTACLES)
+        self.choose(None)
+
+    def choose(self, index: int | None) -> None:
+        """Mark an obstacle with a ring, or none."""
+        self._chosen = index
+        self._show_ring()
+
+    def on_drag(self, pick: Callable[[int], None], drop: Callable[[int, float, float], Awaitable[None]]) -> None:
+        """Call ``pick`` with the index of an obstacle that is dragged, and ``drop`` with its new x and y in metres."""
+
+        def picked(event: SceneDragEventArguments) -> None:
+            if (index := self._index(event.object_id)) is not None:
+                pick(index)
+
+        async def dropped(event: SceneDragEventArguments) -> None:
+            if (index := self._index(event.object_id)) is not None:
+                await drop(index, event.x, event.y)
+
+        self._scene.on_drag_start(picked).on_drag_end(dropped)
+
+    def _index(self, object_id: object) -> int | None:
+        found = (index for (_, index), (_, shape) in self._obstacles.items() if shape.id == object_id)
+        return next(found, None) if self._editable else None
+
+    def _show_ring(self) -> None:
+        chosen = [marker for marker in self._shown.markers if (marker.ns, marker.id) == (OBSTACLES, self._chosen)]
+        self._ring.visible(bool(chosen))
+        for marker in chosen:
+            size = max(_RING_SCALE * math.hypot(marker.scale.x, marker.scale.y), _SMALLEST_RING_M)
+            self._ring.move(marker.pose.position.x, marker.pose.position.y, 0.02).scale(size, size, 1.0)
+
+    def _draw_robot(self, description: str) -> None:
+        for link in self._robot.children:
+            link.delete()
+        try:
+            shapes, chain = visuals(description), list(parents_first(joints(description)))
+        except WorldError as error:
+            log.warning("the page cannot show the robot: %s", error)
+            return
+        # A link without a parent joint is the root, which is the robot itself.
+        links: defaultdict[str, Object3D] = defaultdict(lambda: self._robot)
+        with self._scene:
+            for joint in chain:
+                with links[joint.parent]:
+                    link = self._scene.group().move(*joint.xyz).rotate_R(from_rpy(joint.rpy).tolist())
+                links[joint.child] = link
+            for visual in shapes:
+                with links[visual.link]:
+                    shape = _URDF_SHAPES[visual.shape]
+                    made = _SHAPES[shape](self._scene).move(*visual.xyz)
+                _resize(made, shape, visual.size, from_rpy(visual.rpy))
+                made.material(css_colour(visual.rgba[:3]), visual.rgba[3])
+        self._robot.control([(each, links[each.child]) for each in chain if each.type in _TURNING])
+
+    def _show_obstacles(self, markers: tuple[Marker, ...]) -> None:
+        known = {
+            (marker.ns, marker.id): marker for marker in markers if marker.type in _SHAPES and marker.action == _ADD
+        }
+        for key, (shape, made) in tuple(self._obstacles.items()):
+            if key not in known or known[key].type != shape:
+                made.delete()
+                del self._obstacles[key]
+        for key, marker in known.items():
+            if key not in self._obstacles:
+                with self._scene:
+                    made = _SHAPES[marker.type](self._scene).draggable(self._editable and key[0] == OBSTACLES)
+                self._obstacles[key] = (marker.type, made)
+            _place(self._obstacles[key][1], marker)
+
+
+# Shapes of visualization_msgs/Marker, created with unit size and scaled.
+_CUBE, _SPHERE, _CYLINDER = 1, 2, 3
+_ADD = 0
+_URDF_SHAPES = {"box": _CUBE, "sphere": _SPHERE, "cylinder": _CYLINDER}
+_SHAPES: dict[int, Callable[[ui.scene], Object3D]] = {
+    _CUBE: lambda scene: scene.box(),
+    _SPHERE: lambda scene: scene.sphere(0.5),
+    _CYLINDER: lambda scene: scene.cylinder(0.5, 0.5, 1.0, 32),
+}
+
+
+def _place(made: Object3D, marker: Marker) -> None:
+    position, colour = marker.pose.position, marker.color
+    made.move(round(position.x, 3), round(position.y, 3), round(position.z, 3))
+    size = (marker.scale.x, marker.scale.y, marker.scale.z)
+    _resize(made, marker.type, size, from_quaternion(marker.pose.orientation))
+    made.material(css_colour((colour.r, colour.g, colour.b)), colour.a)
+
+
+def _resize(made: Object3D, shape: int, size: Vector, turn: "Rotation") -> None:
+    if shape == _CYLINDER:
+        size, turn = (size[0], size[2], size[1]), turn @ _Z_TO_Y
+    made.scale(*size).rotate_R(turn.round(4).tolist())
+
+
+def _draw_floor(scene: ui.scene) -> None:
+    """Draw a disc with a line every metre."""
+    disc = scene.cylinder(_FLOOR_RADIUS_M, _FLOOR_RADIUS_M, 0.01, 96).material("#151f36")
+    disc.rotate_R(_Z_TO_Y.tolist()).move(z=-0.008)
+    for at in range(1 - _FLOOR_RADIUS_M, _FLOOR_RADIUS_M):
+        reach = math.sqrt(_FLOOR_RADIUS_M**2 - at**2)
+        scene.box(_LINE_WIDTH_M, 2 * reach, 0.001).move(x=at).material(_LINES)
+        scene.box(2 * reach, _LINE_WIDTH_M, 0.001).move(y=at).material(_LINES)
+
+
+class RobotRig(Object3D, component=STATIC / "robot-rig.js"):
+    """The robot, which moves the camera of ``scene`` with it.
+
+    All motion is sent in one message, because the overhead per message exceeds the cost of its content.
+    """
+
+    def __init__(self, scene: ui.scene) -> None:
+        super().__init__(scene.id, "orbit", [], 0.0, 0.0, 0.0, [])
+        self._names: tuple[str, ...] = ()
+
+    def control(self, links: Sequence[tuple[Joint, Object3D]]) -> None:
+        """Control these links from now on, each by the angle of its joint."""
+        self._names = tuple(joint.name for joint, _ in links)
+        self.args[2] = [[link.id, *joint.rpy, *joint.axis] for joint, link in links]
+        self.args[6] = [0.0] * len(links)
+        self.run_method("control", self.args[2])
+
+    def go(self, x: float, y: float, yaw: float, angles: Mapping[str, float]) -> None:
+        """Move to x and y in metres, heading ``yaw`` in rad, with joints at ``angles`` in rad; 0 if missing."""
+        turned = [round(angles.get(name, 0.0), 2) for name in self._names]
+        pose = [round(x, 3), round(y, 3), round(yaw, 3), turned]
+        if pose != self.args[3:]:
+            self.args[3:] = pose
+            self.run_method("go", *pose)
+
+    def look(self, view: View) -> None:
+        """Move the camera to the start of ``view``."""
+        self.args[1] = view
+        self.run_method("look", view)
+
+
+class ScanDots(Object3D, component=STATIC / "scan.js"):
+    """A laser scan, as dots on the floor; its arguments are the points, and the dots' size and height in metres."""
+
+    def show(self, points: Sequence[Point]) -> None:
+        """Draw these points instead of the previous ones."""
+        self.args[0] = [list(point) for point in points]
+        self.run_method("show", self.args[0])
+
+
+class TrailLine(Object3D, component=STATIC / "trail.js"):
+    """The robot's trail; its arguments are the points, the most of them, and the line's width in metres."""
+
+    def extend(self, shown: Trail, trail: Trail) -> None:
+        """Draw ``trail``, of which ``shown`` is drawn already, unless it is an earlier one."""
+        if trail.number != shown.number:
+            self.args[0] = []
+            self.run_method("clear")
+            shown = Trail()
+        if points := trail.since(shown):
+            new = [[round(x, 2), round(y, 2)] for x, y in points]
+            self.args[0] = [*self.args[0], *new][-self.args[1] :]
+            self.run_method("extend", new)
+
 
 Rotation = NDArray[np.float64]
 """A rotation matrix, (3, 3)."""
@@ -56,215 +276,16 @@ def css_colour(rgb: Iterable[float]) -> str:
 
 
 def parents_first(joints: Iterable[Joint]) -> Iterator[Joint]:
-    """Yield each joint after the one that holds its parent link; joints in a loop are left out."""
+    """Yield each joint after its parent's joint; joints in a loop are left out."""
     waiting = list(joints)
     while waiting:
-        held = {joint.child for joint in waiting}
-        ready = [joint for joint in waiting if joint.parent not in held]
+        children = {joint.child for joint in waiting}
+        ready = [joint for joint in waiting if joint.parent not in children]
         if not ready:
             return
         yield from ready
-        waiting = [joint for joint in waiting if joint.parent in held]
+        waiting = [joint for joint in waiting if joint.parent in children]
 
-
-log = logging.getLogger(__name__)
-
-_SKY = "#0d1424"
-_FLOOR = "#151f36"
-_LINES = "#2b3c63"
-_FLOOR_RADIUS_M = 12
-_LINE_WIDTH_M = 0.015
-_FRAMES_PER_S = 20
-_TRAIL = "#7aa7ff"
-_TRAIL_WIDTH_M = 0.05
-_TRAIL_HEIGHT_M = 0.004
-_SCAN = "#ff6a5e"
-_SCAN_DOT_M = 0.05
-_SCAN_HEIGHT_M = 0.16
-_RING = "#ffd24a"
-_RING_INNER = 0.44
-_RING_SPARE = 1.35
-_SMALLEST_RING_M = 0.3
-_RING_HEIGHT_M = 0.02
-
-# Shapes of visualization_msgs/Marker, created with unit size and scaled.
-_CUBE, _SPHERE, _CYLINDER = 1, 2, 3
-_ADD = 0
-
-_TURNING = {"continuous", "revolute"}
 
 # A cylinder's axis is y in three.js, and z in ROS.
 _Z_TO_Y: Rotation = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
-
-
-class WorldView:
-    """Shows a :class:`~handsteer.dashboard.node.WorldState`; updates only what has moved.
-
-    Args:
-        on_pick: Called with the index of an obstacle when a drag of it starts, while the view is editable.
-        on_drop: Called with its index, and x and y in metres, when it is dropped elsewhere.
-    """
-
-    def __init__(
-        self,
-        on_pick: Callable[[int], None] | None = None,
-        on_drop: Callable[[int, float, float], Awaitable[None]] | None = None,
-    ) -> None:
-        camera = ui.scene.perspective_camera(fov=45, near=0.05, far=200)
-        scene = ui.scene(grid=False, camera=camera, background_color=_SKY, fps=_FRAMES_PER_S, click_events=[])
-        scene.on_drag_start(self._picked).on_drag_end(self._dropped)
-        self._on_pick, self._on_drop = on_pick, on_drop
-        self._scene = scene
-        self._shown = WorldState()
-        self._obstacles: dict[tuple[str, int], tuple[int, Object3D]] = {}
-        self._view: View = "orbit"
-        self._editable = False
-        self._chosen: int | None = None
-        with scene:
-            with scene.group() as self._floor:
-                _draw_floor(scene)
-            self._trail = TrailLine(MOST_POINTS, _TRAIL_WIDTH_M).material(_TRAIL, 0.75, "both").move(z=_TRAIL_HEIGHT_M)
-            self._scan = ScanDots(_SCAN_DOT_M, _SCAN_HEIGHT_M).material(_SCAN)
-            self._ring = scene.ring(_RING_INNER, 0.5, 48).material(_RING, 1.0, "both").visible(False)
-            self._robot = RobotRig(scene)
-        # After the scene's own handler, which would move the camera.
-        scene.on("init", lambda: self._robot.look(self._view))
-
-    def update(self, world: WorldState) -> None:
-        """Show ``world``."""
-        shown, self._shown = self._shown, world
-        if world.description and world.description != shown.description:
-            self._draw_robot(world.description)
-        if world.robot != shown.robot or world.joints != shown.joints:
-            self._robot.go(world.robot.x, world.robot.y, world.robot.yaw, dict(world.joints))
-            self._floor.move(round(world.robot.x), round(world.robot.y))
-        if world.trail is not shown.trail:
-            self._draw_trail(shown.trail, world.trail)
-        if world.scan != shown.scan:
-            self._scan.show(world.scan)
-        if world.markers is not shown.markers:
-            self._show_obstacles(world.markers)
-            self._show_ring()
-
-    def look(self, view: View) -> None:
-        """Move the camera to the start of ``view``."""
-        self._view = view
-        self._robot.look(view)
-
-    def edit(self, *, on: bool) -> None:
-        """Enable or disable dragging of obstacles."""
-        self._editable = on
-        for (namespace, _), (_, shape) in self._obstacles.items():
-            shape.draggable(on and namespace == OBSTACLES)
-        self.choose(None)
-
-    def choose(self, index: int | None) -> None:
-        """Mark an obstacle with a ring, or none."""
-        self._chosen = index
-        self._show_ring()
-
-    def _picked(self, event: SceneDragEventArguments) -> None:
-        index = self._index(event.object_id)
-        if index is not None and self._on_pick:
-            self._on_pick(index)
-
-    async def _dropped(self, event: SceneDragEventArguments) -> None:
-        index = self._index(event.object_id)
-        if index is not None and self._on_drop:
-            await self._on_drop(index, event.x, event.y)
-
-    def _index(self, object_id: object) -> int | None:
-        found = (index for (namespace, index), (_, shape) in self._obstacles.items() if shape.id == object_id)
-        return next(found, None) if self._editable else None
-
-    def _draw_trail(self, shown: Trail, trail: Trail) -> None:
-        if trail.number != shown.number:
-            self._trail.clear()
-            shown = Trail()
-        if points := trail.since(shown):
-            self._trail.extend(points)
-
-    def _show_ring(self) -> None:
-        chosen = [marker for marker in self._shown.markers if (marker.ns, marker.id) == (OBSTACLES, self._chosen)]
-        self._ring.visible(bool(chosen))
-        for marker in chosen:
-            size = max(_RING_SPARE * math.hypot(marker.scale.x, marker.scale.y), _SMALLEST_RING_M)
-            self._ring.move(marker.pose.position.x, marker.pose.position.y, _RING_HEIGHT_M).scale(size, size, 1.0)
-
-    def _draw_robot(self, description: str) -> None:
-        for link in self._robot.children:
-            link.delete()
-        try:
-            shapes, held = visuals(description), joints(description)
-        except WorldError as error:
-            log.warning("the page cannot show the robot: %s", error)
-            return
-        # A link without a parent joint is the root, which is the robot itself.
-        links: defaultdict[str, Object3D] = defaultdict(lambda: self._robot)
-        turning: list[tuple[Joint, Object3D]] = []
-        with self._scene:
-            for joint in parents_first(held):
-                with links[joint.parent]:
-                    link = self._scene.group().move(*joint.xyz).rotate_R(from_rpy(joint.rpy).tolist())
-                links[joint.child] = link
-                if joint.type in _TURNING:
-                    turning.append((joint, link))
-            for visual in shapes:
-                with links[visual.link]:
-                    _draw(self._scene, visual)
-        self._robot.hold(turning)
-
-    def _show_obstacles(self, markers: tuple[Marker, ...]) -> None:
-        known = {
-            (marker.ns, marker.id): marker for marker in markers if marker.type in _SHAPES and marker.action == _ADD
-        }
-        for key in self._obstacles.keys() - known.keys():
-            self._obstacles.pop(key)[1].delete()
-        for key, marker in known.items():
-            if key not in self._obstacles or self._obstacles[key][0] != marker.type:
-                self._make_obstacle(key, marker.type)
-            _place(self._obstacles[key][1], marker)
-
-    def _make_obstacle(self, key: tuple[str, int], shape: int) -> None:
-        if key in self._obstacles:
-            self._obstacles.pop(key)[1].delete()
-        with self._scene:
-            made = _SHAPES[shape](self._scene).draggable(self._editable and key[0] == OBSTACLES)
-        self._obstacles[key] = (shape, made)
-
-
-def _draw(scene: ui.scene, visual: Visual) -> None:
-    shape = _SHAPES[_URDF_SHAPES[visual.shape]](scene)
-    _resize(shape, visual.size, from_rpy(visual.rpy), is_cylinder=visual.shape == "cylinder")
-    shape.move(*visual.xyz).material(css_colour(visual.rgba[:3]), visual.rgba[3])
-
-
-_URDF_SHAPES = {"box": _CUBE, "sphere": _SPHERE, "cylinder": _CYLINDER}
-_SHAPES: dict[int, Callable[[ui.scene], Object3D]] = {
-    _CUBE: lambda scene: scene.box(),
-    _SPHERE: lambda scene: scene.sphere(0.5),
-    _CYLINDER: lambda scene: scene.cylinder(0.5, 0.5, 1.0, 32),
-}
-
-
-def _place(shape: Object3D, marker: Marker) -> None:
-    position, size = marker.pose.position, (marker.scale.x, marker.scale.y, marker.scale.z)
-    shape.move(round(position.x, 3), round(position.y, 3), round(position.z, 3))
-    _resize(shape, size, from_quaternion(marker.pose.orientation), is_cylinder=marker.type == _CYLINDER)
-    shape.material(css_colour((marker.color.r, marker.color.g, marker.color.b)), marker.color.a)
-
-
-def _resize(shape: Object3D, size: Vector, turn: Rotation, *, is_cylinder: bool) -> None:
-    x, y, z = size
-    shape.scale(*((x, z, y) if is_cylinder else size))
-    shape.rotate_R((turn @ _Z_TO_Y if is_cylinder else turn).round(4).tolist())
-
-
-def _draw_floor(scene: ui.scene) -> None:
-    """Draw a disc with a line every metre."""
-    disc = scene.cylinder(_FLOOR_RADIUS_M, _FLOOR_RADIUS_M, 0.01, 96).material(_FLOOR)
-    disc.rotate_R(_Z_TO_Y.tolist()).move(z=-0.008)
-    for at in range(1 - _FLOOR_RADIUS_M, _FLOOR_RADIUS_M):
-        reach = math.sqrt(_FLOOR_RADIUS_M**2 - at**2)
-        scene.box(_LINE_WIDTH_M, 2 * reach, 0.001).move(x=at).material(_LINES)
-        scene.box(2 * reach, _LINE_WIDTH_M, 0.001).move(y=at).material(_LINES)

@@ -21,21 +21,19 @@ from handsteer.cameras.browser import LARGEST_BYTES
 from handsteer.clock import Clock
 from handsteer.config import DashboardConfig
 from handsteer.dashboard.access import HEADERS, Access, AccessMiddleware
-from handsteer.dashboard.doors import Doors, Unjoined
-from handsteer.dashboard.drive import DrivePage
+from handsteer.dashboard.camera import FrameSocket, PictureNode, PictureResponse
+from handsteer.dashboard.drive_page import DrivePage
 from handsteer.dashboard.history import VelocityHistory
-from handsteer.dashboard.joined import JoinedGraph
+from handsteer.dashboard.lesson_page import LessonPage
+from handsteer.dashboard.lessons import Lessons
+from handsteer.dashboard.limits import Connections, UnconnectedPages, limit_log
 from handsteer.dashboard.node import DashboardNode
-from handsteer.dashboard.on_demand import OnDemandNode
-from handsteer.dashboard.page import ASSETS_PATH, ICON, PICTURE_PATH, WEBCAM_PATH, GraphAccess, PageContext
-from handsteer.dashboard.page_log import keep_short
-from handsteer.dashboard.picture import FrameSocket, PictureNode, PictureResponse
-from handsteer.dashboard.settings import SettingsPage
-from handsteer.dashboard.settings_file import DEFAULT_FILE, SettingsFile
-from handsteer.dashboard.settings_store import Settings
+from handsteer.dashboard.page import ASSETS_PATH, ICON, PICTURE_PATH, STATIC, WEBCAM_PATH, PageContext
+from handsteer.dashboard.remote_graph import RemoteGraph
+from handsteer.dashboard.settings import DEFAULT_FILE, Settings, SettingsFile
+from handsteer.dashboard.settings_page import SettingsPage
 from handsteer.dashboard.socket_events import SocketEvents
-from handsteer.dashboard.teach import TeachPage
-from handsteer.dashboard.teaching.teaching import Teaching
+from handsteer.dashboard.viewers import OnDemandNode
 from handsteer.errors import DashboardError
 from handsteer.making import cmd_vel_topic
 from handsteer.messages import CMD_VEL, Topic
@@ -63,13 +61,17 @@ class Dashboard:
         steering: Drives when a viewer steers on the page.
         config: Address and options of the page.
         cmd_vel: The topic of the displayed commands.
-        local: What pages can access of the graph in addition to topics; nothing by default.
-        topics: Whether manual steering may use topics other than the control's, for other robots.
+        graph: What pages can change in addition to topics; nothing by default.
+        file: The YAML file that the graph's parameters were read from, which settings are saved to; by default
+            :data:`~handsteer.dashboard.settings.DEFAULT_FILE`.
+
+    Raises:
+        ConfigError: The file can no longer be read.
 
     Attributes:
         node: Subscribes and steers for the browsers that show the page.
         pictures: Encodes the camera's picture for the browsers that show it.
-        served: What all pages share.
+        context: What all pages share.
         webcam: Receives the frames of a browser's own camera.
     """
 
@@ -81,35 +83,31 @@ class Dashboard:
         config: DashboardConfig,
         *,
         cmd_vel: Topic[Any] = CMD_VEL,
-        local: GraphAccess | None = None,
-        topics: bool = False,
+        graph: RemoteGraph | None = None,
+        file: Path | None = None,
     ) -> None:
-        local = local or GraphAccess()
         history = VelocityHistory()  # outlives the node, so that a reloaded page shows it
         self.node = OnDemandNode(lambda: DashboardNode(transport, clock, steering, cmd_vel, history))
         self.pictures = OnDemandNode(lambda: PictureNode(transport, clock))
-        self.served = PageContext(self.node, local, topics)
-        self.webcam = FrameSocket(local.cameras, self._drives)
+        self.context = PageContext(self.node)
+        if graph is not None:
+            settings_file = SettingsFile(file or DEFAULT_FILE, is_read=file is not None)
+            settings = Settings(lambda: graph.config, graph.reconfigure, settings_file)
+            self.context = PageContext(self.node, graph, settings, Lessons.of(graph))
+        self.webcam = FrameSocket(graph, self._drives)
         self._config = config
         self._server: uvicorn.Server | None = None
         self._thread: threading.Thread | None = None
 
     @classmethod
-    def of(cls, graph: JoinedGraph, file: Path | None = None) -> "Dashboard":
-        """Return the page of a graph that this process can access.
-
-        Settings are saved to ``file``, the YAML file that the graph's parameters were read from; by default
-        :data:`~handsteer.dashboard.settings_file.DEFAULT_FILE`.
+    def of(cls, graph: RemoteGraph, file: Path | None = None) -> "Dashboard":
+        """Return the page of a whole graph.
 
         Raises:
             ConfigError: The file can no longer be read.
         """
-        settings_file = SettingsFile(file or DEFAULT_FILE, is_read=file is not None)
-        settings = Settings(lambda: graph.config, graph.reconfigure, settings_file)
-        topic = cmd_vel_topic(graph.config)
-        wires = (graph.transport, graph.clock, graph.steering)
-        local = GraphAccess(graph.cameras, graph.robot, settings, Teaching.of(graph))
-        return cls(*wires, graph.config.dashboard, cmd_vel=topic, local=local)
+        config, topic = graph.config.dashboard, cmd_vel_topic(graph.config)
+        return cls(graph.transport, graph.clock, graph.steering, config, cmd_vel=topic, graph=graph, file=file)
 
     def start(self) -> str:
         """Serve the page and return its address once it answers; it contains the token if one is needed.
@@ -131,7 +129,7 @@ class Dashboard:
         application = _application()
         application.state.dashboard = self
         application.state.access = access
-        application.state.doors = Doors(certificate)
+        application.state.connections = Connections(certificate)
         self._server = uvicorn.Server(_settings(application))
         self._thread = threading.Thread(target=self._server.run, args=([listener],), name="dashboard", daemon=True)
         self._thread.start()
@@ -144,8 +142,8 @@ class Dashboard:
         """Close the page and all connections; may be called more than once."""
         self.node.close()
         self.pictures.close()
-        if self.served.local.teaching is not None:
-            self.served.local.teaching.close()
+        if self.context.lessons is not None:
+            self.context.lessons.close()
         if self._server is not None and self._thread is not None:
             self._server.should_exit = True
             self._thread.join(_STOP_TIMEOUT_S)
@@ -207,12 +205,12 @@ def _settings(application: FastAPI) -> uvicorn.Config:
     settings = uvicorn.Config(
         # Outermost, so that it covers everything, errors included.
         AccessMiddleware(application, application.state),
-        http=application.state.doors.protocol,
+        http=application.state.connections.protocol,
         headers=list(HEADERS),
         server_header=False,
         proxy_headers=False,  # other users of this machine could forge the header
         # uvloop keeps reading for a protocol that has paused it before TLS begins.
-        loop="asyncio" if application.state.doors.is_secure else "auto",
+        loop="asyncio" if application.state.connections.is_secure else "auto",
         log_config=None,
         access_log=False,
         lifespan="on",
@@ -240,7 +238,7 @@ def _certificate(config: DashboardConfig) -> ssl.SSLContext | None:
 def _application() -> FastAPI:
     """Return the web application, one per process, as NiceGUI requires; it serves ``state.dashboard``."""
     application = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
-    application.mount(ASSETS_PATH, StaticFiles(directory=Path(__file__).parent / "static"))
+    application.mount(ASSETS_PATH, StaticFiles(directory=STATIC))
 
     @application.get(PICTURE_PATH)
     async def picture() -> Response:
@@ -250,19 +248,19 @@ def _application() -> FastAPI:
     async def webcam(socket: WebSocket) -> None:
         await application.state.dashboard.webcam.serve(socket)
 
-    unjoined = Unjoined()
+    unconnected = UnconnectedPages()
 
     @ui.page("/")
     def index() -> None:
-        unjoined.add(DrivePage(application.state.dashboard.served).client)
+        unconnected.add(DrivePage(application.state.dashboard.context).client)
 
     @ui.page("/settings")
     def settings() -> None:
-        unjoined.add(SettingsPage(application.state.dashboard.served).client)
+        unconnected.add(SettingsPage(application.state.dashboard.context).client)
 
     @ui.page("/teach")
     def teach() -> None:
-        unjoined.add(TeachPage(application.state.dashboard.served).client)
+        unconnected.add(LessonPage(application.state.dashboard.context).client)
 
     ui.run_with(
         application,
@@ -281,5 +279,5 @@ def _application() -> FastAPI:
     # Otherwise state of each tab is kept for 30 days; no page here stores anything in it.
     app.storage.max_tab_storage_age = 0.0
     SocketEvents(core.sio)
-    keep_short()
+    limit_log()
     return application

@@ -80,16 +80,16 @@ class SocketEvents:
         if query.get("implicit_handshake") == "true" and not await self._shake_hands(socket, query, environ):
             raise Refused(_REFUSED)
 
-    async def _handshake(self, socket: str, said: Any = None, *_: Any) -> bool:
-        return await self._shake_hands(socket, said, self._server.get_environ(socket) or {})
+    async def _handshake(self, socket: str, sent: Any = None, *_: Any) -> bool:
+        return await self._shake_hands(socket, sent, self._server.get_environ(socket) or {})
 
-    async def _shake_hands(self, socket: str, said: Any, environ: dict[str, Any]) -> bool:
-        if not _fits(said, _HANDSHAKE) or not is_page_of(said["client_id"], environ.get("asgi.scope", {})):
+    async def _shake_hands(self, socket: str, sent: Any, environ: dict[str, Any]) -> bool:
+        if not _fits(sent, _HANDSHAKE) or not is_page_of(sent["client_id"], environ.get("asgi.scope", {})):
             _note("handshake")
             return False
-        if not await self._handlers["handshake"](socket, {name: said[name] for name in (*_HANDSHAKE,)} | _old(said)):
+        if not await self._handlers["handshake"](socket, {name: sent[name] for name in (*_HANDSHAKE,)} | _old(sent)):
             return False
-        self._pages[socket] = said["client_id"]
+        self._pages[socket] = sent["client_id"]
         return True
 
     def _disconnect(self, socket: str, *_: Any) -> None:
@@ -99,14 +99,14 @@ class SocketEvents:
     def _checked(self, name: str) -> Callable[..., Awaitable[None]]:
         """Return the validating handler of the events ``name``."""
 
-        async def take(socket: str, said: Any = None, *_: Any) -> None:
-            if not _fits(said, _SHAPES[name]) or self._pages.get(socket) != said["client_id"]:
+        async def take(socket: str, sent: Any = None, *_: Any) -> None:
+            if not _fits(sent, _SHAPES[name]) or self._pages.get(socket) != sent["client_id"]:
                 _note(name)
                 return
             if name == "log":
-                said = {**said, "message": f"the browser says: {str(said['message'])[:_LONGEST_LOG]!r}"}
+                sent = {**sent, "message": f"the browser says: {str(sent['message'])[:_LONGEST_LOG]!r}"}
             try:
-                answer = self._handlers[name](socket, said)
+                answer = self._handlers[name](socket, sent)
                 if isawaitable(answer):
                     await answer
             except Exception as error:  # NiceGUI does not validate its input
@@ -122,12 +122,12 @@ def is_page_of(page: str, scope: Mapping[str, Any]) -> bool:
     return bool(client and session) and client.request.scope["state"].get(SESSION) == session  # type: ignore[union-attr]
 
 
-def _fits(said: Any, shape: dict[str, Check]) -> bool:
-    return isinstance(said, dict) and all(name in said and check(said[name]) for name, check in shape.items())
+def _fits(sent: Any, shape: dict[str, Check]) -> bool:
+    return isinstance(sent, dict) and all(name in sent and check(sent[name]) for name, check in shape.items())
 
 
-def _old(said: dict[str, Any]) -> dict[str, Any]:
-    return {"old_tab_id": said["old_tab_id"]} if _is_name(said.get("old_tab_id")) else {}
+def _old(sent: dict[str, Any]) -> dict[str, Any]:
+    return {"old_tab_id": sent["old_tab_id"]} if _is_name(sent.get("old_tab_id")) else {}
 
 
 def _note(name: str, error: Exception | None = None) -> None:

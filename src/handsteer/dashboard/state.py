@@ -1,17 +1,17 @@
 """Computes what the page shows from the topics' messages: pure functions, without page or transport."""
 
-import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Literal, TypeVar
 
 from handsteer.config import ControlConfig
-from handsteer.control.effects import rule_from_diagnostics
-from handsteer.nodes.node import ERROR, OK
-from handsteer.robots.course import CourseState, read_course
+from handsteer.nodes.status import ERROR, OK, CameraStatus, ControlStatus, RecognitionStatus, RobotStatus, Status
+from handsteer.robots.course import CourseState
 from handsteer.timeouts import ROBOT_S
 from handsteer.types import NONE, SIGNS, ZERO, Pose2D, Velocity
+
+S = TypeVar("S", bound=Status)
 
 Mood = Literal["driving", "standing", "trouble", "waiting"]
 
@@ -27,24 +27,12 @@ class Report:
     """The last report of a node on ``/diagnostics``.
 
     Attributes:
-        level: 0 OK, 1 WARN, 2 ERROR.
-        message: A sentence for people.
-        values: Named values.
+        status: What it reports.
         came_s: Time of arrival in seconds of the graph's clock.
     """
 
-    level: int
-    message: str
-    values: Mapping[str, str]
+    status: Status
     came_s: float
-
-    def number(self, name: str) -> float | None:
-        """Return the value of ``name`` if it is a finite number, else None."""
-        try:
-            number = float(self.values[name])
-        except (KeyError, ValueError):
-            return None
-        return number if math.isfinite(number) else None
 
 
 Person = Literal["", "you", "another viewer"]
@@ -78,18 +66,46 @@ class Observed:
     """The newest of everything that the page shows in figures.
 
     Attributes:
-        reports: By node name.
+        reports: The last report of each node, by the type of its status.
         command: The last velocity command.
         command_came_s: Its time of arrival in seconds of the graph's clock.
         measured: The velocity from odometry.
         frame_counts: Times and frame counters of the camera's last reports, oldest first.
     """
 
-    reports: Mapping[str, Report] = field(default_factory=dict)
+    reports: Mapping[type[Status], Report] = field(default_factory=dict)
     command: Velocity = ZERO
     command_came_s: float = -math.inf
     measured: Velocity = ZERO
     frame_counts: Sequence[tuple[float, float]] = ()
+
+    def last(self, kind: type[S], since_s: float = -math.inf) -> S | None:
+        """Return the last status of this type; None if it was not reported at ``since_s`` or later."""
+        report = self.reports.get(kind)
+        if report is None or report.came_s <= since_s or not isinstance(report.status, kind):
+            return None
+        return report.status
+
+
+@dataclass(frozen=True)
+class Reporting:
+    """The status of each node that reports; None for one that is silent."""
+
+    camera: CameraStatus | None = None
+    recognition: RecognitionStatus | None = None
+    control: ControlStatus | None = None
+    robot: RobotStatus | None = None
+
+    @classmethod
+    def at(cls, now_s: float, observed: Observed) -> "Reporting":
+        """Return the nodes that report at ``now_s``, in seconds of the graph's clock."""
+        since_s = now_s - STALE_S
+        return cls(
+            observed.last(CameraStatus, since_s),
+            observed.last(RecognitionStatus, since_s),
+            observed.last(ControlStatus, since_s),
+            observed.last(RobotStatus, since_s),
+        )
 
 
 @dataclass(frozen=True)
@@ -155,119 +171,103 @@ class PageState:
 
 def compose(observed: Observed, now_s: float, viewers: Viewers = NOBODY) -> PageState:
     """Return the page's state at ``now_s``, in seconds of the graph's clock, as one of its ``viewers`` sees it."""
-    reports = {name: report for name, report in observed.reports.items() if now_s - report.came_s < STALE_S}
-    seen = reports.get("hand_sign_recognition", _NO_REPORT)
-    control = reports.get("hand_sign_control", _NO_REPORT)
-    robot = reports.get("robot", _NO_REPORT)
-    camera = reports.get("my_camera", _NO_REPORT)
-    mood, headline, reason = explain(reports, viewers)
-    collisions = robot.number("collisions")
+    reporting = Reporting.at(now_s, observed)
+    seen, control = reporting.recognition or RecognitionStatus(), reporting.control or ControlStatus()
+    robot = reporting.robot or RobotStatus()
+    mood, headline, reason = explain(reporting, viewers)
+    # What was last known of a node that has fallen silent.
+    last_seen, last_control = observed.last(RecognitionStatus), observed.last(ControlStatus)
     return PageState(
         mood=mood,
         headline=headline,
         reason=reason,
-        sign=seen.values.get("sign", NONE),
-        seen=seen.values.get("seen", NONE),
-        confidence=seen.number("confidence") or 0.0,
-        handedness=seen.values.get("handedness", ""),
-        signs=known_signs(observed.reports.get("hand_sign_recognition", _NO_REPORT).values),
-        rule=rule_from_diagnostics(observed.reports.get("hand_sign_control", _NO_REPORT).values),
-        no_picture="" if "seen" in seen.values else camera.message if camera.level >= ERROR else seen.message,
-        camera=camera_name(camera.message),
-        driver=control.values.get("source", "nobody"),
-        stopped=is_stopped(reports.get("hand_sign_control"), viewers),
+        sign=seen.sign,
+        seen=seen.seen or NONE,
+        confidence=seen.confidence,
+        handedness=seen.handedness,
+        signs=(last_seen and last_seen.signs) or SIGNS,
+        rule=last_control.rule if last_control else None,
+        no_picture=why_no_picture(reporting),
+        camera=reporting.camera.short_name if reporting.camera else "",
+        driver=control.source,
+        stopped=is_stopped(reporting.control, viewers),
         commanded=observed.command if now_s - observed.command_came_s < COMMAND_HOLDS_S else ZERO,
         measured=observed.measured,
-        latency_median_ms=control.number("latency_median_ms") or None,
-        latency_p99_ms=control.number("latency_p99_ms") or None,
+        latency_median_ms=control.latency_median_ms,
+        latency_p99_ms=control.latency_p99_ms,
         fps=frame_rate(observed.frame_counts, now_s),
-        path_length_m=robot.number("path_length_m"),
-        collisions=None if collisions is None else int(collisions),
+        path_length_m=robot.path_length_m,
+        collisions=robot.collisions,
         confirmed=confirmed(seen),
         viewers=viewers,
-        max_linear_mps=control.number("max_linear") or None,
-        max_angular_radps=control.number("max_angular") or None,
-        course=read_course(robot.values),
-        warnings=warnings_in(reports),
+        max_linear_mps=control.rule.max_linear if control.rule else None,
+        max_angular_radps=control.rule.max_angular if control.rule else None,
+        course=robot.course,
+        warnings=tuple(dict.fromkeys(warning for warning in (control.warning, robot.warning) if warning)),
     )
 
 
-def warnings_in(reports: Mapping[str, Report]) -> tuple[str, ...]:
-    """Return the warnings in the nodes' reports, each sentence once."""
-    said = (report.values.get("warning", "") for report in reports.values())
-    return tuple(dict.fromkeys(warning for warning in said if warning))
+def why_no_picture(reporting: Reporting) -> str:
+    """Return why there are no pictures; empty if there are."""
+    camera, recognition = reporting.camera, reporting.recognition
+    if recognition is not None and recognition.seen is not None:
+        return ""
+    if camera is not None and camera.level >= ERROR:
+        return camera.message
+    return "no report yet" if recognition is None else recognition.message
 
 
-def is_stopped(control: Report | None, viewers: Viewers) -> bool:
+def is_stopped(control: ControlStatus | None, viewers: Viewers) -> bool:
     """Return whether the robot is stopped until reset, as ``control`` or the steering that bypasses it reports."""
-    says_so = control is not None and control.values.get("stopped") == str(True)
-    return says_so or (viewers.stands and (control is None or bool(viewers.topic)))
+    is_reported = control is not None and control.stopped
+    return is_reported or (viewers.stands and (control is None or bool(viewers.topic)))
 
 
-def confirmed(recognition: Report) -> float:
+def confirmed(recognition: RecognitionStatus) -> float:
     """Return the progress of confirming the sign that ``recognition`` reports, 0 to 1."""
-    seen = recognition.values.get("seen", NONE)
-    if seen == NONE:
+    if recognition.seen in (None, NONE):
         return 0.0
-    if seen == recognition.values.get("sign"):
+    if recognition.seen == recognition.sign:
         return 1.0
-    return max(0.0, min(recognition.number("progress") or 0.0, 1.0))
+    return max(0.0, min(recognition.progress, 1.0))
 
 
-def explain(reports: Mapping[str, Report], viewers: Viewers = NOBODY) -> tuple[Mood, str, str]:
+def explain(reporting: Reporting, viewers: Viewers = NOBODY) -> tuple[Mood, str, str]:
     """Return in words what the robot does and why: mood, headline, reason.
 
     The control reports whether the robot is commanded to move. If it is not, because no sign is confirmed, the reason
     lies upstream: the camera gives no picture, no hand is in view, or the hand shows no sign.
 
     Args:
-        reports: The reports of nodes that are not silent, by node name.
+        reporting: The status of each node that is not silent.
         viewers: The viewers' activity, which the control does not know.
     """
     if viewers.topic and viewers.steers:
         return "driving", "Driving", f"steered by hand, straight on {viewers.topic}"
-    control = reports.get("hand_sign_control")
+    control, robot = reporting.control, reporting.robot or RobotStatus()
     stopped = is_stopped(control, viewers)
     if control is None and not stopped:
         return "waiting", "Waiting", "the node hand_sign_control does not report"
-    robot = reports.get("robot", _NO_REPORT)
     if robot.level >= ERROR:
         return "trouble", "Trouble", f"the robot {robot.message}"
     if control is None or stopped:
         by = f"stopped by {viewers.stopped}" if viewers.stopped else "stopped"
         return "trouble", "Stopped", f"{by}, until {'you reset' if viewers.may_reset else 'the driver resets'} it"
-    reason = control.message.partition(": ")[2] or control.message
-    if control.number("linear_mps") or control.number("angular_radps"):
+    reason = control.explanation
+    if control.linear_mps or control.angular_radps:
         return "driving", "Driving", reason if robot.level == OK else f"{reason}, but the robot {robot.message}"
-    steered = control.values.get("source") == "steering"
-    mood, obstacle = ("standing", None) if steered else _why_no_sign(reports)
-    if control.values.get("armed") == str(False) and "seen" in reports.get("hand_sign_recognition", _NO_REPORT).values:
-        obstacle = None  # the robot waits for no sign to be seen
-    return mood, "Standing", obstacle or reason
+    mood, upstream = ("standing", None) if control.source == "steering" else _why_no_sign(reporting)
+    if not control.armed and reporting.recognition is not None and reporting.recognition.seen is not None:
+        upstream = None  # the robot waits for no sign to be seen
+    return mood, "Standing", upstream or reason
 
 
-def _why_no_sign(reports: Mapping[str, Report]) -> tuple[Mood, str | None]:
-    camera = reports.get("my_camera", _NO_REPORT)
-    if camera.level >= ERROR:
-        return "trouble", camera.message
-    recognition = reports.get("hand_sign_recognition")
-    if recognition is None:
+def _why_no_sign(reporting: Reporting) -> tuple[Mood, str | None]:
+    if reporting.camera is not None and reporting.camera.level >= ERROR:
+        return "trouble", reporting.camera.message
+    if reporting.recognition is None:
         return "trouble", "the node hand_sign_recognition does not report"
-    return "standing", recognition.message if recognition.values.get("sign") == NONE else None
-
-
-def camera_name(message: str) -> str:
-    """Return the camera's name from its ``message``, without folders or address, which may contain a password."""
-    return message.partition(": ")[0].rstrip("/").rpartition("/")[2]
-
-
-def known_signs(values: Mapping[str, str]) -> tuple[str, ...]:
-    """Return the signs in a report of the recognition; the shipped ones if it has none."""
-    try:
-        names = json.loads(values["signs"])
-    except (KeyError, ValueError):
-        return SIGNS
-    return tuple(str(name) for name in names) if isinstance(names, list) and names else SIGNS
+    return "standing", reporting.recognition.message if reporting.recognition.sign == NONE else None
 
 
 def frame_rate(counts: Sequence[tuple[float, float]], now_s: float) -> float | None:
@@ -296,6 +296,3 @@ def place_in_world(truth: Pose2D, odometry_then: Pose2D, odometry_now: Pose2D) -
         truth.y + math.sin(turn) * dx + math.cos(turn) * dy,
         odometry_now.yaw + turn,
     )
-
-
-_NO_REPORT = Report(OK, "no report yet", {}, -math.inf)

@@ -9,8 +9,7 @@ import socket
 from handsteer.cameras.webcam import Webcam, webcams
 from handsteer.clock import RealClock
 from handsteer.config import CameraConfig
-from handsteer.doctor.finding import Finding
-from handsteer.doctor.ros2 import examine_ros2
+from handsteer.doctor.ros2 import Finding, examine_ros2
 from handsteer.errors import CameraError, ModelError
 from handsteer.recognition.landmark_models import MODELS, find_model, models_dir
 

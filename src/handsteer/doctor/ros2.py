@@ -11,17 +11,44 @@ import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
-from handsteer.doctor.finding import Finding
 from handsteer.errors import TransportError
 from handsteer.transports.dds.network import PLACES_BY_MULTICAST, Network, multicast_addresses, network
+
+Verdict = Literal["ok", "optional", "wrong", "missing"]
 
 # RTPS 2.3, section 9.6.1.1: ports of a domain, and of a participant in it.
 _BASE, _PER_DOMAIN, _PER_PARTICIPANT, _OWN, _LARGEST_DOMAIN = 7400, 250, 2, 10, 232
 _TABLES = ("/proc/net/udp", "/proc/net/udp6")
 _GROUP = "239.255.0.1"
 _ANSWER_S = 0.3
+
+_TIMEOUT_S = 20.0
+# Cyclone DDS prefixes its lines with the time, the domain and the program.
+_ENGINE_LINE = re.compile(r"^\d+\.\d+ \[\d+\]\s+\S+: (.*)$", re.MULTILINE)
+
+_NAME = "dds"
+_NEWEST_PYTHON = (3, 13)
+_DOMAINS_AT_ONCE = 4
+# Linux assigns ports from 32768 on dynamically.
+_LARGEST_SAFE_DOMAIN = 101
+
+
+@dataclass(frozen=True)
+class Finding:
+    """The result of one check.
+
+    Attributes:
+        name: The subject: ``camera``, ``models``, ``port``...
+        verdict: ``ok``; ``optional`` if missing, but handsteer works without it; ``wrong`` if present, but probably not
+            as intended; ``missing`` if handsteer does not work without it.
+        detail: What was found, and how to fix a problem.
+    """
+
+    name: str
+    verdict: Verdict
+    detail: str
 
 
 def taken_ports() -> set[int]:
@@ -86,11 +113,6 @@ def _hears_itself(address: str) -> bool:
             return False
 
 
-_TIMEOUT_S = 20.0
-# Cyclone DDS prefixes its lines with the time, the domain and the program.
-_ENGINE_LINE = re.compile(r"^\d+\.\d+ \[\d+\]\s+\S+: (.*)$", re.MULTILINE)
-
-
 @dataclass(frozen=True)
 class Sight:
     """What was observed in a domain.
@@ -136,13 +158,6 @@ def _sight(process: subprocess.Popen[str]) -> Sight:
         return Sight(json.loads(out))
     problems = _ENGINE_LINE.findall(words) or words.strip().splitlines()[-1:] or [f"exit code {process.returncode}"]
     return Sight(None, "; ".join(problems))
-
-
-_NAME = "dds"
-_NEWEST_PYTHON = (3, 13)
-_DOMAINS_AT_ONCE = 4
-# Linux assigns ports from 32768 on dynamically.
-_LARGEST_SAFE_DOMAIN = 101
 
 
 def examine_ros2(environment: Mapping[str, str]) -> list[Finding]:

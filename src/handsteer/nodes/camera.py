@@ -3,15 +3,25 @@
 import logging
 from dataclasses import replace
 
-from handsteer.cameras.calibration import uncalibrated
+from handsteer.cameras.choose import uncalibrated
 from handsteer.cameras.freshness import Freshness
 from handsteer.cameras.protocol import Camera, EndOfStream, Frame
 from handsteer.clock import Clock
 from handsteer.errors import CameraError
 from handsteer.images import image_message, jpeg_message
-from handsteer.messages import CAMERA_INFO, IMAGE_COMPRESSED, IMAGE_RAW, CameraInfo, Header
-from handsteer.nodes.node import ERROR, OK, Node
-from handsteer.nodes.stop_keeper import StopKeeper
+from handsteer.messages import (
+    CAMERA_INFO,
+    IMAGE_COMPRESSED,
+    IMAGE_RAW,
+    CameraInfo,
+    CompressedImage,
+    Header,
+    Image,
+    Topic,
+)
+from handsteer.nodes.base import Node
+from handsteer.nodes.status import OK, CameraStatus
+from handsteer.nodes.supervision import StopKeeper
 from handsteer.timeouts import STALE_S
 from handsteer.transports.base import Transport
 
@@ -32,6 +42,8 @@ class CameraNode(Node):
         camera: Delivers the frames.
         frame_id: Coordinate frame of the images.
         calibration: Calibration of the lens, for pictures of its size; None if there is none.
+        image: Topic of the frames.
+        compressed: Topic of the same as JPEG, on demand.
 
     Attributes:
         ended: Set when a file has ended and ends the run.
@@ -45,6 +57,9 @@ class CameraNode(Node):
         camera: Camera,
         frame_id: str = "camera_optical_frame",
         calibration: CameraInfo | None = None,
+        *,
+        image: Topic[Image] = IMAGE_RAW,
+        compressed: Topic[CompressedImage] = IMAGE_COMPRESSED,
     ) -> None:
         super().__init__("my_camera", transport, clock)
         self.frames = 0
@@ -53,14 +68,14 @@ class CameraNode(Node):
         self._calibration = calibration
         self._fits = True
         self._retry_s = _FIRST_RETRY_S
-        self._state = (OK, f"{camera.name}: waiting for the first frame")
+        self._status = CameraStatus(camera.name)
         self._last_frame_s = clock.now()
         self._freshness = Freshness(STALE_S)
         self._last_read_s = clock.now()
         self._is_frozen = False
         StopKeeper(self)
-        self._image = self.publisher(IMAGE_RAW)
-        self._compressed = self.publisher(IMAGE_COMPRESSED)
+        self._image = self.publisher(image)
+        self._compressed = self.publisher(compressed)
         self._info = self.publisher(CAMERA_INFO)
         self._reading = self.every(camera.period_s or 0.0, self._read)
         self.diagnose_every(_DIAGNOSE_PERIOD_S, self._report)
@@ -96,7 +111,7 @@ class CameraNode(Node):
         self._is_frozen = False
         self.frames += 1
         self._last_frame_s = self.clock.now()
-        self._state = (OK, f"{self._camera.name}: delivers frames")
+        self._status = CameraStatus(self._camera.name, "delivers")
         header = Header(stamp=self.clock.stamp(frame.captured_s), frame_id=self._frame_id)
         self._image.publish(image_message(frame.image, header), frame.captured_s)
         if self._compressed.has_subscribers:
@@ -123,7 +138,7 @@ class CameraNode(Node):
         self._freshness.why_refused(frame.image, max(0.0, elapsed_s))
         frozen_s = self._freshness.frozen_s
         if frozen_s > STALE_S:
-            self._state = (ERROR, f"{self._camera.name}: frozen, the same picture for {frozen_s:.1f} s")
+            self._status = CameraStatus(self._camera.name, "frozen", round(frozen_s, 1))
             if not self._is_frozen:
                 log.warning("%s is frozen: it delivers the same picture again and again", self._camera.name)
                 self._is_frozen = True
@@ -131,13 +146,13 @@ class CameraNode(Node):
 
     def _lose(self, error: CameraError) -> None:
         log.warning("%s; trying again in %g s", error, self._retry_s)
-        self._state = (ERROR, str(error))
+        self._status = CameraStatus(self._camera.name, "lost", problem=str(error))
         self._reading.delay_until(self.clock.now() + self._retry_s)
         self._retry_s = min(2 * self._retry_s, _LONGEST_RETRY_S)
 
-    def _report(self) -> None:
-        level, message = self._state
+    def _report(self) -> CameraStatus:
+        status = self._status
         silence_s = self.clock.now() - self._last_frame_s
-        if level == OK and silence_s > _SILENT_AFTER_S:
-            message = f"{self._camera.name}: no frame for {silence_s:.0f} s"
-        self.diagnose(level, message, frames=self.frames)
+        if status.level == OK and silence_s > _SILENT_AFTER_S:
+            status = CameraStatus(self._camera.name, "silent", round(silence_s, 1))
+        return replace(status, frames=self.frames)

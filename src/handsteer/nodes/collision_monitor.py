@@ -3,15 +3,31 @@
 import logging
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 from handsteer.config import CollisionMonitorConfig
+from handsteer.control.explain import Reason
 from handsteer.control.footprint import points_of
 from handsteer.control.obstacles import ObstacleLimiter
-from handsteer.messages import ODOM, SCAN, LaserScan, Odometry
-from handsteer.nodes.node import Node
-from handsteer.nodes.odometry import MeasuredVelocity
+from handsteer.messages import LaserScan, Odometry, Pose, Topic
+from handsteer.nodes.base import Node
 from handsteer.transports.base import Received
 from handsteer.types import Velocity
+
+
+class MeasuredVelocity:
+    """Reads velocities from odometry, including sources that leave the twist at zero while the pose changes."""
+
+    def __init__(self) -> None:
+        self._pose: Pose | None = None
+
+    def read(self, odometry: Odometry) -> Velocity | None:
+        """Return the robot's velocity; None if it moves but its twist does not give the velocity."""
+        twist, pose = odometry.twist.twist, odometry.pose.pose
+        velocity = Velocity(twist.linear.x, twist.angular.z)
+        has_moved, self._pose = self._pose not in (None, pose), pose
+        return None if velocity.is_zero and has_moved else velocity
+
 
 log = logging.getLogger(__name__)
 
@@ -23,11 +39,21 @@ class CollisionMonitor:
         node: The control.
         rule: Whether it is enabled, and its parameters.
         on_slowed: Receives each velocity that is commanded instead of a faster one.
+        scan: Topic of the laser scans.
+        odom: Topic of the robot's odometry.
     """
 
-    def __init__(self, node: Node, rule: CollisionMonitorConfig, on_slowed: Callable[[Velocity], None]) -> None:
+    def __init__(
+        self,
+        node: Node,
+        rule: CollisionMonitorConfig,
+        on_slowed: Callable[[Velocity], None],
+        scan: Topic[LaserScan],
+        odom: Topic[Odometry],
+    ) -> None:
         self._node = node
         self._on_slowed = on_slowed
+        self._scan, self._odom = scan, odom
         self._limiter = ObstacleLimiter(rule)
         self._listens = False
         self._came_s = -math.inf
@@ -42,8 +68,8 @@ class CollisionMonitor:
         self._limiter.hit = None
         if rule.enabled and not self._listens:
             self._listens = True
-            self._node.subscribe(SCAN, self._on_scan)
-            self._node.subscribe(ODOM, self._on_odometry)
+            self._node.subscribe(self._scan, self._on_scan)
+            self._node.subscribe(self._odom, self._on_odometry)
 
     def admit(self, wanted: Velocity) -> Velocity:
         """Return the velocity to command instead of ``wanted``."""
@@ -57,13 +83,13 @@ class CollisionMonitor:
             self._on_slowed(allowed)
         return allowed
 
-    def explain(self, reason: str) -> str:
-        """Return the control's ``reason`` and what slows the robot, as ``driving: Forward, slowed: obstacle …``."""
+    def explain(self, reason: Reason) -> Reason:
+        """Return the control's ``reason``, with the obstacle that slows or stops the robot."""
         hit = self._limiter.hit if self._limiter.rule.enabled else None
         if hit is None:
             return reason
-        said = hit.describe(self._limiter.rule)
-        return f"standing: stopped before an {said}" if self._stands else f"{reason}, slowed: {said}"
+        obstacle = hit.describe(self._limiter.rule)
+        return Reason("obstacle", obstacle) if self._stands else replace(reason, slowed=obstacle)
 
     def why_blind(self) -> str:
         """Return why nothing may move without scans; empty if scans are received or not required."""
@@ -75,13 +101,14 @@ class CollisionMonitor:
             since = f" for {now - self._came_s:.1f} s" if math.isfinite(self._came_s) else ""
             return f"no laser scan has come{since}, so what is in the way is not known"
         if self._is_broken:
-            return "the laser scans that come say nothing, so what is in the way is not known"
+            return "the laser scans that come have no valid range, so what is in the way is not known"
         return f"laser scans come {self._limiter.silence_s(now):.1f} s after their stamp: are the clocks in step?"
 
-    def values(self) -> dict[str, str]:
-        """Return the values for diagnostics."""
+    @property
+    def obstacle_m(self) -> float | None:
+        """Distance of the obstacle that limited the last command; None if none did."""
         hit = self._limiter.hit
-        return {} if hit is None else {"obstacle_m": f"{max(0.0, hit.gap_m):.2f}"}
+        return None if hit is None else round(max(0.0, hit.gap_m), 2)
 
     def _on_scan(self, received: Received[LaserScan]) -> None:
         now = self._node.clock.now()
@@ -90,7 +117,7 @@ class CollisionMonitor:
         if (points is None) != self._is_broken:
             self._is_broken = points is None
             (log.warning if self._is_broken else log.info)(
-                "laser scans %s", "say nothing" if self._is_broken else "come again"
+                "laser scans %s", "have no valid range" if self._is_broken else "are valid again"
             )
         if points is not None:
             captured_s = now if received.captured_s is None else received.captured_s

@@ -5,30 +5,29 @@ from typing import Any
 
 from handsteer.clock import Clock
 from handsteer.config import CollisionMonitorConfig, Config, ControlConfig
-from handsteer.control.control import Control
-from handsteer.control.effects import rule_to_diagnostics
-from handsteer.control.fleet import NEXT
+from handsteer.control import Control
+from handsteer.control.explain import Reason
 from handsteer.control.safety import Following
 from handsteer.messages import (
     CMD_VEL,
     HAND_SIGN,
     ODOM,
+    SCAN,
     STEERING_CMD_VEL,
     STOP,
     Bool,
+    LaserScan,
     Odometry,
     String,
     Topic,
     Twist,
 )
-from handsteer.nodes.collision_monitor import CollisionMonitor
-from handsteer.nodes.latency import LatencyLog
-from handsteer.nodes.node import OK, WARN, Node
-from handsteer.nodes.odometry import MeasuredVelocity
-from handsteer.nodes.rivals import Rivals
-from handsteer.nodes.selection import Selection
-from handsteer.nodes.stall_guard import CALM_S, StallGuard
-from handsteer.nodes.stop_keeper import StopKeeper
+from handsteer.nodes.base import Node
+from handsteer.nodes.collision_monitor import CollisionMonitor, MeasuredVelocity
+from handsteer.nodes.selection import NEXT, Selection
+from handsteer.nodes.status import ControlStatus
+from handsteer.nodes.supervision import Rivals, StopKeeper
+from handsteer.nodes.timing import CALM_S, LatencyLog, StallGuard
 from handsteer.transports.base import Call, Received, Transport
 from handsteer.transports.commands import Commands
 from handsteer.types import NONE, ZERO, Velocity, action_of
@@ -52,6 +51,10 @@ class HandSignControlNode(Node):
         collision_monitor: Whether and how to slow commands before obstacles; disabled by default.
         arming: Whether nothing moves before neutral was seen, or while no robot is subscribed
             (:mod:`handsteer.control.safety`).
+        sign: Topic of the signs.
+        steering: Topic of steering commands, which override signs.
+        odom: Topic of the robot's odometry.
+        scan: Topic of its laser scans.
 
     Attributes:
         latency: From the capture of a frame to the resulting Twist.
@@ -68,6 +71,10 @@ class HandSignControlNode(Node):
         collision_monitor: CollisionMonitorConfig | None = None,
         *,
         arming: bool = False,
+        sign: Topic[String] = HAND_SIGN,
+        steering: Topic[Twist] = STEERING_CMD_VEL,
+        odom: Topic[Odometry] = ODOM,
+        scan: Topic[LaserScan] = SCAN,
     ) -> None:
         super().__init__("hand_sign_control", transport, clock)
         self.latency = LatencyLog()
@@ -80,19 +87,20 @@ class HandSignControlNode(Node):
         self._measured = MeasuredVelocity()
         self._commanded = ZERO
         self._last_step_s = clock.now()
-        self._monitor = CollisionMonitor(self, collision_monitor or CollisionMonitorConfig(), self._mux.hold_back)
+        rule = collision_monitor or CollisionMonitorConfig()
+        self._monitor = CollisionMonitor(self, rule, self._mux.hold_back, scan, odom)
         self._stall_guard = StallGuard(config.sign_timeout, clock.now())
         self._last_sign = NONE
         self._selection = (
             Selection(self, config.robots, cmd_vel, self._commands, self._on_change) if config.robots else None
         )
         self._cmd_vel = self._selection.commands if self._selection else self._commands(cmd_vel)
-        self._rivals = Rivals(self, [HAND_SIGN, *(self._selection.topics if self._selection else [cmd_vel])])
+        self._rivals = Rivals(self, [sign, *(self._selection.topics if self._selection else [cmd_vel])])
         StopKeeper(self, self._on_stop_or_reset)
-        self.subscribe(STEERING_CMD_VEL, self._on_steering)
-        self.subscribe(HAND_SIGN, self._on_sign)
+        self.subscribe(steering, self._on_steering)
+        self.subscribe(sign, self._on_sign)
         if self._following:
-            self.subscribe(ODOM, self._on_odometry)
+            self.subscribe(odom, self._on_odometry)
         self._watchdog = self.every(_WATCHDOG_PERIOD_S, self._watch)
         self.diagnose_every(_DIAGNOSE_PERIOD_S, self._report)
 
@@ -107,13 +115,13 @@ class HandSignControlNode(Node):
         """Return ``stop`` and ``reset``, which are equivalent to true and false on ``/stop``."""
         publisher = self.publisher(STOP)
 
-        def say(is_stopped: bool, answer: str) -> str:
+        def publish(is_stopped: bool, answer: str) -> str:
             publisher.publish(Bool(data=is_stopped))
             return answer
 
         return {
-            "stop": lambda: say(True, "stopped, until it is reset"),
-            "reset": lambda: say(False, "reset"),
+            "stop": lambda: publish(True, "stopped, until it is reset"),
+            "reset": lambda: publish(False, "reset"),
         }
 
     def on_stop(self) -> None:
@@ -129,12 +137,12 @@ class HandSignControlNode(Node):
             self._publish(ZERO)
         else:
             if self._safety.is_stopped:
-                log.info("stop is reset by false on %s, which is published by %s", *self._told_by(STOP))
+                log.info("stop is reset by false on %s, which is published by %s", *self._published_by(STOP))
             self._control.reset()
 
-    def _told_by(self, topic: Topic[Any]) -> tuple[str, str]:
+    def _published_by(self, topic: Topic[Any]) -> tuple[str, str]:
         publishers = self.transport.publishers_of(topic)
-        return self.transport.topic_name(topic), ", ".join(publishers) or "nobody that is known"
+        return self.transport.topic_name(topic), ", ".join(publishers) or "no known node"
 
     def _on_sign(self, received: Received[String]) -> None:
         captured_s = received.captured_s
@@ -239,51 +247,41 @@ class HandSignControlNode(Node):
         now = self.clock.now()
         elapsed_s, self._last_step_s = now - self._last_step_s, now
         if self._stall_guard.note(now):
-            self._safety.fault("the control was held up")
+            self._safety.fault("the control was stalled")
         return elapsed_s
 
-    def _report(self) -> None:
+    def _report(self) -> ControlStatus:
         velocity = self._mux.velocity
-        self.diagnose(
-            WARN if self._rivals.warning or self._monitor.why_blind() else OK,
-            self._reason,
+        # There are no latencies if the transport does not carry capture times with signs.
+        is_measured = len(self.latency) > 0
+        return ControlStatus(
+            reason=self._reason,
             source=self._mux.source,
             stopped=self._safety.is_stopped,
             armed=self._safety.signs_wait is None,
-            linear_mps=f"{velocity.linear_mps:.3f}",
-            angular_radps=f"{velocity.angular_radps:.3f}",
-            **({"robot": self._selection.fleet.selected} if self._selection else {}),
-            **rule_to_diagnostics(self._config),
-            **self._monitor.values(),
-            **({"warning": self._rivals.warning} if self._rivals.warning else {}),
-            **self._latencies(),
+            linear_mps=round(velocity.linear_mps, 3),
+            angular_radps=round(velocity.angular_radps, 3),
+            robot=self._selection.fleet.selected if self._selection else None,
+            blind=bool(self._monitor.why_blind()),
+            obstacle_m=self._monitor.obstacle_m,
+            warning=self._rivals.warning or None,
+            latency_median_ms=round(self.latency.percentile_ms(50), 1) if is_measured else None,
+            latency_p99_ms=round(self.latency.percentile_ms(99), 1) if is_measured else None,
+            rule=self._config,
         )
 
     @property
-    def _reason(self) -> str:
+    def _reason(self) -> Reason:
         safety = self._safety
         if safety.is_stopped:
-            return "standing: stopped, until it is reset"
+            return Reason("stopped")
         if why_blind := self._monitor.why_blind():
-            return f"standing: {why_blind}"
-        source = self._mux.source
-        if source == "steering":
-            waits = safety.steering_waits
-            return (
-                f"standing: {self._disarmed}, steers once the steering has been let go"
-                if waits
-                else self._monitor.explain(self._mux.reason)
-            )
-        why = safety.signs_wait
-        if why is None or (source == "nobody" and not why):
+            return Reason("no_scan", why_blind)
+        source, why = self._mux.source, safety.signs_wait
+        robot = self._selection.fleet.selected if self._selection else ""
+        if source == "steering" and safety.steering_waits:
+            return Reason("steering_disarmed", robot=robot)
+        # Without any input, that is the reason after a reset, which needs no explanation.
+        if source == "steering" or why is None or (source == "nobody" and not why):
             return self._monitor.explain(self._mux.reason)
-        return f"standing: {self._disarmed}{f' ({why})' if why else ''}, moves once Stop is shown, or no hand"
-
-    @property
-    def _disarmed(self) -> str:
-        return f"{self._selection.fleet.selected} is disarmed" if self._selection else "disarmed"
-
-    def _latencies(self) -> dict[str, str]:
-        """Return the latency's percentiles; empty if the transport does not carry capture times with signs."""
-        percents = {"latency_median_ms": 50, "latency_p99_ms": 99} if len(self.latency) else {}
-        return {name: f"{self.latency.percentile_ms(percent):.1f}" for name, percent in percents.items()}
+        return Reason("disarmed", why, robot)

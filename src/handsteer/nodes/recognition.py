@@ -1,6 +1,5 @@
 """The node ``hand_sign_recognition``, which publishes a sign for each frame."""
 
-import json
 import logging
 import math
 from collections.abc import Callable
@@ -15,14 +14,21 @@ from handsteer.clock import Clock
 from handsteer.config import Config, SignsConfig
 from handsteer.errors import ConfigError, ModelError
 from handsteer.images import bgr_image, image_message, jpeg_picture
-from handsteer.messages import HAND_SIGN, IMAGE_ANNOTATED, IMAGE_COMPRESSED, IMAGE_RAW, CompressedImage, Image, String
-from handsteer.nodes.frame_age import FrameAge
-from handsteer.nodes.latency import LatencyLog
-from handsteer.nodes.node import OK, WARN, Node
-from handsteer.nodes.recording import Recording
-from handsteer.nodes.stall_guard import CALM_S, StallGuard
-from handsteer.nodes.stop_keeper import StopKeeper
-from handsteer.recognition.classifier import Classifier
+from handsteer.messages import (
+    HAND_SIGN,
+    IMAGE_ANNOTATED,
+    IMAGE_COMPRESSED,
+    IMAGE_RAW,
+    CompressedImage,
+    Image,
+    String,
+    Topic,
+)
+from handsteer.nodes.base import Node
+from handsteer.nodes.status import RecognitionStatus
+from handsteer.nodes.supervision import StopKeeper
+from handsteer.nodes.timing import CALM_S, FrameAge, LatencyLog, Recording, StallGuard
+from handsteer.recognition.hand import Classifier
 from handsteer.recognition.recognizer import Recognition, Recognizer
 from handsteer.transports.base import Received, Subscription, Transport
 from handsteer.types import NONE
@@ -32,7 +38,6 @@ _WATCH_PERIOD_S = 0.02
 _SILENCE_PERIOD_S = 0.5
 _DIAGNOSE_PERIOD_S = 0.1
 _CHOOSE_PERIOD_S = 0.5
-_SHORTLY_S = 3.0
 
 log = logging.getLogger(__name__)
 
@@ -49,6 +54,9 @@ class HandSignRecognitionNode(Node):
         config: Maximum age of a frame, and which images to subscribe to.
         annotate: Draws the result into a copy of the frame, if there are subscribers.
         open_classifier: Opens the classifier of ``signs.model`` when it changes while the node runs.
+        image: Topic of the frames.
+        compressed: Topic of the same as JPEG.
+        sign: Topic of the signs.
 
     Attributes:
         counts: Number of frames per confirmed sign.
@@ -64,6 +72,9 @@ class HandSignRecognitionNode(Node):
         annotate: Annotate,
         *,
         open_classifier: OpenClassifier,
+        image: Topic[Image] = IMAGE_RAW,
+        compressed: Topic[CompressedImage] = IMAGE_COMPRESSED,
+        sign: Topic[String] = HAND_SIGN,
     ) -> None:
         super().__init__("hand_sign_recognition", transport, clock)
         self.counts: dict[str, int] = {}
@@ -86,8 +97,9 @@ class HandSignRecognitionNode(Node):
         self._refused_s = -math.inf
         self._recognition: Recognition | None = None
         StopKeeper(self)
-        self._sign = self.publisher(HAND_SIGN)
+        self._sign = self.publisher(sign)
         self._annotated = self.publisher(IMAGE_ANNOTATED)
+        self._frames, self._jpegs = image, compressed
         wanted = config.image_transport
         self._compressed = wanted == "compressed" or (wanted == "auto" and transport.crosses_network)
         self._images = self._take_images()
@@ -131,7 +143,7 @@ class HandSignRecognitionNode(Node):
         if self._refused is not None:
             self._refused = self._recording.hint(began_s) or self._refused
         if self._refused is None and self._stall_guard.distrusts(began_s):
-            self._refused = "this process was held up, and frames may have waited meanwhile"
+            self._refused = "this process was stalled, and frames may have waited meanwhile"
         image = picture_of(received.message)
         if self._refused is None:
             self._look_at(image, received, began_s, captured_s)
@@ -173,16 +185,16 @@ class HandSignRecognitionNode(Node):
         if age_s <= self._config.max_frame_age:
             return None
         self._recognizer.reset()
-        return f"a frame was {age_s:.1f} s old when its sign was told: was this process held up?"
+        return f"a frame was {age_s:.1f} s old when its sign was known: was this process stalled?"
 
     def _take_images(self) -> Subscription:
         if self._compressed:
-            return self.subscribe(IMAGE_COMPRESSED, lambda received: self._on_frame(received, jpeg_picture))
-        return self.subscribe(IMAGE_RAW, lambda received: self._on_frame(received, bgr_image))
+            return self.subscribe(self._jpegs, lambda received: self._on_frame(received, jpeg_picture))
+        return self.subscribe(self._frames, lambda received: self._on_frame(received, bgr_image))
 
     def _choose_images(self) -> None:
         """Subscribe to the other kind of images if a camera has only that."""
-        taken, other = (IMAGE_COMPRESSED, IMAGE_RAW) if self._compressed else (IMAGE_RAW, IMAGE_COMPRESSED)
+        taken, other = (self._jpegs, self._frames) if self._compressed else (self._frames, self._jpegs)
         names = self.transport.publishers_of
         if names(taken) or not names(other):
             return
@@ -190,7 +202,7 @@ class HandSignRecognitionNode(Node):
         self._compressed = not self._compressed
         self._images = self._take_images()
         here, there = (self.transport.topic_name(topic) for topic in (taken, other))
-        log.info("nobody publishes %s: images are taken from %s, of %s", here, there, ", ".join(names(other)))
+        log.info("no node publishes %s: images are taken from %s, of %s", here, there, ", ".join(names(other)))
 
     def _since_last_frame(self, captured_s: float) -> float:
         last_s = captured_s if self._last_captured_s is None else self._last_captured_s
@@ -209,42 +221,27 @@ class HandSignRecognitionNode(Node):
             self._recognition = None
             self._sign.publish(String(data=NONE))
 
-    def _report(self) -> None:
-        seen = self._recognition
-        signs = json.dumps(self._recognizer.signs)
+    def _report(self) -> RecognitionStatus:
+        now, seen = self.clock.now(), self._recognition
         if seen is None:
-            self.diagnose(WARN, self._why_no_frame(), sign=NONE, signs=signs)
-            return
-        self.diagnose(
-            OK,
-            self._reason(seen),
+            refuses_now = self._refused is not None and now - self._refused_s <= self._config.max_frame_age
+            no_frame_s = None if refuses_now else round(now - max(self._last_frame_s, self._refused_s), 1)
+            return RecognitionStatus(signs=self._recognizer.signs, no_frame_s=no_frame_s, refused=self._refused or "")
+        is_hand_lost = seen.hand is None and self._last_hand_s is not None
+        return RecognitionStatus(
             sign=seen.sign,
-            signs=signs,
+            signs=self._recognizer.signs,
             seen=seen.seen,
-            confidence=f"{seen.confidence:.2f}",
-            progress=f"{seen.progress:.2f}",
+            confidence=round(seen.confidence, 2),
+            progress=round(seen.progress, 2),
             handedness=seen.hand.handedness if seen.hand else "",
-            processing_ms=f"{self.processing.percentile_ms(50):.1f}",
-            processing_p99_ms=f"{self.processing.percentile_ms(99):.1f}",
+            no_hand_s=round(now - (self._last_hand_s or 0.0), 1) if is_hand_lost else None,
+            processing_ms=round(self.processing.percentile_ms(50), 1),
+            processing_p99_ms=round(self.processing.percentile_ms(99), 1),
             recording=self._recording.is_followed,
-            frame_age_ms=f"{self._age.age_s * 1000:.0f}",
-            clock_ahead_ms=f"{self._age.ahead_s * 1000:.0f}",
+            frame_age_ms=round(self._age.age_s * 1000),
+            clock_ahead_ms=round(self._age.ahead_s * 1000),
         )
-
-    def _reason(self, seen: Recognition) -> str:
-        if seen.hand is not None or self._last_hand_s is None:
-            return seen.reason
-        unseen_s = self.clock.now() - self._last_hand_s
-        # Tenths matter only for a hand that was lost just now.
-        return f"no hand seen for {unseen_s:.{1 if unseen_s < _SHORTLY_S else 0}f} s"
-
-    def _why_no_frame(self) -> str:
-        now = self.clock.now()
-        if self._refused is not None and now - self._refused_s <= self._config.max_frame_age:
-            return self._refused
-        unseen_s = now - max(self._last_frame_s, self._refused_s)
-        before = f"; before: {self._refused}" if self._refused is not None else ""
-        return f"no frame for {unseen_s:.1f} s{before}"
 
 
 _GONE = (-1, -1)

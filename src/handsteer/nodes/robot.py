@@ -2,7 +2,6 @@
 
 import logging
 import math
-from collections.abc import Callable
 from concurrent.futures import Future
 from typing import Any
 
@@ -10,7 +9,6 @@ import numpy as np
 
 from handsteer.clock import Clock
 from handsteer.config import RobotConfig
-from handsteer.errors import WorldError
 from handsteer.messages import (
     CLOCK,
     CMD_VEL,
@@ -19,10 +17,10 @@ from handsteer.messages import (
     ROBOT_DESCRIPTION,
     SCAN,
     TF,
-    WORLD_MARKERS,
     ClockMessage,
     Header,
     JointState,
+    LaserScan,
     Odometry,
     Point,
     Pose,
@@ -42,16 +40,15 @@ from handsteer.messages import (
     twist,
     twist_in,
 )
-from handsteer.nodes.node import ERROR, OK, WARN, Node
-from handsteer.nodes.rivals import Rivals
-from handsteer.nodes.scans import scan_message
-from handsteer.nodes.stall_guard import StallGuard
-from handsteer.nodes.stop_keeper import StopKeeper
-from handsteer.nodes.world_markers import Touches, WorldChanges, gate_strips, world_markers
-from handsteer.robots.course import CourseState, Referee
+from handsteer.nodes.base import Node
+from handsteer.nodes.status import RobotStatus
+from handsteer.nodes.supervision import Rivals, StopKeeper
+from handsteer.nodes.surroundings import Surroundings
+from handsteer.nodes.timing import StallGuard
+from handsteer.robots.course import CourseState
 from handsteer.robots.diff_drive import Velocity
-from handsteer.robots.editing import Change, InWorld
-from handsteer.robots.protocol import Robot, RobotState
+from handsteer.robots.editing import Change
+from handsteer.robots.protocol import RangeScan, Robot, RobotState
 from handsteer.robots.world import World
 from handsteer.transports.base import Call, Received, Transport
 from handsteer.types import Pose2D
@@ -59,7 +56,6 @@ from handsteer.types import Pose2D
 log = logging.getLogger(__name__)
 
 _PERIOD_S = 0.02
-_MARKERS_PERIOD_S = 0.05
 _SCAN_PERIOD_S = 0.1
 _DIAGNOSE_PERIOD_S = 0.1
 # After a longer stall of the machine, the simulated robot pauses instead of jumping.
@@ -79,6 +75,8 @@ class RobotNode(Node):
         robot: The robot to drive.
         config: Names of the coordinate frames, and whether to publish ``/clock``.
         cmd_vel: Topic of the commands, with Twist or TwistStamped.
+        odom: Topic of the odometry.
+        scan: Topic of the laser scans.
 
     Attributes:
         state: The robot's newest state.
@@ -87,7 +85,15 @@ class RobotNode(Node):
     """
 
     def __init__(
-        self, transport: Transport, clock: Clock, robot: Robot, config: RobotConfig, cmd_vel: Topic[Any] = CMD_VEL
+        self,
+        transport: Transport,
+        clock: Clock,
+        robot: Robot,
+        config: RobotConfig,
+        cmd_vel: Topic[Any] = CMD_VEL,
+        *,
+        odom: Topic[Odometry] = ODOM,
+        scan: Topic[LaserScan] = SCAN,
     ) -> None:
         super().__init__("robot", transport, clock)
         self._robot = robot
@@ -100,66 +106,47 @@ class RobotNode(Node):
         self.path_length_m = 0.0
         self.was_located = self.state.located
         StopKeeper(self)
-        self._odom = self.publisher(ODOM)
+        self._odom = self.publisher(odom)
         self._tf = self.publisher(TF)
         self._joint_states = self.publisher(JOINT_STATES)
         self._clock_out = self.publisher(CLOCK) if config.publish_clock else None
-        self._scan = self.publisher(SCAN)
-        self._markers = self.publisher(WORLD_MARKERS)
-        self._most_markers = 0
-        self._touches = Touches()
-        self._in_world = robot if isinstance(robot, InWorld) else None
-        self._changes = WorldChanges()
-        self._referee = Referee(self._in_world.world.gates if self._in_world else ())
+        self._scan = self.publisher(scan)
         self.publisher(ROBOT_DESCRIPTION).publish(String(data=robot.description))
         self._hears_old = False
         self.subscribe(cmd_vel, self._on_command)
         self._rivals = Rivals(self, [cmd_vel], {config.cmd_vel_topic: robot.commanders})
         self.every(_PERIOD_S, self._step)
         self.every(_SCAN_PERIOD_S, self._publish_scan)
-        self.every(_MARKERS_PERIOD_S, self._publish_markers)
+        self._surroundings = Surroundings(
+            self, robot, config.odom_frame_id, before_change=self._stand, after_restart=self._start_again
+        )
         self.diagnose_every(_DIAGNOSE_PERIOD_S, self._report)
 
     @property
     def world(self) -> World | None:
         """The robot's world, with all things in their initial places; None for a real robot."""
-        return self._in_world.world if self._in_world else None
+        return self._surroundings.world
 
     @property
     def course(self) -> CourseState | None:
         """The progress on the course of its world; None if there is no course."""
-        return self._referee.state if self._referee.state.gates else None
+        return self._surroundings.course
 
     def change_world(self, change: Change) -> Future[None]:
-        """Stop the robot, and change the world around it; may be called from any thread.
-
-        Args:
-            change: Takes the world and returns the new one; runs on this node's thread.
-
-        Returns:
-            Done, or failed with the :class:`~handsteer.errors.WorldError` that explains why nothing has changed.
-        """
-        return self._changes.ask(lambda: self._change_world(change))
+        """Stop the robot and change the world: see :meth:`~handsteer.nodes.surroundings.Surroundings.change`."""
+        return self._surroundings.change(change)
 
     def enter_world(self, world: World) -> Future[None]:
         """Move the robot to the start of another world; see :meth:`change_world`."""
-        return self._changes.ask(lambda: self._start_anew(lambda robot: robot.enter(world)))
+        return self._surroundings.enter(world)
 
     def reset(self) -> Future[None]:
         """Reset the robot and all things to their initial places; see :meth:`change_world`."""
-        return self._changes.ask(lambda: self._start_anew(lambda robot: robot.reset()))
+        return self._surroundings.reset()
 
     def services(self) -> dict[str, Call]:
-        """Return ``reset_odometry``, which sets the odometry to 0 at the current place; none for a real robot."""
-        robot = self._in_world
-        if robot is None:
-            return {}
-
-        def reset() -> str:
-            self._changes.ask(robot.reset_odometry)
-            return "the odometry counts from here"
-
-        return {"reset_odometry": reset}
+        """Return those of the world around a simulated robot."""
+        return self._surroundings.services()
 
     def on_stop(self) -> None:
         """Stop the robot."""
@@ -172,7 +159,7 @@ class RobotNode(Node):
         if not is_zero(received.message) and (self._stall_guard.distrusts(now) or self._is_old(received.message, now)):
             return
         command = twist_in(received.message)
-        self._tell(Velocity(command.linear.x, command.angular.z))
+        self._drive(Velocity(command.linear.x, command.angular.z))
 
     def _is_old(self, message: Twist | TwistStamped, now: float) -> bool:
         """Return whether a stamped command is too old to be obeyed, as in ROS's diff_drive_controller."""
@@ -186,35 +173,21 @@ class RobotNode(Node):
 
     def _notice_interruption(self, now: float) -> None:
         if self._stall_guard.note(now):
-            self._tell(Velocity())
+            self._stand()
 
-    def _tell(self, velocity: Velocity) -> None:
+    def _stand(self) -> None:
+        self._drive(Velocity())
+
+    def _start_again(self) -> None:
+        self.state = self._robot.step(0.0)
+        self.path_length_m = 0.0
+
+    def _drive(self, velocity: Velocity) -> None:
         self._command, self._commanded_s = velocity, self.clock.now()
         self._robot.command(velocity.linear_mps, velocity.angular_radps)
 
-    def _editable(self) -> InWorld:
-        if self._in_world is None:
-            raise WorldError("a real robot has no world that could be changed, and cannot be put to its start")
-        return self._in_world
-
-    def _change_world(self, change: Change) -> None:
-        robot = self._editable()
-        gates, world = robot.world.gates, change(robot.world)
-        self._tell(Velocity())
-        robot.change(world)
-        if world.gates != gates:
-            self._referee = Referee(world.gates)
-
-    def _start_anew(self, begin: Callable[[InWorld], None]) -> None:
-        robot = self._editable()
-        self._tell(Velocity())
-        begin(robot)
-        self._referee = Referee(robot.world.gates)
-        self.state = robot.step(0.0)
-        self.path_length_m = 0.0
-
     def _step(self) -> None:
-        self._changes.make()
+        self._surroundings.make_changes()
         now = self.clock.now()
         elapsed_s, self._last_step_s = now - self._last_step_s, now
         self._notice_interruption(now)
@@ -222,7 +195,7 @@ class RobotNode(Node):
         self.state = self._robot.step(min(elapsed_s, _LONGEST_STEP_S))
         self.path_length_m += _distance_m(before, self.state)
         self.was_located |= self.state.located
-        self._referee.step(self.state.truth, self.state.collisions or 0, self.state.time_s)
+        self._surroundings.note(self.state)
         stamp = self.clock.stamp(now)
         header = Header(stamp=stamp, frame_id=self._config.odom_frame_id)
         base = self._config.base_frame_id
@@ -240,42 +213,20 @@ class RobotNode(Node):
             header = Header(stamp=self.clock.stamp(measured_s), frame_id=self._config.scan_frame_id)
             self._scan.publish(scan_message(header, scan), measured_s)
 
-    def _publish_markers(self) -> None:
-        now = self.clock.now()
-        self._touches.note(self.state.contacts, now)
-        if self._markers.has_subscribers:
-            header = Header(stamp=self.clock.stamp(now), frame_id=self._config.odom_frame_id)
-            strips = gate_strips(self.world.gates, self._referee.state) if self.world else []
-            self._markers.publish(
-                world_markers(header, self._robot.obstacles(), strips, self._touches.shown(now), self._most_markers)
-            )
-            # A subscriber keeps each marker until it is deleted.
-            self._most_markers = max(self._most_markers, len(self._robot.obstacles()))
-
-    def _report(self) -> None:
+    def _report(self) -> RobotStatus:
         state = self.state
-        level, message = self._condition()
-        self.diagnose(
-            level,
-            message,
-            **({} if state.collisions is None else {"collisions": state.collisions}),
-            path_length_m=f"{self.path_length_m:.2f}",
-            truth=f"{state.truth.x:.3f} {state.truth.y:.3f} {state.truth.yaw:.3f}",
-            **({} if self.course is None else self.course.as_values()),
-            **({"warning": self._rivals.warning} if self._rivals.warning else {}),
-        )
-
-    def _condition(self) -> tuple[int, str]:
         silence_s = self.clock.now() - self._commanded_s
-        if self.state.trouble:
-            return ERROR, self.state.trouble
-        if self.state.contacts:
-            return WARN, f"touches {', '.join(self.state.contacts)}"
-        if silence_s > self._config.cmd_vel_timeout and self._command != Velocity():
-            return WARN, f"standing: no command for {silence_s:.1f} s, and the last one was to drive"
-        if self._rivals.warning:
-            return WARN, "is commanded by more than one node"
-        return OK, "moves freely"
+        is_expired = silence_s > self._config.cmd_vel_timeout and self._command != Velocity()
+        return RobotStatus(
+            collisions=state.collisions,
+            path_length_m=round(self.path_length_m, 2),
+            truth=Pose2D(round(state.truth.x, 3), round(state.truth.y, 3), round(state.truth.yaw, 3)),
+            course=self._surroundings.course,
+            warning=self._rivals.warning or None,
+            trouble=state.trouble,
+            touches=state.contacts,
+            no_command_s=round(silence_s, 1) if is_expired else None,
+        )
 
 
 def _distance_m(before: RobotState, after: RobotState) -> float:
@@ -315,3 +266,19 @@ def _joint_state(header: Header, state: RobotState) -> JointState:
 
 def _about_z(yaw: float) -> Quaternion:
     return Quaternion(0.0, 0.0, math.sin(yaw / 2), math.cos(yaw / 2))
+
+
+def scan_message(header: Header, scan: RangeScan) -> LaserScan:
+    """Return ``scan`` as a message; all rays have the same time."""
+    return LaserScan(
+        header=header,
+        angle_min=scan.angle_min,
+        angle_max=scan.angle_min + scan.angle_increment * max(0, len(scan.ranges) - 1),
+        angle_increment=scan.angle_increment,
+        time_increment=0.0,
+        scan_time=_SCAN_PERIOD_S,
+        range_min=scan.range_min,
+        range_max=scan.range_max,
+        ranges=scan.ranges,
+        intensities=np.zeros(0, np.float32),
+    )

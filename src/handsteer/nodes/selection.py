@@ -1,13 +1,12 @@
 """Sends velocity commands to the selected one of several robots, and zeros to the ones selected before."""
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
-from handsteer.control.fleet import Fleet
 from handsteer.messages import SELECT_ROBOT, SELECTED_ROBOT, String, Topic
-from handsteer.nodes.node import Node
+from handsteer.nodes.base import Node
 from handsteer.transports.base import Received
 from handsteer.transports.commands import Commands
 
@@ -16,6 +15,41 @@ log = logging.getLogger(__name__)
 _LAST_ZEROS = 10
 
 Advertise = Callable[[Topic[Any]], Commands]
+
+NEXT = "next"
+"""Accepted by :meth:`Fleet.select` instead of a name."""
+
+
+class Fleet:
+    """Several robots, one of which is driven at a time.
+
+    Args:
+        names: Names of the robots, at least one; the first is selected initially.
+
+    Attributes:
+        selected: Name of the robot that is driven.
+    """
+
+    def __init__(self, names: Sequence[str]) -> None:
+        self._names = tuple(names)
+        self.selected = self._names[0]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of all robots, in order."""
+        return self._names
+
+    def select(self, name: str) -> bool:
+        """Select the robot ``name``, or the next one for :data:`NEXT`; return whether the selection changed.
+
+        An unknown name changes nothing.
+        """
+        if name == NEXT:
+            name = self._names[(self._names.index(self.selected) + 1) % len(self._names)]
+        if name == self.selected or name not in self._names:
+            return False
+        self.selected = name
+        return True
 
 
 class Selection:
@@ -86,5 +120,5 @@ class Selection:
     def _on_select(self, received: Received[String]) -> None:
         name = received.message.data.strip()
         self.select(name)
-        if name != self.fleet.selected and name not in (*self.fleet.names, "next"):
+        if name != self.fleet.selected and name not in (*self.fleet.names, NEXT):
             log.warning("there is no robot %r to select; there are %s", name, ", ".join(self.fleet.names))

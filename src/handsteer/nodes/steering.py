@@ -9,10 +9,10 @@ from handsteer.clock import Clock
 from handsteer.config import Config, ControlConfig
 from handsteer.control.safety import Ramp, Safety
 from handsteer.errors import TransportError
-from handsteer.messages import CMD_VEL, STEERING_CMD_VEL, STOP, Bool, Topic
-from handsteer.nodes.node import Node
-from handsteer.nodes.stall_guard import StallGuard
-from handsteer.nodes.stop_keeper import StopKeeper
+from handsteer.messages import CMD_VEL, STEERING_CMD_VEL, STOP, Bool, Topic, Twist
+from handsteer.nodes.base import Node
+from handsteer.nodes.supervision import StopKeeper
+from handsteer.nodes.timing import StallGuard
 from handsteer.timeouts import STALE_S
 from handsteer.transports.base import Received, Transport
 from handsteer.transports.commands import Commands
@@ -27,12 +27,8 @@ _MOST_TOPICS = 8
 @dataclass(frozen=True)
 class _Target:
     name: str
-    topic: Topic[Any]
     commands: Commands
-
-    @property
-    def is_direct(self) -> bool:
-        return self.topic is not STEERING_CMD_VEL
+    is_direct: bool
 
 
 class SteeringNode(Node):
@@ -48,10 +44,17 @@ class SteeringNode(Node):
     Args:
         config: Limits on another topic; the defaults of ``control`` when None.
         cmd_vel: A topic of robot commands, with Twist, TwistStamped or either; the model for other topics.
+        steering: Topic of the commands to ``hand_sign_control``.
     """
 
     def __init__(
-        self, transport: Transport, clock: Clock, config: ControlConfig | None = None, cmd_vel: Topic[Any] = CMD_VEL
+        self,
+        transport: Transport,
+        clock: Clock,
+        config: ControlConfig | None = None,
+        cmd_vel: Topic[Any] = CMD_VEL,
+        *,
+        steering: Topic[Twist] = STEERING_CMD_VEL,
     ) -> None:
         super().__init__("steering", transport, clock)
         self._config = config or ControlConfig()
@@ -65,7 +68,8 @@ class SteeringNode(Node):
         self._safety = Safety(self._config, arming=False)
         self._ramp = Ramp(self._config)
         self._last_step_s = self._last_sent_s = clock.now()
-        self._target = self._to(STEERING_CMD_VEL.name, STEERING_CMD_VEL)
+        self._steering = steering
+        self._target = self._to(steering.name, steering, is_direct=False)
         self._targets = {self._target.name: self._target}
         self._stop = self.publisher(STOP)
         StopKeeper(self)
@@ -97,8 +101,8 @@ class SteeringNode(Node):
         Raises:
             TransportError: It is not a topic name, or the topic has another type.
         """
-        if name == STEERING_CMD_VEL.ros_name:
-            name = STEERING_CMD_VEL.name
+        if name == self._steering.ros_name:
+            name = self._steering.name
         with self._lock:
             target = self._targets.get(name) or self._find(name)
             self.release()
@@ -156,16 +160,16 @@ class SteeringNode(Node):
         is_global = name.startswith("/")
         topic = Topic(name if is_global else f"/{name}", self._cmd_vel.type, is_global=is_global, depth=CMD_VEL.depth)
         topic = replace(topic, or_type=self._cmd_vel.or_type)
-        target = self._to(name, topic)
+        target = self._to(name, topic, is_direct=True)
         if self._heard_stop is None:
             self._heard_stop = False
             self.subscribe(STOP, self._on_stop_or_reset)
         self._targets[name] = target
         return target
 
-    def _to(self, name: str, topic: Topic[Any]) -> _Target:
+    def _to(self, name: str, topic: Topic[Any], *, is_direct: bool) -> _Target:
         commands = Commands(self.transport, self.publisher, topic, self.clock, self._config.cmd_vel_frame_id)
-        return _Target(name, topic, commands)
+        return _Target(name, commands, is_direct)
 
     def _admitted(self, wanted: Velocity) -> Velocity:
         """Return the velocity to send; ``hand_sign_control`` applies the limits unless it is bypassed."""

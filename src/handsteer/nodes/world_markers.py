@@ -1,15 +1,11 @@
-"""Markers of the obstacles and gates of a world, for RViz and the page, and changes requested by pages."""
+"""Markers of the obstacles and gates of a world, for RViz and the page."""
 
 import math
-import threading
-from collections import deque
-from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import Future
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from handsteer.errors import WorldError
 from handsteer.messages import (
     ColorRGBA,
     CompressedImage,
@@ -26,44 +22,6 @@ from handsteer.messages import (
 from handsteer.robots.course import CourseState
 from handsteer.robots.protocol import Obstacle
 from handsteer.robots.world import Gate
-
-_MOST_WAITING = 16
-
-
-class WorldChanges:
-    """Changes of a robot's world that wait for the robot's thread; :meth:`ask` may be called from any thread."""
-
-    def __init__(self) -> None:
-        self._lock = threading.Lock()
-        self._waiting: deque[tuple[Callable[[], None], Future[None]]] = deque()
-
-    def ask(self, change: Callable[[], None]) -> Future[None]:
-        """Queue ``change``; return a future that is done, or fails with the :class:`WorldError` that refuses it."""
-        future: Future[None] = Future()
-        with self._lock:
-            if len(self._waiting) >= _MOST_WAITING:
-                future.set_exception(WorldError("too many changes wait already: the robot is busy or has ended"))
-            else:
-                self._waiting.append((change, future))
-        return future
-
-    def make(self) -> bool:
-        """Make all queued changes in order, on this thread; return whether there were any."""
-        with self._lock:
-            waiting, self._waiting = self._waiting, deque()
-        for change, future in waiting:
-            if future.set_running_or_notify_cancel():
-                try:
-                    change()
-                except WorldError as error:
-                    future.set_exception(error)
-                except Exception as error:
-                    future.set_exception(error)
-                    raise
-                else:
-                    future.set_result(None)
-        return bool(waiting)
-
 
 OBSTACLES, GATES = "world", "gates"
 """Namespaces of the markers."""

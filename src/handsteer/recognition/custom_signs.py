@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handsteer.errors import DatasetError, ModelCorrupt, ModelError, ModelMissing
-from handsteer.recognition.classifier import Classifier, SignGuess
 from handsteer.recognition.features import (
     BEND_COUNT,
     COUNT,
@@ -23,7 +22,7 @@ from handsteer.recognition.features import (
     pair_distances,
     shape_features,
 )
-from handsteer.recognition.hand import Hand
+from handsteer.recognition.hand import Classifier, Hand, SignGuess
 from handsteer.recognition.network import Network, Novelty, from_arrays, to_arrays
 from handsteer.recognition.npz import Arrays, NpzFormat
 from handsteer.recognition.shipped_signs import SURE, legibility

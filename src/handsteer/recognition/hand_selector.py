@@ -8,9 +8,8 @@ from typing import Final
 import numpy as np
 
 from handsteer.config import SignsConfig
-from handsteer.recognition.classifier import SignGuess
 from handsteer.recognition.features import KNUCKLES, WRIST
-from handsteer.recognition.hand import Hand
+from handsteer.recognition.hand import Hand, SignGuess
 from handsteer.types import NONE, STOP
 
 _PALM: Final = [WRIST, *KNUCKLES]

@@ -13,8 +13,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from handsteer.recognition.landmark_models import PictureModel
 from handsteer.recognition.roi import Roi, from_palm, whole_frame
-from handsteer.recognition.tflite import PictureModel
 
 _ANCHOR_GRIDS: Final = ((8, 2), (16, 6))
 """Side of a grid's cells in pixels of the model's input, and number of anchors at each cell's centre."""

@@ -7,14 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handsteer.config import Config, SignsConfig
-from handsteer.recognition.classifier import Classifier, SignGuess
 from handsteer.recognition.custom_signs import CustomClassifier, load_custom_model
 from handsteer.recognition.debouncer import Debouncer, Evidence
-from handsteer.recognition.hand import Hand, Landmarker
+from handsteer.recognition.hand import Classifier, Hand, Landmarker, SignGuess
 from handsteer.recognition.hand_selector import HandPosition, HandSelector
 from handsteer.recognition.landmarker import MediaPipeLandmarker
 from handsteer.recognition.shipped_signs import ShippedClassifier, load_model
-from handsteer.types import NONE
+from handsteer.types import NONE, describe_seen
 
 _NOTHING = SignGuess(NONE, 0.0)
 
@@ -61,13 +60,7 @@ class Recognition:
     @property
     def reason(self) -> str:
         """A sentence that describes what is seen."""
-        if self.hand is None:
-            return "no hand is in view"
-        if self.seen == NONE:
-            return "the hand shows none of the signs"
-        if self.sign != self.seen:
-            return f"{self.seen} is not confirmed yet"
-        return f"{self.sign} is shown"
+        return describe_seen(self.sign, self.seen, is_hand_in_view=self.hand is not None)
 
 
 class Recognizer:

@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handsteer.errors import ModelCorrupt, ModelMissing
-from handsteer.recognition.classifier import SignGuess
 from handsteer.recognition.features import (
     COUNT,
     INDEX_BASE,
@@ -23,7 +22,7 @@ from handsteer.recognition.features import (
     directions,
     shape_features,
 )
-from handsteer.recognition.hand import Hand
+from handsteer.recognition.hand import Hand, SignGuess
 from handsteer.recognition.network import Network, Novelty, from_arrays, to_arrays
 from handsteer.recognition.npz import Arrays, NpzFormat
 from handsteer.types import BACKWARD, FORWARD, GO, NONE, SIGNS, STOP, TURN_LEFT, TURN_RIGHT

@@ -8,12 +8,14 @@ The score is in seconds, lower is better: the time, :data:`BUMP_S` for each bump
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
-from handsteer.robots.world import Gate
 from handsteer.types import Pose2D
+
+if TYPE_CHECKING:
+    from handsteer.robots.world import Gate
 
 BUMP_S = 2.0
 """Penalty for each bump."""
@@ -25,7 +27,6 @@ LEAP_M = 0.5
 """No robot moves so far between two steps: it was moved by hand, and has crossed nothing."""
 
 Phase = Literal["ready", "running", "finished"]
-_PHASES: dict[str, Phase] = {"ready": "ready", "running": "running", "finished": "finished"}
 
 
 @dataclass(frozen=True)
@@ -68,29 +69,6 @@ class CourseState:
         score = f", score {self.score_s:.1f} s" if self.phase == "finished" else ""
         return f"gates {self.passed}/{self.gates}{missed}, bumps {self.bumps}, {stopwatch(self.time_s)}{score}"
 
-    def as_values(self) -> dict[str, str]:
-        """Return it as named values, for diagnostics; :func:`read_course` reads them."""
-        return {
-            "course_gates": str(self.gates),
-            "course_next": str(self.next_gate),
-            "course_missed": " ".join(str(index) for index in sorted(self.missed)),
-            "course_bumps": str(self.bumps),
-            "course_time_s": f"{self.time_s:.2f}",
-            "course_phase": self.phase,
-        }
-
-
-def read_course(values: Mapping[str, str]) -> CourseState | None:
-    """Return the course in the values of :meth:`CourseState.as_values`; None if they are missing or invalid."""
-    try:
-        gates, next_gate, bumps = (int(values[f"course_{name}"]) for name in ("gates", "next", "bumps"))
-        missed = frozenset(int(index) for index in values["course_missed"].split())
-        time_s = float(values["course_time_s"])
-    except (KeyError, ValueError):
-        return None
-    phase = _PHASES.get(values.get("course_phase", ""))
-    return CourseState(gates, next_gate, missed, bumps, time_s, phase) if phase and math.isfinite(time_s) else None
-
 
 def stopwatch(time_s: float) -> str:
     """Return seconds as minutes, seconds and tenths, as ``1:05.3``, rounded down."""
@@ -108,17 +86,12 @@ class Referee:
         state: The progress so far.
     """
 
-    def __init__(self, gates: Sequence[Gate]) -> None:
+    def __init__(self, gates: "Sequence[Gate]") -> None:
         self._gates = tuple(gates)
         self.state = CourseState(len(self._gates))
         self._pose: Pose2D | None = None
         self._collisions = 0
         self._time_s = 0.0
-
-    def restart(self) -> None:
-        """Reset the progress, with the robot before the start."""
-        self.state = CourseState(len(self._gates))
-        self._pose = None
 
     def step(self, pose: Pose2D, collisions: int, time_s: float) -> CourseState:
         """Take the robot's next pose and return the progress.
@@ -149,7 +122,7 @@ class Referee:
                 self.state = replace(self.state, next_gate=index + 1, missed=missed, phase=phase)
 
 
-def crosses(gate: Gate, before: Pose2D, now: Pose2D) -> bool:
+def crosses(gate: "Gate", before: Pose2D, now: Pose2D) -> bool:
     """Return whether the path from ``before`` to ``now`` crosses ``gate`` forward.
 
     A pose on the line counts as behind it, so that a path in several pieces crosses once.

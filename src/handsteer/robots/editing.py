@@ -2,13 +2,14 @@
 
 import math
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
 
 from pydantic import ValidationError
 
 from handsteer.errors import WorldError
 from handsteer.robots.protocol import Robot, Shape
-from handsteer.robots.world import Thing, World, describe_problem
+from handsteer.robots.world import Box, Cylinder, Sphere, Thing, World, describe_problem
 from handsteer.types import Pose2D
 
 Change = Callable[[World], World]
@@ -93,6 +94,48 @@ def remove(world: World, name: str) -> World:
     """
     index = _index(world, name)
     return world.model_copy(update={"obstacles": world.obstacles[:index] + world.obstacles[index + 1 :]})
+
+
+@dataclass(frozen=True)
+class NumericProperty:
+    """One numeric property of a thing.
+
+    Attributes:
+        name: With its unit.
+        value: Current value.
+        step: Increment of the input's arrows.
+        fields: Returns the fields of the world file that set another value.
+    """
+
+    name: str
+    value: float
+    step: float
+    fields: Callable[[float], dict[str, Any]]
+
+
+def numeric_properties(thing: Thing) -> list[NumericProperty]:
+    """Return all numeric properties of ``thing``."""
+    x, y = thing.position
+    found = [
+        NumericProperty("x [m]", x, 0.1, lambda value: {"position": (value, y)}),
+        NumericProperty("y [m]", y, 0.1, lambda value: {"position": (x, value)}),
+    ]
+    match thing:
+        case Box(size=(length, width, height)):
+            found += [
+                NumericProperty("length [m]", length, 0.1, lambda value: {"size": (value, width, height)}),
+                NumericProperty("width [m]", width, 0.1, lambda value: {"size": (length, value, height)}),
+                NumericProperty("height [m]", height, 0.1, lambda value: {"size": (length, width, value)}),
+                NumericProperty("turn [°]", math.degrees(thing.yaw), 15.0, lambda value: {"yaw": math.radians(value)}),
+            ]
+        case Cylinder():
+            found += [
+                NumericProperty("radius [m]", thing.radius, 0.05, lambda value: {"radius": value}),
+                NumericProperty("height [m]", thing.height, 0.1, lambda value: {"height": value}),
+            ]
+        case Sphere():
+            found.append(NumericProperty("radius [m]", thing.radius, 0.05, lambda value: {"radius": value}))
+    return [*found, NumericProperty("mass [kg]", thing.mass, 0.1, lambda value: {"mass": value})]
 
 
 def unique_name(world: World, word: str) -> str:

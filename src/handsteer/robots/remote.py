@@ -154,7 +154,7 @@ class RemoteRobot:
             self._cmd_vel.follow()
             time.sleep(_LOOK_AGAIN_S)
         if not self._cmd_vel.has_subscribers:
-            log.warning("the robot is not there: %s", self._nobody_listens())
+            log.warning("the robot is not there: %s", self._no_subscriber())
 
     def _send(self, velocity: Velocity | None) -> None:
         if velocity is not None:
@@ -175,16 +175,16 @@ class RemoteRobot:
 
     def _trouble(self, *, listens: bool, is_silent: bool) -> str:
         if not listens:
-            return f"is not there: {self._nobody_listens()}"
+            return f"is not there: {self._no_subscriber()}"
         if self._senseless:
             return f"sends odometry on {self._odom_topic} that is no number; it is not used"
         if is_silent:
             return f"is silent: {self._odom_topic} has stopped, so the robot is commanded to stop"
         if self._seen is None and self._config.odom_topic and self._linked_s > _ODOMETRY_DUE_S:
-            return f"does not say where it is: nothing comes on {self._odom_topic} (robot.odom_topic)"
+            return f"does not report where it is: nothing comes on {self._odom_topic} (robot.odom_topic)"
         return "waits until Stop is shown, or no hand" if self._limiter.waits else ""
 
-    def _nobody_listens(self) -> str:
+    def _no_subscriber(self) -> str:
         name = _full_name(self._session, self._config.cmd_vel_topic)
         kind = " or ".join(type_name(kind) for kind in (self._topic.type, self._topic.or_type) if kind)
         advice = _ADVICE.get(self._config.kind, _IN_ROS2)

@@ -10,7 +10,7 @@ from typing import Any, Generic, TypeVar
 
 from handsteer.clock import Clock
 from handsteer.messages import Topic
-from handsteer.nodes.node import Node
+from handsteer.nodes.base import Node
 from handsteer.transports.base import Publisher, Received, Subscription, Transport
 from handsteer.transports.in_process import check_type
 from handsteer.transports.timing import StaleMessageFilter, capture_time

@@ -76,7 +76,7 @@ class Transport(Protocol):
     """Carries messages between nodes.
 
     ``deliver`` is called on a thread of the transport's choice and must return at once: nodes put the message into an
-    inbox that keeps the newest only (:class:`handsteer.nodes.node.Node`).
+    inbox that keeps the newest only (:class:`handsteer.nodes.base.Node`).
     """
 
     @property

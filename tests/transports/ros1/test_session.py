@@ -8,7 +8,7 @@ import pytest
 from handsteer.clock import WallClock
 from handsteer.errors import TransportError
 from handsteer.messages import Image, Topic
-from handsteer.nodes.node import Node
+from handsteer.nodes.base import Node
 from handsteer.transports import join
 from handsteer.transports.base import Received, Session, Transport
 from tests.contracts.transport_contract import TransportContract, eventually

@@ -14,7 +14,7 @@ from handsteer.cli.running import settings
 from handsteer.cli.signs.tables import evaluation_tables
 from handsteer.config import Config
 from handsteer.errors import EvaluationError, needing
-from handsteer.recognition.classifier import Classifier
+from handsteer.recognition.hand import Classifier
 from handsteer.recognition.recognizer import Recognizer, open_classifier
 from handsteer.training.evaluation.labels import labels_of
 from handsteer.training.evaluation.report import Evaluation

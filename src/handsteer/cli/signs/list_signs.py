@@ -5,7 +5,7 @@ import json as json_format
 from handsteer.cli.app import ConfigFile, Flag, Parameters
 from handsteer.cli.running import settings
 from handsteer.cli.signs.tables import table
-from handsteer.control.effects import effect_of
+from handsteer.control.explain import effect_of
 from handsteer.recognition.recognizer import open_classifier
 from handsteer.types import NONE, action_of, find_sign
 

@@ -21,12 +21,12 @@ export default class RobotRig {
     this.scene = scene;
     this.view = view;
     this.mesh = new THREE.Group();
-    this.hold(joints);
+    this.control(joints);
     this.stand({ x, y, yaw, angles });
     return this.mesh;
   }
 
-  hold(joints) {
+  control(joints) {
     this.joints = joints.map(([id, roll, pitch, yaw, ...axis]) => ({
       id,
       rest: new THREE.Quaternion().setFromEuler(new THREE.Euler(roll, pitch, yaw, "ZYX")), // about fixed axes

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from handsteer.errors import TrainingError
-from handsteer.recognition.classifier import Classifier
+from handsteer.recognition.hand import Classifier
 from handsteer.recognition.shipped_signs import SURE
 from handsteer.training.custom.dataset import Dataset, Take, summarise
 from handsteer.training.evaluation.intervals import Share

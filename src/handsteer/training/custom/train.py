@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handsteer import __version__
-from handsteer.recognition.classifier import Classifier
 from handsteer.recognition.custom_signs import FORMAT, Array, CustomModel, Depth, custom_features
+from handsteer.recognition.hand import Classifier
 from handsteer.recognition.shipped_signs import SURE
 from handsteer.training.custom.augmentation import mirrored, points_sideways, vary
 from handsteer.training.custom.checks import (

@@ -10,9 +10,8 @@ import numpy as np
 from handsteer.cameras.files import PHOTO_SUFFIXES, read_photo, video_frames
 from handsteer.cameras.protocol import Frame
 from handsteer.errors import EvaluationError, LabelError
-from handsteer.recognition.classifier import Classifier
 from handsteer.recognition.custom_signs import CustomClassifier
-from handsteer.recognition.hand import Hand
+from handsteer.recognition.hand import Classifier, Hand
 from handsteer.recognition.recognizer import Recognizer
 from handsteer.training.custom.dataset import Dataset, load_dataset
 from handsteer.training.evaluation.labels import LabelledPhoto, read_photo_labels, read_video_labels

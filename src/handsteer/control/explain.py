@@ -1,0 +1,92 @@
+"""Explains in words why the robot drives or stands, and what signs do, with the configured values."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+from handsteer.config import ControlConfig
+from handsteer.types import EFFECTS, Action
+
+ReasonCode = Literal[
+    "sign",
+    "steered",
+    "stopped",
+    "disarmed",
+    "steering_disarmed",
+    "no_image",
+    "no_scan",
+    "obstacle",
+    "steered_at_zero",
+    "no_input",
+    "no_sign",
+    "stop_sign",
+    "not_started",
+]
+"""Every reason for what is commanded; the first two are those of a robot that drives."""
+
+_SENTENCES: dict[ReasonCode, str] = {
+    "sign": "{}",
+    "steered": "steered by hand",
+    "stopped": "stopped, until it is reset",
+    "disarmed": "disarmed{}, moves once Stop is shown, or no hand",
+    "steering_disarmed": "disarmed, steers once the steering has been released",
+    "no_image": "{}",
+    "no_scan": "{}",
+    "obstacle": "stopped before an {}",
+    "steered_at_zero": "steered by hand, at zero",
+    "no_input": "no sign has come for {} s",
+    "no_sign": "no sign is seen",
+    "stop_sign": "the {} sign is shown",
+    "not_started": "no sign has set it in motion yet",
+}
+
+
+@dataclass(frozen=True)
+class Reason:
+    """Why the robot is commanded to drive, or to stand.
+
+    Attributes:
+        code: For programs.
+        detail: What the code leaves open: the sign, why it is disarmed, which obstacle, ...
+        robot: The robot that is disarmed, if there are several; else empty.
+        slowed: The obstacle that slows it, as ``obstacle 0.42 m ahead``; empty if none does.
+    """
+
+    code: ReasonCode
+    detail: str = ""
+    robot: str = ""
+    slowed: str = ""
+
+    @property
+    def is_driving(self) -> bool:
+        """Whether the robot is to move."""
+        return self.code in ("sign", "steered")
+
+    @property
+    def explanation(self) -> str:
+        """The reason in words, without what the robot does, as ``no sign is seen``."""
+        detail = f" ({self.detail})" if self.code == "disarmed" and self.detail else self.detail
+        robot = f"{self.robot} is " if self.robot else ""
+        slowed = f", slowed: {self.slowed}" if self.slowed else ""
+        return f"{robot}{_SENTENCES[self.code].format(detail)}{slowed}"
+
+    def __str__(self) -> str:
+        """Return a sentence, as ``standing: no sign is seen``."""
+        return f"{'driving' if self.is_driving else 'standing'}: {self.explanation}"
+
+
+def effect_of(action: Action, rule: ControlConfig) -> str:
+    """Return the effect of ``action`` on the robot under ``rule``, with steps and limits; for example ``stops``."""
+    figures = figures_of(action, rule)
+    return f"{EFFECTS[action]} ({figures})" if figures else EFFECTS[action]
+
+
+def figures_of(action: Action, rule: ControlConfig) -> str:
+    """Return the step and the limit of ``action`` under ``rule``; empty if it has none."""
+    is_timed = rule.ramp == "per_second"
+    linear = f"{rule.linear_acceleration:g} m/s a second" if is_timed else f"{rule.linear_step:g} m/s a frame"
+    angular = f"{rule.angular_acceleration:g} rad/s a second" if is_timed else f"{rule.angular_step:g} rad/s a frame"
+    if action in ("forward", "backward"):
+        return f"{linear}, up to {rule.max_linear:g} m/s"
+    if action in ("turn_left", "turn_right"):
+        return f"{angular}, up to {rule.max_angular:g} rad/s"
+    return f"up to {rule.max_linear:g} m/s" if action == "turbo" else ""

@@ -1,0 +1,254 @@
+"""The camera on the page: its pictures, those of a browser's own webcam, and the choice between them."""
+
+import asyncio
+import math
+import threading
+import uuid
+from collections import deque
+from collections.abc import AsyncIterator, Callable
+from contextlib import suppress
+
+import cv2
+import numpy as np
+from nicegui import ui
+from numpy.typing import NDArray
+from starlette.responses import StreamingResponse
+from starlette.types import Receive, Scope, Send
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from handsteer.clock import Clock
+from handsteer.dashboard.page import PICTURE_PATH, Page, box, button, switch, text
+from handsteer.dashboard.remote_graph import RemoteGraph
+from handsteer.dashboard.socket_events import is_page_of
+from handsteer.dashboard.state import PageState
+from handsteer.dashboard.viewers import OnDemandNode
+from handsteer.errors import FrameError
+from handsteer.images import bgr_image, encode_jpeg
+from handsteer.messages import IMAGE_ANNOTATED, Image
+from handsteer.nodes.base import Node
+from handsteer.transports.base import Received, Transport
+from handsteer.types import NONE
+
+FRAMES_PER_S = 30.0
+"""Maximum frame rate of a browser."""
+
+NEXT = "next"
+"""Sent to the browser to request another frame; at most one is in transit."""
+
+_NOT_A_FRAME, _NOT_THE_DRIVER, _NO_CAMERA_HERE, _BUSY = 4400, 4403, 4404, 4409
+
+
+class FrameSocket:
+    """The websocket by which the driver's browser sends its webcam's frames; one at a time.
+
+    Args:
+        graph: Receives the frames; None if the camera cannot be accessed.
+        drives: Returns whether the viewer with this id has the control lease; a free lease is given to it.
+    """
+
+    def __init__(self, graph: RemoteGraph | None, drives: Callable[[str], bool]) -> None:
+        self._graph = graph
+        self._drives = drives
+        self._in_use = threading.Lock()
+
+    async def serve(self, socket: WebSocket) -> None:
+        """Receive frames until the browser leaves; close with a reason if it cannot be served."""
+        await socket.accept()
+        viewer = socket.query_params.get("viewer", "")
+        if self._graph is None:
+            await socket.close(_NO_CAMERA_HERE, "the camera is not where the page is")
+        elif not (is_page_of(viewer, socket.scope) and self._drives(viewer)):
+            await socket.close(_NOT_THE_DRIVER, "only who drives may give a camera: ask to drive first")
+        elif not self._in_use.acquire(blocking=False):
+            await socket.close(_BUSY, "another browser gives its camera already")
+        else:
+            try:
+                await self._receive(socket, self._graph, viewer)
+            finally:
+                self._graph.forget_browser()
+                self._in_use.release()
+
+    async def _receive(self, socket: WebSocket, graph: RemoteGraph, viewer: str) -> None:
+        graph.choose_camera("browser")
+        loop = asyncio.get_running_loop()
+        try:
+            while self._drives(viewer):
+                began_s = loop.time()
+                graph.offer_frame(await socket.receive_bytes())
+                await asyncio.sleep(max(0.0, began_s + 1 / FRAMES_PER_S - loop.time()))
+                await socket.send_text(NEXT)
+            await socket.close(_NOT_THE_DRIVER, "somebody else drives now")
+        except FrameError as error:
+            await socket.close(_NOT_A_FRAME, str(error))
+        except (WebSocketDisconnect, KeyError):  # it has left, or sent text instead of a frame
+            pass
+
+
+BYTES_PER_S = 2_000_000
+"""Maximum data rate to one viewer."""
+
+_MAX_PIXELS = 640 * 480
+_BEST_QUALITY, _WORST_QUALITY = 80, 40
+# 60 kB leave room for 30 frames a second within BYTES_PER_S.
+_TOO_LARGE, _SMALL = 60_000, 45_000
+
+_BOUNDARY = b"frame"
+
+
+class PictureNode(Node):
+    """Encodes the newest picture once for all waiting viewers; drops pictures without waiting viewers."""
+
+    def __init__(self, transport: Transport, clock: Clock) -> None:
+        super().__init__("dashboard_picture", transport, clock)
+        self._waiting: deque[asyncio.Future[bytes | None]] = deque()
+        self._has_ended = False
+        self._quality = _BEST_QUALITY
+        self._not_before_s = -math.inf
+        self.subscribe(IMAGE_ANNOTATED, self._on_image)
+
+    async def next_jpeg(self) -> bytes | None:
+        """Return the next picture as a JPEG file; None once the node has been stopped."""
+        future: asyncio.Future[bytes | None] = asyncio.get_running_loop().create_future()
+        self._waiting.append(future)
+        return None if self._has_ended else await future
+
+    def on_stop(self) -> None:
+        """End the pictures of all viewers."""
+        self._has_ended = True
+        self._answer(None)
+
+    def _on_image(self, received: Received[Image]) -> None:
+        now = self.clock.now()
+        if not self._waiting or now < self._not_before_s:
+            return
+        jpeg = encode_jpeg(shrink(bgr_image(received.message)), self._quality).tobytes()
+        self._quality = next_quality(self._quality, len(jpeg))
+        self._not_before_s = now + len(jpeg) / BYTES_PER_S
+        self._answer(jpeg)
+
+    def _answer(self, jpeg: bytes | None) -> None:
+        # A deque, because the server's thread appends concurrently.
+        while self._waiting:
+            future = self._waiting.popleft()
+            with suppress(RuntimeError):  # the server has stopped
+                future.get_loop().call_soon_threadsafe(_resolve, future, jpeg)
+
+
+class PictureResponse(StreamingResponse):
+    """Streams pictures to one viewer until it leaves; a slow reader gets fewer pictures, always the newest."""
+
+    def __init__(self, pictures: OnDemandNode[PictureNode]) -> None:
+        super().__init__(
+            self._parts(),
+            media_type=f"multipart/x-mixed-replace; boundary={_BOUNDARY.decode()}",
+            headers={"Cache-Control": "no-store"},
+        )
+        self._pictures = pictures
+        self._viewer = uuid.uuid4()
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Send pictures; return when the viewer has left or the pictures have ended."""
+        try:
+            await super().__call__(scope, receive, send)
+        finally:
+            self._pictures.leave(self._viewer)
+
+    async def _parts(self) -> AsyncIterator[bytes]:
+        node = self._pictures.join(self._viewer)
+        # The boundary directly follows each picture: browsers show a picture only when they see its end.
+        yield b"--" + _BOUNDARY + b"\r\n"
+        while node is not None and (jpeg := await node.next_jpeg()) is not None:
+            header = b"Content-Type: image/jpeg\r\nContent-Length: %d\r\n\r\n" % len(jpeg)
+            yield header + jpeg + b"\r\n--" + _BOUNDARY + b"\r\n"
+
+
+def shrink(bgr: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Return ``bgr``, (height, width, 3) uint8, scaled down to at most as many pixels as 640x480."""
+    height, width = bgr.shape[:2]
+    scale = math.sqrt(_MAX_PIXELS / (height * width))
+    if scale >= 1:
+        return bgr
+    size = (max(1, int(width * scale)), max(1, int(height * scale)))
+    return np.asarray(cv2.resize(bgr, size, interpolation=cv2.INTER_AREA), np.uint8)
+
+
+def next_quality(quality: int, size: int) -> int:
+    """Return the JPEG quality (0 to 100) for the next picture after one of ``size`` bytes at ``quality``."""
+    if size > _TOO_LARGE:
+        return max(_WORST_QUALITY, quality - 10)
+    return min(_BEST_QUALITY, quality + 1) if size < _SMALL else quality
+
+
+def _resolve(future: "asyncio.Future[bytes | None]", jpeg: bytes | None) -> None:
+    if not future.done():
+        future.set_result(jpeg)
+
+
+_LONGEST_STATUS = 200
+
+
+class CameraPanel:
+    """The mirrored picture, the recognised sign, and the choice of camera.
+
+    Args:
+        page: Shows the panel.
+        graph: The graph whose camera can be chosen; None if there is no choice.
+
+    Attributes:
+        stage: Holds the picture and its overlays.
+    """
+
+    def __init__(self, page: Page, graph: RemoteGraph | None) -> None:
+        self._page, self._graph = page, graph
+        with ui.element("section").classes("card viewer camera"):
+            with box("stage") as self.stage:
+                # Lazy, because otherwise the page would count as loaded only with its first picture.
+                picture = ui.element("img").props('loading="lazy" alt="What the camera sees, mirrored"')
+                picture.props(f'src="{PICTURE_PATH}"')
+                with box("veil") as self._veil:
+                    self._no_picture = text("", "waiting for the first picture")
+                text("caption", "as in a mirror")
+            with box("foot"):
+                self._ring = box("ring").props('role="progressbar" aria-label="Confirmed" aria-valuemax="100"')
+                self._sign = text("sign", "No sign")
+                with box("meter"):
+                    self._confidence = box("")
+                self._percent = text("percent", "")
+                self._hand = text("hand", "")
+            if graph is not None:
+                with box("foot choice"):
+                    browser = f'data-camera="browser" data-viewer="{page.client.id}"'
+                    self._browser = button("Use this device's camera").props(browser)
+                    self._own = button("Use the robot's camera", self._use_own).props('data-camera="own"')
+                    self._status = text("trouble", "").props('role="alert"')
+                ui.on("webcam", lambda event: self._status.set_text(read_status(event.args)))
+
+    def update(self, state: PageState) -> None:
+        """Show ``state``."""
+        # A confirmed sign stays active for a moment when it is not seen.
+        shown = state.sign if state.seen == NONE else state.seen
+        self._sign.set_text("No sign" if shown == NONE else shown)
+        switch(self._sign, "pending", on=shown != state.sign)
+        confirmed = round(100 * state.confirmed)
+        self._ring.style(f"--confirmed: {confirmed}%").props(f"aria-valuenow={confirmed}")
+        switch(self._ring, "whole", on=confirmed == 100)
+        self._hand.set_text(f"{state.handedness} hand" if state.handedness else "No hand")
+        percent = round(100 * state.confidence) if state.seen != NONE else 0
+        self._percent.set_text(f"{percent} %" if percent else "")
+        self._confidence.style(f"width: {percent}%")
+        self._no_picture.set_text(state.no_picture)
+        switch(self._veil, "off", on=not state.no_picture)
+        if self._graph is not None:
+            source = self._graph.state.camera_source
+            switch(self._browser, "hidden", on=source == "browser" and self._graph.state.has_browser)
+            switch(self._own, "hidden", on=source == "own")
+
+    def _use_own(self) -> None:
+        if self._graph is not None and self._page.drives():
+            self._graph.choose_camera("own")
+
+
+def read_status(sent: object) -> str:
+    """Return the camera status sent by a browser, for its own page; empty if it is invalid."""
+    words = sent.get("words") if isinstance(sent, dict) else None
+    return words[:_LONGEST_STATUS] if isinstance(words, str) else ""

@@ -1,0 +1,211 @@
+"""A graph for a page in another process: both ends of the pipe between them.
+
+Topics pass through it as well (:mod:`handsteer.transports.piped`).
+"""
+
+import contextlib
+import itertools
+from collections.abc import Callable
+from concurrent.futures import Future
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from handsteer.cameras.browser import Source, check_frame
+from handsteer.clock import Clock
+from handsteer.config import Config
+from handsteer.errors import ConfigError, FrameError, HandsteerError, TransportError
+from handsteer.graph import Graph
+from handsteer.making import make_steering
+from handsteer.nodes.steering import SteeringNode
+from handsteer.robots.world import World
+from handsteer.transports.piped import Gateway, Pipe, PipedTransport
+
+_ANSWER_TIMEOUT_S = 5.0
+_LOOK_PERIOD_S = 0.2
+
+
+@dataclass(frozen=True)
+class GraphState:
+    """What the page's process receives from the graph in addition to topics.
+
+    Attributes:
+        config: The nodes' configuration.
+        world: The robot's world with all things at their start positions; None for a real robot.
+        camera_source: The selected camera.
+        has_browser: Whether a browser has sent frames since the last one was forgotten.
+    """
+
+    config: Config
+    world: World | None
+    camera_source: Source
+    has_browser: bool
+
+
+class GraphServer:
+    """The graph's end: offers a graph of this process to a :class:`RemoteGraph`.
+
+    Args:
+        pipe: Not started yet; connected to a :class:`RemoteGraph`.
+        graph: The graph.
+        file: The YAML file that its parameters were read from, which settings are saved to.
+    """
+
+    def __init__(self, pipe: Pipe, graph: Graph, file: Path | None = None) -> None:
+        self._pipe = pipe
+        self._graph = graph
+        self._gateway = Gateway(pipe, graph.transport)
+        self._sent = self._state()
+        self._actions: dict[str, Callable[..., Future[None] | None]] = {
+            "reconfigure": graph.reconfigure,
+            "change_world": graph.robot.change_world,
+            "enter_world": graph.robot.enter_world,
+            "reset": graph.robot.reset,
+            "choose_camera": graph.cameras.choose,
+            "forget_browser": graph.cameras.browser.forget,
+        }
+        pipe.on("frame", self._take_frame)
+        pipe.on("request", self._execute)
+        pipe.say("begin", self._sent, graph.clock, file)
+
+    def close(self) -> None:
+        """Close the page's publishers and subscriptions."""
+        self._gateway.close()
+
+    def _state(self) -> GraphState:
+        graph = self._graph
+        return GraphState(graph.config, graph.robot.world, graph.cameras.source, graph.cameras.browser.is_given)
+
+    def _send_state(self) -> None:
+        state = self._state()
+        if state != self._sent:
+            self._sent = state
+            self._pipe.say("state", state)
+
+    def _take_frame(self, frame: bytes) -> None:
+        with contextlib.suppress(FrameError):  # checked before
+            self._graph.cameras.browser.offer(frame)
+        self._send_state()
+
+    def _execute(self, number: int, action: str, *arguments: Any) -> None:
+        try:
+            result = self._actions[action](*arguments)
+        except HandsteerError as error:
+            self._answer(number, error)
+        else:
+            if isinstance(result, Future):
+                result.add_done_callback(lambda done: self._answer(number, done.exception()))
+            else:
+                self._answer(number, None)
+
+    def _answer(self, number: int, error: BaseException | None) -> None:
+        self._send_state()
+        self._pipe.say("answer", number, error)
+
+
+class RemoteGraph:
+    """The page's end: a graph that runs in another process. Use it only after :meth:`join` has returned.
+
+    Args:
+        pipe: Not started yet; connected to a :class:`GraphServer`.
+
+    Attributes:
+        transport: Carries the graph's messages.
+        clock: The graph's clock.
+        state: What the graph has reported last.
+        steering: Runs in this process; not started.
+    """
+
+    clock: Clock
+    state: GraphState
+    steering: SteeringNode
+
+    def __init__(self, pipe: Pipe) -> None:
+        self.transport = PipedTransport(pipe)
+        self._pipe = pipe
+        self._begun: Future[tuple[GraphState, Clock, Path | None]] = Future()
+        self._numbers = itertools.count()
+        self._requests: dict[int, Future[None]] = {}
+        pipe.on("begin", lambda *what: self._begun.set_result(what))
+        pipe.on("state", self._take_state)
+        pipe.on("answer", self._take_answer)
+
+    def join(self) -> Path | None:
+        """Wait until the other process describes its graph; return the file that settings are saved to.
+
+        Raises:
+            TransportError: The other process has ended first.
+        """
+        while not self._pipe.ended.is_set():
+            try:
+                self.state, self.clock, file = self._begun.result(_LOOK_PERIOD_S)
+            except TimeoutError:
+                continue
+            self.steering = make_steering(self.config, self.transport, self.clock)
+            return file
+        raise TransportError("the graph's process has ended")
+
+    @property
+    def config(self) -> Config:
+        """The nodes' configuration."""
+        return self.state.config
+
+    def reconfigure(self, config: Config) -> None:
+        """Apply the live parameters of ``config`` to the nodes, in both processes.
+
+        Raises:
+            ConfigError: A node rejects them, or the other process does not answer; nothing has changed.
+        """
+        try:
+            self._request("reconfigure", config).result(_ANSWER_TIMEOUT_S)
+        except TimeoutError:
+            raise ConfigError("the robot's process does not answer: try again") from None
+        self.steering.reconfigure(config)
+
+    def change_world(self, change: Callable[[World], World]) -> Future[None]:
+        """Change the robot's world; ``change`` must be picklable."""
+        return self._request("change_world", change)
+
+    def enter_world(self, world: World) -> Future[None]:
+        """Move the robot to the start of another world."""
+        return self._request("enter_world", world)
+
+    def reset(self) -> Future[None]:
+        """Move the robot and all things to their start positions."""
+        return self._request("reset")
+
+    def choose_camera(self, source: Source) -> None:
+        """Read frames from ``source`` from now on."""
+        self._request("choose_camera", source)
+
+    def offer_frame(self, data: bytes) -> None:
+        """Send a frame of a browser's camera, see :class:`~handsteer.cameras.browser.BrowserCamera`.
+
+        Raises:
+            FrameError: It is not such a frame, or too large.
+        """
+        check_frame(data)
+        self._pipe.say("frame", data, key="browser's frame", keep=1)
+
+    def forget_browser(self) -> None:
+        """Forget the browser that sends frames; another may follow."""
+        self._request("forget_browser")
+
+    def _request(self, action: str, *arguments: object) -> Future[None]:
+        """Request an action of the other process; return a future of its result."""
+        number, future = next(self._numbers), Future[None]()
+        self._requests[number] = future
+        self._pipe.say("request", number, action, *arguments)
+        return future
+
+    def _take_state(self, state: GraphState) -> None:
+        self.state = state
+
+    def _take_answer(self, number: int, error: BaseException | None) -> None:
+        future = self._requests.pop(number)
+        if not future.set_running_or_notify_cancel():
+            return  # nothing waits for it any more
+        if error is None:
+            future.set_result(None)
+        else:
+            future.set_exception(error)

@@ -1,1 +1,0 @@
-"""Teaches signs on the page: one lesson at a time, run by the driver."""

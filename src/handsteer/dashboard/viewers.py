@@ -1,0 +1,154 @@
+"""The control lease: one viewer at a time drives, the others watch and may request it."""
+
+import threading
+from collections.abc import Callable, Hashable
+from dataclasses import dataclass
+from typing import Generic, Literal, TypeVar
+
+from handsteer.nodes.base import Node
+
+ANSWER_S = 10.0
+"""A request that the driver does not answer within this time is granted."""
+
+Role = Literal["driver", "watcher", "free"]
+
+
+@dataclass(frozen=True)
+class LeaseStatus:
+    """The lease as one viewer sees it.
+
+    Attributes:
+        role: Whether the viewer drives, watches another one, or the lease is free.
+        asked: For the driver: there is a request. For a watcher: it has requested the lease.
+        left_s: Seconds until an unanswered request is granted.
+    """
+
+    role: Role
+    asked: bool = False
+    left_s: float = 0.0
+
+
+class ControlLease:
+    """The control lease; thread-safe.
+
+    The driver keeps the lease until it leaves, hands over, or does not answer a request in time. A refused viewer may
+    ask again.
+    """
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._driver: str | None = None
+        self._request: tuple[str, float] | None = None
+
+    def take(self, viewer: str, now_s: float) -> bool:
+        """Return whether ``viewer`` drives; a free lease is given to it."""
+        with self._lock:
+            self._hand_over_if_due(now_s)
+            if self._driver is None:
+                self._driver = viewer
+            return self._driver == viewer
+
+    def drives(self, viewer: str) -> bool:
+        """Return whether ``viewer`` has the lease."""
+        return self._driver == viewer
+
+    def ask(self, viewer: str, now_s: float) -> None:
+        """Request the lease; ignored while another request is pending."""
+        with self._lock:
+            self._hand_over_if_due(now_s)
+            if self._driver is None:
+                self._driver = viewer
+            elif self._driver != viewer and self._request is None:
+                self._request = (viewer, now_s + ANSWER_S)
+
+    def answer(self, viewer: str, *, hand_over: bool) -> bool:
+        """Grant or refuse the request, if ``viewer`` is the driver; return whether the driver has changed."""
+        with self._lock:
+            if self._driver != viewer or self._request is None:
+                return False
+            asker, self._request = self._request[0], None
+            if hand_over:
+                self._driver = asker
+            return hand_over
+
+    def leave(self, viewer: str) -> bool:
+        """Release the lease or withdraw a request; return whether ``viewer`` was the driver."""
+        with self._lock:
+            if self._request is not None and self._request[0] == viewer:
+                self._request = None
+            if self._driver != viewer:
+                return False
+            # A pending request is granted.
+            self._driver = self._request[0] if self._request else None
+            self._request = None
+            return True
+
+    def tick(self, now_s: float) -> bool:
+        """Grant a request that has not been answered in time; return whether the driver has changed."""
+        with self._lock:
+            return self._hand_over_if_due(now_s)
+
+    def status_of(self, viewer: str, now_s: float) -> LeaseStatus:
+        """Return the lease as ``viewer`` sees it."""
+        with self._lock:
+            asker, due_s = self._request or (None, now_s)
+            left_s = max(0.0, due_s - now_s)
+            if self._driver is None:
+                return LeaseStatus("free")
+            if self._driver == viewer:
+                return LeaseStatus("driver", asker is not None, left_s)
+            return LeaseStatus("watcher", asker == viewer, left_s)
+
+    def _hand_over_if_due(self, now_s: float) -> bool:
+        if self._request is None or now_s < self._request[1]:
+            return False
+        self._driver, self._request = self._request[0], None
+        return True
+
+
+N = TypeVar("N", bound=Node)
+
+
+class OnDemandNode(Generic[N]):
+    """Starts a new node from ``make`` for the first viewer, and stops it after the last; thread-safe."""
+
+    def __init__(self, make: Callable[[], N]) -> None:
+        self._make = make
+        self._lock = threading.Lock()
+        self._viewers: set[Hashable] = set()
+        self._node: N | None = None
+        self._closed = False
+
+    def join(self, viewer: Hashable) -> N | None:
+        """Return the running node, or None after :meth:`close`; joining twice counts once."""
+        with self._lock:
+            if self._closed:
+                return None
+            self._viewers.add(viewer)
+            if self._node is None:
+                self._node = self._make()
+                self._node.start()
+            return self._node
+
+    def is_watched_by(self, viewer: Hashable) -> bool:
+        """Return whether ``viewer`` has joined, and has neither left nor been disconnected by :meth:`close`."""
+        return viewer in self._viewers
+
+    def leave(self, viewer: Hashable) -> None:
+        """Remove ``viewer``; has no effect if it has not joined."""
+        with self._lock:
+            self._viewers.discard(viewer)
+            if not self._viewers:
+                self._stop()
+
+    def close(self) -> None:
+        """Stop the node permanently, with or without viewers."""
+        with self._lock:
+            self._closed = True
+            self._viewers.clear()
+            self._stop()
+
+    def _stop(self) -> None:
+        if self._node is not None:
+            self._node.stop()
+            self._node = None

@@ -1,0 +1,97 @@
+"""What the 3D view shows: the robot, its path reduced to few points, obstacles, and the points of a laser scan."""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from handsteer.messages import LaserScan, Marker
+from handsteer.types import Pose2D
+
+TRAIL_POINTS = 1000
+"""The oldest points of a trail beyond these are dropped."""
+
+STEP_M = 0.08
+"""Distance between the points of a trail."""
+
+LEAP_M = 0.5
+"""A robot farther than this from the last point was repositioned, which starts a new trail."""
+
+_START = Pose2D(0.0, 0.0, 0.0)
+
+SCAN_POINTS = 180
+"""Longer scans are subsampled."""
+
+Point = tuple[float, float]
+"""x and y in metres."""
+
+
+@dataclass(frozen=True)
+class Trail:
+    """The path so far.
+
+    Attributes:
+        points: Oldest first.
+        count: Total number of points, including dropped ones.
+        number: Number of earlier trails.
+    """
+
+    points: tuple[Point, ...] = ()
+    count: int = 0
+    number: int = 0
+
+    def to(self, pose: Pose2D) -> "Trail":
+        """Return the trail extended to ``pose``."""
+        point = (pose.x, pose.y)
+        distance_m = math.dist(self.points[-1], point) if self.points else math.inf
+        if distance_m < STEP_M:
+            return self
+        if LEAP_M < distance_m < math.inf:
+            return self.anew().to(pose)
+        return replace(self, points=(*self.points[-TRAIL_POINTS + 1 :], point), count=self.count + 1)
+
+    def anew(self) -> "Trail":
+        """Return an empty trail with another number."""
+        return Trail(number=self.number + 1)
+
+    def since(self, shown: "Trail") -> tuple[Point, ...]:
+        """Return the points added since ``shown``, an earlier state of the same trail."""
+        new = self.count - shown.count
+        return self.points[-new:] if new else ()
+
+
+@dataclass(frozen=True)
+class WorldState:
+    """The contents of the 3D view.
+
+    Attributes:
+        robot: Pose of the robot in the world.
+        joints: Joint angles in rad by name.
+        markers: The obstacles by namespace and id.
+        description: The robot's URDF; empty until it is known.
+        trail: The robot's path while the page was viewed.
+        scan: Points of the laser scan in the world.
+    """
+
+    robot: Pose2D = _START
+    joints: tuple[tuple[str, float], ...] = ()
+    markers: tuple[Marker, ...] = ()
+    description: str = ""
+    trail: Trail = Trail()
+    scan: tuple[Point, ...] = ()
+
+
+def scan_points(scan: LaserScan, robot: Pose2D) -> tuple[Point, ...]:
+    """Return the points of ``scan`` in the world; rays without a return are left out.
+
+    ``robot`` is the robot's pose at the time of the scan. The scanner is assumed at its centre, facing forward, as on
+    the simulated robot.
+    """
+    ranges = np.asarray(scan.ranges, dtype=np.float64)
+    step = max(1, math.ceil(len(ranges) / SCAN_POINTS))
+    numbers = np.arange(0, len(ranges), step)
+    ranges = ranges[::step]
+    meets = np.isfinite(ranges) & (ranges >= scan.range_min) & (ranges <= scan.range_max)
+    angles = robot.yaw + scan.angle_min + numbers[meets] * scan.angle_increment
+    points = np.stack([robot.x + ranges[meets] * np.cos(angles), robot.y + ranges[meets] * np.sin(angles)], axis=1)
+    return tuple((x, y) for x, y in points[np.isfinite(points).all(axis=1)].round(2).tolist())

@@ -1,0 +1,93 @@
+"""Attached to nodes: keeping the state of Stop, and reporting topics that several nodes publish."""
+
+import logging
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from handsteer.messages import STOP, STOPPED, Bool, Topic
+from handsteer.nodes.base import Node
+from handsteer.transports.base import UNNAMED, Received, many_publishers
+
+log = logging.getLogger(__name__)
+
+_PERIOD_S = 1.0
+# A restarting node appears twice for a moment, and names arrive up to three seconds late.
+_LOOKS, _LOOKS_FOR_NAMES = 2, 4
+
+Look = Callable[[], Sequence[str]]
+
+
+class StopKeeper:
+    """A node's record of ``/stop``; it is published on ``/stopped``, latched, and updated from that of other nodes.
+
+    Every node of the graph has one, so that a Stop survives the restart of any of them. Only false on ``/stop`` ends
+    it.
+
+    Args:
+        on_stop: Called with true at a Stop, from either topic, and with false at a reset.
+    """
+
+    def __init__(self, node: Node, on_stop: Callable[[bool], None] | None = None) -> None:
+        self._on_stop = on_stop
+        self._is_stopped: bool | None = None
+        self._stopped = node.publisher(STOPPED)
+        # Several nodes publish at once: one's true must not be replaced by another's false.
+        node.subscribe(STOPPED, self._on_word_of_others, key=lambda message: bool(message.data))
+        node.subscribe(STOP, self._on_stop_or_reset)
+
+    def _on_stop_or_reset(self, received: Received[Bool]) -> None:
+        self._take(bool(received.message.data))
+
+    def _on_word_of_others(self, received: Received[Bool]) -> None:
+        # A node that missed a reset must not undo a Stop by its false; resets are accepted from /stop only.
+        if received.message.data and not self._is_stopped:
+            self._take(True)
+
+    def _take(self, is_stopped: bool) -> None:
+        is_news = is_stopped != self._is_stopped
+        self._is_stopped = is_stopped
+        if self._on_stop is not None:
+            self._on_stop(is_stopped)
+        if is_news:
+            self._stopped.publish(Bool(data=is_stopped))
+
+
+class Rivals:
+    """Checks the publishers of command topics once a second.
+
+    Args:
+        node: The node that runs the check, on its thread and transport.
+        topics: Topics that must have only one publisher.
+        elsewhere: Further topics by name, of another graph; each value returns the nodes that publish there.
+
+    Attributes:
+        warning: The problem in one sentence; empty if there is none.
+    """
+
+    def __init__(self, node: Node, topics: Sequence[Topic[Any]], elsewhere: dict[str, Look] | None = None) -> None:
+        self.warning = ""
+        self._node = node
+        self._looks: dict[str, Look] = {node.transport.topic_name(topic): self._look_at(topic) for topic in topics}
+        self._looks |= elsewhere or {}
+        self._seen: dict[str, int] = {}
+        self._logged: set[str] = set()
+        node.every(_PERIOD_S, self._look)
+
+    def _look_at(self, topic: Topic[Any]) -> Look:
+        return lambda: self._node.transport.publishers_of(topic)
+
+    def _look(self) -> None:
+        warnings = [warning for name, look in self._looks.items() if (warning := self._problem(name, look()))]
+        for warning in warnings:
+            if warning not in self._logged:
+                log.warning("%s: %s", self._node.name, warning)
+        self._logged = set(warnings)
+        self.warning = "; ".join(warnings)
+
+    def _problem(self, topic: str, publishers: Sequence[str]) -> str:
+        if len(publishers) < 2:
+            self._seen.pop(topic, None)
+            return ""
+        self._seen[topic] = self._seen.get(topic, 0) + 1
+        is_sure = self._seen[topic] >= (_LOOKS_FOR_NAMES if UNNAMED in publishers else _LOOKS)
+        return many_publishers(topic, publishers) if is_sure else ""

@@ -1,0 +1,211 @@
+"""What nodes know of time: whether they were stalled, the age of frames, recordings, and statistics of durations."""
+
+import logging
+from collections import deque
+
+import numpy as np
+
+from handsteer.clock import ClockWatch
+from handsteer.config import Recorded
+from handsteer.timeouts import BURST_S, DISTRUST_S, RECORDED_S, RESYNC_S, STALE_S
+
+log = logging.getLogger(__name__)
+
+CALM_S = 0.09 + 1e-7
+"""How long a node may delay its watchdog after a message, which does the same checks, without missing a timeout.
+
+The timeout of 0.35 s then follows after whole periods of 0.02 s of the watchdog; slightly more for rounding of summed
+times.
+"""
+
+
+class StallGuard:
+    """Detects that a node was stalled: its process was stopped, or the machine was overloaded.
+
+    Without it, commands without a stamp would be obeyed late, however old they are.
+
+    Args:
+        limit_s: A longer gap between two calls of :meth:`note` is a stall; may be changed later.
+        now_s: Current time, in seconds of the graph's clock.
+    """
+
+    def __init__(self, limit_s: float, now_s: float) -> None:
+        self.limit_s = limit_s
+        self._noted_s = now_s
+        self._distrust_until_s = now_s
+        self._asked_s = now_s
+        self._in_burst = False
+
+    def note(self, now_s: float) -> bool:
+        """Record that the node runs; return whether it has just ended a stall."""
+        interrupted = now_s - self._noted_s > self.limit_s
+        self._noted_s = now_s
+        if interrupted:
+            self._distrust_until_s = now_s + DISTRUST_S
+            self._in_burst = True
+        return interrupted
+
+    def distrusts(self, now_s: float) -> bool:
+        """Return whether a message received now may have waited during a stall; call once for each message."""
+        gap_s, self._asked_s = now_s - self._asked_s, now_s
+        if now_s >= self._distrust_until_s and gap_s >= BURST_S:
+            self._in_burst = False
+        return self._in_burst
+
+
+_LEAK = 0.001
+"""Decay of a clock offset, in seconds per second: far more than clocks drift, far less than delays last."""
+
+
+class FrameAge:
+    """Distinguishes old frames from new ones by their stamps.
+
+    A stamp in the future shows that the camera's clock is ahead of ours by at least the difference, which is then added
+    to the age of every frame. So the age is never overestimated, and underestimated by at most the shortest delay of
+    any frame. A clock that is behind cannot be distinguished from a delay, and its frames count as old, unless it was
+    set while frames were received, which :class:`~handsteer.clock.ClockWatch` detects.
+
+    Args:
+        limit_s: Maximum age of a frame in seconds; frames that are further ahead are refused too.
+
+    Attributes:
+        limit_s: As above; may be changed.
+        age_s: Lower bound of the last frame's age.
+        ahead_s: Lower bound of the offset by which the camera's clock is ahead of ours.
+    """
+
+    def __init__(self, limit_s: float) -> None:
+        self.limit_s = limit_s
+        self._noted_s: float | None = None
+        self._watch = ClockWatch(in_step=True)
+        self.age_s = 0.0
+        self.ahead_s = 0.0
+
+    def why_refused(self, now_s: float, captured_s: float) -> str | None:
+        """Return why a frame received now must not be used, in words; None if it is fresh.
+
+        Args:
+            now_s: Current time, in seconds of the graph's clock.
+            captured_s: The frame's stamp, in seconds of the same clock.
+        """
+        elapsed_s = 0.0 if self._noted_s is None else now_s - self._noted_s
+        self._noted_s = now_s
+        self.ahead_s = max(0.0, self.ahead_s - _LEAK * elapsed_s)
+        corrected_s = self._watch.corrected(now_s - captured_s, now_s)
+        if corrected_s is None:
+            return f"{_clock_change(self._watch.set_by_s)}: frames are timed again in a moment"
+        by_stamp_s = corrected_s
+        if by_stamp_s < -self.limit_s:
+            return f"frames are stamped {-by_stamp_s:.1f} s ahead of our clock: are the clocks of the machines in step?"
+        self.ahead_s = max(self.ahead_s, -by_stamp_s)
+        self.age_s = by_stamp_s + self.ahead_s
+        if self.age_s <= self.limit_s:
+            return None
+        ahead = f" by a clock that is {self.ahead_s:.1f} s ahead of ours" if self.ahead_s >= 0.05 else ""
+        return f"frames come {self.age_s:.1f} s after their stamp{ahead}: are the clocks of the machines in step?"
+
+
+def _clock_change(set_by_s: float) -> str:
+    """Return in words that a clock was set back by ``set_by_s`` seconds, or ahead if negative."""
+    return f"a clock was set {'back' if set_by_s > 0 else 'ahead'} by {abs(set_by_s):.1f} s"
+
+
+class Recording:
+    """Decides whether frames come from a recording; these count as captured on arrival.
+
+    The stamp alone is not enough: frames over a slow camera link are old too, and old gestures must not move a robot.
+    So ``auto`` accepts only what a player of recordings publishes. Frames with old stamps that advance in step with
+    time are reported as a possible recording.
+
+    Args:
+        recorded: auto accepts what a player publishes; always accepts also stamps older than any link delay; never
+            accepts nothing.
+        limit_s: Frames that are no older than this, in seconds, are not a recording's.
+
+    Attributes:
+        limit_s: As above; may be changed.
+        is_followed: Whether the last frame was accepted as a recording's.
+    """
+
+    def __init__(self, recorded: Recorded, limit_s: float) -> None:
+        self._recorded = recorded
+        self.limit_s = limit_s
+        self.is_followed = False
+        self._captured_s: float | None = None
+        self._in_step_since: tuple[float, float] | None = None
+        self._is_logged = False
+
+    def follows(self, now_s: float, captured_s: float, *, by_player: bool) -> bool:
+        """Record a frame; return whether it is accepted as a recording's, captured now.
+
+        Args:
+            now_s: Current time, in seconds of the graph's clock.
+            captured_s: The frame's stamp, in seconds of the same clock.
+            by_player: Whether a player of recordings is known to publish it.
+        """
+        age_s = now_s - captured_s
+        stands, self._captured_s = captured_s == self._captured_s, captured_s
+        self._note_step(now_s, age_s)
+        meant = by_player if self._recorded == "auto" else self._recorded == "always"
+        long_ago = age_s > (self.limit_s if by_player else RECORDED_S)
+        # A stamp that does not advance comes from a camera or clock that has failed.
+        self.is_followed = meant and long_ago and not stands
+        if self.is_followed:
+            self._log_once(
+                logging.INFO, f"frames are stamped {duration_in_words(age_s)} ago: they are followed, as a recording's"
+            )
+        return self.is_followed
+
+    def hint(self, now_s: float) -> str | None:
+        """Return what to do if the last frames, which were refused, are a recording's; None if they cannot be."""
+        if self._in_step_since is None or self._recorded == "always":
+            return None
+        since_s, age_s = self._in_step_since
+        if age_s <= RECORDED_S or now_s - since_s < RESYNC_S:
+            return None
+        hint = (
+            f"frames are stamped {duration_in_words(age_s)} ago, and come in step: if they are a recording's, set the "
+            "parameter recorded to always, or play it with --clock and use_sim_time; else the clocks of machines are "
+            "not in step"
+        )
+        self._log_once(logging.WARNING, hint)
+        return hint
+
+    def _note_step(self, now_s: float, age_s: float) -> None:
+        if self._in_step_since is None or abs(age_s - self._in_step_since[1]) > STALE_S:
+            self._in_step_since = (now_s, age_s)
+
+    def _log_once(self, level: int, message: str) -> None:
+        if not self._is_logged:
+            log.log(level, message)
+        self._is_logged = True
+
+
+def duration_in_words(seconds: float) -> str:
+    """Return a duration in words, such as ``3 days``."""
+    for unit, length_s in (("years", 31_557_600.0), ("days", 86_400.0), ("hours", 3600.0), ("minutes", 60.0)):
+        if seconds >= 2 * length_s:
+            return f"{seconds / length_s:.0f} {unit}"
+    return f"{seconds:.0f} s"
+
+
+class LatencyLog:
+    """Keeps the newest durations and computes their percentiles.
+
+    Args:
+        capacity: How many are kept.
+    """
+
+    def __init__(self, capacity: int = 10_000) -> None:
+        self._seconds: deque[float] = deque(maxlen=capacity)
+
+    def __len__(self) -> int:
+        return len(self._seconds)
+
+    def add(self, seconds: float) -> None:
+        """Record one duration in seconds."""
+        self._seconds.append(seconds)
+
+    def percentile_ms(self, percent: float) -> float:
+        """Return a percentile (0 to 100) in milliseconds; 0 if nothing was recorded."""
+        return float(np.percentile(list(self._seconds), percent)) * 1000 if self._seconds else 0.0

@@ -1,0 +1,36 @@
+from typing import get_args
+
+import pytest
+
+from handsteer.config import ControlConfig
+from handsteer.control.explain import Reason, ReasonCode, effect_of
+
+
+@pytest.mark.parametrize(
+    ("reason", "sentence"),
+    [
+        (Reason("sign", "Go"), "driving: Go"),
+        (Reason("sign", "Go", slowed="obstacle 0.42 m ahead"), "driving: Go, slowed: obstacle 0.42 m ahead"),
+        (Reason("obstacle", "obstacle 0.14 m ahead"), "standing: stopped before an obstacle 0.14 m ahead"),
+        (Reason("disarmed"), "standing: disarmed, moves once Stop is shown, or no hand"),
+        (Reason("disarmed", "no sign came"), "standing: disarmed (no sign came), moves once Stop is shown, or no hand"),
+        (
+            Reason("disarmed", "it was selected", "r2"),
+            "standing: r2 is disarmed (it was selected), moves once Stop is shown, or no hand",
+        ),
+        (Reason("stop_sign", "{0}"), "standing: the {0} sign is shown"),
+    ],
+)
+def test_a_reason_is_a_sentence(reason: Reason, sentence: str) -> None:
+    assert str(reason) == sentence
+    assert sentence.endswith(reason.explanation)
+
+
+@pytest.mark.parametrize("code", get_args(ReasonCode))
+def test_every_reason_has_words(code: ReasonCode) -> None:
+    assert Reason(code, "a detail").explanation
+
+
+def test_an_effect_names_step_and_limit() -> None:
+    assert effect_of("turn_left", ControlConfig()).endswith("(0.1 rad/s a frame, up to 2 rad/s)")
+    assert effect_of("stop", ControlConfig()) == "stops"

@@ -1,0 +1,80 @@
+import math
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from handsteer.dashboard.world_state import LEAP_M, SCAN_POINTS, STEP_M, TRAIL_POINTS, Trail, scan_points
+from handsteer.messages import Header, LaserScan, Time
+from handsteer.types import Pose2D
+
+
+def gone(*xs: float) -> Trail:
+    trail = Trail()
+    for x in xs:
+        trail = trail.to(Pose2D(x, 0.0, 0.0))
+    return trail
+
+
+def test_a_robot_that_stands_leaves_one_point() -> None:
+    assert gone(1.0, 1.0, 1.01).points == ((1.0, 0.0),)
+
+
+@given(st.lists(st.floats(-0.3, 0.3), min_size=1, max_size=200))
+def test_points_are_neither_close_nor_far(moves: list[float]) -> None:
+    trail, x = Trail(), 0.0
+    for move in moves:
+        x += move
+        trail = trail.to(Pose2D(x, 0.0, 0.0))
+    for before, after in zip(trail.points, trail.points[1:], strict=False):
+        assert STEP_M <= math.dist(before, after) <= LEAP_M
+
+
+@given(st.lists(st.sampled_from([0.01, 0.1, 0.2, 3.0]), max_size=60), st.lists(st.booleans(), min_size=60, max_size=60))
+def test_what_is_shown_piece_by_piece_is_the_whole(moves: list[float], looks: list[bool]) -> None:
+    trail, shown, x = Trail(), Trail(), 0.0
+    drawn: list[tuple[float, float]] = []
+    for move, looked in zip(moves, [*looks, True], strict=False):
+        x += move
+        trail = trail.to(Pose2D(x, 0.0, 0.0))
+        if looked:
+            if trail.number != shown.number:
+                drawn, shown = [], Trail()
+            drawn += trail.since(shown)
+            shown = trail
+    if trail is shown:
+        assert tuple(drawn) == trail.points
+
+
+def test_a_leap_and_a_restart_begin_a_new_trail() -> None:
+    leapt = gone(0.0, 0.1, 5.0)
+    assert (leapt.points, leapt.number) == (((5.0, 0.0),), 1)
+    assert (leapt.anew().points, leapt.anew().number) == ((), 2)
+
+
+def test_old_points_are_forgotten() -> None:
+    trail = gone(*(0.1 * step for step in range(TRAIL_POINTS + 50)))
+    assert len(trail.points) == TRAIL_POINTS
+    assert trail.count == TRAIL_POINTS + 50
+    assert trail.since(Trail()) == trail.points
+
+
+def scan(*ranges: float, increment: float = math.pi / 2) -> LaserScan:
+    header = Header(Time(0, 0), "base_scan")
+    figures = (0.0, math.tau, increment, 0.0, 0.1, 0.1, 8.0)
+    return LaserScan(header, *figures, np.array(ranges, np.float32), np.zeros(0, np.float32))
+
+
+def test_points_are_in_the_world_where_the_robot_was() -> None:
+    assert scan_points(scan(1.0, 2.0), Pose2D(1.0, 2.0, math.pi / 2)) == ((1.0, 3.0), (-1.0, 2.0))
+
+
+def test_what_is_no_reading_is_no_point() -> None:
+    assert scan_points(scan(math.inf, math.nan, -math.inf, 9.0, 0.01, 1.0), Pose2D(0, 0, 0)) == ((0.0, 1.0),)
+    assert scan_points(scan(1.0, increment=math.nan), Pose2D(0, 0, 0)) == ()
+    assert scan_points(scan(), Pose2D(0, 0, 0)) == ()
+
+
+def test_a_long_scan_is_drawn_in_part() -> None:
+    points = scan_points(scan(*[2.0] * 10_000, increment=math.tau / 10_000), Pose2D(0, 0, 0))
+    assert 0.9 * SCAN_POINTS < len(points) <= SCAN_POINTS
