@@ -4,8 +4,7 @@ from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 from handsteer.clock import RealClock
-from handsteer.robots.course import CourseState
-from handsteer.types import Pose2D
+from handsteer.types import CourseState, Pose2D
 
 if TYPE_CHECKING:
     from handsteer.graph import Graph

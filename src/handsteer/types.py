@@ -1,4 +1,6 @@
-"""Basic types of the whole project: signs, their actions, velocities and poses. Imports nothing of handsteer.
+"""Basic types of the whole project: signs and their actions, velocities, poses, a course's progress.
+
+Imports nothing of handsteer.
 
 Signs are named from the user's own point of view. Axes and units follow REP 103: x forward, y left, a left turn is
 positive; metres, radians, seconds.
@@ -6,14 +8,23 @@ positive; metres, radians, seconds.
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
-from typing import Literal, get_args
+from dataclasses import asdict, dataclass
+from typing import Any, Literal, get_args
 
 Handedness = Literal["Left", "Right"]
 """The person's hand."""
 
 CmdVelType = Literal["auto", "twist", "twist_stamped"]
 """Type of velocity commands: geometry_msgs/Twist, geometry_msgs/TwistStamped, or the one the robot subscribes to."""
+
+Phase = Literal["ready", "running", "finished"]
+"""Of a course."""
+
+BUMP_S = 2.0
+"""Penalty for each bump."""
+
+MISS_S = 10.0
+"""Penalty for each missed gate."""
 
 STOP = "Stop"
 FORWARD = "Forward"
@@ -144,3 +155,50 @@ class Pose2D:
     x: float
     y: float
     yaw: float
+
+
+@dataclass(frozen=True)
+class CourseState:
+    """The progress of a robot on a course.
+
+    Attributes:
+        gates: Number of gates.
+        next_gate: Index of the gate to pass next; ``gates`` once the course is finished.
+        missed: Indices of the missed gates.
+        bumps: How often it has begun to touch an obstacle since the start.
+        time_s: Time since the start gate.
+        phase: ``ready`` before the start gate, then ``running``, ``finished`` after the last one.
+    """
+
+    gates: int
+    next_gate: int = 0
+    missed: frozenset[int] = frozenset()
+    bumps: int = 0
+    time_s: float = 0.0
+    phase: Phase = "ready"
+
+    @property
+    def passed(self) -> int:
+        """Number of gates passed."""
+        return self.next_gate - len(self.missed)
+
+    @property
+    def score_s(self) -> float:
+        """The score so far, in seconds."""
+        return self.time_s + BUMP_S * self.bumps + MISS_S * len(self.missed)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the fields and the score as plain values, for JSON."""
+        return {**asdict(self), "missed": sorted(self.missed), "passed": self.passed, "score_s": self.score_s}
+
+    def __str__(self) -> str:
+        """Return it in words, as ``gates 8/8, missed 1, bumps 2, 0:23.4, score 37.4 s``."""
+        missed = f", missed {len(self.missed)}" if self.missed else ""
+        score = f", score {self.score_s:.1f} s" if self.phase == "finished" else ""
+        return f"gates {self.passed}/{self.gates}{missed}, bumps {self.bumps}, {stopwatch(self.time_s)}{score}"
+
+
+def stopwatch(time_s: float) -> str:
+    """Return seconds as minutes, seconds and tenths, as ``1:05.3``, rounded down."""
+    tenths = int(time_s * 10 + 1e-6)
+    return f"{tenths // 600}:{tenths // 10 % 60:02d}.{tenths % 10}"

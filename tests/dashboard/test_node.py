@@ -40,11 +40,10 @@ from handsteer.nodes.control import HandSignControlNode
 from handsteer.nodes.diagnostics import write_status
 from handsteer.nodes.status import CameraStatus, ControlStatus, RecognitionStatus, RobotStatus, Status
 from handsteer.nodes.steering import SteeringNode
-from handsteer.robots.course import CourseState
 from handsteer.robots.description import robot_description
 from handsteer.transports.base import Publisher, Received
 from handsteer.transports.in_process import InProcessTransport
-from handsteer.types import Pose2D, Velocity
+from handsteer.types import CourseState, Pose2D, Velocity
 from tests.about import about
 
 M = TypeVar("M")

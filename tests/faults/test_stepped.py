@@ -6,6 +6,8 @@ from tests.faults.rows import rows
 from tests.faults.stepped import outcomes
 from tests.faults.table import LIMIT_S, cells, written
 
+# Each worker would compute the whole table for itself.
+pytestmark = pytest.mark.xdist_group("stepped")
 ROWS = {row.name: row for row in rows()}
 LEAST_ROWS = 60
 

@@ -12,8 +12,7 @@ from handsteer.control.twist_mux import Source
 from handsteer.messages import DiagnosticStatus, KeyValue
 from handsteer.nodes.diagnostics import read_status, split_reporter, write_status
 from handsteer.nodes.status import CameraStatus, ControlStatus, RecognitionStatus, RobotStatus, Status
-from handsteer.robots.course import CourseState
-from handsteer.types import ACTIONS, SIGNS, Pose2D, action_of
+from handsteer.types import ACTIONS, SIGNS, CourseState, Pose2D, action_of
 
 TEXTS = st.text(max_size=30)
 NUMBERS = st.floats(-1e9, 1e9)

@@ -21,10 +21,9 @@ from handsteer.nodes.diagnostics import read_status
 from handsteer.nodes.robot import RobotNode
 from handsteer.nodes.status import RobotStatus
 from handsteer.robots import open_robot
-from handsteer.robots.course import CourseState
 from handsteer.robots.editing import add, edit, remove
 from handsteer.robots.world import load_world
-from handsteer.types import Pose2D
+from handsteer.types import CourseState, Pose2D
 from tests.nodes.stepping import Bench
 
 START = Pose2D(0.0, 0.0, 0.0)

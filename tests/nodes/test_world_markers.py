@@ -5,9 +5,9 @@ import pytest
 from handsteer.clock import to_stamp
 from handsteer.messages import Header, yaw_of
 from handsteer.nodes.world_markers import Touches, gate_strips, world_markers
-from handsteer.robots.course import CourseState
 from handsteer.robots.protocol import Obstacle
 from handsteer.robots.world import Gate
+from handsteer.types import CourseState
 
 HEADER = Header(stamp=to_stamp(0.0), frame_id="odom")
 GREY = (0.5, 0.5, 0.5, 1.0)

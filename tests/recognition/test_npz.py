@@ -17,8 +17,8 @@ MANY: dict[str, Any] = {f"a{n}": corpus.saved(1) for n in range(200)}
 @pytest.mark.parametrize(
     ("data", "words"),
     [
-        (corpus.dataset(points=corpus.npy((40_000_000, 21, 3))), "'points.npy' says that it is larger than it is"),
-        (corpus.dataset(points=corpus.npy((10**30, 21, 3))), "says that it is larger than it is"),
+        (corpus.dataset(points=corpus.npy((40_000_000, 21, 3))), "'points.npy' claims to be larger than it is"),
+        (corpus.dataset(points=corpus.npy((10**30, 21, 3))), "claims to be larger than it is"),
         (corpus.dataset(points=corpus.npy((-1, 21, 3))), "not a dataset of signs, or damaged"),
         (corpus.dataset(points=corpus.npy((1,), "|O")), "'points.npy' is neither of numbers nor of text"),
         (corpus.dataset(points=corpus.saved(np.ones((1, 21, 3), complex))), "neither of numbers nor of text"),

@@ -7,10 +7,10 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from handsteer.config import RobotConfig
-from handsteer.robots.course import BUMP_S, LEAP_M, MISS_S, CourseState, Referee, crosses, stopwatch
+from handsteer.robots.course import LEAP_M, Referee, crosses
 from handsteer.robots.simulated import SimulatedRobot
 from handsteer.robots.world import Gate, load_world
-from handsteer.types import Pose2D
+from handsteer.types import BUMP_S, MISS_S, CourseState, Pose2D, stopwatch
 
 PERIOD_S = 0.02
 COURSE = [Gate(name=f"gate {x}", left=(x, 1.0), right=(x, -1.0)) for x in (1.0, 2.0, 3.0, 4.0)]

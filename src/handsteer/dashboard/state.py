@@ -7,9 +7,8 @@ from typing import Literal, TypeVar
 
 from handsteer.config import ControlConfig
 from handsteer.nodes.status import ERROR, OK, CameraStatus, ControlStatus, RecognitionStatus, RobotStatus, Status
-from handsteer.robots.course import CourseState
 from handsteer.timeouts import ROBOT_S
-from handsteer.types import NONE, SIGNS, ZERO, Pose2D, Velocity
+from handsteer.types import NONE, SIGNS, ZERO, CourseState, Pose2D, Velocity
 
 S = TypeVar("S", bound=Status)
 

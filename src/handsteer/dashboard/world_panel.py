@@ -10,7 +10,7 @@ from handsteer.dashboard.scene import View, WorldView
 from handsteer.dashboard.state import PageState
 from handsteer.dashboard.world_editor import WorldEditor
 from handsteer.dashboard.world_state import WorldState
-from handsteer.robots.course import BUMP_S, MISS_S, CourseState, stopwatch
+from handsteer.types import BUMP_S, MISS_S, CourseState, stopwatch
 
 _RULES = f"score: the time, {BUMP_S:.0f} s for each bump, {MISS_S:.0f} s for each missed gate"
 _DRIVERS = {"signs": "your signs", "steering": "hand steering", "nobody": "nobody"}

@@ -6,8 +6,7 @@ from typing import ClassVar, Literal
 from handsteer.config import ControlConfig
 from handsteer.control.explain import Reason
 from handsteer.control.twist_mux import Source
-from handsteer.robots.course import CourseState
-from handsteer.types import NONE, Handedness, Pose2D, describe_seen
+from handsteer.types import NONE, CourseState, Handedness, Pose2D, describe_seen
 
 OK, WARN, ERROR = 0, 1, 2
 """Levels of ``diagnostic_msgs/DiagnosticStatus``."""

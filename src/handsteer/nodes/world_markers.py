@@ -19,9 +19,9 @@ from handsteer.messages import (
     Quaternion,
     Vector3,
 )
-from handsteer.robots.course import CourseState
 from handsteer.robots.protocol import Obstacle
 from handsteer.robots.world import Gate
+from handsteer.types import CourseState
 
 OBSTACLES, GATES = "world", "gates"
 """Namespaces of the markers."""

@@ -4,76 +4,22 @@ The first gate is the start line, the last one the finish, and the time runs bet
 robot's centre crosses the line between its ends forward, with its left end on the left. Gates are to be passed in
 order: passing a later one misses those between. Crossing backwards or a second time does not count.
 
-The score is in seconds, lower is better: the time, :data:`BUMP_S` for each bump, :data:`MISS_S` for each missed gate.
+The score is in seconds, lower is better: the time, and :data:`~handsteer.types.BUMP_S` for each bump and
+:data:`~handsteer.types.MISS_S` for each missed gate.
 """
 
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
-from typing import TYPE_CHECKING, Any, Literal
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
-from handsteer.types import Pose2D
+from handsteer.types import CourseState, Phase, Pose2D
 
 if TYPE_CHECKING:
     from handsteer.robots.world import Gate
 
-BUMP_S = 2.0
-"""Penalty for each bump."""
-
-MISS_S = 10.0
-"""Penalty for each missed gate."""
-
 LEAP_M = 0.5
 """No robot moves so far between two steps: it was moved by hand, and has crossed nothing."""
-
-Phase = Literal["ready", "running", "finished"]
-
-
-@dataclass(frozen=True)
-class CourseState:
-    """The progress of a robot on a course.
-
-    Attributes:
-        gates: Number of gates.
-        next_gate: Index of the gate to pass next; ``gates`` once the course is finished.
-        missed: Indices of the missed gates.
-        bumps: How often it has begun to touch an obstacle since the start.
-        time_s: Time since the start gate.
-        phase: ``ready`` before the start gate, then ``running``, ``finished`` after the last one.
-    """
-
-    gates: int
-    next_gate: int = 0
-    missed: frozenset[int] = frozenset()
-    bumps: int = 0
-    time_s: float = 0.0
-    phase: Phase = "ready"
-
-    @property
-    def passed(self) -> int:
-        """Number of gates passed."""
-        return self.next_gate - len(self.missed)
-
-    @property
-    def score_s(self) -> float:
-        """The score so far, in seconds."""
-        return self.time_s + BUMP_S * self.bumps + MISS_S * len(self.missed)
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the fields and the score as plain values, for JSON."""
-        return {**asdict(self), "missed": sorted(self.missed), "passed": self.passed, "score_s": self.score_s}
-
-    def __str__(self) -> str:
-        """Return it in words, as ``gates 8/8, missed 1, bumps 2, 0:23.4, score 37.4 s``."""
-        missed = f", missed {len(self.missed)}" if self.missed else ""
-        score = f", score {self.score_s:.1f} s" if self.phase == "finished" else ""
-        return f"gates {self.passed}/{self.gates}{missed}, bumps {self.bumps}, {stopwatch(self.time_s)}{score}"
-
-
-def stopwatch(time_s: float) -> str:
-    """Return seconds as minutes, seconds and tenths, as ``1:05.3``, rounded down."""
-    tenths = int(time_s * 10 + 1e-6)
-    return f"{tenths // 600}:{tenths // 10 % 60:02d}.{tenths % 10}"
 
 
 class Referee:
