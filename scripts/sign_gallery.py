@@ -5,11 +5,10 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from handsteer.hand.backgrounds import make_background
 from handsteer.hand.kinematics import angles_of, pose_skeleton
 from handsteer.hand.placement import Pinhole
 from handsteer.hand.poses import HandPose, View, sign_pose
-from handsteer.hand.renderer import Look, render
+from handsteer.hand.renderer import Look, make_background, render
 from handsteer.recognition.recognizer import Recognizer
 from handsteer.types import NONE, SIGNS
 

@@ -1,11 +1,10 @@
 import numpy as np
 import pytest
 
-from handsteer.hand.backgrounds import make_background
 from handsteer.hand.kinematics import pose_skeleton
 from handsteer.hand.placement import Pinhole
 from handsteer.hand.poses import View, sign_pose
-from handsteer.hand.renderer import Look, render, true_pixels
+from handsteer.hand.renderer import Look, make_background, render, true_pixels
 from handsteer.types import SIGNS, STOP, Handedness
 
 CAMERA = Pinhole.webcam(320, 240)
@@ -50,6 +49,15 @@ def test_the_same_hand_gives_the_same_picture_and_leaves_the_background_alone() 
 @pytest.mark.parametrize("position", [(0.0, 2.0, 0.55), (3.0, 0.0, 0.55), (0.0, -2.0, 0.55)])
 def test_a_hand_out_of_the_picture_leaves_the_background(position: tuple[float, float, float]) -> None:
     assert not drawn(draw(View(position=position, roll=np.pi if position[1] < 0 else 0.0))).any()
+
+
+@pytest.mark.parametrize("pitch", [60.0, 90.0, 120.0])
+def test_an_arm_from_behind_the_camera_is_drawn_as_far_as_it_is_in_front(pitch: float) -> None:
+    assert 0.1 < drawn(draw(View(pitch=np.radians(pitch), position=(0.0, 0.05, 0.3)))).mean() < 1.0
+
+
+def test_a_hand_behind_the_camera_is_not_drawn() -> None:
+    assert not drawn(draw(View(pitch=np.radians(-60), position=(0.0, 0.0, -1.0)))).any()
 
 
 @pytest.mark.parametrize("distance", [0.12, 0.2, 0.55, 1.5, 5.0])

@@ -5,11 +5,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from handsteer.hand.backgrounds import make_background
 from handsteer.hand.kinematics import pose_skeleton
 from handsteer.hand.placement import Pinhole
 from handsteer.hand.poses import View, sign_pose
-from handsteer.hand.renderer import SKINS, Look, render, true_pixels
+from handsteer.hand.renderer import SKINS, Look, make_background, render, true_pixels
 from handsteer.types import Handedness
 
 CAMERA = Pinhole.webcam(640, 480)

@@ -7,11 +7,10 @@ import numpy as np
 import pytest
 
 from handsteer.config import LandmarksConfig
-from handsteer.hand.backgrounds import make_background
 from handsteer.hand.kinematics import pose_skeleton
 from handsteer.hand.placement import Pinhole
 from handsteer.hand.poses import THUMB, View
-from handsteer.hand.renderer import Look, render
+from handsteer.hand.renderer import Look, make_background, render
 from handsteer.recognition.landmarker import MediaPipeLandmarker
 from handsteer.recognition.palm import Palm, PalmDetector
 from handsteer.recognition.roi import Roi

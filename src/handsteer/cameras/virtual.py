@@ -6,10 +6,9 @@ from handsteer.cameras.files import SensorNoise
 from handsteer.cameras.protocol import Frame
 from handsteer.clock import Clock
 from handsteer.config import VirtualHandConfig
-from handsteer.hand.backgrounds import make_background
 from handsteer.hand.kinematics import Array, pose_skeleton
 from handsteer.hand.placement import Pinhole
-from handsteer.hand.renderer import Look, render, true_pixels
+from handsteer.hand.renderer import Look, make_background, render, true_pixels
 from handsteer.hand.script import Motion
 
 

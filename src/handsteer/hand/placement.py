@@ -79,9 +79,8 @@ class Pinhole:
         return pixels
 
     def rays(self, columns: ArrayLike, rows: ArrayLike) -> NDArray[np.float32]:
-        """Return (3, n) unit directions through the pixels at (n,) ``columns`` and ``rows``."""
+        """Return (3, ...) unit directions through the pixels at (...) ``columns`` and ``rows``."""
         x = (np.asarray(columns) - self.width / 2) / self.focal_px
         y = (np.asarray(rows) - self.height / 2) / self.focal_px
         directions = np.stack([x, y, np.ones_like(x)])
-        unit: NDArray[np.float32] = (directions / np.linalg.norm(directions, axis=0)).astype(np.float32)
-        return unit
+        return np.asarray(directions / np.linalg.norm(directions, axis=0), np.float32)

@@ -6,10 +6,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from handsteer.errors import ConfigError
 from handsteer.hand.kinematics import Array, Skeleton
 from handsteer.hand.placement import Pinhole, Placement
-from handsteer.hand.surface import Cones, Float, Material, hand_cones
-from handsteer.hand.tracing import BLOCK, Field, Grid, trace
+from handsteer.hand.surface import Float, Material, hand_cones
+from handsteer.hand.tracing import NEAREST_M, TILE, Grid, Hits, trace
 
 Image = NDArray[np.uint8]
 
@@ -20,14 +21,11 @@ SKINS: dict[str, tuple[tuple[float, float, float], ...]] = {
 }
 """Reflectance (blue, green, red; 0 to 1) of the skin, of its redder parts, and of the nails."""
 
-_STRIPS = 3
-_TOLERANCE = 0.08  # in cells
-_NEAR_M = 0.002  # end of the tracing of whole blocks
-_EDGE = 0.75  # nearness at the hand's outline
+_TOUCHING, _EDGE = 1.08, 0.75  # nearness to the hand, of at most 1, where a ray touches it and at its drawn outline
 _GAMMA = 0.8
 _SPECULAR, _SHININESS = 0.24, 14.0
 _AMBIENT, _DIFFUSE = 0.46, 0.62
-_OCCLUSION, _OCCLUSION_REACH_M = 0.22, 0.010
+_OCCLUSION = 0.22
 
 
 @dataclass(frozen=True)
@@ -62,98 +60,104 @@ def render(skeleton: Skeleton, placement: Placement, camera: Pinhole, look: Look
     Returns:
         (height, width, 3) uint8, BGR.
     """
-    cones = hand_cones(skeleton, sleeve=look.sleeve).placed(placement)
+    cones = hand_cones(skeleton, sleeve=look.sleeve).placed(placement).beyond(NEAREST_M)
     picture = background.copy()
     grid = Grid.around(cones, camera)
     if grid is not None:
-        _lay_over(picture, grid, *_trace_grid(grid, cones, camera, look))
+        tiles, hits = trace(grid, cones, camera)
+        layers = np.zeros((grid.rows * grid.columns, 4, TILE, TILE), np.uint8)
+        layers[tiles, :3] = (255 * _shade(hits, look)).reshape(-1, 3, TILE, TILE)
+        cells_m = hits.travelled * np.float32(grid.cell_px / camera.focal_px)
+        nearness = np.clip(_TOUCHING - hits.clearance / cells_m, 0.0, 1.0)
+        layers[tiles, 3] = (255 * nearness).reshape(-1, TILE, TILE)
+        layers = layers.reshape(grid.rows, grid.columns, 4, TILE, TILE).transpose(0, 3, 1, 4, 2)
+        _lay_over(picture, grid, layers.reshape(grid.rows * TILE, grid.columns * TILE, 4))
     return picture
 
 
-def _trace_grid(grid: Grid, cones: Cones, camera: Pinhole, look: Look) -> tuple[Float, Float]:
-    """Return (rows, columns, 3) colours, 0 to 1, and each cell's (rows, columns) nearness to the hand, 1 on it.
-
-    Processed in strips: each contains few cones, and their data stays in the processor's cache.
-    """
-    colour = np.zeros((grid.rows, grid.columns, 3), np.float32)
-    cover = np.zeros((grid.rows, grid.columns), np.float32)
-    near = _near_depth(grid, cones, camera)
-    rows, columns = np.nonzero(np.isfinite(near))
-    for cells in np.array_split(np.arange(len(rows)), _STRIPS):
-        if len(cells):
-            row, column = rows[cells], columns[cells]
-            strip = cones.only(grid.cones_between(int(row[0]), int(row[-1]), cones, camera))
-            directions = grid.directions(column + 0.5, row + 0.5, camera)
-            cell_rad = grid.cell_px / camera.focal_px
-            colour[row, column], cover[row, column] = _look_along(directions, near[row, column], cell_rad, strip, look)
-    return colour, cover
-
-
-def _near_depth(grid: Grid, cones: Cones, camera: Pinhole) -> Float:
-    """Return the (rows, columns) depth to which each cell's ray is surely free; infinite if it misses the hand.
-
-    Blocks of cells are traced as one thick ray each (the first pass of cone marching).
-    """
-    shape = grid.rows // BLOCK, grid.columns // BLOCK
-    row, column = (at.ravel() * BLOCK + BLOCK / 2 for at in np.indices(shape))
-    width_rad = (BLOCK * np.sqrt(0.5) + 1.0) * grid.cell_px / camera.focal_px
-    near, far = cones.depths()
-    start = np.full(len(row), near, np.float32)
-    directions = grid.directions(column, row, camera)
-    hits = trace(Field(cones), directions, start, end=far, tolerance=_NEAR_M, width_rad=width_rad)
-    depth = np.where(hits.clearance <= 2 * _NEAR_M, hits.travelled, np.inf).astype(np.float32)
-    return depth.reshape(shape).repeat(BLOCK, axis=0).repeat(BLOCK, axis=1)
-
-
-def _look_along(directions: Float, near: Float, cell_rad: float, cones: Cones, look: Look) -> tuple[Float, Float]:
-    """Return (n, 3) colours and (n,) nearness along (3, n) directions, ``cell_rad`` apart."""
-    field = Field(cones)
-    cell_m = cell_rad * float(np.median(near))
-    hits = trace(field, directions, near, end=cones.depths()[1], tolerance=_TOLERANCE * cell_m)
-    colour = np.zeros((len(near), 3), np.float32)
-    seen = hits.clearance < 1.7 * cell_m
-    clearance = hits.clearance[seen]
-    colour[seen] = _shade(cones, hits.points[:, seen], clearance, directions[:, seen], look)
-    return colour, np.clip(1.0 + _TOLERANCE - hits.clearance / np.float32(cell_m), 0.0, 1.0)
-
-
-def _shade(cones: Cones, points: Float, clearance: Float, directions: Float, look: Look) -> Float:
-    """Return the (n, 3) colours, 0 to 1, of the skin at (3, n) points with (n,) ``clearance`` from it."""
-    field = Field(cones)
-    normals, weights = field.surface(points)
+def _shade(hits: Hits, look: Look) -> Float:
+    """Return the (T, 3, n) colours, 0 to 1, of what is hit in T tiles of n cells."""
     light = np.array(look.light, np.float32)
     light /= np.linalg.norm(light)
-    facing = light @ normals
-    half = light[:, None] - directions
-    half /= np.linalg.norm(half, axis=0)
-    shine = np.maximum(np.einsum("in,in->n", half, normals), 0.0) ** _SHININESS
+    half = light[:, None] - hits.directions
+    half /= np.linalg.norm(half, axis=1, keepdims=True)
+    shine = np.maximum(np.einsum("tin,tin->tn", half, hits.normals), 0.0) ** _SHININESS
     # Skin is translucent: its shadows begin later than those of an opaque surface.
-    diffuse = np.clip((facing + 0.35) / 1.35, 0.0, 1.0)
-    gap = field.distance(points + normals * np.float32(_OCCLUSION_REACH_M)) - clearance
-    open_sky = np.clip(gap / np.float32(_OCCLUSION_REACH_M), 0.0, 1.0)
-    lit = (_AMBIENT + _DIFFUSE * diffuse) * (1.0 - _OCCLUSION * (1.0 - open_sky))
+    diffuse = np.clip((light @ hits.normals + 0.35) / 1.35, 0.0, 1.0)
+    lit = (_AMBIENT + _DIFFUSE * diffuse) * (1.0 - _OCCLUSION * (1.0 - hits.sky))
     palette = np.array([*SKINS[look.skin], look.sleeve_colour], np.float32)
-    base = weights.T @ palette[cones.material]
-    cloth = weights.T @ (cones.material == Material.SLEEVE).astype(np.float32)
-    colours = base * lit[:, None] + (_SPECULAR * shine * (1.0 - cloth))[:, None]
+    cloth = hits.materials[:, Material.SLEEVE]
+    colours = palette.T @ hits.materials * lit[:, None] + (_SPECULAR * shine * (1.0 - cloth))[:, None]
     shaded: Float = np.clip(look.brightness * colours, 0.0, 1.0) ** np.float32(_GAMMA)
     return shaded
 
 
-def _lay_over(picture: Image, grid: Grid, colour: Float, cover: Float) -> None:
-    """Upscale the traced cells and compose them with the picture, in place."""
-    width = min(int(np.ceil(grid.columns * grid.cell_px)), picture.shape[1] - grid.left)
-    height = min(int(np.ceil(grid.rows * grid.cell_px)), picture.shape[0] - grid.top)
-    scale = np.array([[grid.cell_px, 0, 0.5 * grid.cell_px - 0.5], [0, grid.cell_px, 0.5 * grid.cell_px - 0.5]])
-    layers = np.dstack([colour * np.float32(255), cover])
-    large = cv2.warpAffine(layers, scale, (width, height), flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-    patch = picture[grid.top : grid.top + height, grid.left : grid.left + width]
-    weight = large[..., 3]
+def _lay_over(picture: Image, grid: Grid, layers: Image) -> None:
+    """Enlarge (rows, columns, 4) colours and nearness to the hand of the cells, and lay them over the picture."""
+    large = cv2.resize(layers, None, fx=grid.cell_px, fy=grid.cell_px, interpolation=cv2.INTER_LINEAR)
+    patch = picture[grid.top : grid.top + large.shape[0], grid.left : grid.left + large.shape[1]]
+    large = large[: patch.shape[0], : patch.shape[1]]
     # Upscaling blurs the border of a cell; a steeper step restores the sharp outline.
-    sharp = np.clip((weight - _EDGE) * np.float32(min(grid.cell_px, 4.0)) + 0.5, 0.0, 1.0)
-    patch[:] = cv2.blendLinear(large[..., :3].astype(np.uint8), patch, sharp, 1.0 - sharp)
+    steps = (np.linspace(0.0, 1.0, 256) - _EDGE) * min(grid.cell_px, 4.0) + 0.5
+    table = (255 * np.clip(steps, 0.0, 1.0)).astype(np.uint8)
+    weight = cv2.cvtColor(cv2.LUT(cv2.extractChannel(large, 3), table), cv2.COLOR_GRAY2BGR)
+    colour = cv2.multiply(cv2.cvtColor(large, cv2.COLOR_BGRA2BGR), weight, scale=1 / 255)
+    behind = cv2.multiply(patch, cv2.bitwise_not(weight), scale=1 / 255)
+    cv2.add(colour, behind, dst=patch)
 
 
 def true_pixels(skeleton: Skeleton, placement: Placement, camera: Pinhole) -> Array:
     """Return the (21, 2) pixels of the first hand's joints."""
     return camera.project(placement.apply(skeleton.joints[0]))
+
+
+def make_background(kind: str, width: int, height: int, seed: int = 0) -> NDArray[np.uint8]:
+    """Return a (height, width, 3) uint8 BGR picture; deterministic.
+
+    Args:
+        kind: ``plain`` or ``cluttered``.
+        width: Pixels.
+        height: Pixels.
+        seed: Selects one of many walls or rooms.
+
+    Raises:
+        ConfigError: ``kind`` is unknown.
+    """
+    random = np.random.default_rng(seed)
+    if kind not in ("plain", "cluttered"):
+        raise ConfigError(f"background: {kind!r} should be 'plain' or 'cluttered'")
+    picture = _wall(width, height, random)
+    if kind == "cluttered":
+        _put_things(picture, random)
+    noise = random.normal(0, 2.0, (height, width, 1))
+    image: NDArray[np.uint8] = np.clip(picture + noise, 0, 255).astype(np.uint8)
+    return image
+
+
+def _wall(width: int, height: int, random: np.random.Generator) -> NDArray[np.float32]:
+    """Return a wall lit from one side."""
+    colour = random.uniform(120, 205) * np.array([1.0, 1.0, 1.0]) + random.uniform(-14, 14, 3)
+    towards = random.uniform(-1, 1, 2)
+    x, y = np.meshgrid(np.linspace(-1, 1, width), np.linspace(-1, 1, height))
+    light = 1.0 + 0.10 * (towards[0] * x + towards[1] * y) - 0.05 * (x**2 + y**2)
+    wall: NDArray[np.float32] = (light[..., None] * colour).astype(np.float32)
+    return wall
+
+
+def _put_things(picture: NDArray[np.float32], random: np.random.Generator) -> None:
+    """Paint shelves, boxes, books and round things, out of focus, in place."""
+    height, width = picture.shape[:2]
+    unit = max(height, 8) / 480
+    for _ in range(26):
+        # Colours in real rooms are closer to grey than random ones.
+        colour = (random.uniform(25, 225) + random.normal(0, 22, 3)).tolist()
+        x, y = random.uniform(0, width), random.uniform(0, height)
+        if random.random() < 0.7:
+            size = random.uniform((12, 20), (150, 170)) * unit
+            turn = random.choice([0.0, 0.0, 90.0, random.uniform(-20, 20)])
+            corners = cv2.boxPoints(((x, y), (float(size[0]), float(size[1])), float(turn)))
+            cv2.fillConvexPoly(picture, corners.astype(np.int32), colour)
+        else:
+            cv2.circle(picture, (int(x), int(y)), max(1, int(random.uniform(10, 55) * unit)), colour, cv2.FILLED)
+    blur = max(0.8, 1.6 * unit)
+    cv2.GaussianBlur(picture, (0, 0), blur, dst=picture)

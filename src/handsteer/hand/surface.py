@@ -54,15 +54,23 @@ class Cones:
         """Transform these cones from the hand frame to the camera frame."""
         return replace(self, start=placement.apply(self.start), end=placement.apply(self.end))
 
-    def depths(self) -> tuple[float, float]:
-        """Return bounds on the depths of their nearest and farthest points, in metres."""
-        axis = self.end - self.start
-        square = np.maximum(np.sum(axis**2, axis=1), 1e-12)
-        along = np.clip(-np.sum(self.start * axis, axis=1) / square, 0.0, 1.0)
-        radius = np.maximum(self.start_radius, self.end_radius) + MARGIN_M
-        near = np.linalg.norm(self.start + along[:, None] * axis, axis=1) - radius
-        far = np.maximum(np.linalg.norm(self.start, axis=1), np.linalg.norm(self.end, axis=1)) + radius
-        return max(float(near.min()), 0.0), float(far.max())
+    def beyond(self, depth: float) -> "Cones":
+        """Return what of these cones, in the camera frame, has its axis beyond ``depth`` in metres."""
+        first, last = self.start[:, 2] - depth, self.end[:, 2] - depth
+        if min(first.min(), last.min()) >= 0:
+            return self
+        slope = np.where(first == last, 1.0, first - last)
+        crossing = np.clip(first / slope, 0.0, 1.0)
+        low, high = np.where(first < 0, crossing, 0.0), np.where(last < 0, crossing, 1.0)
+        axis, growth = self.end - self.start, self.end_radius - self.start_radius
+        cut = Cones(
+            self.start + low[:, None] * axis,
+            self.start + high[:, None] * axis,
+            self.start_radius + low * growth,
+            self.start_radius + high * growth,
+            self.material,
+        )
+        return cut.only((first >= 0) | (last >= 0))
 
     def only(self, which: NDArray[np.bool_]) -> "Cones":
         """Return the selected cones."""

@@ -19,10 +19,9 @@ from tqdm import tqdm
 from handsteer.cameras.files import read_photo
 from handsteer.config import LandmarksConfig
 from handsteer.hand import poses
-from handsteer.hand.backgrounds import make_background
 from handsteer.hand.kinematics import ANGLES, Array, angles_of, clamp, pose_skeleton
 from handsteer.hand.placement import Pinhole, Placement, orientation
-from handsteer.hand.renderer import SKINS, Look, render
+from handsteer.hand.renderer import SKINS, Look, make_background, render
 from handsteer.recognition.hand import Hand
 from handsteer.recognition.landmarker import MediaPipeLandmarker
 from handsteer.training.evaluation.labels import read_photo_labels
