@@ -42,7 +42,7 @@ run: $(BIN)/.run models
 	@$(BIN)/handsteer run $(ARGS)
 
 check: lint models
-	@$(BIN)/pytest -n $(WORKERS) --dist loadgroup -m "not (slow or browser)" $(ARGS)
+	@HANDSTEER_FUZZ_CASES=200 $(BIN)/pytest -n $(WORKERS) --dist loadgroup -m "not (slow or browser)" $(ARGS)
 
 test: lint models
 	@HANDSTEER_STEPS=20000 $(BIN)/pytest -n $(WORKERS) --dist loadfile -m "$(PLAIN)" --durations=10 $(ARGS)
