@@ -31,7 +31,7 @@ from tests.faults.painted import FPS as CAMERA_FPS
 
 from handsteer.config import RobotConfig
 from handsteer.messages import CMD_VEL, IMAGE_RAW, ODOM, Topic
-from handsteer.robots.protocol import Robot
+from handsteer.robots import Robot
 from handsteer.robots.simulated import SimulatedRobot
 
 FPS = 60

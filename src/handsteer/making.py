@@ -10,18 +10,20 @@ from typing import TYPE_CHECKING, Any
 
 from handsteer.clock import Clock, SimulatedClock, WallClock
 from handsteer.config import Config, RobotConfig, cmd_vel_type
-from handsteer.messages import TF, Topic, cmd_vel
+from handsteer.errors import ConfigError, needing
+from handsteer.messages import CMD_VEL, TF, Topic, cmd_vel
 from handsteer.transports.base import Session, Transport
 from handsteer.types import NONE, find_sign
 
 if TYPE_CHECKING:
+    from handsteer.cameras import Camera
     from handsteer.cameras.browser import ChoiceOfCameras
-    from handsteer.cameras.protocol import Camera
     from handsteer.nodes.camera import CameraNode
     from handsteer.nodes.control import HandSignControlNode
     from handsteer.nodes.recognition import HandSignRecognitionNode
     from handsteer.nodes.robot import RobotNode
     from handsteer.nodes.steering import SteeringNode
+    from handsteer.robots import Robot
 
 log = logging.getLogger(__name__)
 
@@ -74,8 +76,7 @@ def make_recognition(
         ModelError: A landmark model or the sign model is missing or broken.
     """
     from handsteer.nodes.recognition import HandSignRecognitionNode
-    from handsteer.recognition.drawing import annotate
-    from handsteer.recognition.recognizer import Recognizer, open_classifier
+    from handsteer.recognition.recognizer import Recognizer, annotate, open_classifier
 
     recognizer = Recognizer(config)
     _warn_of_unknown_signs(config, recognizer.signs)
@@ -124,13 +125,40 @@ def make_robot(
         WorldError: The world of a simulated robot cannot be used.
     """
     from handsteer.nodes.robot import RobotNode
-    from handsteer.robots import open_robot
 
     if config.robot.publish_clock and isinstance(clock, SimulatedClock):
         clock = WallClock()
     topics = {"cmd_vel": cmd_vel_topic(config), **topics}
     robot = open_robot(config.robot, link, topics["cmd_vel"], config.control.cmd_vel_frame_id)
     return RobotNode(transport, clock, robot, prefixed(config.robot, transport), **topics)
+
+
+def open_robot(
+    config: RobotConfig, link: Session | None = None, cmd_vel: Topic[Any] = CMD_VEL, frame_id: str = "base_link"
+) -> "Robot":
+    """Return the robot that ``config.kind`` names.
+
+    Args:
+        config: Names and configures the robot.
+        link: This process in the graph of a real robot; not needed by a simulated one.
+        cmd_vel: Topic of a real robot's commands, with Twist or TwistStamped.
+        frame_id: Coordinate frame of a TwistStamped.
+
+    Raises:
+        ConfigError: It is a real robot, and there is no link to it.
+        WorldError: The world of a simulated robot cannot be used.
+        PackageMissing: The simulator is not installed.
+    """
+    if config.kind != "sim":
+        if link is None:
+            raise ConfigError(f"robot.kind is {config.kind}: only `handsteer run` drives a real robot; here it is sim")
+        from handsteer.robots.remote import RemoteRobot
+
+        return RemoteRobot(config, cmd_vel, frame_id, link)
+    with needing("the simulated robot", "sim", "mujoco", "xacro"):
+        from handsteer.robots.simulated import SimulatedRobot
+
+    return SimulatedRobot(config)
 
 
 def make_steering(config: Config, transport: Transport, clock: Clock, **topics: Topic[Any]) -> "SteeringNode":

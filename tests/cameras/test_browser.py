@@ -4,8 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from handsteer.cameras import Camera, Frame
 from handsteer.cameras.browser import LARGEST_BYTES, BrowserCamera, ChoiceOfCameras, NoCamera
-from handsteer.cameras.protocol import Camera, Frame
 from handsteer.cameras.virtual import VirtualHandCamera
 from handsteer.clock import SteppedClock
 from handsteer.config import VirtualHandConfig

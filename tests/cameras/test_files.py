@@ -5,8 +5,8 @@ import cv2
 import numpy as np
 import pytest
 
+from handsteer.cameras import Camera, EndOfStream
 from handsteer.cameras.files import PhotoFolder, VideoFile
-from handsteer.cameras.protocol import Camera, EndOfStream
 from handsteer.clock import SteppedClock
 from handsteer.errors import CameraNotFound, CameraUnreadable
 from tests.contracts.camera_contract import CameraContract

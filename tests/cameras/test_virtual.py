@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from handsteer.cameras.protocol import Camera
+from handsteer.cameras import Camera
 from handsteer.cameras.virtual import VirtualHandCamera
 from handsteer.clock import RealClock, SteppedClock
 from handsteer.config import VirtualHandConfig

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from handsteer.cameras.protocol import Camera
+from handsteer.cameras import Camera
 from handsteer.cameras.webcam import Webcam, is_address, is_device
 from handsteer.clock import SteppedClock
 from handsteer.errors import CameraInUse, CameraLost, CameraNotFound, CameraUnreadable

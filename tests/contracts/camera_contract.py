@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from handsteer.cameras.protocol import Camera, Frame
+from handsteer.cameras import Camera, Frame
 from handsteer.clock import SteppedClock
 
 

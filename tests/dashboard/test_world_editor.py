@@ -2,8 +2,8 @@ import pytest
 
 from handsteer.dashboard.world_editor import LARGEST_FILE_BYTES, read_file
 from handsteer.errors import WorldError
+from handsteer.robots import Shape
 from handsteer.robots.editing import add, edit, numeric_properties
-from handsteer.robots.protocol import Shape
 from handsteer.robots.world import World
 from handsteer.types import Pose2D
 

@@ -2,15 +2,15 @@
 
 from handsteer.clock import Clock
 from handsteer.config import RobotConfig
+from handsteer.robots import Obstacle, RangeScan, RobotState
 from handsteer.robots.diff_drive import DriveState, Velocity, integrate, step, wheel_speeds
-from handsteer.robots.protocol import Obstacle, RangeScan, RobotState
 from handsteer.types import Pose2D
 
 _DT_S = 0.02
 
 
 class Base:
-    """A :class:`~handsteer.robots.protocol.Robot` with the real controller, and wheels that never slip.
+    """A :class:`~handsteer.robots.Robot` with the real controller, and wheels that never slip.
 
     It has a watchdog of its own, as a robot has whose node has died.
     """

@@ -33,9 +33,8 @@ from handsteer.nodes.recognition import HandSignRecognitionNode
 from handsteer.nodes.robot import RobotNode
 from handsteer.nodes.steering import SteeringNode
 from handsteer.parameters import NodeParameters
-from handsteer.recognition.drawing import annotate
-from handsteer.recognition.recognizer import open_classifier
-from handsteer.robots.protocol import Robot
+from handsteer.recognition.recognizer import annotate, open_classifier
+from handsteer.robots import Robot
 from handsteer.robots.remote import RemoteRobot
 from handsteer.testing.fault_transport import FaultTransport
 from handsteer.testing.faulty_camera import SpoiltCamera

@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from handsteer.cameras.protocol import Frame
+from handsteer.cameras import Frame
 from handsteer.clock import Clock
 from handsteer.config import Config, SignsConfig
 from handsteer.recognition.hand import Hand, SignGuess

@@ -10,7 +10,7 @@ from handsteer.config import CollisionMonitorConfig, RobotConfig
 from handsteer.messages import SCAN
 from handsteer.nodes.base import Node
 from handsteer.nodes.control import HandSignControlNode
-from handsteer.robots.protocol import RangeScan, Robot
+from handsteer.robots import RangeScan, Robot
 from handsteer.testing.fault_transport import CUT, FROZEN, LinkFault
 from tests.faults.base import Base
 from tests.faults.chain import Chain

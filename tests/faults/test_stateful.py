@@ -19,8 +19,7 @@ from handsteer.messages import CMD_VEL, IMAGE_RAW, STEERING_CMD_VEL, STOP, Bool,
 from handsteer.nodes.base import Node
 from handsteer.nodes.control import HandSignControlNode
 from handsteer.nodes.recognition import HandSignRecognitionNode
-from handsteer.recognition.drawing import annotate
-from handsteer.recognition.recognizer import open_classifier
+from handsteer.recognition.recognizer import annotate, open_classifier
 from handsteer.robots.command_limiter import CommandLimiter
 from handsteer.robots.diff_drive import Velocity
 from handsteer.transports.base import Received

@@ -28,7 +28,7 @@ from handsteer.messages import (
 from handsteer.nodes.control import HandSignControlNode
 from handsteer.nodes.robot import RobotNode, scan_message
 from handsteer.nodes.steering import SteeringNode
-from handsteer.robots.protocol import RangeScan
+from handsteer.robots import RangeScan
 from handsteer.robots.simulated import SimulatedRobot
 from handsteer.robots.world import World
 from tests.about import about

@@ -12,9 +12,8 @@ from handsteer.messages import DIAGNOSTICS, HAND_SIGN, IMAGE_ANNOTATED, IMAGE_CO
 from handsteer.nodes.recognition import HandSignRecognitionNode
 from handsteer.parameters import NodeParameters
 from handsteer.recognition.custom_signs import save_custom_model
-from handsteer.recognition.drawing import annotate
 from handsteer.recognition.hand import Hand, RecordedLandmarker
-from handsteer.recognition.recognizer import Recognition, Recognizer, open_classifier
+from handsteer.recognition.recognizer import Recognition, Recognizer, annotate, open_classifier
 from handsteer.recognition.shipped_signs import ShippedClassifier, load_model
 from handsteer.types import FORWARD
 from tests.nodes.stepping import Bench

@@ -4,6 +4,7 @@ import pytest
 
 from handsteer.config import RobotConfig
 from handsteer.errors import WorldError
+from handsteer.making import open_robot
 from handsteer.messages import (
     CLOCK,
     DIAGNOSTICS,
@@ -20,7 +21,6 @@ from handsteer.messages import (
 from handsteer.nodes.diagnostics import read_status
 from handsteer.nodes.robot import RobotNode
 from handsteer.nodes.status import RobotStatus
-from handsteer.robots import open_robot
 from handsteer.robots.editing import add, edit, remove
 from handsteer.robots.world import load_world
 from handsteer.types import CourseState, Pose2D

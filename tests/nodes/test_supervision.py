@@ -3,12 +3,12 @@ import logging
 import pytest
 
 from handsteer.config import ControlConfig, RobotConfig
+from handsteer.making import open_robot
 from handsteer.messages import CMD_VEL, DIAGNOSTICS, HAND_SIGN, STOP, STOPPED, Bool, DiagnosticStatus, String
 from handsteer.nodes.base import Node
 from handsteer.nodes.control import HandSignControlNode
 from handsteer.nodes.robot import RobotNode
 from handsteer.nodes.supervision import StopKeeper
-from handsteer.robots import open_robot
 from handsteer.robots.simulated import SimulatedRobot
 from tests.nodes.stepping import Bench
 

@@ -5,7 +5,7 @@ import pytest
 from handsteer.clock import to_stamp
 from handsteer.messages import Header, yaw_of
 from handsteer.nodes.world_markers import Touches, gate_strips, world_markers
-from handsteer.robots.protocol import Obstacle
+from handsteer.robots import Obstacle
 from handsteer.robots.world import Gate
 from handsteer.types import CourseState
 

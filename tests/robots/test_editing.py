@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 
 from handsteer.config import RobotConfig
 from handsteer.errors import WorldError
+from handsteer.robots import Shape
 from handsteer.robots.editing import MOST_OBSTACLES, add, edit, footprint_m, free_place, remove
-from handsteer.robots.protocol import Shape
 from handsteer.robots.simulated import SimulatedRobot
 from handsteer.robots.world import Box, World, load_world
 from handsteer.types import Pose2D

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from handsteer.config import RobotConfig
+from handsteer.robots import RangeScan
 from handsteer.robots.description import joints, robot_description
 from handsteer.robots.physics import RANGE_MAX_M, SCAN_LINK
-from handsteer.robots.protocol import RangeScan
 from handsteer.robots.simulated import SimulatedRobot
 from handsteer.robots.world import World
 

@@ -8,8 +8,8 @@ import pytest
 
 from handsteer.config import RobotConfig
 from handsteer.errors import WorldError
-from handsteer.robots import open_robot
-from handsteer.robots.protocol import RobotState
+from handsteer.making import open_robot
+from handsteer.robots import RobotState
 from handsteer.robots.simulated import SimulatedRobot
 from handsteer.robots.world import World, load_world
 

@@ -3,7 +3,7 @@ import itertools
 import numpy as np
 import pytest
 
-from handsteer.cameras.protocol import Camera, Frame
+from handsteer.cameras import Camera, Frame
 from handsteer.clock import SteppedClock
 from handsteer.errors import CameraLost
 from handsteer.testing.faulty_camera import CAMERA_FAULTS, CameraFault, FaultyCamera, SpoiltCamera

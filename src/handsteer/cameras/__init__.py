@@ -1,7 +1,58 @@
-"""Sources of frames: webcam, video file, folder of photos, virtual hand, browser."""
+"""Sources of frames: webcam, video file, folder of photos, virtual hand, browser; and their interface."""
 
 import os
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
 
 # OpenCV's own messages about devices and files repeat our errors in other terms. It reads these variables once.
 os.environ.setdefault("OPENCV_LOG_LEVEL", "OFF")
 os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
+
+
+@dataclass(frozen=True)
+class Frame:
+    """One camera image.
+
+    Attributes:
+        image: (height, width, 3) uint8, BGR, as the camera saw it (not mirrored).
+        captured_s: Capture time, in seconds of the graph's monotonic clock.
+    """
+
+    image: NDArray[np.uint8]
+    captured_s: float
+
+
+class Camera(Protocol):
+    """A source of frames.
+
+    Attributes:
+        name: Name for people: ``webcam 0``, ``virtual hand``, a path.
+        period_s: Time between two frames that the reader must keep, or None if :meth:`read` itself waits for the
+            device.
+    """
+
+    @property
+    def name(self) -> str: ...  # noqa: D102
+
+    @property
+    def period_s(self) -> float | None: ...  # noqa: D102
+
+    def read(self) -> Frame | None:
+        """Return the newest frame, or None if there is none now (a file that ended and holds).
+
+        Raises:
+            CameraLost: The device stopped delivering frames; reading again may reopen it.
+            EndOfStream: A file has ended and ends the run.
+        """
+        ...
+
+    def close(self) -> None:
+        """Release the device; may be called twice."""
+        ...
+
+
+class EndOfStream(Exception):  # noqa: N818 - not an error
+    """The last frame of a file has been read."""

@@ -6,7 +6,7 @@ import threading
 import time
 from typing import Literal
 
-from handsteer.cameras.protocol import Camera, Frame
+from handsteer.cameras import Camera, Frame
 from handsteer.clock import Clock
 from handsteer.errors import FrameError
 from handsteer.picture_files import decode, size_of
@@ -81,7 +81,7 @@ class BrowserCamera:
 
 
 class NoCamera:
-    """A :class:`~handsteer.cameras.protocol.Camera` without frames, for a machine without a camera of its own."""
+    """A :class:`~handsteer.cameras.Camera` without frames, for a machine without a camera of its own."""
 
     name = "no camera"
     period_s = None
@@ -96,7 +96,7 @@ class NoCamera:
 
 
 class ChoiceOfCameras:
-    """A :class:`~handsteer.cameras.protocol.Camera` that reads from this machine's camera or from the browser's.
+    """A :class:`~handsteer.cameras.Camera` that reads from this machine's camera or from the browser's.
 
     When a browser leaves, there is no automatic change to the machine's own camera, because anything may be in front of
     it: there are no frames until a camera is selected again.

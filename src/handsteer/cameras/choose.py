@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handsteer import plain_yaml
+from handsteer.cameras import Camera
 from handsteer.cameras.files import PHOTO_SUFFIXES, PhotoFolder, VideoFile
-from handsteer.cameras.protocol import Camera
 from handsteer.cameras.webcam import Webcam, is_address, is_device, webcams
 from handsteer.clock import Clock
 from handsteer.config import CameraConfig, VirtualHandConfig

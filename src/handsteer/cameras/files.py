@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from handsteer.cameras.protocol import EndOfStream, Frame
+from handsteer.cameras import EndOfStream, Frame
 from handsteer.clock import Clock, SteppedClock
 from handsteer.errors import CameraNotFound, CameraUnreadable, FrameError
 from handsteer.picture_files import MOST_PIXELS, decode

@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass
 
+from handsteer.cameras import Frame
 from handsteer.cameras.files import SensorNoise
-from handsteer.cameras.protocol import Frame
 from handsteer.clock import Clock
 from handsteer.config import VirtualHandConfig
 from handsteer.hand.kinematics import Array, pose_skeleton
@@ -28,7 +28,7 @@ class Truth:
 
 
 class VirtualHandCamera:
-    """A :class:`~handsteer.cameras.protocol.Camera` that draws a hand showing a script of signs.
+    """A :class:`~handsteer.cameras.Camera` that draws a hand showing a script of signs.
 
     Args:
         config: Script and appearance.

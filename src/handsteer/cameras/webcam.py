@@ -9,7 +9,7 @@ from typing import Any, Protocol
 
 import cv2
 
-from handsteer.cameras.protocol import Frame
+from handsteer.cameras import Frame
 from handsteer.clock import Clock
 from handsteer.errors import CameraError, CameraInUse, CameraLost, CameraNotFound, CameraUnreadable
 from handsteer.picture_files import MOST_PIXELS
@@ -30,7 +30,7 @@ class Capture(Protocol):
 
 
 class Webcam:
-    """A :class:`~handsteer.cameras.protocol.Camera` that waits for its device.
+    """A :class:`~handsteer.cameras.Camera` that waits for its device.
 
     A device that stops is closed; each further :meth:`read` tries once to open it again.
 

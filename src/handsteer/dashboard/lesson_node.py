@@ -17,9 +17,8 @@ from handsteer.images import bgr_image, encode_jpeg
 from handsteer.messages import IMAGE_RAW, Image
 from handsteer.nodes.base import Node
 from handsteer.recognition.custom_signs import CustomClassifier, CustomModel
-from handsteer.recognition.drawing import draw_hand
 from handsteer.recognition.hand import Classifier, Hand, Landmarker, SignGuess
-from handsteer.recognition.recognizer import Recognizer
+from handsteer.recognition.recognizer import Recognizer, draw_hand
 from handsteer.training.custom.background import BackgroundTraining
 from handsteer.training.custom.collect import largest
 from handsteer.training.custom.dataset import Dataset

@@ -13,8 +13,8 @@ from handsteer.dashboard.page import Page, box, button, switch, tag, text
 from handsteer.dashboard.remote_graph import RemoteGraph
 from handsteer.dashboard.scene import WorldView
 from handsteer.errors import WorldError
+from handsteer.robots import Shape
 from handsteer.robots.editing import MOST_OBSTACLES, Change, add, edit, numeric_properties, remove
-from handsteer.robots.protocol import Shape
 from handsteer.robots.world import Thing, World, load_world, parse_world, shipped_worlds, write_world
 from handsteer.types import Pose2D
 

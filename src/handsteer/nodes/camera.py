@@ -3,9 +3,9 @@
 import logging
 from dataclasses import replace
 
+from handsteer.cameras import Camera, EndOfStream, Frame
 from handsteer.cameras.choose import uncalibrated
 from handsteer.cameras.freshness import Freshness
-from handsteer.cameras.protocol import Camera, EndOfStream, Frame
 from handsteer.clock import Clock
 from handsteer.errors import CameraError
 from handsteer.images import image_message, jpeg_message

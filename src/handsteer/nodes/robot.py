@@ -45,9 +45,9 @@ from handsteer.nodes.status import RobotStatus
 from handsteer.nodes.supervision import Rivals, StopKeeper
 from handsteer.nodes.surroundings import Surroundings
 from handsteer.nodes.timing import StallGuard
+from handsteer.robots import RangeScan, Robot, RobotState
 from handsteer.robots.diff_drive import Velocity
 from handsteer.robots.editing import Change
-from handsteer.robots.protocol import RangeScan, Robot, RobotState
 from handsteer.robots.world import World
 from handsteer.transports.base import Call, Received, Transport
 from handsteer.types import CourseState, Pose2D

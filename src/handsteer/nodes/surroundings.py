@@ -9,9 +9,9 @@ from handsteer.errors import WorldError
 from handsteer.messages import WORLD_MARKERS, Header
 from handsteer.nodes.base import Node
 from handsteer.nodes.world_markers import Touches, gate_strips, world_markers
+from handsteer.robots import Robot, RobotState
 from handsteer.robots.course import Referee
 from handsteer.robots.editing import Change, InWorld
-from handsteer.robots.protocol import Robot, RobotState
 from handsteer.robots.world import World
 from handsteer.transports.base import Call
 from handsteer.types import CourseState

@@ -19,7 +19,7 @@ from handsteer.messages import (
     Quaternion,
     Vector3,
 )
-from handsteer.robots.protocol import Obstacle
+from handsteer.robots import Obstacle
 from handsteer.robots.world import Gate
 from handsteer.types import CourseState
 

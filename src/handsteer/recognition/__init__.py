@@ -1,10 +1,9 @@
 """Recognises hand signs: finds the 21 landmarks of hands in a frame, and classifies them.
 
-:mod:`~handsteer.recognition.recognizer` runs the whole chain. ``hand`` and ``classifier`` define its interfaces.
+:mod:`~handsteer.recognition.recognizer` runs the whole chain; ``hand`` defines its interfaces.
 
-``landmarker`` finds hands with MediaPipe's models: ``search`` decides where to look for new ones, ``stillness`` when,
-``palm`` detects palms in the whole frame, and ``roi`` computes the region of a hand from its palm or its last
-landmarks. ``tflite`` runs the model files, which ``landmark_models`` locates and downloads. ``shipped_signs`` and
-``custom_signs`` classify a hand by its ``features`` with a ``network``. ``hand_selector`` selects the active hand, and
-``debouncer`` confirms its sign.
+``landmarker`` finds hands with MediaPipe's models: ``search`` decides where and when to look for new ones, ``palm``
+detects palms in the whole frame, and ``roi`` computes the region of a hand from its palm or its last landmarks.
+``landmark_models`` locates, downloads and runs the model files. ``shipped_signs`` and ``custom_signs`` classify a hand
+by its ``features`` with a ``network``. ``hand_selector`` selects the active hand, and ``debouncer`` confirms its sign.
 """

@@ -22,8 +22,7 @@ from handsteer.recognition.hand import Hand
 from handsteer.recognition.landmark_models import PictureModel, find_pair
 from handsteer.recognition.palm import PalmDetector
 from handsteer.recognition.roi import Roi, from_landmarks
-from handsteer.recognition.search import Search
-from handsteer.recognition.stillness import Pace, Stillness, cells_of_frame, cells_of_hands
+from handsteer.recognition.search import Pace, Search, Stillness, cells_of_frame, cells_of_hands
 
 _DEPTH_SCALE: Final = 0.4
 """Factor of the model's depth relative to its x and y."""

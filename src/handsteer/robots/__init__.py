@@ -1,38 +1,124 @@
-"""Robots to drive: a simulated one, or one behind a topic."""
+"""Robots to drive, a simulated one or one behind a topic, and their interface."""
 
-from typing import Any
+from dataclasses import dataclass
+from typing import Literal, Protocol
 
-from handsteer.config import RobotConfig
-from handsteer.errors import ConfigError, needing
-from handsteer.messages import CMD_VEL, Topic
-from handsteer.robots.protocol import Robot
-from handsteer.transports.base import Session
+import numpy as np
+from numpy.typing import NDArray
+
+from handsteer.types import Pose2D
+
+Shape = Literal["box", "cylinder", "sphere"]
 
 
-def open_robot(
-    config: RobotConfig, link: Session | None = None, cmd_vel: Topic[Any] = CMD_VEL, frame_id: str = "base_link"
-) -> Robot:
-    """Return the robot that ``config.kind`` names.
+@dataclass(frozen=True)
+class RobotState:
+    """The robot at one moment.
 
-    Args:
-        config: Names and configures the robot.
-        link: This process in the graph of a real robot; not needed by a simulated one.
-        cmd_vel: Topic of a real robot's commands, with Twist or TwistStamped.
-        frame_id: Coordinate frame of a TwistStamped.
-
-    Raises:
-        ConfigError: It is a real robot, and there is no link to it.
-        WorldError: The world of a simulated robot cannot be used.
-        PackageMissing: The simulator is not installed.
+    Attributes:
+        time_s: Time since the start, in the robot's own seconds.
+        odometry: Pose from odometry, in frame ``odom``.
+        linear_mps: Forward velocity from odometry, in m/s.
+        angular_radps: Angular velocity from odometry, in rad/s.
+        joint_positions: Wheel angles in rad, by joint name.
+        joint_velocities: Wheel speeds in rad/s, by joint name.
+        truth: The actual pose in the world.
+        contacts: Names of the obstacles that it touches now.
+        collisions: How many times it has begun to touch an obstacle since the start; None if unknown.
+        located: Whether ``odometry`` and ``truth`` are current; otherwise they are the last known ones.
+        trouble: What is wrong, as ``is not there: …``, to be read after "the robot"; empty if nothing is.
     """
-    # All nodes import this module; only the process that has a robot loads its libraries (xacro, MuJoCo).
-    if config.kind != "sim":
-        if link is None:
-            raise ConfigError(f"robot.kind is {config.kind}: only `handsteer run` drives a real robot; here it is sim")
-        from handsteer.robots.remote import RemoteRobot  # noqa: PLC0415
 
-        return RemoteRobot(config, cmd_vel, frame_id, link)
-    with needing("the simulated robot", "sim", "mujoco", "xacro"):
-        from handsteer.robots.simulated import SimulatedRobot  # noqa: PLC0415
+    time_s: float
+    odometry: Pose2D
+    linear_mps: float
+    angular_radps: float
+    joint_positions: dict[str, float]
+    joint_velocities: dict[str, float]
+    truth: Pose2D
+    contacts: tuple[str, ...]
+    collisions: int | None
+    located: bool = True
+    trouble: str = ""
 
-    return SimulatedRobot(config)
+
+@dataclass(frozen=True)
+class Obstacle:
+    """A thing in the robot's world, at its current place.
+
+    Attributes:
+        name: Unique name.
+        shape: A cylinder's axis is its own z.
+        size: Extent along its own x, y and z in metres: a sphere has its diameter three times.
+        rgba: Red, green, blue and opacity, 0 to 1.
+        position: Its centre in the world, in metres.
+        orientation: Unit quaternion x, y, z, w, from its own axes to the world's.
+    """
+
+    name: str
+    shape: Shape
+    size: tuple[float, float, float]
+    rgba: tuple[float, float, float, float]
+    position: tuple[float, float, float]
+    orientation: tuple[float, float, float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class RangeScan:
+    """A laser scan: one turn, or a part of one.
+
+    Attributes:
+        angle_min: Direction of the first ray in the scanner's frame, in rad, left positive.
+        angle_increment: Angle between two rays, in rad.
+        range_min: Minimum measurable distance, in metres.
+        range_max: Maximum measurable distance, in metres.
+        ranges: (N,), in metres by ray; REP 117: +inf for no obstacle, -inf for one that is too near, NaN for no
+            reading.
+        age_s: Time since the measurement, in seconds.
+    """
+
+    angle_min: float
+    angle_increment: float
+    range_min: float
+    range_max: float
+    ranges: NDArray[np.float32]
+    age_s: float = 0.0
+
+
+class Robot(Protocol):
+    """A robot that takes velocity commands.
+
+    Attributes:
+        description: Its URDF, as on the topic ``/robot_description``.
+    """
+
+    @property
+    def description(self) -> str: ...  # noqa: D102
+
+    def command(self, linear_mps: float, angular_radps: float) -> None:
+        """Command a velocity; the robot's own limits apply, and it brakes if no new one arrives in time."""
+        ...
+
+    def step(self, dt_s: float) -> RobotState:
+        """Advance time by ``dt_s`` seconds and return the new state."""
+        ...
+
+    def obstacles(self) -> list[Obstacle]:
+        """Return the things around it at their current places; empty if unknown."""
+        ...
+
+    def scan(self) -> RangeScan | None:
+        """Return the scan of its laser scanner; None if there is no new one, or no scanner."""
+        ...
+
+    def commanders(self) -> list[str]:
+        """Return the nodes that command it in a graph of its own, this one included; empty without such a graph."""
+        ...
+
+    def reset(self) -> None:
+        """Reset the robot and the obstacles to the start."""
+        ...
+
+    def close(self) -> None:
+        """Stop and release all resources; may be called twice."""
+        ...

@@ -10,7 +10,7 @@ from pathlib import Path
 import xacro
 
 from handsteer.errors import WorldError
-from handsteer.robots.protocol import Shape
+from handsteer.robots import Shape
 
 _XACRO = Path(__file__).parent / "urdf" / "handsteer_robot.urdf.xacro"
 _GREY = (0.6, 0.6, 0.6, 1.0)

@@ -8,7 +8,7 @@ from typing import Any, Protocol, runtime_checkable
 from pydantic import ValidationError
 
 from handsteer.errors import WorldError
-from handsteer.robots.protocol import Robot, Shape
+from handsteer.robots import Robot, Shape
 from handsteer.robots.world import Box, Cylinder, Sphere, Thing, World, describe_problem
 from handsteer.types import Pose2D
 

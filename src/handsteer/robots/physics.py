@@ -26,8 +26,8 @@ import mujoco
 import numpy as np
 
 from handsteer.errors import WorldError
+from handsteer.robots import RangeScan, Shape
 from handsteer.robots.description import joints
-from handsteer.robots.protocol import RangeScan, Shape
 from handsteer.robots.world import Thing, World
 
 _log = logging.getLogger(__name__)

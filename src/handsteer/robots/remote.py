@@ -9,10 +9,10 @@ from typing import Any
 
 from handsteer.config import RobotConfig
 from handsteer.messages import CMD_VEL, LaserScan, Odometry, Topic, TurtlePose, type_name, yaw_of
+from handsteer.robots import Obstacle, RangeScan, RobotState
 from handsteer.robots.command_limiter import ZERO, CommandLimiter
 from handsteer.robots.description import robot_description
 from handsteer.robots.diff_drive import Velocity
-from handsteer.robots.protocol import Obstacle, RangeScan, RobotState
 from handsteer.transports.base import Received, Session
 from handsteer.transports.commands import Commands
 from handsteer.types import Pose2D
@@ -43,7 +43,7 @@ class _Seen:
 
 
 class RemoteRobot:
-    """A :class:`~handsteer.robots.protocol.Robot` in another process, reached by topics.
+    """A :class:`~handsteer.robots.Robot` in another process, reached by topics.
 
     :class:`~handsteer.robots.command_limiter.CommandLimiter` computes what is sent. Its odometry counts as the truth,
     and contacts are unknown.

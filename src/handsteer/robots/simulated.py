@@ -8,11 +8,10 @@ from numpy.typing import NDArray
 
 from handsteer.config import RobotConfig
 from handsteer.errors import WorldError
-from handsteer.robots import diff_drive
+from handsteer.robots import Obstacle, RangeScan, RobotState, diff_drive
 from handsteer.robots.description import robot_description
 from handsteer.robots.diff_drive import DriveState, Velocity
 from handsteer.robots.physics import ROBOT_JOINT, TIMESTEP_S, WHEEL_JOINTS, Lidar, compile_model, thing_name
-from handsteer.robots.protocol import Obstacle, RangeScan, RobotState
 from handsteer.robots.world import World, load_world
 from handsteer.types import Pose2D
 

@@ -23,7 +23,7 @@ from pydantic import Field, ValidationError, model_validator
 from handsteer import plain_yaml
 from handsteer.config import Section
 from handsteer.errors import WorldError
-from handsteer.robots.protocol import Shape
+from handsteer.robots import Shape
 
 _SHIPPED = Path(__file__).parent / "worlds"
 

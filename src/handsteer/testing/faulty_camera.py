@@ -6,7 +6,7 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from handsteer.cameras.protocol import Camera, EndOfStream, Frame
+from handsteer.cameras import Camera, EndOfStream, Frame
 from handsteer.clock import Clock
 from handsteer.errors import CameraError, CameraLost
 
@@ -52,7 +52,7 @@ class FaultyCamera:
 
 
 class SpoiltCamera:
-    """A :class:`~handsteer.cameras.protocol.Camera` around another one, with a fault on request.
+    """A :class:`~handsteer.cameras.Camera` around another one, with a fault on request.
 
     ::
 

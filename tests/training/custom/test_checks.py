@@ -1,8 +1,8 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from handsteer.training.custom.checks import split
 from handsteer.training.custom.dataset import Dataset
+from handsteer.training.custom.report import split
 from tests.training.custom.takes import take
 
 HANDS = take("Hi", "Peace", hands=1).hands

@@ -1,5 +1,4 @@
-from handsteer.training.custom.checks import Lookalike
-from handsteer.training.custom.report import TrainingReport, false_hands, how_it_was_tried, mistakes
+from handsteer.training.custom.report import Lookalike, TrainingReport, false_hands, how_it_was_tried, mistakes
 from handsteer.training.evaluation.intervals import Share
 from handsteer.training.evaluation.photo_metrics import Confusion
 

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from handsteer.cameras import Frame
 from handsteer.cameras.files import read_photo, video_frames
-from handsteer.cameras.protocol import Frame
 from handsteer.cameras.virtual import VirtualHandCamera
 from handsteer.clock import SteppedClock
 from handsteer.config import VirtualHandConfig

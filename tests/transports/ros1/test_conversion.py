@@ -15,7 +15,7 @@ from rosbags.typesys.stores import ros2_jazzy
 from handsteer.clock import to_stamp
 from handsteer.messages import Header, JointState, Time
 from handsteer.nodes.world_markers import world_markers
-from handsteer.robots.protocol import Obstacle
+from handsteer.robots import Obstacle
 
 pytestmark = pytest.mark.ros1
 

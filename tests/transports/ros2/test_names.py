@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from handsteer.errors import TransportError
 from handsteer.messages import CAMERA_INFO, CLOCK, CMD_VEL, IMAGE_COMPRESSED, IMAGE_RAW, TF
-from handsteer.transports.ros2.names import NodeName, Remap, identify
+from handsteer.transports.ros2.encoding import NodeName, Remap, identify
 
 TOKENS = st.from_regex(r"[A-Za-z_][A-Za-z0-9_]{0,8}", fullmatch=True)
 FULL = st.lists(TOKENS, min_size=1, max_size=4).map(lambda parts: "".join(f"/{part}" for part in parts))

@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 pytest.importorskip("zenoh")
 
 from handsteer.transports.ros2.base_transport import Profile
-from handsteer.transports.ros2.names import NodeName
+from handsteer.transports.ros2.encoding import NodeName
 from handsteer.transports.zenoh.keys import (
     Endpoint,
     Entity,

@@ -18,7 +18,7 @@ app = App(
 )
 # Named, not imported: a verb's module is loaded when it is used.
 for verb, function in {
-    "list": "list_signs:list_signs",
+    "list": "train:list_signs",
     "evaluate": "evaluate:evaluate",
     "collect": "collect:collect",
     "import": "collect:import_keypoints",

@@ -18,9 +18,8 @@ from handsteer.clock import RealClock
 from handsteer.config import Config, TeachConfig
 from handsteer.errors import DatasetError
 from handsteer.recognition.custom_signs import label_for
-from handsteer.recognition.drawing import draw_hand
 from handsteer.recognition.hand import Hand
-from handsteer.recognition.recognizer import open_landmarker
+from handsteer.recognition.recognizer import draw_hand, open_landmarker
 from handsteer.training.custom.collect import Collector, Facts, Status, collect_live, collect_recorded
 from handsteer.training.custom.dataset import Dataset, load_dataset, save_dataset
 from handsteer.training.custom.keypoint_csv import read_class_names, read_keypoints

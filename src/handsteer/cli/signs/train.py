@@ -1,4 +1,4 @@
-"""``handsteer signs train``: learn signs from datasets."""
+"""``handsteer signs list`` and ``train``: the known signs, and learning further ones from datasets."""
 
 import json as json_format
 import sys
@@ -8,18 +8,53 @@ from typing import Annotated
 from cyclopts import Parameter
 from tqdm import tqdm
 
-from handsteer.cli.app import Flag
-from handsteer.cli.running import say
-from handsteer.cli.signs.tables import teaching_tables
+from handsteer.cli.app import ConfigFile, Flag, Parameters
+from handsteer.cli.running import say, settings
+from handsteer.cli.signs.tables import table, teaching_tables
 from handsteer.config import SignsConfig, TeachConfig
+from handsteer.control.explain import effect_of
 from handsteer.errors import TrainingError
 from handsteer.recognition.custom_signs import save_custom_model
 from handsteer.recognition.recognizer import open_classifier
 from handsteer.training.custom.dataset import Dataset, load_dataset
 from handsteer.training.custom.train import train_signs
+from handsteer.types import NONE, action_of, find_sign
 
 _LOW_RECALL = 0.8
 _DEFAULTS = TeachConfig()
+
+
+def list_signs(*, json: Flag = False, config_file: ConfigFile = None, parameters: Parameters = None) -> int:
+    """Print the signs that the model knows, and what each makes the robot do.
+
+    Example: handsteer signs list --control.actions.Peace turbo
+
+    Parameters
+    ----------
+    json
+        Print one JSON list.
+    config_file
+        YAML file with parameters; options override it.
+    """
+    config = settings(config_file, parameters)
+    actions = config.control.actions
+    known = (*open_classifier(config.signs).signs, NONE)
+    named = [sign for sign in actions if find_sign(sign, known) is None]
+    signs = [
+        {"sign": sign, "action": action, "effect": effect_of(action, config.control), "known": sign in known}
+        for sign in (*known, *named)
+        for action in [action_of(sign, actions)]
+    ]
+    if json:
+        print(json_format.dumps(signs))
+        return 0
+    rows = [[str(sign["sign"]), str(sign["action"]), _effect(sign)] for sign in signs]
+    print(table(["sign", "action", "the robot"], rows, text_columns=3))
+    return 0
+
+
+def _effect(sign: dict[str, object]) -> str:
+    return f"{sign['effect']}{'' if sign['known'] else ' (unknown to the model)'}"
 
 
 def train(

@@ -10,8 +10,8 @@ from typing import Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from handsteer.cameras import Camera
 from handsteer.cameras.files import PHOTO_SUFFIXES, find_photos, read_photo, video_frames
-from handsteer.cameras.protocol import Camera
 from handsteer.clock import Clock
 from handsteer.errors import DatasetError
 from handsteer.recognition.hand import Hand, Landmarker

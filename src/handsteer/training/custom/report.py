@@ -1,13 +1,146 @@
-"""The results of a training: how well custom signs are distinguished from each other and from all other hands."""
+"""Checks a dataset before a training, and reports how well its signs are distinguished afterwards."""
 
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
-from handsteer.training.custom.checks import Lookalike
-from handsteer.training.custom.dataset import LabelSummary
+from handsteer.errors import TrainingError
+from handsteer.recognition.hand import Classifier
+from handsteer.recognition.shipped_signs import SURE
+from handsteer.training.custom.dataset import Dataset, LabelSummary, Take, summarise
 from handsteer.training.evaluation.intervals import Share
 from handsteer.training.evaluation.photo_metrics import Confusion
-from handsteer.types import NONE
+from handsteer.types import NONE, SIGNS, find_sign
+
+_LEAST_TAKES: Final = 2
+_LEAST_ROWS: Final = 10
+_KNOWN_SHARE: Final = 0.3
+_CONFUSED_SHARE: Final = 0.2
+
+_FOLDS: Final = 3
+
+
+def custom_labels(dataset: Dataset, sided: Sequence[str]) -> tuple[str, ...]:
+    """Return the labels of ``dataset`` that are new signs.
+
+    Raises:
+        TrainingError: There is none, two mean the same, or one of ``sided`` is not among them.
+    """
+    labels = tuple(label for label in dataset.labels if label not in (*SIGNS, NONE))
+    if not labels:
+        found = ", ".join(dataset.labels) or "nothing at all"
+        raise TrainingError(f"there is no new sign to learn, only {found}: collect takes with a label of your own")
+    for number, label in enumerate(labels):
+        twin = find_sign(label, labels[:number])
+        if twin:
+            raise TrainingError(f"the labels {twin!r} and {label!r} mean the same sign: give both the same label")
+    strangers = [name for name in sided if name not in labels]
+    if strangers:
+        raise TrainingError(f"--sided: there is no sign {strangers[0]!r} to learn; there are {', '.join(labels)}")
+    return labels
+
+
+def check_enough(dataset: Dataset, labels: Sequence[str]) -> None:
+    """Raise TrainingError unless there are enough takes and hands of each of ``labels``."""
+    for summary in summarise(dataset):
+        if summary.label in labels and (summary.takes < _LEAST_TAKES or summary.rows < _LEAST_ROWS):
+            raise TrainingError(
+                f"too little data for {summary.label}: {summary.takes} takes with {summary.rows} hands; at least "
+                f"{_LEAST_TAKES} takes with {_LEAST_ROWS} hands are needed; five takes of 3 s are good"
+            )
+
+
+@dataclass(frozen=True)
+class Lookalike:
+    """Hands of a new sign that are recognised as a known sign."""
+
+    label: str
+    sign: str
+    hands: Share
+
+
+def lookalikes(dataset: Dataset, labels: Sequence[str], shipped: Classifier) -> tuple[Lookalike, ...]:
+    """Return which of ``labels`` the classifier ``shipped`` already recognises as a sign, and how often."""
+    found = []
+    for label in labels:
+        seen = [
+            guess.sign if guess.confidence >= SURE else NONE
+            for take in dataset.of(label)
+            if not take.is_flat
+            for guess in map(shipped.classify, take.hands)
+        ]
+        found += [Lookalike(label, sign, Share(seen.count(sign), len(seen))) for sign in shipped.signs if sign in seen]
+    return tuple(found)
+
+
+def check_not_known(found: Sequence[Lookalike]) -> None:
+    """Raise TrainingError if a new sign is often recognised as a known one."""
+    for each in found:
+        share = each.hands.rate or 0.0
+        if share > _KNOWN_SHARE:
+            raise TrainingError(
+                f"{each.label} looks like {each.sign}: {share:.0%} of its hands are recognised as that already; "
+                f"teach another shape, or give {each.sign} another action"
+            )
+
+
+def check_distinguished(likeliest: Confusion) -> None:
+    """Raise TrainingError if a sign is often confused with another.
+
+    ``likeliest`` has the likeliest signs of held-out hands, regardless of thresholds.
+    """
+    *labels, _ = likeliest.labels
+    for row, label in enumerate(labels):
+        shown = sum(likeliest.counts[row])
+        for column, other in enumerate(labels):
+            share = likeliest.counts[row][column] / shown if shown else 0.0
+            if row != column and share > _CONFUSED_SHARE:
+                raise TrainingError(
+                    f"{label} looks like {other}: {share:.0%} of its held-out hands look more like that; "
+                    f"teach shapes that differ more, or name both by --sided if one is the mirror image of the other"
+                )
+
+
+@dataclass(frozen=True)
+class Fold:
+    """Takes that are held out together, and the rest, which are trained on."""
+
+    held_out: tuple[Take, ...]
+    rest: tuple[Take, ...]
+
+
+def split(dataset: Dataset, labels: Sequence[str]) -> tuple[str, list[Fold]]:
+    """Return the unit that is held out, ``person``, ``session`` or ``take``, and up to three folds.
+
+    If a sign is shown by several persons, whole persons are held out, without their takes of signs that no other person
+    shows. Otherwise sessions are held out if each label has several, else takes.
+
+    Args:
+        dataset: All takes, with at least two of each label.
+        labels: The taught signs: only their takes are held out.
+    """
+    if any(len({take.person for take in dataset.of(label)}) > 1 for label in labels):
+        return "person", _folds(dataset, labels, {take: take.person for take in dataset.takes})
+    if all(len({(take.person, take.session) for take in dataset.of(label)}) > 1 for label in labels):
+        return "session", _folds(dataset, labels, {take: (take.person, take.session) for take in dataset.takes})
+    numbers = {take: number for label in dataset.labels for number, take in enumerate(dataset.of(label))}
+    return "take", _folds(dataset, labels, numbers)
+
+
+def _folds(dataset: Dataset, labels: Sequence[str], group_of: Mapping[Take, Hashable]) -> list[Fold]:
+    groups = list(dict.fromkeys(group_of[take] for take in dataset.takes if take.label in labels))
+    count = min(_FOLDS, len(groups))
+    folds = []
+    for number in range(count):
+        out = set(groups[number::count])
+        rest = tuple(take for take in dataset.takes if group_of[take] not in out)
+        learnt = {take.label for take in rest}
+        held_out = tuple(
+            take for take in dataset.takes if group_of[take] in out and take.label in labels and take.label in learnt
+        )
+        if held_out:
+            folds.append(Fold(held_out, rest))
+    return folds
 
 
 @dataclass(frozen=True)

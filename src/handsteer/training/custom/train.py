@@ -12,7 +12,10 @@ from handsteer.recognition.custom_signs import FORMAT, Array, CustomModel, Depth
 from handsteer.recognition.hand import Classifier
 from handsteer.recognition.shipped_signs import SURE
 from handsteer.training.custom.augmentation import mirrored, points_sideways, vary
-from handsteer.training.custom.checks import (
+from handsteer.training.custom.dataset import Dataset, Take, summarise
+from handsteer.training.custom.report import (
+    CustomSignFigures,
+    TrainingReport,
     check_distinguished,
     check_enough,
     check_not_known,
@@ -20,8 +23,6 @@ from handsteer.training.custom.checks import (
     lookalikes,
     split,
 )
-from handsteer.training.custom.dataset import Dataset, Take, summarise
-from handsteer.training.custom.report import CustomSignFigures, TrainingReport
 from handsteer.training.evaluation.intervals import Share
 from handsteer.training.evaluation.photo_metrics import Confusion
 from handsteer.training.network import learn_novelty, train

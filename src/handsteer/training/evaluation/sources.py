@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from handsteer.cameras import Frame
 from handsteer.cameras.files import PHOTO_SUFFIXES, read_photo, video_frames
-from handsteer.cameras.protocol import Frame
 from handsteer.errors import EvaluationError, LabelError
 from handsteer.recognition.custom_signs import CustomClassifier
 from handsteer.recognition.hand import Classifier, Hand

@@ -28,8 +28,7 @@ from cyclonedds.topic import Topic
 
 from handsteer.messages import Image, type_name
 from handsteer.transports.dds.topics import dds_type, describe, discovery_qos, host, misfits
-from handsteer.transports.ros2.encoding import dds_type_name, ros_type_name, types
-from handsteer.transports.ros2.names import NodeName
+from handsteer.transports.ros2.encoding import NodeName, dds_type_name, ros_type_name, types
 
 _INFO = "rmw_dds_common/msg/ParticipantEntitiesInfo"
 _DISCOVERY = "ros_discovery_info"

@@ -14,8 +14,7 @@ from handsteer.transports.dds.discovery import Endpoint
 from handsteer.transports.dds.network import Network, network
 from handsteer.transports.dds.participant import Participant
 from handsteer.transports.dds.topics import describe, misfits
-from handsteer.transports.ros2.encoding import ros_type_name
-from handsteer.transports.ros2.names import NodeName
+from handsteer.transports.ros2.encoding import NodeName, ros_type_name
 
 # ROS 2's own tools hide nodes whose names begin with it.
 _HIDDEN = "_"

@@ -28,8 +28,7 @@ from handsteer.transports.base import UNNAMED
 from handsteer.transports.dds.discovery import Endpoint, Matching, RosGraph
 from handsteer.transports.dds.network import Network
 from handsteer.transports.dds.topics import dds_type, opaque_type, reader_qos, service_dds_type, service_qos, writer_qos
-from handsteer.transports.ros2.encoding import dds_type_name, reply_type, request_type, ros_type_name
-from handsteer.transports.ros2.names import NodeName
+from handsteer.transports.ros2.encoding import NodeName, dds_type_name, reply_type, request_type, ros_type_name
 
 _USER_DATA = b"enclave=/;"
 _TICK_S = 0.25

@@ -23,7 +23,7 @@ from handsteer.transports.dds.network import network
 from handsteer.transports.dds.participant import Participant
 from handsteer.transports.dds.topics import user_data
 from handsteer.transports.ros2.base_transport import Take, WireTransport
-from handsteer.transports.ros2.names import NodeName
+from handsteer.transports.ros2.encoding import NodeName
 
 _REQUESTS_AT_ONCE = 100
 _WAIT_FOR_READER_S = 1.0

@@ -14,8 +14,7 @@ from handsteer.parameters import NodeParameters
 from handsteer.transports.base import Call, Publisher
 from handsteer.transports.ros2.arguments import parse_arguments
 from handsteer.transports.ros2.base_transport import WireTransport
-from handsteer.transports.ros2.encoding import decode, encode, request_type
-from handsteer.transports.ros2.names import NodeName, identify
+from handsteer.transports.ros2.encoding import NodeName, decode, encode, identify, request_type
 from handsteer.transports.ros2.parameter_services import PARAMETER_EVENTS, ParameterServices
 from handsteer.transports.timing import ClockMonitor
 

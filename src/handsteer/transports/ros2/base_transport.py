@@ -28,8 +28,7 @@ from handsteer.messages import (
 )
 from handsteer.transports.base import Deliver, Received
 from handsteer.transports.in_process import BasePublisher, BaseTransport, Receive
-from handsteer.transports.ros2.encoding import compile_type, decode, encode
-from handsteer.transports.ros2.names import NodeName
+from handsteer.transports.ros2.encoding import NodeName, compile_type, decode, encode
 from handsteer.transports.timing import StaleMessageFilter, capture_time
 
 M = TypeVar("M")

@@ -10,8 +10,7 @@ from dataclasses import dataclass
 import xxhash
 
 from handsteer.transports.ros2.base_transport import Profile
-from handsteer.transports.ros2.encoding import dds_type_name, ros_type_name, type_hash
-from handsteer.transports.ros2.names import NodeName
+from handsteer.transports.ros2.encoding import NodeName, dds_type_name, ros_type_name, type_hash
 
 _ROOT = "@ros2_lv"
 _NODE = "NN"

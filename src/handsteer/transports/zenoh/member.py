@@ -9,8 +9,7 @@ import zenoh
 
 from handsteer.errors import TransportError
 from handsteer.transports.ros2.base_transport import Profile
-from handsteer.transports.ros2.encoding import type_hash
-from handsteer.transports.ros2.names import NodeName
+from handsteer.transports.ros2.encoding import NodeName, type_hash
 from handsteer.transports.zenoh.configuration import Network, reason, routers
 from handsteer.transports.zenoh.keys import (
     Endpoint,

@@ -18,7 +18,7 @@ import zenoh.ext
 from handsteer.clock import Clock
 from handsteer.messages import Topic, type_name
 from handsteer.transports.ros2.base_transport import IMAGES, Profile, Take, WireTransport, offered, requested
-from handsteer.transports.ros2.names import NodeName
+from handsteer.transports.ros2.encoding import NodeName
 from handsteer.transports.zenoh.configuration import network
 from handsteer.transports.zenoh.keys import attachment, gid, read_attachment
 from handsteer.transports.zenoh.member import Member
