@@ -19,8 +19,7 @@ from handsteer.cameras.virtual import VirtualHandCamera
 from handsteer.clock import SteppedClock
 from handsteer.config import VirtualHandConfig
 from handsteer.hand.kinematics import pose_skeleton
-from handsteer.hand.placement import Pinhole
-from handsteer.hand.poses import sign_pose
+from handsteer.hand.poses import Pinhole, sign_pose
 from handsteer.hand.renderer import SKINS, Look, make_background, render
 from handsteer.types import SIGNS, Handedness
 

@@ -9,8 +9,8 @@ from handsteer.clock import SteppedClock
 from handsteer.config import load
 from handsteer.graph import Graph
 from handsteer.messages import CMD_VEL, HAND_SIGN, IMAGE_RAW, Topic
+from handsteer.testing import Trace
 from handsteer.testing.fault_transport import CUT, FROZEN, FaultTransport, LinkFault
-from handsteer.testing.trace import Trace
 from handsteer.transports.in_process import InProcessTransport
 
 SETTINGS = {

@@ -6,8 +6,7 @@ import cv2
 import numpy as np
 
 from handsteer.hand.kinematics import angles_of, pose_skeleton
-from handsteer.hand.placement import Pinhole
-from handsteer.hand.poses import HandPose, View, sign_pose
+from handsteer.hand.poses import HandPose, Pinhole, View, sign_pose
 from handsteer.hand.renderer import Look, make_background, render
 from handsteer.recognition.recognizer import Recognizer
 from handsteer.types import NONE, SIGNS

@@ -11,7 +11,7 @@ from handsteer.config import CameraConfig, Config, ControlConfig, RobotConfig, V
 from handsteer.errors import ConfigError
 from handsteer.graph import Graph
 from handsteer.messages import CMD_VEL, HAND_SIGN, ODOM, TF, Topic
-from handsteer.testing.trace import Trace
+from handsteer.testing import Trace
 from handsteer.types import Pose2D
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from handsteer.config import LandmarksConfig
 from handsteer.recognition.landmarker import MediaPipeLandmarker
-from handsteer.recognition.roi import from_landmarks
+from handsteer.recognition.regions import from_landmarks
 from handsteer.training.evaluation.views import View
 
 SIDE = 224

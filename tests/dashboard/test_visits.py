@@ -8,8 +8,8 @@ from collections import Counter
 import pytest
 from nicegui import Client
 
-from handsteer.dashboard.history import Sample
 from handsteer.dashboard.limits import MOST_UNCONNECTED_PAGES
+from handsteer.dashboard.world_state import Sample
 from tests.dashboard.network import client_of, join_query
 from tests.dashboard.served import Site
 from tests.dashboard.sockets import PageSocket

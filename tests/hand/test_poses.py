@@ -3,8 +3,7 @@ import pytest
 
 from handsteer.errors import PoseError
 from handsteer.hand.kinematics import LIMITS, pose_joints
-from handsteer.hand.placement import Pinhole
-from handsteer.hand.poses import sign_pose
+from handsteer.hand.poses import Pinhole, sign_pose
 from handsteer.types import BACKWARD, FORWARD, GO, NONE, SIGNS, STOP, TURN_LEFT, TURN_RIGHT, Handedness
 
 CAMERA = Pinhole.webcam(640, 480)

@@ -2,8 +2,7 @@ import numpy as np
 import pytest
 
 from handsteer.hand.kinematics import pose_skeleton
-from handsteer.hand.placement import Pinhole
-from handsteer.hand.poses import View, sign_pose
+from handsteer.hand.poses import Pinhole, View, sign_pose
 from handsteer.hand.renderer import Look, make_background, render, true_pixels
 from handsteer.types import SIGNS, STOP, Handedness
 

@@ -5,8 +5,7 @@ from hypothesis import strategies as st
 
 from handsteer.errors import PoseError
 from handsteer.hand.kinematics import LIMITS, pose_joints
-from handsteer.hand.placement import Pinhole
-from handsteer.hand.poses import sign_pose
+from handsteer.hand.poses import Pinhole, sign_pose
 from handsteer.hand.script import Motion, Part, parse_script
 from handsteer.types import NONE, SIGNS, Handedness
 

@@ -6,8 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handsteer.hand.kinematics import pose_skeleton
-from handsteer.hand.placement import Pinhole
-from handsteer.hand.poses import View, sign_pose
+from handsteer.hand.poses import Pinhole, View, sign_pose
 from handsteer.hand.renderer import SKINS, Look, make_background, render, true_pixels
 from handsteer.types import Handedness
 

@@ -3,8 +3,7 @@
 import numpy as np
 
 from handsteer.hand.kinematics import angles_of, pose_joints, turn_z
-from handsteer.hand.placement import Pinhole, Placement
-from handsteer.hand.poses import FIST, HandPose, View, sign_pose
+from handsteer.hand.poses import FIST, HandPose, Pinhole, Placement, View, sign_pose
 from handsteer.recognition.hand import Hand
 from handsteer.training.synthetic.hands import BONES_M
 from handsteer.types import Handedness

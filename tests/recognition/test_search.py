@@ -8,12 +8,10 @@ import pytest
 
 from handsteer.config import LandmarksConfig
 from handsteer.hand.kinematics import pose_skeleton
-from handsteer.hand.placement import Pinhole
-from handsteer.hand.poses import THUMB, View
+from handsteer.hand.poses import THUMB, Pinhole, View
 from handsteer.hand.renderer import Look, make_background, render
 from handsteer.recognition.landmarker import MediaPipeLandmarker
-from handsteer.recognition.palm import Palm, PalmDetector
-from handsteer.recognition.roi import Roi
+from handsteer.recognition.regions import Palm, PalmDetector, Roi
 from handsteer.recognition.search import Places, Search
 from tests.recognition.drawn_hand import draw, open_right_hand
 

@@ -7,7 +7,7 @@ import pytest
 
 from handsteer.config import LandmarksConfig
 from handsteer.recognition.landmarker import MediaPipeLandmarker
-from handsteer.recognition.roi import Roi
+from handsteer.recognition.regions import Roi
 from handsteer.recognition.search import Pace, Stillness, cells_of_frame, cells_of_hands
 from tests.recognition.drawn_hand import draw, open_left_hand, open_right_hand
 

@@ -7,7 +7,7 @@ from handsteer.cameras.files import SensorNoise
 from handsteer.clock import Clock
 from handsteer.config import VirtualHandConfig
 from handsteer.hand.kinematics import Array, pose_skeleton
-from handsteer.hand.placement import Pinhole
+from handsteer.hand.poses import Pinhole
 from handsteer.hand.renderer import Look, make_background, render, true_pixels
 from handsteer.hand.script import Motion
 

@@ -8,12 +8,12 @@ from nicegui import ui
 from handsteer.config import ControlConfig
 from handsteer.control.explain import figures_of
 from handsteer.dashboard.camera import CameraPanel
-from handsteer.dashboard.history import SPAN_S, Sample, VelocityHistory
 from handsteer.dashboard.node import DashboardNode
 from handsteer.dashboard.page import STATIC, UNKNOWN, Page, PageContext, box, card, switch, tag, text
 from handsteer.dashboard.state import PageState
 from handsteer.dashboard.steer_panel import SteerPanel
 from handsteer.dashboard.world_panel import WorldPanel
+from handsteer.dashboard.world_state import SPAN_S, Sample, VelocityHistory
 from handsteer.types import (
     BACKWARD,
     EFFECTS,

@@ -7,7 +7,6 @@ from dataclasses import replace
 from typing import Any, cast
 
 from handsteer.clock import Clock, to_seconds
-from handsteer.dashboard.history import PERIOD_S, Sample, VelocityHistory
 from handsteer.dashboard.state import (
     COMMAND_HOLDS_S,
     Observed,
@@ -19,7 +18,7 @@ from handsteer.dashboard.state import (
     place_in_world,
 )
 from handsteer.dashboard.viewers import ControlLease
-from handsteer.dashboard.world_state import WorldState, scan_points
+from handsteer.dashboard.world_state import PERIOD_S, Sample, VelocityHistory, WorldState, scan_points
 from handsteer.errors import TransportError
 from handsteer.messages import (
     CMD_VEL,

@@ -23,7 +23,6 @@ from handsteer.config import DashboardConfig
 from handsteer.dashboard.access import HEADERS, Access, AccessMiddleware
 from handsteer.dashboard.camera import FrameSocket, PictureNode, PictureResponse
 from handsteer.dashboard.drive_page import DrivePage
-from handsteer.dashboard.history import VelocityHistory
 from handsteer.dashboard.lesson_page import LessonPage
 from handsteer.dashboard.lessons import Lessons
 from handsteer.dashboard.limits import Connections, UnconnectedPages, limit_log
@@ -34,6 +33,7 @@ from handsteer.dashboard.settings import DEFAULT_FILE, Settings, SettingsFile
 from handsteer.dashboard.settings_page import SettingsPage
 from handsteer.dashboard.socket_events import SocketEvents
 from handsteer.dashboard.viewers import OnDemandNode
+from handsteer.dashboard.world_state import VelocityHistory
 from handsteer.errors import DashboardError
 from handsteer.making import cmd_vel_topic
 from handsteer.messages import CMD_VEL, Topic

@@ -1,12 +1,14 @@
-"""What the 3D view shows: the robot, its path reduced to few points, obstacles, and the points of a laser scan."""
+"""What the 3D view and the plot show: robot, obstacles, laser scan, the path so far, and the last velocities."""
 
 import math
+import threading
+from collections import deque
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from handsteer.messages import LaserScan, Marker
-from handsteer.types import Pose2D
+from handsteer.types import Pose2D, Velocity
 
 TRAIL_POINTS = 1000
 """The oldest points of a trail beyond these are dropped."""
@@ -24,6 +26,12 @@ SCAN_POINTS = 180
 
 Point = tuple[float, float]
 """x and y in metres."""
+
+SPAN_S = 30.0
+"""Length of the plot."""
+
+PERIOD_S = 0.05
+"""Time between samples."""
 
 
 @dataclass(frozen=True)
@@ -95,3 +103,41 @@ def scan_points(scan: LaserScan, robot: Pose2D) -> tuple[Point, ...]:
     angles = robot.yaw + scan.angle_min + numbers[meets] * scan.angle_increment
     points = np.stack([robot.x + ranges[meets] * np.cos(angles), robot.y + ranges[meets] * np.sin(angles)], axis=1)
     return tuple((x, y) for x, y in points[np.isfinite(points).all(axis=1)].round(2).tolist())
+
+
+@dataclass(frozen=True)
+class Sample:
+    """Both velocities at one moment.
+
+    Attributes:
+        at_s: Seconds of the graph's clock.
+        commanded: The commanded velocity; None without a command.
+        measured: The velocity from odometry; None without odometry.
+    """
+
+    at_s: float
+    commanded: Velocity | None
+    measured: Velocity | None
+
+
+class VelocityHistory:
+    """Keeps the samples of the last :data:`SPAN_S` seconds; thread-safe."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._samples: deque[Sample] = deque(maxlen=round(SPAN_S / PERIOD_S) + 1)
+        self._count = 0
+
+    def add(self, sample: Sample) -> None:
+        """Append ``sample``, unless the last one is younger than half of :data:`PERIOD_S`."""
+        with self._lock:
+            if not self._samples or sample.at_s - self._samples[-1].at_s >= PERIOD_S / 2:
+                self._samples.append(sample)
+                self._count += 1
+
+    def since(self, count: int, now_s: float) -> tuple[int, list[Sample]]:
+        """Return the total number of samples so far, and the recent ones after the first ``count``."""
+        with self._lock:
+            fresh = min(self._count - count, len(self._samples))
+            samples = list(self._samples)[len(self._samples) - fresh :] if fresh > 0 else []
+            return self._count, [sample for sample in samples if now_s - sample.at_s <= SPAN_S]

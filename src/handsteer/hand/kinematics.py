@@ -2,7 +2,7 @@
 
 The *hand frame* is that of a right hand: origin at the wrist, x to the thumb's side, y along the middle finger, z out
 of the palm (metres). Seen with the palm to the viewer and the fingers up, x is right, y up, and z towards the viewer. A
-left hand is the mirror image, made by its placement in the camera frame (:mod:`handsteer.hand.placement`).
+left hand is the mirror image, made by its placement in the camera frame (:mod:`handsteer.hand.poses`).
 
 Joints are in the order of the landmark models: wrist, then thumb, index, middle, ring and little finger, each from its
 base to its tip. Angles are in radians, in the order of :data:`ANGLES`.

@@ -1,13 +1,112 @@
-"""The signs as hand poses: the shape of the hand, and its pose relative to the camera."""
+"""The signs as hand poses: the shape of the hand, its pose relative to a camera, and the camera's projection.
+
+The camera frame is ROS's optical frame (REP 103): x to the image's right, y down, z forward, metres. Frames are not
+mirrored, so the left edge of the image is the user's right.
+"""
 
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from handsteer.errors import PoseError
-from handsteer.hand.kinematics import FINGERS, Array, angles_of
-from handsteer.hand.placement import Placement, orientation
+from handsteer.hand.kinematics import FINGERS, Array, angles_of, turn_x, turn_y, turn_z
 from handsteer.types import BACKWARD, FORWARD, GO, NONE, STOP, TURN_LEFT, TURN_RIGHT, Handedness
+
+_PALM_TO_CAMERA: Array = np.diag([1.0, -1.0, -1.0])
+_MIRROR: Array = np.diag([-1.0, 1.0, 1.0])
+PALM_CENTRE_M: Array = np.array([0.0, 0.06, 0.0])
+"""The point of the hand frame that a placement moves to its position."""
+
+_JOINTS = ("spread", "mcp", "pip", "dip")
+_CLOSED = {
+    "index": (0.0, 76.0, 98.0, 52.0),
+    "middle": (0.0, 80.0, 100.0, 55.0),
+    "ring": (0.0, 82.0, 100.0, 55.0),
+    "little": (2.0, 80.0, 98.0, 52.0),
+}
+_STRAIGHT_INDEX = (2.0, 2.0, 4.0, 2.0)
+_THUMB_OVER_INDEX = (19.0, 39.0, 26.0, 64.0, -1.0)
+_THUMB_OVER_MIDDLE = (9.0, 41.0, 29.0, 66.0, -2.0)
+_THUMB_OUT = (58.0, 12.0, -6.0, -14.0, 0.0)
+
+_STRAIGHT = (0.0, 3.0, 5.0, 3.0)
+_STRAIGHT_LITTLE = (-8.0, 4.0, 6.0, 4.0)
+_THUMB_ACROSS = (9.0, 45.0, 32.0, 62.0, 0.0)
+
+_HEIGHT_M, _DEPTH_M = 0.03, 0.55
+_LOWERED_M = 0.75 * _DEPTH_M + 0.20  # below the picture, for any aspect ratio
+
+_OTHER_HANDS = {TURN_LEFT: TURN_RIGHT, TURN_RIGHT: TURN_LEFT}
+
+
+@dataclass(frozen=True)
+class Placement:
+    """The hand's pose in the camera frame.
+
+    Attributes:
+        matrix: (3, 3) from the hand frame to the camera frame: a rotation, with a reflection for a left hand.
+        position: (3,) centre of the palm in metres.
+    """
+
+    matrix: Array
+    position: Array
+
+    def apply(self, points: ArrayLike) -> Array:
+        """Transform (..., 3) points from the hand frame to the camera frame, in metres."""
+        return (np.asarray(points) - PALM_CENTRE_M) @ self.matrix.T + self.position
+
+    def turn(self, directions: ArrayLike) -> Array:
+        """Transform (..., 3) directions from the hand frame to the camera frame."""
+        return np.asarray(directions) @ self.matrix.T
+
+    def mirrored(self) -> "Placement":
+        """Return the placement of the other hand whose picture is the mirror image of this one's."""
+        return Placement(_MIRROR @ self.matrix, _MIRROR @ self.position)
+
+
+def orientation(*, yaw: float = 0.0, pitch: float = 0.0, roll: float = 0.0) -> Array:
+    """Return the (3, 3) rotation of a right hand from the hand frame to the camera frame.
+
+    Args:
+        yaw: Radians about the hand's length. At 0 the palm faces the camera, at pi the back of the hand.
+        pitch: Radians; positive tips the fingers away from the camera.
+        roll: Radians in the image, clockwise as the camera sees it. At 0 the fingers point up.
+    """
+    return turn_z(roll) @ turn_x(-pitch) @ _PALM_TO_CAMERA @ turn_y(yaw)
+
+
+@dataclass(frozen=True)
+class Pinhole:
+    """An ideal pinhole camera.
+
+    Attributes:
+        width: Pixels.
+        height: Pixels.
+        focal_px: Focal length in pixels.
+    """
+
+    width: int
+    height: int
+    focal_px: float
+
+    @classmethod
+    def webcam(cls, width: int, height: int) -> "Pinhole":
+        """Return a webcam of that size with a diagonal field of view of 70 degrees (60 to 78 are common)."""
+        return cls(width, height, float(np.hypot(width, height)) / (2 * np.tan(np.radians(35.0))))
+
+    def project(self, points: ArrayLike) -> Array:
+        """Return (..., 2) pixels of (..., 3) points in the camera frame; pixel centres are at integers + 0.5."""
+        points = np.asarray(points, float)
+        pixels: Array = points[..., :2] / points[..., 2:] * self.focal_px + np.array([self.width, self.height]) / 2
+        return pixels
+
+    def rays(self, columns: ArrayLike, rows: ArrayLike) -> NDArray[np.float32]:
+        """Return (3, ...) unit directions through the pixels at (...) ``columns`` and ``rows``."""
+        x = (np.asarray(columns) - self.width / 2) / self.focal_px
+        y = (np.asarray(rows) - self.height / 2) / self.focal_px
+        directions = np.stack([x, y, np.ones_like(x)])
+        return np.asarray(directions / np.linalg.norm(directions, axis=0), np.float32)
 
 
 @dataclass(frozen=True)
@@ -67,18 +166,6 @@ def _shape(*, thumb: tuple[float, ...], wrist: tuple[float, float] = (0.0, 0.0),
     return angles_of(**degrees)
 
 
-_JOINTS = ("spread", "mcp", "pip", "dip")
-_CLOSED = {
-    "index": (0.0, 76.0, 98.0, 52.0),
-    "middle": (0.0, 80.0, 100.0, 55.0),
-    "ring": (0.0, 82.0, 100.0, 55.0),
-    "little": (2.0, 80.0, 98.0, 52.0),
-}
-_STRAIGHT_INDEX = (2.0, 2.0, 4.0, 2.0)
-_THUMB_OVER_INDEX = (19.0, 39.0, 26.0, 64.0, -1.0)
-_THUMB_OVER_MIDDLE = (9.0, 41.0, 29.0, 66.0, -2.0)
-_THUMB_OUT = (58.0, 12.0, -6.0, -14.0, 0.0)
-
 OPEN = _shape(
     thumb=(46.0, 12.0, 4.0, 2.0, 0.0),
     index=(6.0, 3.0, 5.0, 3.0),
@@ -104,9 +191,6 @@ THUMB = _shape(
     little=(2.0, 86.0, 108.0, 66.0),
 )
 
-_STRAIGHT = (0.0, 3.0, 5.0, 3.0)
-_STRAIGHT_LITTLE = (-8.0, 4.0, 6.0, 4.0)
-_THUMB_ACROSS = (9.0, 45.0, 32.0, 62.0, 0.0)
 PEACE = _shape(thumb=_THUMB_ACROSS, index=(8.0, 3.0, 5.0, 3.0), middle=(-6.0, 3.0, 5.0, 3.0))
 THREE = _shape(thumb=_THUMB_ACROSS, index=(8.0, 3.0, 5.0, 3.0), middle=_STRAIGHT, ring=(-8.0, 4.0, 6.0, 3.0))
 FOUR = _shape(
@@ -125,9 +209,6 @@ OK = _shape(
     ring=(-4.0, 5.0, 8.0, 4.0),
     little=_STRAIGHT_LITTLE,
 )
-
-_HEIGHT_M, _DEPTH_M = 0.03, 0.55
-_LOWERED_M = 0.75 * _DEPTH_M + 0.20  # below the picture, for any aspect ratio
 
 
 def _held(angles: Array, *, yaw: float = 0.0, pitch: float = 0.0, roll: float = 0.0, y: float = _HEIGHT_M) -> HandPose:
@@ -151,7 +232,6 @@ _POSES = {
     "Call": _held(CALL, yaw=8),
     "OK": _held(OK, yaw=8),
 }
-_OTHER_HANDS = {TURN_LEFT: TURN_RIGHT, TURN_RIGHT: TURN_LEFT}
 
 
 def sign_pose(sign: str, handedness: Handedness = "Right") -> HandPose:

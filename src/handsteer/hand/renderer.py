@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from handsteer.errors import ConfigError
 from handsteer.hand.kinematics import Array, Skeleton
-from handsteer.hand.placement import Pinhole, Placement
+from handsteer.hand.poses import Pinhole, Placement
 from handsteer.hand.surface import Float, Material, hand_cones
 from handsteer.hand.tracing import NEAREST_M, TILE, Grid, Hits, trace
 

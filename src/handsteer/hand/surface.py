@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handsteer.hand.kinematics import BONE_LENGTHS_M, Array, Skeleton
-from handsteer.hand.placement import Placement
+from handsteer.hand.poses import Placement
 
 Float = NDArray[np.float32]
 

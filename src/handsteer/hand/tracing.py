@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handsteer.hand.kinematics import Array
-from handsteer.hand.placement import Pinhole
+from handsteer.hand.poses import Pinhole
 from handsteer.hand.surface import BLEND_M, MARGIN_M, Cones, Float, Material
 
 TILE = 8

@@ -2,8 +2,8 @@
 
 :mod:`~handsteer.recognition.recognizer` runs the whole chain; ``hand`` defines its interfaces.
 
-``landmarker`` finds hands with MediaPipe's models: ``search`` decides where and when to look for new ones, ``palm``
-detects palms in the whole frame, and ``roi`` computes the region of a hand from its palm or its last landmarks.
+``landmarker`` finds hands with MediaPipe's models: ``search`` decides where and when to look for new ones, ``regions``
+detects palms in the whole frame, and computes the region of a hand from its palm or its last landmarks.
 ``landmark_models`` locates, downloads and runs the model files. ``shipped_signs`` and ``custom_signs`` classify a hand
 by its ``features`` with a ``network``. ``hand_selector`` selects the active hand, and ``debouncer`` confirms its sign.
 """

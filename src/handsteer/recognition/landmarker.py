@@ -20,8 +20,7 @@ from handsteer.config import LandmarksConfig
 from handsteer.errors import FrameError
 from handsteer.recognition.hand import Hand
 from handsteer.recognition.landmark_models import PictureModel, find_pair
-from handsteer.recognition.palm import PalmDetector
-from handsteer.recognition.roi import Roi, from_landmarks
+from handsteer.recognition.regions import PalmDetector, Roi, from_landmarks
 from handsteer.recognition.search import Pace, Search, Stillness, cells_of_frame, cells_of_hands
 
 _DEPTH_SCALE: Final = 0.4

@@ -15,8 +15,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from handsteer.recognition.palm import Palm, PalmDetector
-from handsteer.recognition.roi import Roi
+from handsteer.recognition.regions import Palm, PalmDetector, Roi
 
 _MIDDLE: Final = 0.7
 """Side of the square in the middle, relative to the frame's shorter side."""

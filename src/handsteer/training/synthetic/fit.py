@@ -20,7 +20,7 @@ from handsteer.cameras.files import read_photo
 from handsteer.config import LandmarksConfig
 from handsteer.hand import poses
 from handsteer.hand.kinematics import ANGLES, Array, angles_of, clamp, pose_skeleton
-from handsteer.hand.placement import Pinhole, Placement, orientation
+from handsteer.hand.poses import Pinhole, Placement, orientation
 from handsteer.hand.renderer import SKINS, Look, make_background, render
 from handsteer.recognition.hand import Hand
 from handsteer.recognition.landmarker import MediaPipeLandmarker

@@ -1,5 +1,5 @@
 from handsteer.dashboard.drive_page import rows_of
-from handsteer.dashboard.history import PERIOD_S, SPAN_S, Sample, VelocityHistory
+from handsteer.dashboard.world_state import PERIOD_S, SPAN_S, Sample, VelocityHistory
 from handsteer.types import Velocity
 
 

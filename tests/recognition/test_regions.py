@@ -6,7 +6,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from handsteer.recognition.roi import Roi, from_landmarks, from_palm, whole_frame
+from handsteer.recognition.regions import Roi, from_landmarks, from_palm, whole_frame
 from tests.about import about
 
 coordinates = st.floats(-2000, 2000)
