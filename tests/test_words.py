@@ -19,9 +19,11 @@ SOURCES = [
     ROOT / ".ci" / "run",
     *sorted(
         path
-        for folder in (*(f"src/handsteer/{each}" for each in ("cli", "config", "doctor")), "examples", "ros", "scripts")
+        for folder in ("src", "examples", "ros", "scripts")
         for path in (ROOT / folder).rglob("*")
-        if path.is_file() and path.suffix != ".pyc"
+        if path.suffix in {"", ".py", ".launch", ".md", ".sh", ".toml", ".xml", ".yaml"}
+        and path.is_file()
+        and not {"dashboard", "synthetic"} & {*path.parts}
     ),
 ]
 

@@ -145,4 +145,4 @@ def test_who_drives_and_whether_it_is_locked_stands_on_diagnostics(mux: Mux) -> 
     mux.lock(locked=True)
     mux.run(0.2)
     told.append(said())
-    assert told == [("nobody", "False"), ("signs", "False"), ("steering", "False"), ("nobody", "True")]
+    assert told == [("none", "False"), ("signs", "False"), ("steering", "False"), ("none", "True")]

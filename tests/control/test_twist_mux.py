@@ -27,7 +27,7 @@ def test_when_steering_ends_one_zero_goes_out_and_signs_start_from_standing() ->
     driver.step(DT, steering=Velocity(0.4, 0.0))
     said = [driver.step(0.1) for _ in range(10)]
     assert [velocity for velocity in said if velocity is not None] == [ZERO]
-    assert driver.source == "nobody"
+    assert driver.source == "none"
     assert driver.step(DT, sign=FORWARD) == Velocity(0.01, 0.0)
 
 

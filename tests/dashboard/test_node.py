@@ -126,7 +126,7 @@ def test_where_a_subscriber_would_pass_for_a_robot_it_shows_what_the_control_say
     bench.report(ControlStatus(source="signs", linear_mps=0.5, angular_radps=0.25))
     assert bench.node.state().commanded == Velocity(0.5, 0.25)
     bench.step(1.0)
-    bench.report(ControlStatus(source="nobody", linear_mps=0.5, angular_radps=0.25))
+    bench.report(ControlStatus(source="none", linear_mps=0.5, angular_radps=0.25))
     assert bench.node.state().commanded == Velocity()
 
 
@@ -310,7 +310,7 @@ def test_keeps_the_velocities_and_gaps_where_nothing_was_said(bench: Bench) -> N
 
 def test_only_who_drives_chooses_the_topic_and_not_while_stopped(bench: Bench) -> None:
     bench.node.steer("me", 0.1, 0.0)
-    with pytest.raises(TransportError, match="only who drives"):
+    with pytest.raises(TransportError, match="only the driver"):
         bench.node.steer_on("you", "/cmd_vel")
     bench.report(ControlStatus(Reason("stopped"), stopped=True))
     with pytest.raises(TransportError, match="is stopped"):

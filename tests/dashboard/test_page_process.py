@@ -98,7 +98,7 @@ def test_a_page_that_dies_is_told() -> None:
         page.process.kill()
         graph.wait(30.0, until=lambda: page.is_gone)
         assert page.is_gone
-        assert "ended (exit code -9), so the robot was told to stand" in str(page.why_gone())
+        assert "ended (exit code -9), so the robot was commanded to stop" in str(page.why_gone())
 
 
 def test_a_run_ends_with_its_page_and_leaves_the_robot_standing(tmp_path: Path) -> None:
@@ -109,7 +109,7 @@ def test_a_run_ends_with_its_page_and_leaves_the_robot_standing(tmp_path: Path) 
         (child,) = Path(f"/proc/{run.popen.pid}/task/{run.popen.pid}/children").read_text().split()
         os.kill(int(child), signal.SIGKILL)
         assert run.code() == 2
-        assert "the page's process has ended (exit code -9), so the robot was told to stand" in run.text
+        assert "the page's process has ended (exit code -9), so the robot was commanded to stop" in run.text
         assert "Traceback" not in run.text
     finally:
         run.kill()

@@ -192,11 +192,11 @@ def test_never_writes_over_what_somebody_else_wrote(bench: Bench) -> None:
     assert (bench.running.control.max_linear, bench.shown("camera.fps")) == (0.3, 10)
     bench.set("camera.fps", "12")
     bench.path.write_text("camera: {fps: 11}\n")
-    with pytest.raises(ConfigError, match=r"my.yaml was changed by somebody else"):
+    with pytest.raises(ConfigError, match=r"my.yaml was changed by another program"):
         bench.settings.save()
     assert bench.path.read_text() == "camera: {fps: 11}\n"
     bench.path.unlink()
-    with pytest.raises(ConfigError, match=r"my.yaml was changed by somebody else"):
+    with pytest.raises(ConfigError, match=r"my.yaml was changed by another program"):
         bench.settings.save()
 
 

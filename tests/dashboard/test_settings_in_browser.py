@@ -109,5 +109,5 @@ def test_who_watches_sees_what_is_set_but_neither_changes_it_nor_sees_passwords(
         of(second, "signs.confirm_time").evaluate("element => element.readOnly = false")
         of(second, "signs.confirm_time").fill("0")
         of(second, "signs.confirm_time").press("Enter")
-        expect(second.locator(".said")).to_contain_text("only who drives may change settings")
+        expect(second.locator(".said")).to_contain_text("only the driver can change settings")
         assert visit.graph.config.signs.confirm_time == 0.2

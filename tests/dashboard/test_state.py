@@ -80,7 +80,7 @@ DISARMED = ControlStatus(Reason("disarmed", "no sign came"), "signs", armed=Fals
             ("trouble", "Standing", "/dev/video0 was unplugged"),
         ),
         (
-            (control(Reason("no_input", "0.5"), source="nobody"),),
+            (control(Reason("no_input", "0.5"), source="none"),),
             ("trouble", "Standing", "the node hand_sign_recognition does not report"),
         ),
         (
@@ -221,7 +221,7 @@ def test_a_stop_is_said_once_the_control_obeys_it_or_when_there_is_no_control() 
 @pytest.mark.parametrize(
     ("stopped", "source", "viewers", "holds"),
     [
-        (False, "nobody", Viewers(), None),
+        (False, "none", Viewers(), None),
         (False, "signs", Viewers(), "Signs"),
         (False, "steering", Viewers(steers="you"), "By hand: you"),
         (False, "steering", Viewers(steers="another viewer"), "By hand: another viewer"),

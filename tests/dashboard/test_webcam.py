@@ -110,10 +110,10 @@ def test_only_who_drives_gives_a_camera(graph: Graph, url: str, browser: Browser
     wait_for_words(first, ".camera .sign", "Forward")
     viewer = second.locator("[data-camera=browser]").get_attribute("data-viewer")
     second.evaluate("viewer => giveCamera(viewer)", viewer)
-    wait_for_words(second, ".camera .trouble", "only who drives may give a camera")
+    wait_for_words(second, ".camera .trouble", "only the driver can share a camera")
     second.get_by_role("button", name="Ask to drive").click()
     first.get_by_text("Hand over").click()
-    wait_for_words(first, ".camera .trouble", "somebody else drives now")
+    wait_for_words(first, ".camera .trouble", "another viewer drives now")
     second.evaluate("viewer => giveCamera(viewer)", viewer)
     wait_for_words(second, ".camera .sign", "Forward")
 

@@ -49,7 +49,7 @@ def test_what_is_shown_piece_by_piece_is_the_whole(moves: list[float], looks: li
 def test_a_leap_and_a_restart_begin_a_new_trail() -> None:
     leapt = gone(0.0, 0.1, 5.0)
     assert (leapt.points, leapt.number) == (((5.0, 0.0),), 1)
-    assert (leapt.anew().points, leapt.anew().number) == ((), 2)
+    assert (leapt.restarted().points, leapt.restarted().number) == ((), 2)
 
 
 def test_old_points_are_forgotten() -> None:

@@ -14,8 +14,8 @@ pytestmark = [pytest.mark.netns, pytest.mark.slow]
 @pytest.mark.parametrize(
     ("ahead_s", "sentence"),
     [
-        (-2.0, r"frames come [23]\.\d s after their stamp: are the clocks of the machines in step\?"),
-        (2.0, r"frames are stamped [12]\.\d s ahead of our clock: are the clocks of the machines in step\?"),
+        (-2.0, r"frames come [23]\.\d s after their stamp: are the clocks of the machines synchronised\?"),
+        (2.0, r"frames are stamped [12]\.\d s ahead of our clock: are the clocks of the machines synchronised\?"),
     ],
     ids=["behind", "ahead"],
 )

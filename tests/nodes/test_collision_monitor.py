@@ -146,7 +146,7 @@ def test_scans_that_come_late_stop_the_robot_and_it_says_so() -> None:
     bench = MonitorBench()
     bench.show("Forward", 10, ahead(7.0), age_s=2.0)
     assert bench.command == (0.0, 0.0)
-    assert bench.report()[0] == "standing: laser scans come 2.1 s after their stamp: are the clocks in step?"
+    assert bench.report()[0] == "standing: laser scans come 2.1 s after their stamp: are the clocks synchronised?"
 
 
 def test_scans_that_say_nothing_stop_the_robot(caplog: pytest.LogCaptureFixture) -> None:

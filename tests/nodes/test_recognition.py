@@ -232,7 +232,7 @@ def test_frames_that_come_late_are_told_from_none() -> None:
     bench.show(frames=20, age_s=2.0)
     assert set(bench.names) == {"NONE"}
     assert statuses[-1].status[0].message == (
-        "frames come 2.0 s after their stamp: are the clocks of the machines in step?"
+        "frames come 2.0 s after their stamp: are the clocks of the machines synchronised?"
     )
 
 
@@ -250,7 +250,7 @@ def test_what_may_be_a_recording_is_not_followed_by_itself_and_says_how() -> Non
     bench.show(frames=60, age_s=3 * 86_400.0)
     assert set(bench.names) == {"NONE"}
     assert (
-        "stamped 3 days ago, and come in step: if they are a recording's, set the param"
+        "stamped 3 days ago, and come at their own rate: if they are recorded, set the param"
         in statuses[-1].status[0].message
     )
     bench.run(1.0)
@@ -264,7 +264,7 @@ def test_frames_of_a_clock_that_is_far_ahead_are_no_frames() -> None:
     bench.show(frames=20, age_s=-2.0)
     assert set(bench.names) == {"NONE"}
     assert statuses[-1].status[0].message == (
-        "frames are stamped 2.0 s ahead of our clock: are the clocks of the machines in step?"
+        "frames are stamped 2.0 s ahead of our clock: are the clocks of the machines synchronised?"
     )
     bench.run(1.0)
     assert statuses[-1].status[0].message.startswith("no frame for 1.")

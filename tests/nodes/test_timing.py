@@ -92,7 +92,7 @@ def test_of_a_clock_that_is_behind_too_few_frames_are_used_never_too_many(
 @pytest.mark.parametrize("ahead_s", [0.4, 2.0, 3600.0])
 def test_a_clock_that_is_far_ahead_is_refused_in_words(ahead_s: float) -> None:
     ((_, why),) = ages([0.0], ahead_s)
-    assert why == f"frames are stamped {ahead_s:.1f} s ahead of our clock: are the clocks of the machines in step?"
+    assert why == f"frames are stamped {ahead_s:.1f} s ahead of our clock: are the clocks of the machines synchronised?"
 
 
 def test_an_old_frame_is_told_though_its_clock_is_ahead() -> None:

@@ -240,7 +240,7 @@ class TestRouter:
         with zenoh_graph(tmp_path) as graph:
             graph.router.kill()
             control = graph.handsteer("control", "--transport", "zenoh")
-            eventually(lambda: "no Zenoh router answers: until there is one, nobody is found" in control.text)
+            eventually(lambda: "no Zenoh router answers: until there is one, no other node is found" in control.text)
             assert f"(looked at {graph.endpoint}); start one with handsteer zenoh-router" in control.text
             time.sleep(0.5)
             assert graph.nodes() == {}

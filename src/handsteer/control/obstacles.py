@@ -70,8 +70,8 @@ class Hit:
 
     def describe(self, rule: CollisionMonitorConfig) -> str:
         """Return its position in words, such as ``obstacle 0.42 m ahead``."""
-        beside = "to the left" if self.y > 0 else "to the right"
-        where = "ahead" if self.x >= rule.front else "behind" if self.x <= -rule.back else beside
+        side = "to the left" if self.y > 0 else "to the right"
+        where = "ahead" if self.x >= rule.front else "behind" if self.x <= -rule.back else side
         return f"obstacle {max(0.0, self.gap_m):.2f} m {where}"
 
 

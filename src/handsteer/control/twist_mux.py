@@ -8,7 +8,7 @@ from handsteer.control.explain import Reason
 from handsteer.control.sign_control import SignControl
 from handsteer.types import NONE, ZERO, Velocity, action_of
 
-Source = Literal["nobody", "signs", "steering"]
+Source = Literal["none", "signs", "steering"]
 
 
 class TwistMux:
@@ -28,7 +28,7 @@ class TwistMux:
         self._since_steering_s = 0.0
         self._last_sign: str | None = None
         self._velocity = ZERO
-        self.source: Source = "nobody"
+        self.source: Source = "none"
 
     @property
     def velocity(self) -> Velocity:
@@ -55,7 +55,7 @@ class TwistMux:
         velocity = self._signs.step(sign, dt_s)
         if sign is not None:
             self._last_sign = sign
-        self.source = "nobody" if self._signs.silent else "signs"
+        self.source = "none" if self._signs.silent else "signs"
         return self._take(velocity)
 
     def reconfigure(self, config: ControlConfig) -> Velocity | None:
@@ -67,7 +67,7 @@ class TwistMux:
         self._config = config
         self._signs.reconfigure(config)
         within = self._velocity.clamped(config.max_linear, config.max_angular)
-        return self._take(within if self.source != "nobody" and within != self._velocity else None)
+        return self._take(within if self.source != "none" and within != self._velocity else None)
 
     def hold_back(self, velocity: Velocity) -> None:
         """Continue from ``velocity``, a slower one that was commanded instead of the last."""
@@ -76,9 +76,9 @@ class TwistMux:
 
     def halt(self) -> Velocity | None:
         """Stop the active input; return one zero, or None if there is none."""
-        was_driving = self.source != "nobody"
+        was_driving = self.source != "none"
         self._signs.halt()
-        self.source = "nobody"
+        self.source = "none"
         return self._take(ZERO if was_driving else None)
 
     @property
@@ -86,7 +86,7 @@ class TwistMux:
         """Why this velocity is commanded."""
         if self.source == "steering":
             return Reason("steered_at_zero" if self._velocity.is_zero else "steered")
-        if self.source == "nobody":
+        if self.source == "none":
             return Reason("no_input", f"{self._config.sign_timeout:g}")
         sign = self._last_sign or NONE
         if not self._velocity.is_zero:

@@ -58,7 +58,7 @@ class FrameSocket:
         if self._graph is None:
             await socket.close(_NO_CAMERA_HERE, "the camera is not where the page is")
         elif not (is_page_of(viewer, socket.scope) and self._drives(viewer)):
-            await socket.close(_NOT_THE_DRIVER, "only who drives may give a camera: ask to drive first")
+            await socket.close(_NOT_THE_DRIVER, "only the driver can share a camera: ask to drive first")
         elif not self._in_use.acquire(blocking=False):
             await socket.close(_BUSY, "another browser gives its camera already")
         else:
@@ -77,7 +77,7 @@ class FrameSocket:
                 graph.offer_frame(await socket.receive_bytes())
                 await asyncio.sleep(max(0.0, began_s + 1 / FRAMES_PER_S - loop.time()))
                 await socket.send_text(NEXT)
-            await socket.close(_NOT_THE_DRIVER, "somebody else drives now")
+            await socket.close(_NOT_THE_DRIVER, "another viewer drives now")
         except FrameError as error:
             await socket.close(_NOT_A_FRAME, str(error))
         except (WebSocketDisconnect, KeyError):  # it has left, or sent text instead of a frame

@@ -148,7 +148,7 @@ class DashboardNode(Node):
             TransportError: The topic is not valid, another viewer drives, or the robot is stopped.
         """
         if not self.lease.take(viewer, self.clock.now()):
-            raise TransportError("only who drives may choose the topic: ask to drive first")
+            raise TransportError("only the driver can choose the topic: ask to drive first")
         if self.state().stopped:
             raise TransportError("the robot is stopped: reset it, then choose the topic")
         with self._lock:
@@ -226,14 +226,14 @@ class DashboardNode(Node):
     def _notice_restart(self, status: RobotStatus) -> None:
         before_m, self._path_length_m = self._path_length_m, status.path_length_m or 0.0
         if self._path_length_m < before_m:
-            self.world = replace(self.world, trail=self.world.trail.anew())
+            self.world = replace(self.world, trail=self.world.trail.restarted())
 
     def _on_command(self, received: Received[Twist | TwistStamped]) -> None:
         twist = twist_in(received.message)
         self._note_command(Velocity(twist.linear.x, twist.angular.z))
 
     def _take_command(self, status: ControlStatus) -> None:
-        if self._believes_control and status.source != "nobody":
+        if self._believes_control and status.source != "none":
             self._note_command(Velocity(status.linear_mps, status.angular_radps))
 
     def _note_command(self, command: Velocity) -> None:

@@ -100,7 +100,7 @@ class PageProcess:
         with contextlib.suppress(subprocess.TimeoutExpired):
             self.process.wait(_EXIT_TIMEOUT_S)
         code = self.process.poll()
-        return DashboardError(f"the page's process has ended (exit code {code}), so the robot was told to stand")
+        return DashboardError(f"the page's process has ended (exit code {code}), so the robot was commanded to stop")
 
     def _watch(self) -> None:
         self._pipe.ended.wait()
@@ -125,7 +125,7 @@ class _Records:
 
 
 def _serve(pipe: Pipe) -> None:
-    """In the page's process: serve the page of the graph at the other end of ``pipe`` until it ends, or says so.
+    """In the page's process: serve the page of the graph at the other end of ``pipe`` until that ends.
 
     Raises:
         HandsteerError: The page cannot be served.

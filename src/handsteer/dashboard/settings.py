@@ -239,7 +239,7 @@ class SettingsFile:
         """
         old = self._content()
         if old != self._known:
-            happened = "was changed by somebody else" if self._known is not None else "exists, and was not read"
+            happened = "was changed by another program" if self._known is not None else "exists, and was not read"
             raise ConfigError(f"{self.path.name} {happened}: load it first, which brings back what it says")
         new = yaml.safe_dump(_in_order_of(old, values), sort_keys=False, allow_unicode=True) if values else ""
         done = f"saved to {self.path.name}"

@@ -61,7 +61,7 @@ class SettingsPanel:
                 with box("") as self._cards[section], card(section, "panel section"):
                     text("meaning", (section_model(section).__doc__ or "").partition("\n")[0])
                     self._rows += [_Row(field, settings, self._change) for field in fields]
-            self._nothing = text("nothing hidden", "No parameter is called so, or says so.")
+            self._nothing = text("nothing hidden", "No parameter has this in its name or description.")
 
     def update(self, *, to_driver: bool, editable: bool) -> None:
         """Show the values; they are ``editable`` if this viewer drives (``to_driver``) or the lease is free."""
@@ -104,7 +104,7 @@ class SettingsPanel:
         """Make a change if this viewer may, and show ``done`` or the error message; return the latter, if any."""
         error = None
         if not self._drives():
-            error = "only who drives may change settings: ask to drive first"
+            error = "only the driver can change settings: ask to drive first"
         else:
             try:
                 change()

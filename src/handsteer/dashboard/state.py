@@ -123,7 +123,7 @@ class PageState:
         rule: Configures the signs' actions, as last reported by the control; None if unknown.
         no_picture: Why there are no pictures; empty if there are.
         camera: Short name of the camera.
-        driver: The active input: ``signs``, ``steering`` or ``nobody``.
+        driver: The active input: ``signs``, ``steering`` or ``none``.
         stopped: Whether the robot is stopped until reset.
         commanded: The commanded velocity, zero without a command.
         measured: The velocity from odometry.

@@ -22,7 +22,7 @@ _HINTS = {
     "driver": "Hold the pad, or W A S D anywhere. Sliders stay, until you leave this page.",
     "watcher": "You watch: request control, at the top.",
 }
-_LATE = "What you asked for came too late, and was left out: is the network slow? Else load the page anew."
+_LATE = "Your command came too late and was ignored: is the network slow? If not, reload the page."
 
 
 class SteerPanel:
@@ -276,7 +276,7 @@ class _MuxRow:
     """The inputs in a row, with the active one highlighted."""
 
     def __init__(self) -> None:
-        with box("mux").props('role="group" aria-label="Who drives; the first goes before the others"'):
+        with box("mux").props('role="group" aria-label="The active input; the first one overrides the others"'):
             text("name", "Who drives")
             self._chips = [text("source chip", name) for name in ("Stop", "By hand", "Signs")]
 

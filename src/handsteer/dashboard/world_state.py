@@ -55,10 +55,10 @@ class Trail:
         if distance_m < STEP_M:
             return self
         if LEAP_M < distance_m < math.inf:
-            return self.anew().to(pose)
+            return self.restarted().to(pose)
         return replace(self, points=(*self.points[-TRAIL_POINTS + 1 :], point), count=self.count + 1)
 
-    def anew(self) -> "Trail":
+    def restarted(self) -> "Trail":
         """Return an empty trail with another number."""
         return Trail(number=self.number + 1)
 

@@ -102,7 +102,7 @@ class CollisionMonitor:
             return f"no laser scan has come{since}, so what is in the way is not known"
         if self._is_broken:
             return "the laser scans that come have no valid range, so what is in the way is not known"
-        return f"laser scans come {self._limiter.silence_s(now):.1f} s after their stamp: are the clocks in step?"
+        return f"laser scans come {self._limiter.silence_s(now):.1f} s after their stamp: are the clocks synchronised?"
 
     @property
     def obstacle_m(self) -> float | None:

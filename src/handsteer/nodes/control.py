@@ -184,7 +184,7 @@ class HandSignControlNode(Node):
         self._log_arming()
         if self._selection:
             self._selection.beat()
-        if self._mux.source == "nobody":
+        if self._mux.source == "none":
             self._calm_down()
 
     def _calm_down(self) -> None:
@@ -282,6 +282,6 @@ class HandSignControlNode(Node):
         if source == "steering" and safety.steering_waits:
             return Reason("steering_disarmed", robot=robot)
         # Without any input, that is the reason after a reset, which needs no explanation.
-        if source == "steering" or why is None or (source == "nobody" and not why):
+        if source == "steering" or why is None or (source == "none" and not why):
             return self._monitor.explain(self._mux.reason)
         return Reason("disarmed", why, robot)

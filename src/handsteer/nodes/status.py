@@ -157,7 +157,7 @@ class ControlStatus(Status):
     node: ClassVar[str] = "hand_sign_control"
 
     reason: Reason | None = None
-    source: Source = "nobody"
+    source: Source = "none"
     stopped: bool = False
     armed: bool = True
     linear_mps: float = 0.0

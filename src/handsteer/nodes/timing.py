@@ -96,13 +96,14 @@ class FrameAge:
             return f"{_clock_change(self._watch.set_by_s)}: frames are timed again in a moment"
         by_stamp_s = corrected_s
         if by_stamp_s < -self.limit_s:
-            return f"frames are stamped {-by_stamp_s:.1f} s ahead of our clock: are the clocks of the machines in step?"
+            ahead = f"{-by_stamp_s:.1f} s ahead of our clock"
+            return f"frames are stamped {ahead}: are the clocks of the machines synchronised?"
         self.ahead_s = max(self.ahead_s, -by_stamp_s)
         self.age_s = by_stamp_s + self.ahead_s
         if self.age_s <= self.limit_s:
             return None
         ahead = f" by a clock that is {self.ahead_s:.1f} s ahead of ours" if self.ahead_s >= 0.05 else ""
-        return f"frames come {self.age_s:.1f} s after their stamp{ahead}: are the clocks of the machines in step?"
+        return f"frames come {self.age_s:.1f} s after their stamp{ahead}: are the clocks of the machines synchronised?"
 
 
 def _clock_change(set_by_s: float) -> str:
@@ -114,7 +115,7 @@ class Recording:
     """Decides whether frames come from a recording; these count as captured on arrival.
 
     The stamp alone is not enough: frames over a slow camera link are old too, and old gestures must not move a robot.
-    So ``auto`` accepts only what a player of recordings publishes. Frames with old stamps that advance in step with
+    So ``auto`` accepts only what a player of recordings publishes. Frames with old stamps that advance at the rate of
     time are reported as a possible recording.
 
     Args:
@@ -164,9 +165,9 @@ class Recording:
         if age_s <= RECORDED_S or now_s - since_s < RESYNC_S:
             return None
         hint = (
-            f"frames are stamped {duration_in_words(age_s)} ago, and come in step: if they are a recording's, set the "
-            "parameter recorded to always, or play it with --clock and use_sim_time; else the clocks of machines are "
-            "not in step"
+            f"frames are stamped {duration_in_words(age_s)} ago, and come at their own rate: if they are recorded, set "
+            "the parameter recorded to always, or play them with --clock and use_sim_time; otherwise the clocks of the "
+            "machines are not synchronised"
         )
         self._log_once(logging.WARNING, hint)
         return hint

@@ -135,13 +135,13 @@ def drawn_hands() -> Iterator[tuple[str, Array]]:
             landmarker.reset()
             hands = landmarker.detect(render(skeleton, placement, camera, look, backgrounds[number % 4 // 2]))
             pointing = placement.apply(skeleton.joints[0])
-            if hands and (shape == FIST or _is_aslant(pointing, shape)):
+            if hands and (shape == FIST or _is_tilted(pointing, shape)):
                 seen.append(_coordinates(_raised(hands)))
         if len(seen) >= LEAST_HANDS:
             yield shape, np.array(seen)
 
 
-def _is_aslant(joints: Array, shape: str) -> bool:
+def _is_tilted(joints: Array, shape: str) -> bool:
     """Return whether the pointing part of (21, 3) joints of a shape is seen from the side, not end on."""
     start, end = {THUMB: (2, 4), POINTING: (5, 8), OPEN: (9, 12)}[shape]
     pointing = joints[end] - joints[start]

@@ -55,20 +55,20 @@ def name_shapes(angles: Array, joints: Array, elevations: Array, facing: Array) 
     reach = thumb_reach(joints)
     straight, open_enough = _straight(angles)
     closed, closed_enough = _closed(angles)
-    apart, aslant = thumb_gap(joints), np.degrees(thumb_angle(joints))
+    apart, tilt = thumb_gap(joints), np.degrees(thumb_angle(joints))
     curled, curled_enough = _closed(angles, ease=10.0)
     elevation = np.degrees(elevations)
     sure = {
         OPEN: straight.all(axis=1) & (reach >= 0.92) & (facing >= 0.4),
         INDEX: straight[:, 0] & curled[:, 1:].all(axis=1) & (reach <= 1.0) & (elevation[:, 0] <= 55),
-        THUMB: closed.all(axis=1) & (reach >= 1.05) & (apart >= 0.5) & (aslant >= 38) & (elevation[:, 1] <= 55),
-        FIST: closed.all(axis=1) & ((reach <= 0.82) | (aslant <= 28) & (reach <= 1.1)),
+        THUMB: closed.all(axis=1) & (reach >= 1.05) & (apart >= 0.5) & (tilt >= 38) & (elevation[:, 1] <= 55),
+        FIST: closed.all(axis=1) & ((reach <= 0.82) | (tilt <= 28) & (reach <= 1.1)),
     }
     possible = {
         OPEN: open_enough.all(axis=1) & (reach >= 0.82),
         INDEX: open_enough[:, 0] & curled_enough[:, 1:].all(axis=1) & (reach <= 1.2) & (elevation[:, 0] <= 68),
-        THUMB: closed_enough.all(axis=1) & (reach >= 0.9) & (apart >= 0.35) & (aslant >= 28) & (elevation[:, 1] <= 68),
-        FIST: closed_enough.all(axis=1) & ((reach <= 0.98) | (aslant <= 36) & (reach <= 1.25)),
+        THUMB: closed_enough.all(axis=1) & (reach >= 0.9) & (apart >= 0.35) & (tilt >= 28) & (elevation[:, 1] <= 68),
+        FIST: closed_enough.all(axis=1) & ((reach <= 0.98) | (tilt <= 36) & (reach <= 1.25)),
     }
     named = np.full(len(angles), _UNSURE)
     for shape, holds in sure.items():

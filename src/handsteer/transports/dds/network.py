@@ -38,8 +38,8 @@ _PLACES = {
     "LOCALHOST": "this machine",
     "PEERS": "this machine and ROS_STATIC_PEERS",
     "SUBNET": "the subnet",
-    "OFF": "nobody",
-    "SYSTEM_DEFAULT": "as Cyclone DDS does by itself",
+    "OFF": "no other node",
+    "SYSTEM_DEFAULT": "as configured in Cyclone DDS",
     "CYCLONEDDS_URI": "as CYCLONEDDS_URI says",
 }
 

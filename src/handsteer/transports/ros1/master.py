@@ -59,7 +59,7 @@ class Master:
             return getattr(self._proxy, method)(caller)
         except (OSError, OverflowError, http.client.HTTPException, xmlrpc.client.Error) as error:
             reason = getattr(error, "strerror", None) or error
-            refused = isinstance(error, ConnectionRefusedError) and _nobody_listens(self._uri)
+            refused = isinstance(error, ConnectionRefusedError) and _refuses_connections(self._uri)
             kind = MasterGone if refused else TransportError
             raise kind(
                 f"no ROS master answers at {self._uri} ({reason}): start roscore, or set ROS_MASTER_URI"
@@ -107,7 +107,7 @@ def _address(uri: str) -> tuple[str, int]:
     return parts.hostname or "", parts.port or 80
 
 
-def _nobody_listens(uri: str) -> bool:
+def _refuses_connections(uri: str) -> bool:
     """Return whether all addresses of the master refuse: localhost has two, and one may only be busy."""
     try:
         found = socket.getaddrinfo(*_address(uri), type=socket.SOCK_STREAM)

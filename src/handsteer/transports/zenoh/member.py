@@ -111,7 +111,7 @@ class Member:
         self._had_router = self._has_router()
         if self._had_router:
             return
-        waits = "it waits for one" if attempts == 0 else "until there is one, nobody is found"
+        waits = "it waits for one" if attempts == 0 else "until there is one, no other node is found"
         log.warning("%s", self._without_router(f"no Zenoh router answers: {waits}"))
         for tried in itertools.count(1):
             if tried == attempts:
