@@ -8,7 +8,8 @@ CASES ?= 100000
 # The matrices are small and tests run in parallel, so NumPy's threads would only wait for each other.
 export OPENBLAS_NUM_THREADS := 1
 
-# Many tests wait for processes: one worker more than processors keeps these busy.
+# Many of the fast tests wait for processes: one worker more than processors keeps these busy. Slow ones are left a
+# processor each, as they drive in real time.
 WORKERS ?= $(shell expr $$(getconf _NPROCESSORS_ONLN) + 1)
 PLAIN := not (ros1 or ros2 or netns or exhaustive)
 
@@ -45,10 +46,10 @@ check: lint models
 	@HANDSTEER_FUZZ_CASES=200 $(BIN)/pytest -n $(WORKERS) --dist loadgroup -m "not (slow or browser)" $(ARGS)
 
 test: lint models
-	@HANDSTEER_STEPS=20000 $(BIN)/pytest -n $(WORKERS) --dist loadfile -m "$(PLAIN)" --durations=10 $(ARGS)
+	@HANDSTEER_STEPS=20000 $(BIN)/pytest -n auto --dist loadfile -m "$(PLAIN)" --durations=10 $(ARGS)
 
 test-all: lint models
-	@HANDSTEER_STEPS=20000 $(BIN)/pytest -n $(WORKERS) --dist loadfile --durations=30 $(ARGS)
+	@HANDSTEER_STEPS=20000 $(BIN)/pytest -n auto --dist loadfile --durations=30 $(ARGS)
 
 lint: $(BIN)/.dev
 	@$(BIN)/ruff format --check .
@@ -64,13 +65,13 @@ ros1: $(BIN)/.dev
 	@scripts/setup-ros1
 
 test-ros1: $(BIN)/.dev models
-	@$(BIN)/pytest -n $(WORKERS) --dist loadfile -m ros1 $(ARGS)
+	@$(BIN)/pytest -n auto --dist loadfile -m ros1 $(ARGS)
 
 ros2: $(BIN)/.dev
 	@scripts/setup-ros2
 
 test-ros2: $(BIN)/.dev models
-	@$(BIN)/pytest -n $(WORKERS) --dist loadfile -m ros2 $(ARGS)
+	@$(BIN)/pytest -n auto --dist loadfile -m ros2 $(ARGS)
 
 models: | $(BIN)/.run
 	@$(BIN)/handsteer models > /dev/null

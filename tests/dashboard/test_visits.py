@@ -2,6 +2,7 @@
 
 import gc
 import itertools
+import logging
 import urllib.parse
 from collections import Counter
 
@@ -34,10 +35,10 @@ def others() -> set[str]:
 
 
 def objects() -> Counter[str]:
-    """Return how many there are of each kind, but for what is bounded by its own."""
+    """Return how many there are of each kind, but for what is bounded by its own, or kept by pytest."""
     urllib.parse.clear_cache()  # type: ignore[attr-defined]
     gc.collect()
-    kinds = [type(each) for each in gc.get_objects() if not isinstance(each, Sample)]
+    kinds = [type(each) for each in gc.get_objects() if not isinstance(each, (Sample, logging.LogRecord))]
     return Counter(f"{kind.__module__}.{kind.__qualname__}" for kind in kinds)
 
 

@@ -255,6 +255,7 @@ class TestRouter:
             eventually(lambda: "no Zenoh router answers: it waits for one" in control.text)
             graph.start_router()
             eventually(lambda: "/gesture/hand_sign" in graph.nodes().get(f"/{NODE}", {}).get("MS", {}))
+            eventually(lambda: "is ready" in control.text)
             control.signal(signal.SIGTERM)
             assert control.code() == 0
 

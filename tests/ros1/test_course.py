@@ -58,7 +58,7 @@ def test_the_chapters_launch_file_drives_the_robot(course: LaunchGraph, tmp_path
     drives(record)
     assert course.talkers(CMD_VEL) == ["/sign_to_controller"]
     # roslaunch itself says what it sets; the nodes have nothing to say about it.
-    assert "does nothing" not in launch.text
+    assert "ignoring unknown" not in launch.text
 
 
 def test_the_chapters_args_count(course: LaunchGraph, tmp_path: Path) -> None:

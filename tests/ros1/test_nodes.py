@@ -151,9 +151,9 @@ def test_a_parameter_that_is_not_known_is_said_and_does_nothing(ros1: Ros1Graph)
     driver.show("Forward")
     driver.expect((0.02, 0.0))
     text = driver.process.text
-    assert text.count(f"{driver.namespace}/{NODE}/linear_stepp does nothing") == 1
+    assert text.count(f"ignoring unknown ROS parameter {driver.namespace}/{NODE}/linear_stepp") == 1
     assert text.count("did you mean linear_step?") == 1
-    assert text.count(f"{driver.namespace}/{NODE}/robot_description does nothing") == 1
+    assert text.count(f"ignoring unknown ROS parameter {driver.namespace}/{NODE}/robot_description") == 1
 
 
 def test_without_a_master_it_ends_at_once(ros1: Ros1Graph) -> None:
