@@ -70,7 +70,7 @@ def driving_chain(graph: PeerGraph) -> Running:
     fields = ["twist.twist.linear.x", "pose.pose.position.x"]
     graph.peer.ask("record", topic=ODOM, type="Odometry", fields=fields)
     start = {
-        "robot": lambda: graph.node("robot", name="/robot"),
+        "robot": lambda: graph.node("robot", "--world", "empty", name="/robot"),
         "control": lambda: graph.node("control", name=f"/{NODE}", ros=("-p", "max_linear:=0.3")),
         "recognition": lambda: graph.node("recognition", name="/hand_sign_recognition"),
         "camera": lambda: graph.node("camera", *FORWARD, name="/my_camera", ros=SCRIPT),

@@ -6,7 +6,7 @@ import os
 import random
 import sys
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, Self
 
@@ -55,15 +55,12 @@ class DdsGraph:
     Args:
         home: Folder for logs.
         peer: Command that starts the plain program; the domain is added.
-        env: Further variables of the environment.
     """
 
     transport = "dds"
     python = sys.executable
 
-    def __init__(
-        self, home: Path, peer: Sequence[str] = (sys.executable, str(PEER)), env: Mapping[str, str] | None = None
-    ) -> None:
+    def __init__(self, home: Path, peer: Sequence[str] = (sys.executable, str(PEER))) -> None:
         self._home = home
         self._peer_command = list(peer)
         self._processes: list[Process] = []
@@ -72,7 +69,6 @@ class DdsGraph:
         for inherited in ROS_VARIABLES:
             self.env.pop(inherited, None)
         self.env["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"  # ours by default, but not ROS 2's
-        self.env.update(env or {})
         self.peer = self.start_peer()
 
     def stop(self) -> None:

@@ -233,7 +233,7 @@ class TestChain(ChainContract):
             fields = ["twist.twist.linear.x", "pose.pose.position.x"]
             peer.ask("record", topic=ODOM, package="nav_msgs", type="Odometry", fields=fields)
             start = {
-                "robot": lambda: graph.node("robot", name="/robot"),
+                "robot": lambda: graph.node("robot", "--world", "empty", name="/robot"),
                 "control": lambda: graph.node("control", "_max_linear:=0.3", name=f"/{NODE}"),
                 "recognition": lambda: graph.node("recognition", name="/hand_sign_recognition"),
                 "camera": lambda: graph.node("camera", *FORWARD, SCRIPT, name="/my_camera"),

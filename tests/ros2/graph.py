@@ -2,7 +2,7 @@
 
 import contextlib
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
 
 from tests.dds.graph import DdsGraph
@@ -18,13 +18,12 @@ class Ros2Graph(DdsGraph):
     Args:
         home: Folder for logs.
         transport: What joins our nodes; ``ros2`` makes them nodes of that same ROS 2.
-        env: Further variables of the environment.
     """
 
-    def __init__(self, home: Path, transport: str = "dds", env: Mapping[str, str] | None = None) -> None:
+    def __init__(self, home: Path, transport: str = "dds") -> None:
         self.transport = transport
         self.python = str(PYTHON) if transport == "ros2" else sys.executable
-        super().__init__(home, (str(PYTHON), str(PEER)), env)
+        super().__init__(home, (str(PYTHON), str(PEER)))
 
     def publishes(self, node: str, topic: str) -> bool:
         """Return whether ROS 2 knows that the node of this full name publishes ``topic``."""
@@ -32,9 +31,9 @@ class Ros2Graph(DdsGraph):
 
 
 @contextlib.contextmanager
-def ros2_graph(home: Path, transport: str = "dds", env: Mapping[str, str] | None = None) -> Iterator[Ros2Graph]:
+def ros2_graph(home: Path, transport: str = "dds") -> Iterator[Ros2Graph]:
     """A domain with a ROS 2 node in it, for as long as the block lasts."""
-    graph = Ros2Graph(home, transport, env)
+    graph = Ros2Graph(home, transport)
     try:
         yield graph
     finally:

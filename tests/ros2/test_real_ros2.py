@@ -34,10 +34,6 @@ pytestmark = [
 
 TRANSPORTS = ("ros2", "dds")
 
-WITHOUT_SHARED_MEMORY = {"FASTDDS_BUILTIN_TRANSPORTS": "UDPv4"}
-"""Where nodes are killed: Fast DDS's shared memory may deliver nothing more to other nodes then, nor to those that are
-started afterwards (eProsima/Fast-DDS#5469); docs/ros2.md says so too."""
-
 
 @pytest.fixture(scope="module", params=TRANSPORTS)
 def ros2_domain(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Ros2Graph]:
@@ -79,7 +75,7 @@ class TestChain(ChainContract):
     @pytest.fixture(scope="class", params=TRANSPORTS)
     @classmethod
     def chain(cls, request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Running]:
-        with ros2_graph(tmp_path_factory.mktemp("chain"), request.param, WITHOUT_SHARED_MEMORY) as graph:
+        with ros2_graph(tmp_path_factory.mktemp("chain"), request.param) as graph:
             yield driving_chain(graph)
 
 
