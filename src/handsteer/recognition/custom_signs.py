@@ -114,7 +114,7 @@ class CustomModel:
 
 
 class CustomClassifier:
-    """A :class:`~handsteer.recognition.classifier.Classifier` that adds taught signs to another classifier's.
+    """A :class:`~handsteer.recognition.hand.Classifier` that adds taught signs to another classifier's.
 
     Confident results of the other are kept, so that no taught sign changes how the shipped ones drive.
 

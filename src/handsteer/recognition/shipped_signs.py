@@ -147,7 +147,7 @@ def _built(arrays: Arrays) -> SignModel:
 
 
 class ShippedClassifier:
-    """A :class:`~handsteer.recognition.classifier.Classifier` for the shapes of a model.
+    """A :class:`~handsteer.recognition.hand.Classifier` for the shapes of a model.
 
     The network gives the likelihoods that the hand is open, points with its index finger, extends its thumb or is a
     fist; the direction in the image determines the sign. A sign's likelihood is the product of those of its shape, of

@@ -132,7 +132,7 @@ class Hands:
     Attributes:
         pixels: (n, 21, 2) landmarks in pixels.
         world: (n, 21, 3) landmarks in metres, with the image's axes.
-        shapes: (n,) indices into :data:`~handsteer.training.synthetic.truth.SHAPES`.
+        shapes: (n,) indices into :data:`~handsteer.training.synthetic.hands.SHAPES`.
     """
 
     pixels: Array

@@ -48,7 +48,7 @@ class Distribution:
 
     Attributes:
         kind: What the hands show, such as ``fist``.
-        shape: Index into :data:`~handsteer.training.synthetic.truth.SHAPES`.
+        shape: Index into :data:`~handsteer.training.synthetic.hands.SHAPES`.
         hands: Number of hands it was fitted to.
         mean: (105,) palm lengths: 21 points in the image (x, y), then 21 in space (x, y, z).
         directions: (k, 105) principal directions, with lengths of one standard deviation.
