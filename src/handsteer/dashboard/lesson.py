@@ -257,5 +257,5 @@ def outcome(seen: Recognition | None, label: str, action_of: Callable[[str], Act
     if seen.hand is None:
         return "No hand", "no hand is in view"
     if seen.seen == NONE:
-        return "No sign", f"show {label}" if label != NONE else "as it shall be"
+        return "No sign", f"show {label}" if label != NONE else "which is correct"
     return f"{seen.seen}, {seen.confidence:.0%}", f"would mean: {EFFECTS[action_of(seen.seen)]}"

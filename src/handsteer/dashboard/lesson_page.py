@@ -23,7 +23,7 @@ _ELSEWHERE: Final = (
     "Elsewhere use handsteer signs collect and handsteer signs train, then set signs.model of the recognition."
 )
 _STANDS: Final = "The robot stands until the lesson is over: keep the sign, or discard it, then press Reset."
-_LOST: Final = "Somebody else drives now: the lesson is over, and nothing of it was kept."
+_LOST: Final = "Another viewer drives now: the lesson has ended, and nothing was saved."
 _STEPS: Final = {"name": "Name", "collect": "Collect", "train": "Train", "try": "Try", "kept": "Keep"}
 
 

@@ -55,11 +55,11 @@ class ViewerLesson:
         """Stop the robot, and begin a lesson if the viewer drives."""
         node = self._page.node
         if node is None or not self._page.drives():
-            self.message = "Somebody else drives: ask to drive first, then teach."
+            self.message = "Another viewer drives: ask to drive first, then teach."
             return
         node.halt()
         await self._run(self.lessons.begin, self._viewer, name, person)
-        if self._is_over:  # the page was left meanwhile
+        if self._is_over:  # the viewer has left the page
             self.lessons.end(self._viewer)
 
     async def save(self, action: str) -> None:
@@ -119,7 +119,7 @@ class NamePanel:
                 if label != NONE:
                     self._pick(label, f"{label} ({count} takes)")
             if takes:
-                self._pick(NONE, "No sign: what shall not count")
+                self._pick(NONE, "No sign: hands that must not count")
 
     def _pick(self, label: str, words: str) -> None:
         button(words, lambda: self._name.set_value(label))
@@ -261,7 +261,7 @@ class LearntPanel:
     def fill(self, learnt: LearntSign) -> None:
         """Show the saved sign."""
         if learnt.action is None:
-            self._words.set_text("What shall not count is learnt")
+            self._words.set_text("The hands that must not count are learnt")
         else:
             self._words.set_text(f"{learnt.label} is learnt, and means: {EFFECTS[learnt.action]}")
         self._yaml.set_text(learnt.yaml)
