@@ -106,3 +106,10 @@ def test_a_picture_that_is_the_same_as_the_last_is_no_frame_and_the_camera_is_sa
     assert [image.data[0] for image in images] == [7, 8, 9, 10]
     assert "faulty camera is back" in caplog.text
     assert node.frames == 4
+
+
+def test_a_frozen_camera_that_delivers_nothing_more_is_said_to_be_silent() -> None:
+    bench, _, _ = start(ONE, *[TWO] * 20, *[None] * 30)
+    diagnostics = bench.record(DIAGNOSTICS)
+    bench.run(4.0)
+    assert diagnostics[-1].status[0].message == "faulty camera: no frame for 2 s"

@@ -20,7 +20,7 @@ from handsteer.messages import (
     Topic,
 )
 from handsteer.nodes.base import Node
-from handsteer.nodes.status import OK, CameraStatus
+from handsteer.nodes.status import CameraStatus
 from handsteer.nodes.supervision import StopKeeper
 from handsteer.timeouts import STALE_S
 from handsteer.transports.base import Transport
@@ -69,7 +69,6 @@ class CameraNode(Node):
         self._fits = True
         self._retry_s = _FIRST_RETRY_S
         self._status = CameraStatus(camera.name)
-        self._last_frame_s = clock.now()
         self._freshness = Freshness(STALE_S)
         self._last_read_s = clock.now()
         self._is_frozen = False
@@ -110,7 +109,6 @@ class CameraNode(Node):
         self._retry_s = _FIRST_RETRY_S
         self._is_frozen = False
         self.frames += 1
-        self._last_frame_s = self.clock.now()
         self._status = CameraStatus(self._camera.name, "delivers")
         header = Header(stamp=self.clock.stamp(frame.captured_s), frame_id=self._frame_id)
         self._image.publish(image_message(frame.image, header), frame.captured_s)
@@ -152,7 +150,7 @@ class CameraNode(Node):
 
     def _report(self) -> CameraStatus:
         status = self._status
-        silence_s = self.clock.now() - self._last_frame_s
-        if status.level == OK and silence_s > _SILENT_AFTER_S:
+        silence_s = self.clock.now() - self._last_read_s
+        if status.state != "lost" and silence_s > _SILENT_AFTER_S:
             status = CameraStatus(self._camera.name, "silent", round(silence_s, 1))
         return replace(status, frames=self.frames)
