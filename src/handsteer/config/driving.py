@@ -63,8 +63,12 @@ def preset(name: object) -> dict[str, Any]:
 
 
 class ControlConfig(Section):
-    """Conversion of signs to velocities."""
+    """Conversion of signs, or of the hand as a joystick, to velocities."""
 
+    mode: Literal["signs", "joystick"] = live(
+        "signs",
+        description="What the hand is: signs, as in the tutorial, or a joystick (/gesture/joy), with a gamepad on /joy",
+    )
     ramp: Literal["per_message", "per_second"] = live(
         "per_message",
         description="per_message adds a step per message, as in the tutorial; per_second is independent of frame rate",
@@ -122,6 +126,11 @@ class ControlConfig(Section):
         description="Whether the robot moves only after neutral (Stop, or no hand) at start-up and after each fault; "
         "auto is on unless the robot is simulated in the same process",
     )
+    engage: Literal["auto", "on", "off"] = Field(
+        "auto",
+        description="Whether the hand drives only after an open palm was held for 1 s, until 5 s without a sign, a "
+        "Stop or a fault; auto is on unless the robot is simulated in the same process",
+    )
     cmd_vel_type: CmdVelType = Field(
         "auto",
         description="Type of commands to send: geometry_msgs/Twist or TwistStamped; auto follows robot.cmd_vel_type, "
@@ -134,11 +143,11 @@ class ControlConfig(Section):
         description="Namespaces of robots that one hand drives in turn, such as [r1, r2]; empty for a single robot",
     )
 
-    @field_validator("arming", mode="before")
+    @field_validator("arming", "engage", mode="before")
     @classmethod
-    def _from_yaml(cls, arming: object) -> object:
+    def _from_yaml(cls, value: object) -> object:
         # YAML, and so ROS, converts on and off to true and false.
-        return {True: "on", False: "off"}[arming] if isinstance(arming, bool) else arming
+        return {True: "on", False: "off"}[value] if isinstance(value, bool) else value
 
     @field_validator("robots")
     @classmethod
