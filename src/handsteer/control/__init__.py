@@ -78,10 +78,10 @@ class Control:
     def reconfigure(self, config: ControlConfig) -> Velocity | None:
         """Change limits, steps and times; return the velocity to command now if the last one exceeds the new limits.
 
-        Another mode stops the robot, and the hand must show neutral first.
+        Another mode or rule stops the robot, and the hand must show neutral first.
         """
-        if config.mode != self._config.mode:
-            self.safety.disarm("the mode has changed")
+        if (config.mode, config.rule) != (self._config.mode, self._config.rule):
+            self.safety.disarm("its rule has changed")
             self.mux.halt()
         self._config = config
         self.safety.reconfigure(config)

@@ -1,4 +1,4 @@
-"""Converts signs to velocities by the tutorial's rule, with limits and a watchdog."""
+"""Converts signs to velocities, by the tutorial's rule or by that of a cruise control, with limits and a watchdog."""
 
 import math
 
@@ -106,6 +106,73 @@ class SignControl:
         if config.ramp == "per_message":
             return config.linear_step, config.angular_step
         return config.linear_acceleration * interval_s, config.angular_acceleration * interval_s
+
+
+class CruiseControl(SignControl):
+    """Keeps a set speed, which signs change in steps, and turns while a turn is shown.
+
+    ``Forward`` raises the set speed by a step when it begins, and by another one each ``cruise_step_time`` while it is
+    held; ``Backward`` lowers it, and stops at zero until it is shown anew. The velocity follows the set speed whatever
+    is shown, so the robot also speeds up in a curve. ``Turn Left`` and ``Turn Right`` turn while they are shown;
+    ``Forward`` and ``Backward`` keep the turn, ``Go`` ends it. ``Stop`` and ``NONE`` set everything to zero at once.
+    """
+
+    def __init__(self, config: ControlConfig) -> None:
+        super().__init__(config)
+        self._set_mps = 0.0
+        self._shown: Action = "stop"
+        self._shown_s = 0.0
+
+    def reconfigure(self, config: ControlConfig) -> None:
+        """Change the configuration; velocity and set speed are clamped to the new limits."""
+        super().reconfigure(config)
+        self._set_mps = max(-config.max_linear, min(self._set_mps, config.max_linear))
+
+    def hold_back(self, velocity: Velocity) -> None:
+        """Clamp velocity and set speed to the magnitudes in ``velocity``, so that it does not speed up by itself."""
+        super().hold_back(velocity)
+        self._set_mps = max(-abs(velocity.linear_mps), min(self._set_mps, abs(velocity.linear_mps)))
+
+    def halt(self) -> Velocity | None:
+        """Set velocity and set speed to zero; return one zero, or None if already silent."""
+        self._set_mps, self._shown = 0.0, "stop"
+        return super().halt()
+
+    def _next(self, action: Action, interval_s: float) -> Velocity:
+        config = self._config
+        begins = action != self._shown
+        self._shown = action
+        if action == "stop":
+            self._set_mps = 0.0
+            return ZERO
+        if action in ("forward", "backward"):
+            self._change_set_speed(1.0 if action == "forward" else -1.0, interval_s, begins=begins)
+        now = self.velocity
+        linear = _approach(now.linear_mps, self._set_mps, config.cruise_acceleration * interval_s)
+        turn = min(config.cruise_turn, config.max_angular)
+        wanted = {"turn_left": turn, "turn_right": -turn, "go": 0.0}.get(action, now.angular_radps)
+        angular = _approach(now.angular_radps, wanted, config.cruise_angular_acceleration * interval_s)
+        return Velocity(round(linear, _DIGITS), round(angular, _DIGITS))
+
+    def _change_set_speed(self, way: float, interval_s: float, *, begins: bool) -> None:
+        self._shown_s = 0.0 if begins else self._shown_s + interval_s
+        if not begins:
+            if self._shown_s < self._config.cruise_step_time:
+                return
+            self._shown_s -= self._config.cruise_step_time
+        before, limit = self._set_mps, self._config.max_linear
+        after = round(before + way * self._config.cruise_step, _DIGITS)
+        if before * way < 0 <= after * way or (before == 0.0 and not begins):
+            after = 0.0  # the direction changes only when the sign is shown anew
+        self._set_mps = max(-limit, min(after, limit))
+
+
+def _approach(now: float, wanted: float, step: float) -> float:
+    """Return ``now`` moved towards ``wanted`` by ``step``, or twice that towards zero."""
+    if now * wanted < 0:
+        wanted = 0.0
+    step = 2 * step if abs(wanted) < abs(now) else step
+    return wanted if abs(wanted - now) <= step else now + math.copysign(step, wanted - now)
 
 
 def _is_faster(after: Velocity, before: Velocity) -> bool:

@@ -125,13 +125,14 @@ class HandSignControlNode(Node):
 
     def on_reconfigure(self, config: Config) -> None:
         """Apply all of ``control``; a robot that exceeds new limits is slowed at once."""
-        before, self._config = self._config.mode, config.control
+        before, self._config = self._config, config.control
         self._stall_guard.limit_s = config.control.sign_timeout
         self._monitor.reconfigure(config.collision_monitor)
-        if config.control.mode != before:
-            self._publish(ZERO)
+        velocity = self._control.reconfigure(config.control)
+        if (config.control.mode, config.control.rule) != (before.mode, before.rule):
+            velocity = ZERO
             self._take_joysticks()
-        self._publish(self._control.reconfigure(config.control))
+        self._publish(velocity)
 
     def services(self) -> dict[str, Call]:
         """Return ``stop`` and ``reset``, which are equivalent to true and false on ``/stop``."""
