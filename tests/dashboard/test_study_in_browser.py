@@ -12,9 +12,10 @@ import yaml
 from playwright.sync_api import Page
 
 from tests.dashboard.browsers import a_browser
-from tests.dashboard.test_accessibility import faults
-from tests.dashboard.visits import NEEDS_A_BROWSER, PATIENCE_MS, WINDOW
+from tests.dashboard.test_accessibility import SMALLEST_PHONE, faults
+from tests.dashboard.visits import NEEDS_A_BROWSER, PATIENCE_MS, WINDOW, visiting
 from tests.processes import Process, eventually, free_port
+from tests.study.plans import PAD, a_plan, a_task
 
 pytestmark = NEEDS_A_BROWSER
 
@@ -174,3 +175,39 @@ def test_a_person_is_led_through_by_hand_and_pad_and_a_killed_study_continues(st
     assert len({row["config"] for row in laps}) == 2
     assert [(row["form"], row["score"]) for row in forms] == [("consent", ""), ("tlx", "20.0"), ("sus", "50.0")]
     assert study.troubles == []
+
+
+def test_only_the_driver_leads_by_the_input_of_the_condition_and_who_leaves_drives_again(tmp_path: Path) -> None:
+    task = a_task(tmp_path, a_plan(conditions=[PAD], forms=[]))
+    with visiting("Forward:600", "/study", study=task, steering=False) as visit:
+        first, robot = visit.page, visit.graph.robot
+        first.get_by_role("button", name="I agree").click()
+        first.get_by_role("button", name="Continue").click()
+        first.get_by_role("button", name="Begin lap").click()
+        first.locator(".study", has_text="Drive through the yellow gate").wait_for()
+        visit.wait_until(lambda: visit.text(".banner .headline") == "Standing" and visit.graph.robot.course is not None)
+        assert len(robot.world.gates if robot.world else ()) == 2
+        assert not first.locator(".sliders").is_visible()
+        first.keyboard.down("w")  # keys are another input
+        second = visit.another_page()
+        second.set_default_timeout(PATIENCE_MS)
+        second.goto(first.url)
+        second.get_by_role("button", name="Give up").click()
+        second.locator(".study", has_text="Another viewer drives, and leads this study").wait_for()
+        assert robot.state.truth.x < 0.01, "neither by the sign that is shown all the time nor by keys"
+
+        first.close()
+        path = tmp_path / "laps.csv"
+        eventually(path.exists)
+        second.locator(".study", has_text="not counted").wait_for()
+        second.locator(".banner", has_text="the robot stands until a lap begins").wait_for()
+        assert [row["outcome"] for row in rows(path)] == ["repeated"]
+        second.get_by_role("button", name="Begin lap").click()
+        second.locator(".study", has_text="Drive through the yellow gate").wait_for()
+        second.get_by_role("button", name="Give up").click()
+        second.locator(".study", has_text="Lap 1 of 2").wait_for()
+        assert [row["outcome"] for row in rows(path)] == ["repeated", "given_up"]
+        second.set_viewport_size(SMALLEST_PHONE)
+        assert second.evaluate("document.documentElement.scrollWidth") <= SMALLEST_PHONE["width"]
+        assert faults(second) == []
+        assert visit.troubles == []

@@ -8,6 +8,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from handsteer.errors import StudyError
+from handsteer.study.order import group_size
 from handsteer.study.plan import config_hash, load_configs, load_courses, plan_hash, read_plan
 from tests.study.plans import PAD, SIGNS, a_plan, write
 
@@ -19,7 +20,10 @@ def test_the_example_is_a_plan() -> None:
     plan = read_plan(EXAMPLE)
     assert plan.participants[:2] == ("P01", "P02")
     assert load_courses(plan, EXAMPLE)["slalom"].gates
-    assert {"signs", "pad"} <= load_configs(plan, EXAMPLE, {}).keys()
+    configs = load_configs(plan, EXAMPLE, {})
+    assert [configs[name].control.rule for name in ("signs", "cruise", "pad")] == ["course", "cruise", "course"]
+    assert configs["joystick"].control.mode == "joystick"
+    assert len(plan.participants) % group_size(plan) == 0
 
 
 @pytest.mark.parametrize(
@@ -93,10 +97,12 @@ def test_a_condition_overrides_the_plan_and_that_what_was_configured_elsewhere()
     assert config_hash(configs["signs"]) != config_hash(configs["pad"])
 
 
-def test_no_sign_moves_the_robot_where_another_input_is_studied() -> None:
-    plan = a_plan(config={"control": {"actions": {"Peace": "turbo", "turn_left": "forward"}}})
+def test_no_hand_moves_the_robot_where_another_input_is_studied() -> None:
+    plan = a_plan(config={"control": {"mode": "joystick", "actions": {"Peace": "turbo", "turn_left": "forward"}}})
     configs = load_configs(plan, Path("plan.yaml"), {})
     assert configs["signs"].control.actions == {"Peace": "turbo", "Turn Left": "forward"}
+    assert configs["signs"].control.mode == "joystick"
+    assert configs["pad"].control.mode == "signs"
     assert set(configs["pad"].control.actions.values()) == {"stop"}
     assert configs["pad"].control.actions.keys() == {"Forward", "Backward", "Turn Left", "Turn Right", "Go"}
 

@@ -1,4 +1,4 @@
-"""The plan of a study as a YAML file: who drives which courses by which inputs, how often, and what is asked.
+"""The plan of a study as a YAML file: the ways of driving to compare, the courses, the laps, and what is asked.
 
 ::
 
@@ -221,9 +221,9 @@ def _config_of(plan: Plan, condition: Condition, path: Path, base: dict[str, Any
         raise StudyError(f"{path}: config of {condition.name!r}: {error}") from None
     if condition.input == "hand":
         return loaded
-    # No sign moves the robot where another input is studied: a hand is in the picture then too.
-    control = loaded.control.model_copy(update={"actions": dict.fromkeys((*sorted(MOTION_SIGNS), GO), "stop")})
-    return loaded.model_copy(update={"control": control})
+    # No hand moves the robot where another input is studied, although one may be in the picture.
+    idle = {"mode": "signs", "actions": dict.fromkeys((*sorted(MOTION_SIGNS), GO), "stop")}
+    return loaded.model_copy(update={"control": loaded.control.model_copy(update=idle)})
 
 
 def _fixed_difference(one: Config, other: Config) -> str | None:

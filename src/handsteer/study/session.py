@@ -47,7 +47,7 @@ class Lap:
     """The lap in progress.
 
     Attributes:
-        viewer: The page's viewer who drives it.
+        viewer: The viewer of the page that drives it.
         begun_s: When it began, in seconds of the graph's clock.
         started_utc: The same in UTC.
         course: The referee's newest report; None until it reports the new lap.
