@@ -179,12 +179,11 @@ def test_a_person_is_led_through_by_hand_and_pad_and_a_killed_study_continues(st
 
 def test_only_the_driver_leads_by_the_input_of_the_condition_and_who_leaves_drives_again(tmp_path: Path) -> None:
     task = a_task(tmp_path, a_plan(conditions=[PAD], forms=[]))
-    with visiting("Forward:600", "/study", study=task, steering=False) as visit:
+    with visiting("Forward:600", "/study", study=task) as visit:
         first, robot = visit.page, visit.graph.robot
         first.get_by_role("button", name="I agree").click()
         first.get_by_role("button", name="Continue").click()
-        first.get_by_role("button", name="Begin lap").click()
-        first.locator(".study", has_text="Drive through the yellow gate").wait_for()
+        begin_lap(first)
         visit.wait_until(lambda: visit.text(".banner .headline") == "Standing" and visit.graph.robot.course is not None)
         assert len(robot.world.gates if robot.world else ()) == 2
         assert not first.locator(".sliders").is_visible()
@@ -202,12 +201,23 @@ def test_only_the_driver_leads_by_the_input_of_the_condition_and_who_leaves_driv
         second.locator(".study", has_text="not counted").wait_for()
         second.locator(".banner", has_text="the robot stands until a lap begins").wait_for()
         assert [row["outcome"] for row in rows(path)] == ["repeated"]
-        second.get_by_role("button", name="Begin lap").click()
-        second.locator(".study", has_text="Drive through the yellow gate").wait_for()
-        second.get_by_role("button", name="Give up").click()
-        second.locator(".study", has_text="Lap 1 of 2").wait_for()
-        assert [row["outcome"] for row in rows(path)] == ["repeated", "given_up"]
-        second.set_viewport_size(SMALLEST_PHONE)
-        assert second.evaluate("document.documentElement.scrollWidth") <= SMALLEST_PHONE["width"]
-        assert faults(second) == []
+        begin_lap(second)
+        third = visit.another_page()
+        third.set_default_timeout(PATIENCE_MS)
+        third.goto(second.url)
+        third.get_by_role("button", name="Ask to drive").click()
+        second.get_by_role("button", name="Hand over").click()
+        second.locator(".study", has_text="The lap before was not counted").wait_for()
+        begin_lap(third)
+        third.get_by_role("button", name="Give up").click()
+        third.locator(".study", has_text="Lap 1 of 2").wait_for()
+        assert [row["outcome"] for row in rows(path)] == ["repeated", "repeated", "given_up"]
+        third.set_viewport_size(SMALLEST_PHONE)
+        assert third.evaluate("document.documentElement.scrollWidth") <= SMALLEST_PHONE["width"]
+        assert faults(third) == []
         assert visit.troubles == []
+
+
+def begin_lap(page: Page) -> None:
+    page.get_by_role("button", name="Begin lap").click()
+    page.locator(".study", has_text="Drive through the yellow gate").wait_for()

@@ -20,7 +20,7 @@ from handsteer.errors import HandsteerError, StudyError
 from handsteer.study.forms import FORMS, Form, Item
 from handsteer.study.order import Step
 from handsteer.study.plan import FormName
-from handsteer.study.session import Session
+from handsteer.study.session import Outcome, Session
 from handsteer.types import stopwatch
 
 _NONE: Final = "No study runs here: start one with handsteer study plan.yaml --participant P01."
@@ -58,14 +58,13 @@ class StudyPage(Page):
     def show(self, node: DashboardNode, state: PageState) -> None:
         """Show changes, and follow the lap in progress if it is this viewer's."""
         session = self._session
-        if session is not None and (session.lap is None or session.lap.course is None) and state.stopped:
-            # Nothing is wrong, and there is nothing to reset.
-            state = replace(state, mood="standing", headline="Standing", reason=_STANDS, stopped=False)
-        super().show(node, state)
+        is_over = session is not None and (session.lap is None or session.lap.course is None)
+        # Between laps nothing is wrong, and there is nothing to reset.
+        calm = replace(state, mood="standing", headline="Standing", reason=_STANDS, stopped=False)
+        super().show(node, calm if is_over and state.stopped else state)
         if session is None:
             return
-        if session.lap is not None and self.lease(node).role == "driver":
-            self._follow(session, node, state)
+        self._follow(session, node, state)
         self._show_desk(session)
         self._card.update()
         self._camera.update(state)
@@ -86,7 +85,7 @@ class StudyPage(Page):
     async def begin(self) -> None:
         """Put the robot to the start of the course, and begin the lap."""
         session, node = self._session, self.node
-        if session is None or node is None or self._begins or session.lap is not None:
+        if session is None or node is None or self._begins or session.lap is not None or session.step.kind != "lap":
             return
         if not self.drives():
             self._card.message = _WATCHED
@@ -108,30 +107,28 @@ class StudyPage(Page):
         finally:
             self._begins = False
 
-    def end(self, *, counts: bool) -> None:
-        """Stop the robot and end the lap, as given up, or to be driven again."""
-        self._halt()
+    def end(self, outcome: Outcome) -> None:
+        """Stop the robot and end the lap, if there is one."""
+        self._graph.steering.halt()
         if self._session is not None:
-            self._session.end_lap("given_up" if counts else "repeated")
+            try:
+                self._session.end_lap(outcome)
+            except StudyError as error:
+                self._card.message = f"{error}."
 
     def _follow(self, session: Session, node: DashboardNode, state: PageState) -> None:
-        """Take the referee's report; this viewer drives."""
-        lap = session.lap
-        if lap is not None and lap.viewer != self.client.id:
-            self.lead(lambda: self.end(counts=False))
+        """Take the referee's report on the lap; end one whose viewer no longer drives."""
+        lap, is_driver = session.lap, self.lease(node).role == "driver"
+        if lap is None or not (is_driver or lap.viewer == self.client.id):
+            return
+        if not is_driver or lap.viewer != self.client.id:
+            self.end("repeated")
             self._card.message = self._card.message or _LOST
             return
-        was_ready = lap is not None and lap.course is not None
-        outcome = None
-
-        def note() -> None:
-            nonlocal outcome
-            outcome = session.note(state.course, state.path_length_m, node.clock.now())
-
-        self.lead(note)
+        self.lead(lambda: session.note(state.course, state.path_length_m, node.clock.now()))
         if session.lap is None:
             self._halt()
-        elif not was_ready and session.lap.course is not None:
+        elif lap.course is None and session.lap.course is not None:
             node.reset(self.client.id)
 
     def _reset(self) -> None:
@@ -143,10 +140,8 @@ class StudyPage(Page):
 
     def _abandon(self) -> None:
         """End the lap of a viewer whose connection is lost: nobody drives."""
-        session = self._session
-        if session is not None and session.lap is not None and session.lap.viewer == self.client.id:
-            self._graph.steering.halt()
-            session.end_lap("repeated")
+        if self._session is not None and self._session.lap and self._session.lap.viewer == self.client.id:
+            self.end("repeated")
 
     def _show_desk(self, session: Session) -> None:
         """Show the inputs of the step's condition only, and none while questions are asked."""
@@ -219,9 +214,9 @@ class _StudyCard:
             self._button("Begin lap", page.begin)
             return
         with box("buttons"):
-            button("Give up", lambda: page.lead(lambda: page.end(counts=True)), "Give up: the lap ends, and counts")
+            button("Give up", lambda: page.lead(lambda: page.end("given_up")), "Give up: the lap ends, and counts")
             again = "Drive again: the lap does not count, because something else went wrong"
-            button("Drive again", lambda: page.lead(lambda: page.end(counts=False)), again)
+            button("Drive again", lambda: page.lead(lambda: page.end("repeated")), again)
 
     def _fill_form(self, name: FormName) -> None:
         form = FORMS[name]
