@@ -69,6 +69,7 @@ def test_the_configuration_is_kept_once(tmp_path: Path) -> None:
     ("content", "message"),
     [
         (b"a,b\n1,2\n", r"laps\.csv: has other columns than this version writes"),
+        (b"a,b\n1,2", r"laps\.csv: has other columns than this version writes"),
         (",".join(LAP_COLUMNS).encode() + b"\r\n1,2\r\n", r"laps\.csv, line 2: has 2 values instead of"),
         (b"\xff\xfe\n", r"laps\.csv: is no CSV file in UTF-8"),
         (",".join(LAP_COLUMNS).encode() + b'\r\n"a\r\n', r"laps\.csv: is no CSV file"),
@@ -96,6 +97,25 @@ def test_a_folder_that_cannot_be_used_is_named(tmp_path: Path) -> None:
     (tmp_path / "laps.csv").mkdir()
     with pytest.raises(StudyError, match=r"cannot use .*laps\.csv"):
         Results(tmp_path)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="limits the size of files")
+def test_a_row_for_which_the_disk_has_no_room_leaves_no_trace(tmp_path: Path) -> None:
+    import resource  # noqa: PLC0415 - not on Windows
+
+    results = Results(tmp_path)
+    results.add_lap(lap(1))
+    before = (tmp_path / "laps.csv").read_bytes()
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (len(before) + 10, limits[1]))
+    try:
+        with pytest.raises(StudyError, match=r"cannot write .*laps\.csv: No space left"):
+            results.add_lap(lap(2))
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert (tmp_path / "laps.csv").read_bytes() == before
+    results.add_lap(lap(2))
+    assert Results(tmp_path).done("P01", "abc") == {step(1), step(2)}
 
 
 @ANY_FOLDER

@@ -5,6 +5,7 @@ half-written last row, of a process that was killed, is cut off when the file is
 """
 
 import csv
+import errno
 import io
 import logging
 import os
@@ -173,7 +174,9 @@ class _Table:
         """Return ``data`` without a half-written last row, which is cut off in the file too."""
         whole = data[: data.rfind(b"\n") + 1]
         rest = data[len(whole) :]
-        if not rest:
+        header = _line(self._columns)
+        is_ours = header.startswith(data) or data.startswith(header.rstrip())
+        if not (rest and is_ours):
             return data
         log.warning("%s ended in a half-written row, which was cut off: %r", self.path, rest[:1000])
         with self.path.open("r+b") as file:
@@ -200,13 +203,16 @@ class _Table:
         is_new = not self.path.exists()
         # One write of whole rows: a second process that appends cannot come between.
         file = os.open(self.path, os.O_WRONLY | os.O_CREAT | os.O_APPEND | getattr(os, "O_BINARY", 0), 0o644)
+        size = os.fstat(file).st_size
         try:
-            written = os.write(file, data)
+            if os.write(file, data) != len(data):
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
             os.fsync(file)
+        except OSError:
+            os.ftruncate(file, size)  # or the next row would follow half of this one
+            raise
         finally:
             os.close(file)
-        if written != len(data):
-            raise OSError(0, "the disk is full")
         if is_new and os.name == "posix":  # or the file itself may be lost
             folder = os.open(self.path.parent, os.O_RDONLY)
             try:
