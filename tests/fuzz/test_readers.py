@@ -45,6 +45,8 @@ from handsteer.recognition.shipped_signs import DEFAULT_MODEL, load_model
 from handsteer.robots.description import joints, robot_description, visuals
 from handsteer.robots.editing import edit
 from handsteer.robots.world import load_world, parse_world
+from handsteer.study.plan import read_plan
+from handsteer.study.session import Session
 from handsteer.training.custom.dataset import load_dataset
 from handsteer.training.custom.keypoint_csv import read_class_names, read_keypoints
 from handsteer.training.evaluation.labels import read_photo_labels
@@ -54,6 +56,7 @@ from handsteer.types import SIGNS
 from tests.fuzz import corpus
 from tests.fuzz.mutants import CASES, hold, mutants
 from tests.recognition.models import model
+from tests.study.plans import a_task
 
 HEADER = Header(stamp=Time(1, 2), frame_id="camera")
 WORLDS = [
@@ -144,6 +147,15 @@ def test_what_a_page_says_of_pad_sliders_and_camera() -> None:
 
 def test_configurations(tmp_path: Path) -> None:
     assert hold(in_file(tmp_path / "c.yaml", load), mutants([CONFIG, *ODD_YAML])) > CASES / 10
+
+
+def test_plans_and_results_of_studies(tmp_path: Path) -> None:
+    plan = (Path(__file__).parents[2] / "examples" / "study.yaml").read_bytes()
+    assert hold(in_file(tmp_path / "p.yaml", read_plan), mutants([plan, *ODD_YAML])) > CASES / 10
+    session = Session(a_task(tmp_path))
+    session.agree()
+    forms = (tmp_path / "forms.csv").read_bytes()
+    hold(in_file(tmp_path / "forms.csv", lambda path: Session(a_task(path.parent))), mutants([forms]))
 
 
 def test_fields_of_the_settings() -> None:
