@@ -31,6 +31,9 @@ _SWAY_HZ = (0.23, 0.41, 0.67)
 _SWAY_JOINTS = 0.010
 _SWAY_VIEW = np.array([0.030, 0.022, 0.022, 0.003, 0.003, 0.004])
 
+_ARM_S = 0.25
+"""Duration of a movement of the wrist by a few centimetres."""
+
 _UNCLEAR = 0.35
 """How far towards a relaxed hand an unclear sign is."""
 
@@ -118,7 +121,7 @@ class OperatorsHand:
         self._random, self._slips, self._choices = random, slips, choices
         self.intended = NONE
         self.changes = 0
-        self._wrist = Limb(2, 0.25, random)
+        self._wrist: Limb | None = None
         self._offset = np.zeros(2)
         self._from = self._to = _numbers(sign_pose(NONE))
         self._share, self._change_s = 1.0, 1.0
@@ -152,18 +155,19 @@ class OperatorsHand:
 
     def reach(self, offset_m: Array) -> None:
         """Move the wrist to ``offset_m``, (2,) metres to the image's right and down from where it is held."""
+        self._wrist = self._wrist or Limb(2, _ARM_S, self._random)
         self._wrist.aim(offset_m)
 
-    def step(self, dt_s: float) -> HandPose:
-        """Return the hand ``dt_s`` seconds later."""
+    def step(self, dt_s: float) -> None:
+        """Advance time by ``dt_s`` seconds."""
         self._time_s += dt_s
         self._share = min(1.0, self._share + dt_s / self._change_s)
         self._notice_s -= dt_s
         if self._notice_s <= 0.0:
             self._notice_s = math.inf
             self._move_to(_numbers(sign_pose(self.intended)))
-        self._offset = self._wrist.step(dt_s)
-        return self._pose()
+        if self._wrist is not None:
+            self._offset = self._wrist.step(dt_s)
 
     def _move_to(self, numbers: Array) -> None:
         self._from, self._to = self._now(), numbers
@@ -174,7 +178,8 @@ class OperatorsHand:
         share = self._share**3 * (self._share * (6.0 * self._share - 15.0) + 10.0)  # minimum jerk
         return np.asarray((1.0 - share) * self._from + share * self._to)
 
-    def _pose(self) -> HandPose:
+    def pose(self) -> HandPose:
+        """Return the hand now."""
         waves = np.sin(math.tau * self._time_s * np.array(_SWAY_HZ)[:, None] + self._phases).mean(axis=0)
         numbers = self._now() + np.concatenate([np.full(len(ANGLES), _SWAY_JOINTS), _SWAY_VIEW]) * waves
         hertz, phases = self._tremor
@@ -199,11 +204,11 @@ class LandmarkErrors:
         missed: Probability that a hand in view is not found in a frame.
     """
 
-    apart: float = 0.012
-    together: float = 0.008
+    apart: float = 0.006
+    together: float = 0.012
     depth: float = 0.03
-    keep: float = 0.3
-    missed: float = 0.002
+    keep: float = 0.0
+    missed: float = 0.001
 
     def scaled(self, factor: float) -> "LandmarkErrors":
         """Return errors that are ``factor`` times as large and as frequent."""

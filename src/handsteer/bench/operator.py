@@ -24,7 +24,7 @@ DECISION_S = 0.05
 REACTION_S = 0.25
 """Default delay of what the operator sees: reaction time to a visual change, without the time of the movement."""
 
-_PROJECTION_S, _SHORTEST_M = 0.9, 0.45
+_SHORTEST_M = 0.45
 _SIDEWAYS_MPS2 = 0.6
 _BRAKE_MPS2 = 0.45
 _SLOWEST_MPS = 0.12
@@ -44,12 +44,14 @@ class Skill:
         pace_mps: Highest speed that is wanted.
         kp: Gain of the displacement, relative to pure pursuit.
         kd: Gain of its rate, in seconds.
+        projection_s: How far ahead of the robot the displacement is judged, in seconds of driving.
         reluctance: How small a change is not worth an act, relative; its meaning depends on the interface.
     """
 
     pace_mps: float = 0.6
     kp: float = 1.0
     kd: float = 0.25
+    projection_s: float = 0.9
     reluctance: float = 0.5
 
 
@@ -130,7 +132,7 @@ class Operator:
         here = path.nearest(pose.x, pose.y, self._s_m)
         self._s_m = float(path.s[here])
         speed = self._speed(seen, here)
-        reach = max(_SHORTEST_M, _PROJECTION_S * max(abs(seen.velocity.linear_mps), abs(speed)))
+        reach = max(_SHORTEST_M, self._skill.projection_s * max(abs(seen.velocity.linear_mps), abs(speed)))
         displacement = projected_displacement(path, pose, self._s_m, reach)
         if self._before is not None:
             # The rate as people see it: over a few moments.
@@ -149,7 +151,8 @@ class Operator:
     def _speed(self, seen: Seen, here: int) -> float:
         """Return the wanted speed at the index ``here`` of the path; negative after the place to stop at."""
         path, course, pace = self._path, self._course, self._skill.pace_mps
-        ahead = slice(here, here + 1 + round((0.3 + _PROJECTION_S * pace) / float(path.s[1])))
+        end = here + 1 + round((0.3 + 0.9 * pace) / float(path.s[1]))
+        ahead = slice(here, end if course.stop_m is None else min(end, path.index(course.stop_m)))
         bend = float(np.abs(path.curvatures[ahead]).max(initial=0.0))
         tight = float(course.clearances[ahead].min(initial=1.0))
         x, y = path.points[here].tolist()

@@ -1,5 +1,6 @@
 """Driving by hand signs: which sign a practised operator shows, and the hand, recognition and control behind it."""
 
+import math
 from collections.abc import Sequence
 from typing import Literal
 
@@ -10,7 +11,7 @@ from handsteer.bench.interfaces import TICK_S
 from handsteer.bench.operator import Skill
 from handsteer.config import Config, ControlConfig
 from handsteer.control.sign_control import SignControl
-from handsteer.hand.poses import HandPose, Pinhole
+from handsteer.hand.poses import Pinhole
 from handsteer.recognition.recognizer import Recognizer
 from handsteer.teleop import Teleop
 from handsteer.types import BACKWARD, FORWARD, GO, NONE, STOP, TURN_LEFT, TURN_RIGHT, ZERO, Velocity
@@ -73,7 +74,7 @@ class SignChoice:
                 continue
             for first in (sign, GO) if GO not in (shown, sign) else (sign,):
                 for steps in _DURATIONS:
-                    cost = self._cost(self._plan(shown, sign, steps, first), now, wanted)
+                    cost = self._cost(self._plan(shown, sign, steps, first), now, wanted, least)
                     if cost < least:
                         best, least = first, cost
         return best
@@ -91,7 +92,8 @@ class SignChoice:
             plan += [sign if sign == STOP else GO] * (_STEPS - len(plan))
         return (plan + [plan[-1]] * _STEPS)[:_STEPS]
 
-    def _cost(self, plan: Sequence[str], now: Velocity, wanted: Velocity) -> float:
+    def _cost(self, plan: Sequence[str], now: Velocity, wanted: Velocity, most: float = math.inf) -> float:
+        """Return the mean difference from what is wanted; infinity if it is above ``most``."""
         rule, cost = self._rule, 0.0
         rule.step(GO, 0.0)
         rule.velocity = now
@@ -99,6 +101,8 @@ class SignChoice:
             after = rule.step(sign, _STEP_S) or ZERO
             cost += ((after.linear_mps - wanted.linear_mps) / _LINEAR_MPS) ** 2
             cost += ((after.angular_radps - wanted.angular_radps) / _ANGULAR_RADPS) ** 2
+            if cost > most * len(plan):
+                return math.inf
         return cost / len(plan)
 
 
@@ -121,14 +125,14 @@ class HandView:
         self._frames = 0
         self._ticks, self._last = 0, 0
 
-    def step(self, pose: HandPose) -> Velocity | None:
+    def step(self, hand: OperatorsHand) -> Velocity | None:
         """Advance time by one tick; return the velocity of a new frame, None if none is due."""
         self._ticks += 1
         if self._ticks * TICK_S + 1e-9 < self._frames * self._period_s:
             return None
         since_s, self._last = (self._ticks - self._last) * TICK_S, self._ticks
         self._frames += 1
-        self._landmarker.pose = pose
+        pose = self._landmarker.pose = hand.pose()
         pictures = self._pictures
         image = pictures.picture(pose, self._ticks * TICK_S) if pictures else blank_picture(self._frames)
         return self.teleop.step(image, since_s)
@@ -172,7 +176,8 @@ class Signs:
     def step(self) -> Velocity | None:
         """Advance time by one tick; return the command of a new frame."""
         self._shown_s += TICK_S
-        velocity = self._view.step(self._hand.step(TICK_S))
+        self._hand.step(TICK_S)
+        velocity = self._view.step(self._hand)
         if velocity is not None:
             self._commanded = velocity
         return velocity
