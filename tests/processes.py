@@ -95,5 +95,7 @@ class Peer(Process):
 
 def as_tests_drive(verb: str, options: tuple[str, ...]) -> tuple[str, ...]:
     """Return the options of one of handsteer's nodes; a control follows the first sign, unless they say otherwise."""
-    is_told = verb != "control" or any("arming" in option for option in options)
-    return options if is_told else ("--control.arming", "off", *options)
+    for switch in ("arming", "engage") if verb == "control" else ():
+        if not any(switch in option for option in options):
+            options = (f"--control.{switch}", "off", *options)
+    return options

@@ -41,21 +41,29 @@ class Person:
         return [self.teleop.step(self.image(sign), DT_S) for _ in range(round(duration_s / DT_S))]
 
     def drives(self) -> None:
-        """Show Stop, then Forward, until it drives."""
-        self.shows("Stop", 1.0)
+        """Show an open palm, then Forward, until it drives."""
+        self.shows("Stop", 1.2)
         assert self.shows("Forward", 1.0)[-1].linear_mps > 0.1
 
 
 def test_a_hand_that_is_up_at_the_start_moves_nothing_before_neutral_was_seen() -> None:
     person = Person()
     assert set(person.shows("Forward", 2.0)) == {ZERO}
-    assert "moves once Stop is shown" in person.teleop.reason
+    assert person.teleop.reason == "standing: disengaged, until an open palm is held for 1 s"
     person.drives()
     assert person.teleop.reason == "driving: Forward"
 
 
-def test_without_arming_the_first_sign_drives() -> None:
-    person = Person(Config(control=ControlConfig(arming="off")))
+def test_without_the_clutch_neutral_is_still_required() -> None:
+    person = Person(Config(control=ControlConfig(engage="off")))
+    assert set(person.shows("Forward", 2.0)) == {ZERO}
+    assert "moves once Stop is shown" in person.teleop.reason
+    person.shows("Stop", 0.1)
+    assert person.shows("Forward", 1.0)[-1].linear_mps > 0.1
+
+
+def test_without_arming_and_engaging_the_first_sign_drives() -> None:
+    person = Person(Config(control=ControlConfig(arming="off", engage="off")))
     assert person.shows("Forward", 1.0)[-1].linear_mps > 0.1
 
 

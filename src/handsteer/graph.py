@@ -29,7 +29,7 @@ from handsteer.making import (
     make_steering,
     open_cameras,
 )
-from handsteer.messages import HAND_SIGN, IMAGE_COMPRESSED, IMAGE_RAW, ODOM, SCAN, STEERING_CMD_VEL
+from handsteer.messages import GESTURE_JOY, HAND_SIGN, IMAGE_COMPRESSED, IMAGE_RAW, ODOM, SCAN, STEERING_CMD_VEL
 from handsteer.nodes.base import Node
 from handsteer.nodes.steering import SteeringNode
 from handsteer.summary import Summary
@@ -74,7 +74,7 @@ class Graph:
         cmd_vel = cmd_vel_topic(config)
         self.robot = make_robot(config, *wires, link, cmd_vel=cmd_vel, odom=ODOM, scan=SCAN)
         self.recognition = make_recognition(
-            config, *wires, image=IMAGE_RAW, compressed=IMAGE_COMPRESSED, sign=HAND_SIGN
+            config, *wires, image=IMAGE_RAW, compressed=IMAGE_COMPRESSED, sign=HAND_SIGN, joy=GESTURE_JOY
         )
         self.cameras = open_cameras(config, self.clock)
         self.camera = make_camera(config, *wires, self.cameras, image=IMAGE_RAW, compressed=IMAGE_COMPRESSED)
@@ -83,6 +83,7 @@ class Graph:
             *wires,
             simulated=config.robot.kind == "sim",
             sign=HAND_SIGN,
+            joy=GESTURE_JOY,
             steering=STEERING_CMD_VEL,
             cmd_vel=cmd_vel,
             odom=ODOM,

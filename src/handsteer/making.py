@@ -76,12 +76,20 @@ def make_recognition(
         ModelError: A landmark model or the sign model is missing or broken.
     """
     from handsteer.nodes.recognition import HandSignRecognitionNode
+    from handsteer.recognition.hand_joystick import HandJoystick
     from handsteer.recognition.recognizer import Recognizer, annotate, open_classifier
 
     recognizer = Recognizer(config)
     _warn_of_unknown_signs(config, recognizer.signs)
     return HandSignRecognitionNode(
-        transport, clock, recognizer, config.signs, annotate, open_classifier=open_classifier, **topics
+        transport,
+        clock,
+        recognizer,
+        config.signs,
+        annotate,
+        joystick=HandJoystick(config.joystick),
+        open_classifier=open_classifier,
+        **topics,
     )
 
 
@@ -99,17 +107,27 @@ def make_control(
 ) -> "HandSignControlNode":
     """Return the node ``hand_sign_control``.
 
-    ``simulated`` is whether the robot is known to be simulated; ``control.arming`` is then off if it is ``auto``.
+    ``simulated`` is whether the robot is known to be simulated; ``control.arming`` and ``control.engage`` are then off
+    if they are ``auto``.
 
     Raises:
         ConfigError: Control and robot are configured with different types of commands.
     """
     from handsteer.nodes.control import HandSignControlNode
 
-    arming = config.control.arming == "on" or (config.control.arming == "auto" and not simulated)
+    def is_on(choice: str) -> bool:
+        return choice == "on" or (choice == "auto" and not simulated)
+
     topics = {"cmd_vel": cmd_vel_topic(config), **topics}
     return HandSignControlNode(
-        transport, clock, config.control, collision_monitor=config.collision_monitor, arming=arming, **topics
+        transport,
+        clock,
+        config.control,
+        collision_monitor=config.collision_monitor,
+        gamepad=config.joy,
+        arming=is_on(config.control.arming),
+        engage=is_on(config.control.engage),
+        **topics,
     )
 
 

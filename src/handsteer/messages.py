@@ -10,6 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Generic, TypeVar
 
+import numpy as np
 from rosbags.typesys.stores.ros2_jazzy import builtin_interfaces__msg__Duration as Duration
 from rosbags.typesys.stores.ros2_jazzy import builtin_interfaces__msg__Time as Time
 from rosbags.typesys.stores.ros2_jazzy import diagnostic_msgs__msg__DiagnosticArray as DiagnosticArray
@@ -33,6 +34,7 @@ from rosbags.typesys.stores.ros2_jazzy import sensor_msgs__msg__CameraInfo as Ca
 from rosbags.typesys.stores.ros2_jazzy import sensor_msgs__msg__CompressedImage as CompressedImage
 from rosbags.typesys.stores.ros2_jazzy import sensor_msgs__msg__Image as Image
 from rosbags.typesys.stores.ros2_jazzy import sensor_msgs__msg__JointState as JointState
+from rosbags.typesys.stores.ros2_jazzy import sensor_msgs__msg__Joy as Joy
 from rosbags.typesys.stores.ros2_jazzy import sensor_msgs__msg__LaserScan as LaserScan
 from rosbags.typesys.stores.ros2_jazzy import sensor_msgs__msg__RegionOfInterest as RegionOfInterest
 from rosbags.typesys.stores.ros2_jazzy import std_msgs__msg__Bool as Bool
@@ -45,7 +47,7 @@ from rosbags.typesys.stores.ros2_jazzy import visualization_msgs__msg__MarkerArr
 from rosbags.typesys.stores.ros2_jazzy import visualization_msgs__msg__MeshFile as MeshFile
 
 from handsteer.timeouts import STALE_S
-from handsteer.types import CmdVelType
+from handsteer.types import RELEASED, CmdVelType, Stick
 
 __all__ = [
     "Bool",
@@ -59,6 +61,7 @@ __all__ = [
     "Header",
     "Image",
     "JointState",
+    "Joy",
     "KeyValue",
     "LaserScan",
     "Log",
@@ -86,6 +89,8 @@ __all__ = [
     "cmd_vel",
     "command",
     "is_zero",
+    "joy_of",
+    "stick_in",
     "twist",
     "twist_in",
     "type_name",
@@ -170,6 +175,11 @@ def is_stopping(sign: String) -> bool:
     return sign.data in STOPPING_SIGNS
 
 
+def is_released(message: Joy) -> bool:
+    """Return whether the joystick of the hand is not held."""
+    return not stick_in(message).held
+
+
 # The functions of topics are no lambdas, so that a topic can be pickled for another process.
 IMAGE_RAW = Topic("/image_raw", Image)
 IMAGE_COMPRESSED = Topic("/image_raw/compressed", CompressedImage, beneath=IMAGE_RAW)
@@ -182,6 +192,10 @@ HAND_SIGN = Topic(
     lifespan_s=STALE_S,
     stops=is_stopping,
 )
+# The hand as a joystick: axes left and forward, -1 to 1, and button 0 while it is held.
+GESTURE_JOY = Topic("/gesture/joy", Joy, lifespan_s=STALE_S, stops=is_released)
+# A gamepad, from ROS's joy.
+JOY = Topic("/joy", Joy, lifespan_s=STALE_S)
 IMAGE_ANNOTATED = Topic("/gesture/image_annotated", Image)
 CMD_VEL = Topic("/robot_diff_drive_controller/cmd_vel", Twist, depth=10, lifespan_s=STALE_S, stops=is_zero)
 SELECT_ROBOT = Topic("/select_robot", String, depth=10)
@@ -237,6 +251,33 @@ def command(topic: Topic[Any], linear_mps: float, angular_radps: float, stamp: T
 def twist_in(message: Twist | TwistStamped) -> Twist:
     """Return the twist in a velocity command."""
     return message.twist if isinstance(message, TwistStamped) else message
+
+
+def joy_of(stick: Stick, header: Header) -> Joy:
+    """Return ``stick`` as a message for :data:`GESTURE_JOY`: axes (left, forward), button 0 while it is held."""
+    axes = np.array([stick.left, stick.forward], np.float32)
+    return Joy(header=header, axes=axes, buttons=np.array([stick.held], np.int32))
+
+
+def stick_in(message: Joy, *, enable_button: int = 0, axis_linear: int = 1, axis_angular: int = 0) -> Stick:
+    """Return the joystick's state in a message from any source, by the conventions of ROS's ``teleop_twist_joy``.
+
+    Args:
+        message: From :data:`GESTURE_JOY` by default.
+        enable_button: Index of the button that must be pressed.
+        axis_linear: Index of the axis for forward.
+        axis_angular: Index of the axis for left.
+
+    Returns:
+        Axes clamped to -1 to 1; not held if the button or an axis is missing, or an axis is not finite.
+    """
+    buttons, axes = message.buttons, message.axes
+    if enable_button >= len(buttons) or max(axis_linear, axis_angular) >= len(axes) or not buttons[enable_button]:
+        return RELEASED
+    forward, left = float(axes[axis_linear]), float(axes[axis_angular])
+    if not (math.isfinite(forward) and math.isfinite(left)):
+        return RELEASED
+    return Stick(True, max(-1.0, min(forward, 1.0)), max(-1.0, min(left, 1.0)))
 
 
 def yaw_of(quaternion: Quaternion) -> float:

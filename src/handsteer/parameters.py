@@ -43,7 +43,11 @@ _WORDS: dict[Kind, str] = {
     "string": "a text",
     "strings": "a list of texts",
 }
-_USED_TOGETHER = {"camera": ("virtual_hand",), "signs": ("landmarks",), "control": ("collision_monitor",)}
+_USED_TOGETHER = {
+    "camera": ("virtual_hand",),
+    "signs": ("landmarks", "joystick"),
+    "control": ("collision_monitor", "joy"),
+}
 _AT_START = "it is only read when the node starts"
 
 log = logging.getLogger(__name__)

@@ -19,16 +19,18 @@ from handsteer.cameras.freshness import Freshness
 from handsteer.config import Config
 from handsteer.control import Control
 from handsteer.control.explain import Reason
+from handsteer.recognition.hand_joystick import HandJoystick
 from handsteer.recognition.recognizer import Recognition, Recognizer
-from handsteer.types import ZERO, Velocity
+from handsteer.timeouts import ENGAGE_S
+from handsteer.types import RELEASED, ZERO, Velocity
 
 
 class Teleop:
     """Drives a robot by the hand signs in a stream of images.
 
-    Nothing moves before neutral was seen: Stop, or half a second without a hand. It is required again after a pause or
-    a frozen camera (:doc:`/safety`). To disable this, for example for a simulated robot, set ``control.arming`` to
-    ``off``.
+    Nothing moves before an open palm was held for a second. It is required again after a pause or a frozen camera
+    (:doc:`/safety`). To disable this, for example for a simulated robot, set ``control.engage`` and ``control.arming``
+    to ``off``.
 
     Args:
         config: All parameters; the defaults when None.
@@ -49,7 +51,11 @@ class Teleop:
         self._freshness = Freshness(self._max_frame_age_s)
         self._refused: str | None = "no image has come"
         self._since_image_s = self._since_seen_s = 0.0
-        self._control = Control(config.control, arming=config.control.arming != "off")
+        self._joystick = HandJoystick(config.joystick)
+        self._stick = RELEASED
+        self._control = Control(
+            config.control, arming=config.control.arming != "off", engage=config.control.engage != "off"
+        )
         self._velocity = ZERO
 
     def step(self, image: NDArray[np.uint8] | None, dt_s: float) -> Velocity:
@@ -72,9 +78,10 @@ class Teleop:
         self._since_seen_s += dt_s
         sign = None if image is None else self._sign_of(image)
         if sign is not None:
-            self._command(self._control.step(0.0, sign=sign))
+            self._command(self._control.step(0.0, sign=sign, stick=self._stick))
         elif self._since_seen_s > self._max_frame_age_s:
             self._recognizer.reset()
+            self._joystick.reset()
             self.recognition = None
         return self._velocity
 
@@ -97,6 +104,8 @@ class Teleop:
             return Reason("stopped")
         if self._refused is not None and self._velocity.is_zero:
             return Reason("no_image", self._refused)
+        if not safety.engagement.engaged:
+            return Reason("disengaged", f"{ENGAGE_S:g}")
         if safety.signs_wait is not None:
             return Reason("disarmed", safety.signs_wait or "reset")
         return self._control.mux.reason
@@ -110,6 +119,7 @@ class Teleop:
         try:
             # The time of skipped images counts too: a sign is timed from when it was last seen.
             self.recognition = self._recognizer.step(image, self._since_seen_s)
+            self._stick = self._joystick.step(self.recognition, self._since_seen_s)
         except Exception:
             self._fault("an image could not be looked at")
             raise

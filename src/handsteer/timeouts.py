@@ -49,3 +49,9 @@ NOT_FOLLOWING_S: Final = 1.0
 
 STOOD_BY_ITSELF_S: Final = 0.1
 """A robot that was following, and stops for this long in spite of commands, does not receive them."""
+
+ENGAGE_S: Final = 1.0
+"""An open palm held for this long engages the hand (``control.engage``)."""
+
+DISENGAGE_S: Final = 5.0
+"""Without a sign for this long, the hand is disengaged."""

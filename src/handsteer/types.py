@@ -149,6 +149,24 @@ ZERO = Velocity()
 
 
 @dataclass(frozen=True)
+class Stick:
+    """State of a joystick: whether it is held, and its deflection, each -1 to 1; 0 while it is not held.
+
+    Attributes:
+        held: Whether its enable button is pressed; for a hand, whether the fist is closed.
+        forward: Positive away from the person.
+        left: Positive to the person's left, as ROS's ``joy`` has it.
+    """
+
+    held: bool = False
+    forward: float = 0.0
+    left: float = 0.0
+
+
+RELEASED = Stick()
+
+
+@dataclass(frozen=True)
 class Pose2D:
     """A pose on the floor: x and y in metres, yaw in radians, left positive (REP 103)."""
 

@@ -1,11 +1,12 @@
 import math
+from collections.abc import Callable
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from handsteer.config import ControlConfig
-from handsteer.control.safety import Allowance, Following, Ramp, Safety
+from handsteer.control.safety import Allowance, Engagement, Following, Ramp, Safety
 from handsteer.timeouts import ARMING_S, FAULT_GAP_S, NEUTRAL_S, STEERING_AT_START_S
 from handsteer.types import ZERO, Velocity
 
@@ -267,3 +268,74 @@ def test_a_limit_of_jerk_alone_lets_it_get_there() -> None:
     for _ in range(30):
         now = ramp.step(Velocity(1.0, 0.0), 0.1)
     assert math.isclose(now.linear_mps, 1.0)
+
+
+def palm(engagement: Engagement, seconds: float, sign: str = "Stop", dt_s: float = 0.05) -> bool:
+    """Show ``sign``; return whether the hand is engaged in the end."""
+    for _ in range(round(seconds / dt_s)):
+        engagement.step(dt_s)
+        engagement.note_sign(sign)
+    return engagement.engaged
+
+
+def test_an_open_palm_held_for_a_second_engages() -> None:
+    engagement = Engagement(enabled=True)
+    assert not palm(engagement, 0.55)
+    assert engagement.progress == pytest.approx(0.5)
+    assert palm(engagement, 0.5)
+    assert engagement.progress == 1.0
+
+
+@pytest.mark.parametrize("sign", ["Go", "Forward", "NONE"])
+def test_a_palm_with_an_interruption_does_not_engage(sign: str) -> None:
+    engagement = Engagement(enabled=True)
+    for _ in range(5):
+        palm(engagement, 0.9)
+        palm(engagement, 0.05, sign)
+    assert not engagement.engaged
+
+
+def test_a_palm_without_frames_in_between_does_not_engage() -> None:
+    engagement = Engagement(enabled=True)
+    for _ in range(20):
+        palm(engagement, 0.35, dt_s=0.35)
+    assert not engagement.engaged
+
+
+def test_five_seconds_without_a_sign_disengage() -> None:
+    engagement = Engagement(enabled=True)
+    palm(engagement, 1.05)
+    palm(engagement, 4.9, "NONE")
+    palm(engagement, 0.05, "Go")
+    assert palm(engagement, 4.9, "NONE")
+    assert not palm(engagement, 0.1, "NONE")
+
+
+def test_without_a_clutch_the_hand_is_always_engaged() -> None:
+    engagement = Engagement(enabled=False)
+    palm(engagement, 10.0, "NONE")
+    engagement.disengage()
+    assert engagement.engaged
+
+
+@pytest.mark.parametrize(
+    "end", [Safety.stop, lambda safety: safety.fault("x"), lambda safety: safety.robot_is_away("x")]
+)
+@pytest.mark.parametrize("arming", [False, True])
+def test_a_stop_and_every_fault_disengage(end: Callable[[Safety], None], arming: bool) -> None:
+    safety = Safety(ControlConfig(), arming=arming, engage=True)
+    palm(safety.engagement, 1.05)
+    end(safety)
+    assert not safety.engagement.engaged
+
+
+def test_a_held_joystick_is_followed_only_after_it_was_released() -> None:
+    safety = Safety(ControlConfig(), arming=False)
+    assert not any(safety.admits_stick(held=True) for _ in range(10))
+    safety.admits_stick(held=False)
+    assert safety.admits_stick(held=True)
+    safety.step(1.0)
+    assert not safety.admits_stick(held=True), "no frame came for a while"
+    safety.admits_stick(held=False)
+    safety.admits_steering(is_zero=False)
+    assert not safety.admits_stick(held=True), "it was steered meanwhile"

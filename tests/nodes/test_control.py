@@ -7,11 +7,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from handsteer.config import Config, ControlConfig
+from handsteer.config import Config, ControlConfig, JoyConfig
 from handsteer.messages import (
     CMD_VEL,
     DIAGNOSTICS,
+    GESTURE_JOY,
     HAND_SIGN,
+    JOY,
     ODOM,
     SELECT_ROBOT,
     SELECTED_ROBOT,
@@ -19,6 +21,7 @@ from handsteer.messages import (
     STOP,
     Bool,
     Header,
+    Joy,
     Odometry,
     Point,
     Pose,
@@ -29,26 +32,46 @@ from handsteer.messages import (
     Twist,
     TwistWithCovariance,
     cmd_vel,
+    joy_of,
     twist,
 )
 from handsteer.nodes.control import HandSignControlNode
 from handsteer.nodes.steering import SteeringNode
+from handsteer.transports.base import Publisher
+from handsteer.types import RELEASED, Stick
 from tests.nodes.stepping import Bench
+
+HEADER = Header(stamp=Time(0, 0), frame_id="camera")
+JOYSTICK = ControlConfig(mode="joystick")
+AHEAD, LEFT = Stick(held=True, forward=0.5), Stick(held=True, left=1.0)
 
 
 class ControlBench(Bench):
-    def __init__(self, *, arming: bool = False) -> None:
+    def __init__(self, config: ControlConfig | None = None, *, arming: bool = False, engage: bool = False) -> None:
         super().__init__()
-        self.control = HandSignControlNode(self.transport, self.clock, ControlConfig(), arming=arming)
+        config = config or ControlConfig()
+        self.control = HandSignControlNode(self.transport, self.clock, config, arming=arming, engage=engage)
         self.steering = SteeringNode(self.transport, self.clock)
         self.nodes = [self.steering, self.control]
         self.signs = self.transport.advertise("recognition", HAND_SIGN)
+        self.joys = self.transport.advertise("recognition", GESTURE_JOY)
+        self.gamepad = self.transport.advertise("gamepad", JOY)
         self.twists = self.record(CMD_VEL)
 
     def show(self, *signs: str, age_s: float = 0.0) -> None:
         for sign in signs:
             self.signs.publish(String(data=sign), self.clock.now() - age_s)
             self.run(1 / 30)
+
+    def hold(self, *sticks: Stick, age_s: float = 0.0, on: Publisher[Joy] | None = None) -> None:
+        """Publish states of a joystick, by default of the hand, 30 a second."""
+        for stick in sticks:
+            (on or self.joys).publish(joy_of(stick, HEADER), self.clock.now() - age_s)
+            self.run(1 / 30)
+
+    def last(self) -> tuple[float, float]:
+        """Return the last command."""
+        return self.commands[-1]
 
     @property
     def commands(self) -> list[tuple[float, float]]:
@@ -562,3 +585,130 @@ def test_topics_may_be_others() -> None:
     bench.run(0.05)
     assert not pad.is_direct
     assert (steered[-1].linear.x, commands[-1].linear.x) == (0.2, 0.2)
+
+
+def test_the_hand_as_a_joystick_is_one_twist_a_frame_in_proportion() -> None:
+    bench = ControlBench(JOYSTICK)
+    bench.hold(RELEASED, Stick(held=True), AHEAD, LEFT, Stick(held=True, forward=-1.0, left=-0.5), RELEASED)
+    assert bench.commands == [(0, 0), (0, 0), (0.5, 0), (0, 2), (-1, -1), (0, 0)]
+
+
+def test_a_joystick_that_is_held_from_the_start_moves_nothing() -> None:
+    bench = ControlBench(JOYSTICK)
+    bench.hold(*[AHEAD] * 60)
+    assert set(bench.commands) == {(0, 0)}
+
+
+def test_when_the_joystick_falls_silent_one_zero_and_it_must_be_released_first() -> None:
+    bench = ControlBench(JOYSTICK)
+    bench.hold(RELEASED, AHEAD)
+    bench.twists.clear()
+    bench.run(1.0)
+    assert bench.commands == [(0, 0)]
+    bench.hold(*[AHEAD] * 10)
+    assert set(bench.commands) == {(0, 0)}
+    bench.hold(RELEASED, AHEAD)
+    assert bench.last() == (0.5, 0)
+
+
+def test_a_joystick_from_a_stale_frame_moves_nothing_but_stops() -> None:
+    bench = ControlBench(JOYSTICK)
+    bench.hold(RELEASED)
+    bench.hold(AHEAD, age_s=0.6)
+    assert bench.commands == [(0, 0)]
+    bench.hold(AHEAD)
+    bench.hold(RELEASED, age_s=0.6)
+    assert bench.commands == [(0, 0), (0.5, 0), (0, 0)]
+
+
+@pytest.mark.parametrize(
+    ("axes", "buttons"),
+    [([], []), ([0.0, 1.0], []), ([0.0], [1]), ([math.nan, 1.0], [1]), ([0.0, math.inf], [1])],
+)
+def test_an_incomplete_joystick_is_a_released_one(axes: list[float], buttons: list[int]) -> None:
+    bench = ControlBench(JOYSTICK)
+    bench.hold(RELEASED, AHEAD)
+    bench.joys.publish(Joy(HEADER, np.array(axes, np.float32), np.array(buttons, np.int32)), bench.clock.now())
+    bench.run(0.05)
+    assert bench.last() == (0, 0)
+
+
+def test_axes_beyond_one_are_full_deflection() -> None:
+    bench = ControlBench(JOYSTICK)
+    bench.hold(RELEASED, Stick(held=True, forward=50.0, left=-1e30))
+    assert bench.last() == (1, -2)
+
+
+def test_signs_do_not_drive_in_the_mode_of_the_joystick_nor_the_joystick_in_that_of_signs() -> None:
+    bench = ControlBench(JOYSTICK)
+    bench.show(*["Forward"] * 10)
+    assert bench.commands == []
+    bench = ControlBench()
+    bench.hold(RELEASED, AHEAD, AHEAD)
+    assert bench.commands == []
+    assert not bench.joys.has_subscribers
+
+
+def test_the_mode_can_change_and_then_neutral_comes_first(bench: ControlBench) -> None:
+    bench.show("Forward", "Forward")
+    bench.control.reconfigure(Config(control=JOYSTICK))
+    bench.hold(*[AHEAD] * 10)
+    assert set(bench.commands[2:]) == {(0, 0)}
+    bench.hold(*[RELEASED] * 20, AHEAD)
+    assert bench.last() == (0.5, 0)
+    bench.control.reconfigure(Config())
+    bench.show("Forward")
+    assert bench.last() == (0, 0)
+    bench.show("Stop", "Forward")
+    assert bench.last() == (0.01, 0)
+
+
+def test_a_gamepad_goes_before_the_hand_while_its_button_is_held() -> None:
+    bench = ControlBench(JOYSTICK)
+    bench.hold(RELEASED, AHEAD)
+    bench.hold(LEFT, LEFT, on=bench.gamepad)
+    assert bench.last() == (0, 2)
+    bench.hold(AHEAD)
+    assert bench.last() == (0, 2)
+    bench.hold(RELEASED, RELEASED, on=bench.gamepad)
+    assert bench.last() == (0, 0)
+    count = len(bench.commands)
+    bench.hold(*[RELEASED] * 30, on=bench.gamepad)
+    assert set(bench.commands[count:]) <= {(0, 0)}
+    bench.hold(RELEASED, AHEAD)
+    assert bench.last() == (0.5, 0), "a gamepad at rest leaves the robot to the hand"
+
+
+def test_button_and_axes_of_the_gamepad_are_those_of_the_configuration() -> None:
+    bench = ControlBench(JOYSTICK)
+    rule = JoyConfig(enable_button=5, axis_linear=3, axis_angular=2)
+    bench.nodes = [HandSignControlNode(bench.transport, bench.clock, JOYSTICK, gamepad=rule)]
+    axes, buttons = np.array([1, 1, 0, 0.25], np.float32), np.array([0, 0, 0, 0, 0, 1], np.int32)
+    for pressed in (0 * buttons, buttons):
+        bench.gamepad.publish(Joy(HEADER, axes, pressed), bench.clock.now())
+        bench.run(0.05)
+    assert bench.last() == (0.25, 0)
+
+
+def test_nothing_moves_before_an_open_palm_engaged_the_hand() -> None:
+    bench = ControlBench(engage=True)
+    diagnostics = bench.record(DIAGNOSTICS)
+    bench.show(*["Forward"] * 30)
+    assert set(bench.commands) == {(0, 0)}
+    reported = {pair.key: pair.value for pair in diagnostics[-1].status[0].values}
+    assert diagnostics[-1].status[0].message == "standing: disengaged, until an open palm is held for 1 s"
+    assert reported["engaged"] == "False"
+    bench.show(*["Stop"] * 32, "Forward")
+    assert bench.last() == (0.01, 0)
+    bench.run(1.0)
+    bench.show("NONE", "Forward")
+    assert bench.last() == (0, 0), "a fault disengages"
+
+
+def test_a_palm_engages_the_joystick_too() -> None:
+    bench = ControlBench(JOYSTICK, arming=True, engage=True)
+    for _ in range(70):
+        bench.signs.publish(String(data="Stop"), bench.clock.now())
+        bench.hold(RELEASED)
+    bench.hold(AHEAD)
+    assert bench.last() == (0.5, 0)

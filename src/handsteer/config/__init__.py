@@ -11,7 +11,15 @@ from typing import Any, Literal, TypeVar
 from pydantic import Field, ValidationError, model_validator
 
 from handsteer.config.driving import CollisionMonitorConfig, ControlConfig, RobotConfig, RobotKind, preset
-from handsteer.config.recognition import CameraConfig, LandmarksConfig, Recorded, SignsConfig, VirtualHandConfig
+from handsteer.config.recognition import (
+    CameraConfig,
+    JoyConfig,
+    JoystickConfig,
+    LandmarksConfig,
+    Recorded,
+    SignsConfig,
+    VirtualHandConfig,
+)
 from handsteer.config.section import Section
 from handsteer.errors import ConfigError
 from handsteer.types import CmdVelType
@@ -22,6 +30,8 @@ __all__ = [
     "Config",
     "ControlConfig",
     "DashboardConfig",
+    "JoyConfig",
+    "JoystickConfig",
     "LandmarksConfig",
     "Recorded",
     "RobotConfig",
@@ -90,6 +100,8 @@ class Config(Section):
     virtual_hand: VirtualHandConfig = VirtualHandConfig()
     landmarks: LandmarksConfig = LandmarksConfig()
     signs: SignsConfig = SignsConfig()
+    joystick: JoystickConfig = JoystickConfig()
+    joy: JoyConfig = JoyConfig()
     control: ControlConfig = ControlConfig()
     collision_monitor: CollisionMonitorConfig = CollisionMonitorConfig()
     robot: RobotConfig = RobotConfig()

@@ -63,8 +63,17 @@ def preset(name: object) -> dict[str, Any]:
 
 
 class ControlConfig(Section):
-    """Conversion of signs to velocities."""
+    """Conversion of signs, or of the hand as a joystick, to velocities."""
 
+    mode: Literal["signs", "joystick"] = live(
+        "signs",
+        description="What the hand is: signs, as in the tutorial, or a joystick (/gesture/joy), with a gamepad on /joy",
+    )
+    rule: Literal["course", "cruise"] = live(
+        "course",
+        description="How signs drive: course is the tutorial's rule; cruise keeps a set speed that Forward and "
+        "Backward change in steps, turns while a turn is shown, and goes straight with Go",
+    )
     ramp: Literal["per_message", "per_second"] = live(
         "per_message",
         description="per_message adds a step per message, as in the tutorial; per_second is independent of frame rate",
@@ -73,6 +82,17 @@ class ControlConfig(Section):
     angular_step: float = live(0.1, gt=0, le=5, description="Change of angular speed per message [rad/s]")
     linear_acceleration: float = live(0.3, gt=0, le=10, description="Change of linear speed with per_second [m/s²]")
     angular_acceleration: float = live(3.0, gt=0, le=50, description="Change of angular speed with per_second [rad/s²]")
+    cruise_step: float = live(0.25, gt=0, le=5, description="Step of the set speed with cruise [m/s]")
+    cruise_step_time: float = live(
+        0.4, gt=0, le=5, description="A sign that is held changes the set speed by a further step after this long [s]"
+    )
+    cruise_acceleration: float = live(
+        1.0, gt=0, le=10, description="Acceleration to the set speed with cruise; it brakes twice as hard [m/s²]"
+    )
+    cruise_turn: float = live(1.2, gt=0, le=20, description="Angular speed that a turn reaches with cruise [rad/s]")
+    cruise_angular_acceleration: float = live(
+        3.0, gt=0, le=50, description="Angular acceleration of a turn with cruise; it ends twice as fast [rad/s²]"
+    )
     max_sign_rate: float = live(
         60.0,
         gt=0,
@@ -122,6 +142,11 @@ class ControlConfig(Section):
         description="Whether the robot moves only after neutral (Stop, or no hand) at start-up and after each fault; "
         "auto is on unless the robot is simulated in the same process",
     )
+    engage: Literal["auto", "on", "off"] = Field(
+        "auto",
+        description="Whether the hand drives only after an open palm was held for 1 s, until 5 s without a sign, a "
+        "Stop or a fault; auto is on unless the robot is simulated in the same process",
+    )
     cmd_vel_type: CmdVelType = Field(
         "auto",
         description="Type of commands to send: geometry_msgs/Twist or TwistStamped; auto follows robot.cmd_vel_type, "
@@ -134,11 +159,11 @@ class ControlConfig(Section):
         description="Namespaces of robots that one hand drives in turn, such as [r1, r2]; empty for a single robot",
     )
 
-    @field_validator("arming", mode="before")
+    @field_validator("arming", "engage", mode="before")
     @classmethod
-    def _from_yaml(cls, arming: object) -> object:
+    def _from_yaml(cls, value: object) -> object:
         # YAML, and so ROS, converts on and off to true and false.
-        return {True: "on", False: "off"}[arming] if isinstance(arming, bool) else arming
+        return {True: "on", False: "off"}[value] if isinstance(value, bool) else value
 
     @field_validator("robots")
     @classmethod

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import ClassVar, Literal
 
-from pydantic import ConfigDict, Field
+from pydantic import ConfigDict, Field, model_validator
 
 from handsteer.config.section import OptionalPath, Section, live
 from handsteer.timeouts import STALE_S
@@ -124,3 +124,42 @@ class SignsConfig(Section):
         description="Images to subscribe to: raw is /image_raw, compressed is /image_raw/compressed; auto is "
         "compressed if nodes may be on other machines (DDS beyond localhost), or the one that is published",
     )
+
+
+class JoystickConfig(Section):
+    """The hand as a joystick: its position while the fist is closed, relative to where it was closed."""
+
+    dead_zone: float = live(
+        0.12,
+        ge=0,
+        le=1,
+        description="Movements of the fist below this have no effect, in each direction [palm lengths]",
+    )
+    full_deflection: float = live(
+        1.0, gt=0, le=5, description="Movement of the fist for full speed [palm lengths]; a palm is about 0.09 m long"
+    )
+    expo: float = live(
+        0.3, ge=0, le=1, description="Share of the cube in the response: 0 is linear, more is finer near the middle"
+    )
+    min_cutoff: float = live(
+        3.0, gt=0, le=100, description="Cutoff frequency of the One-Euro filter for a hand at rest [Hz]"
+    )
+    beta: float = live(
+        1.0, ge=0, le=100, description="Increase of that frequency with speed [Hz per palm length a second]"
+    )
+
+    @model_validator(mode="after")
+    def _has_room_beyond_the_dead_zone(self) -> "JoystickConfig":
+        if self.full_deflection <= self.dead_zone:
+            raise ValueError(
+                f"full_deflection should be above dead_zone, {self.dead_zone:g}; it is {self.full_deflection:g}"
+            )
+        return self
+
+
+class JoyConfig(Section):
+    """How messages of a gamepad on /joy are read, as by ROS's teleop_twist_joy."""
+
+    enable_button: int = Field(0, ge=0, le=63, description="Button that must be held to drive")
+    axis_linear: int = Field(1, ge=0, le=63, description="Axis for forward and backward")
+    axis_angular: int = Field(0, ge=0, le=63, description="Axis for turning; positive is left")

@@ -9,30 +9,38 @@ from handsteer.types import EFFECTS, Action
 ReasonCode = Literal[
     "sign",
     "steered",
+    "joystick",
     "stopped",
     "disarmed",
+    "disengaged",
     "steering_disarmed",
     "no_image",
     "no_scan",
     "obstacle",
     "steered_at_zero",
+    "not_held",
+    "held",
     "no_input",
     "no_sign",
     "stop_sign",
     "not_started",
 ]
-"""Every reason for what is commanded; the first two are those of a robot that drives."""
+"""Every reason for what is commanded; the first three are those of a robot that drives."""
 
 _SENTENCES: dict[ReasonCode, str] = {
     "sign": "{}",
     "steered": "steered by hand",
+    "joystick": "driven by the hand as a joystick",
     "stopped": "stopped, until it is reset",
     "disarmed": "disarmed{}, moves once Stop is shown, or no hand",
+    "disengaged": "disengaged, until an open palm is held for {} s",
     "steering_disarmed": "disarmed, steers once the steering has been released",
     "no_image": "{}",
     "no_scan": "{}",
     "obstacle": "stopped before an {}",
     "steered_at_zero": "steered by hand, at zero",
+    "not_held": "no hand holds the joystick: open it, then close the fist",
+    "held": "the joystick is held, in the middle",
     "no_input": "no sign has come for {} s",
     "no_sign": "no sign is seen",
     "stop_sign": "the {} sign is shown",
@@ -59,7 +67,7 @@ class Reason:
     @property
     def is_driving(self) -> bool:
         """Whether the robot is to move."""
-        return self.code in ("sign", "steered")
+        return self.code in ("sign", "steered", "joystick")
 
     @property
     def explanation(self) -> str:

@@ -1,6 +1,7 @@
 """Decides when the robot may move, and how fast it may accelerate: pure rules without a clock.
 
-A robot moves only while there is a current reason. :class:`Safety` decides whether inputs are followed,
+A robot moves only while there is a current reason. :class:`Safety` decides whether inputs are followed, with the clutch
+:class:`Engagement`,
 :class:`Following` whether the robot does what is commanded, :class:`Allowance` limits the rate of signs, and
 :class:`Ramp` acceleration and jerk. The times are in :mod:`handsteer.timeouts`.
 """
@@ -10,6 +11,8 @@ import math
 from handsteer.config import ControlConfig
 from handsteer.timeouts import (
     ARMING_S,
+    DISENGAGE_S,
+    ENGAGE_S,
     FAULT_GAP_S,
     MOST_OF_ONE_NONE_S,
     NEUTRAL_S,
@@ -18,9 +21,63 @@ from handsteer.timeouts import (
     STEERING_AT_START_S,
     STOOD_BY_ITSELF_S,
 )
-from handsteer.types import NONE, Velocity
+from handsteer.types import NONE, STOP, Velocity
 
 _SLACK_S = 1e-9
+
+
+class Engagement:
+    """The clutch between hand and robot: while disengaged, nothing moves whatever is shown.
+
+    An open palm (``Stop``) held for :data:`~handsteer.timeouts.ENGAGE_S` engages, and
+    :data:`~handsteer.timeouts.DISENGAGE_S` without a sign, a Stop or a fault disengage. It prevents what is known as
+    the Midas touch: everyday movements of the hand that are taken for commands.
+
+    Args:
+        enabled: If not, the hand is always engaged.
+    """
+
+    def __init__(self, *, enabled: bool) -> None:
+        self.enabled = enabled
+        self._engaged = not enabled
+        self._palm_s = 0.0
+        self._idle_s = 0.0
+        self._gap_s = math.inf
+
+    @property
+    def engaged(self) -> bool:
+        """Whether the hand drives."""
+        return self._engaged
+
+    @property
+    def progress(self) -> float:
+        """Progress of engaging, 0 to 1."""
+        return 1.0 if self._engaged else min(1.0, self._palm_s / ENGAGE_S)
+
+    def step(self, dt_s: float) -> None:
+        """Advance time by ``dt_s`` seconds, >= 0."""
+        self._idle_s += dt_s
+        self._gap_s += dt_s
+        if self._idle_s >= DISENGAGE_S - _SLACK_S:
+            self.disengage()
+
+    def note_sign(self, sign: str) -> None:
+        """Record the sign of a frame."""
+        if sign != NONE:
+            self._idle_s = 0.0
+        if sign != STOP:
+            self._palm_s, self._gap_s = 0.0, math.inf
+            return
+        # The time before the first palm, or of a pause, was not observed.
+        self._palm_s = self._palm_s + self._gap_s if self._gap_s < FAULT_GAP_S else 0.0
+        self._gap_s = 0.0
+        if self._palm_s >= ENGAGE_S - _SLACK_S:
+            self._engaged = True
+
+    def disengage(self) -> None:
+        """Require the open palm again; without effect if not enabled."""
+        self._palm_s, self._gap_s = 0.0, math.inf
+        self._engaged = not self.enabled
 
 
 class Safety:
@@ -32,17 +89,24 @@ class Safety:
     pause of steering that was not at zero is a fault too. So a hand that is already up, or a joystick that is held,
     does not start the robot.
 
+    The hand as a joystick must always be released before it is followed: at the start, after each fault, and after
+    steering.
+
     Args:
         config: Timeouts of signs and steering.
         arming: Whether neutral is required after the start and after faults.
+        engage: Whether the hand must also be engaged.
 
     Attributes:
         is_stopped: Whether a Stop is active, until :meth:`reset`.
+        engagement: The clutch.
     """
 
-    def __init__(self, config: ControlConfig, *, arming: bool) -> None:
+    def __init__(self, config: ControlConfig, *, arming: bool, engage: bool = False) -> None:
         self._config = config
         self._arming = arming
+        self.engagement = Engagement(enabled=engage)
+        self._stick_waits = True
         self._age_s = 0.0
         self._sign_age_s = math.inf
         self._steering_age_s = math.inf
@@ -59,6 +123,11 @@ class Safety:
         return self._signs_wait
 
     @property
+    def stick_waits(self) -> bool:
+        """Whether the hand as a joystick has to be released first."""
+        return self._stick_waits
+
+    @property
     def steering_waits(self) -> bool:
         """Whether steering has to be released first."""
         return self._steering_waits
@@ -68,12 +137,14 @@ class Safety:
         self._age_s += dt_s
         self._sign_age_s += dt_s
         self._steering_age_s += dt_s
+        self.engagement.step(dt_s)
         if self._config.sign_timeout <= self._sign_age_s < math.inf:
             self.fault("no sign came")
 
     def stop(self) -> None:
         """Stop the robot until :meth:`reset`."""
         self.is_stopped = True
+        self.engagement.disengage()
 
     def reset(self) -> None:
         """End a Stop; each input must show neutral before it is followed again. Without a Stop it changes nothing."""
@@ -85,11 +156,13 @@ class Safety:
         """Require neutral of signs and steering before either is followed again."""
         self._signs_wait, self._steering_waits = why, True
         self._neutral_s = 0.0
+        self._disengage()
 
     def fault(self, why: str) -> None:
         """Record a fault; with ``arming``, signs have to show neutral again."""
         self._neutral_s = 0.0
         self._was_fault = True
+        self._disengage()
         if self._arming and not self._signs_wait:
             self._signs_wait = why
 
@@ -97,23 +170,26 @@ class Safety:
         """Record that no robot follows the commands; with ``arming``, neutral is required when one does again."""
         if self._arming:
             self.disarm(why)
+        else:
+            self._disengage()
 
     def admits_sign(self, sign: str, *, stops: bool) -> bool:
         """Record a sign, and whether it ``stops``; return whether the robot may follow it."""
-        gap_s, self._sign_age_s = self._sign_age_s, 0.0
-        if sign == NONE:
-            self._note_none(gap_s)
-        elif stops:
-            self._neutral_s = math.inf
-        else:
-            self._neutral_s = 0.0
-        if self._neutral_s >= NEUTRAL_S - _SLACK_S and not (self._arming and self._age_s < ARMING_S):
-            self._signs_wait = None
-        return self._signs_wait is None and not self.is_stopped
+        self._note(sign, stops=stops)
+        return self._signs_wait is None and self.engagement.engaged and not self.is_stopped
+
+    def admits_stick(self, *, held: bool) -> bool:
+        """Record the state of the hand as a joystick; return whether the robot may follow it."""
+        self._note("" if held else NONE, stops=not held)
+        if not held:
+            self._stick_waits = False
+        waits = self._stick_waits or self._signs_wait is not None
+        return self.engagement.engaged and not (waits or self.is_stopped)
 
     def admits_steering(self, *, is_zero: bool) -> bool:
         """Record a steering command; return whether the robot may follow it."""
         age_s, self._steering_age_s = self._steering_age_s, 0.0
+        self._stick_waits = True
         # Steering first received soon after the start may have been held since before it.
         is_first_at_start = math.isinf(age_s) and self._arming and self._age_s < STEERING_AT_START_S
         after_pause = age_s >= self._config.steering_timeout and not is_first_at_start
@@ -129,6 +205,17 @@ class Safety:
         """Change the timeouts."""
         self._config = config
 
+    def _note(self, sign: str, *, stops: bool) -> None:
+        gap_s, self._sign_age_s = self._sign_age_s, 0.0
+        if sign == NONE:
+            self._note_none(gap_s)
+        elif stops:
+            self._neutral_s = math.inf
+        else:
+            self._neutral_s = 0.0
+        if self._neutral_s >= NEUTRAL_S - _SLACK_S and not (self._arming and self._age_s < ARMING_S):
+            self._signs_wait = None
+
     def _note_none(self, gap_s: float) -> None:
         if gap_s >= FAULT_GAP_S:
             self.fault("recognition had no frame")
@@ -136,6 +223,10 @@ class Safety:
             self._neutral_s += min(gap_s, MOST_OF_ONE_NONE_S)
         else:
             self._was_fault = False  # what happened since the fault was not observed
+
+    def _disengage(self) -> None:
+        self._stick_waits = True
+        self.engagement.disengage()
 
 
 class Following:

@@ -1,20 +1,20 @@
-"""Selects the active input: steering overrides signs while it is in use."""
+"""Selects the active input: steering overrides the hand while it is in use."""
 
 import math
 from typing import Literal
 
 from handsteer.config import ControlConfig
 from handsteer.control.explain import Reason
-from handsteer.control.sign_control import SignControl
-from handsteer.types import NONE, ZERO, Velocity, action_of
+from handsteer.control.sign_control import CruiseControl, SignControl
+from handsteer.types import NONE, ZERO, Stick, Velocity, action_of
 
-Source = Literal["none", "signs", "steering"]
+Source = Literal["none", "signs", "joystick", "steering"]
 
 
 class TwistMux:
-    """Merges signs and steering into one stream of velocities.
+    """Merges the hand, as signs or as a joystick, and steering into one stream of velocities.
 
-    A steering command takes over at once and blocks signs until ``steering_timeout`` has passed without another one.
+    A steering command takes over at once and blocks the hand until ``steering_timeout`` has passed without another one.
     Then one zero is commanded, and signs continue from zero. These are the priorities and timeouts of ROS's
     ``twist_mux``, in one place, so that the robot has one source of commands.
 
@@ -24,8 +24,9 @@ class TwistMux:
 
     def __init__(self, config: ControlConfig) -> None:
         self._config = config
-        self._signs = SignControl(config)
-        self._since_steering_s = 0.0
+        self._signs = _signs_by_rule(config)
+        self._since_input_s = 0.0
+        self._is_held = False
         self._last_sign: str | None = None
         self._velocity = ZERO
         self.source: Source = "none"
@@ -35,13 +36,16 @@ class TwistMux:
         """The last commanded velocity."""
         return self._velocity
 
-    def step(self, dt_s: float, *, sign: str | None = None, steering: Velocity | None = None) -> Velocity | None:
+    def step(
+        self, dt_s: float, *, sign: str | None = None, steering: Velocity | None = None, stick: Stick | None = None
+    ) -> Velocity | None:
         """Advance time by ``dt_s``, then process the inputs.
 
         Args:
             dt_s: Seconds since the last step, >= 0; any other value is a fault and stops the robot.
             sign: The sign of one message, if one was received.
             steering: A steering command, if one was received; clamped to the limits, and zero if not finite.
+            stick: The hand as a joystick, if that was received; full deflection is the highest speed.
 
         Returns:
             The velocity to command now, or None to command nothing.
@@ -51,7 +55,11 @@ class TwistMux:
         if steering is not None:
             return self._steer(steering)
         if self.source == "steering":
-            return self._wait_for_steering(dt_s)
+            return self._wait(dt_s, self._config.steering_timeout)
+        if stick is not None:
+            return self._follow(stick)
+        if self.source == "joystick":
+            return self._wait(dt_s, self._config.sign_timeout)
         velocity = self._signs.step(sign, dt_s)
         if sign is not None:
             self._last_sign = sign
@@ -64,8 +72,11 @@ class TwistMux:
         Returns:
             The velocity to command now if the last one exceeds the new limits; else None.
         """
+        if config.rule == self._config.rule:
+            self._signs.reconfigure(config)
+        else:
+            self._signs = _signs_by_rule(config)
         self._config = config
-        self._signs.reconfigure(config)
         within = self._velocity.clamped(config.max_linear, config.max_angular)
         return self._take(within if self.source != "none" and within != self._velocity else None)
 
@@ -86,6 +97,8 @@ class TwistMux:
         """Why this velocity is commanded."""
         if self.source == "steering":
             return Reason("steered_at_zero" if self._velocity.is_zero else "steered")
+        if self.source == "joystick":
+            return Reason("not_held" if not self._is_held else "held" if self._velocity.is_zero else "joystick")
         if self.source == "none":
             return Reason("no_input", f"{self._config.sign_timeout:g}")
         sign = self._last_sign or NONE
@@ -99,14 +112,27 @@ class TwistMux:
         config = self._config
         self._signs.halt()
         self.source = "steering"
-        self._since_steering_s = 0.0
+        self._since_input_s = 0.0
         return self._take(wanted.clamped(config.max_linear, config.max_angular) if wanted.is_finite else ZERO)
 
-    def _wait_for_steering(self, dt_s: float) -> Velocity | None:
-        self._since_steering_s += dt_s
-        return self.halt() if self._since_steering_s >= self._config.steering_timeout else None
+    def _follow(self, stick: Stick) -> Velocity | None:
+        self._signs.halt()
+        self.source = "joystick"
+        self._since_input_s = 0.0
+        self._is_held = stick.held
+        wanted = Velocity(stick.forward * self._config.max_linear, stick.left * self._config.max_angular)
+        is_valid = stick.held and wanted.is_finite
+        return self._take(wanted.clamped(self._config.max_linear, self._config.max_angular) if is_valid else ZERO)
+
+    def _wait(self, dt_s: float, timeout_s: float) -> Velocity | None:
+        self._since_input_s += dt_s
+        return self.halt() if self._since_input_s >= timeout_s else None
 
     def _take(self, velocity: Velocity | None) -> Velocity | None:
         if velocity is not None:
             self._velocity = velocity
         return velocity
+
+
+def _signs_by_rule(config: ControlConfig) -> SignControl:
+    return CruiseControl(config) if config.rule == "cruise" else SignControl(config)

@@ -1,26 +1,30 @@
-"""The node ``hand_sign_control``, which publishes one velocity command per sign."""
+"""The node ``hand_sign_control``, which publishes a velocity per sign, or per frame of the hand as a joystick."""
 
 import logging
 from typing import Any
 
 from handsteer.clock import Clock
-from handsteer.config import CollisionMonitorConfig, Config, ControlConfig
+from handsteer.config import CollisionMonitorConfig, Config, ControlConfig, JoyConfig
 from handsteer.control import Control
 from handsteer.control.explain import Reason
 from handsteer.control.safety import Following
 from handsteer.messages import (
     CMD_VEL,
+    GESTURE_JOY,
     HAND_SIGN,
+    JOY,
     ODOM,
     SCAN,
     STEERING_CMD_VEL,
     STOP,
     Bool,
+    Joy,
     LaserScan,
     Odometry,
     String,
     Topic,
     Twist,
+    stick_in,
 )
 from handsteer.nodes.base import Node
 from handsteer.nodes.collision_monitor import CollisionMonitor, MeasuredVelocity
@@ -28,7 +32,8 @@ from handsteer.nodes.selection import NEXT, Selection
 from handsteer.nodes.status import ControlStatus
 from handsteer.nodes.supervision import Rivals, StopKeeper
 from handsteer.nodes.timing import CALM_S, LatencyLog, StallGuard
-from handsteer.transports.base import Call, Received, Transport
+from handsteer.timeouts import ENGAGE_S
+from handsteer.transports.base import Call, Received, Subscription, Transport
 from handsteer.transports.commands import Commands
 from handsteer.types import NONE, ZERO, Velocity, action_of
 
@@ -41,6 +46,9 @@ _DIAGNOSE_PERIOD_S = 0.1
 class HandSignControlNode(Node):
     """Publishes one Twist per sign, one zero when signs stop, and one zero at the end, however the node ends.
 
+    With ``config.mode`` ``joystick`` it is one Twist per message of the hand as a joystick; signs then only engage, and
+    a gamepad on ``/joy`` steers.
+
     True on ``/stop`` stops the robot and overrides all inputs, until false is received; then signs and steering must
     show neutral first. With ``config.robots`` it drives one of them at a time; see
     :class:`~handsteer.nodes.selection.Selection`.
@@ -49,9 +57,12 @@ class HandSignControlNode(Node):
         config: Limits, steps and timeouts.
         cmd_vel: Topic of the commands, with Twist, TwistStamped or either.
         collision_monitor: Whether and how to slow commands before obstacles; disabled by default.
+        gamepad: How ``/joy`` is read.
         arming: Whether nothing moves before neutral was seen, or while no robot is subscribed
             (:mod:`handsteer.control.safety`).
+        engage: Whether the hand drives nothing before an open palm engaged it.
         sign: Topic of the signs.
+        joy: Topic of the hand as a joystick.
         steering: Topic of steering commands, which override signs.
         odom: Topic of the robot's odometry.
         scan: Topic of its laser scans.
@@ -70,8 +81,11 @@ class HandSignControlNode(Node):
         cmd_vel: Topic[Any] = CMD_VEL,
         collision_monitor: CollisionMonitorConfig | None = None,
         *,
+        gamepad: JoyConfig | None = None,
         arming: bool = False,
+        engage: bool = False,
         sign: Topic[String] = HAND_SIGN,
+        joy: Topic[Joy] = GESTURE_JOY,
         steering: Topic[Twist] = STEERING_CMD_VEL,
         odom: Topic[Odometry] = ODOM,
         scan: Topic[LaserScan] = SCAN,
@@ -79,7 +93,9 @@ class HandSignControlNode(Node):
         super().__init__("hand_sign_control", transport, clock)
         self.latency = LatencyLog()
         self._config = config
-        self._control = Control(config, arming=arming)
+        self._gamepad = (gamepad or JoyConfig()).model_dump()
+        self._is_gamepad_held = False
+        self._control = Control(config, arming=arming, engage=engage)
         self._safety, self._mux = self._control.safety, self._control.mux
         self._following = Following() if arming and not config.robots else None
         self._arming = arming
@@ -99,6 +115,9 @@ class HandSignControlNode(Node):
         StopKeeper(self, self._on_stop_or_reset)
         self.subscribe(steering, self._on_steering)
         self.subscribe(sign, self._on_sign)
+        self._joy = joy
+        self._joysticks: list[Subscription] = []
+        self._take_joysticks()
         if self._following:
             self.subscribe(odom, self._on_odometry)
         self._watchdog = self.every(_WATCHDOG_PERIOD_S, self._watch)
@@ -106,10 +125,14 @@ class HandSignControlNode(Node):
 
     def on_reconfigure(self, config: Config) -> None:
         """Apply all of ``control``; a robot that exceeds new limits is slowed at once."""
-        self._config = config.control
+        before, self._config = self._config, config.control
         self._stall_guard.limit_s = config.control.sign_timeout
         self._monitor.reconfigure(config.collision_monitor)
-        self._publish(self._control.reconfigure(config.control))
+        velocity = self._control.reconfigure(config.control)
+        if (config.control.mode, config.control.rule) != (before.mode, before.rule):
+            velocity = ZERO
+            self._take_joysticks()
+        self._publish(velocity)
 
     def services(self) -> dict[str, Call]:
         """Return ``stop`` and ``reset``, which are equivalent to true and false on ``/stop``."""
@@ -157,9 +180,41 @@ class HandSignControlNode(Node):
         self._publish(self._control.step(elapsed_s, sign=sign), captured_s)
         self._calm_down()
 
+    def _take_joysticks(self) -> None:
+        """Subscribe to joysticks in the mode that follows them."""
+        for subscription in self._joysticks:
+            subscription.close()
+        is_on = self._config.mode == "joystick"
+        self._joysticks = (
+            [self.subscribe(self._joy, self._on_joy), self.subscribe(JOY, self._on_gamepad)] if is_on else []
+        )
+
+    def _on_joy(self, received: Received[Joy]) -> None:
+        stick, captured_s = stick_in(received.message), received.captured_s
+        is_stale = captured_s is not None and self.clock.now() - captured_s > self._config.sign_timeout
+        if is_stale or received.is_late:
+            self._obey_late(is_stop=not stick.held)
+            return
+        elapsed_s = self._elapsed()
+        trusted = None if self._stall_guard.distrusts(self.clock.now()) else stick
+        self._look_after_the_robot(elapsed_s)
+        self._publish(self._control.step(elapsed_s, stick=trusted), captured_s)
+        self._calm_down()
+
+    def _on_gamepad(self, received: Received[Joy]) -> None:
+        """Steer by a gamepad while its enable button is held; one zero when it is released."""
+        stick = stick_in(received.message, **self._gamepad)
+        was_held, self._is_gamepad_held = self._is_gamepad_held, stick.held
+        if not (stick.held or was_held):
+            return
+        self._steer(stick.forward * self._config.max_linear, stick.left * self._config.max_angular, received.is_late)
+
     def _on_steering(self, received: Received[Twist]) -> None:
-        wanted = Velocity(received.message.linear.x, received.message.angular.z)
-        if received.is_late:
+        self._steer(received.message.linear.x, received.message.angular.z, received.is_late)
+
+    def _steer(self, linear_mps: float, angular_radps: float, is_late: bool) -> None:
+        wanted = Velocity(linear_mps, angular_radps)
+        if is_late:
             self._obey_late(is_stop=wanted.is_zero)
             return
         elapsed_s = self._elapsed()
@@ -259,6 +314,8 @@ class HandSignControlNode(Node):
             source=self._mux.source,
             stopped=self._safety.is_stopped,
             armed=self._safety.signs_wait is None,
+            engaged=self._safety.engagement.engaged,
+            engage_progress=round(self._safety.engagement.progress, 2),
             linear_mps=round(velocity.linear_mps, 3),
             angular_radps=round(velocity.angular_radps, 3),
             robot=self._selection.fleet.selected if self._selection else None,
@@ -282,6 +339,8 @@ class HandSignControlNode(Node):
         if source == "steering" and safety.steering_waits:
             return Reason("steering_disarmed", robot=robot)
         # Without any input, that is the reason after a reset, which needs no explanation.
+        if source != "steering" and not safety.engagement.engaged:
+            return Reason("disengaged", f"{ENGAGE_S:g}", robot)
         if source == "steering" or why is None or (source == "none" and not why):
             return self._monitor.explain(self._mux.reason)
         return Reason("disarmed", why, robot)

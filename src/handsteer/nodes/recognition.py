@@ -15,23 +15,28 @@ from handsteer.config import Config, SignsConfig
 from handsteer.errors import ConfigError, ModelError
 from handsteer.images import bgr_image, image_message, jpeg_picture
 from handsteer.messages import (
+    GESTURE_JOY,
     HAND_SIGN,
     IMAGE_ANNOTATED,
     IMAGE_COMPRESSED,
     IMAGE_RAW,
     CompressedImage,
+    Header,
     Image,
+    Joy,
     String,
     Topic,
+    joy_of,
 )
 from handsteer.nodes.base import Node
 from handsteer.nodes.status import RecognitionStatus
 from handsteer.nodes.supervision import StopKeeper
 from handsteer.nodes.timing import CALM_S, FrameAge, LatencyLog, Recording, StallGuard
 from handsteer.recognition.hand import Classifier
+from handsteer.recognition.hand_joystick import HandJoystick
 from handsteer.recognition.recognizer import Recognition, Recognizer
 from handsteer.transports.base import Received, Subscription, Transport
-from handsteer.types import NONE
+from handsteer.types import NONE, RELEASED
 
 _WATCH_PERIOD_S = 0.02
 # Longer than FAULT_GAP_S, so that the control does not take these ``NONE`` for processed frames.
@@ -54,9 +59,11 @@ class HandSignRecognitionNode(Node):
         config: Maximum age of a frame, and which images to subscribe to.
         annotate: Draws the result into a copy of the frame, if there are subscribers.
         open_classifier: Opens the classifier of ``signs.model`` when it changes while the node runs.
+        joystick: The hand as a joystick, with the default parameters when None.
         image: Topic of the frames.
         compressed: Topic of the same as JPEG.
         sign: Topic of the signs.
+        joy: Topic of the hand as a joystick.
 
     Attributes:
         counts: Number of frames per confirmed sign.
@@ -72,15 +79,18 @@ class HandSignRecognitionNode(Node):
         annotate: Annotate,
         *,
         open_classifier: OpenClassifier,
+        joystick: HandJoystick | None = None,
         image: Topic[Image] = IMAGE_RAW,
         compressed: Topic[CompressedImage] = IMAGE_COMPRESSED,
         sign: Topic[String] = HAND_SIGN,
+        joy: Topic[Joy] = GESTURE_JOY,
     ) -> None:
         super().__init__("hand_sign_recognition", transport, clock)
         self.counts: dict[str, int] = {}
         self.processing = LatencyLog()
         self._recognizer = recognizer
         self._config = config
+        self._joystick = joystick or HandJoystick()
         self._annotate = annotate
         self._open_classifier = open_classifier
         self._model = _version_of(config.model)
@@ -98,6 +108,7 @@ class HandSignRecognitionNode(Node):
         self._recognition: Recognition | None = None
         StopKeeper(self)
         self._sign = self.publisher(sign)
+        self._joy = self.publisher(joy)
         self._annotated = self.publisher(IMAGE_ANNOTATED)
         self._frames, self._jpegs = image, compressed
         wanted = config.image_transport
@@ -121,11 +132,13 @@ class HandSignRecognitionNode(Node):
         if self._has_other_model(config.signs):
             version = _version_of(config.signs.model)
             self._recognizer.use(self._open_classifier(config.signs))
+            self._joystick.reset()
             self._model = version
         self._config = config.signs
         limit_s = config.signs.max_frame_age
         self._age.limit_s = self._freshness.limit_s = self._recording.limit_s = self._stall_guard.limit_s = limit_s
         self._recognizer.reconfigure(config.signs)
+        self._joystick.reconfigure(config.joystick)
 
     def _has_other_model(self, config: SignsConfig) -> bool:
         version, mine = _version_of(config.model), self._model
@@ -160,6 +173,7 @@ class HandSignRecognitionNode(Node):
             return
         # The time of skipped pictures counts: a sign is bridged from when it was last seen.
         recognition = self._recognizer.step(image, self._unseen_s)
+        stick = self._joystick.step(recognition, self._unseen_s)
         self._unseen_s = 0.0
         self._refused = self._why_too_late(began_s)
         if self._refused is not None:
@@ -174,10 +188,15 @@ class HandSignRecognitionNode(Node):
         self._recognition = recognition
         self.counts[recognition.sign] = self.counts.get(recognition.sign, 0) + 1
         self._sign.publish(String(data=recognition.sign), received.captured_s)
+        if self._joy.has_subscribers:
+            self._joy.publish(joy_of(stick, received.message.header), received.captured_s)
         self.processing.add(self.clock.now() - began_s)
         if self._annotated.has_subscribers:
             header = received.message.header
-            self._annotated.publish(image_message(self._annotate(image, recognition), header), received.captured_s)
+            picture = self._annotate(image, recognition)
+            if self._joy.has_subscribers:
+                self._joystick.draw(picture)
+            self._annotated.publish(image_message(picture, header), received.captured_s)
 
     def _why_too_late(self, began_s: float) -> str | None:
         """Return why a fresh frame has no sign: this process was stopped or stalled while it was processed."""
@@ -185,6 +204,7 @@ class HandSignRecognitionNode(Node):
         if age_s <= self._config.max_frame_age:
             return None
         self._recognizer.reset()
+        self._joystick.reset()
         return f"a frame was {age_s:.1f} s old when its sign was known: was this process stalled?"
 
     def _take_images(self) -> Subscription:
@@ -218,8 +238,11 @@ class HandSignRecognitionNode(Node):
         if now - self._last_sign_s > period_s:
             self._last_sign_s = now
             self._recognizer.reset()
+            self._joystick.reset()
             self._recognition = None
             self._sign.publish(String(data=NONE))
+            if self._joy.has_subscribers:
+                self._joy.publish(joy_of(RELEASED, Header(stamp=self.clock.stamp(now), frame_id="")))
 
     def _report(self) -> RecognitionStatus:
         now, seen = self.clock.now(), self._recognition

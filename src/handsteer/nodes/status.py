@@ -143,6 +143,8 @@ class ControlStatus(Status):
         source: The active input.
         stopped: Whether the robot is stopped until reset.
         armed: Whether signs count; otherwise they must show neutral first.
+        engaged: Whether the hand drives; otherwise an open palm must engage it first.
+        engage_progress: Progress of engaging, 0 to 1.
         linear_mps: Commanded forward velocity.
         angular_radps: Commanded angular velocity, left positive.
         robot: The selected one of several robots; None if there is one.
@@ -160,6 +162,8 @@ class ControlStatus(Status):
     source: Source = "none"
     stopped: bool = False
     armed: bool = True
+    engaged: bool = True
+    engage_progress: float = 1.0
     linear_mps: float = 0.0
     angular_radps: float = 0.0
     robot: str | None = None

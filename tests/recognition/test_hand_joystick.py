@@ -1,0 +1,220 @@
+"""The hand as a joystick, on hands with known shapes and places."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from handsteer.config import JoystickConfig
+from handsteer.recognition.hand import Hand
+from handsteer.recognition.hand_joystick import HandJoystick, deflection
+from handsteer.recognition.recognizer import Recognition
+from handsteer.types import GO, RELEASED, STOP, Handedness, Stick
+from tests.recognition.hands import SIZE, show_sign
+
+DT_S = 1 / 30
+OPEN, FIST = show_sign(STOP), show_sign(GO)
+LINEAR = JoystickConfig(dead_zone=0.1, full_deflection=1.1, expo=0.0, min_cutoff=100.0)
+
+
+def moved(hand: Hand, right_px: float, down_px: float) -> Hand:
+    """Return ``hand`` elsewhere in the unmirrored picture."""
+    return replace(hand, points=hand.points + np.array([right_px / SIZE[0], down_px / SIZE[1], 0], np.float32))
+
+
+class Person:
+    """Shows hands to a joystick, as a perfect classifier would see them."""
+
+    def __init__(self, config: JoystickConfig = LINEAR) -> None:
+        self.joystick = HandJoystick(config)
+
+    def shows(self, hand: Hand | None, sign: str, frames: int = 1, dt_s: float = DT_S) -> Stick:
+        likelihoods = {sign: 1.0} if hand is not None else {}
+        for _ in range(frames):
+            self.joystick.step(Recognition(sign, sign, 1.0, 1.0, hand, likelihoods), dt_s)
+        return self.joystick.stick
+
+    def opens(self, hand: Hand = OPEN, frames: int = 8) -> Stick:
+        return self.shows(hand, STOP, frames)
+
+    def closes(self, hand: Hand = FIST, frames: int = 6) -> Stick:
+        return self.shows(hand, GO, frames)
+
+    def grabs(self) -> None:
+        self.opens()
+        assert self.closes() == Stick(held=True)
+
+    @property
+    def palm_px(self) -> float:
+        assert self.joystick.grip is not None
+        return self.joystick.grip.palm_px
+
+
+@pytest.fixture
+def person() -> Person:
+    return Person()
+
+
+def test_an_open_hand_that_closes_holds_it_in_the_middle(person: Person) -> None:
+    assert person.opens() == RELEASED
+    assert person.closes(frames=2) == RELEASED
+    assert person.closes(frames=4) == Stick(held=True)
+
+
+def test_a_fist_that_was_not_open_before_holds_nothing(person: Person) -> None:
+    assert person.closes(frames=100) == RELEASED
+    person.opens(frames=2)
+    assert person.closes(frames=100) == RELEASED
+
+
+def test_a_fist_long_after_the_open_hand_holds_nothing(person: Person) -> None:
+    person.opens()
+    person.shows(show_sign("Forward"), "Forward", 60)
+    assert person.closes(frames=10) == RELEASED
+
+
+@pytest.mark.parametrize(
+    ("right", "down", "forward", "left"),
+    [(0, -0.6, 0.5, 0), (0, 0.6, -0.5, 0), (0.6, 0, 0, 0.5), (-0.6, 0, 0, -0.5), (0.09, 0.09, 0, 0), (-1.4, 0, 0, -1)],
+)
+def test_its_movement_in_palm_lengths_is_the_deflection(
+    person: Person, right: float, down: float, forward: float, left: float
+) -> None:
+    person.grabs()
+    palm_px = person.palm_px
+    for share in (0.5, *[1.0] * 30):
+        stick = person.closes(moved(FIST, share * right * palm_px, share * down * palm_px), 1)
+    assert stick.held
+    assert stick.forward == pytest.approx(forward, abs=0.02)
+    assert stick.left == pytest.approx(left, abs=0.02)
+
+
+@pytest.mark.parametrize("away_m", [0.4, 0.6, 1.2])
+def test_the_distance_to_the_camera_does_not_matter(away_m: float) -> None:
+    person = Person()
+    hands = [show_sign(sign, away_m=away_m) for sign in (STOP, GO)]
+    person.opens(hands[0])
+    person.closes(hands[1])
+    for share in (0.3, 0.6):
+        stick = person.closes(moved(hands[1], 0, -share * 0.09 / away_m * _focal_px()), 20)
+    assert stick.forward == pytest.approx(0.5, abs=0.1)
+
+
+def _focal_px() -> float:
+    return float(np.hypot(*SIZE) / (2 * np.tan(np.radians(35.0))))
+
+
+def test_an_open_hand_releases_it_at_once(person: Person) -> None:
+    person.grabs()
+    person.closes(moved(FIST, 40, 0), 10)
+    assert person.opens(moved(OPEN, 40, 0), 1) == RELEASED
+
+
+def test_a_shape_that_is_no_fist_releases_it_soon(person: Person) -> None:
+    person.grabs()
+    assert person.shows(show_sign("Forward"), "Forward", 3).held
+    assert person.shows(show_sign("Forward"), "Forward", 1) == RELEASED
+    assert person.closes(frames=30) == RELEASED, "it must be opened first"
+
+
+@pytest.mark.parametrize("fps", [10, 15, 30, 60])
+def test_a_lost_hand_releases_it_within_a_tenth_of_a_second(person: Person, fps: int) -> None:
+    person.grabs()
+    frames = max(1, int(0.1 * fps + 1e-9))
+    assert person.shows(None, "NONE", frames, 1 / fps) == RELEASED
+    assert person.closes(frames=30) == RELEASED, "it must be opened first"
+
+
+def test_one_frame_without_the_hand_changes_nothing(person: Person) -> None:
+    person.grabs()
+    held = person.closes(moved(FIST, 40, 0), 10)
+    assert person.shows(None, "NONE") == held
+    assert person.closes(moved(FIST, 40, 0), 1).left == pytest.approx(held.left, abs=1e-3)
+
+
+def test_a_hand_at_the_edge_of_the_picture_releases_it(person: Person) -> None:
+    person.grabs()
+    for step in range(20):
+        stick = person.closes(moved(FIST, 20 * step, 0), 1)
+    assert stick == RELEASED
+
+
+@pytest.mark.parametrize("place", [(200, 0), (0, -150)])
+def test_another_hand_elsewhere_releases_it(person: Person, place: tuple[float, float]) -> None:
+    person.grabs()
+    assert person.closes(moved(FIST, *place), 1) == RELEASED
+
+
+@pytest.mark.parametrize("away_m", [0.35, 1.1])
+def test_a_much_nearer_or_farther_hand_releases_it(person: Person, away_m: float) -> None:
+    person.grabs()
+    assert person.closes(show_sign(GO, away_m=away_m), 1) == RELEASED
+
+
+def test_the_persons_other_hand_in_its_place_releases_it(person: Person) -> None:
+    person.grabs()
+    assert person.closes(show_sign(GO, "Left"), 3) == RELEASED
+
+
+def test_frames_that_are_far_apart_release_it(person: Person) -> None:
+    person.grabs()
+    person.shows(FIST, GO, dt_s=0.5)
+    assert person.joystick.stick == RELEASED
+
+
+def test_a_hand_at_rest_stays_at_rest_although_landmarks_tremble(person: Person) -> None:
+    person.grabs()
+    random = np.random.default_rng(0)
+    for _ in range(100):
+        jitter = random.normal(0, 0.01 * person.palm_px, 2)
+        assert person.closes(moved(FIST, *jitter), 1) == Stick(held=True)
+
+
+def test_what_is_drawn_shows_the_held_hand(person: Person) -> None:
+    picture = np.zeros((SIZE[1], SIZE[0], 3), np.uint8)
+    person.joystick.draw(picture)
+    assert not picture.any()
+    person.grabs()
+    person.joystick.draw(picture)
+    assert picture.any()
+
+
+@given(st.floats(-10, 10), st.floats(0, 0.9), st.floats(0, 1))
+def test_the_response_is_odd_rises_and_stays_within_one(moved_by: float, dead_zone: float, expo: float) -> None:
+    config = JoystickConfig(dead_zone=dead_zone, full_deflection=1.0, expo=expo)
+    value = deflection(moved_by, config)
+    assert -1 <= value <= 1
+    assert value == -deflection(-moved_by, config)
+    assert abs(value) <= abs(deflection(moved_by * 1.1, config)) + 1e-12
+    assert value == 0 or (value > 0) == (moved_by > 0)
+    assert value == 0 or abs(moved_by) > dead_zone
+
+
+_SHOWN = st.tuples(
+    st.sampled_from([STOP, GO, "Forward", "NONE"]),
+    st.sampled_from(["Right", "Left"]),
+    st.floats(-250, 250),
+    st.floats(-150, 150),
+    st.integers(1, 12),
+    st.sampled_from([DT_S, 0.1, 0.3]),
+)
+
+
+@given(st.lists(_SHOWN, max_size=25))
+def test_it_is_held_only_by_a_fist_in_view_that_was_open_before(
+    shown: list[tuple[str, Handedness, float, float, int, float]],
+) -> None:
+    person = Person()
+    may_hold = False
+    for sign, side, right, down, frames, dt_s in shown:
+        hand = None if sign == "NONE" else moved(show_sign(sign, side), right, down)
+        stick = person.shows(hand, sign, frames, dt_s)
+        assert abs(stick.forward) <= 1
+        assert abs(stick.left) <= 1
+        assert stick.held or stick == RELEASED
+        may_hold = sign == STOP or (may_hold and not (sign == "NONE" and frames * dt_s > 0.21))
+        if sign != GO and frames * dt_s > 0.11:
+            assert not stick.held
+        assert may_hold or not stick.held
