@@ -1,19 +1,13 @@
-"""The operator's limbs: submovements, tremor and slips, and the virtual hand as the camera or its landmarks see it."""
+"""The operator's limbs: submovements, and a hand that shows signs, with tremor and slips."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from handsteer.cameras.files import SensorNoise
-from handsteer.hand.kinematics import ANGLES, Array, clamp, pose_skeleton
-from handsteer.hand.poses import HandPose, Pinhole, View, sign_pose
-from handsteer.hand.renderer import Look, make_background, render
-from handsteer.recognition.hand import Hand
+from handsteer.hand.kinematics import ANGLES, Array, clamp
+from handsteer.hand.poses import HandPose, View, sign_pose
 from handsteer.types import NONE
-
-Image = NDArray[np.uint8]
 
 SUBMOVEMENT_S = 0.1
 """How often a movement is corrected: the aim of the limb changes at this interval."""
@@ -190,115 +184,3 @@ class OperatorsHand:
 
 def _numbers(pose: HandPose) -> Array:
     return np.concatenate([pose.angles, pose.view.to_array()])
-
-
-@dataclass(frozen=True)
-class LandmarkErrors:
-    """Errors of landmarks of a tracked hand, as ``benchmarks/landmark_errors.py`` measures them on videos of people.
-
-    Attributes:
-        apart: Standard deviation of each landmark's x and y, in palm lengths.
-        together: Likewise, of all of them together.
-        depth: Likewise, of each landmark's z.
-        keep: Correlation of an error with that of the frame before, at 30 frames a second.
-        missed: Probability that a hand in view is not found in a frame.
-    """
-
-    apart: float = 0.006
-    together: float = 0.012
-    depth: float = 0.03
-    keep: float = 0.0
-    missed: float = 0.001
-
-    def scaled(self, factor: float) -> "LandmarkErrors":
-        """Return errors that are ``factor`` times as large and as frequent."""
-        return replace(
-            self,
-            apart=factor * self.apart,
-            together=factor * self.together,
-            depth=factor * self.depth,
-            missed=min(1.0, factor * self.missed),
-        )
-
-
-class HandLandmarker:
-    """A :class:`~handsteer.recognition.hand.Landmarker` that returns the landmarks of a virtual hand, with errors.
-
-    Args:
-        camera: Projects the hand.
-        errors: Errors to add.
-        random: Source of the errors.
-
-    Attributes:
-        pose: The hand to find in the next frame.
-    """
-
-    def __init__(self, camera: Pinhole, errors: LandmarkErrors, random: np.random.Generator) -> None:
-        self.pose = sign_pose(NONE)
-        self._camera, self._errors, self._random = camera, errors, random
-        self._apart, self._together = np.zeros((21, 3)), np.zeros(2)
-
-    def detect(self, image: Image, *, search: bool = True, dt_s: float = math.inf) -> list[Hand]:
-        """Return the hand unless it is missed, or its palm is outside of the picture; ignores the arguments."""
-        keep = self._errors.keep
-        fresh = math.sqrt(1 - keep**2)
-        self._apart = keep * self._apart + fresh * self._random.standard_normal((21, 3))
-        self._together = keep * self._together + fresh * self._random.standard_normal(2)
-        is_missed = self._random.random() < self._errors.missed
-        hand = self._hand()
-        palm = hand.points[[0, 5, 17], :2].mean(axis=0)
-        is_inside = bool(((palm > 0.0) & (palm < 1.0)).all())
-        return [hand] if is_inside and not is_missed else []
-
-    def follow_only(self, hand: Hand) -> None:
-        """Do nothing: there is one hand."""
-
-    def reset(self) -> None:
-        """Do nothing: the hand is found again in the next frame."""
-
-    def _hand(self) -> Hand:
-        skeleton, placement = pose_skeleton(self.pose.angles), self.pose.view.placement("Right")
-        joints = placement.apply(skeleton.joints[0])
-        pixels = self._camera.project(joints)
-        scale = self._camera.focal_px / joints[0, 2]
-        palm_m = float(np.linalg.norm(skeleton.joints[0, 9]))
-        errors = self._errors
-        moved = np.array([errors.apart, errors.apart, errors.depth]) * self._apart * palm_m
-        shift = errors.together * self._together * palm_m
-        size = np.array([self._camera.width, self._camera.height])
-        depth = (joints[:, 2] - joints[0, 2] + moved[:, 2]) * scale / self._camera.width
-        points = np.column_stack([(pixels + (moved[:, :2] + shift) * scale) / size, depth])
-        world = joints - joints.mean(axis=0) + moved
-        return Hand(
-            points.astype(np.float32),
-            world.astype(np.float32),
-            "Right",
-            0.98,
-            0.98,
-            (self._camera.width, self._camera.height),
-        )
-
-
-class HandCamera:
-    """Takes pictures of the operator's hand.
-
-    Args:
-        camera: Its projection.
-        seed: Of background and sensor noise.
-    """
-
-    def __init__(self, camera: Pinhole, seed: int) -> None:
-        self._camera = camera
-        self._background = make_background("plain", camera.width, camera.height, seed)
-        self._noise = SensorNoise(seed)
-
-    def picture(self, pose: HandPose, time_s: float) -> Image:
-        """Return the picture of the hand, (height, width, 3) uint8."""
-        skeleton, placement = pose_skeleton(pose.angles), pose.view.placement("Right")
-        image = render(skeleton, placement, self._camera, Look(), self._background)
-        return self._noise.on(image, time_s)
-
-
-def blank_picture(number: int) -> Image:
-    """Return a tiny picture that differs from all recent ones, for landmarks that come from elsewhere."""
-    return np.full((4, 4, 3), (64 + number % 128, 64 + number // 128 % 128, 100), np.uint8)

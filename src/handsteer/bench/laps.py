@@ -8,10 +8,11 @@ from typing import Any, get_args
 import numpy as np
 
 from handsteer.bench.courses import Course, open_course
-from handsteer.bench.hands import LandmarkErrors, Slips
+from handsteer.bench.hand_interfaces import Joystick, Signs
+from handsteer.bench.hand_view import HandView, LandmarkErrors, Through
+from handsteer.bench.hands import Slips
 from handsteer.bench.interfaces import TICK_S, Gamepad, Interface, Keys, Pad, Sliders
 from handsteer.bench.operator import DECISION_S, REACTION_S, Operator, Seen, Skill, adapted
-from handsteer.bench.signs import HandView, Signs, Through
 from handsteer.config import Config, RobotConfig
 from handsteer.errors import BenchError
 from handsteer.robots import RobotState
@@ -100,17 +101,20 @@ class _Kind:
 
     skill: Skill
     control: dict[str, Any] = field(default_factory=dict)
-    make: Callable[..., Interface] | None = None
-    """For interfaces without a hand in front of a camera."""
+    make: Callable[..., Interface] = Signs
+    by_hand: bool = True
+    """Whether it needs a hand in front of a camera."""
 
 
 KINDS: dict[str, _Kind] = {
     "signs": _Kind(Skill()),
     "signs_per_second": _Kind(Skill(), {"ramp": "per_second"}),
-    "pad": _Kind(Skill(), make=Pad),
-    "keys": _Kind(Skill(), make=Keys),
-    "sliders": _Kind(Skill(), make=Sliders),
-    "gamepad": _Kind(Skill(), make=Gamepad),
+    "cruise": _Kind(Skill(), {"rule": "cruise"}),
+    "joystick": _Kind(Skill(), {"mode": "joystick"}, Joystick),
+    "pad": _Kind(Skill(), make=Pad, by_hand=False),
+    "keys": _Kind(Skill(), make=Keys, by_hand=False),
+    "sliders": _Kind(Skill(), make=Sliders, by_hand=False),
+    "gamepad": _Kind(Skill(), make=Gamepad, by_hand=False),
 }
 """The interfaces by name."""
 
@@ -151,16 +155,16 @@ def run_lap(
 
 def _opened(name: str, conditions: Conditions, skill: Skill, seed: int, config: Config) -> Interface:
     kind = KINDS[name]
-    control = config.control.model_copy(update={"arming": "off", **kind.control})
+    control = config.control.model_copy(update={"arming": "off", "engage": "off", **kind.control})
     random = np.random.default_rng([seed, 1])
-    if kind.make is not None:
+    if not kind.by_hand:
         return kind.make(control, skill, random)
     camera = config.camera.model_copy(update={"fps": conditions.fps})
     config = config.model_copy(update={"control": control, "camera": camera})
     view = HandView(config, conditions.through, LandmarkErrors().scaled(conditions.errors), seed)
     slips = Slips()
     slips = replace(slips, wrong=slips.wrong * conditions.errors, unclear=slips.unclear * conditions.errors)
-    return Signs(config, skill, view, slips, random)
+    return kind.make(config, skill, view, slips, random)
 
 
 class _Run:
