@@ -30,7 +30,9 @@ _BRAKE_MPS2 = 0.45
 _SLOWEST_MPS = 0.12
 _CLEAR_S = 0.3
 _TURNS_RAD = 0.9
-_STUCK_S, _BACK_M = 1.0, 0.35
+_STUCK_S, _STUCK_M = 1.0, 0.06
+_BACK_M, _BACK_MPS = 0.35, 0.25
+_PATIENT_S = 0.7
 
 # Perception: errors of the seen place, heading, and speed, which change slowly (an Ornstein-Uhlenbeck process).
 _SEEN_M, _SEEN_RAD, _SEEN_S = 0.02, math.radians(1.5), 0.5
@@ -98,9 +100,9 @@ class Operator:
         self._s_m = 0.0
         self._before: float | None = None
         self._slope = 0.0
-        self._stuck_s, self._back_until = 0.0, 0
-        self._decisions = 0
-        self._wanted = ZERO
+        self._stuck_at: Pose2D | None = None
+        self._stuck_s = self._stood_s = 0.0
+        self._decisions = self._back_until = 0
 
     def decide(self, seen: Seen) -> Velocity:
         """Return the velocity wanted now; ``seen`` is what happens now, of which the operator learns later.
@@ -114,10 +116,8 @@ class Operator:
         then = self._perceived(self._late[0])
         if self._is_backing_off(then):
             self._before = None
-            self._wanted = Velocity(-0.25, 0.0)
-        else:
-            self._wanted = self._follow(then)
-        return self._wanted
+            return Velocity(-_BACK_MPS, 0.0)
+        return self._impatient(self._follow(then), then)
 
     def _perceived(self, seen: Seen) -> Seen:
         keep = math.exp(-DECISION_S / _SEEN_S)
@@ -187,13 +187,23 @@ class Operator:
         """Return whether the robot is stuck at an obstacle, and has to back off first."""
         if self._decisions < self._back_until:
             return True
-        stands = abs(seen.velocity.linear_mps) < 0.03 and abs(seen.velocity.angular_radps) < 0.1
-        self._stuck_s = self._stuck_s + DECISION_S if stands and seen.touches else 0.0
-        if self._stuck_s > _STUCK_S + self._delay_s:
-            self._stuck_s = 0.0
-            self._back_until = self._decisions + round((_BACK_M / 0.25 + self._delay_s) / DECISION_S)
-            return True
-        return False
+        pose, where = seen.pose, self._stuck_at
+        if not seen.touches or where is None or math.hypot(pose.x - where.x, pose.y - where.y) > _STUCK_M:
+            self._stuck_at, self._stuck_s = pose, 0.0
+        self._stuck_s += DECISION_S
+        if self._stuck_s <= _STUCK_S + self._delay_s:
+            return False
+        self._stuck_at = None
+        self._back_until = self._decisions + round((_BACK_M / _BACK_MPS + self._delay_s) / DECISION_S)
+        return True
+
+    def _impatient(self, wanted: Velocity, seen: Seen) -> Velocity:
+        """Return ``wanted``, larger the longer the robot has been standing in spite of it."""
+        stands = abs(seen.velocity.linear_mps) < 0.02 and abs(seen.velocity.angular_radps) < 0.1
+        self._stood_s = self._stood_s + DECISION_S if stands and not wanted.is_zero else 0.0
+        urge = 1.0 + max(0.0, self._stood_s - _PATIENT_S)
+        linear = math.copysign(min(abs(wanted.linear_mps) * urge, self._skill.pace_mps), wanted.linear_mps)
+        return Velocity(linear, max(-2.0, min(2.0, wanted.angular_radps * urge)))
 
 
 def projected_displacement(path: Path, pose: Pose2D, s_m: float, reach_m: float) -> float:
