@@ -1,8 +1,8 @@
 """Searches the skill of an operator for interfaces of the bench: the constants ``KINDS`` of ``handsteer.bench.laps``.
 
-``JOBS=2 python scripts/bench_skills.py INTERFACE...``. The search is the same for each: 24 random skills, the same ones, and
-then 24 variations of the best so far, by the mean score of the laps of four courses, with seeds from 1000 on, which no
-report uses. The figure eight is not among the courses.
+``JOBS=2 python scripts/bench_skills.py INTERFACE...``. The search is the same for each: 24 random skills, the same
+ones, and then 24 variations of the best so far, by the mean score of the laps of four courses, with seeds from 1000 on,
+which no report uses. The figure eight is not among the courses.
 """
 
 import os

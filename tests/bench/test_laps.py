@@ -41,5 +41,5 @@ def test_unknown_names_are_refused() -> None:
 
 
 def test_conditions_out_of_range_are_refused() -> None:
-    with pytest.raises(BenchError, match="latency_s: -1 should be from 0 to 5"):
+    with pytest.raises(BenchError, match="latency in ms: -1000 should be from 0 to 5000"):
         Conditions(latency_s=-1.0)

@@ -18,14 +18,23 @@ from handsteer.errors import BenchError
 from handsteer.robots import RobotState
 from handsteer.robots.course import Referee
 from handsteer.robots.simulated import SimulatedRobot
-from handsteer.types import BUMP_S, MISS_S, CourseState, Velocity
+from handsteer.types import BUMP_S, MISS_S, CourseState, Pose2D, Velocity
 
 TIMEOUT_S = 180.0
 """A lap that takes longer from the start gate on has failed, and counts with this time."""
 
 _UNSTARTED_S = 60.0
 _STANDS_S, _STANDS_MPS, _STANDS_RADPS = 0.5, 0.02, 0.05
+_TRACE_TICKS = 10
 _DECISION_TICKS = round(DECISION_S / TICK_S)
+
+
+_LIMITS = (
+    ("latency_s", "latency in ms", 1e-3, 0, 5000),
+    ("fps", "frames per second", 1.0, 5, 120),
+    ("errors", "factor on errors", 1.0, 0, 20),
+    ("reaction_s", "reaction time in ms", 1e-3, 0, 2000),
+)
 
 
 @dataclass(frozen=True)
@@ -47,10 +56,10 @@ class Conditions:
     through: Through = "landmarks"
 
     def __post_init__(self) -> None:
-        limits = {"latency_s": (0.0, 5.0), "fps": (5.0, 120.0), "errors": (0.0, 20.0), "reaction_s": (0.0, 2.0)}
-        for name, (low, high) in limits.items():
-            if not low <= getattr(self, name) <= high:
-                raise BenchError(f"{name}: {getattr(self, name):g} should be from {low:g} to {high:g}")
+        for name, what, unit, low, high in _LIMITS:
+            value = getattr(self, name) / unit
+            if not low <= value <= high:
+                raise BenchError(f"{what}: {value:g} should be from {low:g} to {high:g}")
         if self.through not in get_args(Through):
             raise BenchError(f"through: {self.through!r} should be landmarks or pictures")
 
@@ -129,6 +138,8 @@ def run_lap(
     *,
     skill: Skill | None = None,
     config: Config | None = None,
+    adapts: bool = True,
+    trace: list[Pose2D] | None = None,
 ) -> Lap:
     """Drive one lap; the same arguments give the same lap, bit for bit.
 
@@ -139,6 +150,8 @@ def run_lap(
         conditions: Delays and errors; the defaults if None.
         skill: Of the operator, without added delay; that of the interface if None.
         config: Parameters that differ from the defaults; those that the interface needs override them.
+        adapts: Whether the operator adapts the skill to added delay.
+        trace: Receives the robot's pose ten times a second, from the start gate on.
 
     Raises:
         BenchError: There is no such interface, or the course is none.
@@ -148,9 +161,11 @@ def run_lap(
     conditions = conditions or Conditions()
     if interface not in KINDS:
         raise BenchError(f"there is no interface {interface!r}; use {', '.join(INTERFACES)}")
-    skill = adapted(skill or KINDS[interface].skill, conditions.latency_s + conditions.reaction_s - REACTION_S)
+    skill = skill or KINDS[interface].skill
+    if adapts:
+        skill = adapted(skill, conditions.latency_s + conditions.reaction_s - REACTION_S)
     lap = _Run(course, conditions, seed, _opened(interface, conditions, skill, seed, config or Config()), skill)
-    return lap.run()
+    return lap.run(trace)
 
 
 def _opened(name: str, conditions: Conditions, skill: Skill, seed: int, config: Config) -> Interface:
@@ -182,7 +197,7 @@ class _Run:
         self._tick = 0
         self._measures = _Measures(course)
 
-    def run(self) -> Lap:
+    def run(self, trace: list[Pose2D] | None) -> Lap:
         state = self._robot.step(0.0)
         course = self._referee.step(state.truth, 0, state.time_s)
         while not self._measures.is_over(course, state):
@@ -194,6 +209,8 @@ class _Run:
             self._tick += 1
             course = self._referee.step(state.truth, state.collisions or 0, state.time_s)
             self._measures.note(course, state, self._interface.changes)
+            if trace is not None and course.phase != "ready" and self._tick % _TRACE_TICKS == 0:
+                trace.append(state.truth)
         return self._measures.lap(self._seed, course)
 
     def _send(self, command: Velocity | None) -> None:
