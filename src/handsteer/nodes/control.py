@@ -128,11 +128,9 @@ class HandSignControlNode(Node):
         before, self._config = self._config, config.control
         self._stall_guard.limit_s = config.control.sign_timeout
         self._monitor.reconfigure(config.collision_monitor)
-        velocity = self._control.reconfigure(config.control)
-        if (config.control.mode, config.control.rule) != (before.mode, before.rule):
-            velocity = ZERO
+        self._publish(self._control.reconfigure(config.control))
+        if config.control.mode != before.mode:
             self._take_joysticks()
-        self._publish(velocity)
 
     def services(self) -> dict[str, Call]:
         """Return ``stop`` and ``reset``, which are equivalent to true and false on ``/stop``."""
