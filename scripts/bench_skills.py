@@ -1,7 +1,7 @@
 """Searches the skill of an operator for interfaces of the bench: the constants ``KINDS`` of ``handsteer.bench.laps``.
 
-``JOBS=2 python scripts/bench_skills.py INTERFACE...``. The search is the same for each: 24 random skills, the same
-ones, and then 24 variations of the best so far, by the mean score of the laps of four courses, with seeds from 1000 on,
+``JOBS=2 python scripts/bench_skills.py INTERFACE...``. The search is the same for each: 14 random skills, the same
+ones, and then 14 variations of the best so far, by the mean score of the laps of four courses, with seeds from 1000 on,
 which no report uses. The figure eight is not among the courses.
 """
 
@@ -19,13 +19,13 @@ from handsteer.bench.operator import Skill
 
 RANGES = {
     "pace_mps": (0.2, 1.0),
-    "kp": (0.4, 1.6),
-    "kd": (0.0, 0.6),
+    "kp": (0.4, 2.4),
+    "kd": (0.0, 1.0),
     "projection_s": (0.6, 2.2),
     "reluctance": (0.1, 2.0),
 }
 LAPS = (("slalom", 1000), ("slalom", 1001), ("maze", 1000), ("stop-line", 1000), ("parking", 1000))
-RANDOM, VARIED, BATCH = 24, 24, 2
+RANDOM, VARIED, BATCH = 14, 14, 2
 SPREAD = 0.12
 
 

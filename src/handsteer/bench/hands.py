@@ -53,13 +53,16 @@ class Limb:
         """Set the aim, (size,), from the next submovement on."""
         self._aim = np.asarray(target, float)
 
-    def step(self, dt_s: float) -> Array:
-        """Return the (size,) position ``dt_s`` seconds later."""
+    def step(self, dt_s: float) -> None:
+        """Advance time by ``dt_s`` seconds."""
         self._since_s += dt_s
         self._next_s -= dt_s
         if self._next_s <= 1e-9:
             self._plan()
             self._next_s = SUBMOVEMENT_S
+
+    def place(self) -> Array:
+        """Return the (size,) position now."""
         return self._derivatives(min(self._since_s, self._movement_s))[0]
 
     def _derivatives(self, t: float) -> tuple[Array, Array, Array]:
@@ -116,7 +119,6 @@ class OperatorsHand:
         self.intended = NONE
         self.changes = 0
         self._wrist: Limb | None = None
-        self._offset = np.zeros(2)
         self._from = self._to = _numbers(sign_pose(NONE))
         self._share, self._change_s = 1.0, 1.0
         self._notice_s = math.inf
@@ -161,7 +163,7 @@ class OperatorsHand:
             self._notice_s = math.inf
             self._move_to(_numbers(sign_pose(self.intended)))
         if self._wrist is not None:
-            self._offset = self._wrist.step(dt_s)
+            self._wrist.step(dt_s)
 
     def _move_to(self, numbers: Array) -> None:
         self._from, self._to = self._now(), numbers
@@ -178,7 +180,8 @@ class OperatorsHand:
         numbers = self._now() + np.concatenate([np.full(len(ANGLES), _SWAY_JOINTS), _SWAY_VIEW]) * waves
         hertz, phases = self._tremor
         numbers[-3:] += math.sqrt(2.0) * _TREMOR_M * np.sin(math.tau * self._time_s * hertz + phases)
-        numbers[-3:-1] += self._offset
+        if self._wrist is not None:
+            numbers[-3:-1] += self._wrist.place()
         return HandPose(clamp(numbers[: len(ANGLES)]), View.from_array(numbers[len(ANGLES) :]))
 
 

@@ -119,7 +119,8 @@ class Pad(_Page):
         self._thumb.aim(aim)
 
     def _move(self) -> Velocity | None:
-        place = self._thumb.step(TICK_S)
+        self._thumb.step(TICK_S)
+        place = self._thumb.place()
         place = place / max(1.0, float(np.hypot(*place)))
         if not self._is_in_use and float(np.hypot(*place)) < _REST:
             return None

@@ -66,19 +66,22 @@ class Seen:
     touches: bool = False
 
 
+_PATIENCE_S = 0.75
+"""Delay that halves the operator's pace."""
+
+_LEAD = 0.85
+"""Increase of kd / kp for each second of delay, as ``scripts/bench_operator.py`` finds it best."""
+
+
 def adapted(skill: Skill, delay_s: float) -> Skill:
     """Return ``skill`` as used with ``delay_s`` seconds of additional delay in the loop, for every interface alike.
 
-    As the model of Vozar and Tilbury, the ratio kd / kp rises with the delay, and kp falls; the operator also slows
-    down, so that the robot drives no further unseen.
+    As in the model of Vozar and Tilbury, the ratio kd / kp rises with the delay. The operator also slows down, so that
+    the robot drives no further unseen.
     """
-    slower = 1.0 + delay_s / _PATIENCE_S
-    kp = skill.kp / slower
-    return replace(skill, pace_mps=skill.pace_mps / slower, kp=kp, kd=kp * (skill.kd / skill.kp + _LEAD * delay_s))
-
-
-_PATIENCE_S = 0.75
-_LEAD = 0.35
+    delay_s = max(0.0, delay_s)
+    kd = skill.kp * (skill.kd / skill.kp + _LEAD * delay_s)
+    return replace(skill, pace_mps=skill.pace_mps / (1.0 + delay_s / _PATIENCE_S), kd=kd)
 
 
 class Operator:
