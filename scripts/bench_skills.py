@@ -1,7 +1,7 @@
 """Searches the skill of an operator for interfaces of the bench: the constants ``KINDS`` of ``handsteer.bench.laps``.
 
-``JOBS=2 python scripts/bench_skills.py INTERFACE...``. The search is the same for each: 12 random skills, the same
-ones, and then 12 variations of the best so far, by the mean score of laps on four courses, with seeds from 1000 on,
+``JOBS=2 python scripts/bench_skills.py INTERFACE...``. The search is the same for each: 16 random skills, the same
+ones, and then 24 variations of the best so far, by the mean score of laps on four courses, with seeds from 1000 on,
 which no report uses; skills that are clearly worse after some of the laps are given up. The figure eight is not among
 the courses.
 """
@@ -27,9 +27,9 @@ RANGES = {
     "reluctance": (0.1, 2.0),
 }
 LAPS = (("slalom", 1000), ("maze", 1000), ("stop-line", 1000), ("parking", 1000), ("slalom", 1001))
-RANDOM, VARIED, BATCH = 12, 12, 2
+RANDOM, VARIED, BATCH = 16, 24, 2
 WORSE = 1.15
-SPREAD = 0.12
+SPREAD = 0.1
 
 
 def scores(interface: str, skill: Skill, best: list[float]) -> list[float]:
