@@ -20,6 +20,7 @@ _EXAMPLES = """Examples:
   handsteer run                                  drive, and open the page
   handsteer run --headless --duration 30 --json  no page, one summary at the end
   handsteer recognize photo.jpg                  which sign is it?
+  handsteer study examples/study.yaml            compare interfaces with people
   handsteer signs evaluate photos/               how well are signs recognised?
   handsteer bench --course slalom                how well does one drive?
   handsteer camera --transport ros1              one node, in a ROS 1 graph
@@ -38,7 +39,7 @@ app = App(
     result_action="return_value",
 )
 # Named, not imported: a verb's module is loaded when it is used.
-for verb in ("run", "recognize"):
+for verb in ("run", "recognize", "study"):
     app.command(f"handsteer.cli.{verb}:{verb}", name=verb)
 for verb in ("models", "doctor", "ros"):
     app.command(f"handsteer.cli.installation:{verb}", name=verb)
