@@ -111,6 +111,7 @@ docs: $(BIN)/.dev
 screenshots: $(BIN)/.dev models
 	@$(BIN)/python scripts/screenshot.py
 	@$(BIN)/python scripts/sign_pictures.py
+	@$(BIN)/python scripts/joystick_animation.py
 
 screenshots-ros1: | $(BIN)/.dev models
 	@$(BIN)/python scripts/rviz_screenshot.py
