@@ -1,6 +1,8 @@
 from handsteer.config import ControlConfig
-from handsteer.dashboard.drive_page import legend
-from handsteer.types import SIGNS
+from handsteer.dashboard.legend import active_entry, joystick_legend, legend
+from handsteer.dashboard.state import Observed, PageState, Report, compose
+from handsteer.nodes.status import ControlStatus, RecognitionStatus, Status
+from handsteer.types import SIGNS, Velocity
 
 
 def effects(signs: tuple[str, ...], rule: ControlConfig | None) -> dict[str, tuple[str, str]]:
@@ -34,3 +36,26 @@ def test_remapped_signs_say_what_they_really_do() -> None:
 
 def test_says_what_is_built_in_while_nothing_is_known() -> None:
     assert effects(SIGNS, None)["Turn Right"] == ("turns faster to the right", "")
+
+
+def state(control: ControlStatus, sign: str, linear_mps: float = 0.0) -> PageState:
+    recognition = RecognitionStatus(sign, seen=sign, handedness="Right")
+    reports: dict[type[Status], Report] = {type(each): Report(each, 0.0) for each in (control, recognition)}
+    return compose(Observed(reports, command=Velocity(linear_mps, 0.0), command_came_s=0.0), 0.1)
+
+
+def test_the_joystick_is_explained_in_three_steps_with_its_speeds() -> None:
+    rule = ControlConfig(mode="joystick", max_linear=0.4, max_angular=1.5)
+    steps = joystick_legend(rule)
+    assert [step.sign for step in steps] == ["Open the hand", "Close the fist", "Move it"]
+    assert steps[2].figures == "up to 0.4 m/s and 1.5 rad/s"
+    assert all(step.drawing.startswith("<svg") and step.effect for step in steps)
+
+    held = ControlStatus(source="joystick", rule=rule)
+    assert active_entry(state(held, "Stop")) == "Open the hand"
+    assert active_entry(state(held, "Go")) == "Close the fist"
+    assert active_entry(state(held, "Go", 0.1)) == "Move it"
+    assert active_entry(state(held, "Forward")) == ""
+    steered = ControlStatus(source="steering", rule=rule)
+    assert active_entry(state(steered, "Go", 0.1)) == "Close the fist"
+    assert active_entry(state(ControlStatus(source="signs", rule=ControlConfig()), "Go", 0.1)) == "Go"

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from handsteer.config import ControlConfig
 from handsteer.control.explain import Reason
 from handsteer.control.twist_mux import Source
+from handsteer.dashboard.mux_row import mux_inputs
 from handsteer.dashboard.page import spoken
 from handsteer.dashboard.state import (
     STALE_S,
@@ -19,15 +20,11 @@ from handsteer.dashboard.state import (
     compose,
     explain,
     frame_rate,
-    place_in_world,
 )
-from handsteer.dashboard.steer_panel import mux_inputs
 from handsteer.dashboard.steering_input import read_deflection, read_number
 from handsteer.nodes.status import CameraStatus, ControlStatus, RecognitionStatus, RobotStatus, Status
-from handsteer.types import SIGNS, ZERO, Pose2D, Velocity
+from handsteer.types import SIGNS, ZERO, Velocity
 
-FINITE = st.floats(-100, 100)
-POSES = st.builds(Pose2D, FINITE, FINITE, st.floats(-7, 7))
 NO_SIGN = Reason("no_sign")
 
 
@@ -47,6 +44,8 @@ CAMERA = CameraStatus("virtual hand", "delivers", frames=10)
 UNPLUGGED = CameraStatus("/dev/video0", "lost", problem="/dev/video0 was unplugged")
 NO_HAND = RecognitionStatus(seen="NONE")
 DISARMED = ControlStatus(Reason("disarmed", "no sign came"), "signs", armed=False)
+
+DISENGAGED = ControlStatus(Reason("disengaged", "1"), "signs", engaged=False, engage_progress=0.0)
 
 
 @pytest.mark.parametrize(
@@ -74,6 +73,35 @@ DISARMED = ControlStatus(Reason("disarmed", "no sign came"), "signs", armed=Fals
         (
             (control(Reason("stop_sign", "Stop")), RecognitionStatus("Stop", seen="Stop", handedness="Left")),
             ("standing", "Standing", "the Stop sign is shown"),
+        ),
+        ((DISENGAGED, NO_HAND), ("standing", "Disengaged", "until an open palm is held for 1 s")),
+        (
+            (DISENGAGED, RecognitionStatus(no_frame_s=2.0), UNPLUGGED),
+            ("trouble", "Standing", "/dev/video0 was unplugged"),
+        ),
+        (
+            (replace(DISENGAGED, reason=Reason("disengaged", "1", "turtle1")), NO_HAND),
+            ("standing", "Disengaged", "turtle1 is disengaged, until an open palm is held for 1 s"),
+        ),
+        (
+            (replace(DISENGAGED, reason=Reason("steered_at_zero"), source="steering"), NO_HAND),
+            ("standing", "Standing", "steered by hand, at zero"),
+        ),
+        (
+            (control(Reason("not_held"), source="joystick"), NO_HAND),
+            ("standing", "Standing", "no hand holds the joystick: open it, then close the fist"),
+        ),
+        (
+            (control(Reason("not_held"), source="joystick"), RecognitionStatus(refused="the picture is black")),
+            ("standing", "Standing", "the picture is black"),
+        ),
+        (
+            (control(Reason("held"), source="joystick"), RecognitionStatus("Go", seen="Go", handedness="Left")),
+            ("standing", "Standing", "the joystick is held, in the middle"),
+        ),
+        (
+            (control(Reason("joystick"), linear=0.3, source="joystick"),),
+            ("driving", "Driving", "driven by the hand as a joystick"),
         ),
         (
             (control(NO_SIGN), RecognitionStatus(no_frame_s=2.0), UNPLUGGED),
@@ -148,15 +176,6 @@ def test_forgets_a_node_that_has_gone_silent() -> None:
 )
 def test_counts_frames_a_second(counts: tuple[tuple[float, float], ...], now_s: float, rate: float | None) -> None:
     assert frame_rate(counts, now_s) == rate
-
-
-@given(truth=POSES, then=POSES, forward=FINITE)
-def test_the_robot_goes_on_from_its_true_pose_as_its_wheels_count(truth: Pose2D, then: Pose2D, forward: float) -> None:
-    now = Pose2D(then.x + forward * math.cos(then.yaw), then.y + forward * math.sin(then.yaw), then.yaw)
-    placed = place_in_world(truth, then, now)
-    assert placed.x == pytest.approx(truth.x + forward * math.cos(truth.yaw), abs=1e-6)
-    assert placed.y == pytest.approx(truth.y + forward * math.sin(truth.yaw), abs=1e-6)
-    assert placed.yaw == pytest.approx(truth.yaw, abs=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -238,6 +257,30 @@ def test_at_most_one_source_has_the_robot(
     assert [entry.name for entry in shown] == ["Stop", "By hand", "Signs"]
     holding = [entry.name + (f": {entry.viewer}" if entry.viewer else "") for entry in shown if entry.is_active]
     assert holding == ([holds] if holds else [])
+
+
+@pytest.mark.parametrize(("source", "holds"), [("joystick", ["Joystick"]), ("steering", ["By hand"]), ("none", [])])
+def test_the_hand_as_a_joystick_is_a_source_instead_of_the_signs(source: Source, holds: list[str]) -> None:
+    status = ControlStatus(source=source, rule=ControlConfig(mode="joystick"))
+    shown = mux_inputs(compose(observed(status), 0.1))
+    assert [entry.name for entry in shown] == ["Stop", "By hand", "Joystick"]
+    assert [entry.name for entry in shown if entry.is_active] == holds
+
+
+@pytest.mark.parametrize(
+    ("status", "engaging"),
+    [
+        (None, None),
+        (ControlStatus(), None),
+        (ControlStatus(engaged=False, engage_progress=0.4), 0.4),
+        (ControlStatus(engaged=False, engage_progress=7.0), 1.0),
+        (ControlStatus(engaged=False, engage_progress=0.4, stopped=True), None),
+    ],
+)
+def test_tells_how_far_the_hand_is_engaged_while_that_matters(
+    status: ControlStatus | None, engaging: float | None
+) -> None:
+    assert compose(observed(status) if status else Observed(), 0.1).engaging == engaging
 
 
 @pytest.mark.parametrize(

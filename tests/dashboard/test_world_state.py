@@ -1,12 +1,24 @@
 import math
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from handsteer.dashboard.world_state import LEAP_M, SCAN_POINTS, STEP_M, TRAIL_POINTS, Trail, scan_points
+from handsteer.dashboard.world_state import (
+    LEAP_M,
+    SCAN_POINTS,
+    STEP_M,
+    TRAIL_POINTS,
+    Trail,
+    place_in_world,
+    scan_points,
+)
 from handsteer.messages import Header, LaserScan, Time
 from handsteer.types import Pose2D
+
+FINITE = st.floats(-100, 100)
+POSES = st.builds(Pose2D, FINITE, FINITE, st.floats(-7, 7))
 
 
 def gone(*xs: float) -> Trail:
@@ -78,3 +90,12 @@ def test_what_is_no_reading_is_no_point() -> None:
 def test_a_long_scan_is_drawn_in_part() -> None:
     points = scan_points(scan(*[2.0] * 10_000, increment=math.tau / 10_000), Pose2D(0, 0, 0))
     assert 0.9 * SCAN_POINTS < len(points) <= SCAN_POINTS
+
+
+@given(truth=POSES, then=POSES, forward=FINITE)
+def test_the_robot_goes_on_from_its_true_pose_as_its_wheels_count(truth: Pose2D, then: Pose2D, forward: float) -> None:
+    now = Pose2D(then.x + forward * math.cos(then.yaw), then.y + forward * math.sin(then.yaw), then.yaw)
+    placed = place_in_world(truth, then, now)
+    assert placed.x == pytest.approx(truth.x + forward * math.cos(truth.yaw), abs=1e-6)
+    assert placed.y == pytest.approx(truth.y + forward * math.sin(truth.yaw), abs=1e-6)
+    assert placed.yaw == pytest.approx(truth.yaw, abs=1e-9)

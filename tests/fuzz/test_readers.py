@@ -17,7 +17,7 @@ from handsteer.cameras.browser import BrowserCamera
 from handsteer.cameras.files import read_photo
 from handsteer.clock import SteppedClock
 from handsteer.config import Config, ControlConfig, load
-from handsteer.dashboard.camera import read_status
+from handsteer.dashboard.page import read_words
 from handsteer.dashboard.settings_fields import FIELDS
 from handsteer.dashboard.steering_input import SteeringInput, read_deflection, read_number
 from handsteer.dashboard.world_editor import read_file
@@ -138,7 +138,7 @@ def test_what_a_page_says_of_pad_sliders_and_camera() -> None:
         assert abs(x) <= 1
         assert abs(y) <= 1
         assert 0 <= read_number(sent, 0.0, 1.0, 0.5) <= 1
-        assert len(read_status(sent)) <= 200
+        assert len(read_words(sent)) <= 200
         at = sent.get("at") if isinstance(sent, dict) else sent
         SteeringInput().keep_sliders(at, 1.0)
 

@@ -46,12 +46,30 @@ def test_space_between_parts_does_not_matter() -> None:
         ("Go:inf", "'inf' is no duration"),
         ("Go:1e9", "'1e9' is no duration"),
         (":3", "unknown sign ''"),
+        ("Go@:1", "part 1, 'Go@:1': '' is no place.*Go@0.1,-0.05:2"),
+        ("Go@0.1:1", "'0.1' is no place"),
+        ("Go@0.1,0,0:1", "'0.1,0,0' is no place"),
+        ("Go@0.1,nan:1", "'0.1,nan' is no place"),
+        ("Go:1 Go@0.6,0:1", "part 2, 'Go@0.6,0:1': '0.6,0' is no place"),
+        ("Go@0.1,0:x", "'x' is no duration"),
     ],
 )
 def test_a_wrong_script_is_refused_with_its_place(script: str, complaint: str) -> None:
     with pytest.raises(PoseError, match=complaint) as caught:
         parse_script(script)
     assert "\n" not in str(caught.value)
+
+
+@given(st.floats(-0.5, 0.5), st.floats(-0.5, 0.5))
+def test_a_place_is_read_as_it_is_written(right_m: float, down_m: float) -> None:
+    assert parse_script(f"Stop:1 Turn Left@{right_m},{down_m}:2")[1] == Part("Turn Left", 2.0, right_m, down_m)
+
+
+@pytest.mark.parametrize("hand", HANDS)
+def test_a_place_moves_either_hand_to_the_persons_right_and_down(hand: Handedness) -> None:
+    usual, moved = (joints_m(Motion(script, hand), hand, 0.9) for script in ("Go:5", "Go@0.1,-0.05:5"))
+    # The camera looks at the person: its right is the person's left.
+    np.testing.assert_allclose(moved - usual, np.broadcast_to([-0.1, -0.05, 0.0], moved.shape), atol=1e-12)
 
 
 @pytest.mark.parametrize("hand", HANDS)

@@ -17,7 +17,8 @@ from starlette.types import Receive, Scope, Send
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from handsteer.clock import Clock
-from handsteer.dashboard.page import PICTURE_PATH, Page, box, button, switch, text
+from handsteer.dashboard.legend import DRAWN
+from handsteer.dashboard.page import PICTURE_PATH, Page, box, button, read_words, switch, text
 from handsteer.dashboard.remote_graph import RemoteGraph
 from handsteer.dashboard.socket_events import is_page_of
 from handsteer.dashboard.state import PageState
@@ -27,7 +28,7 @@ from handsteer.images import bgr_image, encode_jpeg
 from handsteer.messages import IMAGE_ANNOTATED, Image
 from handsteer.nodes.base import Node
 from handsteer.transports.base import Received, Transport
-from handsteer.types import NONE
+from handsteer.types import NONE, STOP
 
 FRAMES_PER_S = 30.0
 """Maximum frame rate of a browser."""
@@ -184,9 +185,6 @@ def _resolve(future: "asyncio.Future[bytes | None]", jpeg: bytes | None) -> None
         future.set_result(jpeg)
 
 
-_LONGEST_STATUS = 200
-
-
 class CameraPanel:
     """The mirrored picture, the recognised sign, and the choice of camera.
 
@@ -208,6 +206,11 @@ class CameraPanel:
                 with box("veil") as self._veil:
                     self._no_picture = text("", "waiting for the first picture")
                 text("caption", "as in a mirror")
+                with box("engage hidden") as self._engage:
+                    self._engaging = box("ring").props('role="progressbar" aria-label="Engaged" aria-valuemax="100"')
+                    with self._engaging:
+                        ui.html(DRAWN[STOP][1], sanitize=False)
+                    text("", "Hold an open palm")
             with box("foot"):
                 self._ring = box("ring").props('role="progressbar" aria-label="Confirmed" aria-valuemax="100"')
                 self._sign = text("sign", "No sign")
@@ -221,7 +224,7 @@ class CameraPanel:
                     self._browser = button("Use this device's camera").props(browser)
                     self._own = button("Use the robot's camera", self._use_own).props('data-camera="own"')
                     self._status = text("trouble", "").props('role="alert"')
-                ui.on("webcam", lambda event: self._status.set_text(read_status(event.args)))
+                ui.on("webcam", lambda event: self._status.set_text(read_words(event.args)))
 
     def update(self, state: PageState) -> None:
         """Show ``state``."""
@@ -232,6 +235,9 @@ class CameraPanel:
         confirmed = round(100 * state.confirmed)
         self._ring.style(f"--confirmed: {confirmed}%").props(f"aria-valuenow={confirmed}")
         switch(self._ring, "whole", on=confirmed == 100)
+        switch(self._engage, "hidden", on=state.engaging is None)
+        engaged = round(100 * (state.engaging or 0.0))
+        self._engaging.style(f"--engaged: {engaged}%").props(f"aria-valuenow={engaged}")
         self._hand.set_text(f"{state.handedness} hand" if state.handedness else "No hand")
         percent = round(100 * state.confidence) if state.seen != NONE else 0
         self._percent.set_text(f"{percent} %" if percent else "")
@@ -246,9 +252,3 @@ class CameraPanel:
     def _use_own(self) -> None:
         if self._graph is not None and self._page.drives():
             self._graph.choose_camera("own")
-
-
-def read_status(sent: object) -> str:
-    """Return the camera status sent by a browser, for its own page; empty if it is invalid."""
-    words = sent.get("words") if isinstance(sent, dict) else None
-    return words[:_LONGEST_STATUS] if isinstance(words, str) else ""

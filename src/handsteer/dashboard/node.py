@@ -15,10 +15,16 @@ from handsteer.dashboard.state import (
     Report,
     Viewers,
     compose,
-    place_in_world,
 )
 from handsteer.dashboard.viewers import ControlLease
-from handsteer.dashboard.world_state import PERIOD_S, Sample, VelocityHistory, WorldState, scan_points
+from handsteer.dashboard.world_state import (
+    PERIOD_S,
+    Sample,
+    VelocityHistory,
+    WorldState,
+    place_in_world,
+    scan_points,
+)
 from handsteer.errors import TransportError
 from handsteer.messages import (
     CMD_VEL,

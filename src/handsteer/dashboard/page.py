@@ -24,6 +24,8 @@ STATIC = Path(__file__).parent / "static"
 UNKNOWN = "--"
 """Shown for an unknown value."""
 
+_LONGEST_WORDS = 200
+
 
 @contextmanager
 def card(title: str, classes: str) -> Iterator[ui.element]:
@@ -62,6 +64,12 @@ def button(words: str, on_click: Callable[[], object] | None = None, label: str 
 def switch(element: ui.element, name: str, *, on: bool) -> None:
     """Add the class ``name`` to ``element``, or remove it."""
     element.classes(add=name if on else "", remove="" if on else name)
+
+
+def read_words(sent: object) -> str:
+    """Return the sentence that a browser sent, for its own page; empty if it is invalid."""
+    words = sent.get("words") if isinstance(sent, dict) else None
+    return words[:_LONGEST_WORDS] if isinstance(words, str) else ""
 
 
 class LeasePanel:

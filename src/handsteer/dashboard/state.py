@@ -6,9 +6,10 @@ from dataclasses import dataclass, field
 from typing import Literal, TypeVar
 
 from handsteer.config import ControlConfig
+from handsteer.control.twist_mux import Source
 from handsteer.nodes.status import ERROR, OK, CameraStatus, ControlStatus, RecognitionStatus, RobotStatus, Status
 from handsteer.timeouts import ROBOT_S
-from handsteer.types import NONE, SIGNS, ZERO, CourseState, Pose2D, Velocity
+from handsteer.types import NONE, SIGNS, ZERO, CourseState, Velocity
 
 S = TypeVar("S", bound=Status)
 
@@ -123,7 +124,7 @@ class PageState:
         rule: Configures the signs' actions, as last reported by the control; None if unknown.
         no_picture: Why there are no pictures; empty if there are.
         camera: Short name of the camera.
-        driver: The active input: ``signs``, ``steering`` or ``none``.
+        driver: The active input.
         stopped: Whether the robot is stopped until reset.
         commanded: The commanded velocity, zero without a command.
         measured: The velocity from odometry.
@@ -137,6 +138,7 @@ class PageState:
         max_linear_mps: Speed limit of the control, either way; None if not reported.
         max_angular_radps: Likewise, for turning.
         course: Progress on the world's course; None without one.
+        engaging: Progress of engaging the hand, 0 to 1; None if it is engaged, or cannot be.
         warnings: Problems that do not stop operation, such as two nodes that command one robot; a sentence each.
     """
 
@@ -151,7 +153,7 @@ class PageState:
     rule: ControlConfig | None
     no_picture: str
     camera: str
-    driver: str
+    driver: Source
     stopped: bool
     commanded: Velocity
     measured: Velocity
@@ -165,7 +167,13 @@ class PageState:
     max_linear_mps: float | None
     max_angular_radps: float | None
     course: CourseState | None = None
+    engaging: float | None = None
     warnings: tuple[str, ...] = ()
+
+    @property
+    def is_joystick(self) -> bool:
+        """Whether the hand is a joystick instead of showing signs."""
+        return self.rule is not None and self.rule.mode == "joystick"
 
 
 def compose(observed: Observed, now_s: float, viewers: Viewers = NOBODY) -> PageState:
@@ -175,6 +183,7 @@ def compose(observed: Observed, now_s: float, viewers: Viewers = NOBODY) -> Page
     robot = reporting.robot or RobotStatus()
     mood, headline, reason = explain(reporting, viewers)
     # What was last known of a node that has fallen silent.
+    stopped = is_stopped(reporting.control, viewers)
     last_seen, last_control = observed.last(RecognitionStatus), observed.last(ControlStatus)
     return PageState(
         mood=mood,
@@ -189,7 +198,7 @@ def compose(observed: Observed, now_s: float, viewers: Viewers = NOBODY) -> Page
         no_picture=why_no_picture(reporting),
         camera=reporting.camera.short_name if reporting.camera else "",
         driver=control.source,
-        stopped=is_stopped(reporting.control, viewers),
+        stopped=stopped,
         commanded=observed.command if now_s - observed.command_came_s < COMMAND_HOLDS_S else ZERO,
         measured=observed.measured,
         latency_median_ms=control.latency_median_ms,
@@ -202,6 +211,7 @@ def compose(observed: Observed, now_s: float, viewers: Viewers = NOBODY) -> Page
         max_linear_mps=control.rule.max_linear if control.rule else None,
         max_angular_radps=control.rule.max_angular if control.rule else None,
         course=robot.course,
+        engaging=None if control.engaged or stopped else max(0.0, min(control.engage_progress, 1.0)),
         warnings=tuple(dict.fromkeys(warning for warning in (control.warning, robot.warning) if warning)),
     )
 
@@ -255,10 +265,17 @@ def explain(reporting: Reporting, viewers: Viewers = NOBODY) -> tuple[Mood, str,
     reason = control.explanation
     if control.linear_mps or control.angular_radps:
         return "driving", "Driving", reason if robot.level == OK else f"{reason}, but the robot {robot.message}"
+    return _explain_standing(control, reporting)
+
+
+def _explain_standing(control: ControlStatus, reporting: Reporting) -> tuple[Mood, str, str]:
     mood, upstream = ("standing", None) if control.source == "steering" else _why_no_sign(reporting)
-    if not control.armed and reporting.recognition is not None and reporting.recognition.seen is not None:
-        upstream = None  # the robot waits for no sign to be seen
-    return mood, "Standing", upstream or reason
+    is_about_signs = control.armed and control.engaged and control.source != "joystick"
+    if not is_about_signs and reporting.recognition is not None and reporting.recognition.seen is not None:
+        upstream = None
+    if upstream is None and control.reason is not None and control.reason.code == "disengaged":
+        return mood, "Disengaged", control.explanation.removeprefix("disengaged, ")
+    return mood, "Standing", upstream or control.explanation
 
 
 def _why_no_sign(reporting: Reporting) -> tuple[Mood, str | None]:
@@ -280,18 +297,3 @@ def frame_rate(counts: Sequence[tuple[float, float]], now_s: float) -> float | N
     if now_s - last_s > STALE_S:
         return 0.0
     return (last - first) / (last_s - first_s) if last_s > first_s and last >= first else None
-
-
-def place_in_world(truth: Pose2D, odometry_then: Pose2D, odometry_now: Pose2D) -> Pose2D:
-    """Return the robot's current pose in the world: ``truth``, moved by the odometry since.
-
-    These are the transforms ``map`` to ``odom`` to ``base_link`` of REP 105: the step is rotated from the odometry
-    frame, which drifts, into the world. ``odometry_then`` is of the same time as ``truth``.
-    """
-    turn = truth.yaw - odometry_then.yaw
-    dx, dy = odometry_now.x - odometry_then.x, odometry_now.y - odometry_then.y
-    return Pose2D(
-        truth.x + math.cos(turn) * dx - math.sin(turn) * dy,
-        truth.y + math.sin(turn) * dx + math.cos(turn) * dy,
-        odometry_now.yaw + turn,
-    )

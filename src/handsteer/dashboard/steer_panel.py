@@ -1,12 +1,12 @@
-"""The card for manual steering: pad, sliders, active input, and topic."""
+"""The card for manual steering: pad, gamepad, tilt, sliders, active input, and topic."""
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 
 from nicegui import ui
 
-from handsteer.dashboard.page import Page, box, button, card, switch, text
+from handsteer.dashboard.mux_row import MuxRow
+from handsteer.dashboard.page import Page, box, button, card, read_words, switch, text
 from handsteer.dashboard.state import PageState
 from handsteer.dashboard.steering_input import SteeringInput, read_deflection, read_number
 from handsteer.dashboard.viewers import LeaseStatus
@@ -28,6 +28,8 @@ _LATE = "Your command came too late and was ignored: is the network slow? If not
 class SteerPanel:
     """A pad that drives while it is held, and sliders that drive while the page is in front.
 
+    In the browser, a gamepad and the tilt of a phone move the pad.
+
     Args:
         page: Shows the panel.
         has_topics: Whether the viewer may choose another topic to steer on.
@@ -37,7 +39,8 @@ class SteerPanel:
         self._page = page
         self._input = SteeringInput()
         with card("Steer by hand", "panel steer") as self._card:
-            self._mux = _MuxRow()
+            self._mux = MuxRow()
+            button("Hold to drive by tilt", label="Hold to drive by tilting this device").classes("tilt")
             with box("row"):
                 with box("pad-side"):
                     with box("pad").props(
@@ -57,12 +60,14 @@ class SteerPanel:
             with box("last"):
                 button("Both to 0", self._release)
                 self._hint = text("hint", _HINTS["free"])
+            self._sticks = text("sticks", "").props('role="status"')
         self._show_speed()
         ui.on("pad_held", lambda event: self._hold_pad(event.args))
         ui.on(
             "sliders_held", lambda event: self._steer(self._input.keep_sliders(_sent_ms(event.args), time.monotonic()))
         )
         ui.on("let_go", self._release)
+        ui.on("sticks", lambda event: self._sticks.set_text(read_words(event.args)))
 
     def update(self, state: PageState, lease: LeaseStatus) -> None:
         """Show ``state`` to a viewer with ``lease``; sliders of others, and of a stopped robot, are at 0."""
@@ -232,7 +237,7 @@ class _TopicBox:
         self._note.set_text(
             f"Past the control: signs may drive meanwhile. Stop holds here too. {STEERING_CMD_VEL.name} goes back."
             if topic
-            else "Goes through the control, before the signs."
+            else "Goes through the control, before the hand."
         )
         switch(self._note, "direct", on=bool(topic))
 
@@ -243,46 +248,3 @@ class _TopicBox:
                 self._choose(str(self._name.value)[:_LONGEST_TOPIC].strip())
             except TransportError as error:
                 self._error.set_text(str(error))
-
-
-@dataclass(frozen=True)
-class MuxInput:
-    """One input of the twist mux.
-
-    Attributes:
-        name: Its display name.
-        is_active: Whether it drives the robot, or stops it.
-        viewer: The viewer whose input it is, while active; empty if unknown.
-    """
-
-    name: str
-    is_active: bool
-    viewer: str = ""
-
-
-def mux_inputs(state: PageState) -> tuple[MuxInput, ...]:
-    """Return the inputs in order of priority; at most one is active."""
-    directly = bool(state.viewers.topic and state.viewers.steers)
-    by_hand = not state.stopped and (directly or state.driver == "steering")
-    by_signs = not state.stopped and not by_hand and state.driver == "signs"
-    return (
-        MuxInput("Stop", state.stopped, state.viewers.stopped),
-        MuxInput("By hand", by_hand, state.viewers.steers or "another node"),
-        MuxInput("Signs", by_signs),
-    )
-
-
-class _MuxRow:
-    """The inputs in a row, with the active one highlighted."""
-
-    def __init__(self) -> None:
-        with box("mux").props('role="group" aria-label="The active input; the first one overrides the others"'):
-            text("name", "Who drives")
-            self._chips = [text("source chip", name) for name in ("Stop", "By hand", "Signs")]
-
-    def update(self, state: PageState) -> None:
-        """Show ``state``."""
-        for chip, each in zip(self._chips, mux_inputs(state), strict=True):
-            chip.set_text(f"{each.name}: {each.viewer}" if each.is_active and each.viewer else each.name)
-            chip.props('aria-current="true"' if each.is_active else "", remove="" if each.is_active else "aria-current")
-            switch(chip, "holds", on=each.is_active)

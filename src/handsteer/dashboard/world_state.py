@@ -141,3 +141,18 @@ class VelocityHistory:
             fresh = min(self._count - count, len(self._samples))
             samples = list(self._samples)[len(self._samples) - fresh :] if fresh > 0 else []
             return self._count, [sample for sample in samples if now_s - sample.at_s <= SPAN_S]
+
+
+def place_in_world(truth: Pose2D, odometry_then: Pose2D, odometry_now: Pose2D) -> Pose2D:
+    """Return the robot's current pose in the world: ``truth``, moved by the odometry since.
+
+    These are the transforms ``map`` to ``odom`` to ``base_link`` of REP 105: the step is rotated from the odometry
+    frame, which drifts, into the world. ``odometry_then`` is of the same time as ``truth``.
+    """
+    turn = truth.yaw - odometry_then.yaw
+    dx, dy = odometry_now.x - odometry_then.x, odometry_now.y - odometry_then.y
+    return Pose2D(
+        truth.x + math.cos(turn) * dx - math.sin(turn) * dy,
+        truth.y + math.sin(turn) * dx + math.cos(turn) * dy,
+        odometry_now.yaw + turn,
+    )

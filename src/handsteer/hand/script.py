@@ -1,8 +1,8 @@
-"""Scripts of signs, such as ``Forward:3 Turn Left:2 NONE:1``, and the hand's motion through them."""
+"""Scripts of signs and places, such as ``Stop:1 Go:1 Go@0.05,-0.05:2``, and the hand's motion through them."""
 
 import math
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from handsteer.types import Handedness
 
 _CHANGE_S = 0.30
 _MAX_S = 3600.0
+_MAX_M = 0.5
 _PART = re.compile(r"([^:]*):(\S*)\s*")
 
 # The sway of a raised hand: sums of slow waves of these amplitudes, in radians and metres.
@@ -23,10 +24,19 @@ _SWAY_VIEW = np.array([0.030, 0.022, 0.022, 0.003, 0.003, 0.004])
 
 @dataclass(frozen=True)
 class Part:
-    """One sign of a script and its duration in seconds."""
+    """One sign of a script.
+
+    Attributes:
+        sign: Its name.
+        duration_s: Seconds.
+        right_m: How far the hand is from its usual place, to the person's right.
+        down_m: Likewise, downwards.
+    """
 
     sign: str
     duration_s: float
+    right_m: float = 0.0
+    down_m: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -47,8 +57,10 @@ class Moment:
 def parse_script(text: str) -> tuple[Part, ...]:
     """Return the parts of ``text``: signs with durations in seconds, ``SIGN:SECONDS``, separated by spaces.
 
+    ``SIGN@RIGHT,DOWN:SECONDS`` shows the sign so many metres to the person's right of the usual place, and below it.
+
     Raises:
-        PoseError: The script is empty, or a sign or duration in it is wrong; the message names the place.
+        PoseError: The script is empty, or a sign, place or duration in it is wrong; the message names the part.
     """
     parts: list[Part] = []
     rest = text.strip()
@@ -64,21 +76,36 @@ def parse_script(text: str) -> tuple[Part, ...]:
     return tuple(parts)
 
 
-def _part(sign: str, duration: str, number: int) -> Part:
+def _part(shown: str, duration: str, number: int) -> Part:
+    sign, at, place = shown.partition("@")
+    where = f"script part {number}, {shown + ':' + duration!r}"
     try:
         sign_pose(sign)
     except PoseError as error:
-        raise PoseError(f"script part {number}, {sign + ':' + duration!r}: {error}") from None
-    try:
-        seconds = float(duration)
-    except ValueError:
-        seconds = math.nan
+        raise PoseError(f"{where}: {error}") from None
+    right_m, down_m = _read_place(place, where) if at else (0.0, 0.0)
+    seconds = _number(duration)
     if not 0 < seconds <= _MAX_S:
+        raise PoseError(f"{where}: {duration!r} is no duration; write seconds above 0 and up to {_MAX_S:g}")
+    return Part(sign, seconds, right_m, down_m)
+
+
+def _read_place(text: str, where: str) -> tuple[float, float]:
+    """Return metres to the right and down; ``where`` names the part of the script."""
+    metres = [_number(each) for each in text.split(",")]
+    if len(metres) != 2 or not all(abs(each) <= _MAX_M for each in metres):
         raise PoseError(
-            f"script part {number}, {sign + ':' + duration!r}: {duration!r} is no duration; "
-            f"write seconds above 0 and up to {_MAX_S:g}"
+            f"{where}: {text!r} is no place; write metres to the right and down, up to {_MAX_M:g}, as in Go@0.1,-0.05:2"
         )
-    return Part(sign, seconds)
+    return metres[0], metres[1]
+
+
+def _number(text: str) -> float:
+    """Return the number in ``text``; NaN if it is none."""
+    try:
+        return float(text)
+    except ValueError:
+        return math.nan
 
 
 class Motion:
@@ -95,7 +122,7 @@ class Motion:
 
     def __init__(self, script: str, handedness: Handedness = "Right", seed: int = 0) -> None:
         self._parts = parse_script(script)
-        self._poses = [_numbers(sign_pose(part.sign, handedness)) for part in self._parts]
+        self._poses = [_numbers(_placed(part, handedness)) for part in self._parts]
         self._ends = np.cumsum([part.duration_s for part in self._parts])
         self._phases = np.random.default_rng(seed).uniform(0, 2 * np.pi, (len(_SWAY_HZ), len(self._poses[0])))
 
@@ -120,6 +147,14 @@ class Motion:
         waves = np.sin(2 * np.pi * time_s * np.array(_SWAY_HZ)[:, None] + self._phases).mean(axis=0)
         sizes = np.concatenate([np.full(len(ANGLES), _SWAY_JOINTS), _SWAY_VIEW])
         return np.asarray(sizes * waves)
+
+
+def _placed(part: Part, handedness: Handedness) -> HandPose:
+    pose = sign_pose(part.sign, handedness)
+    x, y, z = pose.view.position
+    # Views are of a right hand; a left one has the mirror image. The camera's right is the person's left.
+    right_m = part.right_m if handedness == "Left" else -part.right_m
+    return replace(pose, view=replace(pose.view, position=(x + right_m, y + part.down_m, z)))
 
 
 def _numbers(pose: HandPose) -> Array:

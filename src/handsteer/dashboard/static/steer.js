@@ -7,7 +7,9 @@ const KEYS = {
 };
 const TYPED_IN = "input, textarea, select, [contenteditable]";
 
-let held = null; // the pad that is held: {pad, timer, x, y}, x to the right and y up, -1 to 1
+// The pad that is held: {pad, timer, x, y, follow}, x to the right and y up, -1 to 1. What a gamepad or a tilt holds has
+// a function to follow it, which is called before each message.
+let held = null;
 const pressed = new Set();
 
 // A message that cannot be sent now must not be sent later. The clock is the wall clock, which runs on in standby.
@@ -15,21 +17,22 @@ function say(name, what = {}) {
   if (window.socket?.connected) emitEvent(name, { ...what, at: Date.now() });
 }
 
-function hold(pad, x, y) {
+function hold(pad, x, y, follow) {
   const length = Math.max(1, Math.hypot(x, y));
   const fresh = held === null;
-  held = { pad, timer: held?.timer, x: x / length, y: y / length };
+  held = { pad, timer: held?.timer, x: x / length, y: y / length, follow };
   pad.classList.add("held");
   const reach = (pad.clientWidth - pad.querySelector(".knob").clientWidth) / 2;
   pad.querySelector(".knob").style.transform = `translate(${held.x * reach}px, ${-held.y * reach}px)`;
   if (fresh) {
-    sayHeld();
     held.timer = setInterval(sayHeld, REPEAT_MS);
+    sayHeld();
   }
 }
 
 function sayHeld() {
-  say("pad_held", { x: held.x, y: held.y });
+  held.follow?.();
+  if (held) say("pad_held", { x: held.x, y: held.y });
 }
 
 function releasePad() {

@@ -1,0 +1,202 @@
+"""The card that shows what the hand does: the signs, or the hand as a joystick, as drawings with their effect."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import partial
+
+from nicegui import ui
+
+from handsteer.config import ControlConfig
+from handsteer.control.explain import figures_of
+from handsteer.dashboard.page import Page, box, button, switch, tag, text
+from handsteer.dashboard.settings import Settings
+from handsteer.dashboard.settings_fields import FIELDS
+from handsteer.dashboard.state import PageState
+from handsteer.errors import ConfigError
+from handsteer.types import (
+    BACKWARD,
+    EFFECTS,
+    FORWARD,
+    GO,
+    SIGNS,
+    STOP,
+    TURN_LEFT,
+    TURN_RIGHT,
+    action_of,
+)
+
+# The user's right hand in a mirror, in a box of 64 x 64: the palm, then the fingers as thick lines. The thumb is on the
+# left, where a mirror shows the thumb of a right hand with its palm turned to it.
+_PALM = '<rect x="20" y="30" width="26" height="26" rx="10" class="palm"/>'
+_FINGER = '<path d="M{x} 34V{top}" class="finger"/>'
+_FIST = _PALM + "".join(_FINGER.format(x=x, top=29) for x in (23, 30, 37, 43))
+_TUCKED_THUMB = '<path d="M20 44L33 47" class="finger thumb"/>'
+_THUMB_LEFT = _FIST + '<path d="M24 40L6 36" class="finger"/>'
+_FINGERS = "".join(_FINGER.format(x=x, top=top) for x, top in ((23, 13), (30, 8), (37, 10), (43, 17)))
+_OPEN_PALM = f'{_PALM}{_FINGERS}<path d="M22 46L9 34" class="finger"/>'
+_INDEX_UP = _FIST + _FINGER.format(x=23, top=9) + _TUCKED_THUMB
+
+
+def _svg(shapes: str, transform: str = "", classes: str = "") -> str:
+    return (
+        f'<svg viewBox="0 0 64 64" aria-hidden="true" class="{classes}"><g transform="{transform}">{shapes}</g></svg>'
+    )
+
+
+DRAWN: Mapping[str, tuple[str, str]] = {
+    FORWARD: ("index finger up", _svg(_INDEX_UP)),
+    BACKWARD: ("index finger down", _svg(_INDEX_UP, "rotate(180 32 32)")),
+    STOP: ("open palm", _svg(_OPEN_PALM)),
+    TURN_LEFT: ("thumb to your left", _svg(_THUMB_LEFT)),
+    TURN_RIGHT: ("thumb to your right", _svg(_THUMB_LEFT, "matrix(-1 0 0 1 64 0)")),
+    GO: ("closed fist", _svg(_FIST + _TUCKED_THUMB)),
+}
+"""How to hold the hand for each shipped sign, in words and as SVG."""
+
+_MOVE = "Move it"
+_ARROWS = "".join(
+    f'<path d="M-6 -21L0 -29L6 -21" transform="translate(32 32) rotate({turn})"/>' for turn in (0, 90, 180, 270)
+)
+_MOVED = _svg(f'<g transform="translate(10.5 5) scale(0.65)">{_FIST}{_TUCKED_THUMB}</g><g class="arrows">{_ARROWS}</g>')
+_TAUGHT = ("taught", _svg(_OPEN_PALM, classes="taught"))  # it may have any shape
+
+
+@dataclass(frozen=True)
+class LegendEntry:
+    """One sign and its action.
+
+    Attributes:
+        sign: Its name on ``/gesture/hand_sign``; or a step of the hand as a joystick.
+        pose: How to hold the hand.
+        drawing: SVG.
+        effect: What the robot does.
+        figures: Step and limit; empty if not applicable.
+    """
+
+    sign: str
+    pose: str
+    drawing: str
+    effect: str
+    figures: str
+
+
+def legend(signs: tuple[str, ...], rule: ControlConfig | None) -> tuple[LegendEntry, ...]:
+    """Return the legend of ``signs``: shipped ones first, in the page's order.
+
+    Args:
+        signs: The signs that the classifier recognises.
+        rule: Configures the signs' actions; None if unknown, which gives the default actions, without figures.
+    """
+
+    def entry(sign: str) -> LegendEntry:
+        action = action_of(sign, rule.actions if rule else {})
+        # The semicolon precedes what does not change, which is left out for brevity.
+        effect = EFFECTS[action].partition(";")[0]
+        return LegendEntry(sign, *DRAWN.get(sign, _TAUGHT), effect, figures_of(action, rule) if rule else "")
+
+    order = [*(sign for sign in DRAWN if sign in signs), *(sign for sign in signs if sign not in DRAWN)]
+    return tuple(entry(sign) for sign in order)
+
+
+def joystick_legend(rule: ControlConfig) -> tuple[LegendEntry, ...]:
+    """Return how the hand is a joystick, in three steps."""
+    limits = f"up to {rule.max_linear:g} m/s and {rule.max_angular:g} rad/s"
+    return (
+        LegendEntry("Open the hand", *DRAWN[STOP], "gets ready; lets go at once", ""),
+        LegendEntry("Close the fist", *DRAWN[GO], "holds the joystick: here is its middle", ""),
+        LegendEntry(_MOVE, "closed fist", _MOVED, "up is forward, down backward, sideways turns", limits),
+    )
+
+
+_STEPS = {STOP: "Open the hand", GO: "Close the fist"}
+
+
+def active_entry(state: PageState) -> str:
+    """Return the name of the entry to highlight; empty, or of no entry, if there is none."""
+    if not state.is_joystick:
+        return state.sign
+    if state.driver == "joystick" and not state.commanded.is_zero:
+        return _MOVE
+    return _STEPS.get(state.sign, "")
+
+
+_MODE = FIELDS["control.mode"]
+_MODES = {"signs": "Signs", "joystick": "Joystick"}
+_TITLES = {"signs": "The signs", "joystick": "The hand as a joystick"}
+
+
+class LegendPanel:
+    """What the hand does, as reported by the nodes, with the active sign or step highlighted; and a switch of the mode.
+
+    Args:
+        page: Shows the panel.
+        settings: Those of the graph; None if the mode cannot be changed here.
+    """
+
+    def __init__(self, page: Page, settings: Settings | None) -> None:
+        self._page, self._settings = page, settings
+        self._active = self._mode = ""
+        self._shown: tuple[LegendEntry, ...] = ()
+        self._tiles: dict[str, ui.element] = {}
+        self._choices: dict[str, ui.element] = {}
+        with ui.element("section").classes("card panel legend"):
+            with box("head"):
+                self._title = tag("h2", "", _TITLES["signs"])
+                if settings is not None:
+                    with box("choices").props('role="group" aria-label="What the hand is"'):
+                        self._choices = {
+                            mode: button(name, partial(self._choose, mode)) for mode, name in _MODES.items()
+                        }
+                    self._trouble = text("trouble", "").props('role="alert"')
+            self._box = box("signs")
+        self._fill(legend(SIGNS, None))
+
+    def update(self, state: PageState) -> None:
+        """Show ``state``."""
+        mode = "joystick" if state.is_joystick else "signs"
+        if mode != self._mode:
+            self._mode = mode
+            self._title.set_text(_TITLES[mode])
+            for name, choice in self._choices.items():
+                choice.props(f'aria-pressed="{str(name == mode).lower()}"')
+        entries = joystick_legend(state.rule) if state.rule and state.is_joystick else legend(state.signs, state.rule)
+        if entries != self._shown:
+            self._fill(entries)
+        active = active_entry(state)
+        if active != self._active:
+            for name in {self._active, active} & self._tiles.keys():
+                switch(self._tiles[name], "seen", on=name == active)
+            self._active = active
+
+    def _choose(self, mode: str) -> None:
+        """Change the mode, if this viewer drives; it is not saved to the file."""
+        if self._settings is None:
+            return
+        trouble = ""
+        if not self._page.drives():
+            trouble = "only the driver can change it: ask to drive first"
+        else:
+            try:
+                self._settings.set(_MODE, mode)
+            except ConfigError as error:
+                trouble = str(error)
+        self._trouble.set_text(trouble)
+
+    def _fill(self, entries: tuple[LegendEntry, ...]) -> None:
+        self._shown = entries
+        self._active = ""
+        self._box.clear()
+        with self._box:
+            self._tiles = {entry.sign: _tile(entry) for entry in entries}
+
+
+def _tile(entry: LegendEntry) -> ui.element:
+    with box("sign-tile") as tile:
+        ui.html(entry.drawing, sanitize=False)
+        with box("words"):
+            text("name", entry.sign)
+            text("pose", entry.pose)
+            text("effect", entry.effect)
+            if entry.figures:
+                text("figures", entry.figures)
+    return tile
