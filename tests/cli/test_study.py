@@ -48,7 +48,7 @@ def test_a_wrong_plan_ends_with_file_field_and_what_would_be_right(
 ) -> None:
     path = write(tmp_path / "mine.yaml", {**PLAN, "conditions": [{"name": "a", "input": "feet"}]})
     said = fails(capsys, "study", str(path))
-    assert said.startswith(f"{path}: conditions.0.input: 'feet' should be 'hand', 'pad', 'keys' or 'sliders'")
+    assert said.startswith(f"{path}: conditions.0.input: 'feet' should be 'hand', 'pad', 'keys', 'sliders'")
     assert fails(capsys, "study", str(tmp_path / "gone.yaml")).startswith("cannot read the plan ")
 
 

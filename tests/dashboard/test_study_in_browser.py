@@ -11,8 +11,10 @@ import pytest
 import yaml
 from playwright.sync_api import Page
 
+from handsteer.study.order import order_of
 from tests.dashboard.browsers import a_browser
 from tests.dashboard.test_accessibility import SMALLEST_PHONE, faults
+from tests.dashboard.test_sticks_in_browser import PLUG_IN, push
 from tests.dashboard.visits import NEEDS_A_BROWSER, PATIENCE_MS, WINDOW, visiting
 from tests.processes import Process, eventually, free_port
 from tests.study.plans import PAD, a_plan, a_task
@@ -36,6 +38,8 @@ PLAN: dict[str, Any] = {
 
 
 def rows(path: Path) -> list[dict[str, str]]:
+    if not path.exists():
+        return []
     with path.open(encoding="utf-8", newline="") as file:
         return list(csv.DictReader(file))
 
@@ -72,8 +76,7 @@ class Study:
         self.start()
 
     def laps(self) -> list[str]:
-        path = self.folder / "out" / "laps.csv"
-        return [row["outcome"] for row in rows(path)] if path.exists() else []
+        return [row["outcome"] for row in rows(self.folder / "out" / "laps.csv")]
 
     def press(self, name: str) -> None:
         self.page.locator(".study").get_by_role("button", name=name).click()
@@ -216,6 +219,45 @@ def test_only_the_driver_leads_by_the_input_of_the_condition_and_who_leaves_driv
         assert third.evaluate("document.documentElement.scrollWidth") <= SMALLEST_PHONE["width"]
         assert faults(third) == []
         assert visit.troubles == []
+
+
+def test_only_the_input_of_the_condition_drives(tmp_path: Path) -> None:
+    ways = ("keys", "sliders", "gamepad")
+    plan = a_plan(
+        participants=1, conditions=[{"name": way, "input": way} for way in ways], forms=[], practice_laps=0, laps=1
+    )
+    with visiting("NONE:600", "/study", study=a_task(tmp_path, plan), camera={"fps": 5}) as visit:
+        page, state = visit.page, visit.graph.robot
+        page.evaluate(PLUG_IN, [])
+        page.get_by_role("button", name="I agree").click()
+        for number, way in enumerate(order_of(plan, "P01")[0], 1):
+            page.get_by_role("button", name="Continue").click()
+            begin_lap(page)
+            for other in {*ways, "pad"} - {way, "sliders"}:
+                hold(page, other, down=True)
+                page.wait_for_timeout(300)
+                hold(page, other, down=False)
+            if way != "sliders":
+                assert not page.locator(".sliders").is_visible()
+            assert state.state.truth.x < 0.01, f"neither of the others drives next to {way}"
+            hold(page, way, down=True)
+            visit.wait_until(lambda number=number: len(rows(tmp_path / "laps.csv")) == number)  # type: ignore[misc]
+            hold(page, way, down=False)
+        assert [row["input"] for row in rows(tmp_path / "laps.csv")] == [*order_of(plan, "P01")[0]]
+        assert visit.troubles == []
+
+
+def hold(page: Page, way: str, *, down: bool) -> None:
+    if way == "keys":
+        page.keyboard.down("w") if down else page.keyboard.up("w")
+    elif way == "gamepad":
+        push(page, 0, down=down)
+    elif way == "sliders" and down:
+        for _ in range(3):
+            page.get_by_role("button", name="faster forward").click()
+    elif way == "pad" and (box := page.locator(".pad").bounding_box()):
+        page.mouse.move(box["x"] + box["width"] / 2, box["y"] + 4)
+        page.mouse.down() if down else page.mouse.up()
 
 
 def begin_lap(page: Page) -> None:

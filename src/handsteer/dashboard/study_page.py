@@ -38,7 +38,7 @@ class StudyPage(Page):
 
     def __init__(self, context: PageContext) -> None:
         styles = ("drive.css", "steer.css", "world.css", "study.css")
-        super().__init__(context, "/study", *styles, "steer.js", "webcam.js")
+        super().__init__(context, "/study", *styles, "steer.js", "sticks.js", "webcam.js")
         self._session = context.study
         if context.study is None or context.graph is None:
             with card("Study", "study panel"):
@@ -148,7 +148,8 @@ class StudyPage(Page):
         step = session.step
         method = session.task.plan.condition(step.condition).input if step.condition else "hand"
         classes = f"{'driving' if step.kind == 'lap' else 'asking'} by-{method}"
-        classes += "" if method == "keys" and step.kind == "lap" else " no-keys"
+        # For the scripts of inputs that cannot be hidden.
+        classes += "".join(f" no-{each}" for each in ("keys", "gamepad") if each != method or step.kind != "lap")
         if classes != self._classes:
             self._desk.classes(remove=self._classes, add=classes)
             self._classes = classes

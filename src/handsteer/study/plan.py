@@ -34,8 +34,8 @@ NOT_OF_A_LAP: Final[Mapping[str, bool | Mapping[str, bool]]] = {
 }
 """Parameters that have no effect on a lap; its course is elsewhere."""
 
-Input = Literal["hand", "pad", "keys", "sliders"]
-"""What a participant drives with: hand signs, or one of the page's inputs for manual steering."""
+Input = Literal["hand", "pad", "keys", "sliders", "gamepad", "tilt"]
+"""What a participant drives with: the hand, or one of the page's inputs for manual steering."""
 
 FormName = Literal["tlx", "sus"]
 

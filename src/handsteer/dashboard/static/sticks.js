@@ -44,7 +44,7 @@ function followGamepad() {
   const isSame = found?.index === gamepad && document.hasFocus() && !document.hidden;
   gamepad = found?.index;
   words.gamepad = found ? introduce(found) : "";
-  if (HOLDS.some(isPressed) && isSame) {
+  if (HOLDS.some(isPressed) && isSame && !document.querySelector(".no-gamepad")) {
     if (held ? held.follow === followGamepad : isReady) {
       const [x, y] = found.axes.map((axis) => respond(axis, STICK));
       hold(document.querySelector(".pad"), x, -y, followGamepad);
