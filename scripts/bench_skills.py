@@ -1,9 +1,9 @@
 """Searches the skill of an operator for interfaces of the bench: the constants ``KINDS`` of ``handsteer.bench.laps``.
 
 ``JOBS=2 python scripts/bench_skills.py INTERFACE...``. The search is the same for each: a start, 9 random skills, the
-same ones, and then 14 variations of the best so far, by the mean score of laps on three courses, with seeds from 1000 on,
-which no report uses; skills that are clearly worse after some of the laps are given up. Figure eight and parking are
-left out.
+same ones, and then 14 variations of the best so far, by the mean score of laps on three courses, with seeds from 1000
+on, which no report uses; skills that are clearly worse after some of the laps are given up. Figure eight and parking
+are left out.
 """
 
 import os
