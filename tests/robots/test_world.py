@@ -17,7 +17,9 @@ def thing(fields: str) -> str:
 
 
 def test_shipped_worlds() -> None:
-    assert shipped_worlds() == ["empty", "obstacles", "slalom"]
+    courses = ["figure-eight", "maze", "parking", "slalom", "stop-line"]
+    assert shipped_worlds() == sorted(["empty", "obstacles", *courses])
+    assert all(load_world(name).gates for name in courses)
     assert load_world("empty").obstacles == ()
     things = load_world("obstacles").obstacles
     assert {thing.shape for thing in things} == {"box", "cylinder", "sphere"}
@@ -40,9 +42,8 @@ def test_an_empty_file_is_an_empty_world(tmp_path: Path) -> None:
 
 
 def test_an_unknown_name_lists_the_known_ones() -> None:
-    with pytest.raises(
-        WorldError, match=r"no world 'moon'; use empty or obstacles or slalom, or the path of a \.yaml file"
-    ):
+    names = " or ".join(shipped_worlds())
+    with pytest.raises(WorldError, match=rf"no world 'moon'; use {names}, or the path of a \.yaml file"):
         load_world("moon")
 
 
@@ -147,6 +148,8 @@ worlds = st.builds(
             "floor": st.fixed_dictionaries({"size": st.tuples(metres, metres), "colour": colours}),
             "obstacles": st.lists(things, max_size=5, unique_by=lambda thing: thing["name"]),
             "gates": st.lists(gates, max_size=4, unique_by=lambda gate: gate["name"]),
+            "path": st.lists(st.tuples(numbers, numbers), max_size=4),
+            "stop": st.none() | st.fixed_dictionaries({"position": st.tuples(numbers, numbers)}),
         }
     ),
 )
@@ -165,5 +168,5 @@ def test_shipped_worlds_are_written_one_line_a_thing(name: str) -> None:
     world = load_world(name)
     text = write_world(world)
     assert parse_world(text, "mine") == world
-    headings = sum(bool(part) for part in (world.obstacles, world.gates))
+    headings = sum(bool(part) for part in (world.obstacles, world.gates, world.path, world.stop))
     assert len(text.splitlines()) == 1 + headings + len(world.obstacles) + len(world.gates)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handsteer.errors import BenchError
-from handsteer.robots.world import Gate, Thing, World, load_world
+from handsteer.robots.world import Gate, Stop, Thing, World, load_world
 from handsteer.types import Pose2D
 
 Array = NDArray[np.float64]
@@ -146,6 +146,13 @@ def place_at(path: Path, index: int) -> Pose2D:
     """Return the pose on ``path`` at ``index``."""
     x, y = path.points[index].tolist()
     return Pose2D(x, y, float(path.headings[index]))
+
+
+def off_stop(stop: Stop, pose: Pose2D) -> tuple[float, float]:
+    """Return how far beyond the place to stop at, and how far left of it, ``pose`` is, in metres."""
+    x, y = pose.x - stop.position[0], pose.y - stop.position[1]
+    cosine, sine = math.cos(stop.yaw), math.sin(stop.yaw)
+    return x * cosine + y * sine, y * cosine - x * sine
 
 
 def _corners(world: World) -> Array:

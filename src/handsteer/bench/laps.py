@@ -7,7 +7,7 @@ from typing import Any, get_args
 
 import numpy as np
 
-from handsteer.bench.courses import Course, open_course
+from handsteer.bench.courses import Course, off_stop, open_course
 from handsteer.bench.hand_interfaces import Joystick, Signs
 from handsteer.bench.hand_view import HandView, LandmarkErrors, Through
 from handsteer.bench.hands import Slips
@@ -25,6 +25,7 @@ TIMEOUT_S = 180.0
 
 _UNSTARTED_S = 60.0
 _STANDS_S, _STANDS_MPS, _STANDS_RADPS = 0.5, 0.02, 0.05
+_ASIDE_M = 0.3
 _TRACE_TICKS = 10
 _DECISION_TICKS = round(DECISION_S / TICK_S)
 
@@ -119,13 +120,13 @@ KINDS: dict[str, _Kind] = {
     "signs": _Kind(Skill()),
     "signs_per_second": _Kind(Skill(), {"ramp": "per_second"}),
     "cruise": _Kind(Skill(), {"rule": "cruise"}),
-    "joystick": _Kind(Skill(), {"mode": "joystick"}, Joystick),
-    "pad": _Kind(Skill(), make=Pad, by_hand=False),
+    "joystick": _Kind(Skill(0.958, 1.219, 0.709, 1.805, 1.575), {"mode": "joystick"}, Joystick),
+    "pad": _Kind(Skill(0.944, 1.526, 0.491, 1.939, 1.658), make=Pad, by_hand=False),
     "keys": _Kind(Skill(), make=Keys, by_hand=False),
     "sliders": _Kind(Skill(), make=Sliders, by_hand=False),
     "gamepad": _Kind(Skill(), make=Gamepad, by_hand=False),
 }
-"""The interfaces by name."""
+"""The interfaces by name; the skills are from ``scripts/bench_skills.py``."""
 
 INTERFACES = tuple(KINDS)
 
@@ -269,8 +270,9 @@ class _Measures:
         stop = self._course.world.stop
         if stop is None:
             return True
-        off_m = float(np.hypot(state.truth.x - stop.position[0], state.truth.y - stop.position[1]))
-        return off_m <= stop.tolerance and self._still * TICK_S >= _STANDS_S
+        along, across = off_stop(stop, state.truth)
+        is_there = abs(along) <= stop.tolerance and abs(across) <= _ASIDE_M
+        return is_there and self._still * TICK_S >= _STANDS_S
 
     def lap(self, seed: int, course: CourseState) -> Lap:
         """Return the result."""
@@ -293,7 +295,4 @@ class _Measures:
 
     def _beyond(self, state: RobotState) -> float:
         stop = self._course.world.stop
-        if stop is None:
-            return 0.0
-        along = (state.truth.x - stop.position[0]) * float(np.cos(stop.yaw))
-        return along + (state.truth.y - stop.position[1]) * float(np.sin(stop.yaw))
+        return 0.0 if stop is None else off_stop(stop, state.truth)[0]

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from handsteer.bench.courses import Course, Path
+from handsteer.bench.courses import Course, Path, off_stop
 from handsteer.types import ZERO, Pose2D, Velocity
 
 DECISION_S = 0.05
@@ -147,7 +147,7 @@ class Operator:
         off = math.remainder(float(path.headings[path.index(self._s_m + reach / 2)]) - pose.yaw, math.tau)
         if abs(off) > _TURNS_RAD:
             return Velocity(0.0, math.copysign(min(1.0, abs(off)), off))
-        if speed == 0.0:
+        if speed <= 0.0:
             turn = 0.0
         return Velocity(speed, max(-2.0, min(2.0, turn)))
 
@@ -174,9 +174,7 @@ class Operator:
         """Return ``speed`` reduced for the place to stop at."""
         assert self._course.world.stop is not None
         stop = self._course.world.stop
-        along = (stop.position[0] - seen.pose.x) * math.cos(stop.yaw)
-        along += (stop.position[1] - seen.pose.y) * math.sin(stop.yaw)
-        left = along if self._s_m > stop_m - 1.0 else stop_m - self._s_m
+        left = -off_stop(stop, seen.pose)[0] if self._s_m > stop_m - 1.0 else stop_m - self._s_m
         left -= self._delay_s * seen.velocity.linear_mps  # people know that they see it late
         if abs(left) < stop.tolerance / 2:
             return 0.0

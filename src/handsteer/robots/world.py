@@ -117,7 +117,7 @@ class Stop(Section):
 
     position: tuple[Coordinate, Coordinate] = Field(description="x and y where the robot's centre should be [m]")
     yaw: float = Field(0.0, ge=-math.tau, le=math.tau, description="Its heading there, left positive [rad]")
-    tolerance: float = Field(0.15, ge=0.01, le=10, description="Largest distance of its centre from there [m]")
+    tolerance: float = Field(0.15, ge=0.01, le=10, description="Largest distance along its heading [m]")
 
 
 class World(Section):
