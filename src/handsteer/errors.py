@@ -19,6 +19,8 @@
     ├── TrainingError          signs cannot be learnt from a dataset
     ├── PoseError              a hand pose or a script of signs is wrong
     ├── WorldError             a world file or robot description is wrong
+    ├── BenchError             a lap of the bench cannot be driven, or a world is no course
+    ├── StudyError             the plan of a study, its results or an answer are wrong
     ├── TransportError         a topic cannot be published or subscribed to
     ├── DashboardError         the web page cannot be served
     └── PackageMissing         a Python package that is needed is not installed
@@ -97,6 +99,14 @@ class PoseError(HandsteerError):
 
 class WorldError(HandsteerError):
     """A world file or robot description is wrong."""
+
+
+class BenchError(HandsteerError):
+    """A lap of the bench cannot be driven: an interface or a range is wrong, or a world is no course."""
+
+
+class StudyError(HandsteerError):
+    """The plan of a study, its results or an answer to a form are wrong."""
 
 
 class TransportError(HandsteerError):

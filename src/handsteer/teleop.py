@@ -22,7 +22,7 @@ from handsteer.control.explain import Reason
 from handsteer.recognition.hand_joystick import HandJoystick
 from handsteer.recognition.recognizer import Recognition, Recognizer
 from handsteer.timeouts import ENGAGE_S
-from handsteer.types import RELEASED, ZERO, Velocity
+from handsteer.types import RELEASED, ZERO, Stick, Velocity
 
 
 class Teleop:
@@ -92,6 +92,11 @@ class Teleop:
     def reset(self) -> None:
         """End a Stop; nothing moves before neutral was seen."""
         self._control.reset()
+
+    @property
+    def stick(self) -> Stick:
+        """The hand as a joystick in the last image."""
+        return self._stick
 
     @property
     def reason(self) -> str:

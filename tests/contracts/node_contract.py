@@ -43,6 +43,10 @@ class Driver(ABC):
         """Publish ``sign`` so many times."""
 
     @abstractmethod
+    def hold(self, left: float, forward: float, *, held: bool = True) -> None:
+        """Publish the state of the hand as a joystick; for a control in that mode."""
+
+    @abstractmethod
     def interfere(self) -> None:
         """Become a second publisher of velocity commands."""
 
@@ -94,6 +98,19 @@ class ControlContract:
         driver.show("Forward", count=60, period_s=0.01)
         driver.show("Backward")
         driver.expect((0.04, 0.0), (0.08, 0.0), *[(0.1, 0.0)] * 58, (0.06, 0.0))
+
+    def test_a_joystick_drives_in_its_mode_once_it_was_released(self, drive: MakeDriver) -> None:
+        driver = drive(parameters={"mode": "joystick", "max_linear": 0.5})
+        for left, forward, held in ((0.0, 0.0, False), (-1.0, 0.5, True), (0.0, 0.0, False)):
+            driver.hold(left, forward, held=held)
+        driver.expect((0.0, 0.0), (0.25, -2.0), (0.0, 0.0))
+        time.sleep(0.6)
+        driver.hold(0.0, 1.0)
+        driver.hold(0.0, 0.0, held=False)
+        driver.hold(0.0, 1.0)
+        eventually(lambda: (0.5, 0.0) in driver.twists)
+        moves = [twist for twist in driver.twists[3:] if twist != (0.0, 0.0)]
+        assert moves == [(0.5, 0.0)], "the first was held since before the pause"
 
     def test_options_go_before_parameters_before_the_file(self, drive: MakeDriver, tmp_path: Any) -> None:
         file = tmp_path / "my.yaml"

@@ -23,6 +23,7 @@ PLACES = (
     "/",
     "/teach",
     "/settings",
+    "/study",
     "/camera.mjpg",
     "/assets/page.js",
     "/_nicegui_ws/socket.io/?EIO=4&transport=polling",

@@ -73,7 +73,7 @@ class Driven:
 
 def test_all_pages_are_served_from_another_process() -> None:
     with served() as (_, page, url):
-        for path in ("/", "/teach", "/settings"):
+        for path in ("/", "/teach", "/settings", "/study"):
             assert "handsteer" in fetch(url + path)
         assert page.process.pid != os.getpid()
 

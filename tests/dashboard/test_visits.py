@@ -16,7 +16,7 @@ from tests.dashboard.served import Site
 from tests.dashboard.sockets import PageSocket
 from tests.processes import eventually
 
-PATHS = ("/", "/teach", "/settings")
+PATHS = ("/", "/teach", "/settings", "/study")
 VISITS = 18
 
 

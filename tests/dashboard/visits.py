@@ -16,6 +16,7 @@ from scripts import chromium
 from handsteer.config import load
 from handsteer.dashboard.page_process import PageProcess
 from handsteer.graph import Graph
+from handsteer.study.session import Task
 from tests.dashboard.browsers import a_browser
 
 log = logging.getLogger(__name__)
@@ -92,7 +93,13 @@ class Visit:
 
 @contextmanager
 def visiting(
-    script: str, path: str = "/", webcam: Path | None = None, *, steering: bool = False, **sections: dict[str, Any]
+    script: str,
+    path: str = "/",
+    webcam: Path | None = None,
+    *,
+    steering: bool = False,
+    study: Task | None = None,
+    **sections: dict[str, Any],
 ) -> Iterator[Visit]:
     """Show a page of a whole graph that sees the virtual hand; the hand begins once the browser shows the page.
 
@@ -101,6 +108,7 @@ def visiting(
         path: Which page.
         webcam: The video that the browser takes for its own camera.
         steering: Whether the graph has a node ``steering`` beside that of the page.
+        study: What the page leads a participant through.
         sections: Further configuration by section.
     """
     base = {
@@ -110,7 +118,7 @@ def visiting(
     }
     with Graph(load(None, base, sections), steering=steering) as graph, a_browser(webcam) as browser:
         served = PageProcess()
-        url = served.serve(graph)
+        url = served.serve(graph, study=study).removesuffix("/study")
         visit = Visit(browser.new_page(viewport=WINDOW), graph)
         try:
             visit.page.set_default_timeout(PATIENCE_MS)

@@ -30,8 +30,11 @@ class DdsDriver(Driver):
     def __init__(self, graph: PeerGraph, *options: str, parameters: Mapping[str, Any] | None = None) -> None:
         namespace = f"/n{next(_numbers)}"
         self.signs, self.cmd_vel, self._peer = f"{namespace}/gesture/hand_sign", f"{namespace}{CMD_VEL}", graph.peer
+        self._joy = f"{namespace}/gesture/joy"
+        self._is_joystick = (parameters or {}).get("mode") == "joystick"
         record_twists(graph.peer, self.cmd_vel)
         graph.peer.ask("advertise", topic=self.signs, type="String")
+        graph.peer.ask("advertise", topic=self._joy, type="Joy")
         words = [word for name, value in (parameters or {}).items() for word in ("-p", f"{name}:={value}")]
         ros = ("-r", f"__ns:={namespace}", *words)
         self.process = graph.node("control", *options, name=f"{namespace}/{NODE}", ros=ros)
@@ -43,11 +46,18 @@ class DdsDriver(Driver):
         self._before = len(twists(self._peer, self.cmd_vel))
 
     def _is_heard(self) -> bool:
-        self.show("NONE")
+        if self._is_joystick:
+            self.hold(0.0, 0.0, held=False)
+        else:
+            self.show("NONE")
         return bool(twists(self._peer, self.cmd_vel))
 
     def show(self, sign: str, count: int = 1, period_s: float = 0.02) -> None:
         self._peer.ask("publish", topic=self.signs, values={"data": sign}, count=count, period_s=period_s)
+
+    def hold(self, left: float, forward: float, *, held: bool = True) -> None:
+        values = {"axes": [left, forward], "buttons": [int(held)]}
+        self._peer.ask("publish", topic=self._joy, values=values, period_s=0.02)
 
     def show_raw(self, raw: bytes) -> None:
         self._peer.ask("publish_raw", topic=self.signs, hex=raw.hex())

@@ -30,7 +30,7 @@ from cyclonedds.builtin import (
 from cyclonedds.core import Policy, Qos
 from cyclonedds.domain import Domain, DomainParticipant
 from cyclonedds.idl import IdlStruct
-from cyclonedds.idl.types import array, bounded_str, byte, float64, int32, sequence, uint8, uint32
+from cyclonedds.idl.types import array, bounded_str, byte, float32, float64, int32, sequence, uint8, uint32
 from cyclonedds.internal import InvalidSample
 from cyclonedds.pub import DataWriter
 from cyclonedds.sub import DataReader
@@ -123,6 +123,13 @@ class TwistWithCovariance(IdlStruct, typename="geometry_msgs::msg::dds_::TwistWi
 
 
 @dataclass
+class Joy(IdlStruct, typename="sensor_msgs::msg::dds_::Joy_"):
+    header: Header = field(default_factory=Header)
+    axes: sequence[float32] = field(default_factory=list)
+    buttons: sequence[int32] = field(default_factory=list)
+
+
+@dataclass
 class Odometry(IdlStruct, typename="nav_msgs::msg::dds_::Odometry_"):
     header: Header = field(default_factory=Header)
     child_frame_id: str = ""
@@ -188,6 +195,7 @@ TYPES = {
         Bool,
         String,
         Image,
+        Joy,
         CompressedImage,
         Twist,
         Odometry,

@@ -5,6 +5,7 @@ import json
 import logging
 import random
 from collections.abc import Iterator
+from urllib.parse import urlsplit
 
 import pytest
 
@@ -17,6 +18,7 @@ from tests.dashboard.sockets import PageSocket, events_of
 from tests.fuzz import corpus
 from tests.fuzz.mutants import CASES, mutants
 from tests.processes import eventually
+from tests.study.plans import a_task
 
 VALUES: tuple[object, ...] = (
     None, True, 0, -1, 0.5, 1e308, 2**63, "", "Stop", "x" * 5000, "\x1b[2J\n", "../../etc/passwd", [], [1, 2], [[[]]],
@@ -32,7 +34,7 @@ class Whole(Site):
     def __init__(self, graph: RemoteGraph) -> None:
         self.dashboard = Dashboard.of(graph)
         self.url = self.dashboard.start()
-        self.port = int(self.url.rpartition(":")[2])
+        self.port = urlsplit(self.url).port or 0
 
     def close(self) -> None:
         self.dashboard.stop()
@@ -41,9 +43,11 @@ class Whole(Site):
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Whole]:
     with pytest.MonkeyPatch.context() as patch:
-        patch.chdir(tmp_path_factory.mktemp("work"))
+        folder = tmp_path_factory.mktemp("work")
+        patch.chdir(folder)
         config = load(base={"camera": {"source": "virtual"}, "dashboard": {"port": 0}, "teach": {}})
         with Graph(config, steering=False) as graph, remote(graph) as page:
+            page.study = a_task(folder)
             site = Whole(page)
             yield site
             site.close()
@@ -60,7 +64,7 @@ def said(chance: random.Random) -> list[str]:
     return texts
 
 
-@pytest.mark.parametrize("path", ["/", "/teach", "/settings"])
+@pytest.mark.parametrize("path", ["/", "/teach", "/settings", "/study"])
 def test_nothing_that_is_said_keeps_the_page_from_stopping_the_robot(
     whole: Whole, path: str, caplog: pytest.LogCaptureFixture
 ) -> None:

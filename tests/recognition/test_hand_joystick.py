@@ -1,7 +1,10 @@
 """The hand as a joystick, on hands with known shapes and places."""
 
+from collections.abc import Iterator
 from dataclasses import replace
+from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 from hypothesis import given
@@ -10,7 +13,7 @@ from hypothesis import strategies as st
 from handsteer.config import JoystickConfig
 from handsteer.recognition.hand import Hand
 from handsteer.recognition.hand_joystick import HandJoystick, deflection
-from handsteer.recognition.recognizer import Recognition
+from handsteer.recognition.recognizer import Recognition, Recognizer
 from handsteer.types import GO, RELEASED, STOP, Handedness, Stick
 from tests.recognition.hands import SIZE, show_sign
 
@@ -218,3 +221,34 @@ def test_it_is_held_only_by_a_fist_in_view_that_was_open_before(
         if sign != GO and frames * dt_s > 0.11:
             assert not stick.held
         assert may_hold or not stick.held
+
+
+CLOSED_S = {"dex-retargeting_human_hand_video_1280x720": ((8.4, 9.5), (20.1, 20.8))}
+"""When a hand really closes to a fist in a recording, in seconds; in the others none does."""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("step", [1, 2], ids=["as recorded", "every second frame"])
+@pytest.mark.parametrize("flipped", [False, True], ids=["as recorded", "flipped"])
+def test_in_recordings_of_people_it_is_held_only_while_a_fist_is_closed(
+    data_dir: Path, step: int, *, flipped: bool
+) -> None:
+    for path in sorted((data_dir / "videos").glob("*.mp4")):
+        video = cv2.VideoCapture(str(path))
+        dt_s = step / video.get(cv2.CAP_PROP_FPS)
+        recognizer, joystick = Recognizer(), HandJoystick()
+        held_s = []
+        for number, image in enumerate(frames_of(video)):
+            if number % step == 0:
+                picture = np.ascontiguousarray(image[:, ::-1]) if flipped else image
+                if joystick.step(recognizer.step(picture, dt_s), dt_s).held:
+                    held_s.append(number / step * dt_s)
+        closed = CLOSED_S.get(path.stem, ())
+        false = [time_s for time_s in held_s if not any(start <= time_s <= end for start, end in closed)]
+        assert not false, f"{path.name}: held at {false[0]:.2f} s, {len(false)} frames"
+        assert bool(held_s) == bool(closed)
+
+
+def frames_of(video: cv2.VideoCapture) -> Iterator[np.ndarray]:
+    while (frame := video.read())[0]:
+        yield frame[1]

@@ -48,12 +48,18 @@ class Ros1Driver(Driver):
         self._peer = graph.peer(f"__ns:={self.namespace}")
         record_twists(self._peer, f"{self.namespace}{CMD_VEL}")
         self._peer.ask("advertise", topic="gesture/hand_sign", package="std_msgs", type="String")
-        eventually(lambda: self._peer.ask("listeners", topic="gesture/hand_sign") > 0)
+        self._peer.ask("advertise", topic="gesture/joy", package="sensor_msgs", type="Joy")
+        heard = "gesture/joy" if (parameters or {}).get("mode") == "joystick" else "gesture/hand_sign"
+        eventually(lambda: self._peer.ask("listeners", topic=heard) > 0)
         eventually(lambda: graph.listeners(f"{self.namespace}{CMD_VEL}"))
 
     def show(self, sign: str, count: int = 1, period_s: float = 0.02) -> None:
         values = {"data": sign}
         self._peer.ask("publish", topic="gesture/hand_sign", values=values, count=count, period_s=period_s)
+
+    def hold(self, left: float, forward: float, *, held: bool = True) -> None:
+        values = {"axes": [left, forward], "buttons": [int(held)]}
+        self._peer.ask("publish", topic="gesture/joy", values=values, period_s=0.02)
 
     def interfere(self) -> None:
         self._peer.ask("advertise", topic=f"{self.namespace}{CMD_VEL}", package="geometry_msgs", type="Twist")

@@ -31,12 +31,13 @@ from rclpy.parameter import Parameter, parameter_dict_from_yaml_file, parameter_
 from rclpy.parameter_client import AsyncParameterClient
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rosgraph_msgs.msg import Clock
-from sensor_msgs.msg import CompressedImage, Image
+from sensor_msgs.msg import CompressedImage, Image, Joy
 from std_msgs.msg import Bool, String
 from std_srvs.srv import Trigger
 
 TYPES = {
-    kind.__name__: kind for kind in (Bool, Clock, CompressedImage, Image, Log, Odometry, String, Twist, TwistStamped)
+    kind.__name__: kind
+    for kind in (Bool, Clock, CompressedImage, Image, Joy, Log, Odometry, String, Twist, TwistStamped)
 }
 
 rclpy.init()
@@ -70,6 +71,8 @@ def value(message: Any, path: str) -> Any:
     found = reduce(getattr, path.split("."), message)
     if isinstance(found, Time):
         return found.sec + found.nanosec / 1e9
+    if isinstance(message, Joy) and not isinstance(found, (str, Time)):
+        return list(found)
     return found if isinstance(found, (bool, int, float, str)) else len(found)
 
 

@@ -20,7 +20,9 @@ _EXAMPLES = """Examples:
   handsteer run                                  drive, and open the page
   handsteer run --headless --duration 30 --json  no page, one summary at the end
   handsteer recognize photo.jpg                  which sign is it?
+  handsteer study examples/study.yaml            compare interfaces with people
   handsteer signs evaluate photos/               how well are signs recognised?
+  handsteer bench --course slalom                how well does one drive?
   handsteer camera --transport ros1              one node, in a ROS 1 graph
   handsteer camera --transport auto              one node, in a ROS 2 graph
   handsteer doctor                               what works on this machine
@@ -37,11 +39,12 @@ app = App(
     result_action="return_value",
 )
 # Named, not imported: a verb's module is loaded when it is used.
-for verb in ("run", "recognize"):
+for verb in ("run", "recognize", "study"):
     app.command(f"handsteer.cli.{verb}:{verb}", name=verb)
 for verb in ("models", "doctor", "ros"):
     app.command(f"handsteer.cli.installation:{verb}", name=verb)
 app.command("handsteer.cli.signs:app", name="signs")
+app.command("handsteer.cli.bench:bench", name="bench")
 for verb in _NODES:
     app.command(f"handsteer.cli.nodes:{verb}", name=verb, group="One node of a graph of several processes")
 app.command("handsteer.cli.nodes:zenoh_router", name="zenoh-router", group="One node of a graph of several processes")

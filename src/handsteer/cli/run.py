@@ -18,6 +18,7 @@ from handsteer.dashboard.page_process import PageProcess
 from handsteer.errors import ConfigError
 from handsteer.graph import Graph
 from handsteer.parameters import from_parameters
+from handsteer.study.session import Task
 from handsteer.summary import Summary
 from handsteer.transports import join
 from handsteer.transports.base import Session
@@ -91,7 +92,7 @@ def run(
     if duration is not None and not duration > 0:
         raise ConfigError(f"--duration: {duration:g} should be greater than 0 seconds")
     with _linked(settle, ros_args, fast=fast) as (settings, link):
-        summary = _drive(settings, link, duration, config_file, headless=headless, fast=fast)
+        summary = drive(settings, link, duration, config_file, headless=headless, fast=fast)
     print(json_format.dumps(summary.as_dict()) if json else _summary_text(summary))
     return 0
 
@@ -125,15 +126,23 @@ def _linked(
             link.close()
 
 
-def _drive(
-    settings: Config, link: Session | None, duration: float | None, file: Path | None, *, headless: bool, fast: bool
+def drive(
+    settings: Config,
+    link: Session | None = None,
+    duration: float | None = None,
+    file: Path | None = None,
+    study: Task | None = None,
+    *,
+    headless: bool = False,
+    fast: bool = False,
 ) -> Summary:
+    """Run a graph until it ends, ``duration`` seconds have passed, or a signal comes; return its statistics."""
     # Started first: it loads its libraries while this process loads the models.
     page = None if headless else PageProcess()
     try:
         with Graph(settings, SteppedClock() if fast else RealClock(), link=link, steering=page is None) as graph:
             try:
-                _run_until_end(graph, duration, file, page, fast=fast)
+                _run_until_end(graph, duration, file, study, page, fast=fast)
             except KeyboardInterrupt:
                 say("stopping the robot")
             finally:
@@ -147,7 +156,7 @@ def _drive(
 
 
 def _run_until_end(
-    graph: Graph, duration: float | None, file: Path | None, page: PageProcess | None, *, fast: bool
+    graph: Graph, duration: float | None, file: Path | None, study: Task | None, page: PageProcess | None, *, fast: bool
 ) -> None:
     if fast:
         graph.run_stepped(*([] if duration is None else [duration]))
@@ -157,7 +166,7 @@ def _run_until_end(
         graph.start()
         graph.wait(duration, until=signals.were_raised)
         return
-    url = page.serve(graph, file)
+    url = page.serve(graph, file, study)
     graph.start()
     say(f"the page is at {url}; Ctrl-C ends")
     if graph.config.dashboard.opens_browser:

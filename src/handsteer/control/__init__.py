@@ -60,7 +60,10 @@ class Control:
             stick = RELEASED
         if steering is not None and not self.safety.admits_steering(is_zero=steering.is_zero):
             steering = ZERO
-        return self._ramped(self.mux.step(dt_s, sign=sign, steering=steering, stick=stick))
+        velocity = self.mux.step(dt_s, sign=sign, steering=steering, stick=stick)
+        if self.mux.source in ("signs", "joystick") and not self.safety.engagement.engaged:
+            velocity = self.mux.halt()  # it may be disengaged between two frames
+        return self._ramped(velocity)
 
     def halt(self) -> Velocity | None:
         """Stop the active input; return one zero, or None if there is none."""
@@ -78,15 +81,17 @@ class Control:
     def reconfigure(self, config: ControlConfig) -> Velocity | None:
         """Change limits, steps and times; return the velocity to command now if the last one exceeds the new limits.
 
-        Another mode stops the robot, and the hand must show neutral first.
+        Another mode or rule stops the robot, and the hand must show neutral first.
         """
-        if config.mode != self._config.mode:
-            self.safety.disarm("the mode has changed")
-            self.mux.halt()
+        stopped: Velocity | None = None
+        if (config.mode, config.rule) != (self._config.mode, self._config.rule):
+            self.safety.disarm("its rule has changed")
+            stopped = self.halt()
         self._config = config
         self.safety.reconfigure(config)
         self._ramp.reconfigure(config)
-        return self._ramped(self.mux.reconfigure(config))
+        velocity = self._ramped(self.mux.reconfigure(config))
+        return stopped if velocity is None else velocity
 
     def _admitted(self, sign: str) -> str | None:
         """Return the sign to follow: ``NONE`` if none may be, None if signs do not drive."""

@@ -1,10 +1,10 @@
-"""Converts signs to velocities by the tutorial's rule, with limits and a watchdog."""
+"""Converts signs to velocities, by the tutorial's rule or by that of a cruise control, with limits and a watchdog."""
 
 import math
 
 from handsteer.config import ControlConfig
 from handsteer.control.safety import Allowance
-from handsteer.types import ZERO, Action, Velocity, action_of
+from handsteer.types import MOTION_ACTIONS, NONE, ZERO, Action, Velocity, action_of
 
 _DIGITS = 9
 _TURBO = 2.0
@@ -52,11 +52,11 @@ class SignControl:
             timed_out = not self.silent and self._since_sign_s >= self._config.sign_timeout
             return self.halt() if timed_out else None
         # After silence, it is unknown how long the sign was shown before: its time counts from now.
-        interval_s = 0.0 if self.silent else self._since_sign_s
+        interval_s = 0.0 if self.silent else min(self._since_sign_s, self._config.sign_timeout)
         self._since_sign_s = 0.0
         self.silent = False
         action = action_of(sign, self._config.actions)
-        self.velocity = self._next(action, interval_s)
+        self.velocity = self._next(sign, action, interval_s)
         commanded = self._boosted() if action == "turbo" else self.velocity
         return commanded if commanded.is_finite else self.halt()
 
@@ -78,7 +78,7 @@ class SignControl:
         self._since_sign_s = 0.0
         return None if was_silent else ZERO
 
-    def _next(self, action: Action, interval_s: float) -> Velocity:
+    def _next(self, _sign: str, action: Action, interval_s: float) -> Velocity:
         now = self.velocity
         linear, angular = self._growth(interval_s)
         match action:
@@ -106,6 +106,96 @@ class SignControl:
         if config.ramp == "per_message":
             return config.linear_step, config.angular_step
         return config.linear_acceleration * interval_s, config.angular_acceleration * interval_s
+
+
+class CruiseControl(SignControl):
+    """Keeps a set speed, which signs change in steps, and turns while a turn is shown.
+
+    ``Forward`` raises the set speed by a step when it begins, and by another one each ``cruise_step_time`` while it is
+    held; ``Backward`` lowers it, and stops at zero until it is shown again. The velocity follows the set speed whatever
+    is shown, so the robot also speeds up in a curve. ``Turn Left`` and ``Turn Right`` turn while they are shown;
+    ``Forward`` and ``Backward`` keep the turn, ``Go`` ends it. ``Stop`` and ``NONE`` command zero at once. After a
+    ``NONE`` of at most :data:`BETWEEN_SIGNS_S`, as there is while the fingers go from one sign to another, a sign that
+    moves continues from the set speed, and from the velocity to which the robot has braked meanwhile.
+    """
+
+    BETWEEN_SIGNS_S = 0.5
+
+    def __init__(self, config: ControlConfig) -> None:
+        super().__init__(config)
+        self._set_mps = 0.0
+        self._shown: Action = "stop"
+        self._shown_s = 0.0
+        self._unseen_s = 0.0
+        self._left_mps = 0.0
+
+    def reconfigure(self, config: ControlConfig) -> None:
+        """Change the configuration; velocity and set speed are clamped to the new limits."""
+        super().reconfigure(config)
+        self._set_mps = max(-config.max_linear, min(self._set_mps, config.max_linear))
+
+    def hold_back(self, velocity: Velocity) -> None:
+        """Clamp velocity and set speed to the magnitudes in ``velocity``, so that only a sign speeds it up again."""
+        super().hold_back(velocity)
+        self._set_mps = max(-abs(velocity.linear_mps), min(self._set_mps, abs(velocity.linear_mps)))
+
+    def halt(self) -> Velocity | None:
+        """Set velocity and set speed to zero; return one zero, or None if already silent."""
+        self._forget()
+        return super().halt()
+
+    def _forget(self) -> None:
+        self._set_mps, self._left_mps, self._unseen_s, self._shown = 0.0, 0.0, 0.0, "stop"
+
+    def _next(self, sign: str, action: Action, interval_s: float) -> Velocity:
+        config = self._config
+        if sign == NONE:
+            return self._brake(interval_s)
+        if action == "stop" or (self._unseen_s and action not in MOTION_ACTIONS):
+            self._forget()
+            return ZERO
+        if self._unseen_s:
+            self.velocity, self._unseen_s = Velocity(self._left_mps), 0.0
+        begins = action != self._shown
+        self._shown = action
+        if action in ("forward", "backward"):
+            self._change_set_speed(1.0 if action == "forward" else -1.0, interval_s, begins=begins)
+        now = self.velocity
+        linear = _approach(now.linear_mps, self._set_mps, config.cruise_acceleration * interval_s)
+        turn = min(config.cruise_turn, config.max_angular)
+        wanted = {"turn_left": turn, "turn_right": -turn, "go": 0.0}.get(action, now.angular_radps)
+        angular = _approach(now.angular_radps, wanted, config.cruise_angular_acceleration * interval_s)
+        return Velocity(round(linear, _DIGITS), round(angular, _DIGITS))
+
+    def _brake(self, interval_s: float) -> Velocity:
+        """Command zero, and remember how fast the robot still is at least, if it brakes as this rule does."""
+        if not self._unseen_s:
+            self._left_mps = self.velocity.linear_mps
+        self._unseen_s += interval_s
+        self._left_mps = _approach(self._left_mps, 0.0, self._config.cruise_acceleration * interval_s)
+        if self._unseen_s > self.BETWEEN_SIGNS_S:
+            self._forget()
+        return ZERO
+
+    def _change_set_speed(self, way: float, interval_s: float, *, begins: bool) -> None:
+        self._shown_s = 0.0 if begins else self._shown_s + interval_s
+        if not begins:
+            if self._shown_s < self._config.cruise_step_time:
+                return
+            self._shown_s -= self._config.cruise_step_time
+        before, limit = self._set_mps, self._config.max_linear
+        after = round(before + way * self._config.cruise_step, _DIGITS)
+        if before * way < 0 <= after * way or (before == 0.0 and not begins):
+            after = 0.0  # the direction changes only when the sign is shown again
+        self._set_mps = max(-limit, min(after, limit))
+
+
+def _approach(now: float, wanted: float, step: float) -> float:
+    """Return ``now`` moved towards ``wanted`` by ``step``, or twice that towards zero."""
+    if now * wanted < 0:
+        wanted = 0.0
+    step = 2 * step if abs(wanted) < abs(now) else step
+    return wanted if abs(wanted - now) <= step else now + math.copysign(step, wanted - now)
 
 
 def _is_faster(after: Velocity, before: Velocity) -> bool:

@@ -5,7 +5,7 @@ from typing import Literal
 
 from handsteer.config import ControlConfig
 from handsteer.control.explain import Reason
-from handsteer.control.sign_control import SignControl
+from handsteer.control.sign_control import CruiseControl, SignControl
 from handsteer.types import NONE, ZERO, Stick, Velocity, action_of
 
 Source = Literal["none", "signs", "joystick", "steering"]
@@ -24,7 +24,7 @@ class TwistMux:
 
     def __init__(self, config: ControlConfig) -> None:
         self._config = config
-        self._signs = SignControl(config)
+        self._signs = _signs_by_rule(config)
         self._since_input_s = 0.0
         self._is_held = False
         self._last_sign: str | None = None
@@ -72,8 +72,11 @@ class TwistMux:
         Returns:
             The velocity to command now if the last one exceeds the new limits; else None.
         """
+        if config.rule == self._config.rule:
+            self._signs.reconfigure(config)
+        else:
+            self._signs = _signs_by_rule(config)
         self._config = config
-        self._signs.reconfigure(config)
         within = self._velocity.clamped(config.max_linear, config.max_angular)
         return self._take(within if self.source != "none" and within != self._velocity else None)
 
@@ -129,3 +132,7 @@ class TwistMux:
         if velocity is not None:
             self._velocity = velocity
         return velocity
+
+
+def _signs_by_rule(config: ControlConfig) -> SignControl:
+    return CruiseControl(config) if config.rule == "cruise" else SignControl(config)

@@ -16,6 +16,7 @@ from handsteer.dashboard.remote_graph import RemoteGraph
 from handsteer.dashboard.settings import Settings
 from handsteer.dashboard.state import PageState
 from handsteer.dashboard.viewers import LeaseStatus, OnDemandNode, Role
+from handsteer.study.session import Session
 
 STATIC = Path(__file__).parent / "static"
 """Scripts and styles of the pages."""
@@ -170,12 +171,14 @@ class PageContext:
         graph: The graph, for what pages do in addition to its topics; None if its nodes run elsewhere.
         settings: The graph's parameters, likewise.
         lessons: Teaches the graph signs, likewise.
+        study: Leads a participant through a study; None without one.
     """
 
     node: OnDemandNode[DashboardNode]
     graph: RemoteGraph | None = None
     settings: Settings | None = None
     lessons: Lessons | None = None
+    study: Session | None = None
 
 
 class Page:

@@ -16,6 +16,7 @@ from typing import Final
 from handsteer.dashboard.remote_graph import GraphServer, RemoteGraph
 from handsteer.errors import DashboardError, HandsteerError, needing
 from handsteer.graph import Graph
+from handsteer.study.session import Task
 from handsteer.transports.piped import Pipe
 
 START_TIMEOUT_S: Final = 60.0
@@ -59,10 +60,11 @@ class PageProcess:
         """Whether the process, or its end of the pipe, has ended."""
         return self._pipe.ended.is_set()
 
-    def serve(self, graph: Graph, file: Path | None = None) -> str:
+    def serve(self, graph: Graph, file: Path | None = None, study: Task | None = None) -> str:
         """Serve the page of ``graph`` and return its address once it answers; it contains the token if one is needed.
 
-        Settings are saved to ``file``, the YAML file that the graph's parameters were read from.
+        Settings are saved to ``file``, the YAML file that the graph's parameters were read from. With a ``study``, the
+        address is that of its page, and the robot is stopped until a lap begins.
 
         Raises:
             DashboardError: The address, the port or the certificate cannot be used, or the process has ended.
@@ -71,7 +73,7 @@ class PageProcess:
         self._pipe.on("served", self._address.set_result)
         self._pipe.on("refused", self._address.set_exception)
         self._pipe.on("log", _log)
-        self._server = GraphServer(self._pipe, graph, file)
+        self._server = GraphServer(self._pipe, graph, file, study)
         self._pipe.start()
         # The process may end without a message.
         threading.Thread(target=self._watch, name="page_end", daemon=True).start()
@@ -139,6 +141,8 @@ def _serve(pipe: Pipe) -> None:
     dashboard = Dashboard.of(graph, graph.join())
     pipe.say("served", dashboard.start())
     graph.steering.start()
+    if graph.study is not None:
+        graph.steering.halt()
     # Objects loaded so far stay. Frozen, they do not slow down collections, which can then run as soon as a few pages
     # have been closed; each takes a megabyte.
     gc.collect()

@@ -19,6 +19,7 @@ from handsteer.graph import Graph
 from handsteer.making import make_steering
 from handsteer.nodes.steering import SteeringNode
 from handsteer.robots.world import World
+from handsteer.study.session import Task
 from handsteer.transports.piped import Gateway, Pipe, PipedTransport
 
 _ANSWER_TIMEOUT_S = 5.0
@@ -49,9 +50,10 @@ class GraphServer:
         pipe: Not started yet; connected to a :class:`RemoteGraph`.
         graph: The graph.
         file: The YAML file that its parameters were read from, which settings are saved to.
+        study: What the page leads a participant through, if anything.
     """
 
-    def __init__(self, pipe: Pipe, graph: Graph, file: Path | None = None) -> None:
+    def __init__(self, pipe: Pipe, graph: Graph, file: Path | None = None, study: Task | None = None) -> None:
         self._pipe = pipe
         self._graph = graph
         self._gateway = Gateway(pipe, graph.transport)
@@ -66,7 +68,7 @@ class GraphServer:
         }
         pipe.on("frame", self._take_frame)
         pipe.on("request", self._execute)
-        pipe.say("begin", self._sent, graph.clock, file)
+        pipe.say("begin", self._sent, graph.clock, file, study)
 
     def close(self) -> None:
         """Close the page's publishers and subscriptions."""
@@ -114,16 +116,18 @@ class RemoteGraph:
         clock: The graph's clock.
         state: What the graph has reported last.
         steering: Runs in this process; not started.
+        study: What the page leads a participant through, if anything.
     """
 
     clock: Clock
     state: GraphState
     steering: SteeringNode
+    study: Task | None
 
     def __init__(self, pipe: Pipe) -> None:
         self.transport = PipedTransport(pipe)
         self._pipe = pipe
-        self._begun: Future[tuple[GraphState, Clock, Path | None]] = Future()
+        self._begun: Future[tuple[GraphState, Clock, Path | None, Task | None]] = Future()
         self._numbers = itertools.count()
         self._requests: dict[int, Future[None]] = {}
         pipe.on("begin", lambda *what: self._begun.set_result(what))
@@ -138,7 +142,7 @@ class RemoteGraph:
         """
         while not self._pipe.ended.is_set():
             try:
-                self.state, self.clock, file = self._begun.result(_LOOK_PERIOD_S)
+                self.state, self.clock, file, self.study = self._begun.result(_LOOK_PERIOD_S)
             except TimeoutError:
                 continue
             self.steering = make_steering(self.config, self.transport, self.clock)

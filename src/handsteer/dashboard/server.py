@@ -32,12 +32,14 @@ from handsteer.dashboard.remote_graph import RemoteGraph
 from handsteer.dashboard.settings import DEFAULT_FILE, Settings, SettingsFile
 from handsteer.dashboard.settings_page import SettingsPage
 from handsteer.dashboard.socket_events import SocketEvents
+from handsteer.dashboard.study_page import StudyPage
 from handsteer.dashboard.viewers import OnDemandNode
 from handsteer.dashboard.world_state import VelocityHistory
 from handsteer.errors import DashboardError
 from handsteer.making import cmd_vel_topic
 from handsteer.messages import CMD_VEL, Topic
 from handsteer.nodes.steering import SteeringNode
+from handsteer.study.session import Session
 from handsteer.transports.base import Transport
 
 _START_TIMEOUT_S = 20.0
@@ -67,6 +69,7 @@ class Dashboard:
 
     Raises:
         ConfigError: The file can no longer be read.
+        StudyError: The results of the study cannot be used.
 
     Attributes:
         node: Subscribes and steers for the browsers that show the page.
@@ -93,7 +96,8 @@ class Dashboard:
         if graph is not None:
             settings_file = SettingsFile(file or DEFAULT_FILE, is_read=file is not None)
             settings = Settings(lambda: graph.config, graph.reconfigure, settings_file)
-            self.context = PageContext(self.node, graph, settings, Lessons.of(graph))
+            study = Session(graph.study) if graph.study is not None else None
+            self.context = PageContext(self.node, graph, settings, Lessons.of(graph), study)
         self.webcam = FrameSocket(graph, self._drives)
         self._config = config
         self._server: uvicorn.Server | None = None
@@ -136,7 +140,8 @@ class Dashboard:
         self._wait_until_served()
         scheme = "https" if certificate else "http"
         address = f"{scheme}://{_shown(config.host)}:{listener.getsockname()[1]}"
-        return f"{address}/?token={access.token}" if access.token else address
+        path = "" if self.context.study is None else "/study"
+        return f"{address}{path or '/'}?token={access.token}" if access.token else f"{address}{path}"
 
     def stop(self) -> None:
         """Close the page and all connections; may be called more than once."""
@@ -261,6 +266,10 @@ def _application() -> FastAPI:
     @ui.page("/teach")
     def teach() -> None:
         unconnected.add(LessonPage(application.state.dashboard.context).client)
+
+    @ui.page("/study")
+    def study() -> None:
+        unconnected.add(StudyPage(application.state.dashboard.context).client)
 
     ui.run_with(
         application,

@@ -12,7 +12,6 @@ from handsteer.messages import (
     CMD_VEL,
     GESTURE_JOY,
     HAND_SIGN,
-    JOY,
     ODOM,
     SCAN,
     STEERING_CMD_VEL,
@@ -24,18 +23,18 @@ from handsteer.messages import (
     String,
     Topic,
     Twist,
-    stick_in,
 )
 from handsteer.nodes.base import Node
 from handsteer.nodes.collision_monitor import CollisionMonitor, MeasuredVelocity
+from handsteer.nodes.joysticks import Joysticks
 from handsteer.nodes.selection import NEXT, Selection
 from handsteer.nodes.status import ControlStatus
 from handsteer.nodes.supervision import Rivals, StopKeeper
 from handsteer.nodes.timing import CALM_S, LatencyLog, StallGuard
 from handsteer.timeouts import ENGAGE_S
-from handsteer.transports.base import Call, Received, Subscription, Transport
+from handsteer.transports.base import Call, Received, Transport
 from handsteer.transports.commands import Commands
-from handsteer.types import NONE, ZERO, Velocity, action_of
+from handsteer.types import NONE, ZERO, Stick, Velocity, action_of
 
 log = logging.getLogger(__name__)
 
@@ -93,8 +92,6 @@ class HandSignControlNode(Node):
         super().__init__("hand_sign_control", transport, clock)
         self.latency = LatencyLog()
         self._config = config
-        self._gamepad = (gamepad or JoyConfig()).model_dump()
-        self._is_gamepad_held = False
         self._control = Control(config, arming=arming, engage=engage)
         self._safety, self._mux = self._control.safety, self._control.mux
         self._following = Following() if arming and not config.robots else None
@@ -115,9 +112,8 @@ class HandSignControlNode(Node):
         StopKeeper(self, self._on_stop_or_reset)
         self.subscribe(steering, self._on_steering)
         self.subscribe(sign, self._on_sign)
-        self._joy = joy
-        self._joysticks: list[Subscription] = []
-        self._take_joysticks()
+        self._joysticks = Joysticks(self, joy, self._on_stick, gamepad or JoyConfig(), self._on_gamepad)
+        self._joysticks.listen(on=config.mode == "joystick")
         if self._following:
             self.subscribe(odom, self._on_odometry)
         self._watchdog = self.every(_WATCHDOG_PERIOD_S, self._watch)
@@ -125,13 +121,11 @@ class HandSignControlNode(Node):
 
     def on_reconfigure(self, config: Config) -> None:
         """Apply all of ``control``; a robot that exceeds new limits is slowed at once."""
-        before, self._config = self._config.mode, config.control
+        self._config = config.control
         self._stall_guard.limit_s = config.control.sign_timeout
         self._monitor.reconfigure(config.collision_monitor)
-        if config.control.mode != before:
-            self._publish(ZERO)
-            self._take_joysticks()
         self._publish(self._control.reconfigure(config.control))
+        self._joysticks.listen(on=config.control.mode == "joystick")
 
     def services(self) -> dict[str, Call]:
         """Return ``stop`` and ``reset``, which are equivalent to true and false on ``/stop``."""
@@ -167,53 +161,41 @@ class HandSignControlNode(Node):
         return self.transport.topic_name(topic), ", ".join(publishers) or "no known node"
 
     def _on_sign(self, received: Received[String]) -> None:
-        captured_s = received.captured_s
-        is_stale = captured_s is not None and self.clock.now() - captured_s > self._config.sign_timeout
-        if is_stale or received.is_late:  # a stale frame does not count, so the watchdog keeps running
+        if self._is_stale(received):
             self._obey_late(is_stop=action_of(received.message.data, self._config.actions) == "stop")
             return
         elapsed_s = self._elapsed()
         sign = None if self._stall_guard.distrusts(self.clock.now()) else received.message.data
         self._look_after_the_robot(elapsed_s)
         self._select_by(sign)
-        self._publish(self._control.step(elapsed_s, sign=sign), captured_s)
+        self._publish(self._control.step(elapsed_s, sign=sign), received.captured_s)
         self._calm_down()
 
-    def _take_joysticks(self) -> None:
-        """Subscribe to joysticks in the mode that follows them."""
-        for subscription in self._joysticks:
-            subscription.close()
-        is_on = self._config.mode == "joystick"
-        self._joysticks = (
-            [self.subscribe(self._joy, self._on_joy), self.subscribe(JOY, self._on_gamepad)] if is_on else []
-        )
-
-    def _on_joy(self, received: Received[Joy]) -> None:
-        stick, captured_s = stick_in(received.message), received.captured_s
-        is_stale = captured_s is not None and self.clock.now() - captured_s > self._config.sign_timeout
-        if is_stale or received.is_late:
+    def _on_stick(self, stick: Stick, received: Received[Joy]) -> None:
+        if self._is_stale(received):
             self._obey_late(is_stop=not stick.held)
             return
         elapsed_s = self._elapsed()
         trusted = None if self._stall_guard.distrusts(self.clock.now()) else stick
         self._look_after_the_robot(elapsed_s)
-        self._publish(self._control.step(elapsed_s, stick=trusted), captured_s)
+        self._publish(self._control.step(elapsed_s, stick=trusted), received.captured_s)
         self._calm_down()
 
-    def _on_gamepad(self, received: Received[Joy]) -> None:
-        """Steer by a gamepad while its enable button is held; one zero when it is released."""
-        stick = stick_in(received.message, **self._gamepad)
-        was_held, self._is_gamepad_held = self._is_gamepad_held, stick.held
-        if not (stick.held or was_held):
-            return
-        self._steer(stick.forward * self._config.max_linear, stick.left * self._config.max_angular, received.is_late)
+    def _on_gamepad(self, stick: Stick, received: Received[Joy]) -> None:
+        self._steer(stick.forward * self._config.max_linear, stick.left * self._config.max_angular, received)
+
+    def _is_stale(self, received: Received[Any]) -> bool:
+        """Return whether a message shows what was seen too long ago; the watchdog then keeps running."""
+        captured_s = received.captured_s
+        is_old = captured_s is not None and self.clock.now() - captured_s > self._config.sign_timeout
+        return is_old or received.is_late
 
     def _on_steering(self, received: Received[Twist]) -> None:
-        self._steer(received.message.linear.x, received.message.angular.z, received.is_late)
+        self._steer(received.message.linear.x, received.message.angular.z, received)
 
-    def _steer(self, linear_mps: float, angular_radps: float, is_late: bool) -> None:
+    def _steer(self, linear_mps: float, angular_radps: float, received: Received[Any]) -> None:
         wanted = Velocity(linear_mps, angular_radps)
-        if is_late:
+        if received.is_late:
             self._obey_late(is_stop=wanted.is_zero)
             return
         elapsed_s = self._elapsed()

@@ -185,7 +185,7 @@ def _dumped(world: World) -> list[dict[str, Any]]:
 
 
 def _checked(world: World, things: list[dict[str, Any]]) -> World:
-    values = {"floor": world.floor.model_dump(), "obstacles": things, "gates": [g.model_dump() for g in world.gates]}
+    values = world.model_dump() | {"obstacles": things}
     try:
         return World.model_validate(values)
     except ValidationError as error:

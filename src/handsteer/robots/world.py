@@ -112,12 +112,25 @@ class Gate(Section):
         return self
 
 
+class Stop(Section):
+    """A place on the floor to stop at, after the last gate of a course."""
+
+    position: tuple[Coordinate, Coordinate] = Field(description="x and y where the robot's centre should be [m]")
+    yaw: float = Field(0.0, ge=-math.tau, le=math.tau, description="Its heading there, left positive [rad]")
+    tolerance: float = Field(0.15, ge=0.01, le=10, description="Largest distance of its centre from there [m]")
+
+
 class World(Section):
-    """A floor, the things on it, and the gates of a course in order."""
+    """A floor, the things on it, and the gates of a course in order.
+
+    ``path`` and ``stop`` describe how a course is meant to be driven, for :mod:`handsteer.bench`.
+    """
 
     floor: Floor = Floor()
     obstacles: tuple[Thing, ...] = ()
     gates: tuple[Gate, ...] = Field((), max_length=100)
+    path: tuple[tuple[Coordinate, Coordinate], ...] = Field((), max_length=200)
+    stop: Stop | None = None
 
     @model_validator(mode="after")
     def _names_differ(self) -> "World":
@@ -187,12 +200,17 @@ def write_world(world: World) -> str:
     for section in ("obstacles", "gates"):
         if things := parts.get(section):
             lines += [f"{section}:", *(f"  - {_one_line(thing)}" for thing in things)]
+    if world.path:
+        lines.append(f"path: {_one_line([list(point) for point in world.path])}")
+    if world.stop:
+        lines.append(f"stop: {_one_line(world.stop.model_dump())}")
     return "\n".join(lines) + "\n"
 
 
-def _one_line(values: dict[str, Any]) -> str:
+def _one_line(values: dict[str, Any] | list[list[float]]) -> str:
     # Unprintable characters are escaped: some break lines, and would be read back as a space.
-    readable = all(value.isprintable() for value in values.values() if isinstance(value, str))
+    texts = values.values() if isinstance(values, dict) else ()
+    readable = all(value.isprintable() for value in texts if isinstance(value, str))
     return yaml.safe_dump(
         values, default_flow_style=True, sort_keys=False, allow_unicode=readable, width=math.inf
     ).strip()

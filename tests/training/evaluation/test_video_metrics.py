@@ -77,9 +77,18 @@ def test_without_labels_signs_and_motion_are_counted() -> None:
 
 def test_motion_behind_a_sign_and_behind_none_are_told_apart() -> None:
     figures = report("?" * 12, "..FF.GFF....")
-    assert [event.engaged for event in figures.motion_events] == [False, True]
-    assert figures.engaged_rate.per_minute == pytest.approx(60 / 0.5)
-    assert figures.idle_rate.per_minute == pytest.approx(60 / 0.7)
+    assert [event.follows_sign for event in figures.motion_events] == [False, True]
+    assert figures.after_sign_rate.per_minute == pytest.approx(60 / 0.5)
+    assert figures.after_none_rate.per_minute == pytest.approx(60 / 0.7)
+
+
+def test_with_the_clutch_only_what_follows_a_held_palm_counts() -> None:
+    truth, counts = "S" * 30 + "." * 10 + "." * 80, "FF..." + "S" * 12 + "FFF.........." + "F" * 10 + "." * 79 + "F"
+    figures = report(truth, counts)
+    assert [event.start_s for event in figures.motion_events] == [0.0, 1.7, 3.0, 11.9]
+    assert [event.start_s for event in figures.engaged_motion] == [1.7, 3.0]
+    assert figures.labels is not None
+    assert len(figures.labels.engaged_false) == len(figures.labels.false_commands) - 2
 
 
 @pytest.mark.parametrize("frames", ["", "F"])

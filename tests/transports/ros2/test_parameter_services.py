@@ -58,7 +58,7 @@ def parameter(name: str, value: Any) -> Any:
 
 def test_names_are_those_of_the_command_line() -> None:
     names = Client().call("list_parameters", prefixes=[], depth=0).result
-    assert names.names[:3] == ["mode", "ramp", "linear_step"]
+    assert names.names[:3] == ["mode", "rule", "ramp"]
     assert {"actions.Peace", "collision_monitor.enabled", "use_sim_time"} < set(names.names)
     assert names.prefixes == ["actions", "collision_monitor", "joy"]
     assert "landmarks.model" in Client("signs").call("list_parameters", prefixes=[], depth=0).result.names
@@ -129,7 +129,7 @@ def test_a_set_is_checked_applied_and_told() -> None:
         ("max_linear", [], "max_linear: [] should be a number"),
         ("max_linear", None, "max_linear cannot be removed, only set to another value"),
         ("ramp", "steep", "ramp: 'steep' should be 'per_message' or 'per_second'"),
-        ("max_liner", 0.3, "max_liner: there is no such parameter; the parameters are mode, ramp"),
+        ("max_liner", 0.3, "max_liner: there is no such parameter; the parameters are mode, rule"),
         ("use_sim_time", False, "use_sim_time cannot be set: it is only read when the node starts"),
         ("actions.Stop", "forward", "actions: {'Peace': 'turbo', 'Stop': 'forward'} should leave Stop at 'stop'"),
     ],

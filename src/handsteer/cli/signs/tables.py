@@ -248,9 +248,9 @@ def _video_tables(name: str, report: VideoReport) -> list[str]:
         f"{name}: {report.frames} frames, {report.duration_s:.1f} s",
         table(["sign that counted", "seconds"], [[sign, f"{time_s:.1f}"] for sign, time_s in report.counted_s.items()]),
         f"Onsets of signs that move the robot: {len(report.motion_events)}, "
-        f"{_per_minute(report.motion_rate, ' per minute')}",
-        f"After another sign {_per_minute(report.engaged_rate, ' per minute')} of the time with a sign, "
-        f"after none {_per_minute(report.idle_rate, ' per minute')} of the time without one",
+        f"{_per_minute(report.motion_rate, ' per minute')}; with control.engage: {len(report.engaged_motion)}",
+        f"After another sign {_per_minute(report.after_sign_rate, ' per minute')} of the time with a sign, "
+        f"after none {_per_minute(report.after_none_rate, ' per minute')} of the time without one",
     ]
     if report.labels is None:
         return [*parts, *_events(report.motion_events), "No labels to compare with."]
@@ -263,7 +263,7 @@ def _labelled(labels: LabelledFigures) -> list[str]:
         "By the labels: frames in which the sign was seen and in which it counted, and its reaction time",
         table(["sign", "frames", "seen", "counted", "shown", "missed", "median s", "slowest s"], rows),
         f"False commands: {len(labels.false_commands)} in {labels.scored_s:.1f} s, "
-        f"{_per_minute(labels.false_rate, ' per minute')}",
+        f"{_per_minute(labels.false_rate, ' per minute')}; with control.engage: {len(labels.engaged_false)}",
         *_events(labels.false_commands),
         *confusion_table("frames", labels.confusion),
     ]

@@ -79,6 +79,7 @@ for (const type of ["pointerup", "pointercancel", "lostpointercapture"]) {
 
 // Arrows scroll the page and move sliders, so they steer on the pad only; letters steer anywhere for the driver.
 function padOf(event) {
+  if (document.querySelector(".no-keys")) return null; // a study of another input
   const anywhere = event.code.startsWith("Key") && !event.target.closest?.(TYPED_IN);
   return event.target.closest?.(".pad") ?? (anywhere ? document.querySelector(".steer.yours .pad") : null);
 }

@@ -6,6 +6,7 @@ from itertools import chain, groupby
 from statistics import median
 from typing import Any
 
+from handsteer.control.safety import Engagement
 from handsteer.training.evaluation.intervals import Rate, Share
 from handsteer.training.evaluation.photo_metrics import Confusion
 from handsteer.types import NONE
@@ -37,14 +38,14 @@ class Event:
         start_s: Its start, in seconds from the first frame of the video.
         end_s: The time of its last frame.
         video: The video.
-        engaged: Whether another sign was confirmed directly before, so that the user was driving.
+        follows_sign: Whether another sign was confirmed directly before, so that the user was driving.
     """
 
     sign: str
     start_s: float
     end_s: float
     video: str = ""
-    engaged: bool = field(default=False, compare=False)
+    follows_sign: bool = field(default=False, compare=False)
 
 
 @dataclass(frozen=True)
@@ -75,6 +76,7 @@ class VideoReport:
         duration_s: Total duration.
         counted_s: Time in which each sign was confirmed, including ``NONE``.
         motion_events: Each period in which a sign that moves the robot was confirmed.
+        engaged_motion: The same while the hand was engaged: all that move the robot with ``control.engage``.
         labels: Figures from the labels; None without labels.
     """
 
@@ -83,6 +85,7 @@ class VideoReport:
     duration_s: float
     counted_s: dict[str, float]
     motion_events: tuple[Event, ...]
+    engaged_motion: tuple[Event, ...]
     labels: "LabelledFigures | None"
 
     @property
@@ -91,15 +94,15 @@ class VideoReport:
         return Rate(len(self.motion_events), self.duration_s)
 
     @property
-    def engaged_rate(self) -> Rate:
+    def after_sign_rate(self) -> Rate:
         """Rate of those directly after another sign, in the time in which a sign was confirmed."""
-        engaged_s = sum(time_s for sign, time_s in self.counted_s.items() if sign != NONE)
-        return Rate(sum(event.engaged for event in self.motion_events), engaged_s)
+        with_sign_s = sum(time_s for sign, time_s in self.counted_s.items() if sign != NONE)
+        return Rate(sum(event.follows_sign for event in self.motion_events), with_sign_s)
 
     @property
-    def idle_rate(self) -> Rate:
+    def after_none_rate(self) -> Rate:
         """Rate of those directly after ``NONE``, in the time in which no sign was confirmed."""
-        return Rate(sum(not event.engaged for event in self.motion_events), self.counted_s.get(NONE, 0.0))
+        return Rate(sum(not event.follows_sign for event in self.motion_events), self.counted_s.get(NONE, 0.0))
 
     def as_dict(self) -> dict[str, Any]:
         """Return the figures as plain values, for JSON."""
@@ -110,8 +113,9 @@ class VideoReport:
             "counted_s": self.counted_s,
             "motion_events": [asdict(event) for event in self.motion_events],
             **self.motion_rate.as_dict("motion_events"),
-            **self.engaged_rate.as_dict("motion_events_engaged"),
-            **self.idle_rate.as_dict("motion_events_idle"),
+            **self.after_sign_rate.as_dict("motion_events_after_sign"),
+            **self.after_none_rate.as_dict("motion_events_after_none"),
+            "engaged_motion_events": [asdict(event) for event in self.engaged_motion],
             "labels": self.labels and self.labels.as_dict(),
         }
 
@@ -126,6 +130,7 @@ class LabelledFigures:
         counted_right: Of the frames of each sign, in how many it was confirmed; this includes the reaction time.
         reactions: Reaction times of each sign.
         false_commands: Each period in which a sign that moves the robot was confirmed but not shown.
+        engaged_false: The same while the hand was engaged.
         confusion: Frames by true and confirmed sign.
     """
 
@@ -134,6 +139,7 @@ class LabelledFigures:
     counted_right: dict[str, Share]
     reactions: dict[str, Reaction]
     false_commands: tuple[Event, ...]
+    engaged_false: tuple[Event, ...]
     confusion: Confusion
 
     @property
@@ -150,6 +156,7 @@ class LabelledFigures:
             "reactions": {sign: asdict(reaction) for sign, reaction in self.reactions.items()},
             "false_commands": [asdict(event) for event in self.false_commands],
             **self.false_rate.as_dict("false_commands"),
+            "engaged_false_commands": [asdict(event) for event in self.engaged_false],
             "confusion": self.confusion.as_dict(),
         }
 
@@ -187,6 +194,7 @@ def video_report(
         duration_s=sum(len(frames) * periods_s[name] for name, frames in videos.items()),
         counted_s={sign: round(time_s, 3) for sign, time_s in counted.items() if time_s},
         motion_events=tuple(_events(moving, videos)),
+        engaged_motion=tuple(_events(_while_engaged(moving, videos), videos)),
         labels=_labelled(videos, signs, motion, grace_s) if known else None,
     )
 
@@ -208,6 +216,7 @@ def _labelled(
         counted_right={sign: Share(sum(f.counts == sign for f in of), len(of)) for sign, of in shown.items()},
         reactions={sign: _reaction(sign, videos.values()) for sign in shown},
         false_commands=tuple(_events(false, videos)),
+        engaged_false=tuple(_events(_while_engaged(false, videos), videos)),
         confusion=Confusion.of(((frame.truth or NONE, frame.counts) for frame in frames_known), signs),
     )
 
@@ -249,5 +258,24 @@ def _events(marks: Mapping[str, Sequence[str | None]], videos: Mapping[str, Sequ
             if mark is not None:
                 numbers = [number for number, _ in group]
                 first, last = numbers[0], numbers[-1]
-                engaged = first > 0 and frames[first - 1].counts != NONE
-                yield Event(mark, round(frames[first].time_s, 6), round(frames[last].time_s, 6), video, engaged)
+                follows_sign = first > 0 and frames[first - 1].counts != NONE
+                yield Event(mark, round(frames[first].time_s, 6), round(frames[last].time_s, 6), video, follows_sign)
+
+
+def _while_engaged(
+    marks: Mapping[str, Sequence[str | None]], videos: Mapping[str, Sequence[FrameVerdict]]
+) -> dict[str, list[str | None]]:
+    """Return the marks of the frames in which the hand is engaged, None for the others."""
+    return {
+        video: [mark if engaged else None for mark, engaged in zip(marks[video], _engaged(frames), strict=True)]
+        for video, frames in videos.items()
+    }
+
+
+def _engaged(frames: Sequence[FrameVerdict]) -> Iterator[bool]:
+    clutch, before_s = Engagement(enabled=True), 0.0
+    for frame in frames:
+        clutch.step(max(0.0, frame.time_s - before_s))
+        clutch.note_sign(frame.counts)
+        before_s = frame.time_s
+        yield clutch.engaged

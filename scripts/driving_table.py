@@ -1,0 +1,179 @@
+"""Writes the tables and plots of docs/driving.md: ``make bench-drive``."""
+
+import argparse
+import os
+import re
+import sys
+import time
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+from tqdm import tqdm
+
+from handsteer.bench.cells import Cell, CellResult, Estimate, run_cells, with_factor
+from handsteer.bench.courses import COURSES, open_course
+from handsteer.bench.laps import INTERFACES, Conditions
+from handsteer.bench.plots import write_plots
+
+DOCS = Path(__file__).resolve().parents[1] / "docs"
+PAGE = DOCS / "driving.md"
+PICTURES = DOCS / "pictures" / "driving"
+
+SEEDS = range(20)
+SEEDS_PICTURES = range(6)
+BY_HAND = ("joystick", "cruise", "signs")
+SWEEPS: dict[str, tuple[tuple[str, ...], tuple[float, ...]]] = {
+    "latency": (("pad", "joystick", "cruise"), (0, 250, 500, 750)),
+    "fps": (("joystick", "cruise"), (10, 15, 30, 60)),
+    "errors": (("joystick", "cruise"), (0, 1, 2, 4)),
+    "reaction": (("pad", "joystick"), (150, 250, 400)),
+}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
+    jobs = parser.parse_args().jobs
+    started_s = time.monotonic()
+    usual = [Cell(course, of) for course in COURSES for of in INTERFACES if of != "signs_per_second"]
+    usual.append(Cell("slalom", "signs_per_second"))
+    varied = {
+        factor: [Cell("slalom", of, with_factor(Conditions(), factor, value)) for of in interfaces for value in values]
+        for factor, (interfaces, values) in SWEEPS.items()
+    }
+    pictures = [Cell("slalom", of, Conditions(through="pictures")) for of in BY_HAND]
+    cells = list(dict.fromkeys([*usual, *(cell for row in varied.values() for cell in row)]))
+    laps = len(cells) * len(SEEDS) + len(pictures) * len(SEEDS_PICTURES)
+    with tqdm(total=laps, unit="lap", disable=None) as bar:
+        results = {each.cell: each for each in run_cells(cells, SEEDS, jobs=jobs, progress=bar.update)}
+        seen = run_cells(pictures, SEEDS_PICTURES, jobs=jobs, progress=bar.update)
+    text = "\n\n".join(
+        [
+            _courses(),
+            *(_course(course, [results[cell] for cell in usual if cell.course == course]) for course in COURSES),
+            _goals(results),
+            *(_sweep(factor, [results[cell] for cell in row]) for factor, row in varied.items()),
+            _pictures(seen, results),
+        ]
+    )
+    _write(text)
+    PICTURES.mkdir(parents=True, exist_ok=True)
+    for course in COURSES:
+        write_plots([results[cell] for cell in usual if cell.course == course], (), PICTURES)
+    for factor, row in varied.items():
+        write_plots([results[cell] for cell in row], [(factor, ())], PICTURES)
+    print(f"{laps} laps in {(time.monotonic() - started_s) / 60:.1f} minutes", file=sys.stderr)
+
+
+def _courses() -> str:
+    rows = []
+    for name in COURSES:
+        course = open_course(name)
+        stop = "stops" if course.world.stop else "drives through the finish"
+        rows.append([f"`{name}`", f"{course.length_m:.1f} m", str(len(course.gates)), f"{course.difficulty:.1f}", stop])
+    return _table(["course", "ideal path", "gates", "index of difficulty", "at the end"], rows)
+
+
+def _course(name: str, results: Sequence[CellResult]) -> str:
+    over = open_course(name).world.stop is not None
+    head = ["interface", "time, s", "timed out", "gates missed a lap", "bumps a lap", "path", "off the path, cm"]
+    head += ["overshoot, cm"] if over else []
+    rows = []
+    for each in results:
+        row = [f"`{each.cell.interface}`", _text(each.median("time_s"), 1), str(each.timed_out or "")]
+        row += [_text(each.mean("missed"), 2), _text(each.mean("bumps"), 2), _text(each.median("path_ratio"), 2)]
+        row += [_text(each.median("cross_track_m"), 1, 100)]
+        row += [_text(each.median("overshoot_m"), 1, 100)] if over else []
+        rows.append([*row, _text(each.median("commands_per_min"), 0), _text(each.median("standing"), 0, 100)])
+    return f"### {name}\n\n" + _table([*head, "acts a minute", "stands, %"], rows)
+
+
+def _goals(results: dict[Cell, CellResult]) -> str:
+    def times(interface: str, latency_ms: float = 0.0, course: str = "slalom") -> list[float]:
+        return results[Cell(course, interface, with_factor(Conditions(), "latency", latency_ms))].values("time_s")
+
+    def bumps(interface: str) -> str:
+        return _text(results[Cell("slalom", interface)].mean("bumps"), 2)
+
+    rows = [
+        ["slalom: time of the joystick / pad", _ratio(times("joystick"), times("pad")), "1.25"],
+        ["slalom: bumps a lap of the joystick; of the pad", f"{bumps('joystick')}; {bumps('pad')}", "no more"],
+        ["slalom: time of cruise / signs", _ratio(times("cruise"), times("signs")), "0.6"],
+    ]
+    for interface in ("joystick", "pad"):
+        lost = _ratio(times(interface, 250.0), times(interface))
+        rows.append([f"slalom: time of the {interface} with 250 ms of latency / without", lost, ""])
+    over = [results[Cell("stop-line", of)].median("overshoot_m") for of in ("joystick", "pad")]
+    rows.append(
+        [
+            "stop-line: overshoot of the joystick; of the pad, cm",
+            "; ".join(_text(each, 1, 100) for each in over),
+            "1.25 times",
+        ]
+    )
+    return "### The goals\n\n" + _table(["measure", "median and 95 % interval", "at most"], rows)
+
+
+def _sweep(factor: str, results: Sequence[CellResult]) -> str:
+    interfaces, values = SWEEPS[factor]
+    titles = {
+        "latency": "Added latency, ms",
+        "fps": "Frames a second",
+        "errors": "Errors of landmarks and operator, times the usual",
+        "reaction": "Reaction time, ms",
+    }
+    rows = [
+        [
+            f"`{interface}`",
+            *(_text(each.median("time_s"), 1) for each in results if each.cell.interface == interface),
+            *(f"{each.mean('bumps').value:.2f}" for each in results if each.cell.interface == interface),
+        ]
+        for interface in interfaces
+    ]
+    head = ["time on the slalom, s", *(f"{value:g}" for value in values), *(f"bumps at {value:g}" for value in values)]
+    return f"### {titles[factor]}\n\n" + _table(head, rows)
+
+
+def _pictures(seen: Iterable[CellResult], results: dict[Cell, CellResult]) -> str:
+    rows = []
+    for each in seen:
+        count = len(each.laps)
+        same = results[Cell("slalom", each.cell.interface)].values("time_s")[:count]
+        ratio = _ratio(each.values("time_s"), same)
+        rows.append(
+            [
+                f"`{each.cell.interface}`",
+                str(count),
+                _text(each.median("time_s"), 1),
+                _text(Estimate.of(same), 1),
+                ratio,
+            ]
+        )
+    head = ["slalom", "laps", "through pictures, s", "through landmarks, same seeds, s", "ratio"]
+    return "### Through pictures and through landmarks\n\n" + _table(head, rows)
+
+
+def _ratio(values: Sequence[float], others: Sequence[float]) -> str:
+    return _text(Estimate.of_ratio(values, others), 2)
+
+
+def _text(found: Estimate | None, digits: int, factor: float = 1.0) -> str:
+    if found is None:
+        return ""
+    value, low, high = (f"{factor * each:.{digits}f}" for each in (found.value, found.low, found.high))
+    return value if low == high else f"{value} ({low} to {high})"
+
+
+def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    lines = [head, ["---"] * len(head), *rows]
+    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
+
+
+def _write(text: str) -> None:
+    page = PAGE.read_text(encoding="utf-8")
+    marked = re.compile(r"(<!-- driving -->\n).*?(<!-- end of driving -->)", re.DOTALL)
+    PAGE.write_text(marked.sub(lambda found: f"{found[1]}\n{text}\n\n{found[2]}", page), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,84 @@
+"""``handsteer study``: lead people through a study on the page."""
+
+from pathlib import Path
+
+from handsteer.cli.app import ConfigFile, Flag
+from handsteer.cli.run import drive
+from handsteer.cli.running import say
+from handsteer.cli.running import settings as make_settings
+from handsteer.errors import StudyError
+from handsteer.study.order import group_size, order_of
+from handsteer.study.plan import Plan, course_file, load_configs, load_courses, read_plan
+from handsteer.study.results import prepare
+from handsteer.study.session import Session, Task
+
+
+def study(
+    plan: Path,
+    *,
+    participant: str | None = None,
+    results: Path | None = None,
+    camera: str | None = None,
+    host: str | None = None,
+    port: int | None = None,
+    token: Flag = False,
+    config_file: ConfigFile = None,
+) -> int:
+    """Lead a person through the interfaces and courses of a plan on the page, and write CSV.
+
+    Example: handsteer study examples/study.yaml --participant P01
+
+    Parameters
+    ----------
+    plan
+        YAML file with the plan: docs/study.md.
+    participant
+        Id of the participant; the same command continues an interrupted study. Without it, the plan is checked, and
+        the order and the progress of each participant are printed.
+    results
+        Folder of the results; by default the name of the plan's file with -results, in the working directory.
+    camera
+        auto, virtual, browser (of the device that shows the page), a webcam's index or /dev/videoN, or an address.
+    host
+        Address that the page is served on; 0.0.0.0 makes it reachable from other machines, with a token.
+    port
+        Port of the page; 0 picks a free one.
+    token
+        Require the token in the printed address from this machine too; for machines with several users.
+    config_file
+        YAML file with parameters; options override it, and the plan overrides both.
+    """
+    the_plan = read_plan(plan)
+    first = order_of(the_plan, participant)[1][0] if participant in the_plan.participants else the_plan.courses[0]
+    shorthand = {
+        "robot": {"world": course_file(first, plan)},
+        "camera": {"source": camera},
+        "dashboard": {"host": host, "port": port, "token": "always" if token else None},
+    }
+    base = make_settings(config_file, None, shorthand).model_dump(exclude_unset=True)
+    courses = load_courses(the_plan, plan)
+    configs = load_configs(the_plan, plan, base)
+    folder = results or Path(f"{plan.stem}-results")
+
+    def task(person: str) -> Task:
+        return Task(the_plan, person, courses, configs, folder)
+
+    if participant is None:
+        _list(the_plan, {person: Session(task(person)).progress for person in the_plan.participants})
+        return 0
+    done, steps = Session(task(participant)).progress
+    if done == steps:
+        raise StudyError(f"{participant} has done all of {plan}: the results are in {folder}")
+    prepare(folder)
+    say(f"{participant}: {done} of {steps} laps and forms are done; the results are written to {folder}")
+    drive(next(iter(configs.values())), study=task(participant))
+    return 0
+
+
+def _list(plan: Plan, progress: dict[str, tuple[int, int]]) -> None:
+    for person, (done, steps) in progress.items():
+        conditions, courses = order_of(plan, person)
+        print(f"{person}  {done:3d} of {steps}  {', '.join(conditions)}; courses {', '.join(courses)}")
+    size = group_size(plan)
+    if len(progress) % size:
+        print(f"note: the conditions' order is balanced for each {size} participants; these are {len(progress)}")

@@ -1,0 +1,227 @@
+"""Random histories of signs, joysticks, steering, stops and faults: never a command without a live reason.
+
+``make check`` takes 4,000 steps, ``make test`` 20,000, ``make soak`` a million: HANDSTEER_STEPS says how many.
+"""
+
+import math
+import os
+from dataclasses import dataclass
+
+from hypothesis import HealthCheck, settings
+from hypothesis import strategies as st
+from hypothesis.stateful import RuleBasedStateMachine, initialize, rule
+
+from handsteer.config import ControlConfig
+from handsteer.control import Control
+from handsteer.types import ZERO, Stick, Velocity
+
+STEPS_A_HISTORY = 20
+STEPS = int(os.environ.get("HANDSTEER_STEPS", "4000"))
+SIGNS = ("Forward", "Backward", "Turn Left", "Turn Right", "Go", "Stop", "NONE", "a word nobody knows")
+PERIOD_S = 1 / 30
+ACCELERATION, JERK = 0.8, 4.0
+_SLACK = 1e-6
+
+
+@dataclass
+class Onlooker:
+    """Knows what was shown, said and done, and when; no filter and no velocity."""
+
+    mode: str
+    arming: bool
+    engage: bool
+    now_s: float = 0.0
+    is_stopped: bool = False
+    hand_s: float = -math.inf
+    hand_asks: bool = False
+    sign_s: float = -math.inf
+    steered_s: float = -math.inf
+    steering_asks: bool = False
+    was_released: bool = False
+    neutral_s: float = 0.0
+    palm_s: float = 0.0
+    palm_seen_s: float = -math.inf
+    is_engaged: bool = False
+
+    def interrupt(self, *, disarms: bool = True) -> None:
+        """Something happened after which the hand must show neutral, and engage."""
+        self.was_released = self.is_engaged = False
+        self.palm_s, self.palm_seen_s = 0.0, -math.inf
+        if disarms:
+            self.neutral_s = 0.0
+
+    def wait(self, seconds: float, timeout_s: float) -> None:
+        """Time passes."""
+        self.now_s += seconds
+        if self.now_s - self.hand_s >= timeout_s - _SLACK:
+            self.interrupt(disarms=self.arming)
+        if self.now_s - self.sign_s >= 5.0 - _SLACK:
+            self.is_engaged = False
+
+    def hand(self, *, asks: bool, released: bool, stops: bool) -> None:
+        """The input that drives comes from the hand."""
+        gap_s, self.hand_s = self.now_s - self.hand_s, self.now_s
+        self.hand_asks = asks
+        self.was_released = self.was_released or released
+        if stops:
+            self.neutral_s = math.inf
+        elif not asks:
+            self.neutral_s += min(gap_s, 0.1)
+        elif self.neutral_s < 0.5 - _SLACK:
+            self.neutral_s = 0.0
+
+    def sign(self, sign: str) -> None:
+        """A sign comes, which may engage whatever drives."""
+        if sign != "NONE":
+            self.sign_s = self.now_s
+        gap_s = self.now_s - self.palm_seen_s
+        if sign == "Stop":
+            self.palm_s = self.palm_s + gap_s if gap_s < 0.3 else 0.0
+            self.palm_seen_s = self.now_s
+            self.is_engaged = self.is_engaged or self.palm_s >= 1.0 - _SLACK
+        else:
+            self.palm_s, self.palm_seen_s = 0.0, -math.inf
+
+    def why_not(self, source: str, config: ControlConfig) -> str | None:
+        """Return why ``source`` must not move the robot now; None if it may."""
+        if source == "steering":
+            live = self.now_s - self.steered_s < config.steering_timeout + _SLACK
+            reasons = {"nobody steers": not live or not self.steering_asks}
+        else:
+            reasons = {
+                "no frame has come for a while": self.now_s - self.hand_s >= config.sign_timeout + _SLACK,
+                "the hand asks for nothing": not self.hand_asks,
+                "it is not engaged": self.engage and not self.is_engaged,
+                "the joystick was not released before": self.mode == "joystick" and not self.was_released,
+                "neutral was not seen": self.arming and self.neutral_s < 0.5 - _SLACK,
+            }
+        reasons["it is stopped"] = self.is_stopped
+        return next((reason for reason, holds in reasons.items() if holds), None)
+
+
+class Histories(RuleBasedStateMachine):
+    """Each rule is something that people, machines or networks do."""
+
+    @initialize(
+        mode=st.sampled_from(["signs", "joystick"]),
+        by=st.sampled_from(["course", "cruise"]),
+        ramp=st.sampled_from(["per_message", "per_second"]),
+        arming=st.booleans(),
+        engage=st.booleans(),
+    )
+    def begin(self, mode: str, by: str, ramp: str, arming: bool, engage: bool) -> None:
+        limits = {"max_linear_acceleration": ACCELERATION, "max_angular_jerk": JERK, "linear_step": 0.2}
+        self.config = ControlConfig.model_validate({"mode": mode, "rule": by, "ramp": ramp, **limits})
+        self.control = Control(self.config, arming=arming, engage=engage)
+        self.onlooker = Onlooker(mode, arming, engage)
+        self.commanded, self.commanded_s = ZERO, 0.0
+        self.get_ready()
+
+    def look(self, velocity: Velocity | None) -> None:
+        """Compare what is commanded with what the onlooker knows."""
+        if velocity is not None:
+            since_s = min(self.onlooker.now_s - self.commanded_s, self.config.sign_timeout)
+            before = self.commanded.linear_mps if self.commanded.linear_mps * velocity.linear_mps > 0 else 0.0
+            assert abs(velocity.linear_mps) - abs(before) <= ACCELERATION * since_s + _SLACK
+            self.commanded, self.commanded_s = velocity, self.onlooker.now_s
+        assert self.commanded.is_finite
+        assert abs(self.commanded.linear_mps) <= self.config.max_linear
+        assert abs(self.commanded.angular_radps) <= self.config.max_angular
+        if not self.commanded.is_zero:
+            why_not = self.onlooker.why_not(self.control.mux.source, self.config)
+            assert why_not is None, f"at {self.onlooker.now_s:.2f} s it commands {self.commanded}, though {why_not}"
+
+    def pass_time(self, seconds: float) -> None:
+        """Let the watchdog of the node run."""
+        while seconds > 1e-9:
+            moment = min(seconds, 0.02)
+            self.onlooker.wait(moment, self.config.sign_timeout)
+            self.look(self.control.step(moment))
+            seconds -= moment
+
+    def frame(self, sign: str, stick: Stick, period_s: float = PERIOD_S) -> None:
+        """Receive what recognition publishes of one frame."""
+        self.pass_time(period_s)
+        self.onlooker.sign(sign)
+        if self.config.mode == "joystick":
+            self.onlooker.hand(asks=stick.held, released=not stick.held, stops=False)
+        else:
+            self.onlooker.hand(asks=sign not in {"Stop", "NONE"}, released=False, stops=sign == "Stop")
+        self.look(self.control.step(0.0, sign=sign, stick=stick))
+
+    @rule()
+    def get_ready(self) -> None:
+        for _ in range(65):
+            self.frame("Stop", Stick())
+
+    @rule(
+        sign=st.sampled_from(SIGNS),
+        held=st.booleans(),
+        deflection=st.tuples(st.sampled_from([-1.0, 0.0, 0.4, math.nan]), st.sampled_from([-1.0, 0.0, 0.7, math.inf])),
+        frames=st.sampled_from([1, 2, 4, 12, 40]),
+        period_s=st.sampled_from([PERIOD_S, PERIOD_S, 0.1, 0.32]),
+    )
+    def show(self, sign: str, held: bool, deflection: tuple[float, float], frames: int, period_s: float) -> None:
+        for _ in range(frames):
+            self.frame(sign, Stick(held, *deflection), period_s)
+
+    @rule(sign=st.sampled_from(["Forward", "Go"]))
+    def drive_on(self, sign: str) -> None:
+        for _ in range(20):
+            self.frame(sign, Stick(held=True, forward=0.4))
+
+    @rule(seconds=st.sampled_from([0.05, 0.2, 0.34, 0.36, 0.6, 1.2, 5.5]))
+    def nothing_comes(self, seconds: float) -> None:
+        self.pass_time(seconds)
+
+    @rule(
+        speed=st.sampled_from([0.5, -0.5, 0.0, math.nan]), count=st.integers(1, 4), period_s=st.sampled_from([0.1, 0.4])
+    )
+    def steer(self, speed: float, count: int, period_s: float) -> None:
+        for _ in range(count):
+            self.onlooker.steered_s, self.onlooker.steering_asks = self.onlooker.now_s, speed in {0.5, -0.5}
+            self.onlooker.was_released = False
+            self.look(self.control.step(0.0, steering=Velocity(speed, 0.0)))
+            self.pass_time(period_s)
+
+    @rule()
+    def stop(self) -> None:
+        self.onlooker.is_stopped = True
+        self.onlooker.interrupt(disarms=False)
+        self.look(self.control.stop())
+
+    @rule()
+    def reset(self) -> None:
+        if self.onlooker.is_stopped:
+            self.onlooker.interrupt()
+        self.onlooker.is_stopped = False
+        self.control.reset()
+
+    @rule()
+    def the_robot_is_away(self) -> None:
+        self.onlooker.interrupt(disarms=self.onlooker.arming)
+        self.control.safety.robot_is_away("nobody listens")
+        self.look(self.control.halt())
+
+    @rule(mode=st.sampled_from(["signs", "joystick"]), by=st.sampled_from(["course", "cruise"]))
+    def change_the_rule(self, mode: str, by: str) -> None:
+        config = self.config.model_copy(update={"mode": mode, "rule": by})
+        if (mode, by) != (self.config.mode, self.config.rule):
+            self.onlooker.interrupt()
+            self.onlooker.mode = mode
+        self.config = config
+        self.look(self.control.reconfigure(config))
+
+    @rule(dt_s=st.sampled_from([-1.0, math.nan, math.inf]))
+    def the_clock_is_wrong(self, dt_s: float) -> None:
+        self.onlooker.interrupt(disarms=self.onlooker.arming)
+        self.look(self.control.step(dt_s, sign="Forward", stick=Stick(held=True, forward=1.0)))
+
+
+Histories.TestCase.settings = settings(
+    max_examples=max(1, STEPS // STEPS_A_HISTORY),
+    stateful_step_count=STEPS_A_HISTORY,
+    deadline=None,
+    suppress_health_check=list(HealthCheck),
+)
+TestHistories = Histories.TestCase
