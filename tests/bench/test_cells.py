@@ -29,7 +29,9 @@ def test_a_cell_has_statistics() -> None:
 
 def test_the_interval_of_a_median_covers_it_as_often_as_it_claims() -> None:
     random = np.random.default_rng(0)
-    covers = [low.low <= 0.0 <= low.high for low in (Estimate.of(random.standard_normal(20).tolist()) for _ in range(200))]
+    covers = [
+        low.low <= 0.0 <= low.high for low in (Estimate.of(random.standard_normal(20).tolist()) for _ in range(200))
+    ]
     assert 0.88 < np.mean(covers) <= 1.0
 
 
