@@ -126,8 +126,8 @@ KINDS: dict[str, _Kind] = {
     "joystick": _Kind(Skill(0.958, 1.219, 0.709, 1.805, 1.575), {"mode": "joystick"}, Joystick),
     "pad": _Kind(Skill(0.944, 1.526, 0.491, 1.939, 1.658), make=Pad, by_hand=False),
     "keys": _Kind(Skill(0.846, 1.027, 0.289, 1.735, 1.189), make=Keys, by_hand=False),
-    "sliders": _Kind(Skill(), make=Sliders, by_hand=False),
-    "gamepad": _Kind(Skill(), make=Gamepad, by_hand=False),
+    "sliders": _Kind(Skill(0.261, 0.752, 0.755, 1.409, 1.118), make=Sliders, by_hand=False),
+    "gamepad": _Kind(Skill(0.944, 1.4, 0.61, 1.946, 1.779), make=Gamepad, by_hand=False),
 }
 """The interfaces by name; the skills are from ``scripts/bench_skills.py``."""
 
