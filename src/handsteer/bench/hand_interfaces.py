@@ -3,6 +3,7 @@
 import copy
 import math
 from collections.abc import Sequence
+from functools import cache
 
 import numpy as np
 
@@ -69,30 +70,17 @@ class SignChoice:
         """
         if wanted.is_zero:
             return STOP
-        stay = min(self._cost(self._plan(shown, shown, steps), wanted) for steps in _DURATIONS[1:])
+        stay = min(self._cost(_plan(shown, shown, steps), wanted) for steps in _DURATIONS[1:])
         best, least = shown, stay * (1.0 - 0.5 * self._reluctance) - 0.1 * self._reluctance
         for sign in CHOICES:
             if sign == shown:
                 continue
             for first in (sign, GO) if GO not in (shown, sign) else (sign,):
                 for steps in _DURATIONS:
-                    cost = self._cost(self._plan(shown, sign, steps, first), wanted, least)
+                    cost = self._cost(_plan(shown, sign, steps, first), wanted, least)
                     if cost < least:
                         best, least = first, cost
         return best
-
-    def _plan(self, shown: str, sign: str, steps: int, first: str | None = None) -> list[str]:
-        """Return the sign that counts in each step: ``sign`` for so many steps, through ``first``, and then ``Go``."""
-        plan: list[str] = []
-        before = shown
-        for target in ([] if first in (None, sign) else [first or sign]) + [sign]:
-            if target != before:
-                plan += [before, GO if GO in (before, target) else NONE]
-                before = target
-        plan += [sign] * steps
-        if len(plan) < _STEPS and sign != GO:
-            plan += [sign if sign == STOP else GO] * (_STEPS - len(plan))
-        return (plan + [plan[-1]] * _STEPS)[:_STEPS]
 
     def _cost(self, plan: Sequence[str], wanted: Velocity, most: float = math.inf) -> float:
         """Return the mean difference from what is wanted; infinity if it is above ``most``."""
@@ -104,6 +92,21 @@ class SignChoice:
             if cost > most * len(plan):
                 return math.inf
         return cost / len(plan)
+
+
+@cache
+def _plan(shown: str, sign: str, steps: int, first: str | None = None) -> tuple[str, ...]:
+    """Return the sign that counts in each step: ``sign`` for so many steps, through ``first``, and then ``Go``."""
+    plan: list[str] = []
+    before = shown
+    for target in (*(() if first in (None, sign) else (str(first),)), sign):
+        if target != before:
+            plan += [before, GO if GO in (before, target) else NONE]
+            before = target
+    plan += [sign] * steps
+    if len(plan) < _STEPS and sign != GO:
+        plan += [sign if sign == STOP else GO] * (_STEPS - len(plan))
+    return tuple((plan + [plan[-1]] * _STEPS)[:_STEPS])
 
 
 class Signs:
