@@ -69,18 +69,19 @@ class Seen:
 _PATIENCE_S = 0.75
 """Delay that halves the operator's pace."""
 
-_LEAD = 0.85
-"""Increase of kd / kp for each second of delay, as ``scripts/bench_operator.py`` finds it best."""
+_LEAD_S, _LEAD = 0.15, 0.85
+"""Best ratio kd / kp without delay, and its increase for each second of delay, by ``scripts/bench_operator.py``."""
 
 
 def adapted(skill: Skill, delay_s: float) -> Skill:
     """Return ``skill`` as used with ``delay_s`` seconds of additional delay in the loop, for every interface alike.
 
-    As in the model of Vozar and Tilbury, the ratio kd / kp rises with the delay. The operator also slows down, so that
+    As in the model of Vozar and Tilbury, the ratio kd / kp rises with the delay: to what is best for the delay, unless it
+    is higher anyway. The operator also slows down, so that
     the robot drives no further unseen.
     """
     delay_s = max(0.0, delay_s)
-    kd = skill.kp * (skill.kd / skill.kp + _LEAD * delay_s)
+    kd = max(skill.kd, skill.kp * (_LEAD_S + _LEAD * delay_s)) if delay_s else skill.kd
     return replace(skill, pace_mps=skill.pace_mps / (1.0 + delay_s / _PATIENCE_S), kd=kd)
 
 
