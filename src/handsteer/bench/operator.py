@@ -76,9 +76,8 @@ _LEAD_S, _LEAD = 0.15, 0.85
 def adapted(skill: Skill, delay_s: float) -> Skill:
     """Return ``skill`` as used with ``delay_s`` seconds of additional delay in the loop, for every interface alike.
 
-    As in the model of Vozar and Tilbury, the ratio kd / kp rises with the delay: to what is best for the delay, unless it
-    is higher anyway. The operator also slows down, so that
-    the robot drives no further unseen.
+    As in the model of Vozar and Tilbury, the ratio kd / kp rises with the delay: to what is best for it, unless it is
+    higher anyway. The operator also slows down, so that the robot drives no further unseen.
     """
     delay_s = max(0.0, delay_s)
     kd = max(skill.kd, skill.kp * (_LEAD_S + _LEAD * delay_s)) if delay_s else skill.kd
