@@ -21,6 +21,7 @@ PICTURES = DOCS / "pictures" / "driving"
 
 SEEDS = range(20)
 SEEDS_PICTURES = range(6)
+PLOTS = {"times": "Times of all laps", "laps": "A lap through each interface"}
 BY_HAND = ("joystick", "cruise", "signs")
 SWEEPS: dict[str, tuple[tuple[str, ...], tuple[float, ...]]] = {
     "latency": (("pad", "joystick", "cruise"), (0, 250, 500, 750)),
@@ -85,7 +86,8 @@ def _course(name: str, results: Sequence[CellResult]) -> str:
         row += [_text(each.median("cross_track_m"), 1, 100)]
         row += [_text(each.median("overshoot_m"), 1, 100)] if over else []
         rows.append([*row, _text(each.median("commands_per_min"), 0), _text(each.median("standing"), 0, 100)])
-    return f"### {name}\n\n" + _table([*head, "acts a minute", "stands, %"], rows)
+    pictures = [f"![{text} on {name}](pictures/driving/{name}-{what}.png)" for what, text in PLOTS.items()]
+    return "\n\n".join([f"### {name}", *pictures]) + "\n\n" + _table([*head, "acts a minute", "stands, %"], rows)
 
 
 def _goals(results: dict[Cell, CellResult]) -> str:
@@ -131,7 +133,8 @@ def _sweep(factor: str, results: Sequence[CellResult]) -> str:
         for interface in interfaces
     ]
     head = ["time on the slalom, s", *(f"{value:g}" for value in values), *(f"bumps at {value:g}" for value in values)]
-    return f"### {titles[factor]}\n\n" + _table(head, rows)
+    plot = f"![{titles[factor]}](pictures/driving/slalom-{factor}.png)"
+    return f"### {titles[factor]}\n\n{plot}\n\n" + _table(head, rows)
 
 
 def _pictures(seen: Iterable[CellResult], results: dict[Cell, CellResult]) -> str:

@@ -116,15 +116,18 @@ class _Kind:
     """Whether it needs a hand in front of a camera."""
 
 
+_SIGNS = Skill(0.581, 1.121, 0.818, 1.942, 0.166)
+"""For both ramps, which are the same at 30 frames a second."""
+
 KINDS: dict[str, _Kind] = {
-    "signs": _Kind(Skill()),
-    "signs_per_second": _Kind(Skill(), {"ramp": "per_second"}),
-    "cruise": _Kind(Skill(), {"rule": "cruise"}),
+    "signs": _Kind(_SIGNS),
+    "signs_per_second": _Kind(_SIGNS, {"ramp": "per_second"}),
+    "cruise": _Kind(Skill(0.482, 1.082, 0.888, 2.2, 0.486), {"rule": "cruise"}),
     "joystick": _Kind(Skill(0.958, 1.219, 0.709, 1.805, 1.575), {"mode": "joystick"}, Joystick),
     "pad": _Kind(Skill(0.944, 1.526, 0.491, 1.939, 1.658), make=Pad, by_hand=False),
-    "keys": _Kind(Skill(), make=Keys, by_hand=False),
-    "sliders": _Kind(Skill(), make=Sliders, by_hand=False),
-    "gamepad": _Kind(Skill(), make=Gamepad, by_hand=False),
+    "keys": _Kind(Skill(0.846, 1.027, 0.289, 1.735, 1.189), make=Keys, by_hand=False),
+    "sliders": _Kind(Skill(0.261, 0.752, 0.755, 1.409, 1.118), make=Sliders, by_hand=False),
+    "gamepad": _Kind(Skill(0.944, 1.4, 0.61, 1.946, 1.779), make=Gamepad, by_hand=False),
 }
 """The interfaces by name; the skills are from ``scripts/bench_skills.py``."""
 
