@@ -127,22 +127,25 @@ class SignsConfig(Section):
 
 
 class JoystickConfig(Section):
-    """The hand as a joystick: its position while the fist is closed, relative to where it was closed."""
+    """The hand as a joystick: its position while the fist is closed, relative to where it was closed.
+
+    The defaults are those with which ``handsteer bench`` drives best (``docs/driving.md``).
+    """
 
     dead_zone: float = live(
-        0.12,
+        0.1,
         ge=0,
         le=1,
         description="Movements of the fist below this have no effect, in each direction [palm lengths]",
     )
     full_deflection: float = live(
-        1.0, gt=0, le=5, description="Movement of the fist for full speed [palm lengths]; a palm is about 0.09 m long"
+        1.2, gt=0, le=5, description="Movement of the fist for full speed [palm lengths]; a palm is about 0.09 m long"
     )
     expo: float = live(
-        0.3, ge=0, le=1, description="Share of the cube in the response: 0 is linear, more is finer near the middle"
+        0.4, ge=0, le=1, description="Share of the cube in the response: 0 is linear, more is finer near the middle"
     )
     min_cutoff: float = live(
-        3.0, gt=0, le=100, description="Cutoff frequency of the One-Euro filter for a hand at rest [Hz]"
+        12.0, gt=0, le=100, description="Cutoff frequency of the One-Euro filter for a hand at rest [Hz]"
     )
     beta: float = live(
         1.0, ge=0, le=100, description="Increase of that frequency with speed [Hz per palm length a second]"

@@ -82,7 +82,7 @@ const tiltOf = (event) => event.button === 0 && event.target.closest?.(".tilt");
 
 // From how the device lies to how its screen does, whichever way up that shows the page.
 function attitude({ beta, gamma }) {
-  const turned = screen.orientation?.angle ?? 0;
+  const turned = screen.orientation?.angle ?? window.orientation ?? 0; // the latter in older Safari
   const [b, c, a] = [beta, gamma, turned].map((degrees) => (degrees * Math.PI) / 180);
   // Upwards, along the device's axes: to its right, to its top, and out of its screen.
   const [right, top, out] = [-Math.cos(b) * Math.sin(c), Math.sin(b), Math.cos(b) * Math.cos(c)];
