@@ -196,4 +196,5 @@ def test_cruise_is_within_limits_and_no_message_makes_it_faster_than_time_does(
         assert abs(now.linear_mps) - abs(before.linear_mps) <= CRUISE.cruise_acceleration * CRUISE.sign_timeout + 1e-6
         if sign in {STOP, NONE}:
             assert now == ZERO
-        before = now
+        if sign != NONE:  # after which it continues from where it was
+            before = now

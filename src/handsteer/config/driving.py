@@ -82,16 +82,17 @@ class ControlConfig(Section):
     angular_step: float = live(0.1, gt=0, le=5, description="Change of angular speed per message [rad/s]")
     linear_acceleration: float = live(0.3, gt=0, le=10, description="Change of linear speed with per_second [m/s²]")
     angular_acceleration: float = live(3.0, gt=0, le=50, description="Change of angular speed with per_second [rad/s²]")
+    # The defaults are those with which handsteer bench drives best (docs/driving.md).
     cruise_step: float = live(0.25, gt=0, le=5, description="Step of the set speed with cruise [m/s]")
     cruise_step_time: float = live(
         0.4, gt=0, le=5, description="A sign that is held changes the set speed by a further step after this long [s]"
     )
     cruise_acceleration: float = live(
-        1.0, gt=0, le=10, description="Acceleration to the set speed with cruise; it brakes twice as hard [m/s²]"
+        0.6, gt=0, le=10, description="Acceleration to the set speed with cruise; it brakes twice as hard [m/s²]"
     )
-    cruise_turn: float = live(1.2, gt=0, le=20, description="Angular speed that a turn reaches with cruise [rad/s]")
+    cruise_turn: float = live(1.0, gt=0, le=20, description="Angular speed that a turn reaches with cruise [rad/s]")
     cruise_angular_acceleration: float = live(
-        3.0, gt=0, le=50, description="Angular acceleration of a turn with cruise; it ends twice as fast [rad/s²]"
+        1.5, gt=0, le=50, description="Angular acceleration of a turn with cruise; it ends twice as fast [rad/s²]"
     )
     max_sign_rate: float = live(
         60.0,
