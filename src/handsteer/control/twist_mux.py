@@ -97,8 +97,13 @@ class TwistMux:
         """Why this velocity is commanded."""
         if self.source == "steering":
             return Reason("steered_at_zero" if self._velocity.is_zero else "steered")
-        if self.source == "joystick":
-            return Reason("not_held" if not self._is_held else "held" if self._velocity.is_zero else "joystick")
+        if self._config.mode == "joystick":
+            is_held = self.source == "joystick" and self._is_held
+            return Reason("not_held" if not is_held else "held" if self._velocity.is_zero else "joystick")
+        return self._reason_of_signs
+
+    @property
+    def _reason_of_signs(self) -> Reason:
         if self.source == "none":
             return Reason("no_input", f"{self._config.sign_timeout:g}")
         sign = self._last_sign or NONE
