@@ -28,7 +28,8 @@ _PATIENCE_S = 0.3
 _LINEAR_MPS, _ANGULAR_RADPS = 0.15, 0.5
 
 _OPEN_S = 0.45
-_PALM_M = float(BONE_LENGTHS_M[[4, 8, 12, 16]].mean())
+PALM_M = float(BONE_LENGTHS_M[[4, 8, 12, 16]].mean())
+"""Length of the operator's palm."""
 
 
 class SignChoice:
@@ -198,7 +199,7 @@ class Joystick:
             return
         self._aim, self._since_s = aim, 0.0
         self._moves += 1
-        forward, left = (moved_for(share, self._config) * _PALM_M for share in aim)
+        forward, left = (moved_for(share, self._config) * PALM_M for share in aim)
         # The camera is in front of the person: the person's left is the image's right.
         self._hand.reach(np.array([left, -forward]))
 
