@@ -52,6 +52,7 @@ class Teleop:
         self._refused: str | None = "no image has come"
         self._since_image_s = self._since_seen_s = 0.0
         self._joystick = HandJoystick(config.joystick)
+        self._is_joystick = config.control.mode == "joystick"
         self._stick = RELEASED
         self._control = Control(
             config.control, arming=config.control.arming != "off", engage=config.control.engage != "off"
@@ -82,6 +83,7 @@ class Teleop:
         elif self._since_seen_s > self._max_frame_age_s:
             self._recognizer.reset()
             self._joystick.reset()
+            self._stick = RELEASED
             self.recognition = None
         return self._velocity
 
@@ -124,7 +126,8 @@ class Teleop:
         try:
             # The time of skipped images counts too: a sign is timed from when it was last seen.
             self.recognition = self._recognizer.step(image, self._since_seen_s)
-            self._stick = self._joystick.step(self.recognition, self._since_seen_s)
+            if self._is_joystick:
+                self._stick = self._joystick.step(self.recognition, self._since_seen_s)
         except Exception:
             self._fault("an image could not be looked at")
             raise
