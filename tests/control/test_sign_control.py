@@ -125,12 +125,12 @@ def test_forward_sets_a_speed_in_steps_and_the_robot_follows_it(cruising: Cruise
     assert cruise(cruising, FORWARD, 5) == pytest.approx((0.7, 0), abs=1e-6), "the limit"
 
 
-def test_backward_brakes_to_a_stand_and_reverses_when_shown_anew(cruising: CruiseControl) -> None:
+def test_backward_brakes_to_a_stand_and_then_reverses(cruising: CruiseControl) -> None:
     cruise(cruising, FORWARD, 1.4)
-    assert cruise(cruising, BACKWARD, 10) == pytest.approx((0, 0), abs=1e-6)
-    cruise(cruising, GO, 0.1)
-    assert cruise(cruising, BACKWARD, 0.4) == pytest.approx((-0.2, 0), abs=1e-6)
-    assert cruise(cruising, FORWARD, 10) == pytest.approx((0, 0), abs=1e-6)
+    assert cruise(cruising, BACKWARD, 1.9) == (0, 0)
+    assert cruise(cruising, BACKWARD, 0.5) == pytest.approx((-0.2, 0), abs=1e-6)
+    assert cruise(cruising, FORWARD, 0.9) == (0, 0)
+    assert cruise(cruising, FORWARD, 0.5) == pytest.approx((0.2, 0), abs=1e-6)
 
 
 def test_a_turn_lasts_while_it_is_shown_or_the_speed_changes(cruising: CruiseControl) -> None:

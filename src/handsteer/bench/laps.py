@@ -122,8 +122,8 @@ _SIGNS = Skill(0.581, 1.121, 0.818, 1.942, 0.166)
 KINDS: dict[str, _Kind] = {
     "signs": _Kind(_SIGNS),
     "signs_per_second": _Kind(_SIGNS, {"ramp": "per_second"}),
-    "cruise": _Kind(Skill(0.482, 1.082, 0.888, 2.2, 0.486), {"rule": "cruise"}),
-    "joystick": _Kind(Skill(0.958, 1.219, 0.709, 1.805, 1.575), {"mode": "joystick"}, Joystick),
+    "cruise": _Kind(Skill(0.448, 1.372, 0.889, 2.094, 0.78), {"rule": "cruise"}),
+    "joystick": _Kind(Skill(1.0, 1.374, 0.619, 1.907, 1.621), {"mode": "joystick"}, Joystick),
     "pad": _Kind(Skill(0.944, 1.526, 0.491, 1.939, 1.658), make=Pad, by_hand=False),
     "keys": _Kind(Skill(0.846, 1.027, 0.289, 1.735, 1.189), make=Keys, by_hand=False),
     "sliders": _Kind(Skill(0.261, 0.752, 0.755, 1.409, 1.118), make=Sliders, by_hand=False),

@@ -112,7 +112,7 @@ class CruiseControl(SignControl):
     """Keeps a set speed, which signs change in steps, and turns while a turn is shown.
 
     ``Forward`` raises the set speed by a step when it begins, and by another one each ``cruise_step_time`` while it is
-    held; ``Backward`` lowers it, and stops at zero until it is shown again. The velocity follows the set speed whatever
+    held; ``Backward`` lowers it; at zero it waits for twice that time. The velocity follows the set speed whatever
     is shown, so the robot also speeds up in a curve. ``Turn Left`` and ``Turn Right`` turn while they are shown;
     ``Forward`` and ``Backward`` keep the turn, ``Go`` ends it. ``Stop`` and ``NONE`` command zero at once. After a
     ``NONE`` of at most :data:`BETWEEN_SIGNS_S`, as there is while the fingers go from one sign to another, a sign that
@@ -179,15 +179,15 @@ class CruiseControl(SignControl):
 
     def _change_set_speed(self, way: float, interval_s: float, *, begins: bool) -> None:
         self._shown_s = 0.0 if begins else self._shown_s + interval_s
-        if not begins:
-            if self._shown_s < self._config.cruise_step_time:
-                return
-            self._shown_s -= self._config.cruise_step_time
         before, limit = self._set_mps, self._config.max_linear
+        # At zero it waits twice as long, so that braking does not become driving the other way.
+        wait_s = self._config.cruise_step_time * (2.0 if before == 0.0 else 1.0)
+        if not begins:
+            if self._shown_s < wait_s:
+                return
+            self._shown_s -= wait_s
         after = round(before + way * self._config.cruise_step, _DIGITS)
-        if before * way < 0 <= after * way or (before == 0.0 and not begins):
-            after = 0.0  # the direction changes only when the sign is shown again
-        self._set_mps = max(-limit, min(after, limit))
+        self._set_mps = 0.0 if before * way < 0 <= after * way else max(-limit, min(after, limit))
 
 
 def _approach(now: float, wanted: float, step: float) -> float:
