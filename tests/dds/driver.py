@@ -34,7 +34,8 @@ class DdsDriver(Driver):
         self._is_joystick = (parameters or {}).get("mode") == "joystick"
         record_twists(graph.peer, self.cmd_vel)
         graph.peer.ask("advertise", topic=self.signs, type="String")
-        graph.peer.ask("advertise", topic=self._joy, type="Joy")
+        if self._is_joystick:
+            graph.peer.ask("advertise", topic=self._joy, type="Joy")
         words = [word for name, value in (parameters or {}).items() for word in ("-p", f"{name}:={value}")]
         ros = ("-r", f"__ns:={namespace}", *words)
         self.process = graph.node("control", *options, name=f"{namespace}/{NODE}", ros=ros)

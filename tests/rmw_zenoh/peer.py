@@ -29,6 +29,7 @@ HASHES = {
     "geometry_msgs::msg::dds_::TwistStamped_": "RIHS01_"
     "5f0fcd4f81d5d06ad9b4c4c63e3ea51b82d6ae4d0558f1d475229b1121db6f64",
     "sensor_msgs::msg::dds_::Image_": "RIHS01_d31d41a9a4c4bc8eae9be757b0beed306564f7526c88ea6a4588fb9582527d47",
+    "sensor_msgs::msg::dds_::Joy_": "RIHS01_0d356c79cad3401e35ffeb75a96a96e08be3ef896b8b83841d73e890989372c5",
     "nav_msgs::msg::dds_::Odometry_": "RIHS01_3cc97dc7fb7502f8714462c526d369e35b603cfc34d946e3f2eda2766dfec6e0",
     "rosgraph_msgs::msg::dds_::Clock_": "RIHS01_692f7a66e93a3c83e71765d033b60349ba68023a8c689a79e48078bcb5c58564",
 }
@@ -122,6 +123,15 @@ def cdr(kind: str, values: dict[str, Any]) -> bytes:
         return HEADER + struct.pack("<?", values["data"])
     if kind == "Clock":
         return HEADER + struct.pack("<iI", int(values["s"]), int(values["s"] % 1 * 1e9))
+    if kind == "Joy":
+        axes, buttons = values["axes"], values["buttons"]
+        header = struct.pack("<iII", 0, 0, 1) + bytes(4)  # no frame: one zero byte, and three up to the next number
+        return (
+            HEADER
+            + header
+            + struct.pack(f"<I{len(axes)}f", len(axes), *axes)
+            + struct.pack(f"<I{len(buttons)}i", len(buttons), *buttons)
+        )
     assert kind == "Twist"
     return HEADER + struct.pack("<6d", values.get("linear.x", 0.0), 0, 0, 0, 0, values.get("angular.z", 0.0))
 
