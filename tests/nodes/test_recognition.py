@@ -1,3 +1,4 @@
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -8,7 +9,17 @@ from handsteer.cameras.files import SensorNoise
 from handsteer.config import Config, SignsConfig
 from handsteer.errors import ConfigError
 from handsteer.images import image_message, jpeg_message
-from handsteer.messages import DIAGNOSTICS, HAND_SIGN, IMAGE_ANNOTATED, IMAGE_COMPRESSED, IMAGE_RAW, Header, Image, Time
+from handsteer.messages import (
+    DIAGNOSTICS,
+    GESTURE_JOY,
+    HAND_SIGN,
+    IMAGE_ANNOTATED,
+    IMAGE_COMPRESSED,
+    IMAGE_RAW,
+    Header,
+    Image,
+    Time,
+)
 from handsteer.nodes.recognition import HandSignRecognitionNode
 from handsteer.parameters import NodeParameters
 from handsteer.recognition.custom_signs import save_custom_model
@@ -27,10 +38,12 @@ BROKEN = Image(HEADER, 480, 640, "bgr8", 0, 1920, np.zeros(5, np.uint8))
 
 
 class RecognitionBench(Bench):
-    def __init__(self, config: SignsConfig | None = None, hand: Hand | None = None) -> None:
+    def __init__(
+        self, config: SignsConfig | None = None, hand: Hand | None = None, hands: Sequence[Hand] | None = None
+    ) -> None:
         super().__init__()
         config = config or SignsConfig()
-        landmarker = RecordedLandmarker([[hand or show_sign(FORWARD)]] * 100)
+        landmarker = RecordedLandmarker([[each] for each in hands or [hand or show_sign(FORWARD)] * 100])
         recognizer = Recognizer(Config(signs=config), landmarker=landmarker, classifier=ShippedClassifier(load_model()))
         self.node = HandSignRecognitionNode(
             self.transport, self.clock, recognizer, config, annotate, open_classifier=open_classifier
@@ -72,6 +85,25 @@ def test_while_no_frames_come_none_goes_out(bench: RecognitionBench) -> None:
     bench.signs.clear()
     bench.show()
     assert bench.names == ["NONE"], "a sign has to be confirmed anew after a loss"
+
+
+def test_the_hand_as_a_joystick_is_published_for_who_subscribes() -> None:
+    bench = RecognitionBench(hands=[show_sign("Stop")] * 20 + [show_sign("Go")] * 40)
+    bench.show(frames=30)
+    joys = bench.record(GESTURE_JOY)
+    bench.show(frames=10)
+    assert [joy.buttons.tolist() for joy in joys] == [[0]] * 10, "nobody saw the hand open"
+    assert joys[0].header == HEADER
+
+
+def test_a_fist_that_closes_is_held_until_no_frames_come() -> None:
+    bench = RecognitionBench(hands=[show_sign("Stop")] * 20 + [show_sign("Go")] * 40)
+    joys = bench.record(GESTURE_JOY)
+    bench.show(frames=30)
+    assert [int(joy.buttons[0]) for joy in joys] == [0] * 23 + [1] * 7
+    assert joys[-1].axes.tolist() == [0.0, 0.0]
+    bench.run(1.0)
+    assert joys[-1].buttons.tolist() == [0]
 
 
 def test_a_stale_frame_is_no_frame(bench: RecognitionBench) -> None:

@@ -173,7 +173,11 @@ class HandSignRecognitionNode(Node):
             return
         # The time of skipped pictures counts: a sign is bridged from when it was last seen.
         recognition = self._recognizer.step(image, self._unseen_s)
-        stick = self._joystick.step(recognition, self._unseen_s)
+        is_joystick_wanted = self._joy.has_subscribers
+        if is_joystick_wanted:
+            self._joystick.step(recognition, self._unseen_s)
+        else:
+            self._joystick.reset()
         self._unseen_s = 0.0
         self._refused = self._why_too_late(began_s)
         if self._refused is not None:
@@ -188,14 +192,13 @@ class HandSignRecognitionNode(Node):
         self._recognition = recognition
         self.counts[recognition.sign] = self.counts.get(recognition.sign, 0) + 1
         self._sign.publish(String(data=recognition.sign), received.captured_s)
-        if self._joy.has_subscribers:
-            self._joy.publish(joy_of(stick, received.message.header), received.captured_s)
+        if is_joystick_wanted:
+            self._joy.publish(joy_of(self._joystick.stick, received.message.header), received.captured_s)
         self.processing.add(self.clock.now() - began_s)
         if self._annotated.has_subscribers:
             header = received.message.header
             picture = self._annotate(image, recognition)
-            if self._joy.has_subscribers:
-                self._joystick.draw(picture)
+            self._joystick.draw(picture)
             self._annotated.publish(image_message(picture, header), received.captured_s)
 
     def _why_too_late(self, began_s: float) -> str | None:
