@@ -170,6 +170,30 @@ class Histories(RuleBasedStateMachine):
         for _ in range(20):
             self.frame(sign, Stick(held=True, forward=0.4))
 
+    @rule()
+    def steer_for_a_moment_while_the_fist_is_closed(self) -> None:
+        self.steer(0.5, 2, 0.1)
+        self.drive_on("Go")
+        self.drive_on("Go")
+
+    @rule()
+    def lose_the_camera_while_driving(self) -> None:
+        self.drive_on("Go")
+        self.pass_time(0.6)
+
+    @rule()
+    def look_away_for_long(self) -> None:
+        for _ in range(52):
+            self.frame("NONE", Stick(), 0.1)
+        self.drive_on("Forward")
+
+    @rule(period_s=st.sampled_from([0.2, 0.32]))
+    def show_the_palm_now_and_then(self, period_s: float) -> None:
+        self.the_robot_is_away()
+        for _ in range(5):
+            self.frame("Stop", Stick(), period_s)
+        self.drive_on("Forward")
+
     @rule(seconds=st.sampled_from([0.05, 0.2, 0.34, 0.36, 0.6, 1.2, 5.5]))
     def nothing_comes(self, seconds: float) -> None:
         self.pass_time(seconds)
