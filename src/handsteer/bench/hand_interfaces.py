@@ -110,7 +110,22 @@ def _plan(shown: str, sign: str, steps: int, first: str | None = None) -> tuple[
     return tuple((plan + [plan[-1]] * _STEPS)[:_STEPS])
 
 
-class Signs:
+class ByHand:
+    """What interfaces with a hand in front of the camera share.
+
+    Args:
+        view: The hand as it is seen.
+        slips: How often the operator errs.
+        random: Source of times, slips and tremor.
+    """
+
+    def __init__(self, view: HandView, slips: Slips, random: np.random.Generator) -> None:
+        self.delay_s = HAND_S
+        self._hand = OperatorsHand(random, slips, CHOICES)
+        self._view = view
+
+
+class Signs(ByHand):
     """Hand signs with one of the control's rules.
 
     Args:
@@ -122,9 +137,7 @@ class Signs:
     """
 
     def __init__(self, config: Config, skill: Skill, view: HandView, slips: Slips, random: np.random.Generator) -> None:
-        self.delay_s = HAND_S
-        self._hand = OperatorsHand(random, slips, CHOICES)
-        self._view = view
+        super().__init__(view, slips, random)
         self._choice = SignChoice(config.control, config.camera.fps, skill.reluctance)
         self._shown_s = 0.0
         self._calls = 0
@@ -154,23 +167,14 @@ class Signs:
         return velocity
 
 
-class Joystick:
-    """The hand as a joystick of air: a fist that moves from where it was closed.
+class Joystick(ByHand):
+    """The hand as a joystick: a fist that moves from where it was closed; arguments as for :class:`Signs`.
 
     The operator opens the hand and closes it to hold the joystick, and again whenever it was lost; a stop is neutral.
-
-    Args:
-        config: All parameters.
-        skill: Of the operator.
-        view: The hand as it is seen.
-        slips: How often the operator errs.
-        random: Source of times, slips and tremor.
     """
 
     def __init__(self, config: Config, skill: Skill, view: HandView, slips: Slips, random: np.random.Generator) -> None:
-        self.delay_s = HAND_S
-        self._hand = OperatorsHand(random, slips, CHOICES)
-        self._view = view
+        super().__init__(view, slips, random)
         self._limits = config.control.max_linear, config.control.max_angular
         self._config = config.joystick
         self._least = 0.1 * skill.reluctance

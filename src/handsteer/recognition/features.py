@@ -14,6 +14,8 @@ Array = NDArray[np.floating]
 
 WRIST, THUMB_TIP, INDEX_BASE, INDEX_TIP, MIDDLE_BASE, MIDDLE_TIP, LITTLE_BASE = 0, 4, 5, 8, 9, 12, 17
 KNUCKLES: Final = (5, 9, 13, 17)
+PALM: Final = [WRIST, *KNUCKLES]
+"""Landmarks that the fingers do not move."""
 
 _DIGITS: Final = np.array(
     [[0, 1, 2, 3, 4], [0, 5, 6, 7, 8], [0, 9, 10, 11, 12], [0, 13, 14, 15, 16], [0, 17, 18, 19, 20]]

@@ -10,12 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handsteer.config import JoystickConfig
-from handsteer.recognition.features import KNUCKLES, WRIST
+from handsteer.recognition.features import KNUCKLES, PALM, WRIST
 from handsteer.recognition.hand import Hand
 from handsteer.recognition.recognizer import Recognition
 from handsteer.types import GO, RELEASED, STOP, Handedness, Stick
-
-_PALM: Final = [WRIST, *KNUCKLES]
 
 _OPEN_S: Final = 0.15
 """The open hand must be seen for this long before it closes; a shorter glimpse may be an error."""
@@ -224,12 +222,12 @@ class _Seen:
     def of(cls, hand: Hand) -> "_Seen":
         pixels = hand.pixels[:, :2].astype(np.float64)
         world = hand.world.astype(np.float64)
-        x, y = pixels[_PALM].mean(axis=0).tolist()
+        x, y = pixels[PALM].mean(axis=0).tolist()
         # A palm that points to the camera looks short, so its length is that of the model at the scale of all points.
         scale = np.linalg.norm(np.ptp(pixels, axis=0)) / max(float(np.linalg.norm(np.ptp(world[:, :2], axis=0))), 1e-6)
         palm_m = float(np.linalg.norm(world[KNUCKLES, :] - world[WRIST], axis=1).mean())
         width, height = hand.image_size
-        shares = pixels[_PALM] / [width, height]
+        shares = pixels[PALM] / [width, height]
         is_cut_off = bool((shares < _EDGE).any() or (shares > 1.0 - _EDGE).any())
         return cls(x, y, max(1.0, float(scale) * palm_m), hand.handedness, is_cut_off)
 

@@ -8,11 +8,10 @@ from typing import Final
 import numpy as np
 
 from handsteer.config import SignsConfig
-from handsteer.recognition.features import KNUCKLES, WRIST
+from handsteer.recognition.features import PALM
 from handsteer.recognition.hand import Hand, SignGuess
 from handsteer.types import NONE, STOP
 
-_PALM: Final = [WRIST, *KNUCKLES]
 _JUMP: Final = 1.0
 """Largest movement of a hand between two frames, in hand sizes."""
 _MUCH_SMALLER: Final = 0.6
@@ -37,7 +36,7 @@ class HandPosition:
     @classmethod
     def of_palm(cls, hand: Hand) -> "HandPosition":
         """Return the position of the palm of ``hand``, independent of the fingers, with the size of the whole hand."""
-        x, y = hand.pixels[_PALM, :2].mean(axis=0).tolist()
+        x, y = hand.pixels[PALM, :2].mean(axis=0).tolist()
         return cls(x, y, max(1.0, hand.longer_side_px))
 
     def distance(self, other: "HandPosition") -> float:
