@@ -74,7 +74,7 @@ ACTIONS: tuple[Action, ...] = get_args(Action)
 MOTION_ACTIONS: frozenset[Action] = frozenset({"forward", "backward", "turn_left", "turn_right", "turbo"})
 """The actions that can make a robot move, or move faster."""
 
-EFFECTS: Mapping[Action, str] = {
+EFFECTS: dict[Action, str] = {
     "forward": "faster forward; turning ends",
     "backward": "slower, then backward; turning ends",
     "turn_left": "turns faster to the left; keeps its speed",
@@ -85,6 +85,15 @@ EFFECTS: Mapping[Action, str] = {
     "next_robot": "the next robot is driven, once Stop was shown",
 }
 """The effect of each action on the robot, in words."""
+
+CRUISE_EFFECTS: Mapping[Action, str] = EFFECTS | {
+    "forward": "a step faster forward; keeps turning",
+    "backward": "a step slower, then backward; keeps turning",
+    "turn_left": "turns left while shown; keeps its speed",
+    "turn_right": "turns right while shown; keeps its speed",
+    "go": "drives straight on; keeps its speed",
+}
+"""The same with ``control.rule: cruise``."""
 
 BUILT_IN: Mapping[str, Action] = {
     FORWARD: "forward",

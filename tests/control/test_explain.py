@@ -34,3 +34,10 @@ def test_every_reason_has_words(code: ReasonCode) -> None:
 def test_an_effect_names_step_and_limit() -> None:
     assert effect_of("turn_left", ControlConfig()).endswith("(0.1 rad/s a frame, up to 2 rad/s)")
     assert effect_of("stop", ControlConfig()) == "stops"
+
+
+def test_an_effect_is_that_of_the_rule() -> None:
+    cruise = ControlConfig(rule="cruise", cruise_step=0.2, cruise_turn=0.8, max_linear=0.6)
+    assert effect_of("forward", cruise) == "a step faster forward; keeps turning (0.2 m/s a step, up to 0.6 m/s)"
+    assert effect_of("turn_left", cruise).endswith("(1.5 rad/s a second, up to 0.8 rad/s)")
+    assert effect_of("go", cruise) == "drives straight on; keeps its speed"

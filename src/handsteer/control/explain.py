@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from handsteer.config import ControlConfig
-from handsteer.types import EFFECTS, Action
+from handsteer.types import CRUISE_EFFECTS, EFFECTS, Action
 
 ReasonCode = Literal[
     "sign",
@@ -84,17 +84,25 @@ class Reason:
 
 def effect_of(action: Action, rule: ControlConfig) -> str:
     """Return the effect of ``action`` on the robot under ``rule``, with steps and limits; for example ``stops``."""
-    figures = figures_of(action, rule)
-    return f"{EFFECTS[action]} ({figures})" if figures else EFFECTS[action]
+    figures, words = figures_of(action, rule), effect_words(action, rule)
+    return f"{words} ({figures})" if figures else words
+
+
+def effect_words(action: Action, rule: ControlConfig | None) -> str:
+    """Return the effect of ``action`` under ``rule``, without figures; None is the default rule."""
+    return (CRUISE_EFFECTS if rule and rule.rule == "cruise" else EFFECTS)[action]
 
 
 def figures_of(action: Action, rule: ControlConfig) -> str:
     """Return the step and the limit of ``action`` under ``rule``; empty if it has none."""
-    is_timed = rule.ramp == "per_second"
+    max_angular, is_timed = rule.max_angular, rule.ramp == "per_second"
     linear = f"{rule.linear_acceleration:g} m/s a second" if is_timed else f"{rule.linear_step:g} m/s a frame"
     angular = f"{rule.angular_acceleration:g} rad/s a second" if is_timed else f"{rule.angular_step:g} rad/s a frame"
+    if rule.rule == "cruise":
+        linear, angular = f"{rule.cruise_step:g} m/s a step", f"{rule.cruise_angular_acceleration:g} rad/s a second"
+        max_angular = min(rule.cruise_turn, max_angular)
     if action in ("forward", "backward"):
         return f"{linear}, up to {rule.max_linear:g} m/s"
     if action in ("turn_left", "turn_right"):
-        return f"{angular}, up to {rule.max_angular:g} rad/s"
+        return f"{angular}, up to {max_angular:g} rad/s"
     return f"up to {rule.max_linear:g} m/s" if action == "turbo" else ""

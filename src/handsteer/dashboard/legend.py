@@ -7,7 +7,7 @@ from functools import partial
 from nicegui import ui
 
 from handsteer.config import ControlConfig
-from handsteer.control.explain import figures_of
+from handsteer.control.explain import effect_words, figures_of
 from handsteer.dashboard.page import Page, box, button, switch, tag, text
 from handsteer.dashboard.settings import Settings
 from handsteer.dashboard.settings_fields import FIELDS
@@ -15,7 +15,6 @@ from handsteer.dashboard.state import PageState
 from handsteer.errors import ConfigError
 from handsteer.types import (
     BACKWARD,
-    EFFECTS,
     FORWARD,
     GO,
     SIGNS,
@@ -91,7 +90,7 @@ def legend(signs: tuple[str, ...], rule: ControlConfig | None) -> tuple[LegendEn
     def entry(sign: str) -> LegendEntry:
         action = action_of(sign, rule.actions if rule else {})
         # The semicolon precedes what does not change, which is left out for brevity.
-        effect = EFFECTS[action].partition(";")[0]
+        effect = effect_words(action, rule).partition(";")[0]
         return LegendEntry(sign, *DRAWN.get(sign, _TAUGHT), effect, figures_of(action, rule) if rule else "")
 
     order = [*(sign for sign in DRAWN if sign in signs), *(sign for sign in signs if sign not in DRAWN)]
@@ -102,7 +101,7 @@ def joystick_legend(rule: ControlConfig) -> tuple[LegendEntry, ...]:
     """Return how the hand is a joystick, in three steps."""
     limits = f"up to {rule.max_linear:g} m/s and {rule.max_angular:g} rad/s"
     return (
-        LegendEntry("Open the hand", *DRAWN[STOP], "gets ready; lets go at once", ""),
+        LegendEntry("Open the hand", *DRAWN[STOP], "ready; when held, stops at once", ""),
         LegendEntry("Close the fist", *DRAWN[GO], "holds the joystick: here is its middle", ""),
         LegendEntry(_MOVE, "closed fist", _MOVED, "up is forward, down backward, sideways turns", limits),
     )
