@@ -1,7 +1,8 @@
-"""Prints the errors of landmarks on videos of people: the constants of ``handsteer.bench.hands.LandmarkErrors``.
+"""Prints the errors of landmarks on videos of people: the constants of ``handsteer.bench.hand_view.LandmarkErrors``.
 
-``python benchmarks/landmark_errors.py VIDEO...``, with videos of one hand in view. The truth is not known: a smooth
-curve (a polynomial of second degree through 9 frames) stands for it, so slow errors are not counted.
+``python benchmarks/landmark_errors.py [VIDEO...]``, with videos of one hand in view, by default the clips of people.
+The truth is not known: a smooth curve (a polynomial of second degree through 9 frames) stands for it, so slow errors
+are not counted.
 """
 
 import sys
@@ -16,6 +17,8 @@ from handsteer.recognition.landmarker import MediaPipeLandmarker
 
 Array = NDArray[np.float64]
 
+CLIPS = Path(__file__).parents[2] / "shared" / "data" / "videos"
+ONE_HAND = ("CoderEnko007_hand_544x960.mp4", "dex-retargeting_human_hand_video_1280x720.mp4")
 _WINDOW = 9
 
 
@@ -78,4 +81,4 @@ def _robust(values: Array) -> float:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    main(sys.argv[1:] or [str(CLIPS / name) for name in ONE_HAND])

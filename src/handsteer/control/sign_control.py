@@ -116,7 +116,7 @@ class CruiseControl(SignControl):
     is shown, so the robot also speeds up in a curve. ``Turn Left`` and ``Turn Right`` turn while they are shown;
     ``Forward`` and ``Backward`` keep the turn, ``Go`` ends it. ``Stop`` and ``NONE`` command zero at once. After a
     ``NONE`` of at most :data:`BETWEEN_SIGNS_S`, as there is while the fingers go from one sign to another, a sign that
-    moves continues from the set speed, and from the velocity to which the robot has braked meanwhile.
+    moves restores the set speed, and continues from the velocity that braking has left.
     """
 
     BETWEEN_SIGNS_S = 0.5

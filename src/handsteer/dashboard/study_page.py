@@ -102,7 +102,7 @@ class StudyPage(Page):
         except HandsteerError as error:
             self._card.message = f"{error}."
         else:
-            if self.node is not None and self.drives():  # they may have left meanwhile
+            if self.node is not None and self.drives():  # the viewer may have left
                 session.begin_lap(self.client.id, node.clock.now())
         finally:
             self._begins = False
@@ -139,7 +139,7 @@ class StudyPage(Page):
             super()._reset()
 
     def _abandon(self) -> None:
-        """End the lap of a viewer whose connection is lost: nobody drives."""
+        """End the lap of a viewer whose connection is lost."""
         if self._session is not None and self._session.lap and self._session.lap.viewer == self.client.id:
             self.end("repeated")
 

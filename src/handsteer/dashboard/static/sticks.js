@@ -4,7 +4,7 @@ const HOLDS = [0, 4, 5], STOPS = 1; // buttons of the standard mapping: A and th
 const STICK = { dead: 0.12, full: 0.95 }, TILT = { dead: 3, full: 25 }; // of the stick's range; in degrees
 const EXPO = 0.3;
 const SENSOR_MS = 1500;
-const TELL_MS = 200;
+const SHOW_MS = 200;
 
 // The response of recognition/hand_joystick.py: 1 at full deflection, and finer near the middle.
 function respond(moved, { dead, full }) {
@@ -13,13 +13,13 @@ function respond(moved, { dead, full }) {
 }
 
 const words = { gamepad: "", tilt: "" };
-let told = "";
+let shown = "";
 setInterval(() => {
   const all = Object.values(words).filter(Boolean).join("; ");
-  if (all === told || !window.socket?.connected) return;
-  told = all;
+  if (all === shown || !window.socket?.connected) return;
+  shown = all;
   emitEvent("sticks", { words: all });
-}, TELL_MS);
+}, SHOW_MS);
 
 // The gamepad
 
