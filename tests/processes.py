@@ -1,6 +1,7 @@
 """Processes that a test starts, talks to and ends."""
 
 import json
+import select
 import signal
 import socket
 import subprocess
@@ -88,6 +89,8 @@ class Peer(Process):
 
     def _line(self) -> str:
         assert self.popen.stdout is not None
+        # One answer an order, so that nothing is left in Python's own buffer, which select does not see.
+        assert select.select([self.popen.stdout], [], [], START_S)[0], f"the peer says nothing: {self.text}"
         line = str(self.popen.stdout.readline())
         assert line, f"the peer has ended: {self.text}"
         return line.strip()

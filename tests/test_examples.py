@@ -12,7 +12,7 @@ SAYS = {
         "no pictures arrive for 2 s: the robot stops",
         "a fifth of the commands is lost for 2 s: the robot drives on",
     ],
-    "05_teleop_in_your_program": ["disarmed", "driving: Forward", "the robot is at x"],
+    "05_teleop_in_your_program": ["disengaged", "driving: Forward", "the robot is at x"],
 }
 
 
