@@ -9,6 +9,9 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
+from handsteer.clock import SteppedClock
+from handsteer.config import Config, VirtualHandConfig
+from handsteer.graph import Graph
 from tests.ros1.graph import Ros1Graph, ros1_graph
 
 # The machines that run the tests are shared: how long an example takes says nothing of the code.
@@ -49,6 +52,17 @@ def data_dir() -> Path:
 def slideshow(data_dir: Path) -> Path:
     """A labelled slide show of people showing signs, 12 frames a second."""
     return data_dir / "videos" / "slideshow_emre_MIT_640x480.mp4"
+
+
+@pytest.fixture(scope="session")
+def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A recording of eight seconds of a stepped run by the virtual hand."""
+    path = tmp_path_factory.mktemp("recording") / "drive.mcap"
+    config = Config(virtual_hand=VirtualHandConfig(script="Stop:1 Forward:2 Go:1 Turn Left:2 Stop:1 Backward:1"))
+    with Graph(config, SteppedClock()) as graph:
+        graph.record(path)
+        graph.run_stepped(8.0)
+    return path
 
 
 # Whoever starts the tests by nohup lets them, and all that they start, ignore SIGHUP; nodes are tested by it.

@@ -26,6 +26,11 @@ _LEAST_SET_S = 1.0
 class Clock(Protocol):
     """A monotonic clock."""
 
+    @property
+    def offset_s(self) -> float:
+        """What is added to a time now to get its stamp, in seconds."""
+        ...
+
     def now(self) -> float:
         """Return the time in seconds since an arbitrary, fixed moment; it never goes back."""
         ...
@@ -61,17 +66,19 @@ class RealClock:
 
     def stamp(self, time_s: float) -> "Time":
         """Return Unix time for the monotonic ``time_s``."""
-        return to_stamp(time_s + self._offset_s())
+        return to_stamp(time_s + self.offset_s)
 
     def time_of(self, stamp: "Time") -> float:
         """Return the monotonic time for the Unix time ``stamp``."""
-        return to_seconds(stamp) - self._offset_s()
+        return to_seconds(stamp) - self.offset_s
 
     def wait(self, wake: threading.Condition, timeout_s: float | None) -> None:
         """Wait in real seconds."""
         wake.wait(timeout_s)
 
-    def _offset_s(self) -> float:
+    @property
+    def offset_s(self) -> float:
+        """Unix time minus monotonic time, in seconds."""
         return self._epoch_offset_s
 
 
@@ -81,12 +88,20 @@ class WallClock(RealClock):
     When the wall clock is set, the stamps of all processes must jump alike, or frames of one are stale in another.
     """
 
-    def _offset_s(self) -> float:
+    @property
+    def offset_s(self) -> float:
+        """Unix time minus monotonic time at this moment, in seconds."""
         return time.time() - time.monotonic()
 
 
 class SteppedClock:
-    """A clock that moves only on request; stamps start at 0, as simulated time does in ROS."""
+    """A clock that moves only on request; stamps start at 0, as simulated time does in ROS.
+
+    Attributes:
+        offset_s: What is added to a time to get its stamp, in seconds.
+    """
+
+    offset_s = 0.0
 
     def __init__(self, start_s: float = 0.0) -> None:
         self._now_s = start_s
@@ -152,6 +167,12 @@ class SimulatedClock:
                 self._old_until_s, self._old_offset_s = min(self._told_s, time_s), self._offset_s
                 self._offset_s = now - time_s
             self._told_s, self._told_at_s = time_s, self._real()
+
+    @property
+    def offset_s(self) -> float:
+        """The simulator's time minus this clock's, in seconds."""
+        with self._lock:
+            return -self._offset_s
 
     def now(self) -> float:
         """Return the time in seconds since the simulator's start, including interruptions."""

@@ -21,6 +21,7 @@
     ├── WorldError             a world file or robot description is wrong
     ├── BenchError             a lap of the bench cannot be driven, or a world is no course
     ├── StudyError             the plan of a study, its results or an answer are wrong
+    ├── RecordingError         a recording cannot be written, read or replayed
     ├── TransportError         a topic cannot be published or subscribed to
     ├── DashboardError         the web page cannot be served
     └── PackageMissing         a Python package that is needed is not installed
@@ -107,6 +108,10 @@ class BenchError(HandsteerError):
 
 class StudyError(HandsteerError):
     """The plan of a study, its results or an answer to a form are wrong."""
+
+
+class RecordingError(HandsteerError):
+    """A recording cannot be written, read or replayed."""
 
 
 class TransportError(HandsteerError):

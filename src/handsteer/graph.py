@@ -13,13 +13,16 @@ the hand's sign, :mod:`handsteer.control` converts it to a velocity, and :mod:`h
 (:mod:`handsteer.transports`) carries the messages.
 """
 
+import functools
 import logging
 import math
 from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 from handsteer.clock import Clock, RealClock, SteppedClock
 from handsteer.config import Config
-from handsteer.errors import ConfigError
+from handsteer.errors import ConfigError, RecordingError
 from handsteer.making import (
     cmd_vel_topic,
     make_camera,
@@ -29,12 +32,36 @@ from handsteer.making import (
     make_steering,
     open_cameras,
 )
-from handsteer.messages import GESTURE_JOY, HAND_SIGN, IMAGE_COMPRESSED, IMAGE_RAW, ODOM, SCAN, STEERING_CMD_VEL
+from handsteer.messages import (
+    CAMERA_INFO,
+    CLOCK,
+    DIAGNOSTICS,
+    GESTURE_JOY,
+    HAND_SIGN,
+    IMAGE_COMPRESSED,
+    IMAGE_RAW,
+    JOINT_STATES,
+    JOY,
+    ODOM,
+    ROBOT_DESCRIPTION,
+    SCAN,
+    STEERING_CMD_VEL,
+    STOP,
+    STOPPED,
+    TF,
+    WORLD_MARKERS,
+)
 from handsteer.nodes.base import Node
+from handsteer.nodes.journal import Journal, journal_topic
 from handsteer.nodes.steering import SteeringNode
+from handsteer.recognition.recognizer import model_files
+from handsteer.recordings.about import describe
 from handsteer.summary import Summary
 from handsteer.transports.base import Session, Transport
 from handsteer.transports.in_process import InProcessTransport
+
+if TYPE_CHECKING:
+    from handsteer.recordings.recorder import Recorder
 
 log = logging.getLogger(__name__)
 
@@ -72,15 +99,17 @@ class Graph:
         self.transport = transport or InProcessTransport()
         wires = (self.transport, self.clock)
         cmd_vel = cmd_vel_topic(config)
+        journals = tuple(Journal(*wires) for _ in range(2))
+        noted = tuple((journal.transport, journal.clock) for journal in journals)
         self.robot = make_robot(config, *wires, link, cmd_vel=cmd_vel, odom=ODOM, scan=SCAN)
         self.recognition = make_recognition(
-            config, *wires, image=IMAGE_RAW, compressed=IMAGE_COMPRESSED, sign=HAND_SIGN, joy=GESTURE_JOY
+            config, *noted[0], image=IMAGE_RAW, compressed=IMAGE_COMPRESSED, sign=HAND_SIGN, joy=GESTURE_JOY
         )
         self.cameras = open_cameras(config, self.clock)
         self.camera = make_camera(config, *wires, self.cameras, image=IMAGE_RAW, compressed=IMAGE_COMPRESSED)
         self.control = make_control(
             config,
-            *wires,
+            *noted[1],
             simulated=config.robot.kind == "sim",
             sign=HAND_SIGN,
             joy=GESTURE_JOY,
@@ -91,6 +120,13 @@ class Graph:
         )
         self._steering = make_steering(config, *wires, steering=STEERING_CMD_VEL, cmd_vel=cmd_vel) if steering else None
         self._added: tuple[Node, ...] = ()
+        self.recognition.journal, self.control.journal = journals
+        self._recorder: Recorder | None = None
+        self._recorded = (
+            *(IMAGE_COMPRESSED, CAMERA_INFO, HAND_SIGN, GESTURE_JOY, JOY, cmd_vel, STEERING_CMD_VEL, STOP, STOPPED),
+            *(ODOM, TF, JOINT_STATES, CLOCK, ROBOT_DESCRIPTION, WORLD_MARKERS, DIAGNOSTICS),
+            *((SCAN,) if config.collision_monitor.enabled else ()),
+        )
         self._link = link
         self._began_s = self.clock.now()
 
@@ -146,6 +182,7 @@ class Graph:
         """Stop all nodes and the robot; may be called twice."""
         for node in self.nodes:
             node.stop()
+        self.end_recording()
         self.transport.close()
 
     def reconfigure(self, config: Config) -> None:
@@ -186,6 +223,39 @@ class Graph:
             clock.advance_to(due_s)
             while any([node.spin_once() for node in reversed(self.nodes)]):
                 pass
+
+    def record(self, path: Path) -> None:
+        """Record all topics to ``path`` from now on, an MCAP file that must not exist yet.
+
+        Recorded before the start, a run can be replayed bit for bit. Recognition then uses the recorded, compressed
+        pictures.
+
+        Raises:
+            RecordingError: The file cannot be created, or another recording is being made.
+        """
+        if self._recorder is not None:
+            raise RecordingError(f"{self._recorder.path} is being recorded: end that first")
+        # Only recordings need the package mcap.
+        from handsteer.recordings.recorder import Recorder  # noqa: PLC0415
+
+        about = describe(self.config, self.clock, model_files(self.config))
+        waits = isinstance(self.clock, SteppedClock)
+        recorder = Recorder(path, self.transport, self.clock, self._recorded, about, waits=waits)
+        self._recorder = recorder
+        self.recognition.look_at_compressed()
+        for node in (self.recognition, self.control):
+            assert node.journal is not None
+            node.journal.write_to(functools.partial(recorder.note, journal_topic(node.name)))
+
+    def end_recording(self) -> None:
+        """End the recording, if there is one."""
+        recorder, self._recorder = self._recorder, None
+        if recorder is None:
+            return
+        for node in (self.recognition, self.control):
+            assert node.journal is not None
+            node.journal.write_to(None)
+        recorder.close()
 
     def summary(self) -> Summary:
         """Return the statistics of the run so far."""

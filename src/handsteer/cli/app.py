@@ -21,6 +21,8 @@ _EXAMPLES = """Examples:
   handsteer run --headless --duration 30 --json  no page, one summary at the end
   handsteer recognize photo.jpg                  which sign is it?
   handsteer study examples/study.yaml            compare interfaces with people
+  handsteer run --record drive.mcap              drive, and keep all of it
+  handsteer replay drive.mcap                    the same frames again: the same commands?
   handsteer signs evaluate photos/               how well are signs recognised?
   handsteer bench --course slalom                how well does one drive?
   handsteer camera --transport ros1              one node, in a ROS 1 graph
@@ -43,6 +45,7 @@ for verb in ("run", "recognize", "study"):
     app.command(f"handsteer.cli.{verb}:{verb}", name=verb)
 for verb in ("models", "doctor", "ros"):
     app.command(f"handsteer.cli.installation:{verb}", name=verb)
+app.command("handsteer.cli.recordings:replay", name="replay")
 app.command("handsteer.cli.signs:app", name="signs")
 app.command("handsteer.cli.bench:bench", name="bench")
 for verb in _NODES:

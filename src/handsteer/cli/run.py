@@ -37,6 +37,7 @@ def run(
     headless: Flag = False,
     duration: float | None = None,
     fast: Flag = False,
+    record: Path | None = None,
     json: Flag = False,
     config_file: ConfigFile = None,
     parameters: Parameters = None,
@@ -71,6 +72,8 @@ def run(
         End after this many seconds.
     fast
         Run as fast as possible on simulated time, without the page; the same input gives the same commands.
+    record
+        Record all topics to this MCAP file, which must not exist yet, for `handsteer replay` and `handsteer report`.
     json
         Print a summary in JSON at the end, and nothing else.
     config_file
@@ -92,7 +95,7 @@ def run(
     if duration is not None and not duration > 0:
         raise ConfigError(f"--duration: {duration:g} should be greater than 0 seconds")
     with _linked(settle, ros_args, fast=fast) as (settings, link):
-        summary = drive(settings, link, duration, config_file, headless=headless, fast=fast)
+        summary = drive(settings, link, duration, config_file, record=record, headless=headless, fast=fast)
     print(json_format.dumps(summary.as_dict()) if json else _summary_text(summary))
     return 0
 
@@ -133,6 +136,7 @@ def drive(
     file: Path | None = None,
     study: Task | None = None,
     *,
+    record: Path | None = None,
     headless: bool = False,
     fast: bool = False,
 ) -> Summary:
@@ -141,6 +145,8 @@ def drive(
     page = None if headless else PageProcess()
     try:
         with Graph(settings, SteppedClock() if fast else RealClock(), link=link, steering=page is None) as graph:
+            if record is not None:
+                graph.record(record)
             try:
                 _run_until_end(graph, duration, file, study, page, fast=fast)
             except KeyboardInterrupt:

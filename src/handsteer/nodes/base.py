@@ -9,6 +9,7 @@ from handsteer.config import Config
 from handsteer.messages import DIAGNOSTICS, Topic
 from handsteer.nodes.callbacks import FailureLog, Inbox, Timer
 from handsteer.nodes.diagnostics import write_status
+from handsteer.nodes.journal import Journal
 from handsteer.nodes.status import Status
 from handsteer.transports.base import Call, Publisher, Received, Subscription, Transport
 
@@ -37,9 +38,11 @@ class Node:
         ended: Set when the node has finished.
         callback_errors: Number of failed callbacks.
         stuck: True if a callback was still running when :meth:`stop` timed out.
+        journal: Notes what the node reads from outside, for a replay; None without one.
     """
 
     is_quick = False
+    journal: Journal | None = None
 
     def __init__(self, name: str, transport: Transport, clock: Clock) -> None:
         self.name = name
@@ -156,6 +159,8 @@ class Node:
         with self._wake:
             config, self._new_config = self._new_config, None
             work = [(inbox, received) for inbox in self._inboxes if inbox.filled for received in inbox.take()]
+        if self.journal is not None:
+            self.journal.begin(config, [(inbox.topic, received) for inbox, received in work])
         if config is not None:
             self._guard("reconfigure", self.on_reconfigure, config)
         for inbox, received in work:
@@ -165,7 +170,10 @@ class Node:
         for timer in due:
             timer.schedule_next(now)
             self._guard("timer", timer.callback)
-        return bool(work or due or config is not None)
+        was_busy = bool(work or due or config is not None)
+        if self.journal is not None:
+            self.journal.end(keep=was_busy)
+        return was_busy
 
     def start(self) -> None:
         """Run callbacks and timers on a thread of its own."""
@@ -193,7 +201,11 @@ class Node:
         is_free = self._serving.acquire(timeout=0.0 if self.stuck else timeout_s)
         try:
             self.stuck = not is_free
+            if self.journal is not None:
+                self.journal.begin(None, (), is_stop=True)
             self._guard("stop", self.on_stop)
+            if self.journal is not None:
+                self.journal.end()
         finally:
             if is_free:
                 self._serving.release()

@@ -114,10 +114,20 @@ class HandSignRecognitionNode(Node):
         wanted = config.image_transport
         self._compressed = wanted == "compressed" or (wanted == "auto" and transport.crosses_network)
         self._images = self._take_images()
-        if wanted == "auto":
-            self.every(_CHOOSE_PERIOD_S, self._choose_images)
+        self._chooses = wanted == "auto"
+        self._wants_compressed = False
+        self.every(_CHOOSE_PERIOD_S, self._choose_images)
         self._watchdog = self.every(_WATCH_PERIOD_S, self._watch)
         self.diagnose_every(_DIAGNOSE_PERIOD_S, self._report)
+
+    def look_at_compressed(self) -> None:
+        """Subscribe to the compressed images from now on: a recording has these, and its replay must see the same.
+
+        May be called from any thread.
+        """
+        self._wants_compressed = True
+        if not self._running and not self._compressed:
+            self._change_images()
 
     def check(self, config: Config) -> None:
         """Raise ConfigError if the file of ``signs.model`` has changed and cannot be used."""
@@ -216,16 +226,23 @@ class HandSignRecognitionNode(Node):
         return self.subscribe(self._frames, lambda received: self._on_frame(received, bgr_image))
 
     def _choose_images(self) -> None:
-        """Subscribe to the other kind of images if a camera has only that."""
+        """Subscribe to the other kind of images if a camera has only that, or a recording asks for it."""
+        if self._wants_compressed and not self._compressed:
+            self._change_images()
+        if self._wants_compressed or not self._chooses:
+            return
         taken, other = (self._jpegs, self._frames) if self._compressed else (self._frames, self._jpegs)
         names = self.transport.publishers_of
         if names(taken) or not names(other):
             return
+        self._change_images()
+        here, there = (self.transport.topic_name(topic) for topic in (taken, other))
+        log.info("no node publishes %s: images are taken from %s, of %s", here, there, ", ".join(names(other)))
+
+    def _change_images(self) -> None:
         self._images.close()
         self._compressed = not self._compressed
         self._images = self._take_images()
-        here, there = (self.transport.topic_name(topic) for topic in (taken, other))
-        log.info("no node publishes %s: images are taken from %s, of %s", here, there, ", ".join(names(other)))
 
     def _since_last_frame(self, captured_s: float) -> float:
         last_s = captured_s if self._last_captured_s is None else self._last_captured_s

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -12,8 +13,9 @@ from handsteer.recognition.custom_signs import CustomClassifier, load_custom_mod
 from handsteer.recognition.debouncer import Debouncer, Evidence
 from handsteer.recognition.hand import CONNECTIONS, Classifier, Hand, Landmarker, SignGuess
 from handsteer.recognition.hand_selector import HandPosition, HandSelector
+from handsteer.recognition.landmark_models import find_pair
 from handsteer.recognition.landmarker import MediaPipeLandmarker
-from handsteer.recognition.shipped_signs import ShippedClassifier, load_model
+from handsteer.recognition.shipped_signs import DEFAULT_MODEL, ShippedClassifier, load_model
 from handsteer.types import NONE, describe_seen
 
 _NOTHING = SignGuess(NONE, 0.0)
@@ -41,6 +43,16 @@ def open_classifier(config: SignsConfig) -> Classifier:
     """
     shipped = ShippedClassifier(load_model())
     return CustomClassifier(shipped, load_custom_model(config.model.expanduser())) if config.model else shipped
+
+
+def model_files(config: Config) -> tuple[Path, ...]:
+    """Return the files of the models that ``config`` names: of palms, landmarks, shipped signs and taught signs.
+
+    Raises:
+        ModelError: A landmark model is missing or broken.
+    """
+    taught = () if config.signs.model is None else (config.signs.model.expanduser(),)
+    return (*find_pair(config.landmarks.model), DEFAULT_MODEL, *taught)
 
 
 @dataclass(frozen=True)

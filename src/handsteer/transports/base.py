@@ -34,12 +34,14 @@ class Received(Generic[M]):
         is_late: Whether it was delayed by more than its topic's lifespan. Only late messages that stop the robot
             (``Topic.stops``) are delivered.
         by_player: Whether a player of recordings sent it; False if the transport does not know.
+        number: Its number among the topic's messages, from 1; 0 if the transport does not count them.
     """
 
     message: M
     captured_s: float | None = None
     is_late: bool = False
     by_player: bool = False
+    number: int = 0
 
 
 Deliver = Callable[[Received[M]], None]

@@ -3,6 +3,7 @@
 Each topic has one type in a process, and each message is received and decoded once for all its subscribers there.
 """
 
+import itertools
 import threading
 import weakref
 from abc import ABC, abstractmethod
@@ -62,9 +63,13 @@ class Fanout(Generic[M]):
         latched: Whether a late subscriber gets the last message at once.
         receive: Called with a function for received messages when the first subscriber is added; starts receiving, and
             returns a function that ends it. None if messages come from this process.
+
+    Attributes:
+        numbers: Numbers for the messages of this process.
     """
 
     def __init__(self, *, latched: bool, receive: Receive[M] | None = None) -> None:
+        self.numbers = itertools.count(1)
         self._latched = latched
         self._receive = receive
         self._end: Callable[[], None] | None = None
@@ -246,4 +251,4 @@ class _InProcessPublisher(BasePublisher[M]):
         return self._fanout.has_subscribers
 
     def _send(self, message: M, captured_s: float | None) -> None:
-        self._fanout.send(Received(message, captured_s))
+        self._fanout.send(Received(message, captured_s, number=next(self._fanout.numbers)))

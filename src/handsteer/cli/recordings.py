@@ -1,0 +1,101 @@
+"""``handsteer replay``: run a recording again, and compare."""
+
+import json as json_format
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from cyclopts import Parameter
+
+from handsteer.cli.app import Flag
+from handsteer.cli.running import say
+from handsteer.clock import SteppedClock
+from handsteer.errors import RecordingError
+from handsteer.recognition.recognizer import model_files
+from handsteer.recordings.about import describe
+from handsteer.recordings.mcap_reader import McapFile
+from handsteer.replay.compare import Comparison, Moment, compare, differing_software
+from handsteer.replay.rerun import recorded_config, rerun
+
+_MOST_PRINTED = 50
+
+
+def replay(
+    recording: Path,
+    *,
+    from_: Annotated[Literal["frames", "signs"], Parameter(name="--from")] = "frames",
+    diff: Path | None = None,
+    json: Flag = False,
+) -> int:
+    """Run a recording through today's software, as fast as possible, and compare signs and commands.
+
+    Exit code 0 if all are the same bit for bit, 1 if any differs.
+
+    Example: handsteer replay drive.mcap --diff differences
+
+    Parameters
+    ----------
+    recording
+        MCAP file of `handsteer run --record`.
+    from_
+        frames runs recognition and control again; signs the control alone, from the recorded signs.
+    diff
+        Folder to which the frame of each differing sign is written; it must not exist yet.
+    json
+        Print the result in JSON, and nothing else.
+    """
+    file = McapFile(recording)
+    config = recorded_config(file)
+    others = differing_software(file.about, describe(config, SteppedClock(), model_files(config)))
+    if diff is not None:
+        _make_folder(diff)
+    comparison, moments = Comparison(), []
+    for moment in compare(rerun(file, config, from_), comparison, file.began_s):
+        moments.append(_described(moment, diff))
+        if not json and len(moments) <= _MOST_PRINTED:
+            print(_line(moments[-1]))
+    if file.problem:
+        say(f"{recording}: {file.problem}")
+    if json:
+        print(json_format.dumps({**asdict(comparison), "software": others, "moments": moments}))
+    else:
+        _print_result(comparison, others, len(moments))
+    return 1 if comparison.differing else 0
+
+
+def _make_folder(folder: Path) -> None:
+    try:
+        folder.mkdir(parents=True)
+    except FileExistsError:
+        raise RecordingError(f"--diff: {folder} exists already: give another name, nothing is overwritten") from None
+    except OSError as error:
+        raise RecordingError(f"--diff: cannot create {folder}: {error.strerror}") from None
+
+
+def _described(moment: Moment, folder: Path | None) -> dict[str, Any]:
+    """Return a moment for JSON; its frame is written to ``folder``, if there is one."""
+    told = {"time_s": round(moment.time_s, 3), "what": moment.what}
+    told |= {"recorded": moment.recorded, "replayed": moment.replayed}
+    if folder is not None and moment.frame is not None:
+        path = folder / f"{moment.time_s:010.3f}.jpg"
+        try:
+            path.write_bytes(moment.frame.message.data.tobytes())
+        except OSError as error:
+            raise RecordingError(f"--diff: cannot write {path}: {error.strerror}") from None
+        told["picture"] = str(path)
+    return told
+
+
+def _line(told: dict[str, Any]) -> str:
+    picture = f" ({told['picture']})" if "picture" in told else ""
+    return f"{told['time_s']:9.3f} s  {told['what']}: {told['recorded']} was recorded, now {told['replayed']}{picture}"
+
+
+def _print_result(comparison: Comparison, others: list[str], moments: int) -> None:
+    if moments > _MOST_PRINTED:
+        print(f"and {moments - _MOST_PRINTED} more: --json lists all")
+    counts = f"{comparison.frames} frames, {comparison.signs} signs, {comparison.commands} commands"
+    result = f"{comparison.differing} moments differ" if comparison.differing else "all the same, bit for bit"
+    print(f"replayed {comparison.duration_s:.1f} s: {counts}; {result}")
+    for other in others:
+        print(f"other software: {other}")

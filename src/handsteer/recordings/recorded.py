@@ -1,0 +1,48 @@
+"""A recorded message."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from handsteer.errors import RecordingError
+from handsteer.transports.ros2.encoding import decode, types
+
+_NS_PER_S = 1_000_000_000
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """A message of a recording.
+
+    Attributes:
+        topic: Full name of its topic.
+        type: Name of its type, as ``std_msgs/msg/String``; empty if the recording does not name it.
+        time_ns: When it was received, in ns since the epoch of the recording's clock.
+        number: Its number among the messages of the topic, as :class:`~handsteer.transports.base.Received`; 0 if
+            unknown.
+        raw: The message as CDR.
+    """
+
+    topic: str
+    type: str
+    time_ns: int
+    number: int
+    raw: bytes
+
+    @property
+    def time_s(self) -> float:
+        """When it was received, in seconds."""
+        return self.time_ns / _NS_PER_S
+
+    @property
+    def message(self) -> Any:
+        """The message.
+
+        Raises:
+            RecordingError: Its type is not known here, or its data is damaged.
+        """
+        if self.type not in types().fielddefs:
+            raise RecordingError(f"{self.topic}: messages of the type {self.type[:60]!r} are not known")
+        try:
+            return decode(self.raw, self.type)
+        except Exception as error:
+            raise RecordingError(f"{self.topic}: a damaged message of {self.type}: {error}") from None

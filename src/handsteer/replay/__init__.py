@@ -1,0 +1,1 @@
+"""Runs recordings through today's software, compares the results with the recorded ones, and reports on a drive."""

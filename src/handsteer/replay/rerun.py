@@ -1,0 +1,235 @@
+"""Runs recognition and control again, from a recording with journals, and finds each result that differs.
+
+Each node gets what it got in the recording, at the same readings of its clock; recognition runs first, then the control
+with the signs that result. With the same version, parameters and models, all results are the same bit for bit.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+from pydantic import ValidationError
+
+from handsteer.config import Config
+from handsteer.errors import RecordingError
+from handsteer.making import cmd_vel_topic, make_control, make_recognition
+from handsteer.messages import CMD_VEL, GESTURE_JOY, HAND_SIGN, IMAGE_COMPRESSED
+from handsteer.nodes.base import Node
+from handsteer.recordings.mcap_reader import McapFile
+from handsteer.recordings.recorded import Recorded
+from handsteer.replay.journals import Got, Spin, read_spins
+from handsteer.replay.stage import ReplayClock, ReplayTransport
+from handsteer.transports.base import Received
+from handsteer.transports.ros2.encoding import encode
+
+Source = Literal["frames", "signs"]
+
+RECOGNITION, CONTROL = "hand_sign_recognition", "hand_sign_control"
+_OUTPUTS = {RECOGNITION: (HAND_SIGN.name, GESTURE_JOY.name), CONTROL: (CMD_VEL.name,)}
+# How much later than published a message may be processed before it counts as one that the recording lacks.
+_EXTRA_AFTER_S = 0.005
+
+
+@dataclass(frozen=True)
+class Result:
+    """What a node published in one spin.
+
+    Attributes:
+        node: Name of the node.
+        time_s: When the spin ended, in seconds since the epoch of the recording's stamps.
+        recorded: The recorded messages, as CDR, by topic.
+        replayed: The messages of the replay.
+        messages: The same, with the capture time of each.
+        frame: The frame that was processed; None if there was none.
+    """
+
+    node: str
+    time_s: float
+    recorded: dict[str, list[bytes]]
+    replayed: dict[str, list[bytes]]
+    messages: dict[str, list[tuple[Any, float | None]]]
+    frame: Recorded | None = None
+
+    @property
+    def differs(self) -> bool:
+        """Whether any message differs."""
+        return self.recorded != self.replayed
+
+
+@dataclass
+class _Outputs:
+    """The results of recognition, spin by spin, for the control."""
+
+    results: list[Result] = field(default_factory=list)
+    spin_of: dict[str, list[int]] = field(default_factory=dict)
+
+    def add(self, result: Result) -> None:
+        for topic, raws in result.recorded.items():
+            self.spin_of.setdefault(topic, []).extend([len(self.results)] * len(raws))
+        self.results.append(result)
+
+
+def rerun(file: McapFile, config: Config, source: Source = "frames") -> Iterator[Result]:
+    """Yield the results of the recorded run's spins, first all of recognition, then all of the control.
+
+    Args:
+        file: A recording with journals.
+        config: The parameters of the nodes.
+        source: ``frames`` runs recognition and control, ``signs`` the control alone, with the recorded signs.
+
+    Raises:
+        RecordingError: The recording has no journals, or they are damaged.
+        ModelError: A model is missing or broken.
+    """
+    outputs: _Outputs | None = None
+    if source == "frames":
+        outputs = _Outputs()
+        looks_at_jpegs = config.model_copy(
+            update={"signs": config.signs.model_copy(update={"image_transport": "compressed"})}
+        )
+        for result in _rerun(file, RECOGNITION, lambda *wires: make_recognition(looks_at_jpegs, *wires), None):
+            outputs.add(_light(result))
+            yield result
+    is_simulated = config.robot.kind == "sim"
+    yield from _rerun(
+        file,
+        CONTROL,
+        lambda *wires: make_control(config, *wires, simulated=is_simulated, cmd_vel=cmd_vel_topic(config)),
+        outputs,
+    )
+
+
+def recorded_config(file: McapFile) -> Config:
+    """Return the parameters of the recorded run.
+
+    Raises:
+        RecordingError: The recording does not contain them, or they do not fit this version.
+    """
+    if "config" not in file.about:
+        raise RecordingError(f"{file.path} was not recorded by handsteer: it contains no parameters")
+    try:
+        return Config.model_validate_json(file.about["config"])
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(map(str, first["loc"]))
+        raise RecordingError(f"{file.path}: the recorded parameter {where} does not fit: {first['msg']}") from None
+
+
+def _light(result: Result) -> Result:
+    """Return the result without its picture."""
+    return Result(result.node, result.time_s, result.recorded, result.replayed, result.messages)
+
+
+def _rerun(
+    file: McapFile, name: str, make: Callable[[ReplayTransport, ReplayClock], Node], outputs: _Outputs | None
+) -> Iterator[Result]:
+    clock, transport = ReplayClock(_number(file, "clock_offset_s")), ReplayTransport()
+    spins = read_spins(file, name)
+    recorded = _RecordedOutputs(file, _OUTPUTS[name])
+    first = next(spins, None)
+    if first is None:
+        raise RecordingError(f"{file.path} has no journal of {name}: it was not recorded by `handsteer run`")
+    clock.set(first.readings)
+    transport.answers.update(first.saw)
+    node = make(transport, clock)
+    transport.take()
+    feed = _Feed(outputs) if outputs is not None else None
+    for spin in spins:
+        clock.set(spin.readings)
+        transport.answers.update(spin.saw)
+        if spin.is_stop:
+            node.stop()
+        else:
+            if spin.config is not None:
+                node.reconfigure(_config(file, spin.config))
+            for topic, received in feed.received(spin) if feed else _received(spin.got):
+                transport.deliver(topic, received)
+            node.spin_once()
+        frames = [got.recorded for got in spin.got if got.topic == IMAGE_COMPRESSED.name]
+        yield _result(name, spin, recorded, transport, frames[-1] if frames else None)
+
+
+def _result(
+    name: str, spin: Spin, recorded: "_RecordedOutputs", transport: ReplayTransport, frame: Recorded | None
+) -> Result:
+    messages: dict[str, list[tuple[Any, float | None]]] = {}
+    for topic, message, captured_s in transport.take():
+        if topic in _OUTPUTS[name]:
+            messages.setdefault(topic, []).append((message, captured_s))
+    replayed = {topic: [encode(message) for message, _ in pairs] for topic, pairs in messages.items()}
+    return Result(name, spin.time_s, recorded.take(spin.gave), replayed, messages, frame)
+
+
+class _RecordedOutputs:
+    """The recorded messages of a node's topics, in order."""
+
+    def __init__(self, file: McapFile, topics: tuple[str, ...]) -> None:
+        self._streams = {topic: _by_number(file, topic) for topic in topics}
+
+    def take(self, gave: dict[str, int]) -> dict[str, list[bytes]]:
+        """Return the next messages: so many of each topic."""
+        taken = {
+            topic: [next(stream, b"") for _ in range(gave.get(topic, 0))] for topic, stream in self._streams.items()
+        }
+        return {topic: raws for topic, raws in taken.items() if raws}
+
+
+def _by_number(file: McapFile, topic: str) -> Iterator[bytes]:
+    return (recorded.raw for recorded in file.messages({topic}))
+
+
+class _Feed:
+    """Passes the control the signs of the replay in place of the recorded ones.
+
+    Where the replay published as many as were recorded, these are passed at the same moments; a message that the
+    recording lacks is passed at the first spin after it.
+    """
+
+    def __init__(self, outputs: _Outputs) -> None:
+        self._outputs = outputs
+        self._passed = 0
+
+    def received(self, spin: Spin) -> Iterator[tuple[str, Received[Any]]]:
+        until = self._passed
+        for got in spin.got:
+            spins = self._outputs.spin_of.get(got.topic, ())
+            if 0 < got.number <= len(spins):
+                until = max(until, spins[got.number - 1] + 1)
+        replaced = set(_OUTPUTS[RECOGNITION])
+        results = self._outputs.results
+        while until < len(results) and self._is_extra(results[until], spin):
+            until += 1
+        yield from _received([got for got in spin.got if got.topic not in replaced])
+        numbers = {got.topic: got.number for got in spin.got}
+        for result in results[self._passed : until]:
+            for topic, pairs in result.messages.items():
+                for message, captured_s in pairs:
+                    yield topic, Received(message, captured_s, number=numbers.get(topic, 0))
+        self._passed = max(self._passed, until)
+
+    @staticmethod
+    def _is_extra(result: Result, spin: Spin) -> bool:
+        counts = {topic: len(raws) for topic, raws in result.recorded.items()}
+        is_other = counts != {topic: len(pairs) for topic, pairs in result.messages.items()}
+        return (is_other or not counts) and result.time_s + _EXTRA_AFTER_S < spin.time_s
+
+
+def _received(gots: list[Got]) -> Iterator[tuple[str, Received[Any]]]:
+    for got in gots:
+        if got.recorded is not None:
+            message = got.recorded.message
+            yield got.topic, Received(message, got.captured_s, got.is_late, got.by_player, got.number)
+
+
+def _config(file: McapFile, values: dict[str, Any]) -> Config:
+    try:
+        return Config.model_validate(values)
+    except ValidationError:
+        raise RecordingError(f"{file.path}: parameters that were changed do not fit this version") from None
+
+
+def _number(file: McapFile, name: str) -> float:
+    try:
+        return float(file.about.get(name, "0"))
+    except ValueError:
+        raise RecordingError(f"{file.path}: {name} is {file.about[name][:40]!r}, not a number") from None
