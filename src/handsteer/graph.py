@@ -18,7 +18,7 @@ import logging
 import math
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from handsteer.clock import Clock, RealClock, SteppedClock
 from handsteer.config import Config
@@ -38,6 +38,7 @@ from handsteer.messages import (
     DIAGNOSTICS,
     GESTURE_JOY,
     HAND_SIGN,
+    IMAGE_ANNOTATED,
     IMAGE_COMPRESSED,
     IMAGE_RAW,
     JOINT_STATES,
@@ -50,6 +51,7 @@ from handsteer.messages import (
     STOPPED,
     TF,
     WORLD_MARKERS,
+    Topic,
 )
 from handsteer.nodes.base import Node
 from handsteer.nodes.journal import Journal, journal_topic
@@ -146,6 +148,12 @@ class Graph:
         """The nodes in the order in which they are stopped: the control sends its zero first, the robot ends last."""
         steering = () if self._steering is None else (self._steering,)
         return (self.control, *steering, self.camera, self.recognition, *self._added, self.robot)
+
+    @property
+    def topics(self) -> tuple[Topic[Any], ...]:
+        """All topics that programs next to the graph may look at, including those on demand."""
+        on_demand = (IMAGE_RAW, IMAGE_ANNOTATED, SCAN)
+        return (*self._recorded, *(topic for topic in on_demand if topic not in self._recorded))
 
     def add(self, node: Node) -> None:
         """Run and stop ``node``, on this graph's transport and clock, with the others."""
