@@ -33,28 +33,19 @@ from handsteer.making import (
     open_cameras,
 )
 from handsteer.messages import (
-    CAMERA_INFO,
-    CLOCK,
-    DIAGNOSTICS,
     GESTURE_JOY,
     HAND_SIGN,
     IMAGE_ANNOTATED,
     IMAGE_COMPRESSED,
     IMAGE_RAW,
-    JOINT_STATES,
-    JOY,
     ODOM,
-    ROBOT_DESCRIPTION,
+    RECORDED,
     SCAN,
     STEERING_CMD_VEL,
-    STOP,
-    STOPPED,
-    TF,
-    WORLD_MARKERS,
     Topic,
 )
 from handsteer.nodes.base import Node
-from handsteer.nodes.journal import Journal, journal_topic
+from handsteer.nodes.journal import JOURNALS, Journal, journal_topic
 from handsteer.nodes.steering import SteeringNode
 from handsteer.recognition.recognizer import model_files
 from handsteer.recordings.about import describe
@@ -125,8 +116,7 @@ class Graph:
         self.recognition.journal, self.control.journal = journals
         self._recorder: Recorder | None = None
         self._recorded = (
-            *(IMAGE_COMPRESSED, CAMERA_INFO, HAND_SIGN, GESTURE_JOY, JOY, cmd_vel, STEERING_CMD_VEL, STOP, STOPPED),
-            *(ODOM, TF, JOINT_STATES, CLOCK, ROBOT_DESCRIPTION, WORLD_MARKERS, DIAGNOSTICS),
+            *(IMAGE_COMPRESSED, cmd_vel),
             *((SCAN,) if config.collision_monitor.enabled else ()),
         )
         self._link = link
@@ -153,7 +143,7 @@ class Graph:
     def topics(self) -> tuple[Topic[Any], ...]:
         """All topics that programs next to the graph may look at, including those on demand."""
         on_demand = (IMAGE_RAW, IMAGE_ANNOTATED, SCAN)
-        return (*self._recorded, *(topic for topic in on_demand if topic not in self._recorded))
+        return (*RECORDED, *self._recorded, *(topic for topic in on_demand if topic not in self._recorded))
 
     def add(self, node: Node) -> None:
         """Run and stop ``node``, on this graph's transport and clock, with the others."""
@@ -246,9 +236,9 @@ class Graph:
         # Only recordings need the package mcap.
         from handsteer.recordings.recorder import Recorder  # noqa: PLC0415
 
-        about = describe(self.config, self.clock, model_files(self.config))
+        about = describe(self.config, self.clock, model_files(self.config)) | {JOURNALS: "yes"}
         waits = isinstance(self.clock, SteppedClock)
-        recorder = Recorder(path, self.transport, self.clock, self._recorded, about, waits=waits)
+        recorder = Recorder(path, self.transport, self.clock, (*RECORDED, *self._recorded), about, waits=waits)
         self._recorder = recorder
         self.recognition.look_at_compressed()
         for node in (self.recognition, self.control):
