@@ -60,6 +60,7 @@ def test_a_drive_is_seen_and_ctrl_c_ends_it(drive: Process) -> None:
     assert drive.code() == 0
     assert "ran for" in drive.text
     assert "Traceback" not in drive.text
+    assert "Fatal" not in drive.text
 
 
 @pytest.mark.slow
@@ -114,6 +115,7 @@ def test_a_port_in_use_ends_the_run(page: tuple[str, ...]) -> None:
     lines = [line for line in text.splitlines() if line.startswith("handsteer:")]
     assert lines == [f"handsteer: port {port} on 127.0.0.1 is in use: choose another with --foxglove N (0: a free one)"]
     assert "Traceback" not in text
+    assert "Fatal" not in text
 
 
 @pytest.mark.slow

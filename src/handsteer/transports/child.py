@@ -99,7 +99,9 @@ def serve_parent(serve: Callable[[Pipe], None]) -> None:
     # Other output must not mix with the messages.
     sink = os.fdopen(os.dup(sys.stdout.fileno()), "wb")
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
-    pipe = Pipe(sys.stdin.buffer, sink)
+    # Python closes its own standard input at the end, and aborts if a thread is reading it.
+    source = os.fdopen(os.dup(sys.stdin.fileno()), "rb")
+    pipe = Pipe(source, sink)
     logging.basicConfig(level=logging.INFO, handlers=[logging.handlers.QueueHandler(_Records(pipe))])  # type: ignore[arg-type] # it only puts
     try:
         serve(pipe)
