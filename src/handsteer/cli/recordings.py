@@ -1,4 +1,4 @@
-"""``handsteer replay``: run a recording again, and compare."""
+"""``handsteer replay``: run a recording again, and compare; ``handsteer report``: what happened in it."""
 
 import json as json_format
 from dataclasses import asdict
@@ -15,6 +15,9 @@ from handsteer.recognition.recognizer import model_files
 from handsteer.recordings.about import describe
 from handsteer.recordings.mcap_reader import McapFile
 from handsteer.replay.compare import Comparison, Moment, compare, differing_software
+from handsteer.replay.drive_facts import DriveFacts
+from handsteer.replay.drive_reader import read_drive
+from handsteer.replay.report_words import heading, sign_totals, totals
 from handsteer.replay.rerun import recorded_config, rerun
 
 _MOST_PRINTED = 50
@@ -61,6 +64,47 @@ def replay(
     else:
         _print_result(comparison, others, len(moments))
     return 1 if comparison.differing else 0
+
+
+def report(recording: Path, *, output: Path | None = None, force: Flag = False, json: Flag = False) -> None:
+    """Report what happened in a recording, in one HTML page that needs no network, and print the totals.
+
+    The page shows signs, velocities, the driven path, latencies, and each stop with its reason and frame.
+
+    Example: handsteer report drive.mcap --output drive.html
+
+    Parameters
+    ----------
+    recording
+        MCAP file of `handsteer run --record`, also one that was cut off.
+    output
+        The page; by default next to the recording, as drive.html.
+    force
+        Overwrite the page if it exists.
+    json
+        Print the totals in JSON, and nothing else; no page is written.
+    """
+    if json:
+        print(json_format.dumps(read_drive(McapFile(recording)).totals()))
+        return
+    # Only the page needs the package plotly.
+    from handsteer.replay.report import write_report  # noqa: PLC0415
+
+    page = output or recording.with_suffix(".html")
+    _print_totals(write_report(recording, page, force=force))
+    print(f"report: {page}")
+
+
+def _print_totals(facts: DriveFacts) -> None:
+    print(heading(facts))
+    for total in totals(facts)[1:]:
+        more = f" ({total.more})" if total.more else ""
+        print(f"{total.name + ':':12}{total.value}{more}")
+    signs = ", ".join(f"{total.name} {total.value}" for total in sign_totals(facts))
+    if signs:
+        print(f"{'signs:':12}{signs}")
+    for problem in facts.problems:
+        say(f"{facts.path}: {problem}")
 
 
 def _make_folder(folder: Path) -> None:
