@@ -33,26 +33,16 @@ from handsteer.making import (
     open_cameras,
 )
 from handsteer.messages import (
-    CAMERA_INFO,
-    CLOCK,
-    DIAGNOSTICS,
     GESTURE_JOY,
     HAND_SIGN,
     IMAGE_COMPRESSED,
     IMAGE_RAW,
-    JOINT_STATES,
-    JOY,
     ODOM,
-    ROBOT_DESCRIPTION,
     SCAN,
     STEERING_CMD_VEL,
-    STOP,
-    STOPPED,
-    TF,
-    WORLD_MARKERS,
 )
 from handsteer.nodes.base import Node
-from handsteer.nodes.journal import Journal, journal_topic
+from handsteer.nodes.journal import JOURNALS, Journal, journal_topic
 from handsteer.nodes.steering import SteeringNode
 from handsteer.recognition.recognizer import model_files
 from handsteer.recordings.about import describe
@@ -123,8 +113,7 @@ class Graph:
         self.recognition.journal, self.control.journal = journals
         self._recorder: Recorder | None = None
         self._recorded = (
-            *(IMAGE_COMPRESSED, CAMERA_INFO, HAND_SIGN, GESTURE_JOY, JOY, cmd_vel, STEERING_CMD_VEL, STOP, STOPPED),
-            *(ODOM, TF, JOINT_STATES, CLOCK, ROBOT_DESCRIPTION, WORLD_MARKERS, DIAGNOSTICS),
+            *(IMAGE_COMPRESSED, cmd_vel),
             *((SCAN,) if config.collision_monitor.enabled else ()),
         )
         self._link = link
@@ -236,11 +225,11 @@ class Graph:
         if self._recorder is not None:
             raise RecordingError(f"{self._recorder.path} is being recorded: end that first")
         # Only recordings need the package mcap.
-        from handsteer.recordings.recorder import Recorder  # noqa: PLC0415
+        from handsteer.recordings.recorder import RECORDED, Recorder  # noqa: PLC0415
 
-        about = describe(self.config, self.clock, model_files(self.config))
+        about = describe(self.config, self.clock, model_files(self.config)) | {JOURNALS: "yes"}
         waits = isinstance(self.clock, SteppedClock)
-        recorder = Recorder(path, self.transport, self.clock, self._recorded, about, waits=waits)
+        recorder = Recorder(path, self.transport, self.clock, (*RECORDED, *self._recorded), about, waits=waits)
         self._recorder = recorder
         self.recognition.look_at_compressed()
         for node in (self.recognition, self.control):

@@ -11,8 +11,7 @@ from handsteer.messages import HAND_SIGN, IMAGE_RAW, STEERING_CMD_VEL, STOP, WOR
 from handsteer.nodes.diagnostics import read_status
 from handsteer.nodes.journal import journal_topic
 from handsteer.nodes.status import CameraStatus, ControlStatus, RecognitionStatus, RobotStatus
-from handsteer.recordings.mcap_reader import McapFile
-from handsteer.recordings.recorded import Recorded
+from handsteer.recordings.recorded import Recorded, Recording
 from handsteer.replay.curves import Curve
 from handsteer.replay.drive_facts import DriveFacts
 from handsteer.replay.journals import parse_spin
@@ -32,7 +31,7 @@ _LARGEST = 1e6
 _EPOCH_BEGINS_S = 1e9
 
 
-def read_drive(file: McapFile) -> DriveFacts:
+def read_drive(file: Recording) -> DriveFacts:
     """Return what a recording says about a drive.
 
     Args:
@@ -51,7 +50,7 @@ def read_drive(file: McapFile) -> DriveFacts:
     return reader.end()
 
 
-def _why(file: McapFile) -> str:
+def _why(file: Recording) -> str:
     return f" ({file.problem})" if file.problem else ""
 
 
@@ -73,10 +72,10 @@ class _Numbers:
 
 
 class _Reader:
-    def __init__(self, file: McapFile, began_s: float) -> None:
+    def __init__(self, file: Recording, began_s: float) -> None:
         self._file = file
         self._began_s = self._now_s = began_s
-        self._facts = facts = DriveFacts(file.path, file.about)
+        self._facts = facts = DriveFacts(file.path, dict(file.about))
         self._offset_s = _number(file.about.get("clock_offset_s", ""))
         self._stands = StandLog(facts, began_s, self._offset_s or 0.0)
         self._signs = SignLog(facts)

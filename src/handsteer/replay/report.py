@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from handsteer.errors import RecordingError
-from handsteer.recordings.mcap_reader import McapFile
+from handsteer.recordings import open_recording
 from handsteer.replay.drive_facts import DriveFacts
 from handsteer.replay.drive_reader import read_drive
 from handsteer.replay.report_page import render
@@ -13,7 +13,7 @@ def write_report(recording: Path, output: Path, *, force: bool = False) -> Drive
     """Write a page about a recording that opens without network, and return what it is about.
 
     Args:
-        recording: The recording; it may be cut off.
+        recording: An MCAP file, which may be cut off, or a bag of ROS 1 or 2.
         output: The page; it appears complete or not at all.
         force: Whether to overwrite it.
 
@@ -24,7 +24,7 @@ def write_report(recording: Path, output: Path, *, force: bool = False) -> Drive
     """
     if output.exists() and not force:
         raise RecordingError(f"{output} exists already: give another name, or --force to overwrite it")
-    facts = read_drive(McapFile(recording))
+    facts = read_drive(open_recording(recording))
     _write(output, render(facts))
     return facts
 

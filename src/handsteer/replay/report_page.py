@@ -57,9 +57,11 @@ def render(facts: DriveFacts) -> str:
 <style>{_static("report.css")}</style>
 </head>
 <body>
+<main>
 <h1>{_text(facts.path.name)}</h1>
 <p>{_text(heading(facts))}</p>
 {"".join(parts)}
+</main>
 <script type="application/json" id="figures">{_inert(figures)}</script>
 <script>{plotly}</script>
 <script>{script}</script>

@@ -4,16 +4,15 @@ import math
 from collections import deque
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import Any
 
 import cv2
 import numpy as np
 
 from handsteer.control.explain import Reason
 from handsteer.errors import FrameError, RecordingError
-from handsteer.images import bgr_image, encode_jpeg, jpeg_picture
-from handsteer.messages import CompressedImage
+from handsteer.images import encode_jpeg
 from handsteer.nodes.status import ControlStatus
+from handsteer.recordings.camera import picture_of
 from handsteer.recordings.recorded import Recorded
 from handsteer.replay.drive_facts import DriveFacts, Stand
 from handsteer.replay.journals import Spin
@@ -142,7 +141,7 @@ class StandLog:
             stand.reason = reason.explanation if reason else "no reason was reported"
         if opened.frame is not None and (self._facts.stand_count - 1) % self._picture_every == 0:
             with suppress(FrameError, RecordingError):
-                stand.picture = _small(opened.frame.message)
+                stand.picture = _small(opened.frame)
                 self._limit_pictures()
 
     def _limit_pictures(self) -> None:
@@ -172,8 +171,8 @@ def _captured(spin: Spin) -> list[float]:
     return next((times for times in by_topic.values() if len(times) == commands), [])
 
 
-def _small(message: Any) -> bytes:
-    picture = jpeg_picture(message) if isinstance(message, CompressedImage) else bgr_image(message)
+def _small(frame: Recorded) -> bytes:
+    picture = picture_of(frame)
     scale = _LONGEST_SIDE / max(picture.shape[:2])
     if scale < 1:
         picture = np.asarray(cv2.resize(picture, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA), np.uint8)
