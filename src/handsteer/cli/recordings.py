@@ -151,13 +151,15 @@ def report(recording: Path, *, output: Path | None = None, force: Flag = False, 
 
 
 def _print_totals(facts: DriveFacts) -> None:
-    print(heading(facts))
+    lines = [heading(facts)]
     for total in totals(facts)[1:]:
         more = f" ({total.more})" if total.more else ""
-        print(f"{total.name + ':':12}{total.value}{more}")
+        lines.append(f"{total.name + ':':12}{total.value}{more}")
     signs = ", ".join(f"{total.name} {total.value}" for total in sign_totals(facts))
-    if signs:
-        print(f"{'signs:':12}{signs}")
+    lines += [f"{'signs:':12}{signs}"] if signs else []
+    for line in lines:
+        # Names in a recording may contain what controls a terminal.
+        print("".join(each if each.isprintable() else "?" for each in line))
     for problem in facts.problems:
         say(f"{facts.path}: {problem}")
 

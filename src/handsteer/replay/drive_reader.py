@@ -166,6 +166,7 @@ class _Reader:
 
     def _on_sign(self, recorded: Recorded, time_s: float) -> None:
         self._signs.note(str(recorded.message.data), time_s)
+        self._stands.note_sign(recorded.number, self._signs.sign)
 
     def _on_command(self, recorded: Recorded, time_s: float) -> None:
         twist = twist_in(recorded.message)
@@ -175,7 +176,7 @@ class _Reader:
         self._facts.commands += 1
         self._facts.commanded.add(time_s, velocity.linear_mps, velocity.angular_radps)
         self._robot.note_command(time_s, velocity)
-        self._stands.note_command(recorded.time_s, velocity, self._signs.sign, self._robot.place)
+        self._stands.note_command(recorded.time_s, velocity, self._robot.place)
 
     def _on_odometry(self, recorded: Recorded, time_s: float) -> None:
         self._robot.note_odometry(time_s, recorded.message)
