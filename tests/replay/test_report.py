@@ -198,9 +198,9 @@ class TestInABrowser:
             assert [fault["help"] for fault in found] == []
             opened.emulate_media(color_scheme="dark")
             opened.set_viewport_size({"width": 390, "height": 800})
-            chart = opened.locator("#timeline .main-svg").first
+            drawing = opened.locator("#timeline .main-svg").first
             for _ in range(PATIENCE_MS // 50):
-                if chart.evaluate("svg => svg.clientWidth") <= 390:
+                if drawing.evaluate("svg => svg.clientWidth") <= 390:
                     break
                 opened.wait_for_timeout(50)
             assert opened.evaluate("document.documentElement.scrollWidth") <= 390

@@ -1,5 +1,6 @@
 """A report in words: the totals of a drive, for the page and for the terminal."""
 
+import math
 from typing import NamedTuple
 
 from handsteer.replay.drive_facts import DriveFacts
@@ -52,7 +53,7 @@ def sign_totals(facts: DriveFacts) -> list[Total]:
 
 def _time(duration_s: float) -> str:
     minutes, seconds = divmod(duration_s, 60)
-    return f"{minutes:.0f} min {seconds:.0f} s" if minutes else f"{seconds:.1f} s"
+    return f"{minutes:.0f} min {math.floor(seconds)} s" if minutes else f"{seconds:.1f} s"
 
 
 def _size(facts: DriveFacts) -> str:
@@ -60,7 +61,7 @@ def _size(facts: DriveFacts) -> str:
 
 
 def _seconds(times: dict[str, float]) -> str:
-    return ", ".join(f"{name} {time_s:.1f} s" for name, time_s in times.items())
+    return ", ".join(f"{name} {_time(time_s)}" for name, time_s in times.items())
 
 
 def _driving(facts: DriveFacts) -> Total | None:
