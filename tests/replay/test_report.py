@@ -6,6 +6,7 @@ from typing import Any
 import pytest
 from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import Request
+from rosbags.rosbag2 import StoragePlugin
 
 from handsteer.cli.app import run
 from handsteer.errors import RecordingError
@@ -17,6 +18,7 @@ from handsteer.replay.report import write_report
 from handsteer.transports.ros2.encoding import encode
 from tests.dashboard.browsers import a_browser
 from tests.dashboard.visits import NEEDS_A_BROWSER, PATIENCE_MS
+from tests.recordings.test_bags import as_ros1, as_ros2
 
 EVIL = "</script><script>alert(1)</script><img src=x onerror=alert(2)>"
 VOID = {"meta", "link", "img", "br"}
@@ -115,6 +117,22 @@ def test_names_in_a_recording_are_text(tmp_path: Path) -> None:
     assert any(EVIL[:20] in text for text in parsed.texts)
     labels = parsed.figures["timeline"]["layout"]["yaxis"]["ticktext"]
     assert labels[0].startswith("&lt;/script&gt;")
+
+
+@pytest.mark.parametrize("kind", ["ros1", "ros2"])
+def test_bags_of_others_have_a_report(kind: str, recording: Path, tmp_path: Path) -> None:
+    bag = tmp_path / ("drive.bag" if kind == "ros1" else "drive")
+    if kind == "ros1":
+        as_ros1(recording, bag)
+    else:
+        as_ros2(recording, bag, StoragePlugin.SQLITE3)
+    facts = write_report(bag, tmp_path / "drive.html")
+    parsed = Page(tmp_path / "drive.html")
+    assert facts.totals()["frames"] == 241
+    assert facts.totals()["distance_m"] == pytest.approx(2.63, abs=0.05)
+    assert parsed.figures.keys() == {"timeline", "map"}
+    assert parsed.count("img") == 3
+    assert any("no journal" in text for text in parsed.texts)
 
 
 def test_a_report_is_overwritten_only_on_request(recording: Path, tmp_path: Path) -> None:

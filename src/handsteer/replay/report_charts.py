@@ -181,7 +181,8 @@ def _signs(facts: DriveFacts) -> _Panel:
                 "showlegend": False,
                 "x": _typed(times),
                 "y": _typed([row] * len(times)),
-                "line": {"width": 12, "color": _colour(name, row)},
+                # Short signs would be left out of a long time.
+                "line": {"width": 12, "color": _colour(name, row), "simplify": False},
                 "text": _escape(name),
                 "hovertemplate": "%{text}, %{x:.2f} s<extra></extra>",
             }

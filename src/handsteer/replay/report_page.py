@@ -28,7 +28,9 @@ def render(facts: DriveFacts) -> str:
     """Return the page about a drive."""
     plotly, script = get_plotlyjs(), _static("report.js")
     charts = {"timeline": timeline(facts), "map": drive_map(facts), "latency": latencies(facts)}
-    figures = json.dumps({name: chart for name, chart in charts.items() if chart}, separators=(",", ":"))
+    figures = json.dumps(
+        {name: chart for name, chart in charts.items() if chart}, separators=(",", ":"), allow_nan=False
+    )
     policy = (
         f"default-src 'none'; script-src {_hash(plotly)} {_hash(script)}; "
         "style-src 'unsafe-inline'; img-src data: blob:; base-uri 'none'; form-action 'none'"
