@@ -20,6 +20,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from handsteer.audit import setting_changes
 from handsteer.clock import Clock, RealClock, SteppedClock
 from handsteer.config import Config
 from handsteer.errors import ConfigError, RecordingError
@@ -33,6 +34,7 @@ from handsteer.making import (
     open_cameras,
 )
 from handsteer.messages import (
+    AUDIT,
     CAMERA_INFO,
     CLOCK,
     DIAGNOSTICS,
@@ -51,6 +53,7 @@ from handsteer.messages import (
     TF,
     WORLD_MARKERS,
 )
+from handsteer.nodes.auditing import Auditor
 from handsteer.nodes.base import Node
 from handsteer.nodes.journal import Journal, journal_topic
 from handsteer.nodes.steering import SteeringNode
@@ -65,6 +68,7 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
+_NAME = "handsteer"
 _LOOK_PERIOD_S = 0.2
 
 
@@ -124,9 +128,10 @@ class Graph:
         self._recorder: Recorder | None = None
         self._recorded = (
             *(IMAGE_COMPRESSED, CAMERA_INFO, HAND_SIGN, GESTURE_JOY, JOY, cmd_vel, STEERING_CMD_VEL, STOP, STOPPED),
-            *(ODOM, TF, JOINT_STATES, CLOCK, ROBOT_DESCRIPTION, WORLD_MARKERS, DIAGNOSTICS),
+            *(ODOM, TF, JOINT_STATES, CLOCK, ROBOT_DESCRIPTION, WORLD_MARKERS, DIAGNOSTICS, AUDIT),
             *((SCAN,) if config.collision_monitor.enabled else ()),
         )
+        self._auditor = Auditor(self.transport, _NAME, self.clock)
         self._link = link
         self._began_s = self.clock.now()
 
@@ -185,10 +190,14 @@ class Graph:
         self.end_recording()
         self.transport.close()
 
-    def reconfigure(self, config: Config) -> None:
+    def reconfigure(self, config: Config, by: str = _NAME) -> None:
         """Apply the parameters of ``config`` that can change while nodes run (``live`` of each section).
 
         Returns at once; may be called from any thread.
+
+        Args:
+            config: All parameters.
+            by: Who changes them, for the audit.
 
         Raises:
             ConfigError: A node cannot apply it, for example because a file that it names is broken; nothing has
@@ -196,7 +205,9 @@ class Graph:
         """
         for node in self.nodes:
             node.check(config)
-        self.config = config
+        before, self.config = self.config, config
+        for event in setting_changes(before, config, by):
+            self._auditor.say(event, self.clock.now())
         for node in self.nodes:
             node.reconfigure(config)
 
