@@ -13,17 +13,15 @@ the hand's sign, :mod:`handsteer.control` converts it to a velocity, and :mod:`h
 (:mod:`handsteer.transports`) carries the messages.
 """
 
-import functools
 import logging
 import math
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from handsteer.audit import setting_changes
 from handsteer.clock import Clock, RealClock, SteppedClock
 from handsteer.config import Config
-from handsteer.errors import ConfigError, RecordingError
+from handsteer.errors import ConfigError
 from handsteer.making import (
     cmd_vel_topic,
     make_camera,
@@ -34,37 +32,24 @@ from handsteer.making import (
     open_cameras,
 )
 from handsteer.messages import (
-    AUDIT,
-    CAMERA_INFO,
-    CLOCK,
-    DIAGNOSTICS,
     GESTURE_JOY,
     HAND_SIGN,
     IMAGE_COMPRESSED,
     IMAGE_RAW,
-    JOINT_STATES,
-    JOY,
     ODOM,
-    ROBOT_DESCRIPTION,
     SCAN,
     STEERING_CMD_VEL,
-    STOP,
-    STOPPED,
-    TF,
-    WORLD_MARKERS,
 )
 from handsteer.nodes.auditing import Auditor
 from handsteer.nodes.base import Node
-from handsteer.nodes.journal import Journal, journal_topic
+from handsteer.nodes.journal import JOURNALS, Journal
+from handsteer.nodes.run_recording import RunRecording
 from handsteer.nodes.steering import SteeringNode
 from handsteer.recognition.recognizer import model_files
 from handsteer.recordings.about import describe
 from handsteer.summary import Summary
 from handsteer.transports.base import Session, Transport
 from handsteer.transports.in_process import InProcessTransport
-
-if TYPE_CHECKING:
-    from handsteer.recordings.recorder import Recorder
 
 log = logging.getLogger(__name__)
 
@@ -84,6 +69,9 @@ class Graph:
         link: This process in the graph of a real robot, for ``robot.kind`` other than ``sim``; the caller closes it
             after this graph.
         steering: Whether to include the node ``steering``; the page of another process has its own.
+
+    Attributes:
+        recording: The recording that is being made, or the last one.
 
     Raises:
         HandsteerError: A part cannot be used (camera, model, world); the message suggests what to do.
@@ -125,13 +113,9 @@ class Graph:
         self._steering = make_steering(config, *wires, steering=STEERING_CMD_VEL, cmd_vel=cmd_vel) if steering else None
         self._added: tuple[Node, ...] = ()
         self.recognition.journal, self.control.journal = journals
-        self._recorder: Recorder | None = None
-        self._recorded = (
-            *(IMAGE_COMPRESSED, CAMERA_INFO, HAND_SIGN, GESTURE_JOY, JOY, cmd_vel, STEERING_CMD_VEL, STOP, STOPPED),
-            *(ODOM, TF, JOINT_STATES, CLOCK, ROBOT_DESCRIPTION, WORLD_MARKERS, DIAGNOSTICS, AUDIT),
-            *((SCAN,) if config.collision_monitor.enabled else ()),
-        )
         self._auditor = Auditor(self.transport, _NAME, self.clock)
+        recorded = (IMAGE_COMPRESSED, cmd_vel, *((SCAN,) if config.collision_monitor.enabled else ()))
+        self.recording = RunRecording(*wires, self._auditor, (self.recognition, self.control), recorded)
         self._link = link
         self._began_s = self.clock.now()
 
@@ -235,38 +219,25 @@ class Graph:
             while any([node.spin_once() for node in reversed(self.nodes)]):
                 pass
 
-    def record(self, path: Path) -> None:
+    def record(self, path: Path, by: str = _NAME) -> None:
         """Record all topics to ``path`` from now on, an MCAP file that must not exist yet.
 
         Recorded before the start, a run can be replayed bit for bit. Recognition then uses the recorded, compressed
-        pictures.
+        pictures. May be called from any thread.
+
+        Args:
+            path: The file.
+            by: Who starts it, for the audit.
 
         Raises:
             RecordingError: The file cannot be created, or another recording is being made.
         """
-        if self._recorder is not None:
-            raise RecordingError(f"{self._recorder.path} is being recorded: end that first")
-        # Only recordings need the package mcap.
-        from handsteer.recordings.recorder import Recorder  # noqa: PLC0415
+        about = describe(self.config, self.clock, model_files(self.config)) | {JOURNALS: "yes"}
+        self.recording.start(path, about, by, self.recognition.look_at_compressed)
 
-        about = describe(self.config, self.clock, model_files(self.config))
-        waits = isinstance(self.clock, SteppedClock)
-        recorder = Recorder(path, self.transport, self.clock, self._recorded, about, waits=waits)
-        self._recorder = recorder
-        self.recognition.look_at_compressed()
-        for node in (self.recognition, self.control):
-            assert node.journal is not None
-            node.journal.write_to(functools.partial(recorder.note, journal_topic(node.name)))
-
-    def end_recording(self) -> None:
-        """End the recording, if there is one."""
-        recorder, self._recorder = self._recorder, None
-        if recorder is None:
-            return
-        for node in (self.recognition, self.control):
-            assert node.journal is not None
-            node.journal.write_to(None)
-        recorder.close()
+    def end_recording(self, by: str = _NAME) -> None:
+        """End the recording, if there is one; ``by`` is who ends it, for the audit. May be called from any thread."""
+        self.recording.end(by)
 
     def summary(self) -> Summary:
         """Return the statistics of the run so far."""

@@ -6,12 +6,14 @@ the functions, so that a process with one node does not load what others need.
 # ruff: noqa: PLC0415
 
 import logging
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from handsteer.clock import Clock, SimulatedClock, WallClock
 from handsteer.config import Config, RobotConfig, cmd_vel_type
 from handsteer.errors import ConfigError, needing
 from handsteer.messages import CMD_VEL, TF, Topic, cmd_vel
+from handsteer.recordings import is_recording
 from handsteer.transports.base import Session, Transport
 from handsteer.types import NONE, find_sign
 
@@ -40,10 +42,10 @@ def make_camera(
     Raises:
         CameraError: The camera, or its calibration, cannot be used.
     """
-    from handsteer.cameras.choose import open_camera, read_calibration
+    from handsteer.cameras.choose import read_calibration
     from handsteer.nodes.camera import CameraNode
 
-    camera = camera or open_camera(config.camera, config.virtual_hand, clock)
+    camera = camera or _open_camera(config, clock)
     calibration = (
         None if config.camera.calibration is None else read_calibration(config.camera.calibration.expanduser())
     )
@@ -60,11 +62,21 @@ def open_cameras(config: Config, clock: Clock) -> "ChoiceOfCameras":
         CameraError: The machine's own camera cannot be used.
     """
     from handsteer.cameras.browser import BrowserCamera, ChoiceOfCameras, NoCamera
-    from handsteer.cameras.choose import open_camera
 
     if config.camera.source == "browser":
         return ChoiceOfCameras(NoCamera(), BrowserCamera(clock), "browser")
-    return ChoiceOfCameras(open_camera(config.camera, config.virtual_hand, clock), BrowserCamera(clock))
+    return ChoiceOfCameras(_open_camera(config, clock), BrowserCamera(clock))
+
+
+def _open_camera(config: Config, clock: Clock) -> "Camera":
+    from handsteer.cameras.choose import open_camera
+
+    path = Path(config.camera.source).expanduser()
+    if is_recording(path) and path.exists():
+        from handsteer.recordings.camera import RecordingCamera
+
+        return RecordingCamera(path, clock, config.camera.at_end)
+    return open_camera(config.camera, config.virtual_hand, clock)
 
 
 def make_recognition(

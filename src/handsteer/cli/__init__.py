@@ -11,7 +11,7 @@ from handsteer.cli import signals
 
 # These run until they are interrupted, so exit code 0 also if that comes early: a launcher must not see a failure.
 _UNTIL_INTERRUPTED = frozenset(
-    ("run", "study", "camera", "recognition", "control", "robot", "robots", "steering", "zenoh-router")
+    ("run", "study", "record", "camera", "recognition", "control", "robot", "robots", "steering", "zenoh-router")
 )
 
 

@@ -45,7 +45,8 @@ for verb in ("run", "recognize", "study"):
     app.command(f"handsteer.cli.{verb}:{verb}", name=verb)
 for verb in ("models", "doctor", "ros"):
     app.command(f"handsteer.cli.installation:{verb}", name=verb)
-app.command("handsteer.cli.recordings:replay", name="replay")
+for verb in ("record", "replay"):
+    app.command(f"handsteer.cli.recordings:{verb}", name=verb)
 app.command("handsteer.cli.signs:app", name="signs")
 app.command("handsteer.cli.bench:bench", name="bench")
 for verb in _NODES:

@@ -1,4 +1,4 @@
-"""``handsteer replay``: run a recording again, and compare."""
+"""``handsteer record`` and ``handsteer replay``: record a graph; run a recording again, and compare."""
 
 import json as json_format
 from dataclasses import asdict
@@ -7,17 +7,66 @@ from typing import Annotated, Any, Literal
 
 from cyclopts import Parameter
 
-from handsteer.cli.app import Flag
-from handsteer.cli.running import say
+from handsteer.cli import signals
+from handsteer.cli.app import ConfigFile, Flag, Parameters
+from handsteer.cli.running import say, settings, signals_ignored
 from handsteer.clock import SteppedClock
 from handsteer.errors import RecordingError
 from handsteer.recognition.recognizer import model_files
+from handsteer.recordings import open_recording
 from handsteer.recordings.about import describe
-from handsteer.recordings.mcap_reader import McapFile
+from handsteer.recordings.graph_recorder import GraphRecorder
+from handsteer.replay.by_time import TOLERANCE_S, rerun_by_time
 from handsteer.replay.compare import Comparison, Moment, compare, differing_software
-from handsteer.replay.rerun import recorded_config, rerun
+from handsteer.replay.rerun import has_journals, recorded_config, rerun
+from handsteer.transports import join
 
+_LOOK_PERIOD_S = 0.2
 _MOST_PRINTED = 50
+
+
+def record(
+    output: Path,
+    *ros_args: str,
+    transport: str,
+    config_file: ConfigFile = None,
+    parameters: Parameters = None,
+) -> int:
+    """Record the topics of a graph of several processes to an MCAP file, until Ctrl-C.
+
+    Pictures are recorded as JPEG: those of image_raw/compressed if a node publishes them, else those of image_raw.
+
+    Example: handsteer record drive.mcap --transport ros1 image_raw:=/front/image_raw
+
+    Parameters
+    ----------
+    output
+        The file, which must not exist yet.
+    ros_args
+        ROS arguments. ROS 1: topic:=other, __name:=name, __ns:=namespace.
+        ROS 2: --ros-args -r topic:=other -r __ns:=/namespace.
+    transport
+        ros2 (rclpy), dds or zenoh (ROS 2 without a ROS installation), auto (ros2 if installed, else dds), or ros1.
+    config_file
+        YAML file with parameters, of which cmd_vel_type and collision_monitor matter; options override it.
+    """
+    config = settings(config_file, parameters)
+    session = join(transport, "recorder", ros_args)
+    try:
+        recorder = GraphRecorder(output, session, config)
+        try:
+            say(f"recording to {output}; Ctrl-C ends")
+            while recorder.ended_by is None and not session.wait(_LOOK_PERIOD_S) and not signals.were_raised():
+                recorder.look()
+        except KeyboardInterrupt:
+            pass  # the usual end
+        finally:
+            with signals_ignored():
+                recorder.close()
+    finally:
+        with signals_ignored():
+            session.close()
+    return 0
 
 
 def replay(
@@ -26,31 +75,37 @@ def replay(
     from_: Annotated[Literal["frames", "signs"], Parameter(name="--from")] = "frames",
     diff: Path | None = None,
     json: Flag = False,
+    config_file: ConfigFile = None,
+    parameters: Parameters = None,
 ) -> int:
     """Run a recording through today's software, as fast as possible, and compare signs and commands.
 
-    Exit code 0 if all are the same bit for bit, 1 if any differs.
+    Exit code 0 if all are the same, 1 if any differs. A recording of `handsteer run --record` is compared bit for bit.
 
     Example: handsteer replay drive.mcap --diff differences
 
     Parameters
     ----------
     recording
-        MCAP file of `handsteer run --record`.
+        MCAP file, or a bag of ROS 1 or 2.
     from_
         frames runs recognition and control again; signs the control alone, from the recorded signs.
     diff
         Folder to which the frame of each differing sign is written; it must not exist yet.
     json
         Print the result in JSON, and nothing else.
+    config_file
+        YAML file with parameters that replace the recorded ones; options override it.
     """
-    file = McapFile(recording)
-    config = recorded_config(file)
-    others = differing_software(file.about, describe(config, SteppedClock(), model_files(config)))
+    file = open_recording(recording)
+    recorded = recorded_config(file).model_dump(exclude_unset=True) if "config" in file.about else {}
+    config = settings(config_file, parameters, base=recorded)
+    others = differing_software(file.about, describe(config, SteppedClock(), model_files(config))) if file.about else []
     if diff is not None:
         _make_folder(diff)
     comparison, moments = Comparison(), []
-    for moment in compare(rerun(file, config, from_), comparison, file.began_s):
+    results = rerun(file, config, from_) if has_journals(file) else rerun_by_time(file, config, from_)
+    for moment in compare(results, comparison, file.began_s):
         moments.append(_described(moment, diff))
         if not json and len(moments) <= _MOST_PRINTED:
             print(_line(moments[-1]))
@@ -59,7 +114,7 @@ def replay(
     if json:
         print(json_format.dumps({**asdict(comparison), "software": others, "moments": moments}))
     else:
-        _print_result(comparison, others, len(moments))
+        _print_result(comparison, others, len(moments), is_exact=has_journals(file))
     return 1 if comparison.differing else 0
 
 
@@ -91,11 +146,12 @@ def _line(told: dict[str, Any]) -> str:
     return f"{told['time_s']:9.3f} s  {told['what']}: {told['recorded']} was recorded, now {told['replayed']}{picture}"
 
 
-def _print_result(comparison: Comparison, others: list[str], moments: int) -> None:
+def _print_result(comparison: Comparison, others: list[str], moments: int, *, is_exact: bool) -> None:
     if moments > _MOST_PRINTED:
         print(f"and {moments - _MOST_PRINTED} more: --json lists all")
     counts = f"{comparison.frames} frames, {comparison.signs} signs, {comparison.commands} commands"
-    result = f"{comparison.differing} moments differ" if comparison.differing else "all the same, bit for bit"
+    same = "all the same, bit for bit" if is_exact else f"all the same, within {TOLERANCE_S:g} s"
+    result = f"{comparison.differing} moments differ" if comparison.differing else same
     print(f"replayed {comparison.duration_s:.1f} s: {counts}; {result}")
     for other in others:
         print(f"other software: {other}")

@@ -28,6 +28,9 @@ from handsteer.config import Config
 from handsteer.messages import String, Time, Topic
 from handsteer.transports.base import Deliver, Publisher, Received, Subscription, Transport
 
+JOURNALS = "journals"
+"""Key of a recording's metadata if it contains journals."""
+
 M = TypeVar("M")
 Work = Sequence[tuple[str, Received[Any]]]
 

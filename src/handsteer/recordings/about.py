@@ -14,17 +14,16 @@ from handsteer.config import Config
 _PACKAGES = ("ai-edge-litert", "mujoco", "numpy", "opencv-python-headless")
 
 
-def describe(config: Config, clock: Clock, models: Sequence[Path]) -> dict[str, str]:
+def describe(config: Config | None, clock: Clock, models: Sequence[Path]) -> dict[str, str]:
     """Return the metadata of a recording that begins now: parameters, versions, and hashes of the models.
 
     Args:
-        config: The parameters of all nodes.
+        config: The parameters of all nodes; None if they are not known.
         clock: The graph's clock.
         models: The model files of the recognition.
     """
     about = {
         "handsteer": __version__,
-        "config": config.model_dump_json(),
         "began": datetime.datetime.now(datetime.UTC).isoformat(timespec="milliseconds"),
         "clock_offset_s": repr(clock.offset_s),
         "python": platform.python_version(),
@@ -35,6 +34,8 @@ def describe(config: Config, clock: Clock, models: Sequence[Path]) -> dict[str, 
             about[package] = metadata.version(package)
         except metadata.PackageNotFoundError:
             continue
+    if config is not None:
+        about["config"] = config.model_dump_json()
     return about | hashes_of(models)
 
 

@@ -45,6 +45,7 @@ class McapFile:
         self.path = path
         self.about: dict[str, str] = {}
         self.problem: str | None = None
+        self._began_s: float | None = None
         for opcode, body in self._records():
             if opcode == Opcode.METADATA:
                 metadata = self._parsed(Metadata, body)
@@ -56,7 +57,9 @@ class McapFile:
     @property
     def began_s(self) -> float:
         """The time of the first message, in seconds since the epoch of its stamps; 0 if there is none."""
-        return next((recorded.time_s for recorded in self.messages()), 0.0)
+        if self._began_s is None:
+            self._began_s = next((recorded.time_s for recorded in self.messages()), 0.0)
+        return self._began_s
 
     def messages(self, topics: Collection[str] | None = None) -> Iterator[Recorded]:
         """Yield the messages of ``topics``, of all by default, in the order in which they were written."""

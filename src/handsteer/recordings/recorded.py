@@ -1,7 +1,9 @@
-"""A recorded message."""
+"""Recorded messages, and the interface of what contains them."""
 
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
+from pathlib import Path
+from typing import Any, Protocol
 
 from handsteer.errors import RecordingError
 from handsteer.transports.ros2.encoding import decode, types
@@ -46,3 +48,31 @@ class Recorded:
             return decode(self.raw, self.type)
         except Exception as error:
             raise RecordingError(f"{self.topic}: a damaged message of {self.type}: {error}") from None
+
+
+class Recording(Protocol):
+    """A recording that can be read."""
+
+    @property
+    def path(self) -> Path:
+        """The file or folder."""
+        ...
+
+    @property
+    def about(self) -> Mapping[str, str]:
+        """The metadata that handsteer writes (:mod:`handsteer.recordings.about`); empty in those of others."""
+        ...
+
+    @property
+    def began_s(self) -> float:
+        """The time of the first message, in seconds since the epoch of its stamps; 0 if there is none."""
+        ...
+
+    @property
+    def problem(self) -> str | None:
+        """Why it was not read to its end; None if it was, or was not read yet."""
+        ...
+
+    def messages(self, topics: Collection[str] | None = None) -> Iterator[Recorded]:
+        """Yield the messages of ``topics``, of all by default, in the order in which they were written."""
+        ...

@@ -1,19 +1,49 @@
 """Records the topics of a graph to a file while the graph runs."""
 
+import itertools
 import logging
 import threading
 import time
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Any
 
 from handsteer.clock import Clock
-from handsteer.messages import CompressedImage, String, Topic
+from handsteer.images import bgr_image, jpeg_message
+from handsteer.messages import (
+    AUDIT,
+    CAMERA_INFO,
+    CLOCK,
+    DIAGNOSTICS,
+    GESTURE_JOY,
+    HAND_SIGN,
+    IMAGE_COMPRESSED,
+    IMAGE_RAW,
+    JOINT_STATES,
+    JOY,
+    ODOM,
+    ROBOT_DESCRIPTION,
+    STEERING_CMD_VEL,
+    STOP,
+    STOPPED,
+    TF,
+    WORLD_MARKERS,
+    CompressedImage,
+    Image,
+    String,
+    Topic,
+)
 from handsteer.recordings.mcap_writer import McapWriter
 from handsteer.transports.base import Received, Transport
 from handsteer.transports.ros2.encoding import encode
+
+RECORDED: tuple[Topic[Any], ...] = (
+    *(CAMERA_INFO, HAND_SIGN, GESTURE_JOY, JOY, STEERING_CMD_VEL, STOP, STOPPED, ODOM, TF, JOINT_STATES, CLOCK),
+    *(ROBOT_DESCRIPTION, WORLD_MARKERS, DIAGNOSTICS, AUDIT),
+)
+"""What is recorded besides pictures, commands and laser scans: their topics depend on the graph."""
 
 _NODE = "recorder"
 _WRITE_PERIOD_S = 0.1
@@ -38,6 +68,7 @@ class Recorder:
         topics: What to record.
         about: Metadata of the file: the configuration, versions and so on.
         waits: Whether a publisher waits for the disk; for a stepped run, which is faster than a disk.
+        on_failure: Called when the recording ends by itself, on the thread that writes.
 
     Attributes:
         path: The file.
@@ -57,6 +88,7 @@ class Recorder:
         about: Mapping[str, str],
         *,
         waits: bool = False,
+        on_failure: Callable[[], None] = lambda: None,
     ) -> None:
         self.path = path
         self.lost = 0
@@ -64,6 +96,7 @@ class Recorder:
         self._transport = transport
         self._clock = clock
         self._waits = waits
+        self._on_failure = on_failure
         self._file = McapWriter(path)
         self._file.describe("handsteer", about)
         self._waiting: deque[tuple[Topic[Any], str, Any, int, int]] = deque()
@@ -74,7 +107,7 @@ class Recorder:
         self._ended = threading.Event()
         self._subscriptions = ExitStack()
         for topic in topics:
-            self._listen(topic)
+            self.listen(topic)
         self._thread = threading.Thread(target=self._run, name=_NODE, daemon=True)
         self._thread.start()
 
@@ -92,11 +125,15 @@ class Recorder:
         if self.lost:
             log.warning("%s lacks %d messages: the disk was too slow", self.path, self.lost)
 
-    def _listen(self, topic: Topic[Any]) -> None:
-        name = self._transport.topic_name(topic)
+    def listen(self, topic: Topic[Any]) -> None:
+        """Record ``topic`` too; raw images are recorded as JPEG, on the topic of the compressed ones."""
+        kept = IMAGE_COMPRESSED if topic is IMAGE_RAW else topic
+        name = self._transport.topic_name(kept)
+        # Transports to other processes do not count messages.
+        numbers = itertools.count(1)
 
         def deliver(received: Received[Any]) -> None:
-            self._put(topic, name, received.message, received.number)
+            self._put(kept, name, received.message, received.number or next(numbers))
 
         self._subscriptions.callback(self._transport.subscribe(_NODE, topic, deliver).close)
 
@@ -136,6 +173,7 @@ class Recorder:
                 with suppress(OSError):
                     self._file.close()
                 log.warning("the recording to %s has ended: %s; driving goes on", self.path, self.ended_by)
+                self._on_failure()
 
     def _write_waiting(self) -> None:
         while True:
@@ -145,6 +183,8 @@ class Recorder:
                 topic, name, message, time_ns, number = self._waiting.popleft()
                 self._pictures -= topic.type is CompressedImage
             try:
+                if isinstance(message, Image):
+                    message = jpeg_message(bgr_image(message), message.header)
                 raw = encode(message)
             except Exception as error:
                 log.warning("a message on %s cannot be recorded: %s", name, error)

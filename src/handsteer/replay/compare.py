@@ -6,7 +6,7 @@ from typing import Any
 
 from handsteer.messages import CMD_VEL, GESTURE_JOY, HAND_SIGN, stick_in, twist_in, type_name
 from handsteer.recordings.recorded import Recorded
-from handsteer.replay.rerun import CONTROL, RECOGNITION, Result
+from handsteer.replay.rerun import CONTROL, Result
 from handsteer.transports.ros2.encoding import decode
 
 _WHAT = {HAND_SIGN.name: "sign", GESTURE_JOY.name: "joystick", CMD_VEL.name: "command"}
@@ -58,9 +58,11 @@ def compare(results: Iterable[Result], comparison: Comparison, began_s: float) -
         comparison: Changed.
         began_s: When the recording began, on the clock of the results.
     """
+    frame: Recorded | None = None
     for result in results:
         comparison.duration_s = max(comparison.duration_s, result.time_s - began_s)
-        comparison.frames += result.node == RECOGNITION and result.frame is not None
+        if result.frame is not None and result.frame is not frame:
+            comparison.frames, frame = comparison.frames + 1, result.frame
         comparison.signs += len(result.recorded.get(HAND_SIGN.name, ()))
         comparison.commands += sum(len(raws) for raws in result.recorded.values()) if result.node == CONTROL else 0
         if result.differs:
@@ -75,11 +77,9 @@ def differing_software(about: Mapping[str, str], now: Mapping[str, str]) -> list
         about: Metadata of a recording (:mod:`handsteer.recordings.about`).
         now: The same of this program.
     """
-    names = [name for name in now if name not in ("config", "began", "clock_offset_s")]
+    names = [name for name in now if name in about and name not in ("config", "began", "clock_offset_s")]
     return [
-        f"{name}: {about.get(name, 'none')[:12]} was recorded, now {now[name][:12]}"
-        for name in names
-        if about.get(name) != now[name]
+        f"{name}: {about[name][:12]} was recorded, now {now[name][:12]}" for name in names if about[name] != now[name]
     ]
 
 

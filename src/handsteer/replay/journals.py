@@ -9,8 +9,7 @@ from typing import Any
 
 from handsteer.errors import RecordingError
 from handsteer.nodes.journal import journal_topic
-from handsteer.recordings.mcap_reader import McapFile
-from handsteer.recordings.recorded import Recorded
+from handsteer.recordings.recorded import Recorded, Recording
 
 _LONGEST_ENTRY = 1 << 20
 _MOST_READ_AHEAD = 400
@@ -63,7 +62,7 @@ class Spin:
     is_stop: bool = False
 
 
-def read_spins(file: McapFile, node: str) -> Iterator[Spin]:
+def read_spins(file: Recording, node: str) -> Iterator[Spin]:
     """Yield the spins of the node named ``node``, first its construction, with the messages that it processed.
 
     Raises:

@@ -15,8 +15,8 @@ from handsteer.errors import RecordingError
 from handsteer.making import cmd_vel_topic, make_control, make_recognition
 from handsteer.messages import CMD_VEL, GESTURE_JOY, HAND_SIGN, IMAGE_COMPRESSED
 from handsteer.nodes.base import Node
-from handsteer.recordings.mcap_reader import McapFile
-from handsteer.recordings.recorded import Recorded
+from handsteer.nodes.journal import JOURNALS
+from handsteer.recordings.recorded import Recorded, Recording
 from handsteer.replay.journals import Got, Spin, read_spins
 from handsteer.replay.stage import ReplayClock, ReplayTransport
 from handsteer.transports.base import Received
@@ -69,7 +69,7 @@ class _Outputs:
         self.results.append(result)
 
 
-def rerun(file: McapFile, config: Config, source: Source = "frames") -> Iterator[Result]:
+def rerun(file: Recording, config: Config, source: Source = "frames") -> Iterator[Result]:
     """Yield the results of the recorded run's spins, first all of recognition, then all of the control.
 
     Args:
@@ -99,7 +99,12 @@ def rerun(file: McapFile, config: Config, source: Source = "frames") -> Iterator
     )
 
 
-def recorded_config(file: McapFile) -> Config:
+def has_journals(file: Recording) -> bool:
+    """Return whether :func:`rerun` can run it again; otherwise :func:`handsteer.replay.by_time.rerun_by_time` can."""
+    return JOURNALS in file.about
+
+
+def recorded_config(file: Recording) -> Config:
     """Return the parameters of the recorded run.
 
     Raises:
@@ -121,7 +126,7 @@ def _light(result: Result) -> Result:
 
 
 def _rerun(
-    file: McapFile, name: str, make: Callable[[ReplayTransport, ReplayClock], Node], outputs: _Outputs | None
+    file: Recording, name: str, make: Callable[[ReplayTransport, ReplayClock], Node], outputs: _Outputs | None
 ) -> Iterator[Result]:
     clock, transport = ReplayClock(_number(file, "clock_offset_s")), ReplayTransport()
     spins = read_spins(file, name)
@@ -163,7 +168,7 @@ def _result(
 class _RecordedOutputs:
     """The recorded messages of a node's topics, in order."""
 
-    def __init__(self, file: McapFile, topics: tuple[str, ...]) -> None:
+    def __init__(self, file: Recording, topics: tuple[str, ...]) -> None:
         self._streams = {topic: _by_number(file, topic) for topic in topics}
 
     def take(self, gave: dict[str, int]) -> dict[str, list[bytes]]:
@@ -174,7 +179,7 @@ class _RecordedOutputs:
         return {topic: raws for topic, raws in taken.items() if raws}
 
 
-def _by_number(file: McapFile, topic: str) -> Iterator[bytes]:
+def _by_number(file: Recording, topic: str) -> Iterator[bytes]:
     return (recorded.raw for recorded in file.messages({topic}))
 
 
@@ -221,14 +226,14 @@ def _received(gots: list[Got]) -> Iterator[tuple[str, Received[Any]]]:
             yield got.topic, Received(message, got.captured_s, got.is_late, got.by_player, got.number)
 
 
-def _config(file: McapFile, values: dict[str, Any]) -> Config:
+def _config(file: Recording, values: dict[str, Any]) -> Config:
     try:
         return Config.model_validate(values)
     except ValidationError:
         raise RecordingError(f"{file.path}: parameters that were changed do not fit this version") from None
 
 
-def _number(file: McapFile, name: str) -> float:
+def _number(file: Recording, name: str) -> float:
     try:
         return float(file.about.get(name, "0"))
     except ValueError:

@@ -1,0 +1,64 @@
+"""Reads bags of ROS 1 and of ROS 2, by rosbags."""
+
+from collections.abc import Collection, Iterator
+from pathlib import Path
+from typing import Any
+
+from rosbags.rosbag1 import Reader as Ros1Reader
+from rosbags.rosbag2 import Reader as Ros2Reader
+
+from handsteer.errors import RecordingError
+from handsteer.recordings.recorded import Recorded
+from handsteer.transports.ros2.encoding import types
+
+
+class Bag:
+    """A bag: a file of ROS 1 (``.bag``), or a folder of ROS 2, or a file of one (``.db3``).
+
+    Args:
+        path: The file or folder.
+
+    Attributes:
+        path: The same.
+        about: Empty: bags do not contain what handsteer writes to its recordings.
+        began_s: The time of the first message, in seconds since 1970; 0 if there is none.
+        problem: Why it was not read to its end; None if it was, or was not read yet.
+
+    Raises:
+        RecordingError: It cannot be read.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.about: dict[str, str] = {}
+        self.problem: str | None = None
+        self._is_ros1 = path.suffix == ".bag"
+        self.began_s = next((recorded.time_s for recorded in self.messages()), 0.0)
+        if self.problem is not None:
+            raise RecordingError(f"cannot read the bag {path}: {self.problem}")
+
+    def messages(self, topics: Collection[str] | None = None) -> Iterator[Recorded]:
+        """Yield the messages of ``topics``, of all by default, in the order of their times."""
+        try:
+            reader: Any = Ros1Reader(self.path) if self._is_ros1 else Ros2Reader(self.path)
+            with reader:
+                chosen = [known for known in reader.connections if topics is None or known.topic in topics]
+                # Without connections, all messages would be read.
+                for connection, time_ns, raw in reader.messages(connections=chosen) if chosen else ():
+                    content = self._as_cdr(raw, connection.msgtype)
+                    if content is not None:
+                        yield Recorded(connection.topic, connection.msgtype, time_ns, 0, content)
+        # The type depends on where rosbags fails.
+        except Exception as error:
+            self.problem = " ".join(f"{type(error).__name__}: {error}".split())[:300]
+
+    def _as_cdr(self, raw: bytes, kind: str) -> bytes | None:
+        """Return a message as CDR; None if its type is not known, or not the same in ROS 1."""
+        if not self._is_ros1:
+            return bytes(raw)
+        if kind not in types().fielddefs:
+            return None
+        try:
+            return bytes(types().ros1_to_cdr(raw, kind))
+        except Exception:
+            return None

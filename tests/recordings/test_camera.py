@@ -1,0 +1,58 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from handsteer.cameras import EndOfStream
+from handsteer.clock import SteppedClock
+from handsteer.config import CameraConfig, Config
+from handsteer.errors import CameraUnreadable
+from handsteer.graph import Graph
+from handsteer.images import jpeg_picture
+from handsteer.messages import HAND_SIGN
+from handsteer.recordings.camera import RecordingCamera
+from handsteer.recordings.mcap_reader import McapFile
+from handsteer.recordings.mcap_writer import McapWriter
+from tests.recordings.test_bags import as_ros1
+
+
+def test_it_plays_the_recorded_pictures_at_their_rate(recording: Path) -> None:
+    clock = SteppedClock()
+    camera = RecordingCamera(recording, clock, at_end="end")
+    assert camera.period_s == pytest.approx(1 / 30, rel=0.01)
+    first = camera.read()
+    assert first is not None
+    original = next(McapFile(recording).messages({"/image_raw/compressed"})).message
+    np.testing.assert_array_equal(first.image, jpeg_picture(original))
+    for _ in range(240):
+        assert camera.read() is not None
+    with pytest.raises(EndOfStream):
+        camera.read()
+
+
+def test_it_begins_again_or_holds(recording: Path) -> None:
+    looping = RecordingCamera(recording, SteppedClock(), at_end="loop")
+    assert all(looping.read() is not None for _ in range(300))
+    holding = RecordingCamera(recording, SteppedClock(), at_end="hold")
+    frames = [holding.read() for _ in range(243)]
+    assert frames[240] is not None
+    assert frames[241:] == [None, None]
+
+
+def test_a_graph_sees_the_recorded_signs_again(recording: Path, tmp_path: Path) -> None:
+    config = Config(camera=CameraConfig(source=str(as_ros1(recording, tmp_path / "drive.bag")), at_end="end"))
+    with Graph(config, SteppedClock()) as graph:
+        graph.run_stepped()
+        counts = graph.recognition.counts
+    signs = [recorded.message.data for recorded in McapFile(recording).messages({HAND_SIGN.name})]
+    for sign in ("Stop", "Forward", "Turn Left"):
+        assert counts[sign] == pytest.approx(signs.count(sign), abs=3)
+
+
+def test_without_pictures_it_is_refused(tmp_path: Path) -> None:
+    McapWriter(tmp_path / "empty.mcap").close()
+    with pytest.raises(CameraUnreadable, match="contains no pictures"):
+        RecordingCamera(tmp_path / "empty.mcap", SteppedClock())
+    (tmp_path / "text.mcap").write_text("no recording")
+    with pytest.raises(CameraUnreadable, match="no MCAP file"):
+        RecordingCamera(tmp_path / "text.mcap", SteppedClock())
