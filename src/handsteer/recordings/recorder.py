@@ -68,7 +68,7 @@ class Recorder:
         topics: What to record.
         about: Metadata of the file: the configuration, versions and so on.
         waits: Whether a publisher waits for the disk; for a stepped run, which is faster than a disk.
-        on_failure: Called when the recording ends by itself, on the thread that writes.
+        on_failure: Called when a failure has ended the recording, on the thread that writes.
 
     Attributes:
         path: The file.
