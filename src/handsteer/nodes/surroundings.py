@@ -17,6 +17,7 @@ from handsteer.transports.base import Call
 from handsteer.types import CourseState
 
 _MARKERS_PERIOD_S = 0.05
+_REPEAT_S = 0.5
 _MOST_WAITING = 16
 
 
@@ -87,6 +88,8 @@ class Surroundings:
         self._referee = Referee(self._in_world.world.gates if self._in_world else ())
         self._touches = Touches()
         self._most_markers = 0
+        self._published: tuple[object, ...] | None = None
+        self._published_s = 0.0
         self._markers = node.publisher(WORLD_MARKERS)
         node.every(_MARKERS_PERIOD_S, self._publish)
 
@@ -162,11 +165,17 @@ class Surroundings:
 
     def _publish(self) -> None:
         if not self._markers.has_subscribers:
+            self._published = None
             return
         now = self._node.clock.now()
-        header = Header(stamp=self._node.clock.stamp(now), frame_id=self._frame_id)
         strips = gate_strips(self.world.gates, self._referee.state) if self.world else []
-        obstacles = self._robot.obstacles()
-        self._markers.publish(world_markers(header, obstacles, strips, self._touches.shown(now), self._most_markers))
+        obstacles, touched = self._robot.obstacles(), self._touches.shown(now)
+        content = (obstacles, strips, touched)
+        # A world that stands is repeated for new subscribers only; markers are a tenth of what a recording takes.
+        if content == self._published and now - self._published_s < _REPEAT_S:
+            return
+        self._published, self._published_s = content, now
+        header = Header(stamp=self._node.clock.stamp(now), frame_id=self._frame_id)
+        self._markers.publish(world_markers(header, obstacles, strips, touched, self._most_markers))
         # A subscriber keeps each marker until it is deleted.
         self._most_markers = max(self._most_markers, len(obstacles))

@@ -46,7 +46,8 @@ RECORDED: tuple[Topic[Any], ...] = (
 """What is recorded besides pictures, commands and laser scans: their topics depend on the graph."""
 
 _NODE = "recorder"
-_WRITE_PERIOD_S = 0.1
+# Short, because the other threads wait while messages are encoded.
+_WRITE_PERIOD_S = 0.03
 _CUT_PERIOD_S = 0.5
 # A disk may hang for seconds; a graph publishes some 250 messages a second, 30 of them pictures.
 _MOST_WAITING = 5000

@@ -1,0 +1,62 @@
+"""What a recording costs: runs of the virtual hand with and without one, in turn on the same machine.
+
+Usage: python benchmarks/recording.py [SECONDS] [PAIRS]
+"""
+
+import json
+import os
+import statistics
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+
+def main() -> None:
+    """Print CPU time and latency of each run, and the medians."""
+    seconds, pairs = (int(word) for word in [*sys.argv[1:], "20", "4"][:2])
+    rows: dict[str, list[dict[str, float]]] = {"without": [], "recording": []}
+    with tempfile.TemporaryDirectory() as folder:
+        for pair in range(pairs):
+            for name, found in rows.items():
+                path = Path(folder) / f"{pair}.mcap"
+                words = ("--record", str(path)) if name == "recording" else ()
+                found.append(_run(seconds, words))
+                size = path.stat().st_size / seconds if words else 0
+                print(f"{name:10s} {_line(found[-1])}{f'  {size / 1e6:.2f} MB/s' if words else ''}", flush=True)
+    medians = {
+        name: {key: statistics.median(row[key] for row in found) for key in found[0]} for name, found in rows.items()
+    }
+    for name, row in medians.items():
+        print(f"median {name:10s} {_line(row)}")
+    extra = medians["recording"]["core_percent"] - medians["without"]["core_percent"]
+    print(f"a recording takes {extra:.1f} % of a core")
+
+
+def _run(seconds: int, words: tuple[str, ...]) -> dict[str, float]:
+    command = [sys.executable, "-m", "handsteer", "run", "--headless", "--camera", "virtual", "--json"]
+    process = subprocess.Popen(
+        [*command, "--duration", str(seconds), *words], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
+    )
+    assert process.stdout is not None
+    summary: dict[str, Any] = json.loads(process.stdout.read())
+    _, _, usage = os.wait4(process.pid, 0)
+    return {
+        "core_percent": 100 * (usage.ru_utime + usage.ru_stime) / seconds,
+        "median_ms": summary["latency_median_ms"],
+        "p99_ms": summary["latency_p99_ms"],
+        "fps": summary["fps"],
+        "rss_mb": usage.ru_maxrss / 1024,
+    }
+
+
+def _line(row: dict[str, float]) -> str:
+    return (
+        f"{row['core_percent']:5.1f} % of a core, latency {row['median_ms']:.1f} ms (median) {row['p99_ms']:.1f} ms (p99), "
+        f"{row['fps']:.1f} frames/s, {row['rss_mb']:.0f} MB"
+    )
+
+
+if __name__ == "__main__":
+    main()
