@@ -14,7 +14,8 @@ from typing import Any
 
 from handsteer.errors import needing
 from handsteer.replay.drive_facts import DriveFacts, Stand
-from handsteer.replay.report_charts import drive_map, latencies, timeline
+from handsteer.replay.report_charts import latencies, timeline
+from handsteer.replay.report_map import drive_map
 from handsteer.replay.report_words import Total, heading, sign_totals, totals
 from handsteer.types import stopwatch
 
