@@ -213,6 +213,8 @@ CLOCK = Topic("/clock", ClockMessage, is_global=True)
 ROBOT_DESCRIPTION = Topic("/robot_description", String, latched=True)
 WORLD_MARKERS = Topic("/world/markers", MarkerArray)
 DIAGNOSTICS = Topic("/diagnostics", DiagnosticArray, is_global=True, depth=10)
+# Who did what; see handsteer.audit.
+AUDIT = Topic("/audit", Log, depth=50)
 
 
 def type_name(message_type: type) -> str:

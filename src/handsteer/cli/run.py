@@ -3,7 +3,7 @@
 import json as json_format
 import webbrowser
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, closing, contextmanager, nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +18,7 @@ from handsteer.dashboard.page_process import PageProcess
 from handsteer.errors import ConfigError
 from handsteer.graph import Graph
 from handsteer.parameters import from_parameters
+from handsteer.recordings.audit_log import AuditLog, audit_log_path
 from handsteer.study.session import Task
 from handsteer.summary import Summary
 from handsteer.transports import join
@@ -144,7 +145,10 @@ def drive(
     # Started first: it loads its libraries while this process loads the models.
     page = None if headless else PageProcess()
     try:
-        with Graph(settings, SteppedClock() if fast else RealClock(), link=link, steering=page is None) as graph:
+        with (
+            Graph(settings, SteppedClock() if fast else RealClock(), link=link, steering=page is None) as graph,
+            _audit_log(graph, is_simulated_time=fast),
+        ):
             if record is not None:
                 graph.record(record)
             try:
@@ -159,6 +163,11 @@ def drive(
         if page is not None:
             with signals_ignored():
                 page.stop()
+
+
+def _audit_log(graph: Graph, *, is_simulated_time: bool) -> AbstractContextManager[object]:
+    path = audit_log_path(graph.config.recording.audit_log, is_simulated_time=is_simulated_time)
+    return nullcontext() if path is None else closing(AuditLog(graph.transport, path))
 
 
 def _run_until_end(
