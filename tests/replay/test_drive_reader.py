@@ -18,6 +18,7 @@ from handsteer.messages import (
     ODOM,
     STOP,
     Bool,
+    Log,
     String,
     Time,
     Topic,
@@ -287,3 +288,18 @@ def test_laps_and_bumps_of_several_tries(tmp_path: Path) -> None:
 def test_a_stop_that_is_set_twice_counts_once(tmp_path: Path) -> None:
     presses: list[Message] = [(n, STOP, Bool(data=is_set)) for n, is_set in enumerate([True, True, False, True])]
     assert facts_of(written(tmp_path / "drive.mcap", presses)).stops == 2
+
+
+def test_the_audit_is_listed_without_what_is_listed_as_stops(tmp_path: Path) -> None:
+    def event(who: str, code: str, sentence: str) -> Log:
+        return Log(Time(sec=0, nanosec=0), level=20, name=who, msg=sentence, file="", function=code, line=0)
+
+    audit = Topic("/audit", Log)
+    messages: list[Message] = [
+        (0.0, audit, event("viewer 1", "seat_taken", "took the seat")),
+        (1.0, audit, event("hand_sign_control", "stands", "stands: no sign is seen")),
+        (2.0, audit, event("viewer 1", "setting_changed", "changed control.max_linear from 1 to 0.2")),
+    ]
+    events = facts_of(written(tmp_path / "drive.mcap", messages)).events
+    assert [(each.time_s, each.who) for each in events] == [(0.0, "viewer 1"), (2.0, "viewer 1")]
+    assert events[1].sentence == "changed control.max_linear from 1 to 0.2"

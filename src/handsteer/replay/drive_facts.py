@@ -79,6 +79,21 @@ class Lap:
 
 
 @dataclass(frozen=True)
+class Event:
+    """What a person or a node did, from the audit.
+
+    Attributes:
+        time_s: When, in seconds since the recording began.
+        who: The node or the viewer of the page.
+        sentence: What, to be read after ``who``.
+    """
+
+    time_s: float
+    who: str
+    sentence: str
+
+
+@dataclass(frozen=True)
 class Thing:
     """An obstacle or a gate on the map.
 
@@ -134,6 +149,7 @@ class DriveFacts:
         bumps: When it began to touch obstacles, and where.
         knows_bumps: Whether the robot reports what it touches.
         laps: On the world's course.
+        events: What people and nodes did, from the audit; only the first 1,000.
         things: Obstacles and gates, at the end.
         latencies_ms: From the capture of each frame to the command that followed from it.
         no_latency: Why there are none.
@@ -168,6 +184,7 @@ class DriveFacts:
     bumps: list[tuple[float, float | None, float | None]] = field(default_factory=list)
     knows_bumps: bool = False
     laps: list[Lap] = field(default_factory=list)
+    events: list[Event] = field(default_factory=list)
     things: list[Thing] = field(default_factory=list)
     latencies_ms: Curve = field(default_factory=lambda: Curve(2))
     no_latency: str = ""

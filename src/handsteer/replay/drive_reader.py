@@ -13,7 +13,7 @@ from handsteer.nodes.journal import journal_topic
 from handsteer.nodes.status import CameraStatus, ControlStatus, RecognitionStatus, RobotStatus
 from handsteer.recordings.recorded import Recorded, Recording
 from handsteer.replay.curves import Curve
-from handsteer.replay.drive_facts import DriveFacts
+from handsteer.replay.drive_facts import DriveFacts, Event
 from handsteer.replay.journals import parse_spin
 from handsteer.replay.map_things import MapThings
 from handsteer.replay.robot_log import RobotLog
@@ -28,6 +28,8 @@ _MARKERS_PERIOD_S = 1.0
 # Statuses come ten times a second.
 _LONGEST_STATUS_S = 0.5
 _LARGEST = 1e6
+_SHOWN_AS_STOPS = ("drives", "stands")
+_MOST_EVENTS, _LONGEST = 1000, 300
 _EPOCH_BEGINS_S = 1e9
 
 
@@ -149,6 +151,7 @@ class _Reader:
             WORLD_MARKERS.name: ("MarkerArray", self._on_markers),
             "/diagnostics": ("DiagnosticArray", self._on_diagnostics),
             "/camera_info": ("CameraInfo", self._on_camera_info),
+            "/audit": ("Log", self._on_event),
         }
         return next((handle for end, (of, handle) in endings.items() if of == kind and topic.endswith(end)), None)
 
@@ -185,6 +188,12 @@ class _Reader:
         is_set = bool(recorded.message.data)
         self._facts.stops += is_set and not self._is_set
         self._is_set = is_set
+
+    def _on_event(self, recorded: Recorded, time_s: float) -> None:
+        message = recorded.message
+        # The page lists each stop with its reason.
+        if message.function not in _SHOWN_AS_STOPS and len(self._facts.events) < _MOST_EVENTS:
+            self._facts.events.append(Event(time_s, message.name[:_LONGEST], message.msg[:_LONGEST]))
 
     def _on_markers(self, recorded: Recorded, time_s: float) -> None:
         self._markers = recorded

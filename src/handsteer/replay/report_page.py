@@ -8,12 +8,14 @@ import base64
 import hashlib
 import html
 import json
+from collections.abc import Sequence
 from importlib import resources
 from typing import Any
 
 from handsteer.errors import needing
 from handsteer.replay.drive_facts import DriveFacts, Stand
-from handsteer.replay.report_charts import drive_map, latencies, timeline
+from handsteer.replay.report_charts import latencies, timeline
+from handsteer.replay.report_map import drive_map
 from handsteer.replay.report_words import Total, heading, sign_totals, totals
 from handsteer.types import stopwatch
 
@@ -46,6 +48,7 @@ def render(facts: DriveFacts) -> str:
         _chart(
             "latency", "Latency", charts["latency"], f"Latencies are unknown: {facts.no_latency}.", _percentiles(facts)
         ),
+        _events(facts),
         _about(facts),
     ]
     return f"""<!DOCTYPE html>
@@ -142,16 +145,24 @@ def _stand(number: int, stand: Stand) -> str:
     )
 
 
+def _events(facts: DriveFacts) -> str:
+    rows = [(f"{event.time_s:.2f} s", event.who, event.sentence) for event in facts.events]
+    return _details("Who did what", ("at", "who", "what"), rows)
+
+
 def _about(facts: DriveFacts) -> str:
-    rows = "".join(
-        f"<tr><td>{_text(name)}</td><td>{_text(value)}</td></tr>"
-        for name, value in facts.about.items()
-        if name != "config"
-    )
+    rows = [(name, value) for name, value in facts.about.items() if name != "config"]
+    return _details("Software", ("name", "version or SHA-256"), rows)
+
+
+def _details(title: str, names: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """Return a table that is folded up at first; nothing without rows."""
     if not rows:
         return ""
-    table = f'<div class="wide"><table>{rows}</table></div>'
-    return f"<section><details><summary>Software</summary>{table}</details></section>"
+    head = "".join(f"<th>{name}</th>" for name in names)
+    body = "".join(f"<tr>{''.join(f'<td>{_text(cell)}</td>' for cell in row)}</tr>" for row in rows)
+    table = f'<div class="wide"><table><tr>{head}</tr>{body}</table></div>'
+    return f"<section><details><summary>{title}</summary>{table}</details></section>"
 
 
 def _text(text: str) -> str:
