@@ -1,8 +1,11 @@
 """What tests share: where the real photos and clips are, and a ROS 1 graph."""
 
+import atexit
 import importlib.util
+import os
 import shutil
 import signal
+import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -64,6 +67,10 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
         graph.run_stepped(8.0)
     return path
 
+
+# What runs write for their users, such as the audit, must not be in the home of who runs the tests.
+os.environ["XDG_STATE_HOME"] = tempfile.mkdtemp(prefix="handsteer-tests-")
+atexit.register(shutil.rmtree, os.environ["XDG_STATE_HOME"], ignore_errors=True)
 
 # Whoever starts the tests by nohup lets them, and all that they start, ignore SIGHUP; nodes are tested by it.
 signal.signal(signal.SIGHUP, signal.SIG_DFL)

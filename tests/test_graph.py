@@ -10,7 +10,7 @@ from handsteer.clock import SteppedClock
 from handsteer.config import CameraConfig, Config, ControlConfig, RobotConfig, VirtualHandConfig
 from handsteer.errors import ConfigError
 from handsteer.graph import Graph
-from handsteer.messages import CMD_VEL, HAND_SIGN, ODOM, TF, Topic
+from handsteer.messages import AUDIT, CMD_VEL, HAND_SIGN, ODOM, TF, Log, Topic
 from handsteer.testing import Trace
 from handsteer.types import Pose2D
 
@@ -130,3 +130,17 @@ def test_in_real_time_latency_is_measured_and_the_end_is_a_zero() -> None:
     assert summary.latency_p99_ms is not None
     assert 0 < summary.latency_median_ms <= summary.latency_p99_ms
     assert commands[-1] == 0.0
+
+
+def test_changed_parameters_are_in_the_audit_with_who_changed_them() -> None:
+    with Graph(Config(), SteppedClock()) as graph:
+        told: list[Log] = []
+        graph.transport.subscribe("listener", AUDIT, lambda received: told.append(received.message))
+        slower = graph.config.control.model_copy(update={"max_linear": 0.3, "linear_step": 0.02})
+        graph.reconfigure(graph.config.model_copy(update={"control": slower}), "viewer 1")
+        graph.reconfigure(graph.config)
+    assert {(each.function, each.name) for each in told} == {("setting_changed", "viewer 1")}
+    assert sorted(each.msg for each in told) == [
+        "changed control.linear_step from 0.01 to 0.02",
+        "changed control.max_linear from 1 to 0.3",
+    ]

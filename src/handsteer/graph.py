@@ -13,16 +13,16 @@ the hand's sign, :mod:`handsteer.control` converts it to a velocity, and :mod:`h
 (:mod:`handsteer.transports`) carries the messages.
 """
 
-import functools
 import logging
 import math
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from handsteer.audit import setting_changes
 from handsteer.clock import Clock, RealClock, SteppedClock
 from handsteer.config import Config
-from handsteer.errors import ConfigError, RecordingError
+from handsteer.errors import ConfigError
 from handsteer.making import (
     cmd_vel_topic,
     make_camera,
@@ -44,8 +44,10 @@ from handsteer.messages import (
     STEERING_CMD_VEL,
     Topic,
 )
+from handsteer.nodes.auditing import Auditor
 from handsteer.nodes.base import Node
-from handsteer.nodes.journal import JOURNALS, Journal, journal_topic
+from handsteer.nodes.journal import JOURNALS, Journal
+from handsteer.nodes.run_recording import RunRecording
 from handsteer.nodes.steering import SteeringNode
 from handsteer.recognition.recognizer import model_files
 from handsteer.recordings.about import describe
@@ -53,11 +55,9 @@ from handsteer.summary import Summary
 from handsteer.transports.base import Session, Transport
 from handsteer.transports.in_process import InProcessTransport
 
-if TYPE_CHECKING:
-    from handsteer.recordings.recorder import Recorder
-
 log = logging.getLogger(__name__)
 
+_NAME = "handsteer"
 _LOOK_PERIOD_S = 0.2
 
 
@@ -73,6 +73,9 @@ class Graph:
         link: This process in the graph of a real robot, for ``robot.kind`` other than ``sim``; the caller closes it
             after this graph.
         steering: Whether to include the node ``steering``; the page of another process has its own.
+
+    Attributes:
+        recording: The recording that is being made, or the last one.
 
     Raises:
         HandsteerError: A part cannot be used (camera, model, world); the message suggests what to do.
@@ -114,11 +117,10 @@ class Graph:
         self._steering = make_steering(config, *wires, steering=STEERING_CMD_VEL, cmd_vel=cmd_vel) if steering else None
         self._added: tuple[Node, ...] = ()
         self.recognition.journal, self.control.journal = journals
-        self._recorder: Recorder | None = None
-        self._recorded = (
-            *(IMAGE_COMPRESSED, cmd_vel),
-            *((SCAN,) if config.collision_monitor.enabled else ()),
-        )
+        self._auditor = Auditor(self.transport, _NAME, self.clock)
+        self._cmd_vel = cmd_vel
+        recorded = (IMAGE_COMPRESSED, cmd_vel, *((SCAN,) if config.collision_monitor.enabled else ()))
+        self.recording = RunRecording(*wires, self._auditor, (self.recognition, self.control), recorded)
         self._link = link
         self._began_s = self.clock.now()
 
@@ -143,7 +145,7 @@ class Graph:
     def topics(self) -> tuple[Topic[Any], ...]:
         """All topics that programs next to the graph may look at, including those on demand."""
         on_demand = (IMAGE_RAW, IMAGE_ANNOTATED, SCAN)
-        return (*RECORDED, *self._recorded, *(topic for topic in on_demand if topic not in self._recorded))
+        return (*RECORDED, IMAGE_COMPRESSED, self._cmd_vel, *on_demand)
 
     def add(self, node: Node) -> None:
         """Run and stop ``node``, on this graph's transport and clock, with the others."""
@@ -183,10 +185,14 @@ class Graph:
         self.end_recording()
         self.transport.close()
 
-    def reconfigure(self, config: Config) -> None:
+    def reconfigure(self, config: Config, by: str = _NAME) -> None:
         """Apply the parameters of ``config`` that can change while nodes run (``live`` of each section).
 
         Returns at once; may be called from any thread.
+
+        Args:
+            config: All parameters.
+            by: Who changes them, for the audit.
 
         Raises:
             ConfigError: A node cannot apply it, for example because a file that it names is broken; nothing has
@@ -194,7 +200,9 @@ class Graph:
         """
         for node in self.nodes:
             node.check(config)
-        self.config = config
+        before, self.config = self.config, config
+        for event in setting_changes(before, config, by):
+            self._auditor.say(event, self.clock.now())
         for node in self.nodes:
             node.reconfigure(config)
 
@@ -222,38 +230,25 @@ class Graph:
             while any([node.spin_once() for node in reversed(self.nodes)]):
                 pass
 
-    def record(self, path: Path) -> None:
+    def record(self, path: Path, by: str = _NAME) -> None:
         """Record all topics to ``path`` from now on, an MCAP file that must not exist yet.
 
         Recorded before the start, a run can be replayed bit for bit. Recognition then uses the recorded, compressed
-        pictures.
+        pictures. May be called from any thread.
+
+        Args:
+            path: The file.
+            by: Who starts it, for the audit.
 
         Raises:
             RecordingError: The file cannot be created, or another recording is being made.
         """
-        if self._recorder is not None:
-            raise RecordingError(f"{self._recorder.path} is being recorded: end that first")
-        # Only recordings need the package mcap.
-        from handsteer.recordings.recorder import Recorder  # noqa: PLC0415
-
         about = describe(self.config, self.clock, model_files(self.config)) | {JOURNALS: "yes"}
-        waits = isinstance(self.clock, SteppedClock)
-        recorder = Recorder(path, self.transport, self.clock, (*RECORDED, *self._recorded), about, waits=waits)
-        self._recorder = recorder
-        self.recognition.look_at_compressed()
-        for node in (self.recognition, self.control):
-            assert node.journal is not None
-            node.journal.write_to(functools.partial(recorder.note, journal_topic(node.name)))
+        self.recording.start(path, about, by, self.recognition.look_at_compressed)
 
-    def end_recording(self) -> None:
-        """End the recording, if there is one."""
-        recorder, self._recorder = self._recorder, None
-        if recorder is None:
-            return
-        for node in (self.recognition, self.control):
-            assert node.journal is not None
-            node.journal.write_to(None)
-        recorder.close()
+    def end_recording(self, by: str = _NAME) -> None:
+        """End the recording, if there is one; ``by`` is who ends it, for the audit. May be called from any thread."""
+        self.recording.end(by)
 
     def summary(self) -> Summary:
         """Return the statistics of the run so far."""

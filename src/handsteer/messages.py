@@ -213,10 +213,12 @@ CLOCK = Topic("/clock", ClockMessage, is_global=True)
 ROBOT_DESCRIPTION = Topic("/robot_description", String, latched=True)
 WORLD_MARKERS = Topic("/world/markers", MarkerArray)
 DIAGNOSTICS = Topic("/diagnostics", DiagnosticArray, is_global=True, depth=10)
+# Who did what; see handsteer.audit.
+AUDIT = Topic("/audit", Log, depth=50)
 
 RECORDED: tuple[Topic[Any], ...] = (
     *(CAMERA_INFO, HAND_SIGN, GESTURE_JOY, JOY, STEERING_CMD_VEL, STOP, STOPPED, ODOM, TF, JOINT_STATES, CLOCK),
-    *(ROBOT_DESCRIPTION, WORLD_MARKERS, DIAGNOSTICS),
+    *(ROBOT_DESCRIPTION, WORLD_MARKERS, DIAGNOSTICS, AUDIT),
 )
 """What is recorded besides pictures, commands and laser scans: their topics depend on the graph."""
 

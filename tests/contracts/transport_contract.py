@@ -9,10 +9,12 @@ from typing import TypeVar
 import numpy as np
 import pytest
 
+from handsteer.audit import WARN, AuditEvent, write_event
 from handsteer.clock import Clock, RealClock
 from handsteer.errors import TransportError
 from handsteer.images import bgr_image, image_message
 from handsteer.messages import (
+    AUDIT,
     CMD_VEL,
     HAND_SIGN,
     IMAGE_RAW,
@@ -21,7 +23,9 @@ from handsteer.messages import (
     Header,
     Image,
     LaserScan,
+    Log,
     String,
+    Time,
     Topic,
     twist,
 )
@@ -119,6 +123,16 @@ class TransportContract:
         assert eventually(lambda: got)
         assert got[0].message == String(data="Go")
         assert got[0].captured_s in {12.5, None}
+
+    def test_an_event_of_the_audit_arrives(self, make_node: Callable[[str], Node]) -> None:
+        talker, listener = make_node("talker"), make_node("listener")
+        got: list[Received[Log]] = []
+        listener.subscribe(AUDIT, got.append)
+        listener.start()
+        sent = write_event(AuditEvent("stopped", "viewer 1", "pressed Stop", "/stop", WARN), Time(12, 500))
+        heard(talker.publisher(AUDIT)).publish(sent)
+        assert eventually(lambda: got)
+        assert got[0].message == sent
 
     def test_a_laser_scan_arrives_whole(self, make_node: Callable[[str], Node]) -> None:
         talker, listener = make_node("talker"), make_node("listener")

@@ -24,6 +24,7 @@ OTHERS = (
     "/tf",
     "/joint_states",
     "/world/markers",
+    "/audit",
     "/diagnostics",
     "/robot_description",
 )

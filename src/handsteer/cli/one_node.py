@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from handsteer import making
+from handsteer.audit import setting_changes
 from handsteer.cli import signals
 from handsteer.cli.running import exit_code, freeze_loaded_objects, set_up_logging, settings, signals_ignored
 from handsteer.clock import Clock
@@ -83,7 +84,7 @@ def run(job: Job, transport: str, words: tuple[str, ...]) -> int:
         session = join(transport, job.node, words)
         config = job.settings(from_parameters(session.parameters, job.section, session.name))
         node = job.make(config, session.transport, session.clock)
-        session.serve(NodeParameters(config, job.section, node.reconfigure, node.check))
+        session.serve(NodeParameters(config, job.section, _audited(node, config), node.check))
         session.offer(node.services)
         _run_until_end(node, session, job.companion(node, config))
     except KeyboardInterrupt:
@@ -93,6 +94,20 @@ def run(job: Job, transport: str, words: tuple[str, ...]) -> int:
             with signals_ignored():
                 session.close()
     return 0
+
+
+def _audited(node: Node, config: Config) -> Callable[[Config], None]:
+    """Return what changes the parameters of ``node``, which begins with ``config``, and publishes the changes."""
+    auditor, running = node.auditor, config
+
+    def reconfigure(new: Config) -> None:
+        nonlocal running
+        before, running = running, new
+        for event in setting_changes(before, new, auditor.who):
+            auditor.say(event, node.clock.now())
+        node.reconfigure(new)
+
+    return reconfigure
 
 
 def _run_until_end(node: Node, session: Session, companion: AbstractContextManager[None]) -> None:

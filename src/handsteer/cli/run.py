@@ -3,7 +3,7 @@
 import json as json_format
 import webbrowser
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, closing, contextmanager, nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +19,7 @@ from handsteer.errors import ConfigError
 from handsteer.graph import Graph
 from handsteer.live.process import LiveProcess
 from handsteer.parameters import from_parameters
+from handsteer.recordings.audit_log import AuditLog, audit_log_path
 from handsteer.study.session import Task
 from handsteer.summary import Summary
 from handsteer.transports import join
@@ -152,7 +153,10 @@ def drive(
     page = None if headless else PageProcess()
     live = None if settings.foxglove.port is None else LiveProcess()
     try:
-        with Graph(settings, SteppedClock() if fast else RealClock(), link=link, steering=page is None) as graph:
+        with (
+            Graph(settings, SteppedClock() if fast else RealClock(), link=link, steering=page is None) as graph,
+            _audit_log(graph, is_simulated_time=fast),
+        ):
             if record is not None:
                 graph.record(record)
             if live is not None:
@@ -172,6 +176,11 @@ def drive(
                 page.stop()
             if live is not None:
                 live.stop()
+
+
+def _audit_log(graph: Graph, *, is_simulated_time: bool) -> AbstractContextManager[object]:
+    path = audit_log_path(graph.config.recording.audit_log, is_simulated_time=is_simulated_time)
+    return nullcontext() if path is None else closing(AuditLog(graph.transport, path))
 
 
 def _run_until_end(

@@ -35,6 +35,7 @@ __all__ = [
     "JoystickConfig",
     "LandmarksConfig",
     "Recorded",
+    "RecordingConfig",
     "RobotConfig",
     "RobotKind",
     "Section",
@@ -62,6 +63,20 @@ class TeachConfig(Section):
     takes: int = Field(5, ge=2, le=50, description="Number of takes of a sign")
     take_time: float = Field(3.0, ge=0.2, le=60, description="Duration of each take [s]")
     countdown: float = Field(3.0, ge=0, le=60, description="Countdown before each take [s]")
+
+
+class RecordingConfig(Section):
+    """Recordings that are started on the page, and the audit's log file."""
+
+    folder: Path = Field(
+        Path("recordings"), description="Folder of the recordings that are started on the page; created when needed"
+    )
+    audit_log: str = Field(
+        "auto",
+        min_length=1,
+        description="File that `handsteer run` writes the audit to: auto is audit.log in the user's folder of logs, "
+        "without --fast; off is none",
+    )
 
 
 class DashboardConfig(Section):
@@ -126,6 +141,7 @@ class Config(Section):
     collision_monitor: CollisionMonitorConfig = CollisionMonitorConfig()
     robot: RobotConfig = RobotConfig()
     teach: TeachConfig = TeachConfig()
+    recording: RecordingConfig = RecordingConfig()
     dashboard: DashboardConfig = DashboardConfig()
     foxglove: FoxgloveConfig = FoxgloveConfig()
 

@@ -8,6 +8,7 @@ from handsteer.dashboard.camera import CameraPanel
 from handsteer.dashboard.legend import LegendPanel
 from handsteer.dashboard.node import DashboardNode
 from handsteer.dashboard.page import STATIC, UNKNOWN, Page, PageContext, box, card, tag, text
+from handsteer.dashboard.record_panel import RecordPanel
 from handsteer.dashboard.state import PageState
 from handsteer.dashboard.steer_panel import SteerPanel
 from handsteer.dashboard.world_panel import WorldPanel
@@ -29,6 +30,9 @@ class DrivePage(Page):
         with box("panels"):
             self._velocity = VelocityPanel()
             self._timing = TimingPanel()
+            self._recording = (
+                RecordPanel(self, graph, context.recordings) if graph is not None and context.recordings else None
+            )
             self._steering = SteerPanel(self, has_topics=graph is None)
             self._legend = LegendPanel(self, context.settings)
         self._updates = 0
@@ -40,6 +44,8 @@ class DrivePage(Page):
         for panel in (self._camera, self._velocity, self._timing, self._legend):
             panel.update(state)
         self._steering.update(state, self.lease(node))
+        if self._recording is not None:
+            self._recording.update(self.lease(node))
         self._updates += 1
         if self._updates % _PLOT_EVERY == 0:
             self._velocity.draw(node.history, node.clock.now())

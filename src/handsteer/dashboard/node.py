@@ -6,7 +6,9 @@ from collections import deque
 from dataclasses import replace
 from typing import Any, cast
 
+from handsteer.audit import WARN
 from handsteer.clock import Clock, to_seconds
+from handsteer.dashboard.audit import PageAudit
 from handsteer.dashboard.state import (
     COMMAND_HOLDS_S,
     Observed,
@@ -74,6 +76,7 @@ class DashboardNode(Node):
         cmd_vel: The topic of the displayed commands. If its type is open and the transport reports types, the commands
             that the control reports are shown instead.
         history: Stores the velocities, including earlier ones; a new one by default.
+        audit: Publishes what viewers do; a new one by default.
 
     Attributes:
         world: The contents of the 3D view.
@@ -88,10 +91,13 @@ class DashboardNode(Node):
         steering: SteeringNode,
         cmd_vel: Topic[Any] = CMD_VEL,
         history: VelocityHistory | None = None,
+        *,
+        audit: PageAudit | None = None,
     ) -> None:
         super().__init__("dashboard", transport, clock)
         self.world = WorldState()
-        self.lease = ControlLease()
+        self._audit = audit or PageAudit(transport, clock)
+        self.lease = ControlLease(self._audit.on_seat)
         self.history = history or VelocityHistory()
         self._observed = Observed()
         self._namespace, _ = split_reporter(transport.full_name(self.name))
@@ -137,6 +143,8 @@ class DashboardNode(Node):
         """
         if self.lease.take(viewer, self.clock.now()):
             with self._lock:
+                if self._holder is None:
+                    self._audit.say("steers", viewer, "steers by hand")
                 self._holder = (viewer, self.clock.now())
                 self._steering.steer(linear_mps, angular_radps)
 
@@ -160,6 +168,7 @@ class DashboardNode(Node):
         with self._lock:
             self._holder = None
             self._steering.send_to(topic)
+        self._audit.say("steering_topic", viewer, f"steers on {topic}", topic)
 
     def halt(self, viewer: str = "") -> None:
         """Stop the robot, whether or not ``viewer`` drives."""
@@ -167,6 +176,7 @@ class DashboardNode(Node):
             self._holder = None
             self._stopper = viewer or None
             self._steering.halt()
+        self._audit.say("stop_pressed", viewer, "pressed Stop", level=WARN)
 
     def reset(self, viewer: str) -> None:
         """Reset Stop if ``viewer`` has the control lease or the lease is free."""
@@ -174,6 +184,7 @@ class DashboardNode(Node):
             with self._lock:
                 self._stopper = None
                 self._steering.reset()
+            self._audit.say("reset_pressed", viewer, "pressed Reset")
 
     def leave(self, viewer: str) -> None:
         """Stop if ``viewer`` is steering, and release its lease."""

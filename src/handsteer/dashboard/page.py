@@ -10,8 +10,11 @@ from typing import ClassVar
 
 from nicegui import ui
 
+from handsteer.dashboard.access import SESSION
+from handsteer.dashboard.audit import PageAudit
 from handsteer.dashboard.lessons import Lessons
 from handsteer.dashboard.node import DashboardNode
+from handsteer.dashboard.recordings import Recordings
 from handsteer.dashboard.remote_graph import RemoteGraph
 from handsteer.dashboard.settings import Settings
 from handsteer.dashboard.state import PageState
@@ -172,6 +175,8 @@ class PageContext:
         settings: The graph's parameters, likewise.
         lessons: Teaches the graph signs, likewise.
         study: Leads a participant through a study; None without one.
+        audit: Publishes what viewers do; None if they need no names.
+        recordings: Serves recordings; None if none can be made.
     """
 
     node: OnDemandNode[DashboardNode]
@@ -179,6 +184,8 @@ class PageContext:
     settings: Settings | None = None
     lessons: Lessons | None = None
     study: Session | None = None
+    audit: PageAudit | None = None
+    recordings: Recordings | None = None
 
 
 class Page:
@@ -193,8 +200,10 @@ class Page:
     def __init__(self, context: PageContext, path: str, *assets: str) -> None:
         self.client = ui.context.client
         self._context = context
+        self._introduce(context.audit)
         self.client.on_disconnect(self._leave)
         self.client.on_delete(self._leave)
+        self.client.on_delete(self._forget)
         for name in ("page.css", "page.js", *assets):
             ui.add_head_html(_ASSET[name.rpartition(".")[2]].format(f"{ASSETS_PATH}/{name}"))
         self._top(path)
@@ -226,6 +235,16 @@ class Page:
     def lease(self, node: DashboardNode) -> LeaseStatus:
         """Return the control lease as this viewer sees it."""
         return node.lease.status_of(self.client.id, node.clock.now())
+
+    def _introduce(self, audit: PageAudit | None) -> None:
+        request = self.client.request
+        if audit is not None:
+            session = request.scope.get("state", {}).get(SESSION, "")
+            audit.introduce(self.client.id, session, request.client.host if request.client else "")
+
+    def _forget(self) -> None:
+        if self._context.audit is not None:
+            self._context.audit.forget(self.client.id)
 
     def _top(self, path: str) -> None:
         with ui.element("header").classes("top"):

@@ -4,9 +4,11 @@ Topics pass through it as well (:mod:`handsteer.transports.piped`).
 """
 
 import contextlib
+import datetime
 import itertools
+import threading
 from collections.abc import Callable
-from concurrent.futures import Future
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,10 +16,12 @@ from typing import Any
 from handsteer.cameras.browser import Source, check_frame
 from handsteer.clock import Clock
 from handsteer.config import Config
+from handsteer.dashboard.audit import PageAudit
 from handsteer.errors import ConfigError, FrameError, HandsteerError, TransportError
 from handsteer.graph import Graph
 from handsteer.making import make_steering
 from handsteer.nodes.steering import SteeringNode
+from handsteer.recordings.folder import RecordingFolder, RecordingState
 from handsteer.robots.world import World
 from handsteer.study.session import Task
 from handsteer.transports.piped import Gateway, Pipe, PipedTransport
@@ -35,12 +39,14 @@ class GraphState:
         world: The robot's world with all things at their start positions; None for a real robot.
         camera_source: The selected camera.
         has_browser: Whether a browser has sent frames since the last one was forgotten.
+        recording: The recording that is being made, or the last one; None if there was none.
     """
 
     config: Config
     world: World | None
     camera_source: Source
     has_browser: bool
+    recording: RecordingState | None = None
 
 
 class GraphServer:
@@ -58,6 +64,10 @@ class GraphServer:
         self._graph = graph
         self._gateway = Gateway(pipe, graph.transport)
         self._sent = self._state()
+        self._sending = threading.Lock()
+        # Files are opened and closed on a thread of their own: the pipe also carries Stop.
+        self._recording = ThreadPoolExecutor(1, "recording")
+        graph.recording.on_change = self._send_state
         self._actions: dict[str, Callable[..., Future[None] | None]] = {
             "reconfigure": graph.reconfigure,
             "change_world": graph.robot.change_world,
@@ -65,6 +75,8 @@ class GraphServer:
             "reset": graph.robot.reset,
             "choose_camera": graph.cameras.choose,
             "forget_browser": graph.cameras.browser.forget,
+            "record": lambda by: self._recording.submit(self._record, by),
+            "end_recording": lambda by: self._recording.submit(graph.end_recording, by),
         }
         pipe.on("frame", self._take_frame)
         pipe.on("request", self._execute)
@@ -73,16 +85,23 @@ class GraphServer:
     def close(self) -> None:
         """Close the page's publishers and subscriptions."""
         self._gateway.close()
+        self._recording.shutdown(wait=False)
+
+    def _record(self, by: str) -> None:
+        folder = RecordingFolder(self._graph.config.recording.folder)
+        self._graph.record(folder.new(datetime.datetime.now()), by)
 
     def _state(self) -> GraphState:
         graph = self._graph
-        return GraphState(graph.config, graph.robot.world, graph.cameras.source, graph.cameras.browser.is_given)
+        cameras, recording = graph.cameras, graph.recording.state
+        return GraphState(graph.config, graph.robot.world, cameras.source, cameras.browser.is_given, recording)
 
     def _send_state(self) -> None:
-        state = self._state()
-        if state != self._sent:
-            self._sent = state
-            self._pipe.say("state", state)
+        with self._sending:
+            state = self._state()
+            if state != self._sent:
+                self._sent = state
+                self._pipe.say("state", state)
 
     def _take_frame(self, frame: bytes) -> None:
         with contextlib.suppress(FrameError):  # checked before
@@ -117,12 +136,14 @@ class RemoteGraph:
         state: What the graph has reported last.
         steering: Runs in this process; not started.
         study: What the page leads a participant through, if anything.
+        audit: Publishes what viewers do.
     """
 
     clock: Clock
     state: GraphState
     steering: SteeringNode
     study: Task | None
+    audit: PageAudit
 
     def __init__(self, pipe: Pipe) -> None:
         self.transport = PipedTransport(pipe)
@@ -145,6 +166,7 @@ class RemoteGraph:
                 self.state, self.clock, file, self.study = self._begun.result(_LOOK_PERIOD_S)
             except TimeoutError:
                 continue
+            self.audit = PageAudit(self.transport, self.clock)
             self.steering = make_steering(self.config, self.transport, self.clock)
             return file
         raise TransportError("the graph's process has ended")
@@ -161,26 +183,28 @@ class RemoteGraph:
             ConfigError: A node rejects them, or the other process does not answer; nothing has changed.
         """
         try:
-            self._request("reconfigure", config).result(_ANSWER_TIMEOUT_S)
+            self._request("reconfigure", config, self.audit.driver).result(_ANSWER_TIMEOUT_S)
         except TimeoutError:
             raise ConfigError("the robot's process does not answer: try again") from None
         self.steering.reconfigure(config)
 
     def change_world(self, change: Callable[[World], World]) -> Future[None]:
         """Change the robot's world; ``change`` must be picklable."""
-        return self._request("change_world", change)
+        return self._told(self._request("change_world", change), "changed the world")
 
     def enter_world(self, world: World) -> Future[None]:
         """Move the robot to the start of another world."""
-        return self._request("enter_world", world)
+        return self._told(self._request("enter_world", world), "loaded another world")
 
     def reset(self) -> Future[None]:
         """Move the robot and all things to their start positions."""
-        return self._request("reset")
+        return self._told(self._request("reset"), "put the robot and all things back to the start")
 
     def choose_camera(self, source: Source) -> None:
         """Read frames from ``source`` from now on."""
         self._request("choose_camera", source)
+        name = "the camera of a browser" if source == "browser" else "the robot's camera"
+        self.audit.say_of_driver("camera_chosen", f"chose {name}", source)
 
     def offer_frame(self, data: bytes) -> None:
         """Send a frame of a browser's camera, see :class:`~handsteer.cameras.browser.BrowserCamera`.
@@ -194,6 +218,24 @@ class RemoteGraph:
     def forget_browser(self) -> None:
         """Forget the browser that sends frames; another may follow."""
         self._request("forget_browser")
+
+    def record(self) -> Future[None]:
+        """Start a recording in the folder of recordings."""
+        return self._request("record", self.audit.driver)
+
+    def end_recording(self) -> Future[None]:
+        """End the recording, if there is one."""
+        return self._request("end_recording", self.audit.driver)
+
+    def _told(self, future: Future[None], sentence: str) -> Future[None]:
+        """Return ``future``, whose success is published on the audit as the driver's change of the world."""
+
+        def tell(done: Future[None]) -> None:
+            if not done.cancelled() and done.exception() is None:
+                self.audit.say_of_driver("world_changed", sentence)
+
+        future.add_done_callback(tell)
+        return future
 
     def _request(self, action: str, *arguments: object) -> Future[None]:
         """Request an action of the other process; return a future of its result."""

@@ -18,6 +18,7 @@ from handsteer.cameras.browser import LARGEST_BYTES
 from handsteer.clock import Clock
 from handsteer.config import DashboardConfig
 from handsteer.dashboard.access import HEADERS, Access, AccessMiddleware
+from handsteer.dashboard.audit import PageAudit
 from handsteer.dashboard.camera import FrameSocket, PictureNode, PictureResponse
 from handsteer.dashboard.drive_page import DrivePage
 from handsteer.dashboard.lesson_page import LessonPage
@@ -25,6 +26,7 @@ from handsteer.dashboard.lessons import Lessons
 from handsteer.dashboard.limits import Connections, UnconnectedPages, limit_log
 from handsteer.dashboard.node import DashboardNode
 from handsteer.dashboard.page import ASSETS_PATH, ICON, PICTURE_PATH, STATIC, WEBCAM_PATH, PageContext
+from handsteer.dashboard.recordings import Recordings, serve_recordings
 from handsteer.dashboard.remote_graph import RemoteGraph
 from handsteer.dashboard.settings import DEFAULT_FILE, Settings, SettingsFile
 from handsteer.dashboard.settings_page import SettingsPage
@@ -88,14 +90,21 @@ class Dashboard:
         file: Path | None = None,
     ) -> None:
         history = VelocityHistory()  # outlives the node, so that a reloaded page shows it
-        self.node = OnDemandNode(lambda: DashboardNode(transport, clock, steering, cmd_vel, history))
+        audit = PageAudit(transport, clock) if graph is None else graph.audit
+        self.node = OnDemandNode(lambda: DashboardNode(transport, clock, steering, cmd_vel, history, audit=audit))
         self.pictures = OnDemandNode(lambda: PictureNode(transport, clock))
-        self.context = PageContext(self.node)
+        self.context = PageContext(self.node, audit=audit)
         if graph is not None:
             settings_file = SettingsFile(file or DEFAULT_FILE, is_read=file is not None)
-            settings = Settings(lambda: graph.config, graph.reconfigure, settings_file)
+            settings = Settings(
+                lambda: graph.config,
+                graph.reconfigure,
+                settings_file,
+                lambda done: audit.say_of_driver("settings_saved", done, settings_file.path.name),
+            )
             study = Session(graph.study) if graph.study is not None else None
-            self.context = PageContext(self.node, graph, settings, Lessons.of(graph), study)
+            recordings = Recordings(graph.config.recording.folder, lambda: graph.state.recording)
+            self.context = PageContext(self.node, graph, settings, Lessons.of(graph), study, audit, recordings)
         self.webcam = FrameSocket(graph, self._drives)
         self._config = config
         self._server: uvicorn.Server | None = None
@@ -149,6 +158,8 @@ class Dashboard:
         self.pictures.close()
         if self.context.lessons is not None:
             self.context.lessons.close()
+        if self.context.recordings is not None:
+            self.context.recordings.close()
         if self._server is not None and self._thread is not None:
             self._server.should_exit = True
             self._thread.join(_STOP_TIMEOUT_S)
@@ -218,6 +229,7 @@ def _application() -> FastAPI:
     async def webcam(socket: WebSocket) -> None:
         await application.state.dashboard.webcam.serve(socket)
 
+    serve_recordings(application, lambda: application.state.dashboard.context.recordings)
     unconnected = UnconnectedPages()
 
     @ui.page("/")

@@ -39,6 +39,7 @@ class Settings:
         running: Returns the nodes' configuration.
         apply: Applies live parameters to the nodes.
         file: The file that settings are saved to.
+        on_save: Called with what was done, once the settings are saved.
 
     Attributes:
         file: The file that settings are saved to.
@@ -46,8 +47,15 @@ class Settings:
         revision: Counts changes and saves.
     """
 
-    def __init__(self, running: Callable[[], Config], apply: Callable[[Config], None], file: "SettingsFile") -> None:
+    def __init__(
+        self,
+        running: Callable[[], Config],
+        apply: Callable[[Config], None],
+        file: "SettingsFile",
+        on_save: Callable[[str], None] = lambda _: None,
+    ) -> None:
         self.file = file
+        self._on_save = on_save
         self.revision = 0
         self._running = running
         self._apply = apply
@@ -115,6 +123,7 @@ class Settings:
             done = self.file.save(nested(self._changed))
             self._saved = self.wanted
             self.revision += 1
+            self._on_save(done)
             return done
 
     def load(self) -> None:

@@ -11,6 +11,7 @@ ANSWER_S = 10.0
 """A request that the driver does not answer within this time is granted."""
 
 Role = Literal["driver", "watcher", "free"]
+SeatChangeReason = Literal["free", "handed_over", "unanswered", "left"]
 
 
 @dataclass(frozen=True)
@@ -28,14 +29,33 @@ class LeaseStatus:
     left_s: float = 0.0
 
 
+@dataclass(frozen=True)
+class SeatChange:
+    """The lease has got another holder.
+
+    Attributes:
+        before: The driver before; None if there was none.
+        after: The driver now; None if there is none.
+        how: Why it has changed.
+    """
+
+    before: str | None
+    after: str | None
+    how: SeatChangeReason
+
+
 class ControlLease:
     """The control lease; thread-safe.
 
     The driver keeps the lease until it leaves, hands over, or does not answer a request in time. A refused viewer may
     ask again.
+
+    Args:
+        on_change: Called with each change of the driver; must return at once, and not use the lease.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, on_change: Callable[[SeatChange], None] = lambda _: None) -> None:
+        self._on_change = on_change
         self._lock = threading.Lock()
         self._driver: str | None = None
         self._request: tuple[str, float] | None = None
@@ -45,7 +65,7 @@ class ControlLease:
         with self._lock:
             self._hand_over_if_due(now_s)
             if self._driver is None:
-                self._driver = viewer
+                self._change(viewer, "free")
             return self._driver == viewer
 
     def drives(self, viewer: str) -> bool:
@@ -57,7 +77,7 @@ class ControlLease:
         with self._lock:
             self._hand_over_if_due(now_s)
             if self._driver is None:
-                self._driver = viewer
+                self._change(viewer, "free")
             elif self._driver != viewer and self._request is None:
                 self._request = (viewer, now_s + ANSWER_S)
 
@@ -68,7 +88,7 @@ class ControlLease:
                 return False
             asker, self._request = self._request[0], None
             if hand_over:
-                self._driver = asker
+                self._change(asker, "handed_over")
             return hand_over
 
     def leave(self, viewer: str) -> bool:
@@ -79,7 +99,7 @@ class ControlLease:
             if self._driver != viewer:
                 return False
             # A pending request is granted.
-            self._driver = self._request[0] if self._request else None
+            self._change(self._request[0] if self._request else None, "left")
             self._request = None
             return True
 
@@ -102,8 +122,13 @@ class ControlLease:
     def _hand_over_if_due(self, now_s: float) -> bool:
         if self._request is None or now_s < self._request[1]:
             return False
-        self._driver, self._request = self._request[0], None
+        self._change(self._request[0], "unanswered")
+        self._request = None
         return True
+
+    def _change(self, driver: str | None, how: SeatChangeReason) -> None:
+        before, self._driver = self._driver, driver
+        self._on_change(SeatChange(before, driver, how))
 
 
 N = TypeVar("N", bound=Node)

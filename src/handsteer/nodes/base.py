@@ -1,12 +1,14 @@
 """Base class of all nodes: subscriptions, timers, and the thread that runs their callbacks."""
 
+import functools
 import threading
 from collections.abc import Callable, Hashable
 from typing import Any, TypeVar
 
 from handsteer.clock import Clock
 from handsteer.config import Config
-from handsteer.messages import DIAGNOSTICS, Topic
+from handsteer.messages import AUDIT, DIAGNOSTICS, Topic
+from handsteer.nodes.auditing import Auditor
 from handsteer.nodes.callbacks import FailureLog, Inbox, Timer
 from handsteer.nodes.diagnostics import write_status
 from handsteer.nodes.journal import Journal
@@ -63,6 +65,12 @@ class Node:
         self._thread: threading.Thread | None = None
         self._topics: dict[str, set[str]] = {"publishes": set(), "listens to": set()}
         self._diagnostics = self.publisher(DIAGNOSTICS)
+
+    @functools.cached_property
+    def auditor(self) -> Auditor:
+        """Publishes on ``/audit``; nodes that do not use it do not advertise the topic."""
+        self._topics["publishes"].add(self.transport.topic_name(AUDIT))
+        return Auditor(self.transport, self.name, self.clock)
 
     @property
     def topics(self) -> str:
@@ -123,16 +131,22 @@ class Node:
     def diagnose_every(self, period_s: float, status: Callable[[], Status]) -> None:
         """Publish ``status()``, the state of this node, on ``/diagnostics`` every ``period_s`` seconds.
 
-        Without subscribers it is skipped; a new subscriber receives its first report within half a second.
+        Without subscribers it is skipped; a new subscriber receives its first report within half a second. Faults are
+        also published on ``/audit``, when they begin and end.
         """
 
         def beat() -> None:
-            if self._diagnostics.has_subscribers:
-                name = self.transport.full_name(self.name)
-                self._diagnostics.publish(write_status(status(), name, self.clock.stamp(self.clock.now())))
-            else:
+            is_watched = self._diagnostics.has_subscribers
+            if is_watched or self.auditor.has_listeners:
+                report, now = status(), self.clock.now()
+                if is_watched:
+                    name = self.transport.full_name(self.name)
+                    self._diagnostics.publish(write_status(report, name, self.clock.stamp(now)))
+                self.auditor.look_at_status(report, now)
+            if not is_watched:
                 timer.delay_until(self.clock.now() + _LOOK_FOR_LISTENERS_S)
 
+        _ = self.auditor  # advertised now, so that others find it before it is used
         timer = self.every(period_s, beat)
 
     def reconfigure(self, config: Config) -> None:

@@ -24,6 +24,7 @@ from handsteer.messages import (
     Topic,
     Twist,
 )
+from handsteer.nodes.auditing import ControlAudit
 from handsteer.nodes.base import Node
 from handsteer.nodes.collision_monitor import CollisionMonitor, MeasuredVelocity
 from handsteer.nodes.joysticks import Joysticks
@@ -96,7 +97,6 @@ class HandSignControlNode(Node):
         self._safety, self._mux = self._control.safety, self._control.mux
         self._following = Following() if arming and not config.robots else None
         self._arming = arming
-        self._waited = False
         self._measured = MeasuredVelocity()
         self._commanded = ZERO
         self._last_step_s = clock.now()
@@ -109,6 +109,7 @@ class HandSignControlNode(Node):
         )
         self._cmd_vel = self._selection.commands if self._selection else self._commands(cmd_vel)
         self._rivals = Rivals(self, [sign, *(self._selection.topics if self._selection else [cmd_vel])])
+        self._audit = ControlAudit(self.auditor, lambda: self._published_by(STOP)[1])
         StopKeeper(self, self._on_stop_or_reset)
         self.subscribe(steering, self._on_steering)
         self.subscribe(sign, self._on_sign)
@@ -155,6 +156,7 @@ class HandSignControlNode(Node):
             if self._safety.is_stopped:
                 log.info("stop is reset by false on %s, which is published by %s", *self._published_by(STOP))
             self._control.reset()
+        self._look_for_changes(self.clock.now())
 
     def _published_by(self, topic: Topic[Any]) -> tuple[str, str]:
         publishers = self.transport.publishers_of(topic)
@@ -202,6 +204,7 @@ class HandSignControlNode(Node):
         steering = None if self._stall_guard.distrusts(self.clock.now()) else wanted
         self._look_after_the_robot(elapsed_s)
         self._publish(self._control.step(elapsed_s, steering=steering))
+        self._look_for_changes(self._last_step_s)
 
     def _obey_late(self, *, is_stop: bool) -> None:
         """Stop for a late sign or command; it does not show what is seen now, so it does not arm."""
@@ -217,7 +220,7 @@ class HandSignControlNode(Node):
         elapsed_s = self._elapsed()
         self._look_after_the_robot(elapsed_s)
         self._publish(self._control.step(elapsed_s))
-        self._log_arming()
+        self._look_for_changes(self._last_step_s)
         if self._selection:
             self._selection.beat()
         if self._mux.source == "none":
@@ -225,20 +228,13 @@ class HandSignControlNode(Node):
 
     def _calm_down(self) -> None:
         """Delay the watchdog while nothing moves: waking up fifty times a second costs more than all signs."""
-        self._log_arming()
+        self._look_for_changes(self._last_step_s)
         # The selection uses the same timer, and steering must time out even while signs arrive.
         if self._selection is None and self._mux.source != "steering":
             self._watchdog.delay_until(self.clock.now() + CALM_S)
 
-    def _log_arming(self) -> None:
-        """Log when signs begin and cease to wait for neutral, for users without the page."""
-        waits = self._safety.signs_wait is not None
-        if waits and not self._waited:
-            why = self._safety.signs_wait or "after a reset"
-            log.info("disarmed (%s): nothing moves by signs before Stop was shown, or no hand", why)
-        elif self._waited and not waits:
-            log.info("armed: signs count again")
-        self._waited = waits
+    def _look_for_changes(self, now_s: float) -> None:
+        self._audit.look(self._safety, self._mux.source, self._reason, now_s)
 
     def _look_after_the_robot(self, elapsed_s: float) -> None:
         changed = self._selection.follow() if self._selection else self._cmd_vel.follow()
@@ -284,6 +280,7 @@ class HandSignControlNode(Node):
         elapsed_s, self._last_step_s = now - self._last_step_s, now
         if self._stall_guard.note(now):
             self._safety.fault("the control was stalled")
+            self._audit.stalled(now)
         return elapsed_s
 
     def _report(self) -> ControlStatus:

@@ -5,7 +5,7 @@ import logging
 import threading
 import time
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Any
@@ -48,6 +48,7 @@ class Recorder:
         topics: What to record.
         about: Metadata of the file: the configuration, versions and so on.
         waits: Whether a publisher waits for the disk; for a stepped run, which is faster than a disk.
+        on_failure: Called when a failure has ended the recording, on the thread that writes.
 
     Attributes:
         path: The file.
@@ -67,6 +68,7 @@ class Recorder:
         about: Mapping[str, str],
         *,
         waits: bool = False,
+        on_failure: Callable[[], None] = lambda: None,
     ) -> None:
         self.path = path
         self.lost = 0
@@ -74,6 +76,7 @@ class Recorder:
         self._transport = transport
         self._clock = clock
         self._waits = waits
+        self._on_failure = on_failure
         self._file = McapWriter(path)
         self._file.describe("handsteer", about)
         self._waiting: deque[tuple[Topic[Any], str, Any, int, int]] = deque()
@@ -150,6 +153,7 @@ class Recorder:
                 with suppress(OSError):
                     self._file.close()
                 log.warning("the recording to %s has ended: %s; driving goes on", self.path, self.ended_by)
+                self._on_failure()
 
     def _write_waiting(self) -> None:
         while True:

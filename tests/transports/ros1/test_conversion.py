@@ -13,7 +13,7 @@ from rosbags.interfaces import Nodetype
 from rosbags.typesys.stores import ros2_jazzy
 
 from handsteer.clock import to_stamp
-from handsteer.messages import Header, JointState, Time
+from handsteer.messages import Header, JointState, Log, Time
 from handsteer.nodes.world_markers import world_markers
 from handsteer.robots import Obstacle
 
@@ -144,3 +144,17 @@ def test_fields_that_ros_1_does_not_have_come_back_empty() -> None:
     assert (back.ns, back.text, back.scale) == ("world", "", sent.markers[0].scale)
     assert back.texture.header.stamp == Time(0, 0)
     assert (back.uv_coordinates, back.mesh_file.filename, back.texture.data.size) == ([], "", 0)
+
+
+@pytest.mark.parametrize("level", [10, 20, 30, 40, 50])
+def test_a_log_message_is_one_of_ros1_there(level: int) -> None:
+    from handsteer.transports.ros1.conversion import from_ros1, to_ros1  # noqa: PLC0415
+
+    sent = Log(Time(12, 5), level, "viewer 1", "pressed Stop", "/stop", "stop_pressed", 0)
+    ours = to_ros1(sent, 7)
+    theirs = importlib.import_module("rosgraph_msgs.msg").Log
+    assert (ours._type, ours._md5sum) == (theirs._type, theirs._md5sum)
+    read = theirs().deserialize(ours.raw)
+    assert (read.header.seq, read.header.stamp.secs, read.level) == (7, 12, 1 << (level // 10 - 1))
+    assert (read.name, read.msg, read.file, read.function) == ("viewer 1", "pressed Stop", "/stop", "stop_pressed")
+    assert from_ros1(ours, "rcl_interfaces/msg/Log") == sent

@@ -14,10 +14,11 @@ from rosbags.interfaces import Nodetype
 from rosbags.typesys import Stores, get_typestore
 from rosbags.typesys.store import Typestore
 
-from handsteer.messages import CompressedImage, Header, Marker, MeshFile, Time, type_name
+from handsteer.messages import CompressedImage, Header, Log, Marker, MeshFile, Time, type_name
 from handsteer.transports.ros2.encoding import message_types
 
 _HEADER, _MARKER = "std_msgs/msg/Header", "visualization_msgs/msg/Marker"
+_LOG, _ROS1_LOG = "rcl_interfaces/msg/Log", "rosgraph_msgs/msg/Log"
 _SEQ_BYTES = 4
 _NO_BYTES = np.zeros(0, np.uint8)
 _NO_HEADER = Header(Time(0, 0), "")
@@ -49,10 +50,11 @@ class RawMessage(genpy.Message):  # type: ignore[misc]
 @functools.cache
 def ros1_type(name: str) -> type[RawMessage]:
     """Return rospy's class for a message type such as ``std_msgs/msg/String``."""
+    name = _ROS1_LOG if name == _LOG else name
     store = message_types(Stores.ROS1_NOETIC)
     if name not in store.fielddefs:  # those that rosbags has for ROS 2 only are the same in ROS 1
         store.register({name: _written_types().fielddefs[name]})
-    for used in (_written_types(), _read_types()):
+    for used in (store,) if name == _ROS1_LOG else (_written_types(), _read_types()):
         used.get_msgdef(name)  # compiles it before the first message
     definition, md5 = store.generate_msgdef(name)
     package, _, message = name.split("/")
@@ -64,6 +66,8 @@ def ros1_type(name: str) -> type[RawMessage]:
 
 def to_ros1(message: Any, number: int = 0) -> RawMessage:
     """Return one of our messages for rospy; ``number`` is the ``seq`` of its header, if it has one."""
+    if isinstance(message, Log):
+        return _to_ros1_log(message, number)
     name, store = type_name(type(message)), _written_types()
     raw = store.cdr_to_ros1(store.serialize_cdr(message, name), name)
     kind = ros1_type(name)
@@ -76,7 +80,29 @@ def from_ros1(message: RawMessage, name: str) -> Any:
     Raises:
         Exception: It is not such a message; the type depends on where rosbags fails.
     """
+    if name == _LOG:
+        return _from_ros1_log(_ros1_types().deserialize_ros1(message.raw, _ROS1_LOG))
     return _read_types().deserialize_ros1(message.raw, name)
+
+
+@functools.cache
+def _ros1_types() -> Typestore:
+    return get_typestore(Stores.ROS1_NOETIC)
+
+
+def _to_ros1_log(message: Log, number: int) -> RawMessage:
+    """Return a log message of ROS 2 as one of ROS 1, whose levels are 1, 2, 4, 8 and 16, not 10 to 50."""
+    types = _ros1_types().types
+    header = types[_HEADER](number, types["builtin_interfaces/msg/Time"](message.stamp.sec, message.stamp.nanosec), "")
+    texts = {name: getattr(message, name) for name in ("name", "msg", "file", "function", "line")}
+    theirs = types[_ROS1_LOG](header=header, level=1 << (message.level // 10 - 1), topics=[], **texts)
+    return ros1_type(_LOG)(bytes(_ros1_types().serialize_ros1(theirs, _ROS1_LOG)))
+
+
+def _from_ros1_log(theirs: Any) -> Log:
+    stamp = Time(theirs.header.stamp.sec, theirs.header.stamp.nanosec)
+    texts = {name: getattr(theirs, name) for name in ("name", "msg", "file", "function", "line")}
+    return Log(stamp=stamp, level=10 * max(1, int(theirs.level).bit_length()), **texts)
 
 
 @functools.cache

@@ -1,0 +1,227 @@
+"""The charts over time of a report, as plotly's figures: plain data, whose colours the page adds.
+
+Texts from a recording are escaped, because plotly reads HTML in texts.
+"""
+
+import base64
+import html
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from handsteer.replay.drive_facts import DriveFacts
+from handsteer.types import NONE, SIGNS
+
+Figure = dict[str, Any]
+
+_COLOURS = ("#e5484d", "#2f9e5b", "#8e5bd0", "#2b7fd9", "#e08a1e", "#1aa0a8")
+_MORE_COLOURS = ("#c2569f", "#7d8c2c", "#5b6ee1", "#b5793f")
+GREY, DRIVEN, STAND = "#8a94a6", "#2b7fd9", "#e5484d"
+"""Colours that have the same meaning in all charts."""
+
+_COMMANDED = "#e08a1e"
+_BINS = 60
+
+
+@dataclass
+class _Panel:
+    """A part of the timeline, above others.
+
+    Attributes:
+        title: Of its axis.
+        traces: Its curves.
+        share: Height compared with others.
+        axis: Further properties of its axis.
+    """
+
+    title: str
+    traces: list[dict[str, Any]]
+    share: float = 1.0
+    axis: dict[str, Any] = field(default_factory=dict)
+
+
+def timeline(facts: DriveFacts) -> Figure | None:
+    """Return signs, confidence and velocities over one time axis; None if none is known."""
+    panels = [panel for panel in (_signs(facts), _confidence(facts), *_velocities(facts)) if panel.traces]
+    if not panels:
+        return None
+    figure: Figure = {"data": [], "layout": {"height": 60 + round(190 * sum(panel.share for panel in panels))}}
+    gap = 0.05 if len(panels) > 1 else 0.0
+    shares = np.array([panel.share for panel in panels])
+    heights = shares / shares.sum() * (1 - gap * (len(panels) - 1))
+    top = 1.0
+    for index, (panel, height) in enumerate(zip(panels, heights, strict=True), 1):
+        name = f"y{index}" if index > 1 else "y"
+        figure["data"] += [{**trace, "yaxis": name, "xaxis": "x"} for trace in panel.traces]
+        bottom = max(0.0, top - float(height))
+        figure["layout"]["yaxis" + name[1:]] = {
+            "domain": [bottom, top],
+            "title": {"text": panel.title},
+            "fixedrange": True,
+            **panel.axis,
+        }
+        top = bottom - gap
+    figure["layout"]["xaxis"] = {
+        "anchor": f"y{len(panels)}" if len(panels) > 1 else "y",
+        "title": {"text": "s since the recording began"},
+        "range": [0, facts.duration_s or 1],
+    }
+    figure["layout"]["hovermode"] = "closest"
+    return figure
+
+
+def latencies(facts: DriveFacts) -> Figure | None:
+    """Return how often each latency occurred; None if they are unknown."""
+    table = facts.latencies_ms.table(len(facts.latencies_ms))
+    if not len(table):
+        return None
+    values = table[:, 1]
+    # A few stalls would hide the rest; they are counted in the last bar.
+    end = max(float(np.percentile(values, 99.5)) * 1.2, float(values.min()) + 1.0)
+    counts, edges = np.histogram(np.minimum(values, end), bins=_BINS)
+    hover = [
+        f"{low:.1f} to {high:.1f} ms: {count} frames"
+        for low, high, count in zip(edges[:-1], edges[1:], counts, strict=True)
+    ]
+    beyond = int((values > end).sum())
+    if beyond:
+        hover[-1] = f"{edges[-2]:.1f} ms and more, up to {values.max():.0f} ms: {counts[-1]} frames"
+    bars = {
+        "type": "bar",
+        "x": typed((edges[:-1] + edges[1:]) / 2),
+        "y": typed(counts),
+        "width": float(edges[1] - edges[0]),
+        "hovertext": hover,
+        "hoverinfo": "text",
+        "marker": {"color": DRIVEN},
+        "name": "frames",
+    }
+    layout = {
+        "height": 320,
+        "bargap": 0,
+        "showlegend": False,
+        "xaxis": {"title": {"text": "ms from the capture of a frame to its command"}},
+        "yaxis": {"title": {"text": "frames"}},
+    }
+    return {"data": [bars], "layout": layout}
+
+
+def _signs(facts: DriveFacts) -> _Panel:
+    """Return a row per sign, with a thick line while it was the confirmed one."""
+    names = sorted(facts.signs, key=_rank, reverse=True)
+    traces = []
+    for row, name in enumerate(names):
+        spans = [span for span in facts.spans if span.sign == name]
+        times = [time_s for span in spans for time_s in (span.begin_s, span.end_s, np.nan)]
+        traces.append(
+            {
+                "type": "scatter",
+                "mode": "lines",
+                "name": escape(name),
+                "showlegend": False,
+                "x": typed(times),
+                "y": typed([row] * len(times)),
+                # Short signs would be left out of a long time.
+                "line": {"width": 12, "color": _colour(name, row), "simplify": False},
+                "text": escape(name),
+                "hovertemplate": "%{text}, %{x:.2f} s<extra></extra>",
+            }
+        )
+    labels = {
+        "tickvals": [*range(len(names))],
+        "ticktext": [escape(name) for name in names],
+        "range": [-0.6, len(names) - 0.4],
+        "title": None,
+        "zeroline": False,
+    }
+    return _Panel("", traces, 0.3 + 0.12 * len(names), labels)
+
+
+def _confidence(facts: DriveFacts) -> _Panel:
+    table = facts.confidence.table()
+    if not len(table):
+        return _Panel("", [])
+    seen = [escape(name) for name in facts.seen]
+    trace = {
+        "type": "scatter",
+        "mode": "lines",
+        "name": "confidence",
+        "showlegend": False,
+        "x": typed(table[:, 0]),
+        "y": typed(table[:, 1]),
+        "text": [seen[int(index)] for index in table[:, 2]],
+        "hovertemplate": "%{text} with %{y:.2f}, %{x:.2f} s<extra></extra>",
+        "line": {"width": 1.2, "color": _MORE_COLOURS[2]},
+    }
+    return _Panel("confidence", [trace], 0.6, {"range": [-0.03, 1.03]})
+
+
+def _velocities(facts: DriveFacts) -> list[_Panel]:
+    commanded, driven = facts.commanded.table(), facts.driven.table()
+    panels = []
+    for column, title in ((1, "m/s"), (2, "rad/s")):
+        traces = []
+        if len(commanded):
+            traces.append(_line(commanded, column, "commanded", _COMMANDED) | {"line": _hv(_COMMANDED)})
+        if len(driven):
+            traces.append(_line(driven, column, "driven, by odometry", DRIVEN))
+        if column == 1 and facts.stands:
+            traces.append(_stand_marks(facts))
+        for trace in traces:
+            trace["showlegend"] = column == 1
+            trace["legendgroup"] = trace["name"]
+        panels.append(_Panel(title, traces))
+    return panels
+
+
+def _line(table: NDArray[np.float64], column: int, name: str, colour: str) -> dict[str, Any]:
+    return {
+        "type": "scatter",
+        "mode": "lines",
+        "name": name,
+        "x": typed(table[:, 0]),
+        "y": typed(table[:, column]),
+        "line": {"width": 1.5, "color": colour},
+        "hovertemplate": "%{y:.3f}, %{x:.2f} s<extra>" + name + "</extra>",
+    }
+
+
+def _hv(colour: str) -> dict[str, Any]:
+    """Return a line that keeps its value until the next point, as a command does."""
+    return {"width": 1.5, "color": colour, "shape": "hv"}
+
+
+def _stand_marks(facts: DriveFacts) -> dict[str, Any]:
+    return {
+        "type": "scatter",
+        "mode": "markers",
+        "name": "stopped",
+        "x": typed([stand.time_s for stand in facts.stands]),
+        "y": typed([0] * len(facts.stands)),
+        "hovertext": [escape(f"{number}. {stand.reason}") for number, stand in enumerate(facts.stands, 1)],
+        "hoverinfo": "text",
+        "marker": {"color": STAND, "size": 7, "symbol": "square"},
+    }
+
+
+def _rank(sign: str) -> tuple[int, str]:
+    known = (*SIGNS, NONE)
+    return (known.index(sign) if sign in SIGNS else len(known) + (sign == NONE), sign)
+
+
+def _colour(sign: str, row: int) -> str:
+    if sign == NONE:
+        return GREY
+    return _COLOURS[SIGNS.index(sign)] if sign in SIGNS else _MORE_COLOURS[row % len(_MORE_COLOURS)]
+
+
+def escape(text: str) -> str:
+    """Return a text of a recording for plotly."""
+    return html.escape(text, quote=False)
+
+
+def typed(values: ArrayLike) -> dict[str, str]:
+    """Return numbers as plotly's typed array, smaller than text."""
+    return {"dtype": "f4", "bdata": base64.b64encode(np.asarray(values, "<f4").tobytes()).decode()}
