@@ -30,6 +30,7 @@ RUN_AGAIN = (
     "tests/distributed",
     "tests/faults/test_networks.py",
     "tests/faults/test_processes.py",
+    "tests/live",
     "tests/rmw_zenoh",
     "tests/ros1",
     "tests/ros2",

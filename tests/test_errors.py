@@ -19,6 +19,11 @@ VIRTUAL = ("--camera", "virtual", "--camera.width", "320", "--camera.height", "2
             "the simulated robot needs the package mujoco: run pip install 'ha",
         ),
         ("nicegui", ("run", *VIRTUAL), "the page (a run with --headless does without) needs the package nicegui"),
+        (
+            "websockets",
+            ("run", "--headless", "--foxglove", "0", *VIRTUAL),
+            "--foxglove needs the package websockets: run pip install 'handsteer[foxglove]'",
+        ),
         ("zenoh", ("zenoh-router",), "the Zenoh router needs the package zenoh: run pip install 'handsteer[zenoh]'"),
     ],
 )

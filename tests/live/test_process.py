@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from websockets.exceptions import ConnectionClosed
+from websockets.exceptions import ConnectionClosed, InvalidHandshake
 
 from handsteer.config import FoxgloveConfig, load
 from handsteer.errors import LiveError
@@ -61,6 +61,13 @@ def test_a_drive_is_seen_and_ctrl_c_ends_it(drive: Process) -> None:
     assert "ran for" in drive.text
     assert "Traceback" not in drive.text
     assert "Fatal" not in drive.text
+
+
+@pytest.mark.slow
+def test_a_refused_page_is_told_in_the_log(drive: Process) -> None:
+    with pytest.raises(InvalidHandshake):
+        Viewer(address_of(drive), headers=[("Origin", "https://evil.example")])
+    eventually(lambda: "handsteer: refused a program that asked for the topics: pages of this site" in drive.text)
 
 
 @pytest.mark.slow

@@ -102,7 +102,8 @@ def serve_parent(serve: Callable[[Pipe], None]) -> None:
     # Python closes its own standard input at the end, and aborts if a thread is reading it.
     source = os.fdopen(os.dup(sys.stdin.fileno()), "rb")
     pipe = Pipe(source, sink)
-    logging.basicConfig(level=logging.INFO, handlers=[logging.handlers.QueueHandler(_Records(pipe))])  # type: ignore[arg-type] # it only puts
+    to_parent = logging.handlers.QueueHandler(_Records(pipe))  # type: ignore[arg-type] # it only puts
+    logging.basicConfig(level=logging.INFO, format="%(message)s", handlers=[to_parent])
     try:
         serve(pipe)
     except HandsteerError as error:
