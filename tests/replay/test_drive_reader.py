@@ -6,11 +6,13 @@ import cv2
 import numpy as np
 import pytest
 
+from handsteer.audit import AuditEvent, write_event
 from handsteer.clock import SteppedClock
 from handsteer.config import Config, RobotConfig, VirtualHandConfig
 from handsteer.errors import RecordingError
 from handsteer.graph import Graph
 from handsteer.messages import (
+    AUDIT,
     CMD_VEL,
     DIAGNOSTICS,
     HAND_SIGN,
@@ -18,7 +20,6 @@ from handsteer.messages import (
     ODOM,
     STOP,
     Bool,
-    Log,
     String,
     Time,
     Topic,
@@ -291,15 +292,14 @@ def test_a_stop_that_is_set_twice_counts_once(tmp_path: Path) -> None:
 
 
 def test_the_audit_is_listed_without_what_is_listed_as_stops(tmp_path: Path) -> None:
-    def event(who: str, code: str, sentence: str) -> Log:
-        return Log(Time(sec=0, nanosec=0), level=20, name=who, msg=sentence, file="", function=code, line=0)
-
-    audit = Topic("/audit", Log)
-    messages: list[Message] = [
-        (0.0, audit, event("viewer 1", "seat_taken", "took the seat")),
-        (1.0, audit, event("hand_sign_control", "stands", "stands: no sign is seen")),
-        (2.0, audit, event("viewer 1", "setting_changed", "changed control.max_linear from 1 to 0.2")),
+    events = [
+        AuditEvent("seat_taken", "viewer 1", "took the seat"),
+        AuditEvent("stands", "hand_sign_control", "stands: no sign is seen"),
+        AuditEvent("setting_changed", "viewer 1", "changed control.max_linear from 1 to 0.2"),
     ]
-    events = facts_of(written(tmp_path / "drive.mcap", messages)).events
-    assert [(each.time_s, each.who) for each in events] == [(0.0, "viewer 1"), (2.0, "viewer 1")]
-    assert events[1].sentence == "changed control.max_linear from 1 to 0.2"
+    messages: list[Message] = [
+        (float(n), AUDIT, write_event(event, Time(sec=n, nanosec=0))) for n, event in enumerate(events)
+    ]
+    told = facts_of(written(tmp_path / "drive.mcap", messages)).events
+    assert [(event.time_s, event.who) for event in told] == [(0.0, "viewer 1"), (2.0, "viewer 1")]
+    assert told[1].sentence == "changed control.max_linear from 1 to 0.2"
