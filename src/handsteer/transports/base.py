@@ -1,7 +1,7 @@
 """The interfaces of transports, which publish and subscribe to topics, and of sessions, which join a graph."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Generic, Protocol, TypeVar, runtime_checkable
 
 from handsteer.clock import Clock
@@ -41,7 +41,7 @@ class Received(Generic[M]):
     captured_s: float | None = None
     is_late: bool = False
     by_player: bool = False
-    number: int = 0
+    number: int = field(default=0, compare=False)
 
 
 Deliver = Callable[[Received[M]], None]
