@@ -269,7 +269,7 @@ class _Reader:
     def _explain_latency(self) -> None:
         facts = self._facts
         if not any(topic.endswith(journal_topic(_CONTROL).name) for topic in self._topics):
-            facts.no_latency = "it has no journal, which only `handsteer run --record` writes"
+            facts.no_latency = "it has no journal, which recordings of handsteer run have"
             facts.problems.append(f"{facts.no_latency}: latencies are unknown")
         elif self._offset_s == 0.0:
             # Stamps of a real clock are Unix time.
