@@ -227,6 +227,17 @@ class TestInABrowser:
                 Axe().run(opened, options={"runOnly": ["wcag2a", "wcag2aa", "best-practice"]}).response["violations"]
             )
             assert [fault["help"] for fault in found] == []
+            panel = opened.locator("#timeline .nsewdrag").last
+            panel.scroll_into_view_if_needed()
+            box = panel.bounding_box()
+            assert box is not None
+            middle = box["y"] + box["height"] / 2
+            opened.mouse.move(box["x"] + 0.25 * box["width"], middle)
+            opened.mouse.down()
+            opened.mouse.move(box["x"] + 0.5 * box["width"], middle, steps=5)
+            opened.mouse.up()
+            zoomed = opened.locator("#timeline").evaluate("chart => chart.layout.xaxis.range")
+            assert zoomed == pytest.approx([2.0, 4.0], abs=0.1)
             opened.emulate_media(color_scheme="dark")
             opened.set_viewport_size({"width": 390, "height": 800})
             drawing = opened.locator("#timeline .main-svg").first
