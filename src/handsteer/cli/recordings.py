@@ -145,7 +145,9 @@ def report(recording: Path, *, output: Path | None = None, force: Flag = False, 
     # Only the page needs the package plotly.
     from handsteer.replay.report import write_report  # noqa: PLC0415
 
-    page = output or recording.with_suffix(".html")
+    # The name of a folder, such as rosbag2_2026_11_22-10.00.00, has no suffix.
+    whole = recording.resolve()
+    page = output or (whole.with_name(f"{whole.name}.html") if recording.is_dir() else recording.with_suffix(".html"))
     _print_totals(write_report(recording, page, force=force))
     print(f"report: {page}")
 
