@@ -94,7 +94,8 @@ class Auditor:
             is_fault = report.level > status.OK
             level = ERROR if report.level == status.ERROR else WARN if is_fault else INFO
             code: AuditCode = "fault" if is_fault else "fault_ended"
-            self.look("fault", is_fault, at_s, lambda: self.event(code, report.message, "status", level), first=False)
+            sentence = report.message if is_fault else f"has recovered: {report.message}"
+            self.look("fault", is_fault, at_s, lambda: self.event(code, sentence, "status", level), first=False)
 
 
 class ControlAudit:
