@@ -14,7 +14,7 @@ from typing import Any
 
 
 def main() -> None:
-    """Print CPU time and latency of each run, and the medians."""
+    """Print CPU time, latency (median and 99th percentile), frames and memory of each run, and the medians."""
     seconds, pairs = (int(word) for word in [*sys.argv[1:], "20", "4"][:2])
     rows: dict[str, list[dict[str, float]]] = {"without": [], "recording": []}
     with tempfile.TemporaryDirectory() as folder:
@@ -53,7 +53,7 @@ def _run(seconds: int, words: tuple[str, ...]) -> dict[str, float]:
 
 def _line(row: dict[str, float]) -> str:
     return (
-        f"{row['core_percent']:5.1f} % of a core, latency {row['median_ms']:.1f} ms (median) {row['p99_ms']:.1f} ms (p99), "
+        f"{row['core_percent']:5.1f} % of a core, latency {row['median_ms']:.1f} and {row['p99_ms']:.1f} ms, "
         f"{row['fps']:.1f} frames/s, {row['rss_mb']:.0f} MB"
     )
 

@@ -32,13 +32,18 @@ def headless(path: Path, *words: str) -> Process:
     return Process([*command, *words], dict(os.environ), path.with_suffix(".log"))
 
 
+def wait_for(path: Path) -> None:
+    """Wait until a recording has its first pictures."""
+    eventually(lambda: path.exists() and path.stat().st_size > 300_000, what="a recording")
+
+
 @pytest.mark.slow
 def test_after_kill_9_all_but_the_last_second_is_read(tmp_path: Path) -> None:
     chance = random.Random(1)
     for number in range(KILLS):
         path = tmp_path / f"{number}.mcap"
         process = headless(path)
-        eventually(lambda path=path: path.exists() and path.stat().st_size > 300_000, what="a recording")
+        wait_for(path)
         time.sleep(chance.uniform(0.0, 2.0))
         killed_s = time.time()
         process.kill()
@@ -53,7 +58,7 @@ def test_after_kill_9_all_but_the_last_second_is_read(tmp_path: Path) -> None:
 def test_a_recording_ends_with_ctrl_c_and_is_whole(tmp_path: Path) -> None:
     path = tmp_path / "drive.mcap"
     process = headless(path)
-    eventually(lambda: path.exists() and path.stat().st_size > 300_000, what="a recording")
+    wait_for(path)
     process.signal(signal.SIGINT)
     assert process.code() == 0, process.text
     file = McapFile(path)

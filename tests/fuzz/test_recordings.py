@@ -1,6 +1,7 @@
 """Every reader of recordings, over mutants of good files and of those that are made to do harm."""
 
 import itertools
+import json
 import struct
 import zlib
 from collections.abc import Callable
@@ -14,9 +15,13 @@ from rosbags.rosbag2 import StoragePlugin
 
 from handsteer.config import Config
 from handsteer.errors import RecordingError
+from handsteer.messages import CAMERA_INFO, ODOM, WORLD_MARKERS
 from handsteer.recordings import open_recording
 from handsteer.recordings.mcap_reader import McapFile
 from handsteer.replay.by_time import rerun_by_time
+from handsteer.replay.drive_reader import read_drive
+from handsteer.replay.report_charts import drive_map, latencies, timeline
+from handsteer.replay.report_words import totals
 from handsteer.replay.rerun import has_journals, recorded_config, rerun
 from tests.fuzz.mutants import hold, mutants
 from tests.recordings.test_bags import as_ros1, as_ros2
@@ -25,8 +30,13 @@ KEPT = ("/replay/hand_sign_control", "/gesture/hand_sign", "/robot_diff_drive_co
 BOMB_BYTES = 2_000_000_000
 
 
-def small(recording: Path, path: Path, compression: CompressionType = CompressionType.NONE) -> Path:
-    """Write the first second of a recording, without pictures."""
+def small(
+    recording: Path,
+    path: Path,
+    compression: CompressionType = CompressionType.NONE,
+    topics: tuple[str, ...] = KEPT,
+) -> Path:
+    """Write the first messages of a recording, without pictures."""
     file = McapFile(recording)
     with path.open("wb") as stream:
         # Checksums would hide what is behind them.
@@ -34,7 +44,7 @@ def small(recording: Path, path: Path, compression: CompressionType = Compressio
         writer.start(profile="ros2", library="test")
         writer.add_metadata("handsteer", file.about)
         channels: dict[str, int] = {}
-        for recorded in itertools.islice(file.messages(set(KEPT)), 120):
+        for recorded in itertools.islice(file.messages(set(topics)), 120):
             if recorded.topic not in channels:
                 schema = writer.register_schema(recorded.type, "ros2msg", b"string data")
                 channels[recorded.topic] = writer.register_channel(recorded.topic, "cdr", schema)
@@ -85,6 +95,12 @@ def replay_all(path: Path) -> None:
         pass
 
 
+def report_all(path: Path) -> None:
+    facts = read_drive(open_recording(path))
+    told = [facts.totals(), totals(facts), timeline(facts), drive_map(facts), latencies(facts)]
+    json.dumps(told, allow_nan=False)
+
+
 def of_file(path: Path, read: Callable[[Path], None]) -> Callable[[bytes], None]:
     """Return a function that writes its bytes to ``path`` and calls ``read``."""
 
@@ -107,6 +123,12 @@ def test_replays(recording: Path, tmp_path: Path, caplog: pytest.LogCaptureFixtu
     good = small(recording, tmp_path / "good.mcap")
     replay_all(good)
     assert hold(of_file(tmp_path / "bad.mcap", replay_all), mutants([good.read_bytes()]))
+
+
+def test_reports(recording: Path, tmp_path: Path) -> None:
+    good = small(recording, tmp_path / "good.mcap", topics=(*KEPT, ODOM.name, WORLD_MARKERS.name, CAMERA_INFO.name))
+    report_all(good)
+    assert hold(of_file(tmp_path / "bad.mcap", report_all), mutants([good.read_bytes()]))
 
 
 def test_bags_of_ros1(recording: Path, tmp_path: Path) -> None:

@@ -23,6 +23,7 @@ _EXAMPLES = """Examples:
   handsteer study examples/study.yaml            compare interfaces with people
   handsteer run --record drive.mcap              drive, and keep all of it
   handsteer replay drive.mcap                    the same frames again: the same commands?
+  handsteer report drive.mcap                    what happened, as an HTML page
   handsteer signs evaluate photos/               how well are signs recognised?
   handsteer bench --course slalom                how well does one drive?
   handsteer camera --transport ros1              one node, in a ROS 1 graph
@@ -45,7 +46,7 @@ for verb in ("run", "recognize", "study"):
     app.command(f"handsteer.cli.{verb}:{verb}", name=verb)
 for verb in ("models", "doctor", "ros"):
     app.command(f"handsteer.cli.installation:{verb}", name=verb)
-for verb in ("record", "replay"):
+for verb in ("record", "replay", "report"):
     app.command(f"handsteer.cli.recordings:{verb}", name=verb)
 app.command("handsteer.cli.signs:app", name="signs")
 app.command("handsteer.cli.bench:bench", name="bench")

@@ -1,4 +1,4 @@
-"""``handsteer record`` and ``handsteer replay``: record a graph; run a recording again, and compare."""
+"""``handsteer record``, ``replay`` and ``report``: record a graph; run it again, and compare; what happened in it."""
 
 import json as json_format
 from dataclasses import asdict
@@ -18,6 +18,9 @@ from handsteer.recordings.about import describe
 from handsteer.recordings.graph_recorder import GraphRecorder
 from handsteer.replay.by_time import TOLERANCE_S, rerun_by_time
 from handsteer.replay.compare import Comparison, Moment, compare, differing_software
+from handsteer.replay.drive_facts import DriveFacts
+from handsteer.replay.drive_reader import read_drive
+from handsteer.replay.report_words import heading, sign_totals, totals
 from handsteer.replay.rerun import has_journals, recorded_config, rerun
 from handsteer.transports import join
 
@@ -116,6 +119,49 @@ def replay(
     else:
         _print_result(comparison, others, len(moments), is_exact=has_journals(file))
     return 1 if comparison.differing else 0
+
+
+def report(recording: Path, *, output: Path | None = None, force: Flag = False, json: Flag = False) -> None:
+    """Report what happened in a recording, in one HTML page that needs no network, and print the totals.
+
+    The page shows signs, velocities, the driven path, latencies, and each stop with its reason and frame.
+
+    Example: handsteer report drive.mcap --output drive.html
+
+    Parameters
+    ----------
+    recording
+        MCAP file, or a bag of ROS 1 or 2; it may be cut off.
+    output
+        The page; by default next to the recording, as drive.html.
+    force
+        Overwrite the page if it exists.
+    json
+        Print the totals in JSON, and nothing else; no page is written.
+    """
+    if json:
+        print(json_format.dumps(read_drive(open_recording(recording)).totals()))
+        return
+    # Only the page needs the package plotly.
+    from handsteer.replay.report import write_report  # noqa: PLC0415
+
+    page = output or recording.with_suffix(".html")
+    _print_totals(write_report(recording, page, force=force))
+    print(f"report: {page}")
+
+
+def _print_totals(facts: DriveFacts) -> None:
+    lines = [heading(facts)]
+    for total in totals(facts)[1:]:
+        more = f" ({total.more})" if total.more else ""
+        lines.append(f"{total.name + ':':12}{total.value}{more}")
+    signs = ", ".join(f"{total.name} {total.value}" for total in sign_totals(facts))
+    lines += [f"{'signs:':12}{signs}"] if signs else []
+    for line in lines:
+        # Names in a recording may contain what controls a terminal.
+        print("".join(each if each.isprintable() else "?" for each in line))
+    for problem in facts.problems:
+        say(f"{facts.path}: {problem}")
 
 
 def _make_folder(folder: Path) -> None:

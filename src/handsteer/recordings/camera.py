@@ -2,6 +2,7 @@
 
 import itertools
 import logging
+import math
 import statistics
 from collections.abc import Iterator
 from pathlib import Path
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 
 from handsteer.cameras import EndOfStream, Frame
 from handsteer.cameras.files import AtEnd
-from handsteer.clock import Clock
+from handsteer.clock import Clock, SteppedClock
 from handsteer.errors import CameraUnreadable, FrameError, RecordingError
 from handsteer.images import bgr_image, jpeg_picture
 from handsteer.messages import IMAGE_COMPRESSED, IMAGE_RAW, CompressedImage, Image, type_name
@@ -54,11 +55,11 @@ class RecordingCamera:
         except RecordingError as error:
             raise CameraUnreadable(str(error)) from None
         self._topic = self._find_topic()
-        times_s = [recorded.time_s for recorded in itertools.islice(self._pictures(), _TIMED)]
+        times_s = [recorded.time_s for recorded in itertools.islice(self.pictures(), _TIMED)]
         gaps_s = [after - before for before, after in itertools.pairwise(times_s) if after > before]
         period_s = statistics.median(gaps_s) if gaps_s else _DEFAULT_PERIOD_S
         self.period_s = min(max(period_s, _SHORTEST_PERIOD_S), _LONGEST_PERIOD_S)
-        self._frames = self._pictures()
+        self._frames = self.pictures()
 
     def read(self) -> Frame | None:
         """Return the next frame; None after the last one if the end holds, and for a damaged one.
@@ -68,7 +69,7 @@ class RecordingCamera:
         """
         recorded = next(self._frames, None)
         if recorded is None and self._at_end == "loop":
-            self._frames = self._pictures()
+            self._frames = self.pictures()
             recorded = next(self._frames, None)
         if recorded is None:
             if self._at_end == "end":
@@ -83,7 +84,13 @@ class RecordingCamera:
         """Stop reading; may be called twice."""
         self._frames = iter(())
 
-    def _pictures(self) -> Iterator[Recorded]:
+    @property
+    def began_s(self) -> float:
+        """When the recording began, in seconds since the epoch of its stamps."""
+        return self._recording.began_s
+
+    def pictures(self) -> Iterator[Recorded]:
+        """Yield the messages with pictures, from the first one on."""
         return self._recording.messages({self._topic})
 
     def _find_topic(self) -> str:
@@ -98,6 +105,26 @@ class RecordingCamera:
         if len(found) > 1 and not ours:
             log.warning("%s: playing %s; it also has pictures on %s", self.name, topic, ", ".join(found[1:]))
         return topic
+
+
+def recorded_frames(path: Path, begin_s: float = 0.0, end_s: float = math.inf) -> Iterator[Frame]:
+    """Yield the pictures of a recording from ``begin_s`` to ``end_s``, with their times, without damaged ones.
+
+    Times are in seconds since the recording began.
+
+    Raises:
+        CameraUnreadable: It cannot be read, or contains no pictures.
+    """
+    camera = RecordingCamera(path, SteppedClock(), at_end="end")
+    for recorded in camera.pictures():
+        time_s = recorded.time_s - camera.began_s
+        if time_s > end_s:
+            return
+        if time_s >= begin_s:
+            try:
+                yield Frame(picture_of(recorded), time_s)
+            except (FrameError, RecordingError):
+                continue
 
 
 def picture_of(recorded: Recorded) -> NDArray[np.uint8]:

@@ -73,7 +73,7 @@ def read_spins(file: Recording, node: str) -> Iterator[Spin]:
     seen: dict[str, OrderedDict[int, Recorded]] = {}
     for recorded in file.messages():
         if recorded.topic == journal:
-            waiting.append(_parse(recorded))
+            waiting.append(parse_spin(recorded))
         elif not recorded.topic.startswith("/replay/"):
             of_topic = seen.setdefault(recorded.topic, OrderedDict())
             of_topic[recorded.number] = recorded
@@ -94,7 +94,12 @@ def _filled(spin: Spin, seen: dict[str, OrderedDict[int, Recorded]]) -> Spin:
     return replace(spin, got=[replace(got, recorded=recorded) for got, recorded in zip(spin.got, found, strict=True)])
 
 
-def _parse(recorded: Recorded) -> Spin:
+def parse_spin(recorded: Recorded) -> Spin:
+    """Return the entry of a journal, without the messages that it names.
+
+    Raises:
+        RecordingError: It is damaged.
+    """
     try:
         text = recorded.message.data
         entry = json.loads(text if len(text) <= _LONGEST_ENTRY else "")

@@ -13,7 +13,15 @@ from handsteer.clock import RealClock
 from handsteer.config import Config, VirtualHandConfig
 from handsteer.errors import CameraNotFound, DatasetError
 from handsteer.recognition.recognizer import open_landmarker
-from handsteer.training.custom.collect import Collector, Facts, Status, collect_live, collect_recorded, largest
+from handsteer.training.custom.collect import (
+    Collector,
+    Facts,
+    Status,
+    collect_live,
+    collect_moment,
+    collect_recorded,
+    largest,
+)
 from tests.recognition.hands import moved, show_sign
 
 FACTS = Facts("Hi", "me", "today", "test")
@@ -146,3 +154,20 @@ def test_recordings_without_a_hand_are_refused(tmp_path: Path, pictures: list[np
         collect_recorded(tmp_path, landmarker, FACTS, 1.0)
     with pytest.raises(CameraNotFound):
         collect_recorded(tmp_path / "gone.mp4", landmarker, FACTS, 1.0)
+
+
+@pytest.mark.slow
+def test_a_moment_of_a_recording_becomes_a_take(recording: Path) -> None:
+    landmarker = open_landmarker(Config())
+    take = collect_moment(recording, landmarker, FACTS, 1.5, 2.0)
+    assert 10 <= len(take.hands) <= 17
+    assert take.times_s[0] == 0.0
+    assert take.times_s[-1] <= 0.5
+    with pytest.raises(DatasetError, match="no hand from 100 to 101 s"):
+        collect_moment(recording, landmarker, FACTS, 100.0, 101.0)
+
+
+@pytest.mark.slow
+def test_a_whole_recording_becomes_takes(recording: Path) -> None:
+    takes = collect_recorded(recording, open_landmarker(Config()), FACTS, 2.0)
+    assert 3 <= len(takes) <= 4

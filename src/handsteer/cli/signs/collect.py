@@ -2,6 +2,7 @@
 
 import datetime
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -20,11 +21,12 @@ from handsteer.errors import DatasetError
 from handsteer.recognition.custom_signs import label_for
 from handsteer.recognition.hand import Hand
 from handsteer.recognition.recognizer import draw_hand, open_landmarker
-from handsteer.training.custom.collect import Collector, Facts, Status, collect_live, collect_recorded
+from handsteer.training.custom.collect import Collector, Facts, Status, collect_live, collect_moment, collect_recorded
 from handsteer.training.custom.dataset import Dataset, load_dataset, save_dataset
 from handsteer.training.custom.keypoint_csv import read_class_names, read_keypoints
 
 _DEFAULTS = TeachConfig()
+_AROUND_S = 0.25
 
 
 def collect(
@@ -37,6 +39,8 @@ def collect(
     takes: int = _DEFAULTS.takes,
     take_time: float = _DEFAULTS.take_time,
     countdown: float = _DEFAULTS.countdown,
+    from_: Annotated[Path | None, Parameter(name="--from")] = None,
+    at: Annotated[list[str] | None, Parameter(consume_multiple=True)] = None,
     hold: Flag = False,
     undo: Flag = False,
     config_file: ConfigFile = None,
@@ -70,6 +74,11 @@ def collect(
         Duration of each take, in seconds.
     countdown
         Countdown before each take, in seconds.
+    from_
+        Recording of a drive: each moment that --at names becomes a take.
+    at
+        Times in the recording, in seconds since it began, as `handsteer replay` and `report` print them: 12.4, which
+        takes half a second around it, or 12.4-13.0.
     hold
         Record while the space key is held, without a countdown.
     undo
@@ -90,8 +99,17 @@ def collect(
     _check(takes, take_time, countdown, dataset)
     when = session or f"{datetime.datetime.now():%Y-%m-%d %H:%M}"
     facts = Facts(label_for(label, known.labels), person, when, _source_name(config.camera.source))
+    if (from_ is None) != (at is None):
+        raise DatasetError("--from needs --at and --at needs --from: a recording, and its moments in seconds")
     recorded = Path(config.camera.source).expanduser()
-    if recorded.exists() and not recorded.is_char_device():
+    if from_ is not None and at is not None:
+        moments = [_part(word) for word in at]
+        facts = replace(facts, source=from_.name)
+        landmarker = open_landmarker(config)
+        takes_of_moments = [collect_moment(from_, landmarker, facts, *moment) for moment in moments]
+        known = known.with_takes(takes_of_moments)
+        save_dataset(known, dataset)
+    elif recorded.exists() and not recorded.is_char_device():
         new = collect_recorded(recorded, open_landmarker(config), facts, take_time)
         known = known.with_takes(new)
         save_dataset(known, dataset)
@@ -164,6 +182,18 @@ def _sentence(status: Status, label: str, hand: Hand | None) -> str:
         "recording": f"recording {label}: {status.hands} hands{seen}",
         "done": "all takes are done",
     }[status.phase]
+
+
+def _part(word: str) -> tuple[float, float]:
+    """Return begin and end of the part of a recording that ``word`` names: ``12.4`` or ``12.4-13.0``."""
+    begin, dash, end = word.partition("-")
+    try:
+        begin_s, end_s = float(begin), float(end) if dash else float(begin)
+    except ValueError:
+        begin_s = end_s = math.nan
+    if not 0 <= begin_s <= end_s < math.inf:
+        raise DatasetError(f"--at: {word!r} should be a time in seconds, as 12.4, or two, as 12.4-13.0")
+    return (begin_s, end_s) if dash else (max(0.0, begin_s - _AROUND_S), begin_s + _AROUND_S)
 
 
 def _source_name(source: str) -> str:

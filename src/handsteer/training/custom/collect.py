@@ -15,6 +15,8 @@ from handsteer.cameras.files import PHOTO_SUFFIXES, find_photos, read_photo, vid
 from handsteer.clock import Clock
 from handsteer.errors import DatasetError
 from handsteer.recognition.hand import Hand, Landmarker
+from handsteer.recordings import is_recording
+from handsteer.recordings.camera import recorded_frames
 from handsteer.training.custom.dataset import Take
 
 Phase = Literal["ready", "countdown", "recording", "done"]
@@ -22,6 +24,8 @@ Phase = Literal["ready", "countdown", "recording", "done"]
 _FEWEST: Final = 5
 """Minimum number of hands in a take."""
 
+
+_RUN_UP_S: Final = 0.5
 
 _HELD_S: Final = 0.7
 """Terminals report a held key by repeating it; the first repetition comes after up to 0.66 s."""
@@ -180,23 +184,51 @@ def collect_live(
 
 
 def collect_recorded(source: Path, landmarker: Landmarker, facts: Facts, take_s: float) -> list[Take]:
-    """Return the takes in a video, a photo or a folder of photos.
+    """Return the takes in a video, a recording, a photo or a folder of photos.
 
-    A video is divided into takes of ``take_s`` seconds. Each photo is a separate take; the photos of a folder form a
-    session.
+    A video or recording is divided into takes of ``take_s`` seconds. Each photo is a separate take; the photos of a
+    folder form a session.
 
     Raises:
         CameraNotFound: The file does not exist, or the folder contains no photos.
         CameraUnreadable: A file cannot be decoded.
         DatasetError: No hand was found in it.
     """
-    if source.is_dir() or source.suffix.lower() in PHOTO_SUFFIXES:
+    if (source.is_dir() and not is_recording(source)) or source.suffix.lower() in PHOTO_SUFFIXES:
         takes = list(_photo_takes(source, landmarker, facts))
     else:
         takes = list(_video_takes(source, landmarker, facts, take_s))
     if not takes:
         raise DatasetError(f"{source}: no hand was found in it")
     return takes
+
+
+def collect_moment(recording: Path, landmarker: Landmarker, facts: Facts, begin_s: float, end_s: float) -> Take:
+    """Return the hands in a part of a recording as a take, such as a moment at which a sign was not recognised.
+
+    Args:
+        recording: An MCAP file, or a bag of ROS 1 or 2.
+        landmarker: Finds the hands.
+        facts: Label and origin of the take.
+        begin_s: Begin of the part, in seconds since the recording began.
+        end_s: Its end.
+
+    Raises:
+        CameraUnreadable: The recording cannot be read, or contains no pictures.
+        DatasetError: There is no hand in that part.
+    """
+    landmarker.reset()
+    hands: list[Hand] = []
+    times_s: list[float] = []
+    # The landmarker follows a hand from picture to picture, so it begins a little earlier.
+    for frame in recorded_frames(recording, begin_s - _RUN_UP_S, end_s):
+        hand = largest(landmarker.detect(frame.image))
+        if hand is not None and frame.captured_s >= begin_s:
+            hands.append(hand)
+            times_s.append(frame.captured_s)
+    if not hands:
+        raise DatasetError(f"{recording}: there is no hand from {begin_s:g} to {end_s:g} s")
+    return facts.take(hands, times_s)
 
 
 def largest(hands: Sequence[Hand]) -> Hand | None:
@@ -219,7 +251,7 @@ def _video_takes(source: Path, landmarker: Landmarker, facts: Facts, take_s: flo
     hands: list[Hand] = []
     times_s: list[float] = []
     end_s = take_s
-    for frame in video_frames(source):
+    for frame in recorded_frames(source) if is_recording(source) else video_frames(source):
         if frame.captured_s >= end_s:
             end_s += take_s
             if len(hands) >= _FEWEST:
