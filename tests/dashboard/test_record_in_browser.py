@@ -64,6 +64,16 @@ def test_the_driver_records_everybody_sees_it_and_the_file_is_downloaded(visit: 
     topics = {recorded.topic for recorded in file.messages()}
     assert file.problem is None
     assert {"/image_raw/compressed", "/gesture/hand_sign", "/audit", "/diagnostics"} <= topics
+
+    press(page, "Make report")
+    page.get_by_role("link", name="Report").wait_for()
+    shown = visit.another_page()
+    faults: list[str] = []
+    shown.on("pageerror", lambda error: faults.append(str(error)))
+    shown.goto(page.url.rstrip("/") + str(page.get_by_role("link", name="Report").get_attribute("href")))
+    shown.locator(".js-plotly-plot .main-svg").first.wait_for()  # its scripts run, in their sandbox
+    assert path.name in shown.locator("h1").inner_text()
+    assert faults == []
     assert visit.troubles == []
 
 
