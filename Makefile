@@ -136,7 +136,7 @@ COMPILE = uv pip compile --quiet --universal --python-version 3.11 --generate-ha
 	--no-emit-index-url --no-annotate --no-header --upgrade
 lock:
 	@test -x $(BIN)/uv || { python3 -m venv $(VENV) && $(BIN)/python -m pip install --quiet uv; }
-	@PATH="$(BIN):$$PATH" $(COMPILE) pyproject.toml --extra sim --extra page --extra record --group setup --output-file requirements.txt
+	@PATH="$(BIN):$$PATH" $(COMPILE) pyproject.toml --extra sim --extra page --extra record --extra foxglove --group setup --output-file requirements.txt
 	@PATH="$(BIN):$$PATH" $(COMPILE) pyproject.toml --extra all --group setup --group dev --output-file requirements-dev.txt
 	@PATH="$(BIN):$$PATH" $(COMPILE) --group pyproject.toml:ros2 --output-file requirements-ros2.txt
 	@echo "mediapipe==0.10.21" | PATH="$(BIN):$$PATH" $(COMPILE) - --output-file benchmarks/tutorial-requirements.txt

@@ -24,6 +24,7 @@
     ├── RecordingError         a recording cannot be written, read or replayed
     ├── TransportError         a topic cannot be published or subscribed to
     ├── DashboardError         the web page cannot be served
+    ├── LiveError              topics cannot be served to other programs, or a program asks for them wrongly
     └── PackageMissing         a Python package that is needed is not installed
 
 A message is one line that reports what was wrong, where, and what would be right. Only :mod:`handsteer.cli` prints one
@@ -120,6 +121,10 @@ class TransportError(HandsteerError):
 
 class DashboardError(HandsteerError):
     """The web page cannot be served."""
+
+
+class LiveError(HandsteerError):
+    """Topics cannot be served to other programs, or a program asks for them wrongly."""
 
 
 class PackageMissing(HandsteerError):  # noqa: N818

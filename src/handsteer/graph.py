@@ -17,6 +17,7 @@ import logging
 import math
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from handsteer.audit import setting_changes
 from handsteer.clock import Clock, RealClock, SteppedClock
@@ -34,11 +35,14 @@ from handsteer.making import (
 from handsteer.messages import (
     GESTURE_JOY,
     HAND_SIGN,
+    IMAGE_ANNOTATED,
     IMAGE_COMPRESSED,
     IMAGE_RAW,
     ODOM,
+    RECORDED,
     SCAN,
     STEERING_CMD_VEL,
+    Topic,
 )
 from handsteer.nodes.auditing import Auditor
 from handsteer.nodes.base import Node
@@ -114,6 +118,7 @@ class Graph:
         self._added: tuple[Node, ...] = ()
         self.recognition.journal, self.control.journal = journals
         self._auditor = Auditor(self.transport, _NAME, self.clock)
+        self._cmd_vel = cmd_vel
         recorded = (IMAGE_COMPRESSED, cmd_vel, *((SCAN,) if config.collision_monitor.enabled else ()))
         self.recording = RunRecording(*wires, self._auditor, (self.recognition, self.control), recorded)
         self._link = link
@@ -135,6 +140,12 @@ class Graph:
         """The nodes in the order in which they are stopped: the control sends its zero first, the robot ends last."""
         steering = () if self._steering is None else (self._steering,)
         return (self.control, *steering, self.camera, self.recognition, *self._added, self.robot)
+
+    @property
+    def topics(self) -> tuple[Topic[Any], ...]:
+        """All topics that programs next to the graph may look at, including those on demand."""
+        on_demand = (IMAGE_RAW, IMAGE_ANNOTATED, SCAN)
+        return (*RECORDED, IMAGE_COMPRESSED, self._cmd_vel, *on_demand)
 
     def add(self, node: Node) -> None:
         """Run and stop ``node``, on this graph's transport and clock, with the others."""

@@ -216,6 +216,12 @@ DIAGNOSTICS = Topic("/diagnostics", DiagnosticArray, is_global=True, depth=10)
 # Who did what; see handsteer.audit.
 AUDIT = Topic("/audit", Log, depth=50)
 
+RECORDED: tuple[Topic[Any], ...] = (
+    *(CAMERA_INFO, HAND_SIGN, GESTURE_JOY, JOY, STEERING_CMD_VEL, STOP, STOPPED, ODOM, TF, JOINT_STATES, CLOCK),
+    *(ROBOT_DESCRIPTION, WORLD_MARKERS, DIAGNOSTICS, AUDIT),
+)
+"""What is recorded besides pictures, commands and laser scans: their topics depend on the graph."""
+
 
 def type_name(message_type: type) -> str:
     """Return the ROS name of a message class, as ``std_msgs/msg/String``."""

@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from handsteer.config import DashboardConfig
-from handsteer.dashboard.access import Access, is_loopback
+from handsteer.dashboard.access import Access
 from handsteer.errors import DashboardError
 from tests.dashboard.network import cookies_of
 from tests.dashboard.served import PATIENCE_S, Site
@@ -230,7 +230,6 @@ def test_an_address_of_another_machine_is_named(host: str) -> None:
     ("host", "alone"), [("127.0.0.1", True), ("::1", True), ("localhost", True), ("0.0.0.0", False)]
 )
 def test_what_only_this_machine_can_reach(host: str, alone: bool) -> None:
-    assert is_loopback(host) is alone
     assert (Access.to(host).token is None) is alone
 
 
@@ -240,3 +239,9 @@ def test_only_the_token_is_admitted(given_text: str) -> None:
     assert not access.admits(given_text)
     assert not access.admits(None)
     assert access.admits(access.token)
+
+
+def test_recordings_are_for_those_with_the_token_only(open_site: Site) -> None:
+    for path in ("/recordings/drive.mcap", "/recordings/drive.mcap/report"):
+        assert open_site.get(path).status == 401
+        assert open_site.get(path, Authorization=f"Bearer {token_of(open_site)}").status == 404

@@ -9,7 +9,7 @@ from cyclopts import Parameter
 
 from handsteer.cli import signals
 from handsteer.cli.app import ConfigFile, Flag, Parameters
-from handsteer.cli.running import say, settings, signals_ignored
+from handsteer.cli.running import printable, say, settings, signals_ignored
 from handsteer.clock import SteppedClock
 from handsteer.errors import RecordingError
 from handsteer.recognition.recognizer import model_files
@@ -111,7 +111,7 @@ def replay(
     for moment in compare(results, comparison, file.began_s):
         moments.append(_described(moment, diff))
         if not json and len(moments) <= _MOST_PRINTED:
-            print(_line(moments[-1]))
+            print(printable(_line(moments[-1])))
     if file.problem:
         say(f"{recording}: {file.problem}")
     if json:
@@ -160,8 +160,7 @@ def _print_totals(facts: DriveFacts) -> None:
     signs = ", ".join(f"{total.name} {total.value}" for total in sign_totals(facts))
     lines += [f"{'signs:':12}{signs}"] if signs else []
     for line in lines:
-        # Names in a recording may contain what controls a terminal.
-        print("".join(each if each.isprintable() else "?" for each in line))
+        print(printable(line))
     for problem in facts.problems:
         say(f"{facts.path}: {problem}")
 
@@ -202,4 +201,4 @@ def _print_result(comparison: Comparison, others: list[str], moments: int, *, is
     result = f"{comparison.differing} moments differ" if comparison.differing else same
     print(f"replayed {comparison.duration_s:.1f} s: {counts}; {result}")
     for other in others:
-        print(f"other software: {other}")
+        print(printable(f"other software: {other}"))

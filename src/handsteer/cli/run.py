@@ -17,6 +17,7 @@ from handsteer.config.driving import PRESETS
 from handsteer.dashboard.page_process import PageProcess
 from handsteer.errors import ConfigError
 from handsteer.graph import Graph
+from handsteer.live.process import LiveProcess
 from handsteer.parameters import from_parameters
 from handsteer.recordings.audit_log import AuditLog, audit_log_path
 from handsteer.study.session import Task
@@ -39,6 +40,7 @@ def run(
     duration: float | None = None,
     fast: Flag = False,
     record: Path | None = None,
+    foxglove: int | None = None,
     json: Flag = False,
     config_file: ConfigFile = None,
     parameters: Parameters = None,
@@ -75,6 +77,8 @@ def run(
         Run as fast as possible on simulated time, without the page; the same input gives the same commands.
     record
         Record all topics to this MCAP file, which must not exist yet, for `handsteer replay` and `handsteer report`.
+    foxglove
+        Serve all topics to Foxglove and PlotJuggler on this port, such as 8765; 0 picks a free one.
     json
         Print a summary in JSON at the end, and nothing else.
     config_file
@@ -85,6 +89,7 @@ def run(
         "camera": {"source": camera},
         "robot": {**_robot(robot), "world": world},
         "dashboard": {"host": host, "port": port, "token": "always" if token else None},
+        "foxglove": {"port": foxglove},
     }
     base = {"camera": {"at_end": "end"}} if headless else {}
 
@@ -93,6 +98,8 @@ def run(
 
     if headless and settle({}).camera.source == "browser":
         raise ConfigError("--camera browser needs the page, which --headless and --fast leave out")
+    if fast and settle({}).foxglove.port is not None:
+        raise ConfigError("--foxglove shows a run in real time: leave out --fast, or record the run and open the file")
     if duration is not None and not duration > 0:
         raise ConfigError(f"--duration: {duration:g} should be greater than 0 seconds")
     with _linked(settle, ros_args, fast=fast) as (settings, link):
@@ -144,6 +151,7 @@ def drive(
     """Run a graph until it ends, ``duration`` seconds have passed, or a signal comes; return its statistics."""
     # Started first: it loads its libraries while this process loads the models.
     page = None if headless else PageProcess()
+    live = None if settings.foxglove.port is None else LiveProcess()
     try:
         with (
             Graph(settings, SteppedClock() if fast else RealClock(), link=link, steering=page is None) as graph,
@@ -151,6 +159,9 @@ def drive(
         ):
             if record is not None:
                 graph.record(record)
+            if live is not None:
+                address = live.serve(graph.transport, graph.clock, graph.topics, settings.foxglove)
+                say(f"Foxglove and PlotJuggler see all topics at {address}")
             try:
                 _run_until_end(graph, duration, file, study, page, fast=fast)
             except KeyboardInterrupt:
@@ -160,9 +171,11 @@ def drive(
                     graph.stop()
             return graph.summary()
     finally:
-        if page is not None:
-            with signals_ignored():
+        with signals_ignored():
+            if page is not None:
                 page.stop()
+            if live is not None:
+                live.stop()
 
 
 def _audit_log(graph: Graph, *, is_simulated_time: bool) -> AbstractContextManager[object]:

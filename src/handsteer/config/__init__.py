@@ -30,6 +30,7 @@ __all__ = [
     "Config",
     "ControlConfig",
     "DashboardConfig",
+    "FoxgloveConfig",
     "JoyConfig",
     "JoystickConfig",
     "LandmarksConfig",
@@ -108,6 +109,25 @@ class DashboardConfig(Section):
         return self.open_browser and self.token == "auto"
 
 
+class FoxgloveConfig(Section):
+    """Topics for Foxglove and PlotJuggler, by the Foxglove WebSocket protocol."""
+
+    port: int | None = Field(
+        None, ge=0, le=65535, description="Port on which `run` serves all topics; none by default; 0 picks a free one"
+    )
+    host: str = Field(
+        "127.0.0.1",
+        min_length=1,
+        description="Address that they are served on; any other than 127.0.0.1 makes them reachable from other "
+        "machines, which need the token in the printed address",
+    )
+    token: Literal["auto", "always"] = Field(
+        "auto",
+        description="When a program needs the token: auto if other machines can reach the address, or always, for "
+        "machines with several users and for viewers on other web sites",
+    )
+
+
 class Config(Section):
     """All parameters, by section."""
 
@@ -123,6 +143,7 @@ class Config(Section):
     teach: TeachConfig = TeachConfig()
     recording: RecordingConfig = RecordingConfig()
     dashboard: DashboardConfig = DashboardConfig()
+    foxglove: FoxgloveConfig = FoxgloveConfig()
 
     @model_validator(mode="after")
     def _monitors_one_robot(self) -> "Config":

@@ -7,7 +7,6 @@ page in a frame either.
 
 import hashlib
 import hmac
-import ipaddress
 import secrets
 from dataclasses import dataclass, field
 from http.cookies import CookieError, SimpleCookie
@@ -19,6 +18,7 @@ from starlette.responses import PlainTextResponse, RedirectResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from handsteer.dashboard.limits import Connections
+from handsteer.transports.addresses import is_loopback
 
 # NiceGUI's pages contain inline scripts and styles, and Vue compiles their templates.
 _CONTENT: Final = {
@@ -150,14 +150,6 @@ class AccessMiddleware:
                 send = _with_session(send, scope, session)
             scope.setdefault("state", {})[SESSION] = session if session and access.sessions.knows(session) else ""
             await self._app(scope, receive, send)
-
-
-def is_loopback(host: str) -> bool:
-    """Return whether ``host``, a name or an address, is this machine's loopback, which no other machine can reach."""
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return host == "localhost"
 
 
 async def _refuse(answer: Response, scope: Scope, receive: Receive, send: Send) -> None:

@@ -1,9 +1,6 @@
 """The web server of the page, on its own thread next to the graph."""
 
-import errno
 import functools
-import os
-import socket
 import ssl
 import threading
 import time
@@ -42,6 +39,7 @@ from handsteer.making import cmd_vel_topic
 from handsteer.messages import CMD_VEL, Topic
 from handsteer.nodes.steering import SteeringNode
 from handsteer.study.session import Session
+from handsteer.transports.addresses import host_for_others, listen
 from handsteer.transports.base import Transport
 
 _START_TIMEOUT_S = 20.0
@@ -134,7 +132,9 @@ class Dashboard:
         config = self._config
         try:
             certificate = _certificate(config)
-            listener = _listen(config.host, config.port)
+            listener = listen(
+                config.host, config.port, _SEND_BUFFER_BYTES, options=("--host", "--port"), error=DashboardError
+            )
         except DashboardError:
             _one_at_a_time.release()
             raise
@@ -148,7 +148,7 @@ class Dashboard:
         self._thread.start()
         self._wait_until_served()
         scheme = "https" if certificate else "http"
-        address = f"{scheme}://{_shown(config.host)}:{listener.getsockname()[1]}"
+        address = f"{scheme}://{host_for_others(config.host)}:{listener.getsockname()[1]}"
         path = "" if self.context.study is None else "/study"
         return f"{address}{path or '/'}?token={access.token}" if access.token else f"{address}{path}"
 
@@ -180,41 +180,6 @@ class Dashboard:
                 self.stop()
                 raise DashboardError("the page's server did not start; its log says why")
             time.sleep(0.01)
-
-
-def _listen(host: str, port: int) -> socket.socket:
-    try:
-        family, _, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)[0]
-    except OSError as error:
-        raise DashboardError(f"--host {host} is no address of this machine: {error.strerror}") from None
-    listener = socket.socket(family, socket.SOCK_STREAM)
-    if os.name == "posix":  # on other systems, this option lets two programs use the same port
-        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-    listener.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BUFFER_BYTES)
-    try:
-        listener.bind(address)
-        listener.listen()
-    except OSError as error:
-        listener.close()
-        if error.errno == errno.EADDRNOTAVAIL:
-            raise DashboardError(
-                f"--host {host} is no address of this machine: 0.0.0.0 stands for all it has"
-            ) from None
-        problem = "is in use" if error.errno == errno.EADDRINUSE else f"cannot be used ({error.strerror})"
-        raise DashboardError(f"port {port} on {host} {problem}: choose another with --port N (0: a free one)") from None
-    return listener
-
-
-def _shown(host: str) -> str:
-    """Return the address of this machine for others when the page is served on ``host``."""
-    if host in {"0.0.0.0", "::", ""}:
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-            try:
-                probe.connect(("203.0.113.1", 9))  # sends nothing; only determines the route
-                host = str(probe.getsockname()[0])
-            except OSError:  # no network
-                host = socket.gethostname()
-    return f"[{host}]" if ":" in host else host
 
 
 def _settings(application: FastAPI) -> uvicorn.Config:

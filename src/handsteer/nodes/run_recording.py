@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from handsteer.audit import INFO, WARN, AuditCode, AuditEvent
 from handsteer.clock import Clock, SteppedClock
 from handsteer.errors import RecordingError
-from handsteer.messages import Topic
+from handsteer.messages import RECORDED, Topic
 from handsteer.nodes.auditing import Auditor
 from handsteer.nodes.base import Node
 from handsteer.nodes.journal import journal_topic
@@ -86,7 +86,7 @@ class RunRecording:
 
     def _open(self, path: Path, about: Mapping[str, str], prepare: Callable[[], None]) -> "Recorder":
         # Only recordings need the package mcap.
-        from handsteer.recordings.recorder import RECORDED, Recorder  # noqa: PLC0415
+        from handsteer.recordings.recorder import Recorder  # noqa: PLC0415
 
         waits = isinstance(self._clock, SteppedClock)
         topics = (*RECORDED, *self._topics)

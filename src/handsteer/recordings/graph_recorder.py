@@ -5,9 +5,9 @@ import time
 from pathlib import Path
 
 from handsteer.config import Config, cmd_vel_type
-from handsteer.messages import IMAGE_COMPRESSED, IMAGE_RAW, cmd_vel
+from handsteer.messages import IMAGE_COMPRESSED, IMAGE_RAW, RECORDED, cmd_vel
 from handsteer.recordings.about import describe
-from handsteer.recordings.recorder import RECORDED, Recorder
+from handsteer.recordings.recorder import Recorder
 from handsteer.transports.base import Session
 
 # Nodes of other processes appear late.

@@ -6,7 +6,7 @@ from typing import Any
 
 from handsteer.errors import RecordingError, needing
 from handsteer.messages import Topic, type_name
-from handsteer.transports.ros2.encoding import type_hash, types
+from handsteer.transports.ros2.encoding import message_definition, type_hash
 
 with needing("recording", "record", "mcap"):
     from mcap.writer import CompressionType, Writer
@@ -101,8 +101,8 @@ class McapWriter:
 
     def _register(self, topic: Topic[Any], name: str, kind: str) -> int:
         if kind not in self._schemas:
-            definition, _ = types().generate_msgdef(kind, ros_version=2)
-            self._schemas[kind] = self._writer.register_schema(kind, "ros2msg", definition.encode())
+            definition = message_definition(kind).encode()
+            self._schemas[kind] = self._writer.register_schema(kind, "ros2msg", definition)
         durability = _TRANSIENT_LOCAL if topic.latched else _VOLATILE
         qos = _QOS.format(depth=topic.depth, durability=durability)
         about = {"offered_qos_profiles": qos, "topic_type_hash": type_hash(kind)}

@@ -13,23 +13,8 @@ from typing import Any
 from handsteer.clock import Clock
 from handsteer.images import bgr_image, jpeg_message
 from handsteer.messages import (
-    AUDIT,
-    CAMERA_INFO,
-    CLOCK,
-    DIAGNOSTICS,
-    GESTURE_JOY,
-    HAND_SIGN,
     IMAGE_COMPRESSED,
     IMAGE_RAW,
-    JOINT_STATES,
-    JOY,
-    ODOM,
-    ROBOT_DESCRIPTION,
-    STEERING_CMD_VEL,
-    STOP,
-    STOPPED,
-    TF,
-    WORLD_MARKERS,
     CompressedImage,
     Image,
     String,
@@ -38,12 +23,6 @@ from handsteer.messages import (
 from handsteer.recordings.mcap_writer import McapWriter
 from handsteer.transports.base import Received, Transport
 from handsteer.transports.ros2.encoding import encode
-
-RECORDED: tuple[Topic[Any], ...] = (
-    *(CAMERA_INFO, HAND_SIGN, GESTURE_JOY, JOY, STEERING_CMD_VEL, STOP, STOPPED, ODOM, TF, JOINT_STATES, CLOCK),
-    *(ROBOT_DESCRIPTION, WORLD_MARKERS, DIAGNOSTICS, AUDIT),
-)
-"""What is recorded besides pictures, commands and laser scans: their topics depend on the graph."""
 
 _NODE = "recorder"
 # Short, because the other threads wait while messages are encoded.

@@ -178,7 +178,7 @@ class _PipedPublisher(BasePublisher[M]):
         if self._end.alive:
             # All processes of a machine share one monotonic clock.
             sent = (self._number, Received(message, captured_s), time.monotonic())
-            self._pipe.say("publish", *sent, key=self._number, keep=_kept(self.topic))
+            self._pipe.say("publish", *sent, key=self._number, keep=kept(self.topic))
 
     def close(self) -> None:
         self._end()
@@ -221,7 +221,7 @@ class Gateway:
 
     def _subscribe(self, node: str, topic: Topic[Any]) -> None:
         def deliver(received: Received[Any]) -> None:
-            self._pipe.say("message", topic.name, received, key=topic.name, keep=_kept(topic))
+            self._pipe.say("message", topic.name, received, key=topic.name, keep=kept(topic))
 
         self._unsubscribe(topic.name)
         self._subscriptions[topic.name] = self._transport.subscribe(node, topic, deliver)
@@ -232,6 +232,6 @@ class Gateway:
             subscription.close()
 
 
-def _kept(topic: Topic[Any]) -> int:
-    """Return how many messages of ``topic`` may wait; only the newest for pictures, which are large."""
+def kept(topic: Topic[Any]) -> int:
+    """Return how many messages of ``topic`` may wait for a slow reader; of pictures, which are large, the newest."""
     return 1 if topic.type in (Image, CompressedImage) else _KEPT

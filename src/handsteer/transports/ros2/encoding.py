@@ -193,6 +193,12 @@ def compile_type(name: str) -> None:
             compile_type(of[1])
 
 
+def message_definition(name: str) -> str:
+    """Return the definition of the type ``name`` and of all that it contains, as in ``.msg`` files (``ros2msg``)."""
+    definition, _ = types().generate_msgdef(name, ros_version=2)
+    return definition
+
+
 def encode(message: Any) -> bytes:
     """Return ``message`` as little-endian CDR."""
     return bytes(types().serialize_cdr(message, message.__msgtype__))
