@@ -239,3 +239,9 @@ def test_only_the_token_is_admitted(given_text: str) -> None:
     assert not access.admits(given_text)
     assert not access.admits(None)
     assert access.admits(access.token)
+
+
+def test_recordings_are_for_those_with_the_token_only(open_site: Site) -> None:
+    for path in ("/recordings/drive.mcap", "/recordings/drive.mcap/report"):
+        assert open_site.get(path).status == 401
+        assert open_site.get(path, Authorization=f"Bearer {token_of(open_site)}").status == 404

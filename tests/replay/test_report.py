@@ -146,6 +146,13 @@ def test_a_report_is_overwritten_only_on_request(recording: Path, tmp_path: Path
     assert [path.name for path in tmp_path.iterdir()] == ["drive.html"]
 
 
+def test_a_report_never_overwrites_its_recording(recording: Path) -> None:
+    before = recording.read_bytes()
+    with pytest.raises(RecordingError, match="is the recording: give another name"):
+        write_report(recording, recording, force=True)
+    assert recording.read_bytes() == before
+
+
 def test_a_report_that_cannot_be_written_is_an_error(recording: Path, tmp_path: Path) -> None:
     with pytest.raises(RecordingError, match=r"cannot write the report to .*missing"):
         write_report(recording, tmp_path / "missing" / "drive.html")
@@ -169,6 +176,12 @@ def test_the_verb_prints_json(recording: Path, capsys: pytest.CaptureFixture[str
     totals = json.loads(capsys.readouterr().out)
     assert totals["frames"] == 241
     assert not recording.with_suffix(".html").exists()
+
+
+def test_the_report_on_a_folder_is_next_to_it(recording: Path, tmp_path: Path) -> None:
+    as_ros2(recording, tmp_path / "rosbag2-10.00.00", StoragePlugin.MCAP)
+    assert run(["report", str(tmp_path / "rosbag2-10.00.00")]) == 0
+    assert (tmp_path / "rosbag2-10.00.00.html").is_file()
 
 
 def test_the_verb_refuses_what_has_nothing_to_report(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -214,6 +227,17 @@ class TestInABrowser:
                 Axe().run(opened, options={"runOnly": ["wcag2a", "wcag2aa", "best-practice"]}).response["violations"]
             )
             assert [fault["help"] for fault in found] == []
+            panel = opened.locator("#timeline .nsewdrag").last
+            panel.scroll_into_view_if_needed()
+            box = panel.bounding_box()
+            assert box is not None
+            middle = box["y"] + box["height"] / 2
+            opened.mouse.move(box["x"] + 0.25 * box["width"], middle)
+            opened.mouse.down()
+            opened.mouse.move(box["x"] + 0.5 * box["width"], middle, steps=5)
+            opened.mouse.up()
+            zoomed = opened.locator("#timeline").evaluate("chart => chart.layout.xaxis.range")
+            assert zoomed == pytest.approx([2.0, 4.0], abs=0.1)
             opened.emulate_media(color_scheme="dark")
             opened.set_viewport_size({"width": 390, "height": 800})
             drawing = opened.locator("#timeline .main-svg").first

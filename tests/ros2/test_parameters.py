@@ -79,6 +79,19 @@ def test_a_lower_limit_slows_a_driving_robot_at_once(ros2: Ros2Graph) -> None:
     driver.expect((0.3, 0.0), (0.6, 0.0), (0.2, 0.0))
 
 
+def test_a_changed_parameter_is_in_the_audit(ros2: Ros2Graph) -> None:
+    node = f"/told/{NODE}"
+    ros2.node("control", name=node, ros=("-r", "__ns:=/told"))
+    ros2.peer.ask("record", topic="/told/audit", type="Log", fields=["name", "function", "msg"])
+    assert ask(ros2, node, "set_parameters", {"name": "max_linear", "value": 0.2})["results"][0]["successful"]
+
+    def told() -> list[Any]:
+        return [values for _, values in ros2.peer.ask("get", topic="/told/audit")]
+
+    changed = ["told/hand_sign_control", "setting_changed", "changed control.max_linear from 1 to 0.2"]
+    eventually(lambda: changed in told())
+
+
 def test_a_limit_that_is_broken_and_a_change_too_late_are_refused_in_words(ros2: Ros2Graph) -> None:
     node = "/late/my_camera"
     ros2.node("camera", *FORWARD, name=node, ros=("-r", "__ns:=/late"))

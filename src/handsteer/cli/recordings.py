@@ -9,7 +9,7 @@ from cyclopts import Parameter
 
 from handsteer.cli import signals
 from handsteer.cli.app import ConfigFile, Flag, Parameters
-from handsteer.cli.running import say, settings, signals_ignored
+from handsteer.cli.running import printable, say, settings, signals_ignored
 from handsteer.clock import SteppedClock
 from handsteer.errors import RecordingError
 from handsteer.recognition.recognizer import model_files
@@ -111,7 +111,7 @@ def replay(
     for moment in compare(results, comparison, file.began_s):
         moments.append(_described(moment, diff))
         if not json and len(moments) <= _MOST_PRINTED:
-            print(_line(moments[-1]))
+            print(printable(_line(moments[-1])))
     if file.problem:
         say(f"{recording}: {file.problem}")
     if json:
@@ -145,7 +145,9 @@ def report(recording: Path, *, output: Path | None = None, force: Flag = False, 
     # Only the page needs the package plotly.
     from handsteer.replay.report import write_report  # noqa: PLC0415
 
-    page = output or recording.with_suffix(".html")
+    # The name of a folder, such as rosbag2_2026_11_22-10.00.00, has no suffix.
+    whole = recording.resolve()
+    page = output or (whole.with_name(f"{whole.name}.html") if recording.is_dir() else recording.with_suffix(".html"))
     _print_totals(write_report(recording, page, force=force))
     print(f"report: {page}")
 
@@ -158,8 +160,7 @@ def _print_totals(facts: DriveFacts) -> None:
     signs = ", ".join(f"{total.name} {total.value}" for total in sign_totals(facts))
     lines += [f"{'signs:':12}{signs}"] if signs else []
     for line in lines:
-        # Names in a recording may contain what controls a terminal.
-        print("".join(each if each.isprintable() else "?" for each in line))
+        print(printable(line))
     for problem in facts.problems:
         say(f"{facts.path}: {problem}")
 
@@ -200,4 +201,4 @@ def _print_result(comparison: Comparison, others: list[str], moments: int, *, is
     result = f"{comparison.differing} moments differ" if comparison.differing else same
     print(f"replayed {comparison.duration_s:.1f} s: {counts}; {result}")
     for other in others:
-        print(f"other software: {other}")
+        print(printable(f"other software: {other}"))

@@ -58,6 +58,11 @@ def settings(
     return config.load(file, base or {}, service or {}, short, full)
 
 
+def printable(line: str) -> str:
+    """Return ``line`` without what controls a terminal, which names in files of others may contain."""
+    return "".join(each if each.isprintable() else "?" for each in line)
+
+
 def say(message: str) -> None:
     """Print a message to standard error."""
     print(f"handsteer: {message}", file=sys.stderr, flush=True)

@@ -14,7 +14,7 @@ from handsteer.dashboard.access import SESSION
 from handsteer.dashboard.audit import PageAudit
 from handsteer.dashboard.lessons import Lessons
 from handsteer.dashboard.node import DashboardNode
-from handsteer.dashboard.recordings import Recordings
+from handsteer.dashboard.recordings import Recordings, duration_text
 from handsteer.dashboard.remote_graph import RemoteGraph
 from handsteer.dashboard.settings import Settings
 from handsteer.dashboard.state import PageState
@@ -215,6 +215,11 @@ class Page:
         """Show changes, ten times a second; pages extend this."""
         self._driving.update(self.lease(node))
         self._source.set_text(state.camera)
+        recording = self._context.graph.state.recording if self._context.graph is not None else None
+        is_on = recording is not None and recording.ended_s is None
+        switch(self._recorded, "hidden", on=not is_on)
+        if recording is not None and is_on:
+            self._recorded.set_text(duration_text(recording, node.clock.now()))
         self._banner.update(state)
 
     @property
@@ -257,6 +262,7 @@ class Page:
                     ui.link(name, target).props('aria-current="page"' if target == path else "")
             with ui.element("div").classes("right"):
                 self._driving = LeasePanel(self._ask, self._answer)
+                self._recorded = text("recorded hidden", "").props('title="A recording is being made"')
                 self._source = ui.label("").classes("source chip")
                 with ui.element("button").classes("icon-button theme").props('aria-label="Light or dark"'):
                     ui.html(_THEME_ICON, sanitize=False)

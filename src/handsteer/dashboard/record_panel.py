@@ -8,7 +8,7 @@ from contextlib import suppress
 from nicegui import ui
 
 from handsteer.dashboard.page import Page, box, button, card, switch, text
-from handsteer.dashboard.recordings import RECORDINGS_PATH, Recordings
+from handsteer.dashboard.recordings import RECORDINGS_PATH, Recordings, duration_text, size_text
 from handsteer.dashboard.remote_graph import RemoteGraph
 from handsteer.dashboard.viewers import LeaseStatus
 from handsteer.errors import HandsteerError
@@ -66,8 +66,7 @@ class RecordPanel:
         self._trouble.set_text(" ".join(problem for problem in problems if problem))
 
     def _show(self, recording: RecordingState) -> None:
-        until_s = self._graph.clock.now() if recording.ended_s is None else recording.ended_s
-        self._time.set_text(clock_text(until_s - recording.began_s))
+        self._time.set_text(duration_text(recording, self._graph.clock.now()))
         self._about.set_text(" · ".join(part for part in (self._size, recording.path.name) if part))
 
     def _show_links(self, recording: RecordingState | None) -> None:
@@ -118,14 +117,3 @@ def _problem_of(recording: RecordingState | None) -> str:
     ended = f"The recording has ended: {recording.ended_by}. Driving goes on." if recording.ended_by else ""
     lost = f"{recording.lost} messages are missing: the disk was too slow." if recording.lost else ""
     return " ".join(part for part in (ended, lost) if part)
-
-
-def clock_text(seconds: float) -> str:
-    """Return a duration as minutes and seconds, such as ``1:05``."""
-    minutes, rest = divmod(max(0, int(seconds)), 60)
-    return f"{minutes}:{rest:02d}"
-
-
-def size_text(count: int) -> str:
-    """Return the size of a file of ``count`` bytes, such as ``3.1 MB``."""
-    return f"{count / 1e6:.1f} MB" if count < 1e9 else f"{count / 1e9:.2f} GB"

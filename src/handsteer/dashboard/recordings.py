@@ -113,6 +113,18 @@ class Recordings:
         return "" if process.returncode == 0 else (lines[-1] if lines else "it failed").removeprefix("handsteer: ")
 
 
+def duration_text(recording: RecordingState, now_s: float) -> str:
+    """Return for how long a recording was made until ``now_s`` of the graph's clock, such as ``1:05``."""
+    until_s = now_s if recording.ended_s is None else recording.ended_s
+    minutes, seconds = divmod(max(0, int(until_s - recording.began_s)), 60)
+    return f"{minutes}:{seconds:02d}"
+
+
+def size_text(count: int) -> str:
+    """Return the size of a file of ``count`` bytes, such as ``3.1 MB``."""
+    return f"{count / 1e6:.1f} MB" if count < 1e9 else f"{count / 1e9:.2f} GB"
+
+
 def serve_recordings(application: FastAPI, recordings: Callable[[], Recordings | None]) -> None:
     """Serve the recordings and reports of what ``recordings`` returns; they are read on threads of the server."""
 

@@ -17,6 +17,7 @@ HOLD_S = 0.5
 """Least time between two events about the same state; one that flaps faster is reported as often as this."""
 
 _STARTS_S = 3.0
+_MOST_KEPT = 500
 
 log = logging.getLogger(__name__)
 
@@ -40,13 +41,14 @@ class Auditor:
         clock: The graph's clock; it is only asked for stamps, so that a replay of the node needs no further readings.
 
     Attributes:
-        who: Full name of the node.
+        who: Name of the node's own process, with its namespace, or of the node in a process of several.
     """
 
     def __init__(self, transport: Transport, node: str, clock: Clock) -> None:
         self._publisher = transport.advertise(node, AUDIT)
         self._clock = clock
-        self.who = transport.full_name(node)
+        process, _, name = transport.full_name(node).rpartition(": ")
+        self.who = process or name
         self._states: dict[str, _State] = {}
         self._last: dict[tuple[str, str], tuple[str, float]] = {}
         self._began_s: float | None = None
@@ -66,6 +68,8 @@ class Auditor:
         sentence, said_s = self._last.get(key, ("", 0.0))
         if sentence == event.sentence and abs(at_s - said_s) < HOLD_S:
             return
+        if len(self._last) >= _MOST_KEPT:  # there may be any number of viewers
+            self._last.clear()
         self._last[key] = (event.sentence, at_s)
         self._publisher.publish(write_event(event, self._clock.stamp(at_s)))
 
@@ -94,7 +98,8 @@ class Auditor:
             is_fault = report.level > status.OK
             level = ERROR if report.level == status.ERROR else WARN if is_fault else INFO
             code: AuditCode = "fault" if is_fault else "fault_ended"
-            self.look("fault", is_fault, at_s, lambda: self.event(code, report.message, "status", level), first=False)
+            sentence = report.message if is_fault else f"has recovered: {report.message}"
+            self.look("fault", is_fault, at_s, lambda: self.event(code, sentence, "status", level), first=False)
 
 
 class ControlAudit:

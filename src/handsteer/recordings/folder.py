@@ -19,7 +19,7 @@ class RecordingState:
         path: The file.
         began_s: When it began, in seconds of the graph's clock.
         ended_s: When it ended; None while it is being made.
-        ended_by: Why it ended early, such as a full disk; empty if it was ended on request.
+        ended_by: Which failure ended it, such as a full disk; empty if none did.
         lost: Number of messages that are missing because the disk was too slow.
     """
 

@@ -107,7 +107,10 @@ class McapFile:
                     yield opcode, body
         except OSError as error:
             raise RecordingError(f"cannot read {self.path}: {error.strerror or error}") from None
-        self.problem = f"it was cut off or damaged after {at} of {size} bytes"
+        was_cut = f"it was cut off or damaged after {at} of {size} bytes"
+        self.problem = (
+            was_cut if at < size else "it was not closed, as after a power cut; its last messages may be missing"
+        )
 
     def _parsed(self, kind: Any, body: bytes) -> Any:
         try:

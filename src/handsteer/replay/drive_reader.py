@@ -6,8 +6,19 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
+from handsteer.audit import read_event
 from handsteer.errors import RecordingError
-from handsteer.messages import HAND_SIGN, IMAGE_RAW, STEERING_CMD_VEL, STOP, WORLD_MARKERS, twist_in
+from handsteer.messages import (
+    AUDIT,
+    CAMERA_INFO,
+    DIAGNOSTICS,
+    HAND_SIGN,
+    IMAGE_RAW,
+    STEERING_CMD_VEL,
+    STOP,
+    WORLD_MARKERS,
+    twist_in,
+)
 from handsteer.nodes.diagnostics import read_status
 from handsteer.nodes.journal import journal_topic
 from handsteer.nodes.status import CameraStatus, ControlStatus, RecognitionStatus, RobotStatus
@@ -28,8 +39,7 @@ _MARKERS_PERIOD_S = 1.0
 # Statuses come ten times a second.
 _LONGEST_STATUS_S = 0.5
 _LARGEST = 1e6
-_SHOWN_AS_STOPS = ("drives", "stands")
-_MOST_EVENTS, _LONGEST = 1000, 300
+_MOST_EVENTS = 1000
 _EPOCH_BEGINS_S = 1e9
 
 
@@ -149,9 +159,9 @@ class _Reader:
             HAND_SIGN.name: ("String", self._on_sign),
             STOP.name: ("Bool", self._on_stop),
             WORLD_MARKERS.name: ("MarkerArray", self._on_markers),
-            "/diagnostics": ("DiagnosticArray", self._on_diagnostics),
-            "/camera_info": ("CameraInfo", self._on_camera_info),
-            "/audit": ("Log", self._on_event),
+            DIAGNOSTICS.name: ("DiagnosticArray", self._on_diagnostics),
+            CAMERA_INFO.name: ("CameraInfo", self._on_camera_info),
+            AUDIT.name: ("Log", self._on_event),
         }
         return next((handle for end, (of, handle) in endings.items() if of == kind and topic.endswith(end)), None)
 
@@ -190,10 +200,10 @@ class _Reader:
         self._is_set = is_set
 
     def _on_event(self, recorded: Recorded, time_s: float) -> None:
-        message = recorded.message
+        event = read_event(recorded.message)
         # The page lists each stop with its reason.
-        if message.function not in _SHOWN_AS_STOPS and len(self._facts.events) < _MOST_EVENTS:
-            self._facts.events.append(Event(time_s, message.name[:_LONGEST], message.msg[:_LONGEST]))
+        if event and event.code not in ("drives", "stands") and len(self._facts.events) < _MOST_EVENTS:
+            self._facts.events.append(Event(time_s, event.who, event.sentence))
 
     def _on_markers(self, recorded: Recorded, time_s: float) -> None:
         self._markers = recorded
@@ -259,7 +269,7 @@ class _Reader:
     def _explain_latency(self) -> None:
         facts = self._facts
         if not any(topic.endswith(journal_topic(_CONTROL).name) for topic in self._topics):
-            facts.no_latency = "it has no journal, which only `handsteer run --record` writes"
+            facts.no_latency = "it has no journal, which recordings of handsteer run have"
             facts.problems.append(f"{facts.no_latency}: latencies are unknown")
         elif self._offset_s == 0.0:
             # Stamps of a real clock are Unix time.

@@ -22,9 +22,12 @@ def write_report(recording: Path, output: Path, *, force: bool = False) -> Drive
             written.
         PackageMissing: The package plotly or mcap is not installed.
     """
+    file = open_recording(recording)
+    if output.resolve() == recording.resolve():
+        raise RecordingError(f"{output} is the recording: give another name for the report")
     if output.exists() and not force:
         raise RecordingError(f"{output} exists already: give another name, or --force to overwrite it")
-    facts = read_drive(open_recording(recording))
+    facts = read_drive(file)
     _write(output, render(facts))
     return facts
 

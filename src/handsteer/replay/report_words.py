@@ -3,7 +3,7 @@
 import math
 from typing import NamedTuple
 
-from handsteer.replay.drive_facts import DriveFacts
+from handsteer.replay.drive_facts import DriveFacts, SignTotal
 
 _MOST_SIGNS = 12
 
@@ -18,7 +18,7 @@ class Total(NamedTuple):
 
 def heading(facts: DriveFacts) -> str:
     """Return when and for how long it was recorded, and by what."""
-    began = f"Recorded {facts.began}, " if facts.began else ""
+    began = f"Recorded {facts.began}, " if facts.began else "A recording of "
     by = f" by handsteer {facts.about['handsteer'][:40]}" if "handsteer" in facts.about else ""
     system = ", ".join(f"{name} {facts.about[name][:60]}" for name in ("python", "system") if name in facts.about)
     return f"{began}{_time(facts.duration_s)}{by}{f' ({system})' if system else ''}"
@@ -46,9 +46,15 @@ def totals(facts: DriveFacts) -> list[Total]:
 def sign_totals(facts: DriveFacts) -> list[Total]:
     """Return a total per sign, the longest first."""
     by_time = sorted(facts.signs.items(), key=lambda pair: -pair[1].seconds)[:_MOST_SIGNS]
-    return [
-        Total(name, f"{total.seconds:.1f} s", f"{total.frames} frames, {total.times} times") for name, total in by_time
-    ]
+    return [Total(name, f"{total.seconds:.1f} s", _counts(total)) for name, total in by_time]
+
+
+def _counts(total: SignTotal) -> str:
+    return f"{_many(total.frames, 'frame')}, {_many(total.times, 'time')}"
+
+
+def _many(count: int, what: str) -> str:
+    return f"{count} {what}{'' if count == 1 else 's'}"
 
 
 def _time(duration_s: float) -> str:
@@ -77,7 +83,7 @@ def _stops(facts: DriveFacts) -> Total | None:
     for stand in facts.stands:
         reasons[stand.reason] = reasons.get(stand.reason, 0) + 1
     by_count = sorted(reasons.items(), key=lambda pair: -pair[1])[:3]
-    pressed = [f"/stop was set {facts.stops} times"] if facts.stops else []
+    pressed = [f"/stop was set {_many(facts.stops, 'time')}"] if facts.stops else []
     return Total(
         "stops", str(facts.stand_count), "; ".join([f"{n}: {reason[:80]}" for reason, n in by_count] + pressed)
     )
