@@ -83,12 +83,12 @@ def test_ros2_sees_the_node_by_its_names_types_and_hashes(dds: DdsGraph) -> None
     ]
     eventually(lambda: "rt/base/cmd_vel" in dds.nodes()["/far/driver"]["writers"])
     eventually(lambda: len(topics(dds.nodes()["/far/driver"]["readers"])) == 4)
-    eventually(lambda: len(topics(dds.nodes()["/far/driver"]["writers"])) == 5)
+    eventually(lambda: len(topics(dds.nodes()["/far/driver"]["writers"])) == 6)
     node = dds.nodes()["/far/driver"]
     assert node["participant"] == "enclave=/;"
     assert node["writers"]["rt/base/cmd_vel"] == twist
     assert topics(node["writers"]) == {
-        *("rt/base/cmd_vel", "rt/diagnostics", "rt/far/stopped", "rt/parameter_events", "rt/rosout")
+        *("rt/base/cmd_vel", "rt/far/audit", "rt/diagnostics", "rt/far/stopped", "rt/parameter_events", "rt/rosout")
     }
     assert topics(node["readers"]) == {
         *("rt/far/gesture/hand_sign", "rt/far/steering/cmd_vel", "rt/far/stop", "rt/far/stopped")

@@ -89,11 +89,11 @@ def test_messages_pass_both_ways_with_their_capture_times(both: Both) -> None:
     both.start()
     both.transport.advertise("steering", STEERING_CMD_VEL).publish(twist(0.5, -1.0))
     assert eventually(lambda: heard_there)
-    assert heard_there[0] == Received(twist(0.5, -1.0))
+    assert heard_there[0] == Received(twist(0.5, -1.0), number=1)
     assert eventually(lambda: both.graph.advertise("recognition", HAND_SIGN).has_subscribers)
     both.graph.advertise("recognition", HAND_SIGN).publish(String(data="Go"), 12.5)
     assert eventually(lambda: heard_here)
-    assert heard_here[0] == Received(String(data="Go"), 12.5)
+    assert heard_here[0] == Received(String(data="Go"), 12.5, number=1)
 
 
 def test_the_graph_counts_publishers_of_the_other_process_until_they_are_gone(both: Both) -> None:
