@@ -79,5 +79,5 @@ def test_a_sign_never_counts_that_was_not_seen_for_the_whole_confirmation(frames
         counted = signs.step(seen, dt_s)
         if counted not in (before, NONE, STOP):
             assert counted == seen
-            assert run_s >= config.confirm_time - 1e-9
+            assert run_s >= config.confirm_time - 0.001  # the slack for stamps that jitter
         before = counted

@@ -98,7 +98,7 @@ def run(
 
     if headless and settle({}).camera.source == "browser":
         raise ConfigError("--camera browser needs the page, which --headless and --fast leave out")
-    if fast and settle({}).foxglove.port is not None:
+    if fast and settle({}).foxglove.port >= 0:
         raise ConfigError("--foxglove shows a run in real time: leave out --fast, or record the run and open the file")
     if duration is not None and not duration > 0:
         raise ConfigError(f"--duration: {duration:g} should be greater than 0 seconds")
@@ -151,7 +151,7 @@ def drive(
     """Run a graph until it ends, ``duration`` seconds have passed, or a signal comes; return its statistics."""
     # Started first: it loads its libraries while this process loads the models.
     page = None if headless else PageProcess()
-    live = None if settings.foxglove.port is None else LiveProcess()
+    live = None if settings.foxglove.port < 0 else LiveProcess()
     try:
         with (
             Graph(settings, SteppedClock() if fast else RealClock(), link=link, steering=page is None) as graph,

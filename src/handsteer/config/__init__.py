@@ -112,8 +112,8 @@ class DashboardConfig(Section):
 class FoxgloveConfig(Section):
     """Topics for Foxglove and PlotJuggler, by the Foxglove WebSocket protocol."""
 
-    port: int | None = Field(
-        None, ge=0, le=65535, description="Port on which `run` serves all topics; none by default; 0 picks a free one"
+    port: int = Field(
+        -1, ge=-1, le=65535, description="Port on which `run` serves all topics; 0 picks a free one, -1 serves none"
     )
     host: str = Field(
         "127.0.0.1",

@@ -132,7 +132,7 @@ class LiveServer:
         Raises:
             LiveError: The address or the port cannot be used.
         """
-        host, port = self._config.host, self._config.port or 0
+        host, port = self._config.host, max(0, self._config.port)
         listener = listen(host, port, _SEND_BUFFER_BYTES, options=("--foxglove.host", "--foxglove"), error=LiveError)
         self._thread = threading.Thread(target=asyncio.run, args=(self._serve(listener),), name="foxglove", daemon=True)
         self._thread.start()
