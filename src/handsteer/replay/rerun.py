@@ -5,7 +5,7 @@ with the signs that result. With the same version, parameters and models, all re
 """
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, Literal
 
 from pydantic import ValidationError
@@ -56,17 +56,60 @@ class Result:
         return self.recorded != self.replayed
 
 
-@dataclass
-class _Outputs:
-    """The results of recognition, spin by spin, for the control."""
+@dataclass(frozen=True)
+class _Sent:
+    """A message that recognition has published in the replay.
 
-    results: list[Result] = field(default_factory=list)
-    spin_of: dict[str, list[int]] = field(default_factory=dict)
+    Attributes:
+        spin: The spin in which it did, from 0.
+        message: The message.
+        captured_s: Capture time of the frame that led to it.
+        is_as_recorded: Whether as many messages of the topic were recorded in that spin.
+        time_s: When that spin ended.
+    """
+
+    spin: int
+    message: Any
+    captured_s: float | None
+    is_as_recorded: bool
+    time_s: float
+
+
+class _Outputs:
+    """The results of recognition, message by message, for the control.
+
+    Args:
+        first: Number of the first recorded message of each topic.
+    """
+
+    def __init__(self, first: dict[str, int]) -> None:
+        self.sent: dict[str, list[_Sent]] = {}
+        self._first = first
+        self._recorded: dict[str, list[tuple[int, int]]] = {}
+        self._begins: dict[str, list[int]] = {}
+        self._spins = 0
 
     def add(self, result: Result) -> None:
-        for topic, raws in result.recorded.items():
-            self.spin_of.setdefault(topic, []).extend([len(self.results)] * len(raws))
-        self.results.append(result)
+        for topic in _OUTPUTS[RECOGNITION]:
+            sent = self.sent.setdefault(topic, [])
+            self._begins.setdefault(topic, []).append(len(sent))
+            count = len(result.recorded.get(topic, ()))
+            messages = result.messages.get(topic, [])
+            same = count == len(messages)
+            sent += [_Sent(self._spins, message, captured_s, same, result.time_s) for message, captured_s in messages]
+            self._recorded.setdefault(topic, []).extend((self._spins, position) for position in range(count))
+        self._spins += 1
+
+    def end_of(self, topic: str, number: int) -> int:
+        """Return how many messages of the replay go until the recorded one of this number, that included."""
+        recorded, begins = self._recorded.get(topic, []), self._begins.get(topic, [])
+        index = number - self._first.get(topic, 1)
+        if not 0 <= index < len(recorded):
+            return 0
+        spin, position = recorded[index]
+        end = begins[spin + 1] if spin + 1 < len(begins) else len(self.sent[topic])
+        is_same = all(each.is_as_recorded for each in self.sent[topic][begins[spin] : end])
+        return begins[spin] + position + 1 if is_same and begins[spin] + position < end else end
 
 
 def rerun(file: Recording, config: Config, source: Source = "frames") -> Iterator[Result]:
@@ -83,12 +126,12 @@ def rerun(file: Recording, config: Config, source: Source = "frames") -> Iterato
     """
     outputs: _Outputs | None = None
     if source == "frames":
-        outputs = _Outputs()
+        outputs = _Outputs({topic: _first_number(file, topic) for topic in _OUTPUTS[RECOGNITION]})
         looks_at_jpegs = config.model_copy(
             update={"signs": config.signs.model_copy(update={"image_transport": "compressed"})}
         )
         for result in _rerun(file, RECOGNITION, lambda *wires: make_recognition(looks_at_jpegs, *wires), None):
-            outputs.add(_light(result))
+            outputs.add(result)
             yield result
     is_simulated = config.robot.kind == "sim"
     yield from _rerun(
@@ -120,9 +163,8 @@ def recorded_config(file: Recording) -> Config:
         raise RecordingError(f"{file.path}: the recorded parameter {where} does not fit: {first['msg']}") from None
 
 
-def _light(result: Result) -> Result:
-    """Return the result without its picture."""
-    return Result(result.node, result.time_s, result.recorded, result.replayed, result.messages)
+def _first_number(file: Recording, topic: str) -> int:
+    return next((recorded.number for recorded in file.messages({topic})), 1)
 
 
 def _rerun(
@@ -192,31 +234,23 @@ class _Feed:
 
     def __init__(self, outputs: _Outputs) -> None:
         self._outputs = outputs
-        self._passed = 0
+        self._passed = dict.fromkeys(_OUTPUTS[RECOGNITION], 0)
 
     def received(self, spin: Spin) -> Iterator[tuple[str, Received[Any]]]:
-        until = self._passed
-        for got in spin.got:
-            spins = self._outputs.spin_of.get(got.topic, ())
-            if 0 < got.number <= len(spins):
-                until = max(until, spins[got.number - 1] + 1)
-        replaced = set(_OUTPUTS[RECOGNITION])
-        results = self._outputs.results
-        while until < len(results) and self._is_extra(results[until], spin):
-            until += 1
-        yield from _received([got for got in spin.got if got.topic not in replaced])
-        numbers = {got.topic: got.number for got in spin.got}
-        for result in results[self._passed : until]:
-            for topic, pairs in result.messages.items():
-                for message, captured_s in pairs:
-                    yield topic, Received(message, captured_s, number=numbers.get(topic, 0))
-        self._passed = max(self._passed, until)
+        yield from _received([got for got in spin.got if got.topic not in self._passed])
+        for topic, passed in self._passed.items():
+            numbers = [got.number for got in spin.got if got.topic == topic]
+            sent = self._outputs.sent.get(topic, [])
+            until = max([passed, *(self._outputs.end_of(topic, number) for number in numbers)])
+            while until < len(sent) and self._is_extra(sent[until], spin):
+                until += 1
+            for each in sent[passed:until]:
+                yield topic, Received(each.message, each.captured_s, number=max(numbers, default=0))
+            self._passed[topic] = until
 
     @staticmethod
-    def _is_extra(result: Result, spin: Spin) -> bool:
-        counts = {topic: len(raws) for topic, raws in result.recorded.items()}
-        is_other = counts != {topic: len(pairs) for topic, pairs in result.messages.items()}
-        return (is_other or not counts) and result.time_s + _EXTRA_AFTER_S < spin.time_s
+    def _is_extra(sent: _Sent, spin: Spin) -> bool:
+        return not sent.is_as_recorded and sent.time_s + _EXTRA_AFTER_S < spin.time_s
 
 
 def _received(gots: list[Got]) -> Iterator[tuple[str, Received[Any]]]:
