@@ -108,9 +108,7 @@ class McapFile:
         except OSError as error:
             raise RecordingError(f"cannot read {self.path}: {error.strerror or error}") from None
         was_cut = f"it was cut off or damaged after {at} of {size} bytes"
-        self.problem = (
-            was_cut if at < size else "it was not closed, as after a power cut; its last messages may be missing"
-        )
+        self.problem = was_cut if at < size else "it was not closed, as after kill -9; its last messages may be missing"
 
     def _parsed(self, kind: Any, body: bytes) -> Any:
         try:
