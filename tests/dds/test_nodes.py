@@ -206,7 +206,7 @@ def test_a_node_says_once_that_it_is_ready_and_names_its_topics_as_others_know_t
         camera = graph.node("camera", *FORWARD, name="/r1/my_camera", ros=words)
         line = (
             "/r1/my_camera is ready: publishes /diagnostics, /front/camera_info, /front/image, "
-            "/front/image/compressed, /r1/stopped; listens to /r1/stop"
+            "/front/image/compressed, /r1/audit, /r1/stopped; listens to /r1/stop"
         )
         eventually(lambda: line in camera.text, 10.0, what=line)
         assert camera.text.count("is ready") == 1
