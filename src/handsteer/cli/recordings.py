@@ -176,21 +176,21 @@ def _make_folder(folder: Path) -> None:
 
 def _described(moment: Moment, folder: Path | None) -> dict[str, Any]:
     """Return a moment for JSON; its frame is written to ``folder``, if there is one."""
-    told = {"time_s": round(moment.time_s, 3), "what": moment.what}
-    told |= {"recorded": moment.recorded, "replayed": moment.replayed}
+    row = {"time_s": round(moment.time_s, 3), "what": moment.what}
+    row |= {"recorded": moment.recorded, "replayed": moment.replayed}
     if folder is not None and moment.frame is not None:
         path = folder / f"{moment.time_s:010.3f}.jpg"
         try:
             path.write_bytes(moment.frame.message.data.tobytes())
         except OSError as error:
             raise RecordingError(f"--diff: cannot write {path}: {error.strerror}") from None
-        told["picture"] = str(path)
-    return told
+        row["picture"] = str(path)
+    return row
 
 
-def _line(told: dict[str, Any]) -> str:
-    picture = f" ({told['picture']})" if "picture" in told else ""
-    return f"{told['time_s']:9.3f} s  {told['what']}: {told['recorded']} was recorded, now {told['replayed']}{picture}"
+def _line(row: dict[str, Any]) -> str:
+    picture = f" ({row['picture']})" if "picture" in row else ""
+    return f"{row['time_s']:9.3f} s  {row['what']}: {row['recorded']} was recorded, now {row['replayed']}{picture}"
 
 
 def _print_result(comparison: Comparison, others: list[str], moments: int, *, is_exact: bool) -> None:

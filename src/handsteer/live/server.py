@@ -68,7 +68,7 @@ class Client:
         self._channels: dict[int, int] = {}
 
     def obey(self, data: str | bytes) -> None:
-        """Do what it asks for; it is told if that is wrong."""
+        """Execute a request; a wrong one is answered by an error status."""
         try:
             request = read_request(data)
             if isinstance(request, Subscribe):

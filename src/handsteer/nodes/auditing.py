@@ -14,7 +14,7 @@ from handsteer.nodes import status
 from handsteer.transports.base import Transport
 
 HOLD_S = 0.5
-"""Least time between two events about the same state; one that flaps faster is reported as often as this."""
+"""Least time between two events about the same state; one that changes faster is reported as often as this."""
 
 _STARTS_S = 3.0
 _MOST_KEPT = 500
@@ -26,8 +26,8 @@ Tell = Callable[[], AuditEvent]
 
 @dataclass
 class _State:
-    told: Hashable
-    told_s: float = float("-inf")
+    reported: Hashable
+    reported_s: float = float("-inf")
     value: Hashable = None
     since_s: float = 0.0
 
@@ -74,20 +74,20 @@ class Auditor:
         self._publisher.publish(write_event(event, self._clock.stamp(at_s)))
 
     def look(self, state: str, value: Hashable, at_s: float, tell: Tell, first: Hashable = None) -> None:
-        """Publish ``tell()`` if the value of ``state`` is not the one that was last told.
+        """Publish ``tell()`` if the value of ``state`` is not the one that was last reported.
 
         Args:
             state: What is observed.
             value: Its present value.
             at_s: Present time, in seconds of the graph's clock.
             tell: Returns the event.
-            first: The value that needs not be told at the beginning.
+            first: The value that needs not be reported at the beginning.
         """
         known = self._states.setdefault(state, _State(first, value=first))
         if value != known.value:
             known.value, known.since_s = value, at_s
-        if value != known.told and at_s - known.told_s >= HOLD_S:
-            known.told, known.told_s = value, at_s
+        if value != known.reported and at_s - known.reported_s >= HOLD_S:
+            known.reported, known.reported_s = value, at_s
             self.say(tell(), known.since_s)
 
     def look_at_status(self, report: status.Status, at_s: float) -> None:

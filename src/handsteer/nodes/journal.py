@@ -58,7 +58,7 @@ class Journal:
         self._readings: list[float] = []
         self._gave: dict[str, int] = {}
         self._saw: dict[str, Any] = {}
-        self._told: dict[str, Any] = {}
+        self._answered: dict[str, Any] = {}
         # The thread that constructs the node, then the one that runs the current spin.
         self._thread: int | None = threading.get_ident()
         self._entry: dict[str, Any] = {}
@@ -76,7 +76,7 @@ class Journal:
         if write is not None:
             entry = {"t": [self._real.now()]} if self._is_constructed else self._close_entry()
             self._end_construction()
-            self._told = {}
+            self._answered = {}
             write(json.dumps(entry))
         self._write = write
 
@@ -115,8 +115,8 @@ class Journal:
 
     def see(self, question: str, answer: Any) -> None:
         """Note an answer of the transport."""
-        if self._thread == threading.get_ident() and self._told.get(question) != answer:
-            self._told[question] = self._saw[question] = answer
+        if self._thread == threading.get_ident() and self._answered.get(question) != answer:
+            self._answered[question] = self._saw[question] = answer
 
     def _end_construction(self) -> None:
         if not self._is_constructed:

@@ -71,8 +71,8 @@ def rerun_by_time(recording: Recording, config: Config, source: Source = "frames
         ModelError: A model is missing or broken.
     """
     cmd_vel = cmd_vel_topic(config)
-    traces = _run(recording, config, source, cmd_vel)
     pictures = _picture_topic(recording)
+    traces = _run(recording, config, source, cmd_vel, pictures)
     frame: Recorded | None = None
     for recorded in recording.messages({*traces, pictures}):
         if recorded.topic == pictures:
@@ -98,7 +98,9 @@ def _picture_topic(recording: Recording) -> str:
     return next((topic.name for topic in _PICTURES if topic.name in found), "")
 
 
-def _run(recording: Recording, config: Config, source: Source, cmd_vel: Topic[Any]) -> dict[str, _Trace]:
+def _run(
+    recording: Recording, config: Config, source: Source, cmd_vel: Topic[Any], picture_topic: str
+) -> dict[str, _Trace]:
     """Run the nodes; return what they published on the compared topics."""
     clock, transport = SteppedClock(recording.began_s), InProcessTransport()
     control = make_control(config, transport, clock, simulated=config.robot.kind == "sim", cmd_vel=cmd_vel)
@@ -107,7 +109,7 @@ def _run(recording: Recording, config: Config, source: Source, cmd_vel: Topic[An
     compared = [cmd_vel]
     if source == "frames":
         pictures = {topic.name: topic for topic in _PICTURES}
-        kept = pictures.get(_picture_topic(recording))
+        kept = pictures.get(picture_topic)
         if kept is None:
             raise RecordingError(f"{recording.path} contains no pictures on {' or '.join(pictures)}")
         inputs[kept.name] = kept

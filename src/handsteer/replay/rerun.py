@@ -6,6 +6,7 @@ with the signs that result. With the same version, parameters and models, all re
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from itertools import islice
 from typing import Any, Literal
 
 from pydantic import ValidationError
@@ -61,14 +62,12 @@ class _Sent:
     """A message that recognition has published in the replay.
 
     Attributes:
-        spin: The spin in which it did, from 0.
         message: The message.
         captured_s: Capture time of the frame that led to it.
         is_as_recorded: Whether as many messages of the topic were recorded in that spin.
         time_s: When that spin ended.
     """
 
-    spin: int
     message: Any
     captured_s: float | None
     is_as_recorded: bool
@@ -96,7 +95,7 @@ class _Outputs:
             count = len(result.recorded.get(topic, ()))
             messages = result.messages.get(topic, [])
             same = count == len(messages)
-            sent += [_Sent(self._spins, message, captured_s, same, result.time_s) for message, captured_s in messages]
+            sent += [_Sent(message, captured_s, same, result.time_s) for message, captured_s in messages]
             self._recorded.setdefault(topic, []).extend((self._spins, position) for position in range(count))
         self._spins += 1
 
@@ -211,18 +210,16 @@ class _RecordedOutputs:
     """The recorded messages of a node's topics, in order."""
 
     def __init__(self, file: Recording, topics: tuple[str, ...]) -> None:
-        self._streams = {topic: _by_number(file, topic) for topic in topics}
+        self._streams = {topic: file.messages({topic}) for topic in topics}
 
     def take(self, gave: dict[str, int]) -> dict[str, list[bytes]]:
         """Return the next messages: so many of each topic."""
-        taken = {
-            topic: [next(stream, b"") for _ in range(gave.get(topic, 0))] for topic, stream in self._streams.items()
-        }
-        return {topic: raws for topic, raws in taken.items() if raws}
-
-
-def _by_number(file: Recording, topic: str) -> Iterator[bytes]:
-    return (recorded.raw for recorded in file.messages({topic}))
+        taken: dict[str, list[bytes]] = {}
+        for topic, stream in self._streams.items():
+            if count := gave.get(topic, 0):
+                found = [recorded.raw for recorded in islice(stream, count)]
+                taken[topic] = found + [b""] * (count - len(found))
+        return taken
 
 
 class _Feed:
