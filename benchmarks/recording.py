@@ -1,4 +1,7 @@
-"""What a recording costs: runs of the virtual hand with and without one, in turn on the same machine.
+"""What a recording costs: runs of a camera with and without one, in turn on the same machine.
+
+The cameras are the virtual hand, whose pictures a recording has to compress, and a recording of it, which delivers JPEG
+as browsers do.
 
 Usage: python benchmarks/recording.py [SECONDS] [PAIRS]
 """
@@ -16,15 +19,25 @@ from typing import Any
 def main() -> None:
     """Print CPU time, latency (median and 99th percentile), frames and memory of each run, and the medians."""
     seconds, pairs = (int(word) for word in [*sys.argv[1:], "20", "4"][:2])
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        played = folder / "played.mcap"
+        _run("virtual", 10, played)
+        for camera, source in (("virtual hand", "virtual"), ("camera of JPEG", str(played))):
+            print(camera)
+            _compare(source, seconds, pairs, folder)
+
+
+def _compare(source: str, seconds: int, pairs: int, folder: Path) -> None:
     rows: dict[str, list[dict[str, float]]] = {"without": [], "recording": []}
-    with tempfile.TemporaryDirectory() as folder:
-        for pair in range(pairs):
-            for name, found in rows.items():
-                path = Path(folder) / f"{pair}.mcap"
-                words = ("--record", str(path)) if name == "recording" else ()
-                found.append(_run(seconds, words))
-                size = path.stat().st_size / seconds if words else 0
-                print(f"{name:10s} {_line(found[-1])}{f'  {size / 1e6:.2f} MB/s' if words else ''}", flush=True)
+    for _ in range(pairs):
+        for name, found in rows.items():
+            path = folder / "drive.mcap" if name == "recording" else None
+            found.append(_run(source, seconds, path))
+            size = path.stat().st_size / seconds if path else 0
+            print(f"{name:10s} {_line(found[-1])}{f'  {size / 1e6:.2f} MB/s' if path else ''}", flush=True)
+            if path:
+                path.unlink()
     medians = {
         name: {key: statistics.median(row[key] for row in found) for key in found[0]} for name, found in rows.items()
     }
@@ -34,8 +47,9 @@ def main() -> None:
     print(f"a recording takes {extra:.1f} % of a core")
 
 
-def _run(seconds: int, words: tuple[str, ...]) -> dict[str, float]:
-    command = [sys.executable, "-m", "handsteer", "run", "--headless", "--camera", "virtual", "--json"]
+def _run(source: str, seconds: int, path: Path | None) -> dict[str, float]:
+    command = [sys.executable, "-m", "handsteer", "run", "--headless", "--camera", source, "--json"]
+    words = ("--record", str(path)) if path else ()
     process = subprocess.Popen(
         [*command, "--duration", str(seconds), *words], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
     )

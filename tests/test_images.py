@@ -1,3 +1,5 @@
+import pickle
+
 import cv2
 import numpy as np
 import pytest
@@ -5,8 +7,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from handsteer.errors import FrameError
-from handsteer.images import bgr_image, image_message, jpeg_message, jpeg_picture
+from handsteer.images import bgr_image, camera_jpeg_message, image_message, jpeg_message, jpeg_picture
 from handsteer.messages import CompressedImage, Header, Image, Time
+from handsteer.picture_files import decode
+from handsteer.transports.ros2.encoding import encode
 from tests.fuzz import corpus
 
 HEADER = Header(stamp=Time(1, 2), frame_id="camera")
@@ -120,6 +124,19 @@ def test_jpeg() -> None:
     assert np.abs(decoded.astype(int) - smooth).mean() < 3
     assert "jpeg" in compressed.format
     np.testing.assert_array_equal(jpeg_picture(compressed), decoded)
+
+
+def test_a_cameras_own_jpeg_is_passed_on_and_not_decoded_again() -> None:
+    data = corpus.jpeg()
+    picture = decode(data)
+    message = camera_jpeg_message(data, picture, HEADER)
+    assert message.data.tobytes() == data
+    assert jpeg_picture(message) is picture
+    elsewhere = pickle.loads(pickle.dumps(message))
+    assert type(elsewhere) is CompressedImage
+    assert len(pickle.dumps(message)) < len(data) + 500
+    np.testing.assert_array_equal(jpeg_picture(elsewhere), picture)
+    assert encode(message) == encode(elsewhere)
 
 
 @given(st.binary(max_size=64))

@@ -77,12 +77,36 @@ def jpeg_message(bgr: NDArray[np.uint8], header: Header, quality: int = 80) -> C
     return CompressedImage(header=header, format="bgr8; jpeg compressed bgr8", data=encode_jpeg(bgr, quality))
 
 
+class _DecodedJpeg(CompressedImage):
+    """A JPEG message and its picture, which was decoded before; other processes get the message alone."""
+
+    picture: NDArray[np.uint8]
+
+    def __reduce__(self) -> tuple[type[CompressedImage], tuple[Header, str, NDArray[np.uint8]]]:
+        return CompressedImage, (self.header, self.format, self.data)
+
+
+def camera_jpeg_message(jpeg: bytes, bgr: NDArray[np.uint8], header: Header) -> CompressedImage:
+    """Return the message of a camera's own JPEG file.
+
+    Args:
+        jpeg: The file.
+        bgr: Its picture, (height, width, 3) uint8, which :func:`jpeg_picture` returns within this process.
+        header: The message's header.
+    """
+    message = _DecodedJpeg(header=header, format="bgr8; jpeg compressed bgr8", data=np.frombuffer(jpeg, np.uint8))
+    object.__setattr__(message, "picture", bgr)
+    return message
+
+
 def jpeg_picture(message: CompressedImage) -> NDArray[np.uint8]:
     """Return the picture of ``message``, a JPEG or PNG file, as (height, width, 3) uint8, BGR.
 
     Raises:
         FrameError: The data is not such a picture, is truncated, or has more than :data:`MOST_PIXELS`.
     """
+    if isinstance(message, _DecodedJpeg):
+        return message.picture
     try:
         return decode(message.data.tobytes())
     except FrameError as error:

@@ -36,6 +36,11 @@ class FileSize(NamedTuple):
     height: int
 
 
+def is_jpeg(data: bytes) -> bool:
+    """Return whether ``data`` begins as a JPEG file does."""
+    return data.startswith(_JPEG)
+
+
 def size_of(data: bytes) -> FileSize:
     """Return the size of the picture in a JPEG or PNG file, without decoding it.
 

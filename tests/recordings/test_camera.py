@@ -9,10 +9,11 @@ from handsteer.config import CameraConfig, Config
 from handsteer.errors import CameraUnreadable
 from handsteer.graph import Graph
 from handsteer.images import jpeg_picture
-from handsteer.messages import HAND_SIGN
+from handsteer.messages import HAND_SIGN, IMAGE_COMPRESSED
 from handsteer.recordings.camera import RecordingCamera
 from handsteer.recordings.mcap_reader import McapFile
 from handsteer.recordings.mcap_writer import McapWriter
+from handsteer.replay.rerun import recorded_config, rerun
 from tests.recordings.test_bags import as_ros1
 
 
@@ -28,6 +29,21 @@ def test_it_plays_the_recorded_pictures_at_their_rate(recording: Path) -> None:
         assert camera.read() is not None
     with pytest.raises(EndOfStream):
         camera.read()
+
+
+def test_a_recording_of_a_camera_of_jpegs_has_the_cameras_own_files(recording: Path, tmp_path: Path) -> None:
+    path = tmp_path / "again.mcap"
+    camera = CameraConfig(source=str(recording), at_end="end")
+    with Graph(Config(camera=camera), clock=SteppedClock()) as graph:
+        graph.record(path)
+        graph.run_stepped(3.0)
+    first, again = (
+        [recorded.message.data.tobytes() for recorded in McapFile(each).messages({IMAGE_COMPRESSED.name})]
+        for each in (recording, path)
+    )
+    assert len(again) > 80
+    assert again == first[: len(again)]
+    assert not [result for result in rerun(McapFile(path), recorded_config(McapFile(path))) if result.differs]
 
 
 def test_it_begins_again_or_holds(recording: Path) -> None:

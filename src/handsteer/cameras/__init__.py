@@ -19,10 +19,13 @@ class Frame:
     Attributes:
         image: (height, width, 3) uint8, BGR, as the camera saw it (not mirrored).
         captured_s: Capture time, in seconds of the graph's monotonic clock.
+        jpeg: The JPEG file that the image was decoded from, by :func:`handsteer.picture_files.decode`; None if there
+            was none.
     """
 
     image: NDArray[np.uint8]
     captured_s: float
+    jpeg: bytes | None = None
 
 
 class Camera(Protocol):

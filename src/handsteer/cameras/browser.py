@@ -75,7 +75,7 @@ class BrowserCamera:
         if newest is None:
             return None
         try:
-            return Frame(decode(newest[0], _MOST_PIXELS), newest[1])
+            return Frame(decode(newest[0], _MOST_PIXELS), newest[1], newest[0])
         except FrameError:  # damaged image data
             return None
 

@@ -8,7 +8,7 @@ from handsteer.cameras.choose import uncalibrated
 from handsteer.cameras.freshness import Freshness
 from handsteer.clock import Clock
 from handsteer.errors import CameraError
-from handsteer.images import image_message, jpeg_message
+from handsteer.images import camera_jpeg_message, image_message, jpeg_message
 from handsteer.messages import (
     CAMERA_INFO,
     IMAGE_COMPRESSED,
@@ -113,8 +113,7 @@ class CameraNode(Node):
         header = Header(stamp=self.clock.stamp(frame.captured_s), frame_id=self._frame_id)
         self._image.publish(image_message(frame.image, header), frame.captured_s)
         if self._compressed.has_subscribers:
-            self._compressed.publish(jpeg_message(frame.image, header), frame.captured_s)
-
+            self._compressed.publish(_compressed(frame, header), frame.captured_s)
         if self._info.has_subscribers:
             self._info.publish(replace(self._info_for(frame), header=header), frame.captured_s)
 
@@ -154,3 +153,9 @@ class CameraNode(Node):
         if status.state != "lost" and silence_s > _SILENT_AFTER_S:
             status = CameraStatus(self._camera.name, "silent", round(silence_s, 1))
         return replace(status, frames=self.frames)
+
+
+def _compressed(frame: Frame, header: Header) -> CompressedImage:
+    if frame.jpeg is None:
+        return jpeg_message(frame.image, header)
+    return camera_jpeg_message(frame.jpeg, frame.image, header)

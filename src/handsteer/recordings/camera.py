@@ -16,6 +16,7 @@ from handsteer.clock import Clock, SteppedClock
 from handsteer.errors import CameraUnreadable, FrameError, RecordingError
 from handsteer.images import bgr_image, jpeg_picture
 from handsteer.messages import IMAGE_COMPRESSED, IMAGE_RAW, CompressedImage, Image, type_name
+from handsteer.picture_files import is_jpeg
 from handsteer.recordings import open_recording
 from handsteer.recordings.recorded import Recorded
 
@@ -76,7 +77,7 @@ class RecordingCamera:
                 raise EndOfStream
             return None
         try:
-            return Frame(picture_of(recorded), self._clock.now())
+            return Frame(picture_of(recorded), self._clock.now(), _jpeg_of(recorded.message))
         except (FrameError, RecordingError):
             return None
 
@@ -125,6 +126,11 @@ def recorded_frames(path: Path, begin_s: float = 0.0, end_s: float = math.inf) -
                 yield Frame(picture_of(recorded), time_s)
             except (FrameError, RecordingError):
                 continue
+
+
+def _jpeg_of(message: CompressedImage | Image) -> bytes | None:
+    data = message.data.tobytes() if isinstance(message, CompressedImage) else b""
+    return data if is_jpeg(data) else None
 
 
 def picture_of(recorded: Recorded) -> NDArray[np.uint8]:
