@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from handsteer.clock import Clock, SimulatedClock, WallClock
 from handsteer.config import Config, RobotConfig, cmd_vel_type
 from handsteer.errors import ConfigError, needing
-from handsteer.messages import CMD_VEL, TF, Topic, cmd_vel
+from handsteer.messages import CMD_VEL, STEERING_CMD_VEL, TF, Topic, Twist, cmd_vel
 from handsteer.recordings import is_recording
 from handsteer.transports.base import Session, Transport
 from handsteer.types import NONE, find_sign
@@ -191,7 +191,14 @@ def open_robot(
     return SimulatedRobot(config)
 
 
-def make_steering(config: Config, transport: Transport, clock: Clock, **topics: Topic[Any]) -> "SteeringNode":
+def make_steering(
+    config: Config,
+    transport: Transport,
+    clock: Clock,
+    *,
+    cmd_vel: Topic[Any] | None = None,
+    steering: Topic[Twist] = STEERING_CMD_VEL,
+) -> "SteeringNode":
     """Return the node ``steering``, whose methods are called to steer by hand, as the page does.
 
     Raises:
@@ -199,7 +206,7 @@ def make_steering(config: Config, transport: Transport, clock: Clock, **topics: 
     """
     from handsteer.nodes.steering import SteeringNode
 
-    return SteeringNode(transport, clock, config.control, **{"cmd_vel": cmd_vel_topic(config), **topics})
+    return SteeringNode(transport, clock, config.control, cmd_vel or cmd_vel_topic(config), steering=steering)
 
 
 def _warn_of_unknown_signs(config: Config, signs: tuple[str, ...]) -> None:

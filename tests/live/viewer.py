@@ -85,6 +85,19 @@ class Viewer:
         """End the subscriptions to ``topics``."""
         self.ask(op="unsubscribe", subscriptionIds=[self.channels[topic]["id"] + 100 for topic in topics])
 
+    def advertise(self, encoding: str = "json", topic: str = "/cmd_vel", kind: str = "geometry_msgs/Twist") -> None:
+        """Offer commands, on the channel 7."""
+        self.ask(op="advertise", channels=[{"id": 7, "topic": topic, "encoding": encoding, "schemaName": kind}])
+
+    def publish(self, content: bytes) -> None:
+        """Publish a message on the channel 7."""
+        self.socket.send(struct.pack("<BI", 1, 7) + content)
+
+    def command(self, linear_mps: float, angular_radps: float = 0.0) -> None:
+        """Publish a Twist as JSON."""
+        twist = {"linear": {"x": linear_mps, "y": 0, "z": 0}, "angular": {"x": 0, "y": 0, "z": angular_radps}}
+        self.publish(json.dumps(twist).encode())
+
     def raw(self) -> tuple[str, int, bytes]:
         """Return topic, time and content of the next message."""
         while isinstance(data := self.socket.recv(PATIENCE_S), str):

@@ -78,7 +78,8 @@ def run(
     record
         Record all topics to this MCAP file, which must not exist yet, for `handsteer replay` and `handsteer report`.
     foxglove
-        Serve all topics to Foxglove and PlotJuggler on this port, such as 8765; 0 picks a free one.
+        Serve all topics to Foxglove and PlotJuggler on this port, such as 8765; 0 picks a free one. With
+        --foxglove.drive true they may also drive.
     json
         Print a summary in JSON at the end, and nothing else.
     config_file
@@ -160,8 +161,12 @@ def drive(
             if record is not None:
                 graph.record(record)
             if live is not None:
+                if page is not None:
+                    live.share_seat(page.seat)
+                    page.on_driver = live.note_driver
                 address = live.serve(graph.transport, graph.clock, graph.topics, settings.foxglove)
-                say(f"Foxglove and PlotJuggler see all topics at {address}")
+                drive_too = ", and may drive" if settings.foxglove.drive else ""
+                say(f"Foxglove and PlotJuggler see all topics at {address}{drive_too}")
             try:
                 _run_until_end(graph, duration, file, study, page, fast=fast)
             except KeyboardInterrupt:

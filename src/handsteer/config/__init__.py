@@ -126,6 +126,9 @@ class FoxgloveConfig(Section):
         description="When a program needs the token: auto if other machines can reach the address, or always, for "
         "machines with several users and for viewers on other web sites",
     )
+    drive: bool = Field(
+        False, description="Whether these programs may drive, one at a time, by Twist on /cmd_vel; else they only look"
+    )
 
 
 class Config(Section):

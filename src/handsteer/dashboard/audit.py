@@ -3,6 +3,7 @@
 import itertools
 import threading
 from collections import OrderedDict
+from collections.abc import Callable
 
 from handsteer.audit import INFO, AuditCode, AuditEvent
 from handsteer.clock import Clock
@@ -23,10 +24,12 @@ class PageAudit:
 
     Attributes:
         driver: Name of the driver, or of the last one.
+        on_driver: Called with the viewer that has got the seat, or None if it is free; must return at once.
     """
 
     def __init__(self, transport: Transport, clock: Clock) -> None:
         self.driver = "dashboard"
+        self.on_driver: Callable[[str | None], None] = lambda _: None
         self._auditor = Auditor(transport, "dashboard", clock)
         self._clock = clock
         self._lock = threading.RLock()
@@ -42,6 +45,11 @@ class PageAudit:
             if len(self._sessions) > _MOST_SESSIONS:
                 self._sessions.popitem(last=False)
             self._names[viewer] = f"viewer {number} ({address})" if address else f"viewer {number}"
+
+    def introduce_program(self, viewer: str) -> None:
+        """Name a viewer that is no page but a program by its own name."""
+        with self._lock:
+            self._names[viewer] = viewer
 
     def forget(self, viewer: str) -> None:
         """Forget the name of a viewer who has left."""
@@ -64,6 +72,7 @@ class PageAudit:
 
     def on_seat(self, change: SeatChange) -> None:
         """Publish who has left the seat and who has taken it."""
+        self.on_driver(change.after)
         before, after = (viewer and self.name_of(viewer) for viewer in (change.before, change.after))
         if change.before is not None:
             left = {"handed_over": f"handed the seat over to {after}", "unanswered": "lost the seat: gave no answer"}

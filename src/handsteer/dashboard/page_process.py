@@ -1,19 +1,25 @@
 """The page in its own process: a stalled page does not delay the robot's nodes."""
 
 import contextlib
+import functools
 import gc
 import importlib.util
 import threading
+from collections.abc import Callable
 from concurrent.futures import Future, InvalidStateError
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
+from handsteer.dashboard.audit import PageAudit
 from handsteer.dashboard.remote_graph import GraphServer, RemoteGraph
 from handsteer.errors import DashboardError, needing
 from handsteer.graph import Graph
 from handsteer.study.session import Task
 from handsteer.transports.child import Child, serve_parent
 from handsteer.transports.piped import Pipe
+
+if TYPE_CHECKING:
+    from handsteer.dashboard.server import Dashboard
 
 START_TIMEOUT_S: Final = 60.0
 _LOOK_PERIOD_S: Final = 0.2
@@ -23,6 +29,10 @@ class PageProcess:
     """Serves the page of a graph from a separate process, which starts to load its libraries immediately.
 
     The graph needs no node ``steering``: it runs in the page's process.
+
+    Attributes:
+        on_driver: Called with the viewer or program that has got the seat, or None if it is free; set it before
+            :meth:`serve`.
 
     Raises:
         PackageMissing: NiceGUI is not installed.
@@ -36,6 +46,7 @@ class PageProcess:
         self.process = self._child.process
         self._address: Future[str] = Future()
         self._server: GraphServer | None = None
+        self.on_driver: Callable[[str | None], None] = lambda _: None
 
     @property
     def is_gone(self) -> bool:
@@ -55,6 +66,7 @@ class PageProcess:
         pipe = self._child.pipe
         pipe.on("served", self._address.set_result)
         pipe.on("refused", self._address.set_exception)
+        pipe.on("driver", self.on_driver)
         self._server = GraphServer(pipe, graph, file, study)
         pipe.start()
         # The process may end without a message.
@@ -63,6 +75,14 @@ class PageProcess:
             return self._address.result(START_TIMEOUT_S)
         except TimeoutError:
             raise DashboardError(f"the page's process did not serve the page within {START_TIMEOUT_S:g} s") from None
+
+    def seat(self, request: str, program: str) -> None:
+        """Ask for the seat (``ask``) for a program that is no page, or give it back (``leave``).
+
+        Ignored before :meth:`serve`.
+        """
+        if self._server is not None:
+            self._child.pipe.say("seat", request, program, key=f"seat of {program}", keep=1)
 
     def stop(self) -> None:
         """End the page and its process; may be called more than once."""
@@ -91,9 +111,13 @@ def _serve(pipe: Pipe) -> None:
     from handsteer.dashboard.server import Dashboard  # noqa: PLC0415
 
     graph, end = RemoteGraph(pipe), threading.Event()
+    pages: Future[Dashboard] = Future()
     pipe.on("end", end.set)
+    pipe.on("seat", lambda *request: _request_seat(pages.result(), graph.audit, *request) if pages.done() else None)
     pipe.start()
     dashboard = Dashboard.of(graph, graph.join())
+    graph.audit.on_driver = functools.partial(pipe.say, "driver", key="driver", keep=1)
+    pages.set_result(dashboard)
     pipe.say("served", dashboard.start())
     graph.steering.start()
     if graph.study is not None:
@@ -106,6 +130,18 @@ def _serve(pipe: Pipe) -> None:
         pass
     graph.steering.stop()
     dashboard.stop()
+
+
+def _request_seat(dashboard: "Dashboard", audit: PageAudit, request: str, program: str) -> None:
+    node = dashboard.node
+    if request == "ask":
+        audit.introduce_program(program)
+        if joined := node.join(program):
+            joined.lease.ask(program, joined.clock.now())
+    elif node.is_watched_by(program) and (joined := node.join(program)):
+        joined.leave(program)
+        node.leave(program)
+        audit.forget(program)
 
 
 if __name__ == "__main__":

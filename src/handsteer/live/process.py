@@ -5,7 +5,7 @@ import importlib.util
 import logging
 import os
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future, InvalidStateError
 from typing import Any, Final
 
@@ -40,6 +40,19 @@ class LiveProcess:
         self._address: Future[str] = Future()
         self._gateway: Gateway | None = None
         self._is_stopped = False
+        self._shares: Callable[[str, str], None] | None = None
+
+    def share_seat(self, say: Callable[[str, str], None]) -> None:
+        """Let clients ask the page for the seat, and not take it themselves; call it before :meth:`serve`.
+
+        Args:
+            say: Called with ``ask`` or ``leave``, and the name of the client. The answer is :meth:`note_driver`.
+        """
+        self._shares = say
+
+    def note_driver(self, driver: str | None) -> None:
+        """Note who has the seat now, a client or a viewer of the page."""
+        self._child.pipe.say("driver", driver, key="driver", keep=1)
 
     def serve(self, transport: Transport, clock: Clock, topics: Sequence[Topic[Any]], config: FoxgloveConfig) -> str:
         """Serve ``topics`` and return the address, with the token if one is needed.
@@ -50,7 +63,7 @@ class LiveProcess:
             transport: The graph's.
             clock: The graph's.
             topics: What to offer.
-            config: Address and token.
+            config: Address and token, and whether clients may drive.
 
         Raises:
             LiveError: The address or the port cannot be used, or the process has ended.
@@ -58,8 +71,10 @@ class LiveProcess:
         pipe = self._child.pipe
         pipe.on("served", self._address.set_result)
         pipe.on("refused", self._address.set_exception)
+        if self._shares is not None:
+            pipe.on("seat", self._shares)
         self._gateway = Gateway(pipe, transport)
-        pipe.say("begin", clock, tuple(topics), config)
+        pipe.say("begin", clock, tuple(topics), config, self._shares is not None)
         pipe.start()
         threading.Thread(target=self._watch, name="foxglove_end", daemon=True).start()
         try:
@@ -94,12 +109,16 @@ def _serve(pipe: Pipe) -> None:
         LiveError: They cannot be served.
     """
     # The graph's process, which imports this module too, needs no server.
+    from handsteer.live.driving import Driving, OwnSeat, SharedSeat  # noqa: PLC0415
     from handsteer.live.server import LiveServer  # noqa: PLC0415
+    from handsteer.nodes.steering import SteeringNode  # noqa: PLC0415
 
     if hasattr(os, "nice"):
         os.nice(_NICENESS)  # where processors are scarce, driving comes first
-    begun: Future[tuple[Clock, tuple[Topic[Any], ...], FoxgloveConfig]] = Future()
+    begun: Future[tuple[Clock, tuple[Topic[Any], ...], FoxgloveConfig, bool]] = Future()
     end = threading.Event()
+    shared = SharedSeat(lambda request, program: pipe.say("seat", request, program, key=f"seat of {program}", keep=1))
+    pipe.on("driver", shared.note)
     pipe.on("begin", lambda *what: begun.set_result(what))
     pipe.on("end", end.set)
     transport = PipedTransport(pipe)
@@ -107,11 +126,18 @@ def _serve(pipe: Pipe) -> None:
     while not begun.done():
         if end.wait(_LOOK_PERIOD_S) or pipe.ended.is_set():
             return
-    server = LiveServer(transport, *begun.result())
+    clock, topics, config, is_shared = begun.result()
+    steering = SteeringNode(transport, clock, name="foxglove") if config.drive else None
+    driving = Driving(steering, shared if is_shared else OwnSeat()) if steering is not None else None
+    server = LiveServer(transport, clock, topics, config, driving)
     pipe.say("served", server.start())
+    if steering is not None:
+        steering.start()
     while not (end.wait(_LOOK_PERIOD_S) or pipe.ended.is_set()):
         pass
     server.stop()
+    if steering is not None:
+        steering.stop()
 
 
 if __name__ == "__main__":

@@ -1,8 +1,9 @@
-"""The server of topics, by the Foxglove WebSocket protocol; read-only."""
+"""The server of topics, by the Foxglove WebSocket protocol; read-only unless clients may drive."""
 
 import asyncio
 import contextlib
 import http
+import itertools
 import logging
 import threading
 import time
@@ -20,15 +21,21 @@ from handsteer.clock import Clock
 from handsteer.config import FoxgloveConfig
 from handsteer.errors import LiveError
 from handsteer.live.access import Access
+from handsteer.live.driving import Driving
 from handsteer.live.feeds import Feeds
 from handsteer.live.outbox import Outbox
 from handsteer.live.protocol import (
     LARGEST_REQUEST_BYTES,
     SUBPROTOCOLS,
+    Advertise,
+    ClientChannel,
+    Published,
     Subscribe,
+    Unadvertise,
     Unsubscribe,
     advertise,
     message_data,
+    read_command,
     read_request,
     server_info,
     status,
@@ -38,8 +45,13 @@ from handsteer.transports.addresses import host_for_others, listen
 from handsteer.transports.base import Transport
 
 _MOST_CLIENTS: Final = 16
+_MOST_CHANNELS: Final = 100
 _REQUEST_PERIOD_S: Final = 0.01
 """A client that sends more often than this waits, so that it cannot take all of this thread."""
+
+_AT_ONCE_S: Final = 0.001
+_MOST_WAITING: Final = 5
+"""A command is late if so many messages before it had waited too: a network has held them back."""
 
 _CLOSE_TIMEOUT_S: Final = 0.3
 _START_TIMEOUT_S: Final = 20.0
@@ -58,17 +70,31 @@ _silent.setLevel(logging.CRITICAL)
 class Client:
     """A connected program.
 
+    Args:
+        name: Its name, for viewers of the page and the audit.
+        feeds: The topics.
+        driving: Takes its commands; None if clients may not drive.
+
     Attributes:
         outbox: What waits for it.
     """
 
-    def __init__(self, feeds: Feeds) -> None:
+    def __init__(self, name: str, feeds: Feeds, driving: Driving | None) -> None:
         self.outbox = Outbox()
+        self._name = name
         self._feeds = feeds
+        self._driving = driving
+        self._drives = True
         self._channels: dict[int, int] = {}
+        self._own: dict[int, ClientChannel] = {}
 
-    def obey(self, data: str | bytes) -> None:
-        """Execute a request; a wrong one is answered by an error status."""
+    def obey(self, data: str | bytes, *, is_late: bool = False) -> None:
+        """Execute a request; a wrong one is answered by an error status.
+
+        Args:
+            data: The request.
+            is_late: Whether it has waited for many others.
+        """
         try:
             request = read_request(data)
             if isinstance(request, Subscribe):
@@ -76,13 +102,36 @@ class Client:
             elif isinstance(request, Unsubscribe):
                 for subscription in request.subscriptions:
                     self._unsubscribe(subscription)
+            elif isinstance(request, Advertise):
+                self._own = dict(itertools.islice((self._own | dict(request.channels)).items(), _MOST_CHANNELS))
+            elif isinstance(request, Unadvertise):
+                self._unadvertise(request)
+            elif isinstance(request, Published):
+                self._take(request, is_late=is_late)
         except LiveError as error:
             self.outbox.reply(status(str(error)))
 
     def leave(self) -> None:
-        """End all its subscriptions."""
+        """End all its subscriptions, and its driving."""
         for subscription in list(self._channels):
             self._unsubscribe(subscription)
+        self._unadvertise(Unadvertise(list(self._own)))
+
+    def _take(self, published: Published, *, is_late: bool) -> None:
+        if self._driving is None:
+            raise LiveError("this server is read-only: to drive from here, run handsteer with --foxglove.drive true")
+        channel = self._own.get(published.channel)
+        if channel is None or not channel.has_commands:
+            raise LiveError("only commands are taken: geometry_msgs/Twist on /cmd_vel, as JSON or CDR")
+        velocity = read_command(published.content, channel.encoding)
+        drove, self._drives = self._drives, self._driving.command(self._name, velocity, is_late=is_late)
+        if drove and not self._drives:
+            self.outbox.reply(status("another one drives the robot, and has been asked to hand over"))
+
+    def _unadvertise(self, request: Unadvertise) -> None:
+        ended = [channel for number in request.channels if (channel := self._own.pop(number, None)) is not None]
+        if self._driving is not None and any(channel.has_commands for channel in ended):
+            self._driving.leave(self._name)
 
     def _subscribe(self, request: Subscribe) -> None:
         for subscription, channel in request.channels.items():
@@ -110,12 +159,20 @@ class LiveServer:
         clock: The graph's clock.
         topics: What to offer.
         config: Address and token.
+        driving: Takes the commands of clients; without it, the server is read-only.
     """
 
     def __init__(
-        self, transport: Transport, clock: Clock, topics: Sequence[Topic[Any]], config: FoxgloveConfig
+        self,
+        transport: Transport,
+        clock: Clock,
+        topics: Sequence[Topic[Any]],
+        config: FoxgloveConfig,
+        driving: Driving | None = None,
     ) -> None:
         self._transport = transport
+        self._driving = driving
+        self._numbers = itertools.count(1)
         self._clock = clock
         self._topics = topics
         self._config = config
@@ -191,14 +248,18 @@ class LiveServer:
             log.warning("refused a program that asked for the topics: %s", reason)
 
     async def _converse(self, connection: ServerConnection, feeds: Feeds) -> None:
-        client = Client(feeds)
+        client = Client(f"Foxglove {next(self._numbers)}", feeds, self._driving)
         self._clients.add(client)
-        client.outbox.reply(server_info(self._session))
+        client.outbox.reply(server_info(self._session, takes_commands=self._driving is not None))
         client.outbox.reply(advertise(feeds.channels))
         sending = asyncio.create_task(_send(connection, client.outbox))
         try:
-            async for data in connection:
-                client.obey(data)
+            waiting = 0
+            while True:
+                asked_s = time.monotonic()
+                data = await connection.recv()
+                waiting = waiting + 1 if time.monotonic() - asked_s < _AT_ONCE_S else 0
+                client.obey(data, is_late=waiting > _MOST_WAITING)
                 await asyncio.sleep(_REQUEST_PERIOD_S)
         except ConnectionClosed:
             pass

@@ -45,6 +45,7 @@ class SteeringNode(Node):
         config: Limits on another topic; the defaults of ``control`` when None.
         cmd_vel: A topic of robot commands, with Twist, TwistStamped or either; the model for other topics.
         steering: Topic of the commands to ``hand_sign_control``.
+        name: Name of the node.
     """
 
     def __init__(
@@ -55,8 +56,9 @@ class SteeringNode(Node):
         cmd_vel: Topic[Any] = CMD_VEL,
         *,
         steering: Topic[Twist] = STEERING_CMD_VEL,
+        name: str = "steering",
     ) -> None:
-        super().__init__("steering", transport, clock)
+        super().__init__(name, transport, clock)
         self._config = config or ControlConfig()
         self._cmd_vel = cmd_vel
         self._lock = threading.RLock()

@@ -1,0 +1,147 @@
+"""Lets programs drive by their commands on ``cmd_vel``: one at a time, the one that has the seat."""
+
+import math
+import threading
+from collections.abc import Callable
+from typing import Final, Protocol
+
+from handsteer.nodes.steering import SteeringNode
+from handsteer.types import Velocity
+
+HOLD_TIMEOUT_S: Final = 0.3
+"""Steering ends when a program has sent no command for this long."""
+
+CONFIRM_S: Final = 0.2
+"""After a pause, commands count once they have come for this long: those that a network held back come all at once."""
+
+_WATCH_PERIOD_S: Final = 0.05
+_ASK_PERIOD_S: Final = 1.0
+
+
+class Seat(Protocol):
+    """Who drives: one program, or a viewer of the page."""
+
+    def has(self, program: str) -> bool:
+        """Return whether ``program`` has the seat."""
+        ...
+
+    def ask(self, program: str) -> None:
+        """Ask for the seat for ``program``; it may get it later."""
+        ...
+
+    def leave(self, program: str) -> None:
+        """Give back the seat, or end the request for it; has no effect on others."""
+        ...
+
+
+class OwnSeat:
+    """A :class:`Seat` for a run without a page: whoever asks first has it."""
+
+    def __init__(self) -> None:
+        self._driver: str | None = None
+
+    def has(self, program: str) -> bool:
+        """Return whether ``program`` has the seat."""
+        return self._driver == program
+
+    def ask(self, program: str) -> None:
+        """Take the seat for ``program`` if it is free."""
+        self._driver = self._driver or program
+
+    def leave(self, program: str) -> None:
+        """Give back the seat."""
+        if self._driver == program:
+            self._driver = None
+
+
+class SharedSeat:
+    """A :class:`Seat` that the page's viewers share: its driver is asked, and may hand it over.
+
+    Args:
+        say: Tells the page that a program asks (``ask``) or leaves (``leave``).
+    """
+
+    def __init__(self, say: Callable[[str, str], None]) -> None:
+        self._say = say
+        self._driver: str | None = None
+
+    def note(self, driver: str | None) -> None:
+        """Note who has the seat now, a program or a viewer."""
+        self._driver = driver
+
+    def has(self, program: str) -> bool:
+        """Return whether ``program`` has the seat."""
+        return self._driver == program
+
+    def ask(self, program: str) -> None:
+        """Ask for the seat."""
+        self._say("ask", program)
+
+    def leave(self, program: str) -> None:
+        """Give back the seat, or end the request for it."""
+        self._say("leave", program)
+
+
+class Driving:
+    """Steers by the commands of the program that has the seat; thread-safe.
+
+    Args:
+        steering: Publishes the velocity until it is released; not started yet.
+        seat: Who drives.
+    """
+
+    def __init__(self, steering: SteeringNode, seat: Seat) -> None:
+        self._steering = steering
+        self._seat = seat
+        self._lock = threading.Lock()
+        self._program: str | None = None
+        self._heard_s = self._began_s = self._asked_s = -math.inf
+        # On the thread that repeats the velocity: while it hangs, nothing is repeated.
+        steering.every(_WATCH_PERIOD_S, self._watch)
+
+    def command(self, program: str, wanted: Velocity, *, is_late: bool = False) -> bool:
+        """Drive at ``wanted`` if ``program`` has the seat, until :data:`HOLD_TIMEOUT_S` after its last command.
+
+        A program without the seat asks for it.
+
+        Args:
+            program: Name of the program.
+            wanted: The velocity.
+            is_late: Whether the command has waited for others, so that it says nothing about now.
+
+        Returns:
+            Whether it has the seat.
+        """
+        now = self._steering.clock.now()
+        if not self._seat.has(program) and now - self._asked_s >= _ASK_PERIOD_S:
+            self._asked_s = now
+            self._seat.ask(program)
+        if not self._seat.has(program):
+            return False
+        with self._lock:
+            if program != self._program or now - self._heard_s > HOLD_TIMEOUT_S or is_late:
+                self._program, self._began_s = program, now
+                self._steering.release()
+            self._heard_s = now
+            if wanted.is_zero or now - self._began_s >= CONFIRM_S:
+                self._steering.steer(wanted.linear_mps, wanted.angular_radps)
+        return True
+
+    def leave(self, program: str) -> None:
+        """Stop if ``program`` steers, and give back its seat."""
+        with self._lock:
+            if self._program == program:
+                self._release()
+        self._seat.leave(program)
+
+    def _watch(self) -> None:
+        with self._lock:
+            if self._program is None:
+                return
+            is_silent = self._steering.clock.now() - self._heard_s > HOLD_TIMEOUT_S
+            if is_silent or not self._seat.has(self._program):
+                self._release()
+
+    def _release(self) -> None:
+        self._program = None
+        self._steering.release()
