@@ -19,7 +19,7 @@ _ASK_PERIOD_S: Final = 1.0
 
 
 class Seat(Protocol):
-    """Who drives: one program, or a viewer of the page."""
+    """The right to drive, which one program or one viewer of the page has at a time."""
 
     def has(self, program: str) -> bool:
         """Return whether ``program`` has the seat."""
@@ -35,7 +35,7 @@ class Seat(Protocol):
 
 
 class OwnSeat:
-    """A :class:`Seat` for a run without a page: whoever asks first has it."""
+    """A :class:`Seat` for a run without a page: the first program that asks has it."""
 
     def __init__(self) -> None:
         self._driver: str | None = None
@@ -87,7 +87,7 @@ class Driving:
 
     Args:
         steering: Publishes the velocity until it is released; not started yet.
-        seat: Who drives.
+        seat: Decides which program drives.
     """
 
     def __init__(self, steering: SteeringNode, seat: Seat) -> None:
