@@ -145,11 +145,6 @@ def test_what_cannot_be_done_gets_one_line_and_leaves_files_as_they_are(
     assert sorted(path.name for path in Path().iterdir()) == ["bad.npz", "hi.npz"]
 
 
-@pytest.mark.parametrize("verb", ["collect", "import", "train"])
-def test_help_has_an_example(capsys: pytest.CaptureFixture[str], verb: str) -> None:
-    assert f"Example: handsteer signs {verb}" in prints(capsys, "signs", verb, "--help")
-
-
 @pytest.mark.slow
 def test_an_action_of_a_sign_that_nobody_knows_is_warned_of(
     caplog: pytest.LogCaptureFixture, capsys: pytest.CaptureFixture[str]

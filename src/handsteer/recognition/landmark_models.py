@@ -62,6 +62,11 @@ _TRIES = 5
 _BETWEEN_TRIES_S = 0.001
 
 
+def are_elsewhere() -> bool:
+    """Return whether ``HANDSTEER_MODELS`` names the folder of the model files."""
+    return bool(os.environ.get("HANDSTEER_MODELS"))
+
+
 def models_dir() -> Path:
     """Return the folder of the model files: ``HANDSTEER_MODELS`` if set, else in the user's data directory."""
     chosen = os.environ.get("HANDSTEER_MODELS")
