@@ -135,16 +135,3 @@ def _problem(error: CycloptsError) -> str:
     if isinstance(error, UnknownOptionError) and "Did you mean" not in text:
         text += with_section((error.token.keyword or error.token.value).partition("=")[0])
     return f"{text}; see {chain} --help" if not text.endswith("?") else f"{text} See {chain} --help"
-
-
-def with_parameters(group: App) -> None:
-    """Let the verbs of ``group`` list every parameter among their options, as shell completion needs it."""
-    from handsteer.config import Config
-
-    every = Annotated[Config | None, Parameter(name="*")]
-    for name in group:
-        verb = group[name]
-        with_parameters(verb)
-        call = verb.default_command
-        if call is not None and call.__annotations__.get("parameters") == Parameters:
-            call.__annotations__["parameters"] = every

@@ -1,13 +1,15 @@
 """``handsteer recognize``: which sign is it?"""
 
 import json as json_format
+import time
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from handsteer.cli.app import ConfigFile, Flag, Parameters, loads
-from handsteer.cli.running import settings
+from handsteer.cli.running import say, settings
 from handsteer.errors import CameraNotFound
 
 if TYPE_CHECKING:
@@ -20,7 +22,8 @@ def recognize(
 ) -> int:
     """Print which sign each frame of a photo, a folder of photos or a video shows.
 
-    Photos are processed independently, the frames of a video like those of a camera.
+    Photos are processed independently, the frames of a video like those of a camera. A summary follows on standard
+    error.
 
     For example:
       handsteer recognize photo.jpg         one photo
@@ -46,9 +49,20 @@ def recognize(
     fetch_missing(config.landmarks.model)
     recognizer = Recognizer(config)
     is_photo = source.is_dir() or source.suffix.lower() in PHOTO_SUFFIXES
+    signs: Counter[str] = Counter()
+    began_s = time.monotonic()
     for result in (_photos if is_photo else _video)(source, recognizer):
+        signs[result.sign] += 1
         print(json_format.dumps(asdict(result)) if json else _text(result), flush=True)
+    if signs.total() > 1:
+        say(_summary(signs, "photos" if is_photo else "frames", time.monotonic() - began_s))
     return 0
+
+
+def _summary(signs: Counter[str], unit: str, took_s: float) -> str:
+    total = signs.total()
+    shares = ", ".join(f"{sign} {count / total:.0%}" for sign, count in signs.most_common())
+    return f"{total} {unit} in {took_s:.1f} s, {total / took_s:.0f} per second: {shares}"
 
 
 @dataclass(frozen=True)
