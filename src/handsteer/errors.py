@@ -138,6 +138,11 @@ def did_you_mean(word: str, known: Iterable[str]) -> str:
     return f": did you mean {near[0]}?" if near else ""
 
 
+def reason_of(error: Exception) -> str:
+    """Return why something failed, for a message: of a system error its words without the number."""
+    return (error.strerror if isinstance(error, OSError) else None) or str(error)
+
+
 @contextmanager
 def needing(what: str, extra: str, *modules: str) -> Iterator[None]:
     """Report how to install a package that an import within the block lacks.
