@@ -36,7 +36,7 @@ from handsteer.transports.in_process import InProcessTransport
 
 WIDTH, HEIGHT = 640, 480
 SETTLE_S = 0.5
-MODULES = ("handsteer.cli.app", "handsteer.cli.nodes")
+MODULES = ("handsteer.cli.app", "handsteer.cli.one_node")
 SESSIONS = {
     "dds": "handsteer.transports.dds.transport",
     "zenoh": "handsteer.transports.zenoh.transport",

@@ -118,3 +118,33 @@ def test_old_names_still_count_with_one_warning(
     assert load(None, {"signs": {"dropout_hold": 0.4}}, {"signs": {"bridge_time": 0.5}}).signs.dropout_hold == 0.5
     said = [record.getMessage() for record in caplog.records if "bridge_time" in record.getMessage()]
     assert said == ["parameter bridge_time is deprecated: use dropout_hold"]
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        (
+            "control:\n  rule: course\n  max_liner: 1\n",
+            r"my\.yaml, line 3: control\.max_liner: .*did you mean max_linear\?",
+        ),
+        (
+            "# mine\ncontrl: {mode: signs}\n",
+            r"my\.yaml, line 2: contrl: there is no such parameter: did you mean control\?",
+        ),
+        ("control:\n  mode: joystik\n", r"my\.yaml, line 2: control\.mode: 'joystik' .*: did you mean joystick\?"),
+        ("control:\n  actions:\n    Hi: turbos\n", r"my\.yaml, line 3: control\.actions\.Hi: .*: did you mean turbo\?"),
+        ("camera: 5\n", r"my\.yaml, line 1: camera: 5 should be"),
+    ],
+)
+def test_what_is_wrong_in_a_file_is_found_by_its_line(tmp_path: Path, text: str, says: str) -> None:
+    path = tmp_path / "my.yaml"
+    path.write_text(text)
+    with pytest.raises(ConfigError, match=says):
+        load(path)
+
+
+def test_the_file_is_not_blamed_for_an_option(tmp_path: Path) -> None:
+    path = tmp_path / "my.yaml"
+    path.write_text("control:\n  max_linear: 1\n")
+    with pytest.raises(ConfigError, match=r"^control\.max_linear: 99 should be"):
+        load(path, None, {"control": {"max_linear": 99}})

@@ -31,7 +31,8 @@ A message is one line that reports what was wrong, where, and what would be righ
 and exits (with code 2).
 """
 
-from collections.abc import Iterator
+import difflib
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 
 
@@ -129,6 +130,17 @@ class LiveError(HandsteerError):
 
 class PackageMissing(HandsteerError):  # noqa: N818
     """A Python package that is needed is not installed."""
+
+
+def did_you_mean(word: str, known: Iterable[str]) -> str:
+    """Return ``: did you mean X?`` with the nearest of the ``known`` words, for a message; empty if none is near."""
+    near = difflib.get_close_matches(word, list(known), n=1)
+    return f": did you mean {near[0]}?" if near else ""
+
+
+def reason_of(error: Exception) -> str:
+    """Return why something failed, for a message: of a system error its words without the number."""
+    return (error.strerror if isinstance(error, OSError) else None) or str(error)
 
 
 @contextmanager

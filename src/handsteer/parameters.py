@@ -120,6 +120,7 @@ class Description:
         choices: The allowed values; empty if others are allowed too.
         why_fixed: Why it cannot be set while the node runs; None if it can.
         removable: Whether it is an entry of a table that can be removed.
+        is_path: Whether it names a file or folder.
     """
 
     kind: Kind
@@ -130,6 +131,7 @@ class Description:
     choices: tuple[str, ...] = ()
     why_fixed: str | None = None
     removable: bool = False
+    is_path: bool = False
 
 
 class NodeParameters:
@@ -308,7 +310,8 @@ def describe(model: type[Section], name: str) -> Description:
     lowest = above if above is not None else _bound(field, "ge")
     constraint = f"one of {', '.join(choices)}" if choices else f"above {above:g}" if above is not None else ""
     fixed = None if name in model.live else _AT_START
-    return Description(kind, field.description or "", lowest, _bound(field, "le"), constraint, choices, fixed)
+    bounds = (lowest, _bound(field, "le"))
+    return Description(kind, field.description or "", *bounds, constraint, choices, fixed, is_path=of is Path)
 
 
 def _without_none(annotation: Any) -> Any:

@@ -4,7 +4,7 @@ A few hundred bytes of YAML can expand to gigabytes (aliases of aliases, merge k
 contain a number that takes minutes to read. So the events of a text are checked before anything is constructed from it.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -95,6 +95,29 @@ def read(path: Path, source: str, error: type[HandsteerError], unreadable: str) 
     except UnicodeDecodeError:
         raise error(f"{source}: not valid YAML") from None
     return parse(text, source, error)
+
+
+def line_of(path: Path, place: Sequence[str | int]) -> int | None:
+    """Return the line, from 1, of the key or item at ``place`` in the file, such as ``("control", "mode")``.
+
+    None if it is not there, or the file can no longer be read.
+    """
+    try:
+        with path.open("rb") as file:
+            text = file.read(LARGEST_BYTES).decode("utf-8-sig")
+        _look_through(text)
+        node = yaml.compose(text, _Loader)
+    except (OSError, ValueError, yaml.YAMLError, _ProblemError):
+        return None
+    found: Any = None
+    for part in place:
+        pairs = enumerate(node.value) if isinstance(node, yaml.SequenceNode) else getattr(node, "value", ())
+        below = [(key, of) for key, of in pairs if part == (key if isinstance(key, int) else key.value)]
+        if isinstance(node, yaml.ScalarNode) or not below:
+            return None
+        key, node = below[0]
+        found = node if isinstance(key, int) else key
+    return found.start_mark.line + 1 if found is not None else None
 
 
 def _at(line: int | None, text: str | bytes) -> str:

@@ -54,7 +54,8 @@ def prints(capsys: pytest.CaptureFixture[str], *arguments: str, code: int = 0) -
         (["run", "--camera", str(Path(__file__).parent)], r"there are no photos in "),
         (["run", "--camera", "rtsp://127.0.0.1:9/x"], r"no picture comes from rtsp://127\.0\.0\.1:9/x"),
         (["run", "--world", "moon"], r"moon.*obstacles"),
-        (["run", "--robot", "tank"], r"robot\.kind: 'tank' should be 'sim'"),
+        (["run", "--robot", "tank"], r"--robot: there is no 'tank': give sim, auto, ros2, dds, zenoh, ros1, generic, "),
+        (["run", "--robot", "turtlbot4"], r"there is no 'turtlbot4': did you mean turtlebot4\?"),
         (["run", "--port", "99999"], r"dashboard\.port: 99999 should be less than or equal to 65535"),
         (["run", "--control.linear-step", "7"], r"control\.linear_step: '7' should be less than or equal to 1"),
         (["run", "--camera.fps", "quick"], r"camera\.fps: 'quick' should be a valid number"),
@@ -63,11 +64,28 @@ def prints(capsys: pytest.CaptureFixture[str], *arguments: str, code: int = 0) -
         (["run", "--config", "gone.yaml"], r"cannot read the configuration gone\.yaml: No such file"),
         (["run", "--camera", "virtual", "--virtual-hand.script", "Wave:2"], r"Wave"),
         (["run", "--colour", "red"], r"Unknown option: --colour"),
+        (["run", "--headles"], r"Unknown option: --headles\. Did you mean --headless\? See handsteer run --help"),
+        (["run", "--max-linear", "1"], r"Did you mean --control\.max-linear or --robot\.max-linear\?"),
+        (["run", "--control.max-liner", "1"], r"no option --control\.max-liner: did you mean --control\.max-linear\?"),
+        (["run", "--control.colour", "1"], r"no option --control\.colour: handsteer parameters control lists all"),
+        (["run", "--contrl.max-linear", "1"], r"no option --contrl\.max-linear: did you mean --control\.max-linear\?"),
+        (["run", "--control.max-linear"], r"--control\.max-linear needs a value"),
+        (["run", "--control.max-linear", "--fast"], r"--control\.max-linear needs a value"),
+        (["run", "--control.max-linear=1", "--control.max-linear=2"], r"--control\.max-linear is given twice"),
+        (["run", "--control.actions", "turbo"], r"expected the form --control\.actions\.Peace turbo"),
+        (["run", "--control.mode", "joystik"], r"'signs' or 'joystick': did you mean joystick\?"),
+        (["run", "--robot.preset", "turtlbot4"], r"robot\.preset: 'turtlbot4' .*: did you mean turtlebot4\?"),
+        (["run", "--world", "obstacle"], r"obstacle.*did you mean obstacles\?"),
         (["recognize", "gone.jpg"], r"there is no gone\.jpg: give a photo, a folder of photos or a video file"),
         (["camera"], r"--transport requires an argument"),
         (["control", "--transport", "pigeon"], r"there is no transport 'pigeon': use ros1"),
         (["control", "--transport", "ros1", "--config", "gone.yaml"], r"cannot read the configuration gone\.yaml"),
-        (["dance"], r'Unknown command "dance"'),
+        (["dance"], r'Unknown command "dance": the commands are run, recognize, .*robots$'),
+        (["recogize"], r'Unknown command "recogize": did you mean recognize\? the commands'),
+        (["signs", "colect"], r'Unknown command "colect": did you mean collect\?'),
+        (["doctor", "--control.mode", "signs"], r"doctor takes no parameters"),
+        (["control", "--transport", "zeno"], r"there is no transport 'zeno': did you mean zenoh\?"),
+        (["parameters", "max_liner"], r"no parameter is called max_liner: did you mean max_linear\?"),
     ],
     ids=lambda value: " ".join(value[:3]) if isinstance(value, list) else None,
 )
@@ -124,7 +142,11 @@ def test_a_file_plays_once_in_a_headless_run(capsys: pytest.CaptureFixture[str],
 
 @pytest.mark.slow
 def test_recognize_prints_a_line_a_frame(capsys: pytest.CaptureFixture[str], slideshow: Path) -> None:
-    lines = [json.loads(line) for line in prints(capsys, "recognize", str(slideshow), "--json").splitlines()]
+    with pytest.raises(SystemExit):
+        main(["recognize", str(slideshow), "--json"])
+    captured = capsys.readouterr()
+    assert re.search(r"270 frames in [\d.]+ s, \d+ per second: .*Stop \d+%", captured.err)
+    lines = [json.loads(line) for line in captured.out.splitlines()]
     assert [line["frame"] for line in lines] == list(range(270))
     assert lines[-1]["time_s"] == pytest.approx(269 / 12)
     assert {line["sign"] for line in lines} >= {"NONE", "Stop", "Forward", "Go", "Turn Right", "Turn Left"}
@@ -201,7 +223,7 @@ def test_help_says_what_each_verb_does(capsys: pytest.CaptureFixture[str], argum
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--robot", "hal"], "robot.kind: 'hal' should be 'sim', 'auto', 'ros2', 'dds', 'zenoh' or 'ros1'"),
+        (["--robot", "hal"], "--robot: there is no 'hal': give sim, auto, ros2, dds, zenoh, ros1, generic, "),
         (["--robot", "dds", "--fast"], "--fast runs on simulated time, which a real robot (robot.kind dds) does not"),
         (["--ros-args", "-r", "a:=b"], "'--ros-args': ROS arguments need a real robot"),
         (["--control.cmd-vel-type=twist", "--robot.cmd-vel-type=twist_stamped"], "control.cmd_vel_type is twist and"),

@@ -243,11 +243,6 @@ def test_list_needs_no_landmark_models(
     assert "Backward" in prints(capsys, "signs", "list")
 
 
-@pytest.mark.parametrize("verb", ["evaluate", "list"])
-def test_help_has_an_example(capsys: pytest.CaptureFixture[str], verb: str) -> None:
-    assert f"Example: handsteer signs {verb}" in prints(capsys, "signs", verb, "--help")
-
-
 @pytest.mark.parametrize(
     ("option", "message"),
     [

@@ -4,9 +4,11 @@ import json
 from pathlib import Path
 
 import cv2
+import numpy as np
 import pytest
 
 from handsteer.cameras.virtual import VirtualHandCamera
+from handsteer.cli import main
 from handsteer.clock import SteppedClock
 from handsteer.config import VirtualHandConfig
 from handsteer.training.custom.dataset import Dataset, load_dataset, save_dataset
@@ -145,14 +147,27 @@ def test_what_cannot_be_done_gets_one_line_and_leaves_files_as_they_are(
     assert sorted(path.name for path in Path().iterdir()) == ["bad.npz", "hi.npz"]
 
 
-@pytest.mark.parametrize("verb", ["collect", "import", "train"])
-def test_help_has_an_example(capsys: pytest.CaptureFixture[str], verb: str) -> None:
-    assert f"Example: handsteer signs {verb}" in prints(capsys, "signs", verb, "--help")
-
-
 @pytest.mark.slow
 def test_an_action_of_a_sign_that_nobody_knows_is_warned_of(
     caplog: pytest.LogCaptureFixture, capsys: pytest.CaptureFixture[str]
 ) -> None:
     prints(capsys, "run", "--fast", "--duration", "0.2", *VIRTUAL, "--control.actions.Hi", "turbo")
     assert "control.actions: the sign Hi is not known; the signs are Stop" in caplog.text
+
+
+def test_what_cannot_be_written_is_said_before_the_work(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    for verb in (["collect", "--label", "Hi", "--dataset"], ["train", "--output"]):
+        assert f"{tmp_path} is a folder: give the name of a file" in fails(capsys, "signs", *verb, str(tmp_path))
+        assert "cannot write /proc/my.npz: " in fails(capsys, "signs", *verb, "/proc/my.npz")
+
+
+def test_photos_without_a_hand_are_named(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    config = VirtualHandConfig(script="Peace:60")
+    camera = VirtualHandCamera(config, width=320, height=240, fps=10, clock=SteppedClock())
+    cv2.imwrite(str(tmp_path / "hand.png"), camera.read().image)
+    for name in ("grey", "white"):
+        cv2.imwrite(str(tmp_path / f"{name}.png"), np.full((240, 320, 3), 128 if name == "grey" else 255, np.uint8))
+    with pytest.raises(SystemExit):
+        main(["signs", "collect", "--label", "Hi", "--camera", str(tmp_path)])
+    said = capsys.readouterr().err
+    assert f"no hand was found in 2 photos, which were left out: {tmp_path}/grey.png, {tmp_path}/white.png" in said

@@ -3,9 +3,10 @@
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from typing import Any
 
-from handsteer.cli import main, nodes
+from handsteer.cli import main, one_node
 
 SPEED_MPS = 0.3
 
@@ -24,5 +25,5 @@ def held(node: Any, config: Any) -> Iterator[None]:
     ended.set()
 
 
-nodes._served = held
+one_node.JOBS["steering"] = replace(one_node.JOBS["steering"], companion=held)
 main()

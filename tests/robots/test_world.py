@@ -42,8 +42,8 @@ def test_an_empty_file_is_an_empty_world(tmp_path: Path) -> None:
 
 
 def test_an_unknown_name_lists_the_known_ones() -> None:
-    names = " or ".join(shipped_worlds())
-    with pytest.raises(WorldError, match=rf"no world 'moon'; use {names}, or the path of a \.yaml file"):
+    names = ", ".join(shipped_worlds())
+    with pytest.raises(WorldError, match=rf"no world 'moon': use {names}, or the path of a \.yaml file"):
         load_world("moon")
 
 

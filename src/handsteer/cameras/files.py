@@ -51,6 +51,10 @@ class VideoFile:
         self._at_end = at_end
         if not path.is_file():
             raise CameraNotFound(f"there is no video file {path}")
+        try:
+            path.open("rb").close()
+        except OSError as error:
+            raise CameraUnreadable(f"cannot read the video {path}: {error.strerror}") from None
         self._capture = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG)
         width, height = (int(self._capture.get(side)) for side in (cv2.CAP_PROP_FRAME_WIDTH, cv2.CAP_PROP_FRAME_HEIGHT))
         if width * height > MOST_PIXELS:

@@ -45,12 +45,12 @@ def _run(words: list[str]) -> int:
         # pydantic would search all installed packages for plugins.
         os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
         try:
-            from handsteer.cli.one_node import run_ros1  # noqa: PLC0415
+            from handsteer.cli.one_node import run_ros1
 
             return run_ros1(words[0], words[3:])
         finally:
             gc.enable()
-    from handsteer.cli.app import run  # noqa: PLC0415
+    from handsteer.cli.app import run
 
     return run(words)
 

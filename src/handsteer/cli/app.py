@@ -1,20 +1,28 @@
-"""The command line: its verbs, the options that they share, and how errors are reported."""
+"""The command line: its verbs, the options that they share, and how errors are reported.
 
+Only what help needs is loaded here and at the top of each verb's file, so that help and shell completion are fast; a
+verb names the modules it works with by :func:`loads`.
+"""
+
+import importlib
+from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any, TypeVar
 
-from cyclopts import App, CycloptsError, Parameter, ValidationError
-from pydantic import ValidationError as PydanticError
+from cyclopts import App, CycloptsError, Parameter, UnknownCommandError, UnknownOptionError
 
-from handsteer import __version__, config
+from handsteer import __version__
 from handsteer.cli import signals
+from handsteer.cli.options import take_parameters, with_section
 from handsteer.cli.running import exit_code, fail, set_up_logging
-from handsteer.parameters import section_model
+from handsteer.errors import did_you_mean
 
-Flag = Annotated[bool, Parameter(negative="")]
-Parameters = Annotated[config.Config | None, Parameter(name="*", group="Every parameter (also in a --config file)")]
+Flag = Annotated[bool, Parameter(negative="", show_default=False)]
+Parameters = Annotated[dict[str, Any] | None, Parameter(parse=False)]
+"""Options with the full name of a parameter, such as --control.max-linear, by section."""
 ConfigFile = Annotated[Path | None, Parameter(name="--config")]
 
+V = TypeVar("V", bound=Callable[..., int | None])
 
 _EXAMPLES = """Examples:
   handsteer run                                  drive, and open the page
@@ -28,10 +36,13 @@ _EXAMPLES = """Examples:
   handsteer bench --course slalom                how well does one drive?
   handsteer camera --transport ros1              one node, in a ROS 1 graph
   handsteer camera --transport auto              one node, in a ROS 2 graph
+  handsteer parameters control                   what can be set, each as an option
   handsteer doctor                               what works on this machine
 """
 
+_GRAPH = "One node of a graph of several processes"
 _NODES = ("camera", "recognition", "control", "robot", "steering")
+_LOADS: dict[object, tuple[str, ...]] = {}
 
 app = App(
     name="handsteer",
@@ -42,40 +53,52 @@ app = App(
     result_action="return_value",
 )
 # Named, not imported: a verb's module is loaded when it is used.
-for verb in ("run", "recognize", "study"):
-    app.command(f"handsteer.cli.{verb}:{verb}", name=verb)
+for verb in ("run", "recognize", "study", "parameters", "completion"):
+    app.command(f"handsteer.cli.{verb}:{verb}", name=verb, help_epilogue="")
 for verb in ("models", "doctor", "ros"):
-    app.command(f"handsteer.cli.installation:{verb}", name=verb)
+    app.command(f"handsteer.cli.installation:{verb}", name=verb, help_epilogue="")
 for verb in ("record", "replay", "report"):
-    app.command(f"handsteer.cli.recordings:{verb}", name=verb)
+    app.command(f"handsteer.cli.recordings:{verb}", name=verb, help_epilogue="")
 app.command("handsteer.cli.signs:app", name="signs")
-app.command("handsteer.cli.bench:bench", name="bench")
+app.command("handsteer.cli.bench:bench", name="bench", help_epilogue="")
 for verb in _NODES:
-    app.command(f"handsteer.cli.nodes:{verb}", name=verb, group="One node of a graph of several processes")
-app.command("handsteer.cli.nodes:zenoh_router", name="zenoh-router", group="One node of a graph of several processes")
-app.command("handsteer.cli.nodes:robots", name="robots", group="One node of a graph of several processes")
+    app.command(f"handsteer.cli.nodes:{verb}", name=verb, group=_GRAPH, help_epilogue="")
+app.command("handsteer.cli.nodes:zenoh_router", name="zenoh-router", group=_GRAPH, help_epilogue="")
+app.command("handsteer.cli.nodes:robots", name="robots", group=_GRAPH, help_epilogue="")
+
+
+def loads(*modules: str) -> Callable[[V], V]:
+    """Declare the modules that a verb works with; they are imported before signals can interrupt an import."""
+
+    def declared(verb: V) -> V:
+        _LOADS[verb] = modules
+        return verb
+
+    return declared
 
 
 def run(words: list[str]) -> int:
     """Run the verb that ``words`` name; return the exit code: 0 for success, 2 for wrong input."""
     set_up_logging()
-    words = [_by_new_name(word) for word in _ros_words_last(words)]
     _load_what_help_lists(app, words)
     return exit_code(lambda: _run(words))
 
 
 def _run(words: list[str]) -> int:
+    own, parameters = take_parameters(_ros_words_last(words))
     try:
-        verb, given, _ = app.parse_args(words, exit_on_error=False, print_error=False)
-        if words and words[0] in _NODES:
-            from handsteer.cli.one_node import load  # noqa: PLC0415 - no other verb needs it
-
-            load(words[0])
-        # The verb is loaded; from here on, an interrupt must clean up what it started.
-        signals.interrupt_on_signals()
-        return int(verb(*given.args, **given.kwargs) or 0)
+        verb, given, unparsed = app.parse_args(own, exit_on_error=False, print_error=False)
     except CycloptsError as error:
         return fail(_problem(error))
+    if "parameters" in unparsed:
+        given.arguments["parameters"] = parameters
+    elif parameters:
+        return fail(f"{words[0]} takes no parameters of the configuration; see handsteer {words[0]} --help")
+    for module in _LOADS.get(verb, ()):
+        importlib.import_module(module)
+    # The verb is loaded; from here on, an interrupt must clean up what it started.
+    signals.interrupt_on_signals()
+    return int(verb(*given.args, **given.kwargs) or 0)
 
 
 def _load_what_help_lists(group: App, arguments: list[str]) -> None:
@@ -85,16 +108,6 @@ def _load_what_help_lists(group: App, arguments: list[str]) -> None:
             group[verb]
     elif arguments[0] in set(group):
         _load_what_help_lists(group[arguments[0]], arguments[1:])
-
-
-def _by_new_name(word: str) -> str:
-    """Return an option that has an old name, such as ``--signs.bridge-time=0.2``, with its new name."""
-    option, equals, value = word.partition("=")
-    section, _, name = option.removeprefix("--").partition(".")
-    if not word.startswith("--") or section not in config.Config.model_fields:
-        return word
-    new = section_model(section).new_name(name.replace("-", "_"))
-    return word if new == name.replace("-", "_") else f"--{section}.{new.replace('_', '-')}{equals}{value}"
 
 
 def _ros_words_last(arguments: list[str]) -> list[str]:
@@ -113,6 +126,12 @@ def _ros_words_last(arguments: list[str]) -> list[str]:
 
 
 def _problem(error: CycloptsError) -> str:
-    if isinstance(error, ValidationError) and isinstance(error.__cause__, PydanticError):
-        return config.describe(error.__cause__)
-    return f"{str(error).rstrip('.')}; see handsteer --help"
+    chain = " ".join(("handsteer", *(error.command_chain or ())))
+    if isinstance(error, UnknownCommandError) and error.app and error.unused_tokens:
+        verbs = [name for name in error.app if not name.startswith("-")]
+        near = did_you_mean(error.unused_tokens[0], verbs)
+        return f'Unknown command "{error.unused_tokens[0]}"{near or ":"} the commands are {", ".join(verbs)}'
+    text = str(error).rstrip(".")
+    if isinstance(error, UnknownOptionError) and "Did you mean" not in text:
+        text += with_section((error.token.keyword or error.token.value).partition("=")[0])
+    return f"{text}; see {chain} --help" if not text.endswith("?") else f"{text} See {chain} --help"

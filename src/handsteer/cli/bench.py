@@ -7,11 +7,9 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
-from tqdm import tqdm
 
-from handsteer.cli.app import ConfigFile, Parameters
-from handsteer.cli.running import say, settings
-from handsteer.cli.signs.tables import table
+from handsteer.cli.app import ConfigFile, Parameters, loads
+from handsteer.cli.running import check_writable, say, settings
 from handsteer.errors import BenchError, needing
 
 if TYPE_CHECKING:
@@ -25,6 +23,7 @@ _HEAD = (
 )
 
 
+@loads("handsteer.cli.table", "handsteer.config", "tqdm")
 def bench(
     *,
     course: Words = None,
@@ -43,7 +42,10 @@ def bench(
 ) -> int:
     """Measure laps that a simulated operator drives through interfaces. Simulated laps are no user study.
 
-    Example: handsteer bench --course slalom --interface signs --interface pad --seeds 20
+    For example:
+      handsteer bench --course slalom --seeds 5  all interfaces
+      handsteer bench --course maze --interface signs --interface pad
+      handsteer bench --course slalom --sweep latency=0,250,500
 
     The table has medians with their 95 % intervals, and means of missed gates and bumps a lap.
     Laps that take longer than three minutes count with three minutes.
@@ -76,15 +78,18 @@ def bench(
     config_file
         YAML file with parameters of handsteer, such as control.rule; options override it.
     """
+    from tqdm import tqdm
+
     if not 1 <= seeds <= 10_000 or first_seed < 0:
         raise BenchError(f"--seeds: {seeds} should be 1 to 10,000, and --first-seed, {first_seed}, not negative")
     if jobs is not None and jobs < 1:
         raise BenchError(f"--jobs: {jobs} should be at least 1")
     with needing("the simulated robot", "sim", "mujoco", "xacro"):
-        from handsteer.bench import cells as of_cells  # noqa: PLC0415 - needs the simulator
-        from handsteer.bench.courses import COURSES  # noqa: PLC0415
-        from handsteer.bench.laps import INTERFACES, Conditions  # noqa: PLC0415
-    _check_file(json)
+        from handsteer.bench import cells as of_cells  # needs the simulator
+        from handsteer.bench.courses import COURSES
+        from handsteer.bench.laps import INTERFACES, Conditions
+    if json is not None:
+        check_writable("--json", json, BenchError)
     drawing = _open_plots(plots)
     base = Conditions(latency_s=latency / 1000, fps=fps, through=through)
     sweeps = [of_cells.parse_sweep(text) for text in sweep or ()]
@@ -115,6 +120,8 @@ def bench(
 
 def bench_table(results: "list[CellResult]") -> str:
     """Return the results as a table, a row for each cell."""
+    from handsteer.cli.table import table
+
     return table(_HEAD, [_row(result) for result in results], text_columns=3)
 
 
@@ -157,17 +164,12 @@ def _open_plots(folder: Path | None) -> ModuleType | None:
     if folder is None:
         return None
     with needing("a plot", "plots", "matplotlib"):
-        from handsteer.bench import plots  # noqa: PLC0415 - needs Matplotlib
+        from handsteer.bench import plots
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise BenchError(f"--plots: cannot make the folder {folder}: {error.strerror}") from None
     return plots
-
-
-def _check_file(path: Path | None) -> None:
-    if path is not None and not path.absolute().parent.is_dir():
-        raise BenchError(f"--json: {path}: there is no folder {path.absolute().parent}")
 
 
 def _write(path: Path, text: str) -> None:

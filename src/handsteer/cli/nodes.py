@@ -7,21 +7,19 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from typing import Any
 
-from handsteer import making
-from handsteer.cli.app import ConfigFile, Flag, Parameters
-from handsteer.cli.one_node import Job, run
+from handsteer.cli.app import ConfigFile, Flag, Parameters, loads
 from handsteer.cli.running import say, signals_ignored
-from handsteer.config import Config
-from handsteer.errors import ConfigError, needing
-from handsteer.transports import TRANSPORTS
+from handsteer.errors import ConfigError, did_you_mean, needing
 
 _MOST = 30
 _LOOK_PERIOD_S = 0.2
 _END_TIMEOUT_S = 3.0
 
 
+@loads("handsteer.cli.one_node", "handsteer.nodes.camera")
 def camera(
     *ros_args: str,
     transport: str,
@@ -31,7 +29,9 @@ def camera(
 ) -> int:
     """Publish a camera's frames on image_raw.
 
-    Example: handsteer camera --transport ros1 --camera /dev/video0 image_raw:=/front/image_raw
+    For example:
+      handsteer camera --transport auto
+      handsteer camera --transport ros1 --camera 0 image_raw:=/front/image_raw
 
     Parameters
     ----------
@@ -43,16 +43,20 @@ def camera(
     camera
         auto, virtual, a webcam's index or /dev/videoN, an address (rtsp, http), a video file or a folder of photos.
     config_file
-        YAML file with parameters; ROS parameters override it, and options override both.
+        YAML file with parameters, each of which is an option too: `handsteer parameters`. ROS parameters override the
+        file, and options override both.
     """
-    job = Job("my_camera", "camera", making.make_camera, config_file, parameters, {"camera": {"source": camera}})
-    return run(job, transport, ros_args)
+    short = {"camera": {"source": camera}}
+    return _run("camera", transport, ros_args, file=config_file, given=parameters, shorthand=short)
 
 
+@loads("handsteer.cli.one_node", "handsteer.nodes.recognition")
 def recognition(*ros_args: str, transport: str, config_file: ConfigFile = None, parameters: Parameters = None) -> int:
     """Recognise the sign in each frame of image_raw, and publish it on gesture/hand_sign.
 
-    Example: handsteer recognition --transport ros1 image_raw:=/front/image_raw
+    For example:
+      handsteer recognition --transport auto
+      handsteer recognition --transport ros1 image_raw:=/front/image_raw
 
     Parameters
     ----------
@@ -62,16 +66,19 @@ def recognition(*ros_args: str, transport: str, config_file: ConfigFile = None, 
     transport
         ros2 (rclpy), dds or zenoh (ROS 2 without a ROS installation), auto (ros2 if installed, else dds), or ros1.
     config_file
-        YAML file with parameters; ROS parameters override it, and options override both.
+        YAML file with parameters, each of which is an option too: `handsteer parameters`. ROS parameters override the
+        file, and options override both.
     """
-    job = Job("hand_sign_recognition", "signs", making.make_recognition, config_file, parameters)
-    return run(job, transport, ros_args)
+    return _run("recognition", transport, ros_args, file=config_file, given=parameters)
 
 
+@loads("handsteer.cli.one_node", "handsteer.nodes.control")
 def control(*ros_args: str, transport: str, config_file: ConfigFile = None, parameters: Parameters = None) -> int:
     """Convert the signs on gesture/hand_sign to velocities on robot_diff_drive_controller/cmd_vel.
 
-    Example: handsteer control --transport ros1 robot_diff_drive_controller/cmd_vel:=/cmd_vel _max_linear:=0.5
+    For example:
+      handsteer control --transport auto --ros-args -p max_linear:=0.5
+      handsteer control --transport ros1 _max_linear:=0.5
 
     Parameters
     ----------
@@ -81,12 +88,13 @@ def control(*ros_args: str, transport: str, config_file: ConfigFile = None, para
     transport
         ros2 (rclpy), dds or zenoh (ROS 2 without a ROS installation), auto (ros2 if installed, else dds), or ros1.
     config_file
-        YAML file with parameters; ROS parameters override it, and options override both.
+        YAML file with parameters, each of which is an option too: `handsteer parameters`. ROS parameters override the
+        file, and options override both.
     """
-    job = Job("hand_sign_control", "control", making.make_control, config_file, parameters)
-    return run(job, transport, ros_args)
+    return _run("control", transport, ros_args, file=config_file, given=parameters)
 
 
+@loads("handsteer.cli.one_node", "handsteer.nodes.robot")
 def robot(
     *ros_args: str,
     transport: str,
@@ -96,7 +104,9 @@ def robot(
 ) -> int:
     """Simulate a robot that follows robot_diff_drive_controller/cmd_vel.
 
-    Example: handsteer robot --transport ros1 --world obstacles
+    For example:
+      handsteer robot --transport auto
+      handsteer robot --transport ros1 --world obstacles
 
     Parameters
     ----------
@@ -108,12 +118,14 @@ def robot(
     world
         Name of a shipped world, or a YAML file.
     config_file
-        YAML file with parameters; ROS parameters override it, and options override both.
+        YAML file with parameters, each of which is an option too: `handsteer parameters`. ROS parameters override the
+        file, and options override both.
     """
-    job = Job("robot", "robot", making.make_robot, config_file, parameters, {"robot": {"world": world}})
-    return run(job, transport, ros_args)
+    short = {"robot": {"world": world}}
+    return _run("robot", transport, ros_args, file=config_file, given=parameters, shorthand=short)
 
 
+@loads("handsteer.cli.one_node", "handsteer.nodes.steering")
 def steering(
     *ros_args: str,
     transport: str,
@@ -125,7 +137,9 @@ def steering(
 ) -> int:
     """Serve the page, which shows the state of the graph and steers the robot on steering/cmd_vel.
 
-    Example: handsteer steering --transport ros1 --port 8080
+    For example:
+      handsteer steering --transport auto
+      handsteer steering --transport ros1 --port 9000
 
     Parameters
     ----------
@@ -141,31 +155,18 @@ def steering(
     token
         Require the token in the printed address from this machine too; for machines with several users.
     config_file
-        YAML file with parameters; ROS parameters override it, and options override both.
+        YAML file with parameters, each of which is an option too: `handsteer parameters`. ROS parameters override the
+        file, and options override both.
     """
-    shorthand = {"dashboard": {"host": host, "port": port, "token": "always" if token else None}}
-    job = Job("steering", "dashboard", making.make_steering, config_file, parameters, shorthand, _served)
-    return run(job, transport, ros_args)
+    short = {"dashboard": {"host": host, "port": port, "token": "always" if token else None}}
+    return _run("steering", transport, ros_args, file=config_file, given=parameters, shorthand=short)
 
 
-@contextmanager
-def _served(node: Any, config: Config) -> Iterator[None]:
-    # The page's libraries take a second to load, which the other nodes do not need.
-    with needing("the page", "page", "nicegui"):
-        from handsteer.dashboard.server import Dashboard  # noqa: PLC0415
+def _run(verb: str, transport: str, words: tuple[str, ...], **settings: Any) -> int:
+    """Run the node of ``verb``; ``settings`` replace fields of its :class:`~handsteer.cli.one_node.Job`."""
+    from handsteer.cli.one_node import JOBS, run
 
-    wires = (node.transport, node.clock, node)
-    dashboard = Dashboard(*wires, config.dashboard, cmd_vel=making.cmd_vel_topic(config))
-    url = dashboard.start()
-    try:
-        say(f"the page is at {url}")
-        if config.dashboard.opens_browser:
-            import webbrowser  # noqa: PLC0415
-
-            webbrowser.open(url)
-        yield
-    finally:
-        dashboard.stop()
+    return run(replace(JOBS[verb], **settings), transport, words)
 
 
 def zenoh_router(*, listen: str | None = None) -> int:
@@ -174,7 +175,9 @@ def zenoh_router(*, listen: str | None = None) -> int:
     ROS 2's own does the same (ros2 run rmw_zenoh_cpp rmw_zenohd); each machine
     needs only one of them.
 
-    Example: handsteer zenoh-router
+    For example:
+      handsteer zenoh-router                         for this machine
+      handsteer zenoh-router --listen tcp/[::]:7447  for other machines too
 
     Parameters
     ----------
@@ -194,16 +197,16 @@ def zenoh_router(*, listen: str | None = None) -> int:
 
 def _open(listen: str | None) -> Any:
     with needing("the Zenoh router", "zenoh", "zenoh", "xxhash"):
-        from handsteer.transports.zenoh.configuration import Router  # noqa: PLC0415
+        from handsteer.transports.zenoh.configuration import Router
     return Router(os.environ, listen)
 
 
 def robots(count: int, /, *, transport: str, world: str | None = None) -> int:
     """Simulate several robots, /r1, /r2 and so on, each in its own process and world.
 
-    Example: handsteer robots 3 --transport dds
-
-    To drive them in turn with one hand: handsteer control --transport dds --ros-args -p "robots:=[r1, r2, r3]"
+    For example:
+      handsteer robots 3 --transport dds
+      handsteer control --transport dds --ros-args -p "robots:=[r1, r2, r3]"
 
     Parameters
     ----------
@@ -214,10 +217,13 @@ def robots(count: int, /, *, transport: str, world: str | None = None) -> int:
     world
         Name of a shipped world, or a YAML file.
     """
+    from handsteer.transports import TRANSPORTS
+
     if not 1 <= count <= _MOST:
         raise ConfigError(f"{count} robots: there should be 1 to {_MOST}")
     if transport not in TRANSPORTS:
-        raise ConfigError(f"there is no transport {transport!r}: use {' or '.join(TRANSPORTS)}")
+        near = did_you_mean(transport, TRANSPORTS)
+        raise ConfigError(f"there is no transport {transport!r}{near or ':'} use {' or '.join(TRANSPORTS)}")
     names = [f"/r{number}" for number in range(1, count + 1)]
     try:
         with _started({name: _command(name, transport, world) for name in names}) as processes:

@@ -2,8 +2,8 @@
 
 import importlib
 import logging
-from collections.abc import Callable, Sequence
-from contextlib import AbstractContextManager, nullcontext
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,9 +11,10 @@ from typing import Any
 from handsteer import making
 from handsteer.audit import setting_changes
 from handsteer.cli import signals
-from handsteer.cli.running import exit_code, freeze_loaded_objects, set_up_logging, settings, signals_ignored
+from handsteer.cli.running import exit_code, freeze_loaded_objects, say, set_up_logging, settings, signals_ignored
 from handsteer.clock import Clock
 from handsteer.config import Config
+from handsteer.errors import needing
 from handsteer.nodes.base import Node
 from handsteer.parameters import NodeParameters, from_parameters
 from handsteer.transports import join
@@ -28,6 +29,26 @@ def _alone(_node: Any, _config: Config) -> AbstractContextManager[None]:
     return nullcontext()
 
 
+@contextmanager
+def _served(node: Any, config: Config) -> Iterator[None]:
+    # The page's libraries take a second to load, which the other nodes do not need.
+    with needing("the page", "page", "nicegui"):
+        from handsteer.dashboard.server import Dashboard
+
+    wires = (node.transport, node.clock, node)
+    dashboard = Dashboard(*wires, config.dashboard, cmd_vel=making.cmd_vel_topic(config))
+    url = dashboard.start()
+    try:
+        say(f"the page is at {url}")
+        if config.dashboard.opens_browser:
+            import webbrowser
+
+            webbrowser.open(url)
+        yield
+    finally:
+        dashboard.stop()
+
+
 @dataclass(frozen=True)
 class Job:
     """One node, as a process.
@@ -37,7 +58,7 @@ class Job:
         section: Its own section of the configuration.
         make: Constructs the node.
         file: YAML file with parameters.
-        given: Options with a full name.
+        given: Options with a full name, by section.
         shorthand: Options with a short name.
         companion: Runs alongside the node.
     """
@@ -46,7 +67,7 @@ class Job:
     section: str
     make: Callable[[Config, Transport, Clock], Node]
     file: Path | None = None
-    given: Config | None = None
+    given: dict[str, Any] | None = None
     shorthand: dict[str, Any] | None = None
     companion: Callable[[Any, Config], AbstractContextManager[None]] = _alone
 
@@ -55,11 +76,12 @@ class Job:
         return settings(self.file, self.given, self.shorthand, service=service)
 
 
-_ROS1_JOBS = {
+JOBS = {
     "camera": Job("my_camera", "camera", making.make_camera),
     "recognition": Job("hand_sign_recognition", "signs", making.make_recognition),
     "control": Job("hand_sign_control", "control", making.make_control),
     "robot": Job("robot", "robot", making.make_robot),
+    "steering": Job("steering", "dashboard", making.make_steering, companion=_served),
 }
 
 
@@ -73,7 +95,7 @@ def run_ros1(verb: str, words: Sequence[str]) -> int:
     set_up_logging()
     load(verb)
     signals.interrupt_on_signals()
-    return exit_code(lambda: run(_ROS1_JOBS[verb], "ros1", tuple(words)))
+    return exit_code(lambda: run(JOBS[verb], "ros1", tuple(words)))
 
 
 def run(job: Job, transport: str, words: tuple[str, ...]) -> int:

@@ -1,25 +1,34 @@
 """``handsteer recognize``: which sign is it?"""
 
 import json as json_format
+import time
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from handsteer.cameras.files import PHOTO_SUFFIXES, find_photos, read_photo, video_frames
-from handsteer.cli.app import ConfigFile, Flag, Parameters
-from handsteer.cli.running import settings
+from handsteer.cli.app import ConfigFile, Flag, Parameters, loads
+from handsteer.cli.running import say, settings
 from handsteer.errors import CameraNotFound
-from handsteer.recognition.recognizer import Recognition, Recognizer
+
+if TYPE_CHECKING:
+    from handsteer.recognition.recognizer import Recognition, Recognizer
 
 
+@loads("handsteer.cameras.files", "handsteer.cli.models", "handsteer.recognition.recognizer")
 def recognize(
     source: Path, /, *, json: Flag = False, config_file: ConfigFile = None, parameters: Parameters = None
 ) -> int:
     """Print which sign each frame of a photo, a folder of photos or a video shows.
 
-    Photos are processed independently, the frames of a video like those of a camera.
+    Photos are processed independently, the frames of a video like those of a camera. A summary follows on standard
+    error.
 
-    Example: handsteer recognize drive.mp4 --json
+    For example:
+      handsteer recognize photo.jpg         one photo
+      handsteer recognize photos/           all photos of a folder
+      handsteer recognize drive.mp4 --json  a video, a line of JSON for each frame
 
     Parameters
     ----------
@@ -28,15 +37,32 @@ def recognize(
     json
         Print one JSON object per line, with the landmarks.
     config_file
-        YAML file with parameters; options override it.
+        YAML file with parameters, each of which is an option too: `handsteer parameters`. Options override the file.
     """
-    recognizer = Recognizer(settings(config_file, parameters))
+    from handsteer.cameras.files import PHOTO_SUFFIXES
+    from handsteer.cli.models import fetch_missing
+    from handsteer.recognition.recognizer import Recognizer
+
+    config = settings(config_file, parameters)
     if not source.exists():
         raise CameraNotFound(f"there is no {source}: give a photo, a folder of photos or a video file")
+    fetch_missing(config.landmarks.model)
+    recognizer = Recognizer(config)
     is_photo = source.is_dir() or source.suffix.lower() in PHOTO_SUFFIXES
+    signs: Counter[str] = Counter()
+    began_s = time.monotonic()
     for result in (_photos if is_photo else _video)(source, recognizer):
+        signs[result.sign] += 1
         print(json_format.dumps(asdict(result)) if json else _text(result), flush=True)
+    if signs.total() > 1:
+        say(_summary(signs, "photos" if is_photo else "frames", time.monotonic() - began_s))
     return 0
+
+
+def _summary(signs: Counter[str], unit: str, took_s: float) -> str:
+    total = signs.total()
+    shares = ", ".join(f"{sign} {count / total:.0%}" for sign, count in signs.most_common())
+    return f"{total} {unit} in {took_s:.1f} s, {total / took_s:.0f} per second: {shares}"
 
 
 @dataclass(frozen=True)
@@ -53,12 +79,16 @@ class _Result:
     landmarks: list[list[float]] | None
 
 
-def _photos(source: Path, recognizer: Recognizer) -> Iterator[_Result]:
+def _photos(source: Path, recognizer: "Recognizer") -> Iterator[_Result]:
+    from handsteer.cameras.files import find_photos, read_photo
+
     for path in find_photos(source):
         yield _result(path, 0, 0.0, recognizer.recognize(read_photo(path)))
 
 
-def _video(path: Path, recognizer: Recognizer) -> Iterator[_Result]:
+def _video(path: Path, recognizer: "Recognizer") -> Iterator[_Result]:
+    from handsteer.cameras.files import video_frames
+
     last_s = 0.0
     for number, frame in enumerate(video_frames(path)):
         recognition = recognizer.step(frame.image, frame.captured_s - last_s)
@@ -66,7 +96,7 @@ def _video(path: Path, recognizer: Recognizer) -> Iterator[_Result]:
         yield _result(path, number, frame.captured_s, recognition)
 
 
-def _result(source: Path, number: int, time_s: float, recognition: Recognition) -> _Result:
+def _result(source: Path, number: int, time_s: float, recognition: "Recognition") -> _Result:
     hand = recognition.hand
     return _Result(
         source=str(source),

@@ -3,31 +3,24 @@
 import json as json_format
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
 from handsteer.cli import signals
-from handsteer.cli.app import ConfigFile, Flag, Parameters
+from handsteer.cli.app import ConfigFile, Flag, Parameters, loads
 from handsteer.cli.running import printable, say, settings, signals_ignored
-from handsteer.clock import SteppedClock
 from handsteer.errors import RecordingError
-from handsteer.recognition.recognizer import model_files
-from handsteer.recordings import open_recording
-from handsteer.recordings.about import describe
-from handsteer.recordings.graph_recorder import GraphRecorder
-from handsteer.replay.by_time import TOLERANCE_S, rerun_by_time
-from handsteer.replay.compare import Comparison, Moment, compare, differing_software
-from handsteer.replay.drive_facts import DriveFacts
-from handsteer.replay.drive_reader import read_drive
-from handsteer.replay.report_words import heading, sign_totals, totals
-from handsteer.replay.rerun import has_journals, recorded_config, rerun
-from handsteer.transports import join
+
+if TYPE_CHECKING:
+    from handsteer.replay.compare import Comparison, Moment
+    from handsteer.replay.drive_facts import DriveFacts
 
 _LOOK_PERIOD_S = 0.2
 _MOST_PRINTED = 50
 
 
+@loads("handsteer.recordings.graph_recorder", "handsteer.transports")
 def record(
     output: Path,
     *ros_args: str,
@@ -39,7 +32,9 @@ def record(
 
     Pictures are recorded as JPEG: those of image_raw/compressed if a node publishes them, else those of image_raw.
 
-    Example: handsteer record drive.mcap --transport ros1 image_raw:=/front/image_raw
+    For example:
+      handsteer record drive.mcap --transport auto  a graph of ROS 2
+      handsteer record drive.mcap --transport ros1 image_raw:=/front/image_raw
 
     Parameters
     ----------
@@ -53,6 +48,9 @@ def record(
     config_file
         YAML file with parameters, of which cmd_vel_type and collision_monitor matter; options override it.
     """
+    from handsteer.recordings.graph_recorder import GraphRecorder
+    from handsteer.transports import join
+
     config = settings(config_file, parameters)
     session = join(transport, "recorder", ros_args)
     try:
@@ -72,6 +70,7 @@ def record(
     return 0
 
 
+@loads("handsteer.replay.by_time", "handsteer.replay.rerun")
 def replay(
     recording: Path,
     *,
@@ -85,7 +84,10 @@ def replay(
 
     Exit code 0 if all are the same, 1 if any differs. A recording of `handsteer run --record` is compared bit for bit.
 
-    Example: handsteer replay drive.mcap --diff differences
+    For example:
+      handsteer replay drive.mcap                recognition and control
+      handsteer replay drive.mcap --from signs   control alone
+      handsteer replay drive.mcap --diff folder  keep frames that differ
 
     Parameters
     ----------
@@ -100,6 +102,14 @@ def replay(
     config_file
         YAML file with parameters that replace the recorded ones; options override it.
     """
+    from handsteer.clock import SteppedClock
+    from handsteer.recognition.recognizer import model_files
+    from handsteer.recordings import open_recording
+    from handsteer.recordings.about import describe
+    from handsteer.replay.by_time import rerun_by_time
+    from handsteer.replay.compare import Comparison, compare, differing_software
+    from handsteer.replay.rerun import has_journals, recorded_config, rerun
+
     file = open_recording(recording)
     recorded = recorded_config(file).model_dump(exclude_unset=True) if "config" in file.about else {}
     config = settings(config_file, parameters, base=recorded)
@@ -121,12 +131,16 @@ def replay(
     return 1 if comparison.differing else 0
 
 
+@loads("handsteer.replay.drive_reader", "handsteer.replay.report_words")
 def report(recording: Path, *, output: Path | None = None, force: Flag = False, json: Flag = False) -> None:
     """Report what happened in a recording, in one HTML page that needs no network, and print the totals.
 
     The page shows signs, velocities, the driven path, latencies, and each stop with its reason and frame.
 
-    Example: handsteer report drive.mcap --output drive.html
+    For example:
+      handsteer report drive.mcap                     writes drive.html next to it
+      handsteer report drive.mcap --output page.html  another name
+      handsteer report drive.mcap --json              the totals, for programs
 
     Parameters
     ----------
@@ -139,11 +153,14 @@ def report(recording: Path, *, output: Path | None = None, force: Flag = False, 
     json
         Print the totals in JSON, and nothing else; no page is written.
     """
+    from handsteer.recordings import open_recording
+    from handsteer.replay.drive_reader import read_drive
+
     if json:
         print(json_format.dumps(read_drive(open_recording(recording)).totals()))
         return
     # Only the page needs the package plotly.
-    from handsteer.replay.report import write_report  # noqa: PLC0415
+    from handsteer.replay.report import write_report
 
     # The name of a folder, such as rosbag2_2026_11_22-10.00.00, has no suffix.
     whole = recording.resolve()
@@ -152,7 +169,9 @@ def report(recording: Path, *, output: Path | None = None, force: Flag = False, 
     print(f"report: {page}")
 
 
-def _print_totals(facts: DriveFacts) -> None:
+def _print_totals(facts: "DriveFacts") -> None:
+    from handsteer.replay.report_words import heading, sign_totals, totals
+
     lines = [heading(facts)]
     for total in totals(facts)[1:]:
         more = f" ({total.more})" if total.more else ""
@@ -174,7 +193,7 @@ def _make_folder(folder: Path) -> None:
         raise RecordingError(f"--diff: cannot create {folder}: {error.strerror}") from None
 
 
-def _described(moment: Moment, folder: Path | None) -> dict[str, Any]:
+def _described(moment: "Moment", folder: Path | None) -> dict[str, Any]:
     """Return a moment for JSON; its frame is written to ``folder``, if there is one."""
     row = {"time_s": round(moment.time_s, 3), "what": moment.what}
     row |= {"recorded": moment.recorded, "replayed": moment.replayed}
@@ -193,7 +212,9 @@ def _line(row: dict[str, Any]) -> str:
     return f"{row['time_s']:9.3f} s  {row['what']}: {row['recorded']} was recorded, now {row['replayed']}{picture}"
 
 
-def _print_result(comparison: Comparison, others: list[str], moments: int, *, is_exact: bool) -> None:
+def _print_result(comparison: "Comparison", others: list[str], moments: int, *, is_exact: bool) -> None:
+    from handsteer.replay.by_time import TOLERANCE_S
+
     if moments > _MOST_PRINTED:
         print(f"and {moments - _MOST_PRINTED} more: --json lists all")
     counts = f"{comparison.frames} frames, {comparison.signs} signs, {comparison.commands} commands"

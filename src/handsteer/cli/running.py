@@ -5,13 +5,16 @@ import logging
 import os
 import signal
 import sys
+import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from handsteer import config
 from handsteer.errors import HandsteerError
+
+if TYPE_CHECKING:
+    from handsteer.config import Config
 
 
 def set_up_logging() -> None:
@@ -40,22 +43,41 @@ def fail(message: str) -> int:
 
 def settings(
     file: Path | None,
-    given: config.Config | None,
+    given: dict[str, Any] | None,
     shorthand: dict[str, Any] | None = None,
     base: dict[str, Any] | None = None,
     service: dict[str, Any] | None = None,
-) -> config.Config:
+) -> "Config":
     """Return the parameters.
 
     Each overrides the ones before: the defaults, ``base``, the file, a graph's parameter ``service``, the shorthand
     options, and the options with a full name.
     """
+    from handsteer import config  # this module is loaded for help too
+
     short = {
         section: {name: value for name, value in values.items() if value is not None}
         for section, values in (shorthand or {}).items()
     }
-    full = given.model_dump(exclude_unset=True) if given else {}
-    return config.load(file, base or {}, service or {}, short, full)
+    return config.load(file, base or {}, service or {}, short, given or {})
+
+
+def check_writable(option: str, path: Path, error: type[HandsteerError]) -> None:
+    """Check that the file ``path``, which ``option`` names, can be written, before the work rather than after it.
+
+    Raises:
+        HandsteerError: It cannot; of the given type.
+    """
+    folder = path.absolute().parent
+    if not folder.is_dir():
+        raise error(f"{option}: there is no folder {folder} for {path.name}")
+    if path.is_dir():
+        raise error(f"{option}: {path} is a folder: give the name of a file")
+    try:
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as problem:
+        raise error(f"{option}: cannot write {path}: {problem.strerror}") from None
 
 
 def printable(line: str) -> str:

@@ -1,18 +1,19 @@
 """``handsteer study``: lead people through a study on the page."""
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from handsteer.cli.app import ConfigFile, Flag
-from handsteer.cli.run import drive
+from handsteer.cli.app import ConfigFile, Flag, loads
 from handsteer.cli.running import say
 from handsteer.cli.running import settings as make_settings
 from handsteer.errors import StudyError
-from handsteer.study.order import group_size, order_of
-from handsteer.study.plan import Plan, course_file, load_configs, load_courses, read_plan
-from handsteer.study.results import prepare
-from handsteer.study.session import Session, Task
+
+if TYPE_CHECKING:
+    from handsteer.study.plan import Plan
+    from handsteer.study.session import Task
 
 
+@loads("handsteer.cli.drive", "handsteer.cli.models", "handsteer.study.results")
 def study(
     plan: Path,
     *,
@@ -26,7 +27,9 @@ def study(
 ) -> int:
     """Lead a person through the interfaces and courses of a plan on the page, and write CSV.
 
-    Example: handsteer study examples/study.yaml --participant P01
+    For example:
+      handsteer study plan.yaml                    check it; who has done what
+      handsteer study plan.yaml --participant P01  lead P01 through it
 
     Parameters
     ----------
@@ -48,6 +51,13 @@ def study(
     config_file
         YAML file with parameters; options override it, and the plan overrides both.
     """
+    from handsteer.cli.drive import drive
+    from handsteer.cli.models import fetch_missing
+    from handsteer.study.order import order_of
+    from handsteer.study.plan import course_file, load_configs, load_courses, read_plan
+    from handsteer.study.results import prepare
+    from handsteer.study.session import Session, Task
+
     the_plan = read_plan(plan)
     first = order_of(the_plan, participant)[1][0] if participant in the_plan.participants else the_plan.courses[0]
     shorthand = {
@@ -60,7 +70,7 @@ def study(
     configs = load_configs(the_plan, plan, base)
     folder = results or Path(f"{plan.stem}-results")
 
-    def task(person: str) -> Task:
+    def task(person: str) -> "Task":
         return Task(the_plan, person, courses, configs, folder)
 
     if participant is None:
@@ -69,13 +79,16 @@ def study(
     done, steps = Session(task(participant)).progress
     if done == steps:
         raise StudyError(f"{participant} has done all of {plan}: the results are in {folder}")
+    fetch_missing(next(iter(configs.values())).landmarks.model)
     prepare(folder)
     say(f"{participant}: {done} of {steps} laps and forms are done; the results are written to {folder}")
     drive(next(iter(configs.values())), study=task(participant))
     return 0
 
 
-def _list(plan: Plan, progress: dict[str, tuple[int, int]]) -> None:
+def _list(plan: "Plan", progress: dict[str, tuple[int, int]]) -> None:
+    from handsteer.study.order import group_size, order_of
+
     for person, (done, steps) in progress.items():
         conditions, courses = order_of(plan, person)
         print(f"{person}  {done:3d} of {steps}  {', '.join(conditions)}; courses {', '.join(courses)}")

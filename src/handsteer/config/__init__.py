@@ -4,7 +4,8 @@ The YAML file, the command line and the settings of the page are generated from 
 units are SI (REP 103), in brackets in each description.
 """
 
-from collections.abc import Mapping
+import re
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal, TypeVar
 
@@ -21,7 +22,7 @@ from handsteer.config.recognition import (
     VirtualHandConfig,
 )
 from handsteer.config.section import Section
-from handsteer.errors import ConfigError
+from handsteer.errors import ConfigError, did_you_mean
 from handsteer.types import CmdVelType
 
 __all__ = [
@@ -167,9 +168,33 @@ def load(path: Path | None = None, base: dict[str, Any] | None = None, *override
         ConfigError: The file cannot be read, or a field is unknown or out of range; the message names it.
     """
     values: dict[str, Any] = {}
-    for changes in (base or {}, _read_yaml(path) if path else {}, *overrides):
+    of_file = _read_yaml(path) if path else {}
+    for changes in (base or {}, of_file, *overrides):
         values = _merge(values, _with_new_names(changes))
-    return validate(Config, _merge(_preset(values), values), f" (also read: {path})" if path else "")
+    try:
+        return Config.model_validate(_merge(_preset(values), values))
+    except ValidationError as error:
+        where = "" if path is None else _where(path, of_file, overrides, error)
+        raise ConfigError(where + describe(error, Config)) from None
+
+
+def _where(path: Path, of_file: dict[str, Any], overrides: Sequence[dict[str, Any]], error: ValidationError) -> str:
+    """Return the file and the line of the first problem of ``error``; empty if it is not in the file."""
+    from handsteer import plain_yaml  # noqa: PLC0415
+
+    place = error.errors(include_url=False)[0]["loc"]
+    if not _has(of_file, place) or any(_has(_with_new_names(changes), place) for changes in overrides):
+        return ""
+    line = plain_yaml.line_of(path, place)
+    return f"{path}: " if line is None else f"{path}, line {line}: "
+
+
+def _has(values: Any, place: tuple[str | int, ...]) -> bool:
+    for part in place:
+        if not isinstance(values, dict) or part not in values:
+            return False
+        values = values[part]
+    return bool(place)
 
 
 def cmd_vel_type(config: Config) -> CmdVelType:
@@ -196,18 +221,35 @@ def validate(section: type[S], values: Any, where: str = "") -> S:
     try:
         return section.model_validate(values)
     except ValidationError as error:
-        raise ConfigError(describe(error) + where) from None
+        raise ConfigError(describe(error, section) + where) from None
 
 
-def describe(error: ValidationError) -> str:
-    """Return the first problem of ``error`` in one line: the field, the value, what is allowed."""
+def describe(error: ValidationError, section: type[Section] | None = None) -> str:
+    """Return the first problem of ``error`` in one line: the field, the value, what is allowed.
+
+    Args:
+        error: What pydantic raised.
+        section: The model that was validated, to find the nearest name of an unknown field.
+    """
     problem = error.errors(include_url=False)[0]
     field = ".".join(str(part) for part in problem["loc"]) or "configuration"
     if problem["type"] == "extra_forbidden":
-        return f"{field}: there is no such parameter"
+        known = _fields_beside(section, problem["loc"])
+        return f"{field}: there is no such parameter{did_you_mean(str(problem['loc'][-1]), known)}"
     reason = problem["msg"].removeprefix("Input ").removeprefix("Value error, ")
     given = repr(problem["input"])
+    if problem["type"] == "literal_error":
+        reason += did_you_mean(str(problem["input"]), re.findall(r"'([^']*)'", reason))
     return f"{field}: {given if len(given) <= _LONGEST_SHOWN else given[:_LONGEST_SHOWN] + '...'} {reason}"
+
+
+def _fields_beside(section: type[Section] | None, place: tuple[str | int, ...]) -> list[str]:
+    """Return the names that are allowed where an unknown one is, at ``place`` of ``section``; none if unknown."""
+    model: Any = section
+    for part in place[:-1]:
+        field = model.model_fields.get(str(part)) if isinstance(model, type) and issubclass(model, Section) else None
+        model = field.annotation if field else None
+    return list(model.model_fields) if isinstance(model, type) and issubclass(model, Section) else []
 
 
 def _preset(values: dict[str, Any]) -> dict[str, Any]:

@@ -28,6 +28,7 @@ _BRAKES = 0.7
 _TURTLESIM = {"cmd_vel_topic": "turtle1/cmd_vel", "odom_topic": "turtle1/pose", "odom_type": "turtlesim_pose"}
 
 RobotKind = Literal["sim", "auto", "ros2", "dds", "zenoh", "ros1"]
+ROBOT_KINDS: tuple[RobotKind, ...] = get_args(RobotKind)
 _NAMESPACE = re.compile(r"[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)
 
 

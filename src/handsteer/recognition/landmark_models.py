@@ -8,6 +8,7 @@ package index, proxies and certificates. A small model derived from one of them 
 import hashlib
 import importlib.util
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -60,6 +61,11 @@ _OFFLINE: Final = "set HANDSTEER_MODELS to a folder that has them"
 _PER_LEVEL = np.float32(1 / 255)
 _TRIES = 5
 _BETWEEN_TRIES_S = 0.001
+
+
+def are_elsewhere() -> bool:
+    """Return whether ``HANDSTEER_MODELS`` names the folder of the model files."""
+    return bool(os.environ.get("HANDSTEER_MODELS"))
 
 
 def models_dir() -> Path:
@@ -149,6 +155,8 @@ def _download_wheel(folder: Path, progress: Progress) -> Path:
     environment = os.environ | dict.fromkeys(("TMPDIR", "TEMP", "TMP"), str(folder))
     # Resume a broken download. As an option it would fail with pip before 25.1, which does not know it.
     environment.setdefault("PIP_RESUME_RETRIES", "5")
+    # Without network, each further try takes twice as long.
+    environment.setdefault("PIP_RETRIES", "3")
     log = folder / "pip.log"
     with log.open("wb") as output, subprocess.Popen(command, env=environment, stdout=output, stderr=output) as pip:
         try:
@@ -162,7 +170,7 @@ def _download_wheel(folder: Path, progress: Progress) -> Path:
     if pip.returncode or not wheels:
         reason = _last_error(log.read_text(encoding="utf-8", errors="replace"))
         raise ModelMissing(
-            f"cannot download {_PACKAGE} for its landmark models: {reason}; check the network, or {_OFFLINE}"
+            f"cannot download {_PACKAGE} for its landmark models: {reason}: check the network, or {_OFFLINE}"
         )
     progress(_WHEEL_BYTES, _WHEEL_BYTES)
     return wheels[0]
@@ -186,7 +194,9 @@ def _wheel_bytes(folder: Path) -> int:
 
 
 def _last_error(log: str) -> str:
-    """Return the most informative line of pip's output: the first error, or else the last line."""
+    """Return the most informative line of pip's output: why it cannot connect, the first error, or the last line."""
+    if unconnected := re.search(r"Failed to establish a new connection: (?:\[Errno -?\d+\] )?([^']+)'", log):
+        return f"no connection to the package index ({unconnected[1]})"
     lines = [line.strip() for line in log.splitlines() if line.strip()]
     errors = [line.removeprefix("ERROR: ") for line in lines if line.startswith("ERROR: ")]
     return next(iter(errors or lines[-1:]), "pip failed without a message")

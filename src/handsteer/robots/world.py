@@ -22,7 +22,7 @@ from pydantic import Field, ValidationError, model_validator
 
 from handsteer import plain_yaml
 from handsteer.config import Section
-from handsteer.errors import WorldError
+from handsteer.errors import WorldError, did_you_mean
 from handsteer.robots import Shape
 
 _SHIPPED = Path(__file__).parent / "worlds"
@@ -161,7 +161,9 @@ def load_world(name_or_path: str | Path) -> World:
     path = Path(name_or_path)
     if path.suffix in (".yaml", ".yml") or path.exists():
         return read_world(path)
-    raise WorldError(f"there is no world {name!r}; use {' or '.join(shipped_worlds())}, or the path of a .yaml file")
+    known = shipped_worlds()
+    near = did_you_mean(name, known)
+    raise WorldError(f"there is no world {name!r}{near or ':'} use {', '.join(known)}, or the path of a .yaml file")
 
 
 def read_world(path: Path) -> World:

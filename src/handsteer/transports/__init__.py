@@ -5,7 +5,7 @@ import sys
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from handsteer.errors import TransportError, needing
+from handsteer.errors import TransportError, did_you_mean, needing
 from handsteer.transports.base import Session
 
 
@@ -22,7 +22,8 @@ def join(transport: str, node: str, arguments: Sequence[str]) -> Session:
         TransportError: There is no such transport or graph, or an argument is wrong.
     """
     if transport not in TRANSPORTS:
-        raise TransportError(f"there is no transport {transport!r}: use {' or '.join(TRANSPORTS)}")
+        near = did_you_mean(transport, TRANSPORTS)
+        raise TransportError(f"there is no transport {transport!r}{near or ':'} use {' or '.join(TRANSPORTS)}")
     return TRANSPORTS[transport](node, arguments)
 
 

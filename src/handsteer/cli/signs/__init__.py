@@ -24,4 +24,4 @@ for verb, function in {
     "import": "collect:import_keypoints",
     "train": "train:train",
 }.items():
-    app.command(f"handsteer.cli.signs.{function}", name=verb)
+    app.command(f"handsteer.cli.signs.{function}", name=verb, help_epilogue="")

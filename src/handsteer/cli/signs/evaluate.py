@@ -1,38 +1,15 @@
 """``handsteer signs evaluate``: how well are the signs recognised?"""
 
-import json as json_format
-import sys
-from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 from cyclopts import Parameter
-from tqdm import tqdm
 
-from handsteer.cli.app import ConfigFile, Flag, Parameters
+from handsteer.cli.app import ConfigFile, Flag, Parameters, loads
 from handsteer.cli.running import settings
-from handsteer.cli.signs.tables import evaluation_tables
-from handsteer.config import Config
-from handsteer.errors import EvaluationError, needing
-from handsteer.recognition.hand import Classifier
-from handsteer.recognition.recognizer import Recognizer, open_classifier
-from handsteer.training.evaluation.labels import labels_of
-from handsteer.training.evaluation.report import Evaluation
-from handsteer.training.evaluation.sources import (
-    LabelledFolder,
-    LabelledHands,
-    LabelledVideo,
-    PhotoRun,
-    Source,
-    open_source,
-)
-from handsteer.training.evaluation.views import View
-from handsteer.types import motion_signs
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 
+@loads("handsteer.cli.signs.evaluation")
 def evaluate(
     *sources: Path,
     json: Flag = False,
@@ -49,7 +26,10 @@ def evaluate(
 ) -> int:
     """Print how well the signs are recognised in labelled photos, videos, or datasets of landmarks.
 
-    Example: handsteer signs evaluate photos/ more/ a.mp4 --flip --rotate -15,0,15
+    For example:
+      handsteer signs evaluate photos/                         print tables
+      handsteer signs evaluate a.mp4 --flip --rotate -15,0,15  also tilted
+      handsteer signs evaluate photos/ --png confusion.png     and a plot
 
     A folder contains an index.csv (columns path, sign, and optionally kind and
     person_set), or a subfolder for each sign and one named negatives.
@@ -79,128 +59,11 @@ def evaluate(
     grace
         In a video, for how many seconds a sign may still count after it is no longer shown.
     config_file
-        YAML file with parameters; options override it.
+        YAML file with parameters, each of which is an option too: `handsteer parameters`. Options override the file.
     """
-    config = settings(config_file, parameters)
+    from handsteer.cli.signs.evaluation import Wanted, print_evaluation
+
     pictures = {"--png": png, "--reliability": reliability, "--sweep-png": sweep_png}
-    _check(grace, pictures)
-    views = _views(rotate, flip=flip, enlarge=not as_is)
-    classifier = open_classifier(config.signs)
-    opened = _open(sources, classifier)
-    _check_figures(opened, {**pictures, "--sweep": sweep})
-    evaluation = _evaluate(opened, views, config, classifier, grace)
-    runs = evaluation.stills or evaluation.videos
-    names = ", ".join(dict.fromkeys(Path(run.source).resolve().name for run in runs))
-    for option, path in pictures.items():
-        if path is not None:
-            _write_plot(option, path, _plot(option, evaluation, names))
-    with_sweep = sweep or sweep_png is not None
-    if json:
-        print(json_format.dumps(evaluation.as_dict(with_sweep=with_sweep)))
-    else:
-        print(evaluation_tables(evaluation, with_reliability=reliability is not None, with_sweep=with_sweep))
+    wanted = Wanted(sources, pictures, rotate=rotate, flip=flip, enlarge=not as_is, sweep=sweep, grace_s=grace)
+    print_evaluation(settings(config_file, parameters), wanted, json=json)
     return 0
-
-
-def _views(rotate: str, *, flip: bool, enlarge: bool) -> list[View]:
-    """Return the views: one for a single angle; for several, one for each, and with ``flip`` also each flipped."""
-    try:
-        angles = [float(angle) for angle in rotate.split(",") if angle.strip()]
-    except ValueError:
-        angles = []
-    if not angles:
-        raise EvaluationError(f"--rotate: {rotate!r} should be degrees, or several separated by commas, as -15,0,15")
-    for angle in angles:
-        if not -360 <= angle <= 360:
-            raise EvaluationError(f"--rotate: {angle:g} should be from -360 to 360 degrees")
-    flips = [flip] if "," not in rotate else [False, True] if flip else [False]
-    return list(dict.fromkeys(View(flipped, angle, enlarge) for flipped in flips for angle in angles))
-
-
-def _open(paths: Iterable[Path], classifier: Classifier) -> list[Source]:
-    """Return all sources, checked as far as possible before the evaluation, which takes a while."""
-    unique = list(dict.fromkeys(paths))
-    if not unique:
-        raise EvaluationError("there is nothing to evaluate: give folders of labelled photos, videos, or datasets")
-    return [open_source(path, classifier) for path in unique]
-
-
-def _evaluate(
-    sources: Sequence[Source], views: Sequence[View], config: Config, classifier: Classifier, grace_s: float
-) -> Evaluation:
-    folders = [source for source in sources if isinstance(source, LabelledFolder)]
-    datasets = [source for source in sources if isinstance(source, LabelledHands)]
-    videos = [source for source in sources if isinstance(source, LabelledVideo)]
-    least = config.signs.min_confidence
-    hands = [data.run(classifier, least, view, _with_progress) for data in datasets for view in views]
-    _check_scored(hands)
-    # Datasets contain landmarks, so the landmark models are not needed for them.
-    recognizer = Recognizer(config) if folders or videos else None
-    photos = [folder.run(recognizer, view, _with_progress) for folder in folders for view in views if recognizer]
-    _check_scored(photos)
-    return Evaluation(
-        signs=classifier.signs,
-        motion=motion_signs(config.control.actions, classifier.signs),
-        photos=tuple(photos),
-        hands=tuple(hands),
-        videos=tuple(video.run(recognizer, view, _with_progress) for video in videos for view in views if recognizer),
-        grace_s=grace_s,
-    )
-
-
-def _check_scored(runs: Sequence[PhotoRun]) -> None:
-    for source in dict.fromkeys(run.source for run in runs):
-        if not any(run.results for run in runs if run.source == source):
-            raise EvaluationError(
-                f"{source}: nothing in it shows a sign or NONE at this rotation; try another --rotate"
-            )
-
-
-def _with_progress(things: Iterable[Any], unit: str) -> Iterable[Any]:
-    return tqdm(things, unit=f" {unit}", file=sys.stderr, disable=not sys.stderr.isatty())
-
-
-def _check(grace_s: float, pictures: Mapping[str, Path | None]) -> None:
-    if not 0 <= grace_s <= 10:
-        raise EvaluationError(f"--grace: {grace_s:g} should be from 0 to 10 seconds")
-    # Checked before the evaluation, which takes a while.
-    for option, png in pictures.items():
-        if png is not None and (png.suffix.lower() != ".png" or not png.parent.is_dir()):
-            raise EvaluationError(f"{option}: {png} should be a file name that ends in .png, in an existing folder")
-    if any(pictures.values()):
-        with needing("a plot", "plots", "matplotlib"):
-            pass
-
-
-def _check_figures(sources: Sequence[Source], wanted: Mapping[str, object]) -> None:
-    """Refuse options that need more than videos."""
-    videos = [source for source in sources if isinstance(source, LabelledVideo)]
-    if len(videos) < len(sources):
-        return
-    if wanted["--png"] and all(video.truths is None for video in videos):
-        path = videos[0].path
-        raise EvaluationError(
-            f"--png: there are no labels for {path}, so no confusion matrix: expected {labels_of(path)}"
-        )
-    for option in ("--reliability", "--sweep", "--sweep-png"):
-        if wanted[option]:
-            raise EvaluationError(f"{option} needs photos or a dataset, not only videos")
-
-
-def _plot(option: str, evaluation: Evaluation, names: str) -> "Figure":
-    # Loaded only when asked for: it is an extra.
-    from handsteer.training.evaluation.plots import draw_confusion, draw_reliability, draw_sweep  # noqa: PLC0415
-
-    if option == "--reliability":
-        return draw_reliability(evaluation.calibration, f"{names}: reliability of likelihoods")
-    if option == "--sweep-png":
-        return draw_sweep(evaluation.sweep, f"{names}: thresholds")
-    assert evaluation.confusion is not None
-    return draw_confusion(evaluation.confusion, f"{names}: signs shown and seen")
-
-
-def _write_plot(option: str, path: Path, plot: "Figure") -> None:
-    try:
-        plot.savefig(path)
-    except OSError as error:
-        raise EvaluationError(f"{option}: cannot write {path}: {error.strerror}") from None

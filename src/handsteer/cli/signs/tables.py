@@ -2,10 +2,7 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 
-from rich.console import Console
-from rich.table import Table
-from rich.text import Text
-
+from handsteer.cli.table import table
 from handsteer.training.custom.dataset import Dataset, summarise
 from handsteer.training.custom.report import TrainingReport, false_hands, how_it_was_tried, mistakes
 from handsteer.training.evaluation.intervals import Rate, Share
@@ -15,24 +12,9 @@ from handsteer.training.evaluation.sources import PhotoRun
 from handsteer.training.evaluation.video_metrics import Event, LabelledFigures, VideoReport
 from handsteer.types import NONE
 
-_WIDEST = 10_000
 _PHOTOS_AGAIN = (
     "Each counts once per view, though it shows the same person: intervals over several views are too narrow."
 )
-
-
-def table(head: Sequence[str], rows: Sequence[Sequence[str]], text_columns: int = 1) -> str:
-    """Return a table as text; columns after the first ``text_columns`` are aligned to the right."""
-    grid = Table(box=None, pad_edge=False)
-    for column, name in enumerate(head):
-        grid.add_column(Text(name), justify="left" if column < text_columns else "right", no_wrap=True)
-    for row in rows:
-        grid.add_row(*map(Text, row))
-    # Wide enough never to wrap: another program may read the lines.
-    console = Console(width=_WIDEST, color_system=None, force_terminal=False)
-    with console.capture() as text:
-        console.print(grid)
-    return "\n".join(line.rstrip() for line in text.get().splitlines())
 
 
 def dataset_table(dataset: Dataset) -> str:

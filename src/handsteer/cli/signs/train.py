@@ -6,36 +6,37 @@ from pathlib import Path
 from typing import Annotated
 
 from cyclopts import Parameter
-from tqdm import tqdm
 
-from handsteer.cli.app import ConfigFile, Flag, Parameters
-from handsteer.cli.running import say, settings
-from handsteer.cli.signs.tables import table, teaching_tables
-from handsteer.config import SignsConfig, TeachConfig
-from handsteer.control.explain import effect_of
+from handsteer.cli.app import ConfigFile, Flag, Parameters, loads
+from handsteer.cli.running import check_writable, say, settings
 from handsteer.errors import TrainingError
-from handsteer.recognition.custom_signs import save_custom_model
-from handsteer.recognition.recognizer import open_classifier
-from handsteer.training.custom.dataset import Dataset, load_dataset
-from handsteer.training.custom.train import train_signs
-from handsteer.types import NONE, action_of, find_sign
 
 _LOW_RECALL = 0.8
-_DEFAULTS = TeachConfig()
+_DATASET = Path("signs.npz")  # as teach.dataset and teach.model of the configuration
+_MODEL = Path("my-signs.npz")
 
 
+@loads("handsteer.cli.table", "handsteer.control.explain", "handsteer.recognition.recognizer")
 def list_signs(*, json: Flag = False, config_file: ConfigFile = None, parameters: Parameters = None) -> int:
     """Print the signs that the model knows, and what each makes the robot do.
 
-    Example: handsteer signs list --control.actions.Peace turbo
+    For example:
+      handsteer signs list
+      handsteer signs list --control.actions.Peace turbo  with your action
+      handsteer signs list --json                         for programs
 
     Parameters
     ----------
     json
         Print one JSON list.
     config_file
-        YAML file with parameters; options override it.
+        YAML file with parameters, each of which is an option too: `handsteer parameters`. Options override the file.
     """
+    from handsteer.cli.table import table
+    from handsteer.control.explain import effect_of
+    from handsteer.recognition.recognizer import open_classifier
+    from handsteer.types import NONE, action_of, find_sign
+
     config = settings(config_file, parameters)
     actions = config.control.actions
     known = (*open_classifier(config.signs).signs, NONE)
@@ -57,15 +58,18 @@ def _effect(sign: dict[str, object]) -> str:
     return f"{sign['effect']}{'' if sign['known'] else ' (unknown to the model)'}"
 
 
+@loads("handsteer.cli.signs.tables", "handsteer.recognition.recognizer", "handsteer.training.custom.train", "tqdm")
 def train(
     *datasets: Path,
-    output: Path = _DEFAULTS.model,
-    sided: Annotated[list[str] | None, Parameter(consume_multiple=True)] = None,
+    output: Path = _MODEL,
+    sided: Annotated[list[str] | None, Parameter(consume_multiple=True, negative="")] = None,
     json: Flag = False,
 ) -> int:
     """Learn the signs of datasets, and print how well they are distinguished from each other and from other hands.
 
-    Example: handsteer signs train signs.npz --output my-signs.npz
+    For example:
+      handsteer signs train                                signs.npz
+      handsteer signs train a.npz b.npz --output ours.npz  several datasets
 
     The shipped signs do not change; a dataset's rows of them, and of NONE, are
     used as examples of other hands. Use the learnt signs with --signs.model
@@ -82,9 +86,17 @@ def train(
     json
         Print one JSON object.
     """
-    if not output.absolute().parent.is_dir():
-        raise TrainingError(f"--output: there is no folder {output.absolute().parent} for {output.name}")
-    takes = [take for path in datasets or (_DEFAULTS.dataset,) for take in load_dataset(path).takes]
+    from tqdm import tqdm
+
+    from handsteer.cli.signs.tables import teaching_tables
+    from handsteer.config import SignsConfig
+    from handsteer.recognition.custom_signs import save_custom_model
+    from handsteer.recognition.recognizer import open_classifier
+    from handsteer.training.custom.dataset import Dataset, load_dataset
+    from handsteer.training.custom.train import train_signs
+
+    check_writable("--output", output, TrainingError)
+    takes = [take for path in datasets or (_DATASET,) for take in load_dataset(path).takes]
     with tqdm(unit=" steps", file=sys.stderr, disable=not sys.stderr.isatty()) as bar:
 
         def progress(done: int, of: int) -> None:

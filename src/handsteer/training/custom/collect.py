@@ -183,11 +183,17 @@ def collect_live(
             time.sleep(max(0.0, frame.captured_s + camera.period_s - clock.now()))
 
 
-def collect_recorded(source: Path, landmarker: Landmarker, facts: Facts, take_s: float) -> list[Take]:
+def collect_recorded(
+    source: Path,
+    landmarker: Landmarker,
+    facts: Facts,
+    take_s: float,
+    without_hand: Callable[[Path], None] = lambda _: None,
+) -> list[Take]:
     """Return the takes in a video, a recording, a photo or a folder of photos.
 
     A video or recording is divided into takes of ``take_s`` seconds. Each photo is a separate take; the photos of a
-    folder form a session.
+    folder form a session. ``without_hand`` is called with each photo in which no hand is found.
 
     Raises:
         CameraNotFound: The file does not exist, or the folder contains no photos.
@@ -195,7 +201,7 @@ def collect_recorded(source: Path, landmarker: Landmarker, facts: Facts, take_s:
         DatasetError: No hand was found in it.
     """
     if (source.is_dir() and not is_recording(source)) or source.suffix.lower() in PHOTO_SUFFIXES:
-        takes = list(_photo_takes(source, landmarker, facts))
+        takes = list(_photo_takes(source, landmarker, facts, without_hand))
     else:
         takes = list(_video_takes(source, landmarker, facts, take_s))
     if not takes:
@@ -236,13 +242,17 @@ def largest(hands: Sequence[Hand]) -> Hand | None:
     return max(hands, key=lambda hand: hand.longer_side_px, default=None)
 
 
-def _photo_takes(source: Path, landmarker: Landmarker, facts: Facts) -> Iterator[Take]:
+def _photo_takes(
+    source: Path, landmarker: Landmarker, facts: Facts, without_hand: Callable[[Path], None]
+) -> Iterator[Take]:
     for path in find_photos(source):
         landmarker.reset()
         hand = largest(landmarker.detect(read_photo(path)))
         below = path.parent.relative_to(source) if source.is_dir() else Path()
         session = facts.session if below == Path() else f"{facts.session}/{below.as_posix()}"
-        if hand is not None:
+        if hand is None:
+            without_hand(path)
+        else:
             yield Facts(facts.label, facts.person, session, facts.source).take([hand], [0.0])
 
 

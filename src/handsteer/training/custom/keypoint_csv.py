@@ -14,7 +14,7 @@ from typing import Final, TextIO, cast
 
 import numpy as np
 
-from handsteer.errors import DatasetError
+from handsteer.errors import DatasetError, reason_of
 from handsteer.recognition.hand import Hand
 from handsteer.training.custom.dataset import Take
 
@@ -62,7 +62,7 @@ def read_class_names(path: Path) -> dict[str, str]:
         with path.open(encoding="utf-8-sig") as file:
             names = file.read(_LONGEST_LINE).splitlines()
     except (OSError, UnicodeDecodeError) as error:
-        raise DatasetError(f"cannot read the names of the classes {path}: {error}") from None
+        raise DatasetError(f"cannot read the names of the classes {path}: {reason_of(error)}") from None
     if not names or not all(name.strip() for name in names):
         raise DatasetError(f"{path}: expected the name of one class per line, found an empty line")
     return {str(number): name.strip() for number, name in enumerate(names)}
@@ -81,7 +81,7 @@ def _rows(path: Path, *, mirrored: bool) -> Iterator[tuple[str, Hand]]:
                 if row:
                     yield row[0].strip(), _hand(row, f"{path}, line {number}", mirrored=mirrored)
     except (OSError, EOFError, UnicodeDecodeError, csv.Error, zlib.error) as error:
-        raise DatasetError(f"cannot read the keypoints {path}: {error}") from None
+        raise DatasetError(f"cannot read the keypoints {path}: {reason_of(error)}") from None
 
 
 def _lines(file: TextIO, path: Path) -> Iterator[str]:

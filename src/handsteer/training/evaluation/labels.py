@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from handsteer.cameras.files import PHOTO_SUFFIXES
-from handsteer.errors import LabelError
+from handsteer.errors import LabelError, reason_of
 from handsteer.types import NONE, find_sign
 
 INDEX = "index.csv"
@@ -141,7 +141,7 @@ def _rows(path: Path, needed: tuple[str, ...]) -> Iterator[tuple[str, dict[str, 
                     raise LabelError(f"{where}: expected {len(needed)} or more fields")
                 yield where, {name: (value or "").strip() for name, value in row.items() if isinstance(name, str)}
     except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise LabelError(f"cannot read the labels {path}: {error}") from None
+        raise LabelError(f"cannot read the labels {path}: {reason_of(error)}") from None
 
 
 def _shown(path: str) -> str:
