@@ -14,10 +14,10 @@ from pathlib import Path
 import numpy as np
 
 from handsteer.config import SignsConfig, load
+from handsteer.dashboard.lesson import Lesson
 from handsteer.dashboard.lessons import Lessons
 from handsteer.graph import Graph
 from handsteer.recognition.recognizer import open_classifier
-from handsteer.training.custom.dataset import Dataset
 from handsteer.training.custom.train import train_signs
 
 ALONE_S = 5.0
@@ -66,17 +66,18 @@ def main() -> None:
             time.sleep(2.0)
             lessons = Lessons.of(graph)
             before = alone(graph)
-            lessons.begin("me", "Peace")
+            lessons.begin("me")
             lesson = lessons.node("me")
             assert lesson is not None
             rate, began_s = Rate(graph), time.monotonic()
-            lesson.record()
-            wait_until(lambda: not lesson.state.recording, lessons)
+            lesson.do(lambda of: of.add_class("Peace"))
+            lesson.do(lambda of: of.record(of.state.classes[0].key))
+            wait_until(lambda: lesson.state.recorded is None, lessons)
             row("takes are collected", before, rate.fps(), time.monotonic() - began_s)
-            takes = Dataset(tuple(each.take for each in lesson.state.takes))
+            takes = lesson.do(Lesson.dataset)
             rate, began_s = Rate(graph), time.monotonic()
             lesson.train()
-            wait_until(lambda: lesson.state.step != "train", lessons)
+            wait_until(lambda: not lesson.state.is_training, lessons)
             row("training in its own process", before, rate.fps(), time.monotonic() - began_s)
             rate, began_s = Rate(graph), time.monotonic()
             time.sleep(TRY_S)

@@ -59,3 +59,9 @@ def test_the_joystick_is_explained_in_three_steps_with_its_speeds() -> None:
     steered = ControlStatus(source="steering", rule=rule)
     assert active_entry(state(steered, "Go", 0.1)) == "Close the fist"
     assert active_entry(state(ControlStatus(source="signs", rule=ControlConfig()), "Go", 0.1)) == "Go"
+
+
+def test_a_taught_sign_has_its_own_drawing() -> None:
+    peace, call = legend(("Peace", "Call"), None, {"Peace": "<svg>peace</svg>"})
+    assert (peace.pose, peace.drawing) == ("taught", "<svg>peace</svg>")
+    assert call.drawing.startswith("<svg")

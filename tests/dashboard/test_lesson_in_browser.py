@@ -8,10 +8,14 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
+from playwright.sync_api import Locator
 
 from handsteer.cameras.files import video_frames
+from handsteer.config import load
 from handsteer.recognition.custom_signs import load_custom_model
 from handsteer.training.custom.dataset import load_dataset
+from handsteer.training.custom.shared import LARGEST_SHARED_BYTES
+from tests.dashboard.test_accessibility import faults
 from tests.dashboard.visits import NEEDS_A_BROWSER, PATIENCE_MS, Visit, visiting
 
 pytestmark = NEEDS_A_BROWSER
@@ -39,7 +43,7 @@ def landscape(image: np.ndarray) -> np.ndarray:
 @pytest.fixture
 def plan(tmp_path: Path) -> dict[str, Any]:
     files = {"dataset": tmp_path / "signs.npz", "model": tmp_path / "mine.npz"}
-    return {**files, "takes": 2, "take_time": 3.0, "countdown": 1.0}
+    return {**files, "takes": 2, "take_time": 1.5, "countdown": 0.5}
 
 
 @pytest.fixture
@@ -52,63 +56,123 @@ def press(visit: Visit, name: str) -> None:
     visit.page.locator(".lesson").get_by_role("button", name=name, exact=True).click()
 
 
-def begin(visit: Visit, name: str) -> None:
+def begin(visit: Visit, name: str) -> Locator:
+    """Begin a lesson, add a sign, and return its card."""
+    press(visit, "Start a lesson")
+    own = visit.page.locator(".class.own")
+    own.first.wait_for()
+    count = own.count()
     visit.page.get_by_label("Name of the sign").fill(name)
-    press(visit, "Begin")
+    press(visit, "Add the sign")
+    own.nth(count).wait_for()
+    return own.nth(count - 1)  # the last one is the background
+
+
+def hold(visit: Visit, card: Locator) -> None:
+    """Record a take of a second or so while the button is held."""
+    count = card.locator(".take").count()
+    card.locator(".hold").hover()
+    visit.page.mouse.down()
+    wait_for_hands(visit)
+    visit.page.mouse.up()
+    card.locator(".take").nth(count).wait_for()
+
+
+def wait_for_hands(visit: Visit) -> None:
+    visit.page.locator(".countdown").wait_for()
+    visit.wait_until(lambda: (words := visit.text(".countdown .number")).isdecimal() and int(words) >= 8)
+
+
+def percent(card: Locator) -> int:
+    return int(card.locator(".bar .percent").inner_text().split()[0])
 
 
 def test_a_sign_is_taught_from_the_browsers_webcam_and_drives(
-    two_fingers: Path, plan: dict[str, Any], tmp_path: Path
+    two_fingers: Path, plan: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.chdir(tmp_path)
     # A machine that draws the world in software, and has little time, is slow to send its camera's frames.
     patient: dict[str, Any] = {"signs": {"max_frame_age": 2.0, "dropout_hold": 1.0}, "control": {"sign_timeout": 2.0}}
     with visiting("NONE:600", "/teach", webcam=two_fingers, teach=plan, **patient) as visit:
-        teach(visit)
-        keep(visit)
-        assert [take.label for take in load_dataset(tmp_path / "signs.npz").takes] == ["Two"] * 2
-        assert load_custom_model(tmp_path / "mine.npz").labels == ("Two",)
+        visit.page.get_by_role("button", name="Use this device's camera").click()
+        card = begin(visit, "Zwei")
+        teach(visit, card)
+        keep(visit, card, tmp_path)
+        always(visit, tmp_path / "handsteer.yaml")
         drive(visit)
         assert visit.troubles == []
+    with visiting("Peace:600", "/teach", teach={**plan, "dataset": tmp_path / "b.npz"}) as visit:
+        (tmp_path / "mine.npz").unlink()
+        use_file(visit, tmp_path / "shared.npz")
 
 
-def teach(visit: Visit) -> None:
+def teach(visit: Visit, card: Locator) -> None:
     page = visit.page
-    page.get_by_role("button", name="Use this device's camera").click()
-    begin(visit, "Two")
-    press(visit, "Record")
-    page.locator(".countdown").wait_for()
-    page.locator(".take").nth(1).wait_for()
-    press(visit, "Delete take 1")
-    page.locator(".take").nth(1).wait_for(state="detached")
-    press(visit, "Record")
-    page.locator(".take").nth(1).wait_for()
-    assert page.locator(".take img").nth(1).evaluate("image => image.naturalHeight") == 120
+    hold(visit, card)
+    hold(visit, card)
+    card.get_by_role("button", name="1 timed take").click()
+    card.locator(".take").nth(2).wait_for()
+    card.locator(".take .delete").first.click()
+    card.locator(".take").nth(2).wait_for(state="detached")
+    press(visit, "Undo: delete a take of Zwei")
+    card.locator(".take").nth(2).wait_for()
+    name = card.get_by_label("Name")
+    name.fill("Two")
+    name.press("Enter")
+    card.get_by_role("heading", name="Two").wait_for()
+    assert card.locator(".take svg.landmarks .finger").count() == 15
+    assert percent(card) == 0, "nothing is learnt yet"
     press(visit, "Train")
     page.get_by_role("progressbar", name="Training").wait_for()
 
 
-def keep(visit: Visit) -> None:
+def keep(visit: Visit, card: Locator, folder: Path) -> None:
     page, graph = visit.page, visit.graph
-    page.get_by_role("region", name="Confusion matrix").wait_for(timeout=TRAINING_MS)
-    rows = page.locator(".lesson tbody tr").all_inner_texts()
-    assert [row.split()[0] for row in rows] == ["Two"]
-    visit.wait_until(lambda: visit.text(".opinion .sign").startswith("Two"))
-    page.get_by_label("What it does").click()
+    page.locator(".recalls li", has_text="Two").wait_for(timeout=TRAINING_MS)
+    visit.wait_until(lambda: percent(card) >= 80 and visit.text(".opinion .sign").startswith("Two"))
+    card.get_by_label("What it does").click()
     page.get_by_role("option", name="turn left").click()
     visit.wait_until(lambda: "turns faster to the left" in visit.text(".opinion"))
     assert graph.config.signs.model is None, "nothing is in use before it is kept"
+    with page.expect_download() as download:
+        page.get_by_role("link", name="Download takes and model").click()
+    download.value.save_as(folder / "shared.npz")
+    with page.expect_download() as download:
+        page.get_by_role("link", name="Download the takes as a table").click()
+    assert download.value.path().read_text().startswith("label,person,session,take,time_s")
     press(visit, "Keep")
-    visit.wait_until(lambda: visit.text(".lesson .kept .count").startswith("Two is learnt"))
-    assert "Two: turn_left" in visit.text(".lesson .lines")
+    page.locator(".tools .message", has_text="Kept, and in use").wait_for()
+    assert [take.label for take in load_dataset(folder / "signs.npz").takes] == ["Two"] * 3
+    assert load_custom_model(folder / "mine.npz").labels == ("Two",)
+    page.get_by_role("button", name="Reset").click()
+    page.locator(".tools .message", has_text="stands until the lesson is over").wait_for()
     assert visit.text(".banner .headline") == "Stopped"
+    press(visit, "End the lesson")
+    page.locator(".taught .tile", has_text="Two").locator("svg.landmarks").wait_for()
+
+
+def always(visit: Visit, file: Path) -> None:
+    def kept() -> Any:
+        config = load(file)
+        return config.signs.model, dict(config.control.actions)
+
+    file.write_text("control:\n  max_linear: 0.4\n")
+    press(visit, "Use at every start")
+    visit.page.locator(".always", has_text="Use them at every start by").wait_for()
+    assert kept() == (file.with_name("mine.npz"), {"Two": "turn_left"})
+    press(visit, "No longer use at every start")
+    visit.page.locator(".always", has_text="until handsteer ends").wait_for()
+    assert kept() == (None, {})
+    assert load(file).control.max_linear == 0.4, "the rest of the file stays"
 
 
 def drive(visit: Visit) -> None:
     page, robot = visit.page, visit.graph.robot
     page.set_viewport_size({"width": 480, "height": 740})
-    page.locator(".lesson").get_by_role("link", name="Drive").click()
+    page.get_by_role("link", name="Drive").click()
     page.get_by_role("button", name="Reset").click()
     page.locator(".banner .headline", has_text="Standing").wait_for()
+    page.locator(".sign-tile", has_text="Two").locator("svg.landmarks").wait_for()
     # A webcam that has left shows nothing, not even that no hand is there: the robot's own camera does.
     page.get_by_role("button", name="Use the robot's camera").click()
     visit.wait_until(lambda: "no hand" in visit.text(".banner") and "disarmed" not in visit.text(".banner"))
@@ -117,30 +181,51 @@ def drive(visit: Visit) -> None:
     visit.wait_until(lambda: robot.state.angular_radps > 0.2)
 
 
+def use_file(visit: Visit, file: Path) -> None:
+    """Use the signs that were taught in an earlier run."""
+    page = visit.page
+    press(visit, "Start a lesson")
+    hostile = file.with_name("thesis.npz")
+    hostile.write_bytes(b"my thesis")
+    upload = page.locator("input[data-upload]")
+    upload.set_input_files(hostile)
+    page.locator(".tools .message", has_text="The file: not a file of taught signs").wait_for()
+    hostile.write_bytes(bytes(LARGEST_SHARED_BYTES + 1))
+    upload.set_input_files(hostile)
+    page.locator(".tools .message", has_text="The file is too large").wait_for()
+    upload.set_input_files(file)
+    card = page.locator(".class.own").first
+    card.get_by_role("heading", name="Two").wait_for()
+    page.locator(".tools .message", has_text="try them, then keep them").wait_for()
+    press(visit, "Keep")
+    page.locator(".tools .message", has_text="Kept, and in use").wait_for()
+    assert load_custom_model(file.with_name("mine.npz")).labels == ("Two",)
+    visit.wait_until(lambda: visit.graph.config.signs.model is not None)
+
+
 def test_one_teaches_at_a_time_while_the_robot_stands(visit: Visit, tmp_path: Path) -> None:
     first, robot = visit.page, visit.graph.robot
-    begin(visit, "Forward")
-    first.locator(".lesson .trouble", has_text="Forward is known already").wait_for()
-    begin(visit, "<b>Peace</b>")
-    visit.wait_until(lambda: visit.text(".lesson .title") == "<b>Peace</b>")
-    first.get_by_role("button", name="Reset").click()
-    first.locator(".lesson .trouble", has_text="stands until the lesson is over").wait_for()
+    card = begin(visit, "<b>Peace</b>")
+    card.get_by_role("heading", name="<b>Peace</b>").wait_for()
+    first.get_by_label("Name of the sign").fill("Forward")
+    press(visit, "Add the sign")
+    first.locator(".tools .message", has_text="Forward is known already").wait_for()
     assert visit.text(".banner .headline") == "Stopped"
 
     second = visit.another_page()
     second.goto(first.url)
-    second.locator(".lesson .trouble", has_text="Somebody teaches <b>Peace</b> now").wait_for()
-    second.get_by_label("Name of the sign").fill("Mine")
-    second.locator(".lesson").get_by_role("button", name="Begin", exact=True).click()
-    second.locator(".lesson .trouble", has_text="ask to drive first").wait_for()
+    second.locator(".start .trouble", has_text="Another viewer teaches now").wait_for()
+    second.get_by_role("button", name="Start a lesson").click()
+    second.locator(".start .trouble", has_text="ask to drive first").wait_for()
 
-    press(visit, "Record")
-    first.locator(".take").first.wait_for()
+    hold(visit, card)
     first.close()
-    second.locator(".lesson .trouble", has_text="Somebody teaches").wait_for(state="detached")
+    second.get_by_role("button", name="Continue the last lesson").wait_for()
     wait_until_over(visit)
     assert abs(robot.state.linear_mps) < 0.01
     assert list(tmp_path.iterdir()) == []
+    second.get_by_role("button", name="Continue the last lesson").click()
+    second.locator(".take").first.wait_for()
 
 
 def wait_until_over(visit: Visit) -> None:
@@ -152,17 +237,27 @@ def wait_until_over(visit: Visit) -> None:
     pytest.fail("the lesson goes on")
 
 
-def test_every_step_fits_a_phone(visit: Visit) -> None:
-    visit.page.set_viewport_size({"width": 360, "height": 740})
-    begin(visit, "Peace")
-    press(visit, "Record")
-    visit.page.locator(".take").first.wait_for()
-    assert visit.page.evaluate("document.documentElement.scrollWidth") <= 360
-    small = visit.page.evaluate(
+def test_a_lesson_is_for_all_and_fits_a_phone(visit: Visit) -> None:
+    page = visit.page
+    card = begin(visit, "Peace")
+    hold(visit, card)
+    card.locator(".hold").focus()
+    page.keyboard.down("Enter")
+    wait_for_hands(visit)
+    page.keyboard.up("Enter")
+    card.locator(".take").nth(1).wait_for()
+    press(visit, "Train")
+    page.locator(".recalls li").first.wait_for(timeout=TRAINING_MS)
+    assert faults(page) == []
+    page.locator(".theme").click()
+    visit.wait_until(lambda: "body--dark" in (page.locator("body").get_attribute("class") or ""))
+    assert faults(page) == []
+    page.set_viewport_size({"width": 360, "height": 740})
+    assert page.evaluate("document.documentElement.scrollWidth") <= 360
+    small = page.evaluate(
         """[...document.querySelectorAll(".lesson .text-button")].map(button => button.getBoundingClientRect().height)
             .filter(height => height > 0 && height < 40)"""
     )
     assert small == []
-    press(visit, "Discard: end the lesson and keep nothing")
-    visit.page.locator(".lesson .trouble", has_text="nothing of it was kept").wait_for()
+    card.locator(".hold").scroll_into_view_if_needed()
     assert visit.troubles == []

@@ -10,9 +10,10 @@ import pytest
 
 from handsteer.clock import RealClock
 from handsteer.config import Config, TeachConfig
-from handsteer.dashboard.lesson import LessonState
-from handsteer.dashboard.lesson_node import thumbnail
-from handsteer.dashboard.lessons import Lessons, with_sign
+from handsteer.dashboard.hand_drawing import taught_drawings
+from handsteer.dashboard.lesson_node import LessonNode
+from handsteer.dashboard.lesson_state import SignClass
+from handsteer.dashboard.lessons import KEPT, KEPT_TAKES, Lessons, with_signs
 from handsteer.errors import ConfigError, DatasetError, ModelCorrupt
 from handsteer.images import image_message
 from handsteer.messages import IMAGE_RAW, Header
@@ -20,8 +21,9 @@ from handsteer.recognition.custom_signs import load_custom_model, save_custom_mo
 from handsteer.recognition.hand import Hand, RecordedLandmarker
 from handsteer.recognition.recognizer import open_classifier
 from handsteer.training.custom.dataset import Dataset, load_dataset, save_dataset
+from handsteer.training.custom.shared import load_shared, save_shared
 from handsteer.transports.in_process import InProcessTransport
-from tests.recognition.hands import show_sign
+from handsteer.types import NONE
 from tests.recognition.models import model
 from tests.training.custom.takes import shaken, takes
 
@@ -93,15 +95,32 @@ def school(tmp_path: Path) -> Iterator[School]:
     school.close()
 
 
-def seen_by_ann(lessons: Lessons) -> LessonState:
-    node = lessons.node("ann")
-    assert node is not None
-    return node.state
-
-
-def collected(school: School) -> int:
+def ann(school: School) -> LessonNode:
     node = school.lessons.node("ann")
-    return len(node.state.takes) if node else -1
+    assert node is not None
+    return node
+
+
+def begin(school: School, name: str = "peace", person: str = "", *, restore: bool = False) -> LessonNode:
+    """Begin a lesson of Ann's with one more sign."""
+    school.lessons.begin("ann", person, restore=restore)
+    node = ann(school)
+    node.do(lambda lesson: lesson.add_class(name))
+    return node
+
+
+def own(school: School, label: str = "peace") -> SignClass:
+    return next(one for one in ann(school).state.classes if one.label == label)
+
+
+def collected(school: School, label: str = "peace") -> int:
+    return len(own(school, label).takes)
+
+
+def record(school: School) -> None:
+    key = own(school).key
+    ann(school).do(lambda lesson: lesson.record(key))
+    school.wait_until(lambda: collected(school) == 3)
 
 
 @pytest.mark.slow
@@ -109,119 +128,138 @@ def test_a_sign_is_collected_learnt_kept_and_taken_by_the_graph(school: School) 
     save_dataset(Dataset(tuple(takes("Call", count=2))), school.folder / "signs.npz")
     save_custom_model(model(), school.folder / "mine.npz")
     lessons = school.lessons
-    lessons.begin("ann", " peace ", "Ann")
-    assert lessons.lost() == ("Hi", "Ho")
-    assert lessons.save("ann", "turbo") is None, "nothing is learnt yet"
-    lesson = lessons.node("ann")
-    assert lesson is not None
+    lesson = begin(school, person="Ann")
+    assert lesson.state.lost == ("Hi", "Ho")
     assert lessons.node("ben") is None
-    lesson.record()
-    school.wait_until(lambda: collected(school) == 3)
-    lesson.delete(1)
-    assert school.files == {"signs.npz", "mine.npz"}
-    assert seen_by_ann(lessons).takes[0].picture.startswith(b"\xff\xd8")
+    record(school)
+    first = own(school).takes[0].number
+    lesson.do(lambda of: of.delete_take(first))
+    before = (school.folder / "signs.npz").read_bytes()
 
     lesson.train()
-    school.wait_until(lambda: seen_by_ann(lessons).progress > 0)
-    school.wait_until(lambda: seen_by_ann(lessons).step == "try")
-    school.wait_until(lambda: (seen := seen_by_ann(lessons).seen) is not None and seen.sign == "peace")
-    report = seen_by_ann(lessons).report
+    school.wait_until(lambda: (lesson.state.progress or 0) > 0)
+    school.wait_until(lambda: lesson.state.is_fresh)
+    school.wait_until(lambda: (seen := lesson.state.seen) is not None and seen.confidences.get("peace", 0) > 0.8)
+    report = lesson.state.report
     assert report is not None
     assert report.confusion.labels == ("Call", "peace", "NONE")
 
     with pytest.raises(ConfigError, match="'fly' is no action: choose one of forward"):
-        lessons.save("ann", "fly")
-    assert lessons.save("ben", "turbo") is None
+        lessons.save("ann", {"peace": "fly"})
+    lessons.save("ben", {"peace": "turbo"})
     school.refuses = True
     with pytest.raises(ConfigError, match="refused"):
-        lessons.save("ann", "turbo")
+        lessons.save("ann", {"peace": "turbo"})
+    assert (school.folder / "signs.npz").read_bytes() == before
     school.refuses = False
-    learnt = lessons.save("ann", "turbo")
-    assert learnt is not None
-    assert school.config.control.actions == {"peace": "turbo"}
+    lessons.save("ann", {"peace": "turbo", "Call": "go"})
+    assert (lesson.state.message, lesson.state.is_changed) == (KEPT, False)
+    assert school.config.control.actions == {"peace": "turbo"}, "what is so by default is not written"
     assert school.config.signs.model == school.folder / "mine.npz"
     assert load_custom_model(school.folder / "mine.npz").labels == ("Call", "peace")
     saved = load_dataset(school.folder / "signs.npz").takes
     assert [(take.label, take.person) for take in saved] == [("Call", "me")] * 2 + [("peace", "Ann")] * 2
-    assert (lessons.label, lessons.node("ann")) == (None, None)
-    assert "actions:\n    peace: turbo" in learnt.yaml
+    assert set(taught_drawings(school.config.signs)) == {"Call", "peace"}
+
+    shared = school.folder / "shared.npz"
+    assert lessons.share("ann", shared)
+    assert not lessons.share("ben", shared)
+    dataset, shared_model = load_shared(shared)
+    assert (len(dataset.takes), shared_model is not None) == (4, True)
+    lessons.save("ann", {"peace": "stop"})
+    assert school.config.control.actions == {"peace": "stop"}, "an action changes without another training"
+    lessons.end("ann")
+    assert (lessons.is_running, lessons.draft) == (False, None)
 
 
-def test_what_is_discarded_leaves_nothing(school: School) -> None:
-    school.lessons.begin("ann", "Peace")
-    lesson = school.lessons.node("ann")
-    assert lesson is not None
-    lesson.record()
-    school.wait_until(lambda: collected(school) == 2)
+def test_the_takes_alone_are_kept_too(school: School) -> None:
+    begin(school)
+    record(school)
+    school.lessons.save("ann", {"peace": "turbo"})
+    assert ann(school).state.message == KEPT_TAKES
+    assert (school.files, school.config) == ({"signs.npz"}, school.initial)
+    (school.folder / "signs.npz").unlink()
+    with pytest.raises(DatasetError, match="was changed by another program"):
+        school.lessons.save("ann", {})
+
+
+def test_what_is_not_kept_leaves_no_file_and_can_be_continued(school: School) -> None:
+    begin(school)
+    record(school)
     school.lessons.end("ben")
-    label = school.lessons.label
-    assert label == "Peace", "another one's lesson goes on"
+    assert school.lessons.is_running, "another one's lesson goes on"
     school.lessons.end("ann")
-    assert (school.lessons.label, school.files, school.config) == (None, set(), school.initial)
+    assert (school.lessons.is_running, school.files, school.config) == (False, set(), school.initial)
+    draft = school.lessons.draft
+    assert draft is not None
+    school.lessons.begin("ann", restore=True)
+    assert ann(school).state.classes == draft.classes
+    assert collected(school) == 3
+    school.lessons.end("ann")
+    school.lessons.begin("ann")
+    assert [one.label for one in ann(school).state.classes] == [NONE]
+
+
+def test_a_file_is_added_or_refused_in_one_sentence(school: School) -> None:
+    school.lessons.begin("ann")
+    path = school.folder / "upload.npz"
+    school.lessons.take_file("ben", path)
+    for hostile in (b"my thesis", b""):
+        path.write_bytes(hostile)
+        school.lessons.take_file("ann", path)
+        message = ann(school).state.message
+        assert message.startswith("The file: not a file of taught signs")
+        assert str(school.folder) not in message
+        assert "\n" not in message
+    save_shared(path, Dataset(tuple(takes("Hi", "Peace", count=2))), model())
+    school.lessons.take_file("ann", path)
+    assert collected(school, "Hi") == 2
+    assert ann(school).state.is_fresh
 
 
 def test_a_training_is_cancelled_with_the_lesson_or_before(school: School) -> None:
-    school.lessons.begin("ann", "Peace")
-    lesson = school.lessons.node("ann")
-    assert lesson is not None
-    lesson.record()
-    school.wait_until(lambda: collected(school) == 3)
+    lesson = begin(school)
+    record(school)
     lesson.train()
-    lesson.go_back()
-    assert (lesson.state.step, collected(school)) == ("collect", 3)
+    lesson.cancel()
+    assert (lesson.state.is_training, collected(school)) == (False, 3)
     lesson.train()
     school.lessons.end("ann")
     school.wait_until(lambda: not any(thread.name == "lesson_training" for thread in threading.enumerate()))
     assert school.files == set()
 
 
-def test_takes_are_collected_only_while_the_page_is_there(school: School) -> None:
-    school.lessons.begin("ann", "Peace")
-    lesson = school.lessons.node("ann")
-    assert lesson is not None
-    lesson.record()
+def test_takes_are_recorded_only_while_the_page_is_there(school: School) -> None:
+    lesson = begin(school)
+    key = own(school).key
+    lesson.do(lambda of: of.record(key))
     waiting = threading.Event()
     for _ in range(200):
-        if not lesson.state.recording:
+        if lesson.state.recorded is None:
             break
         waiting.wait(0.05)
-    assert not lesson.state.recording
-    assert school.lessons.label == "Peace", "the page may come back"
+    assert lesson.state.recorded is None
+    assert school.lessons.is_running, "the page may come back"
 
 
-@pytest.mark.parametrize(
-    ("name", "person", "problem"),
-    [
-        ("", "", "'' is no name for a sign"),
-        ("turn left", "", "Turn Left is known already: give the new sign a name of its own"),
-        ("x" * 41, "", "is no name for a sign"),
-        ("Hi\x07", "", "is no name for a sign"),
-        ("Hi", "y" * 41, "is no name of a person"),
-    ],
-)
-def test_what_is_no_name_is_refused(school: School, name: str, person: str, problem: str) -> None:
-    with pytest.raises(DatasetError, match=problem):
-        school.lessons.begin("ann", name, person)
-    assert school.lessons.label is None
+def test_what_is_no_name_of_a_person_is_refused(school: School) -> None:
+    with pytest.raises(DatasetError, match="is no name of a person"):
+        school.lessons.begin("ann", "y" * 41)
+    assert not school.lessons.is_running
 
 
 def test_files_that_are_something_else_are_not_written_over(school: School) -> None:
     (school.folder / "mine.npz").write_bytes(b"my thesis")
     with pytest.raises(ModelCorrupt, match="not a model of taught signs"):
-        school.lessons.begin("ann", "Peace")
+        school.lessons.begin("ann")
     (school.folder / "signs.npz").write_bytes(b"my thesis")
     with pytest.raises(DatasetError, match="not a dataset of signs"):
-        school.lessons.begin("ann", "Peace")
+        school.lessons.begin("ann")
 
 
 def test_a_sign_that_has_an_action_by_another_spelling_gets_another() -> None:
-    config = Config.model_validate({"control": {"actions": {"thumb-up": "go"}, "max_linear": 0.5}})
-    changed = with_sign(config, Path("mine.npz"), "Thumb up", "turbo")
+    config = Config.model_validate({"control": {"actions": {"thumb-up": "go", "Old": "stop"}, "max_linear": 0.5}})
+    changed = with_signs(config, Path("mine.npz"), {"Thumb up": "turbo", "Call": "go"}, ["old"])
     assert changed.control.actions == {"thumb-up": "turbo"}
     assert changed.control.max_linear == 0.5
-    assert with_sign(config, Path("mine.npz"), "NONE", None).control == config.control
-
-
-def test_a_picture_of_a_take_is_small() -> None:
-    picture = thumbnail(np.zeros((480, 640, 3), np.uint8), show_sign("Stop"))
-    assert len(picture) < 10_000
+    assert with_signs(config, Path("mine.npz"), {}).control == config.control

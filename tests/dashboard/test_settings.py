@@ -244,3 +244,34 @@ def test_a_graph_drives_on_by_what_is_set(tmp_path: Path) -> None:
 
 def test_every_section_has_its_fields() -> None:
     assert list(FORM) == list(Config.model_fields)
+
+
+ACTIONS, MODEL = FIELDS["control.actions"], FIELDS["signs.model"]
+
+
+def test_some_values_are_kept_in_the_file_without_the_rest_that_runs(tmp_path: Path) -> None:
+    bench = Bench(tmp_path, {"camera": {"fps": 15}}, "control:\n  max_linear: 0.4\n")
+    bench.set("control.max_angular", "1.5")
+    assert bench.settings.keep({ACTIONS: {"Peace": "turbo"}, MODEL: tmp_path / "mine.npz"}) == "saved to my.yaml"
+    config = load(bench.path)
+    assert (config.control.max_linear, config.control.actions) == (0.4, {"Peace": "turbo"})
+    assert (config.control.max_angular, config.camera.fps) == (Config().control.max_angular, 30)
+    assert bench.settings.in_file(MODEL) == tmp_path / "mine.npz"
+    assert bench.shown("control.max_angular") == 1.5, "what is wanted stays wanted"
+    assert bench.settings.save() == "saved to my.yaml", "it knows what it has written"
+    bench.settings.keep({ACTIONS: {}, MODEL: None})
+    assert (load(bench.path).signs.model, load(bench.path).control.actions) == (None, {})
+
+
+def test_a_file_that_was_not_read_keeps_its_content_and_is_not_overwritten_later(tmp_path: Path) -> None:
+    bench = Bench(tmp_path)
+    assert bench.settings.in_file(MODEL) is None
+    bench.path.write_text("control:\n  max_linear: 0.4\n")
+    bench.settings.keep({MODEL: tmp_path / "mine.npz"})
+    assert (load(bench.path).control.max_linear, load(bench.path).signs.model) == (0.4, tmp_path / "mine.npz")
+    with pytest.raises(ConfigError, match="exists, and was not read"):
+        bench.settings.save()
+    bench.path.write_text("contrl: {}\n")
+    with pytest.raises(ConfigError, match="contrl"):
+        bench.settings.keep({MODEL: None})
+    assert bench.path.read_text() == "contrl: {}\n"

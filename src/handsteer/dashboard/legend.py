@@ -3,11 +3,13 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
+from types import MappingProxyType
 
 from nicegui import ui
 
 from handsteer.config import ControlConfig
 from handsteer.control.explain import effect_words, figures_of
+from handsteer.dashboard.hand_drawing import taught_drawings
 from handsteer.dashboard.page import Page, box, button, switch, tag, text
 from handsteer.dashboard.settings import Settings
 from handsteer.dashboard.settings_fields import FIELDS
@@ -57,7 +59,7 @@ _ARROWS = "".join(
     f'<path d="M-6 -21L0 -29L6 -21" transform="translate(32 32) rotate({turn})"/>' for turn in (0, 90, 180, 270)
 )
 _MOVED = _svg(f'<g transform="translate(10.5 5) scale(0.65)">{_FIST}{_TUCKED_THUMB}</g><g class="arrows">{_ARROWS}</g>')
-_TAUGHT = ("taught", _svg(_OPEN_PALM, classes="taught"))  # it may have any shape
+_TAUGHT = _svg(_OPEN_PALM, classes="taught")  # where no drawing of its takes is known
 
 
 @dataclass(frozen=True)
@@ -79,19 +81,23 @@ class LegendEntry:
     figures: str
 
 
-def legend(signs: tuple[str, ...], rule: ControlConfig | None) -> tuple[LegendEntry, ...]:
+def legend(
+    signs: tuple[str, ...], rule: ControlConfig | None, taught: Mapping[str, str] = MappingProxyType({})
+) -> tuple[LegendEntry, ...]:
     """Return the legend of ``signs``: shipped ones first, in the page's order.
 
     Args:
         signs: The signs that the classifier recognises.
         rule: Configures the signs' actions; None if unknown, which gives the default actions, without figures.
+        taught: SVG of each taught sign; a palm for the others.
     """
 
     def entry(sign: str) -> LegendEntry:
         action = action_of(sign, rule.actions if rule else {})
         # The semicolon precedes what does not change, which is left out for brevity.
         effect = effect_words(action, rule).partition(";")[0]
-        return LegendEntry(sign, *DRAWN.get(sign, _TAUGHT), effect, figures_of(action, rule) if rule else "")
+        drawn = DRAWN.get(sign) or ("taught", taught.get(sign, _TAUGHT))
+        return LegendEntry(sign, *drawn, effect, figures_of(action, rule) if rule else "")
 
     order = [*(sign for sign in DRAWN if sign in signs), *(sign for sign in signs if sign not in DRAWN)]
     return tuple(entry(sign) for sign in order)
@@ -136,6 +142,8 @@ class LegendPanel:
         self._page, self._settings = page, settings
         self._active = self._mode = ""
         self._shown: tuple[LegendEntry, ...] = ()
+        self._signs: tuple[str, ...] = SIGNS
+        self._taught: Mapping[str, str] = {}
         self._tiles: dict[str, ui.element] = {}
         self._choices: dict[str, ui.element] = {}
         with ui.element("section").classes("card panel legend"):
@@ -158,7 +166,10 @@ class LegendPanel:
             self._title.set_text(_TITLES[mode])
             for name, choice in self._choices.items():
                 choice.props(f'aria-pressed="{str(name == mode).lower()}"')
-        entries = joystick_legend(state.rule) if state.rule and state.is_joystick else legend(state.signs, state.rule)
+        if state.signs != self._signs and self._settings is not None:
+            self._signs, self._taught = state.signs, taught_drawings(self._settings.running.signs)
+        signs = legend(state.signs, state.rule, self._taught)
+        entries = joystick_legend(state.rule) if state.rule and state.is_joystick else signs
         if entries != self._shown:
             self._fill(entries)
         active = active_entry(state)

@@ -1,261 +1,294 @@
-"""The steps of a lesson that teaches one sign, without page, clock, camera or threads."""
+"""A lesson: classes of hands, their takes, and the model trained from them; without page, clock, camera or threads."""
 
-import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from typing import Any, Final, Literal
-
-import numpy as np
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any, Final
 
 from handsteer.config import TeachConfig
-from handsteer.recognition.custom_signs import CustomModel
-from handsteer.recognition.features import KNUCKLES, WRIST
+from handsteer.dashboard.lesson_state import NO_HAND, READY, Collected, LessonState, Seen, SignClass, filled, hint
+from handsteer.errors import DatasetError
+from handsteer.recognition.custom_signs import CustomModel, label_for
 from handsteer.recognition.hand import Hand, SignGuess
-from handsteer.recognition.recognizer import Recognition
-from handsteer.recognition.shipped_signs import SURE
 from handsteer.training.custom.collect import Collector, Facts, Status
-from handsteer.training.custom.dataset import Take
+from handsteer.training.custom.dataset import Dataset, Take
 from handsteer.training.custom.report import TrainingReport
-from handsteer.types import EFFECTS, NONE, Action
-
-_SMALL_PX: Final = 60.0
-_ENOUGH_HANDS: Final = 15
-_LEAST_TURN_RAD: Final = np.radians(6.0)
-_LEAST_GROWTH: Final = 1.12
-
-NO_HAND: Final = "No hand is in view."
-SMALL: Final = "Come nearer: the hand is small in the picture."
-STILL: Final = "Move the hand a little: nearer, farther, tilted."
-
-
-def hint(hand: Hand | None, guess: SignGuess, hands: Sequence[Hand]) -> str:
-    """Return one sentence on what to improve; empty if nothing.
-
-    Args:
-        hand: The hand in the newest frame.
-        guess: What the shipped signs' classifier recognises it as.
-        hands: The hands of the current take, oldest first.
-    """
-    if hand is None:
-        return NO_HAND
-    if hand.longer_side_px < _SMALL_PX:
-        return SMALL
-    if guess.sign != NONE and guess.confidence >= SURE:
-        return f"This looks like {guess.sign}, which is known already: show another shape."
-    return STILL if is_still(hands) else ""
-
-
-def is_still(hands: Sequence[Hand]) -> bool:
-    """Return whether ``hands`` are many, and all of similar size and tilt."""
-    if len(hands) < _ENOUGH_HANDS:
-        return False
-    pixels = np.array([hand.pixels[:, :2] for hand in hands], np.float64)
-    palms = pixels[:, KNUCKLES].mean(axis=1) - pixels[:, WRIST]
-    lengths = np.maximum(np.linalg.norm(palms, axis=1), 1e-9)
-    # Relative to the mean direction, so that a hand that points up or down is treated alike.
-    mean = palms.mean(axis=0)
-    turns = np.arctan2(palms[:, 1] * mean[0] - palms[:, 0] * mean[1], palms @ mean)
-    return bool(np.ptp(turns) < _LEAST_TURN_RAD and lengths.max() / lengths.min() < _LEAST_GROWTH)
-
-
-Step = Literal["collect", "train", "try"]
+from handsteer.types import NONE, SIGNS, find_sign
 
 MOST_TAKES: Final = 50
-"""Maximum number of takes in one lesson."""
-
-_LEAST_TAKES: Final = 2
-_READY: Final = Status("ready", 0.0, 0)
-_TOO_FEW: Final = "Too few hands were seen: this take is done again."
-
-
-@dataclass(frozen=True)
-class Collected:
-    """A take of this lesson.
-
-    Attributes:
-        number: From 1, in order of collection.
-        take: The hands.
-        picture: A small JPEG file of one of its frames, mirrored, with the hand's skeleton; it stays in memory.
-    """
-
-    number: int
-    take: Take
-    picture: bytes
-
-
-@dataclass(frozen=True)
-class LessonState:
-    """The state of a lesson.
-
-    Attributes:
-        label: The sign.
-        wanted: Number of takes to collect.
-        step: Collecting takes, training, or trying the result.
-        recording: Whether a take, or the countdown before it, is in progress.
-        status: Progress of collecting.
-        hint: What to improve; empty if nothing.
-        takes: Collected takes, without deleted ones.
-        progress: Of the training, 0 to 1.
-        error: The last error; empty if none.
-        model: The taught model, while it is tried.
-        report: How well the sign was learnt.
-        seen: Recognition of the newest frame by the taught model.
-    """
-
-    label: str
-    wanted: int
-    step: Step = "collect"
-    recording: bool = False
-    status: Status = _READY
-    hint: str = ""
-    takes: tuple[Collected, ...] = ()
-    progress: float = 0.0
-    error: str = ""
-    model: CustomModel | None = None
-    report: TrainingReport | None = None
-    seen: Recognition | None = None
-
-    @property
-    def can_train(self) -> bool:
-        """Whether there are enough takes."""
-        return len(self.takes) >= _LEAST_TAKES and not self.recording
+"""Maximum number of takes of a class that can be recorded."""
+MOST_CLASSES: Final = 20
+"""Maximum number of classes."""
+MOST_HANDS: Final = 100_000
+"""Maximum number of hands of a lesson to which a file is added."""
+LONGEST_HOLD_S: Final = 10.0
+"""Maximum duration of a take that is recorded while a button is held."""
+_MOST_UNDO: Final = 50
+_TOO_FEW: Final = "Too few hands were seen: this take does not count."
+_ADDED: Final = "The takes of the file are here: press Train, then try them."
+_ADDED_READY: Final = "The signs of the file are here: try them, then keep them."
 
 
 class Lesson:
-    """Collect takes, train, try the result; calls that do not fit the current step have no effect.
+    """Edits classes, records takes, and holds the result of training.
+
+    Calls that do not fit the current state have no effect.
 
     Args:
-        facts: Of all takes, including the sign.
+        dataset: The takes of earlier lessons.
         plan: Number and length of takes.
+        facts: Person, session and source of new takes; the label is ignored.
+        model: The model in use, if any.
 
     Attributes:
-        facts: Of all takes.
         state: The state, replaced by each change.
     """
 
-    def __init__(self, facts: Facts, plan: TeachConfig) -> None:
-        self.facts = facts
-        self.state = LessonState(facts.label, plan.takes)
-        self._plan = plan
+    def __init__(self, dataset: Dataset, plan: TeachConfig, facts: Facts, model: CustomModel | None = None) -> None:
+        self._plan, self._facts = plan, facts
+        self._count = 0
         self._collector: Collector | None = None
         self._hands: list[Hand] = []
-        self._count = 0
+        self._learning: tuple[SignClass, ...] = ()
+        self._undo: list[tuple[str, SignClass]] = []
+        # Takes of shipped signs are examples of other hands; the page does not show them.
+        self._others = tuple(take for take in dataset.takes if take.label in SIGNS)
+        labels = [*(label for label in dataset.labels if label not in (*SIGNS, NONE)), NONE]
+        classes = tuple(self._class(label, dataset) for label in labels)
+        self.state = LessonState(classes, kept=classes, kept_model=model, model=model)
 
-    def record(self) -> None:
-        """Start the countdown to the missing takes, or to one more if none is missing."""
-        room = MOST_TAKES - len(self.state.takes)
-        if self.state.step != "collect" or self.state.recording or room <= 0:
+    def restore(self, state: LessonState) -> None:
+        """Continue with the classes of a lesson that has ended, and its model."""
+        numbers = [each.number for one in state.classes for each in one.takes]
+        self._count = max([self._count, *numbers, *(one.key for one in state.classes)])
+        names = ("classes", "model", "learnt_from", "report", "take_numbers")
+        self._set(**{name: getattr(state, name) for name in names})
+
+    def add_class(self, name: str) -> None:
+        """Add a class for the sign ``name``.
+
+        Raises:
+            DatasetError: It is no name for a sign, or taken; or there are too many.
+        """
+        self._put(self._class(self._free_label(name)))
+
+    def rename(self, key: int, name: str) -> None:
+        """Give a class another name.
+
+        Raises:
+            DatasetError: It is no name for a sign, or taken.
+        """
+        old = self.state.of(key)
+        if old is not None and old.label not in (NONE, name) and not self._is_busy:
+            self._put(replace(old, label=self._free_label(name, but=old.label)))
+
+    def enable(self, key: int, *, on: bool) -> None:
+        """Learn a class from the next training on, or leave it out."""
+        old = self.state.of(key)
+        if old is not None and old.label != NONE and old.is_enabled != on and not self._is_busy:
+            self._put(replace(old, is_enabled=on))
+
+    def delete_class(self, key: int) -> None:
+        """Delete a class; of ``NONE``, its takes."""
+        old = self.state.of(key)
+        if old is None or self._is_busy:
             return
-        missing = max(1, self._plan.takes - len(self.state.takes))
-        self._collector = Collector(
-            self.facts, takes=min(missing, room), take_s=self._plan.take_time, countdown_s=self._plan.countdown
-        )
+        self._undo.append((f"Undo: delete {_named(old.label)}", old))
+        if old.label == NONE:
+            self._put(replace(old, takes=()))
+        else:
+            self._set(classes=tuple(each for each in self.state.classes if each.key != key))
+
+    def delete_take(self, number: int) -> None:
+        """Delete a take."""
+        if self.state.is_training:
+            return
+        for old in self.state.classes:
+            gone = tuple(each for each in old.takes if each.number == number)
+            if gone:
+                self._undo.append((f"Undo: delete a take of {_named(old.label)}", replace(old, takes=gone)))
+                self._put(replace(old, takes=tuple(each for each in old.takes if each.number != number)))
+
+    def undo(self) -> None:
+        """Undo the last deletion."""
+        if not self._undo or self._is_busy:
+            return
+        _, gone = self._undo.pop()
+        now = self.state.of(gone.key)
+        if now is not None:
+            takes = {each.number: each for each in (*now.takes, *gone.takes)}
+            gone = replace(now, takes=tuple(takes[number] for number in sorted(takes)))
+        elif any(find_sign(gone.label, [each.label]) for each in self.state.classes):
+            self._set(message=f"There is another sign {gone.label} now: rename it, then teach this one again.")
+            return
+        self._put(gone)
+
+    def record(self, key: int, *, hold: bool = False) -> None:
+        """Record a take until :meth:`finish`; without ``hold``, the missing takes, each after a countdown."""
+        to = self.state.of(key)
+        if to is None or self._is_busy or len(to.takes) >= MOST_TAKES:
+            return
+        facts = replace(self._facts, label=to.label)
+        if hold:
+            self._collector = Collector(facts, takes=1, take_s=LONGEST_HOLD_S, countdown_s=0.0)
+        else:
+            missing = min(max(1, self._plan.takes - len(to.takes)), MOST_TAKES - len(to.takes))
+            plan = self._plan
+            self._collector = Collector(facts, takes=missing, take_s=plan.take_time, countdown_s=plan.countdown)
         self._hands = []
-        self._set(recording=True, error="")
+        self._set(recorded=key, is_held=hold, message="")
+
+    def finish(self) -> None:
+        """End the take that is being recorded, and keep it."""
+        if self._collector is not None:
+            self._note(self._collector.finish(), None)
 
     def pause(self) -> None:
-        """Drop the current take, and stop collecting until :meth:`record`."""
+        """Drop the current take, and stop recording."""
         self._collector = None
         self._hands = []
-        self._set(recording=False, status=_READY)
+        self._set(recorded=None, status=READY)
 
-    def see(self, hand: Hand | None, guess: SignGuess, dt_s: float) -> Status:
-        """Process the next frame while takes are collected, and return the progress.
+    def see(self, hand: Hand | None, guess: SignGuess, confidences: Mapping[str, float], dt_s: float) -> None:
+        """Process the next frame.
 
-        ``guess`` is what the classifier of known signs recognises ``hand`` as; ``dt_s`` are the seconds since the last
-        frame.
+        Args:
+            hand: The hand in it, if any.
+            guess: What the model recognises it as.
+            confidences: The confidence of each sign.
+            dt_s: Seconds since the last frame.
         """
-        if self.state.step != "collect":
-            return _READY
-        status = _READY
+        none = {NONE: 1.0 - max(confidences.values(), default=0.0)} if hand is not None else {}
+        self._set(seen=Seen(hand is not None, guess.sign, guess.confidence, {**confidences, **none}))
         if self._collector is not None:
-            status = self._collector.step(hand, dt_s)
-            self._note(status, hand)
-            if self._collector.done:
-                self._collector = None
-        self._set(recording=self._collector is not None, status=status, hint=hint(hand, guess, self._hands))
-        return status
-
-    def add(self, take: Take, picture: bytes) -> None:
-        """Add a finished take."""
-        self._count += 1
-        self._set(takes=(*self.state.takes, Collected(self._count, take, picture)))
-
-    def delete(self, number: int) -> None:
-        """Delete a take; it is replaced by another one while takes are recorded."""
-        left = tuple(each for each in self.state.takes if each.number != number)
-        if self.state.step == "collect" and len(left) < len(self.state.takes):
-            self._set(takes=left)
-            if self._collector is not None:
-                self._collector.again()
+            self._note(self._collector.step(hand, dt_s), hand)
+        advice = hint(hand, guess, self._hands) if self.state.recorded is not None else ""
+        self._set(hint=NO_HAND if hand is None else advice)
 
     def lose_frames(self) -> None:
         """Report that no frames arrive."""
         self._set(hint="No picture comes from the camera.", seen=None)
 
-    def begin_training(self) -> bool:
-        """Start the training if there are enough takes; return whether it has started."""
-        if self.state.step != "collect" or not self.state.can_train:
-            return False
-        self._set(step="train", progress=0.0, error="")
-        return True
+    def dataset(self) -> Dataset:
+        """Return all takes, under the names of their classes."""
+        takes = [replace(each.take, label=one.label) for one in self.state.classes for each in one.takes]
+        disabled = frozenset(one.label for one in self.state.classes if not one.is_enabled and one.takes)
+        return Dataset((*takes, *self._others), disabled)
+
+    def add_dataset(self, dataset: Dataset, model: CustomModel | None) -> None:
+        """Add the takes of a shared file; its ``model`` is tried if there were no own takes before.
+
+        Raises:
+            DatasetError: There would be too many classes or hands.
+        """
+        new = [label for label in dataset.labels if label not in SIGNS and self._class_of(label) is None]
+        if len(self.state.classes) + len(new) > MOST_CLASSES:
+            raise DatasetError(f"with this file there would be more than {MOST_CLASSES} classes")
+        if sum(len(take.hands) for take in (*dataset.takes, *self.dataset().takes)) > MOST_HANDS:
+            raise DatasetError(f"with this file there would be more than {MOST_HANDS} hands")
+        was_empty = not any(one.takes for one in self.state.classes)
+        before = self.state.classes
+        for label in dataset.labels:
+            if label not in SIGNS:
+                old = self._class_of(label) or self._class(label)
+                known = {_content(each.take) for each in old.takes}
+                takes = [take for take in dataset.of(label) if _content(take) not in known]
+                self._put(replace(old, takes=(*old.takes, *self._numbered(takes))))
+        self._others = (*self._others, *(take for take in dataset.takes if take.label in SIGNS))
+        adopted = model is not None and (was_empty or before == self.state.classes)
+        if adopted:
+            self._set(model=model, learnt_from=filled(self.state.classes), report=None, take_numbers=())
+        self._set(message=_ADDED_READY if adopted else _ADDED)
+
+    def begin_training(self) -> Dataset | None:
+        """Start the training, if there is something to learn from; return its takes."""
+        if not self.state.can_train:
+            return None
+        numbers = tuple(each.number for one in self.state.classes for each in one.takes)
+        self._learning = filled(self.state.classes)
+        self._set(progress=0.0, message="", take_numbers=numbers, report=None)
+        return self.dataset()
 
     def advance(self, done: int, of: int) -> None:
         """Set the number of training steps that are done."""
         self._set(progress=done / of)
 
     def learn(self, model: CustomModel, report: TrainingReport) -> None:
-        """Set the result of the training, to be tried."""
-        if self.state.step == "train":
-            self._set(step="try", model=model, report=report, seen=None)
+        """Set the result of the training."""
+        if self.state.is_training:
+            self._set(progress=None, model=model, report=report, learnt_from=self._learning)
 
-    def try_out(self, seen: Recognition) -> None:
-        """Set the recognition of the next frame by the taught model."""
-        if self.state.step == "try":
-            self._set(seen=seen, hint="")
+    def end_training(self, message: str = "") -> None:
+        """End the training without a result."""
+        self._set(progress=None, message=message)
 
-    def go_back(self, error: str = "") -> None:
-        """Return to collecting, with all takes; ``error`` is shown."""
-        self._set(step="collect", model=None, report=None, error=error)
-        self.pause()
+    def mark_kept(self, message: str) -> None:
+        """Note that all has been kept."""
+        model = self.state.model if self.state.is_fresh else self.state.kept_model
+        self._set(kept=self.state.classes, kept_model=model, message=message)
 
-    def _set(self, **changes: Any) -> None:
-        self.state = replace(self.state, **changes)
+    def say(self, message: str) -> None:
+        """Show an error, or what has happened."""
+        self._set(message=message)
+
+    @property
+    def _is_busy(self) -> bool:
+        return self.state.is_training or self.state.recorded is not None
+
+    def _class(self, label: str, dataset: Dataset | None = None) -> SignClass:
+        self._count += 1
+        empty = SignClass(self._count, label, is_enabled=dataset is None or label not in dataset.disabled)
+        return replace(empty, takes=self._numbered(dataset.of(label))) if dataset is not None else empty
+
+    def _numbered(self, takes: Sequence[Take]) -> tuple[Collected, ...]:
+        first = self._count + 1
+        self._count += len(takes)
+        return tuple(Collected(number, take) for number, take in enumerate(takes, first))
+
+    def _class_of(self, label: str) -> SignClass | None:
+        return next((one for one in self.state.classes if one.label == label), None)
+
+    def _free_label(self, name: str, but: str = "") -> str:
+        taken = [each.label for each in self.state.classes if each.label != but]
+        if not but and len(taken) >= MOST_CLASSES:
+            raise DatasetError(f"there are {MOST_CLASSES} classes already: delete one first")
+        label = label_for(name, taken)
+        if label in (*SIGNS, NONE):
+            raise DatasetError(f"{label} is known already: give the new sign a name of its own")
+        if label in taken:
+            raise DatasetError(f"there is a sign {label} already: record more takes of that, or choose another name")
+        return label
+
+    def _put(self, one: SignClass) -> None:
+        """Replace the class of the same key, or insert ``one`` before ``NONE``."""
+        classes = self.state.classes
+        if any(each.key == one.key for each in classes):
+            self._set(classes=tuple(one if each.key == one.key else each for each in classes), message="")
+        else:
+            self._set(classes=(*classes[:-1], one, classes[-1]), message="")
 
     def _note(self, status: Status, hand: Hand | None) -> None:
+        key = self.state.recorded
+        to = self.state.of(key) if key is not None else None
+        if status.finished is not None and to is not None:
+            self._put(replace(to, takes=(*to.takes, *self._numbered([status.finished]))))
         if status.finished is not None or status.failed:
             self._hands = []
-            self._set(error=_TOO_FEW if status.failed else "")
+            self._set(message=_TOO_FEW if status.failed else "")
         elif status.phase == "recording" and hand is not None:
             self._hands.append(hand)
+        if self._collector is not None and self._collector.done:
+            self._collector = None
+        self._set(recorded=key if self._collector is not None else None, status=status)
+
+    def _set(self, **changes: Any) -> None:
+        del self._undo[:-_MOST_UNDO]
+        self.state = replace(self.state, **changes, undo=self._undo[-1][0] if self._undo else "")
 
 
-def counted(state: LessonState) -> str:
-    """Return the number of takes of ``state``, and of their hands, in words."""
-    takes, hands = len(state.takes), sum(len(each.take.hands) for each in state.takes)
-    of = f" of {state.wanted}" if takes <= state.wanted else ""
-    return f"{takes}{of} takes, {hands} hands"
+def _content(take: Take) -> tuple[object, ...]:
+    """Return what is the same in two copies of a take."""
+    return len(take.hands), take.person, take.session, take.hands[0].points.tobytes() if take.hands else b""
 
 
-def instruction(state: LessonState) -> tuple[str, str]:
-    """Return the current instruction while takes are recorded: a number, and words."""
-    if state.status.phase == "recording":
-        return str(state.status.hands), f"hands: show {state.label}"
-    return str(math.ceil(state.status.left_s)), f"then show {state.label}"
-
-
-def outcome(seen: Recognition | None, label: str, action_of: Callable[[str], Action]) -> tuple[str, str]:
-    """Return in words how the taught model recognises the hand, and what the robot would do.
-
-    Args:
-        seen: The recognition of the newest frame; None without a frame.
-        label: The taught sign.
-        action_of: Returns the action of a sign, current or intended.
-    """
-    if seen is None:
-        return "No picture", ""
-    if seen.hand is None:
-        return "No hand", "no hand is in view"
-    if seen.seen == NONE:
-        return "No sign", f"show {label}" if label != NONE else "which is correct"
-    return f"{seen.seen}, {seen.confidence:.0%}", f"would mean: {EFFECTS[action_of(seen.seen)]}"
+def _named(label: str) -> str:
+    return "the background" if label == NONE else label

@@ -3,35 +3,29 @@
 import logging
 import threading
 from collections.abc import Callable
-from typing import Final
-
-import cv2
-import numpy as np
-from numpy.typing import NDArray
+from typing import Final, TypeVar
 
 from handsteer.clock import Clock
-from handsteer.config import Config, SignsConfig
-from handsteer.dashboard.lesson import Lesson, LessonState
+from handsteer.dashboard.lesson import Lesson
+from handsteer.dashboard.lesson_state import LessonState
 from handsteer.errors import TrainingError
-from handsteer.images import bgr_image, encode_jpeg
+from handsteer.images import bgr_image
 from handsteer.messages import IMAGE_RAW, Image
 from handsteer.nodes.base import Node
 from handsteer.recognition.custom_signs import CustomClassifier, CustomModel
-from handsteer.recognition.hand import Classifier, Hand, Landmarker, SignGuess
-from handsteer.recognition.recognizer import Recognizer, draw_hand
+from handsteer.recognition.hand import Classifier, Landmarker, SignGuess
 from handsteer.training.custom.background import BackgroundTraining
 from handsteer.training.custom.collect import largest
-from handsteer.training.custom.dataset import Dataset
 from handsteer.transports.base import Received, Transport
 from handsteer.types import NONE
 
+T = TypeVar("T")
 log = logging.getLogger(__name__)
 
 _WATCH_PERIOD_S: Final = 0.2
 _NO_FRAME_S: Final = 1.0
 _UNATTENDED_S: Final = 1.0
 _LONGEST_STEP_S: Final = 0.5
-_THUMBNAIL_HEIGHT: Final = 120
 _NOTHING: Final = SignGuess(NONE, 0.0)
 
 OpenModels = Callable[[], tuple[Landmarker, Classifier]]
@@ -40,36 +34,23 @@ OpenModels = Callable[[], tuple[Landmarker, Classifier]]
 class LessonNode(Node):
     """Runs one lesson; thread-safe.
 
-    Hands are detected a second time, in addition to the recognition, only while takes are collected or tried.
+    Hands are detected a second time, in addition to the recognition, only during a lesson.
 
     Args:
         transport: Carries the messages.
         clock: The graph's clock.
         lesson: Used only by this node from here on.
-        known: The takes of earlier lessons, which are trained on too.
         open_models: Opens the landmarker and the classifier of the shipped signs; called on this node's thread.
-        signs: Returns the current parameters of recognition.
     """
 
-    def __init__(
-        self,
-        transport: Transport,
-        clock: Clock,
-        *,
-        lesson: Lesson,
-        known: Dataset,
-        open_models: OpenModels,
-        signs: Callable[[], SignsConfig],
-    ) -> None:
+    def __init__(self, transport: Transport, clock: Clock, lesson: Lesson, open_models: OpenModels) -> None:
         super().__init__("dashboard_lesson", transport, clock)
         self._lesson = lesson
-        self._known = known
-        self._open_models, self._signs = open_models, signs
+        self._open_models = open_models
         self._lock = threading.RLock()
         self._training: BackgroundTraining | None = None
         self._models: tuple[Landmarker, Classifier] | None = None
-        self._trying: tuple[CustomModel, Recognizer] | None = None
-        self._picture: tuple[NDArray[np.uint8], Hand, float] | None = None
+        self._classifier: tuple[CustomModel | None, Classifier] | None = None
         self._last_s: float | None = None
         self._last_frame_s = self._attended_s = clock.now()
         self.subscribe(IMAGE_RAW, self._on_image)
@@ -81,38 +62,28 @@ class LessonNode(Node):
         return self._lesson.state
 
     def attend(self) -> None:
-        """Report that the teaching viewer's page is open; without this for a second, no takes are collected."""
+        """Report that the teaching viewer's page is open; without this for a second, no takes are recorded."""
         self._attended_s = self.clock.now()
 
-    def record(self) -> None:
-        """Start the countdown to the missing takes."""
+    def do(self, action: Callable[[Lesson], T]) -> T:
+        """Return the result of ``action`` with the lesson, which must not be slow."""
         with self._lock:
-            self._lesson.record()
-
-    def pause(self) -> None:
-        """Drop the current take, and stop collecting."""
-        with self._lock:
-            self._lesson.pause()
-
-    def delete(self, number: int) -> None:
-        """Delete a take."""
-        with self._lock:
-            self._lesson.delete(number)
+            return action(self._lesson)
 
     def train(self) -> None:
-        """Train on the takes of this and earlier lessons, on a separate thread and in a separate process."""
+        """Train on all takes, on a separate thread and in a separate process."""
         with self._lock:
-            if not self._lesson.begin_training():
+            dataset = self._lesson.begin_training()
+            if dataset is None:
                 return
-            training = BackgroundTraining(self._known.with_takes([each.take for each in self.state.takes]))
-            self._training = training
+            training = self._training = BackgroundTraining(dataset)
         threading.Thread(target=self._learn, args=(training,), name="lesson_training", daemon=True).start()
 
-    def go_back(self) -> None:
-        """Collect further takes; cancels a running training and drops the taught model."""
+    def cancel(self) -> None:
+        """Cancel a running training."""
         with self._lock:
             self._cancel()
-            self._lesson.go_back()
+            self._lesson.end_training()
 
     def on_stop(self) -> None:
         """End the training."""
@@ -134,10 +105,10 @@ class LessonNode(Node):
         try:
             result = training.run(progress)
         except TrainingError as problem:
-            error = str(problem)
+            error = f"Nothing could be learnt: {problem}."
         except Exception:
-            log.exception("the training of %s failed", self._lesson.facts.label)
-            error = "the training failed; the log says why"
+            log.exception("the training failed")
+            error = "The training failed; the log says why."
         with self._lock:
             if self._training is not training:
                 return  # it was cancelled
@@ -145,7 +116,7 @@ class LessonNode(Node):
             if result is not None:
                 self._lesson.learn(*result)
             else:
-                self._lesson.go_back(error)
+                self._lesson.end_training(error)
 
     def _on_image(self, received: Received[Image]) -> None:
         now = self.clock.now()
@@ -154,62 +125,24 @@ class LessonNode(Node):
         step_s = 0.0 if self._last_s is None else min(max(0.0, captured_s - self._last_s), _LONGEST_STEP_S)
         self._last_s = captured_s
         state = self.state
-        if state.step == "train":
+        if state.is_training:
             return
         if self._models is None:
             self._models = self._open_models()
-        image = bgr_image(received.message)
-        if state.step == "collect":
-            self._collect(image, step_s, *self._models)
-        elif state.model is not None:
-            self._try(state.model, image, step_s, *self._models)
-
-    def _collect(self, image: NDArray[np.uint8], step_s: float, landmarker: Landmarker, shipped: Classifier) -> None:
-        hand = largest(landmarker.detect(image))
-        guess = shipped.classify(hand) if hand is not None else _NOTHING
+        landmarker, shipped = self._models
+        if self._classifier is None or self._classifier[0] is not state.model:
+            self._classifier = state.model, CustomClassifier(shipped, state.model) if state.model else shipped
+        classifier = self._classifier[1]
+        hand = largest(landmarker.detect(bgr_image(received.message)))
+        guess = classifier.classify(hand) if hand is not None else _NOTHING
+        confidences = {sign: classifier.confidence(sign, chance) for sign, chance in guess.likelihoods.items()}
         with self._lock:
-            status = self._lesson.see(hand, guess, step_s)
-            if status.finished is not None and self._picture is not None:
-                self._lesson.add(status.finished, thumbnail(*self._picture[:2]))
-            if status.finished is not None or status.phase != "recording":
-                self._picture = None
-            elif hand is not None:
-                self._choose_picture(image, hand, status.left_s)
-
-    def _choose_picture(self, image: NDArray[np.uint8], hand: Hand, left_s: float) -> None:
-        """Store the frame in the middle of the take; at its start the hand is still moving."""
-        take_s = left_s if self._picture is None else self._picture[2]
-        if self._picture is None or left_s >= take_s / 2:
-            self._picture = image, hand, take_s
-
-    def _try(
-        self,
-        model: CustomModel,
-        image: NDArray[np.uint8],
-        step_s: float,
-        landmarker: Landmarker,
-        shipped: Classifier,
-    ) -> None:
-        if self._trying is None or self._trying[0] is not model:
-            landmarker.reset()
-            classifier, config = CustomClassifier(shipped, model), Config(signs=self._signs())
-            self._trying = model, Recognizer(config, landmarker=landmarker, classifier=classifier)
-        seen = self._trying[1].step(image, step_s)
-        with self._lock:
-            self._lesson.try_out(seen)
+            self._lesson.see(hand, guess, confidences, step_s)
 
     def _watch(self) -> None:
         now = self.clock.now()
         with self._lock:
-            if now - self._attended_s > _UNATTENDED_S and self.state.recording:
+            if now - self._attended_s > _UNATTENDED_S and self.state.recorded is not None:
                 self._lesson.pause()
             if now - self._last_frame_s > _NO_FRAME_S:
                 self._lesson.lose_frames()
-
-
-def thumbnail(image: NDArray[np.uint8], hand: Hand) -> bytes:
-    """Return a small, mirrored JPEG file of ``image``, (height, width, 3) uint8, BGR, with the skeleton of ``hand``."""
-    height, width = image.shape[:2]
-    size = (max(1, round(width * _THUMBNAIL_HEIGHT / height)), _THUMBNAIL_HEIGHT)
-    small = np.asarray(cv2.resize(draw_hand(image, hand), size, interpolation=cv2.INTER_AREA), np.uint8)
-    return encode_jpeg(small, 75).tobytes()

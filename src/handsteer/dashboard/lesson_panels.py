@@ -1,26 +1,32 @@
-"""The steps of a lesson on the page: the sign's name, its takes, the training, the result, and what was learnt."""
+"""The panels of the page ``/teach`` in addition to its cards: the start, the tools, and what happens at every start."""
 
 import asyncio
-import base64
-from collections.abc import Callable, Sequence
-from typing import TypeVar
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Final, TypeVar
 
 from nicegui import ui
 
-from handsteer.dashboard.lesson import LessonState, counted, outcome
+from handsteer.dashboard.hand_drawing import taught_drawings
+from handsteer.dashboard.legend import DRAWN
+from handsteer.dashboard.lesson import Lesson
+from handsteer.dashboard.lesson_files import LESSON_PATH
 from handsteer.dashboard.lesson_node import LessonNode
-from handsteer.dashboard.lessons import LearntSign, Lessons
+from handsteer.dashboard.lesson_state import LessonState, outcome
+from handsteer.dashboard.lessons import Lessons
 from handsteer.dashboard.page import Page, box, button, switch, tag, text
+from handsteer.dashboard.settings import Settings
+from handsteer.dashboard.settings_fields import FIELDS
 from handsteer.errors import HandsteerError
-from handsteer.training.custom.dataset import Dataset, summarise
-from handsteer.training.custom.report import TrainingReport, false_hands, how_it_was_tried, mistakes
-from handsteer.types import EFFECTS, NONE, Action
+from handsteer.recognition.custom_signs import load_custom_model
+from handsteer.types import Action, find_sign
 
 T = TypeVar("T")
 
-_DISCARDED = "The lesson is over, and nothing of it was kept. The robot stands until you press Reset."
-_LONGEST = 200
-_DISCARD = "Discard: end the lesson and keep nothing"
+_NOT_DRIVING: Final = "Another viewer drives: ask to drive first, then teach."
+_UNKEPT: Final = "The lesson is over. What was not kept is still here, until the next lesson begins or handsteer ends."
+_OVER: Final = "The lesson is over. Press Reset to drive."
+_LONGEST: Final = 200
 
 
 class ViewerLesson:
@@ -28,273 +34,281 @@ class ViewerLesson:
 
     Attributes:
         lessons: Run it.
-        message: An error, or what has happened; empty if nothing.
-        learnt: The sign that was taught and saved last, until the next lesson.
+        viewer: The viewer.
+        message: An error, or what has happened, while there is no lesson; empty if nothing.
     """
 
     def __init__(self, page: Page, lessons: Lessons) -> None:
         self.lessons = lessons
+        self.viewer = page.client.id
         self.message = ""
-        self.learnt: LearntSign | None = None
         self._page = page
-        self._viewer = page.client.id
         self._is_over = False
 
     @property
     def node(self) -> LessonNode | None:
         """The lesson, if there is one."""
-        return self.lessons.node(self._viewer)
+        return self.lessons.node(self.viewer)
 
-    def do(self, action: Callable[[LessonNode], object]) -> None:
-        """Call ``action`` with the lesson, if there is one."""
-        self.message = ""
-        if node := self.node:
-            action(node)
+    def do(self, action: Callable[[Lesson], object]) -> None:
+        """Call ``action`` with the lesson, if there is one, and show any error in it."""
+        node = self.node
+        if node is None:
+            return
+        try:
+            node.do(action)
+        except HandsteerError as error:
+            words = f"{error}."
+            node.do(lambda lesson: lesson.say(words))
 
-    async def begin(self, name: str, person: str) -> None:
+    def hold(self, sent: object) -> None:
+        """Record a take while a button is held, as the browser reports."""
+        key = sent.get("key") if isinstance(sent, dict) else None
+        if not isinstance(sent, dict) or not isinstance(key, int):
+            return
+        if sent.get("held") is True:
+            self.do(lambda lesson: lesson.record(key, hold=True))
+        else:
+            self.do(Lesson.finish)
+
+    async def begin(self, person: str, *, restore: bool) -> None:
         """Stop the robot, and begin a lesson if the viewer drives."""
         node = self._page.node
-        if node is None or not self._page.drives():
-            self.message = "Another viewer drives: ask to drive first, then teach."
+        if node is None or not self.may_change():
             return
-        node.halt()
-        await self._run(self.lessons.begin, self._viewer, name, person)
+        node.halt(self.viewer)
+        await self.run(lambda: self.lessons.begin(self.viewer, person, restore=restore))
         if self._is_over:  # the viewer has left the page
-            self.lessons.end(self._viewer)
+            self.lessons.end(self.viewer)
 
-    async def save(self, action: str) -> None:
-        """Save what was learnt, with this action."""
-        self.learnt = await self._run(self.lessons.save, self._viewer, action)
+    async def save(self, actions: Mapping[str, str]) -> None:
+        """Keep the takes and the model, with these actions."""
+        error = await self.run(lambda: self.lessons.save(self.viewer, actions))
+        if error:
+            self.do(lambda lesson: lesson.say(error))
 
-    async def known(self) -> Dataset:
-        """Return the takes of earlier lessons; none if they cannot be read."""
-        return await self._run(self.lessons.known) or Dataset()
+    def may_change(self) -> bool:
+        """Return whether the viewer drives; show why not."""
+        drives = self._page.drives()
+        self.message = "" if drives else _NOT_DRIVING
+        return drives
 
-    def discard(self) -> None:
-        """End the lesson without saving anything."""
-        self.end(_DISCARDED)
-
-    def end(self, why: str) -> None:
-        """End the lesson without saving anything, and show ``why``."""
-        self.lessons.end(self._viewer)
-        self.message = why
+    def end(self, why: str = "") -> None:
+        """End the lesson, and show ``why``."""
+        self.lessons.end(self.viewer)
+        self.message = why or (_OVER if self.lessons.draft is None else _UNKEPT)
 
     def leave(self) -> None:
         """End the lesson, because the page is left."""
         self._is_over = True
-        self.lessons.end(self._viewer)
+        self.lessons.end(self.viewer)
 
-    async def _run(self, action: Callable[..., T], *arguments: object) -> T | None:
-        """Return the result of ``action``, which reads or writes files; show an error instead."""
-        self.message = ""
+    async def run(self, action: Callable[[], object]) -> str:
+        """Call ``action``, which reads or writes files; show and return an error message, empty if none."""
         try:
-            return await asyncio.to_thread(action, *arguments)
+            await asyncio.to_thread(action)
         except HandsteerError as error:
             self.message = f"{error}."
-            return None
+        else:
+            self.message = ""
+        return self.message
 
 
-class NamePanel:
-    """Name a new sign, or select one that was taught before."""
+class StartPanel:
+    """Begins a lesson; shows the signs that have been taught.
 
-    def __init__(self, lesson: ViewerLesson) -> None:
+    Args:
+        lesson: The viewer's lesson.
+        settings: Those of the graph.
+    """
+
+    def __init__(self, lesson: ViewerLesson, settings: Settings | None) -> None:
         self._lesson = lesson
-        with box("step name") as self.element:
-            ui.label("Show a sign of your own to the camera a few times, and say what the robot does when it sees it.")
-            with box("fields"):
-                self._name = ui.input("Name of the sign", placeholder="Peace").props("outlined dense maxlength=40")
-                self._person = ui.input("Who shows it", value="me").props("outlined dense maxlength=40")
-            self._known = box("picks")
-            self._name.on("keydown.enter", self._begin)
-            with box("buttons"):
-                button("Begin", self._begin).classes("primary")
-            text("faint", "The robot is stopped while you teach. Pictures are not stored, only the hand's landmarks.")
-
-    async def fill(self) -> None:
-        """Offer the signs of earlier lessons for selection."""
-        takes = {each.label: each.takes for each in summarise(await self._lesson.known())}
-        self._known.clear()
-        with self._known:
-            for label, count in takes.items():
-                if label != NONE:
-                    self._pick(label, f"{label} ({count} takes)")
-            if takes:
-                self._pick(NONE, "No sign: hands that must not count")
-
-    def _pick(self, label: str, words: str) -> None:
-        button(words, lambda: self._name.set_value(label))
-
-    async def _begin(self) -> None:
-        await self._lesson.begin(*(str(each.value or "")[:_LONGEST] for each in (self._name, self._person)))
-
-
-class CollectPanel:
-    """Record takes, view them, delete some, and start the training."""
-
-    def __init__(self, lesson: ViewerLesson) -> None:
-        self._lesson = lesson
-        self._shown: tuple[int, ...] = ()
-        with box("step collect hidden") as self.element:
-            self._count = text("count", "").props('role="status"')
-            self._hint = text("hint", "").props('role="status"')
-            with box("buttons"):
-                self._record = button("Record", lambda: lesson.do(LessonNode.record)).classes("primary")
-                self._pause = button("Pause", lambda: lesson.do(LessonNode.pause))
-                self._train = button("Train", lambda: lesson.do(LessonNode.train))
-                button("Discard", lesson.discard, _DISCARD)
-            self._takes = ui.element("ul").classes("takes").props('aria-label="Takes"')
+        self._shown: object = None
+        with ui.element("section").classes("card panel start") as self.element:
+            tag("h2", "", "Teach your own signs")
             text(
-                "faint",
-                "Show the sign as you will when you drive: nearer and farther, tilted, turned. Hands that are"
-                " of no use, as the camera saw something else, are deleted with their take.",
+                "lead", "Show a sign to the camera a few times, train for some seconds, and choose what the robot does."
             )
-
-    def update(self, state: LessonState) -> None:
-        """Show ``state``."""
-        self._count.set_text(counted(state))
-        self._hint.set_text(state.hint)
-        switch(self._record, "hidden", on=state.recording)
-        switch(self._pause, "hidden", on=not state.recording)
-        self._train.props(remove="disabled") if state.can_train else self._train.props("disabled")
-        enough = len(state.takes) >= state.wanted
-        switch(self._record, "primary", on=not enough)
-        switch(self._train, "primary", on=enough)
-        numbers = tuple(each.number for each in state.takes)
-        if numbers != self._shown:
-            self._shown = numbers
-            self._takes.clear()
-            with self._takes:
-                for each in state.takes:
-                    self._tile(each.number, each.picture, len(each.take.hands))
-
-    def _tile(self, number: int, picture: bytes, hands: int) -> None:
-        data = base64.b64encode(picture).decode()
-        with ui.element("li").classes("take"):
-            ui.element("img").props(f'src="data:image/jpeg;base64,{data}" alt="A frame of take {number}"')
-            text("faint", f"{number}: {hands} hands")
-            button("Delete", lambda: self._lesson.do(lambda node: node.delete(number)), f"Delete take {number}")
-
-
-class TrainPanel:
-    """The progress of the training, and a button that returns to the takes."""
-
-    def __init__(self, lesson: ViewerLesson) -> None:
-        with box("step train hidden") as self.element:
-            self._words = text("count", "Learning").props('role="status"')
-            with box("meter progress").props('role="progressbar" aria-label="Training"') as self._meter:
-                self._fill = box("")
+            self._taught = box("taught")
+            self._message = text("trouble", "").props('role="alert"')
+            self._person = ui.input("Who shows the signs", value="me").props("outlined dense maxlength=40")
             with box("buttons"):
-                button("Cancel", lambda: lesson.do(LessonNode.go_back), "Cancel the training")
+                button("Start a lesson", lambda: self._begin(restore=False)).classes("primary")
+                self._restore = button("Continue the last lesson", lambda: self._begin(restore=True))
+            text("faint", "The robot is stopped during a lesson. Only landmarks are recorded, no pictures.")
+            self._always = AlwaysPanel(lesson, settings) if settings is not None else None
+
+    def update(self) -> None:
+        """Show changes."""
+        lessons = self._lesson.lessons
+        others = "Another viewer teaches now." if lessons.is_running else ""
+        self._message.set_text(self._lesson.message or others)
+        switch(self._restore, "hidden", on=lessons.draft is None)
+        if self._always is not None:
+            self._always.update()
+        shown = lessons.signs.model, lessons.is_running
+        if shown != self._shown:
+            self._shown = shown
+            self._taught.clear()
+            with self._taught:
+                shipped = {sign: drawing for sign, (_, drawing) in DRAWN.items()}
+                for sign, drawing in (shipped | dict(taught_drawings(lessons.signs))).items():
+                    with box("tile"):
+                        ui.html(drawing, sanitize=False)
+                        text("name", sign)
+
+    async def _begin(self, *, restore: bool) -> None:
+        await self._lesson.begin(str(self._person.value or "")[:_LONGEST], restore=restore)
+
+
+_MODEL, _ACTIONS = FIELDS["signs.model"], FIELDS["control.actions"]
+
+
+class AlwaysPanel:
+    """Writes the taught signs in use to the configuration file, or removes them from it."""
+
+    def __init__(self, lesson: ViewerLesson, settings: Settings) -> None:
+        self._lesson, self._settings = lesson, settings
+        self._shown: object = None
+        with box("always") as self._box:
+            self._words = text("", "").props('role="status"')
+            self._use = button("Use at every start", lambda: self._change(self._keep))
+            self._drop = button("No longer use at every start", lambda: self._change(self._remove))
+
+    def update(self) -> None:
+        """Show whether the next start uses the signs, if any are in use."""
+        running = self._settings.running.signs.model
+        shown = running, self._settings.revision
+        if shown != self._shown:
+            self._shown = shown
+            self._show(running)
+
+    def _show(self, running: Path | None) -> None:
+        try:
+            kept = self._settings.in_file(_MODEL)
+        except HandsteerError as error:
+            kept = None
+            self._lesson.message = f"{error}."
+        is_kept = kept is not None and running is not None and _full(kept) == _full(running)
+        file = self._settings.file.path
+        self._words.set_text(
+            f"These signs are in {file}. Use them at every start by: handsteer run --config {file}"
+            if is_kept
+            else "These signs are in use until handsteer ends."
+        )
+        switch(self._box, "hidden", on=running is None)
+        switch(self._use, "hidden", on=is_kept)
+        switch(self._drop, "hidden", on=not is_kept)
+
+    async def _change(self, change: Callable[[], object]) -> None:
+        if self._lesson.may_change():
+            await self._lesson.run(change)
+            self._shown = None
+
+    def _keep(self) -> None:
+        running = self._settings.running
+        if running.signs.model is not None:
+            self._settings.keep({_MODEL: _full(running.signs.model), _ACTIONS: running.control.actions})
+
+    def _remove(self) -> None:
+        model = self._settings.running.signs.model
+        taught = load_custom_model(model.expanduser()).labels if model is not None else ()
+        actions: Mapping[str, Action] = self._settings.in_file(_ACTIONS)
+        others = {sign: action for sign, action in actions.items() if find_sign(sign, taught) is None}
+        self._settings.keep({_MODEL: None, _ACTIONS: others})
+
+
+def _full(path: Path) -> Path:
+    return path.expanduser().absolute()
+
+
+class LessonPanel:
+    """What the hand is recognised as, and the tools: train, keep, undo, files, the end.
+
+    Args:
+        lesson: The viewer's lesson.
+        actions: Returns the action that is selected for each sign.
+    """
+
+    def __init__(self, lesson: ViewerLesson, actions: Callable[[], Mapping[str, str]]) -> None:
+        self._lesson, self._actions = lesson, actions
+        with ui.element("section").classes("card panel tools") as self.element:
+            with box("opinion"):
+                self._sign = text("sign", "")
+                self._effect = text("effect", "")
+            with box("buttons"):
+                self._train = button("Train", self._begin_training).classes("primary")
+                self._keep = button("Keep", lambda: lesson.save(actions()))
+                self._undo = button("Undo", lambda: lesson.do(Lesson.undo))
+                with box("files"):
+                    viewer = f"viewer={lesson.viewer}"
+                    _download("Download", f"{LESSON_PATH}/signs.npz?{viewer}", "Download takes and model as one file")
+                    _download("CSV", f"{LESSON_PATH}/takes.csv?{viewer}", "Download the takes as a table, CSV")
+                    button("Upload", label="Upload a file of taught signs").props("data-choose")
+                    file = ui.element("input").props(
+                        f'type=file accept=".npz" data-upload="{LESSON_PATH}/signs?{viewer}"'
+                    )
+                    file.classes("hidden").props('aria-label="File of taught signs"')
+                button("End the lesson", lesson.end).classes("end")
+            with box("training hidden") as self._training:
+                self._progress = text("", "").props('role="status"')
+                with box("meter progress").props('role="progressbar" aria-label="Training"') as self._meter:
+                    self._fill = box("")
+                button("Cancel", self._cancel, "Cancel the training")
+            self._hint = text("hint", "").props('role="status"')
+            self._message = text("message", "").props('role="alert"')
+            self._lost = text("trouble", "")
 
     def update(self, state: LessonState) -> None:
         """Show ``state``."""
-        percent = round(100 * state.progress)
-        learning = f"Learning what all takes have in common: {percent} %"
-        self._words.set_text(learning if percent else "Making hands of every shape, to tell the sign from")
+        sign, effect = outcome(state.seen, self._lesson.lessons.signs.min_confidence, self._action_of)
+        self._sign.set_text(sign)
+        self._effect.set_text(effect)
+        is_idle = state.recorded is None and not state.is_training
+        _enable(self._train, on=state.can_train)
+        _enable(self._keep, on=is_idle)
+        to_keep = state.is_fresh and state.is_changed
+        switch(self._train, "primary", on=not to_keep)
+        switch(self._keep, "primary", on=to_keep)
+        set_words(self._undo, state.undo)
+        switch(self._undo, "hidden", on=not state.undo or not is_idle)
+        self._hint.set_text("" if state.is_training else state.hint)
+        self._message.set_text(state.message)
+        lost = ", ".join(state.lost)
+        self._lost.set_text(f"There are no takes of {lost}: training would lose what was learnt of it." if lost else "")
+        switch(self._training, "hidden", on=not state.is_training)
+        percent = round(100 * (state.progress or 0.0))
+        self._progress.set_text(f"Learning: {percent} %" if percent else "Making hands of every shape")
         self._fill.style(f"width: {percent}%")
         self._meter.props(f"aria-valuenow={percent}")
 
-
-class ResultPanel:
-    """How well the sign was learnt; try it, assign an action, and save or discard it."""
-
-    def __init__(self, lesson: ViewerLesson) -> None:
-        self._lessons = lesson.lessons
-        actions = {action: f"{action.replace('_', ' ')}: {EFFECTS[action]}" for action in self._lessons.actions()}
-        with box("step result hidden") as self.element:
-            tag("h3", "", "Try it")
-            with box("opinion").props('role="status"'):
-                self._sign = text("sign", "")
-                self._effect = text("faint", "")
-            self._action = ui.select(actions, label="What it does", value="go").props("outlined dense")
-            with box("buttons"):
-                button("Keep", lambda: lesson.save(str(self._action.value))).classes("primary")
-                button("More takes", lambda: lesson.do(LessonNode.go_back))
-                button("Discard", lesson.discard, _DISCARD)
-            self._lost = text("trouble", "")
-            tag("h3", "", "How well it was learnt")
-            self._report = box("figures")
-
-    def fill(self, state: LessonState) -> None:
-        """Show the report of ``state``, the sign's current action, and the signs that would be lost."""
-        lost = ", ".join(self._lessons.lost())
-        self._action.set_value(self._lessons.action_of(state.label))
-        switch(self._action, "hidden", on=state.label == NONE)
-        self._lost.set_text(
-            f"There are no takes of {lost}: what was learnt before of it would be lost." if lost else ""
+    def _action_of(self, sign: str) -> Action:
+        chosen = self._actions().get(sign)
+        return next((each for each in self._lesson.lessons.actions() if each == chosen), None) or (
+            self._lesson.lessons.action_of(sign)
         )
-        self._report.clear()
-        if state.report is not None:
-            with self._report:
-                _show_report(state.report)
 
-    def update(self, state: LessonState) -> None:
-        """Show ``state``."""
+    def _begin_training(self) -> None:
+        if node := self._lesson.node:
+            node.train()
 
-        def action_of(sign: str) -> Action:
-            action: Action = self._action.value if sign == state.label else self._lessons.action_of(sign)
-            return action
-
-        sign, effect = outcome(state.seen, state.label, action_of)
-        self._sign.set_text(sign)
-        self._effect.set_text(effect)
+    def _cancel(self) -> None:
+        if node := self._lesson.node:
+            node.cancel()
 
 
-class LearntPanel:
-    """The saved sign, and how to make it permanent; calls ``again`` to teach another sign."""
-
-    def __init__(self, again: Callable[[], object]) -> None:
-        with box("step kept hidden") as self.element:
-            self._words = text("count", "").props('role="status"')
-            text(
-                "",
-                "It is in use already. The robot stands until you press Reset above, and moves once you have shown"
-                " Stop, or no hand.",
-            )
-            text("", "To have it at the next start too, put this into your configuration file:")
-            self._yaml = tag("pre", "lines", "").props("tabindex=0")
-            self._files = text("faint", "")
-            with box("buttons"):
-                button("Teach another sign", again).classes("primary")
-                ui.link("Drive", "/").classes("text-button")
-
-    def fill(self, learnt: LearntSign) -> None:
-        """Show the saved sign."""
-        if learnt.action is None:
-            self._words.set_text("The hands that must not count are learnt")
-        else:
-            self._words.set_text(f"{learnt.label} is learnt, and means: {EFFECTS[learnt.action]}")
-        self._yaml.set_text(learnt.yaml)
-        self._files.set_text(f"The takes are in {learnt.dataset}, what was learnt from them in {learnt.model}.")
+def set_words(element: ui.element, words: str) -> None:
+    """Set the words of a button."""
+    label = element.default_slot.children[0]
+    if isinstance(label, ui.label):
+        label.set_text(words)
 
 
-def _show_report(report: TrainingReport) -> None:
-    labels, counts = report.confusion.labels, report.confusion.counts
-    with box("scroll").props('tabindex=0 role="region" aria-label="Confusion matrix"'), ui.element("table"):
-        tag("caption", "", "A row for each sign that was shown, a column for each that came out, in hands")
-        with ui.element("thead"), ui.element("tr"):
-            _heads("col", ["shown", *(_named(label) for label in labels), "right"])
-        with ui.element("tbody"):
-            for row, label in enumerate(labels):
-                if any(counts[row]):
-                    _row(label, counts[row], row)
-    for words in (*mistakes(report), f"{how_it_was_tried(report)}.", false_hands(report)):
-        text("", words)
+def _enable(element: ui.element, *, on: bool) -> None:
+    element.props(remove="disabled") if on else element.props("disabled")
 
 
-def _row(label: str, counts: Sequence[int], own: int) -> None:
-    with ui.element("tr"):
-        _heads("row", [_named(label)])
-        for column, count in enumerate(counts):
-            kind = "right" if column == own else "wrong" if count else ""
-            tag("td", kind, str(count))
-        tag("td", "", f"{counts[own] / sum(counts):.1%}")
-
-
-def _heads(scope: str, names: Sequence[str]) -> None:
-    for name in names:
-        tag("th", "", name).props(f"scope={scope}")
-
-
-def _named(label: str) -> str:
-    return "no sign" if label == NONE else label
+def _download(words: str, address: str, label: str) -> None:
+    with ui.element("a").classes("text-button").props(f'href="{address}" download aria-label="{label}"'):
+        ui.label(words).style("display: inline")

@@ -2,62 +2,49 @@
 
 import datetime
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-import yaml
-
 from handsteer.clock import Clock
-from handsteer.config import Config, ControlConfig, validate
+from handsteer.config import Config, ControlConfig, SignsConfig, validate
 from handsteer.dashboard.lesson import Lesson
 from handsteer.dashboard.lesson_node import LessonNode, OpenModels
+from handsteer.dashboard.lesson_state import LessonState
 from handsteer.dashboard.remote_graph import RemoteGraph
 from handsteer.errors import ConfigError, DatasetError
 from handsteer.graph import Graph
-from handsteer.recognition.custom_signs import label_for, load_custom_model, save_custom_model
+from handsteer.recognition.custom_signs import load_custom_model, save_custom_model
 from handsteer.recognition.hand import Classifier, Landmarker
 from handsteer.recognition.recognizer import open_classifier, open_landmarker
 from handsteer.training.custom.collect import Facts
 from handsteer.training.custom.dataset import Dataset, load_dataset, save_dataset
+from handsteer.training.custom.shared import load_shared, save_shared
 from handsteer.transports.base import Transport
-from handsteer.types import ACTIONS, NONE, SIGNS, Action, action_of, find_sign
+from handsteer.types import ACTIONS, NONE, Action, action_of, find_sign
+
+KEPT: Final = "Kept, and in use. End the lesson, then press Reset to drive."
+KEPT_TAKES: Final = "The takes are kept. Train to use them."
 
 _LONGEST_PERSON: Final = 40
-
-
-@dataclass(frozen=True)
-class LearntSign:
-    """A sign that was taught and saved.
-
-    Attributes:
-        label: The sign.
-        action: Its action; None for ``NONE``.
-        dataset: The file with its takes.
-        model: The file with the taught model, which is now in use.
-        yaml: The lines of a configuration file that make the change permanent.
-    """
-
-    label: str
-    action: Action | None
-    dataset: Path
-    model: Path
-    yaml: str
 
 
 @dataclass
 class _Current:
     viewer: str
     node: LessonNode
-    lost: tuple[str, ...]  # see Lessons.lost
-    takes_are_saved: bool = False
+    read: "_Version"
+
+
+_Version = tuple[int, int] | None
+"""Identifies the content of a file; None if there is none."""
 
 
 class Lessons:
     """Runs one lesson at a time on a running graph; thread-safe.
 
-    :meth:`known`, :meth:`begin` and :meth:`save` read and write files.
+    :meth:`begin`, :meth:`save`, :meth:`share` and :meth:`take_file` read and write files.
 
     Args:
         transport: Carries the graph's messages.
@@ -82,6 +69,7 @@ class Lessons:
         self._reconfigure = reconfigure
         self._lock = threading.RLock()
         self._current: _Current | None = None
+        self._draft: LessonState | None = None
         self._closed = False
 
     @classmethod
@@ -95,24 +83,34 @@ class Lessons:
         return cls(graph.transport, graph.clock, open_models, lambda: graph.config, graph.reconfigure)
 
     @property
-    def label(self) -> str | None:
-        """The sign that is being taught by any viewer; None if none is."""
-        current = self._current
-        return current.node.state.label if current else None
+    def is_running(self) -> bool:
+        """Whether any viewer teaches."""
+        return self._current is not None
+
+    @property
+    def draft(self) -> LessonState | None:
+        """The last lesson, if it ended with something that was not kept; it stays in memory."""
+        return self._draft
+
+    @property
+    def signs(self) -> SignsConfig:
+        """The running parameters of recognition."""
+        return self._config().signs
 
     @property
     def model_path(self) -> Path:
         """The file that the taught model is written to."""
         return self._config().signs.model or self._plan.model
 
-    def known(self) -> Dataset:
-        """Return the takes of earlier lessons.
+    @property
+    def dataset_path(self) -> Path:
+        """The file that takes are written to."""
+        return self._plan.dataset
 
-        Raises:
-            DatasetError: Their file is damaged.
-        """
-        path = self._plan.dataset.expanduser()
-        return load_dataset(path) if path.exists() else Dataset()
+    @property
+    def takes_wanted(self) -> int:
+        """Number of takes of a sign."""
+        return self._plan.takes
 
     def actions(self) -> tuple[Action, ...]:
         """Return the available actions."""
@@ -123,88 +121,103 @@ class Lessons:
         """Return the current or default action of the sign ``label``."""
         return action_of(label, self._config().control.actions)
 
-    def begin(self, viewer: str, name: str, person: str = "") -> None:
-        """Begin a lesson; a lesson abandoned by another viewer ends.
+    def begin(self, viewer: str, person: str = "", *, restore: bool = False) -> None:
+        """Begin a lesson on the takes of earlier ones; a lesson abandoned by another viewer ends.
 
         Args:
             viewer: The viewer who teaches.
-            name: The sign: taught before, new, or ``NONE`` for hands that are no sign.
-            person: The person who shows it; ``me`` by default.
+            person: The person who shows the signs; ``me`` by default.
+            restore: Whether to continue the last lesson, if it was not kept.
 
         Raises:
-            DatasetError: It is not a valid name, the name of a shipped sign, or the file of takes is damaged.
+            DatasetError: It is not a valid name, or the file of takes is damaged.
             ModelError: The file to be overwritten is not a model of taught signs.
         """
-        known = self.known()
-        label = label_for(name, known.labels)
-        if label in SIGNS:
-            raise DatasetError(f"{label} is known already: give the new sign a name of its own")
-        path = self.model_path.expanduser()
-        old = load_custom_model(path).labels if path.exists() else ()
-        lost = tuple(sign for sign in old if sign not in (*known.labels, label))
+        path = self._plan.dataset.expanduser()
+        read = _version(path)
+        dataset = load_dataset(path) if path.exists() else Dataset()
+        old = self.model_path.expanduser()
+        model = load_custom_model(old) if old.exists() else None
         when = f"{datetime.datetime.now():%Y-%m-%d %H:%M}"
-        lesson = Lesson(Facts(label, _person(person), when, "page"), self._plan)
-        node = LessonNode(
-            self._transport,
-            self._clock,
-            lesson=lesson,
-            known=known,
-            open_models=self._open_models,
-            signs=lambda: self._config().signs,
-        )
+        lesson = Lesson(dataset, self._plan, Facts(NONE, _person(person), when, "page"), model)
         with self._lock:
             self._end()
-            if not self._closed:
-                self._current = _Current(viewer, node, lost)
-                node.start()
+            if self._closed:
+                return
+            if restore and self._draft is not None:
+                lesson.restore(self._draft)
+            self._draft = None
+            node = LessonNode(self._transport, self._clock, lesson, self._open_models)
+            self._current = _Current(viewer, node, read)
+            node.start()
 
     def node(self, viewer: str) -> LessonNode | None:
         """Return the lesson of ``viewer``, if any."""
         current = self._current
         return current.node if current is not None and current.viewer == viewer else None
 
-    def lost(self) -> tuple[str, ...]:
-        """Return the signs of the current model that would be missing in this lesson's."""
-        current = self._current
-        return current.lost if current else ()
+    def save(self, viewer: str, actions: Mapping[str, str]) -> None:
+        """Save the takes, and the model if it was learnt from them, which the graph uses from then on.
 
-    def save(self, viewer: str, action: str) -> LearntSign | None:
-        """Save the takes and the taught model, let the graph use it, and end the lesson.
-
-        The robot obeys the sign as soon as it may move again.
+        The robot obeys the signs as soon as it may move again.
 
         Args:
             viewer: The viewer who teaches.
-            action: The sign's action.
-
-        Returns:
-            What was saved; None if ``viewer`` has no lesson, or nothing to save yet.
+            actions: The action of each sign.
 
         Raises:
-            ConfigError: The action does not exist, or the running nodes reject the sign.
-            DatasetError: The file of takes is damaged, or cannot be written.
+            ConfigError: An action does not exist, or the running nodes reject a sign.
+            DatasetError: The file of takes has changed, or cannot be written.
             ModelError: The model cannot be written.
         """
         with self._lock:
             current = self._current
-            if current is None or current.viewer != viewer or (model := current.node.state.model) is None:
-                return None
-            state = current.node.state
-            effect = next((each for each in self.actions() if each == action and state.label != NONE), None)
-            if effect is None and state.label != NONE:
-                raise ConfigError(f"{action!r} is no action: choose one of {', '.join(self.actions())}")
-            path = self.model_path
-            save_custom_model(model, path.expanduser())
-            if not current.takes_are_saved:
-                takes = [each.take for each in state.takes]
-                save_dataset(self.known().with_takes(takes), self._plan.dataset.expanduser())
-                current.takes_are_saved = True
-            self._reconfigure(with_sign(self._config(), path, state.label, effect))
-            self._end()
-            return LearntSign(state.label, effect, self._plan.dataset, path, self._yaml(path))
+            if current is None or current.viewer != viewer:
+                return
+            state, dataset = current.node.state, current.node.do(Lesson.dataset)
+            labels = [one.label for one in state.classes if one.label != NONE]
+            effects = {label: self._action(actions[label]) for label in labels if label in actions}
+            path = self._plan.dataset.expanduser()
+            if _version(path) != current.read:
+                raise DatasetError(f"{path} was changed by another program: end the lesson, and begin another")
+            message = KEPT_TAKES
+            if state.model is not None and (state.is_fresh or state.learnt_from is None):
+                if state.is_fresh:
+                    save_custom_model(state.model, self.model_path.expanduser())
+                removed = [one.label for one in state.kept if one.label not in labels]
+                self._reconfigure(with_signs(self._config(), self.model_path, effects, removed))
+                message = KEPT
+            save_dataset(dataset, path)
+            current.read = _version(path)
+            current.node.do(lambda lesson: lesson.mark_kept(message))
+
+    def share(self, viewer: str, path: Path) -> bool:
+        """Write the takes and the model of the lesson of ``viewer`` to ``path``; return whether there is a lesson.
+
+        Raises:
+            DatasetError: It cannot be written.
+        """
+        node = self.node(viewer)
+        if node is None:
+            return False
+        state = node.state
+        save_shared(path, node.do(Lesson.dataset), state.model if state.is_fresh else None)
+        return True
+
+    def take_file(self, viewer: str, path: Path) -> None:
+        """Add the takes and the model of an untrusted file to the lesson of ``viewer``, which shows any error."""
+        node = self.node(viewer)
+        if node is None:
+            return
+        try:
+            dataset, model = load_shared(path)
+            node.do(lambda lesson: lesson.add_dataset(dataset, model))
+        except DatasetError as error:
+            sentence = str(error).replace(str(path), "The file")
+            node.do(lambda lesson: lesson.say(f"{sentence[:1].upper()}{sentence[1:]}."))
 
     def end(self, viewer: str) -> None:
-        """End the lesson of ``viewer``, if any, without saving anything."""
+        """End the lesson of ``viewer``, if any; what was not kept can be restored until the next lesson."""
         with self._lock:
             if self.node(viewer) is not None:
                 self._end()
@@ -218,27 +231,43 @@ class Lessons:
     def _end(self) -> None:
         current, self._current = self._current, None
         if current is not None:
+            if current.node.state.is_changed:
+                self._draft = current.node.state
             # Off this thread, which may be the server's: a frame may be in progress.
             threading.Thread(target=current.node.stop, name="lesson_end", daemon=True).start()
 
-    def _yaml(self, model: Path) -> str:
-        actions = dict(self._config().control.actions)
-        content = {"signs": {"model": str(model)}, **({"control": {"actions": actions}} if actions else {})}
-        return yaml.safe_dump(content, sort_keys=False, allow_unicode=True)
+    def _action(self, name: str) -> Action:
+        found = next((each for each in self.actions() if each == name), None)
+        if found is None:
+            raise ConfigError(f"{name!r} is no action: choose one of {', '.join(self.actions())}")
+        return found
 
 
-def with_sign(config: Config, model: Path, label: str, action: Action | None) -> Config:
-    """Return ``config`` with another model of taught signs, and with the action of the sign ``label``, if any.
+def with_signs(config: Config, model: Path, actions: Mapping[str, Action], removed: Iterable[str] = ()) -> Config:
+    """Return ``config`` with another model of taught signs, their actions, and without those of ``removed`` signs.
 
     Raises:
-        ConfigError: ``label`` cannot have that action.
+        ConfigError: A sign cannot have its action.
     """
     control = config.control
-    if action is not None:
-        actions = {**control.actions, find_sign(label, control.actions) or label: action}
-        control = validate(ControlConfig, {**control.model_dump(exclude_unset=True), "actions": actions})
+    gone = {find_sign(label, control.actions) for label in removed}
+    wanted = {name: action for name, action in control.actions.items() if name not in gone}
+    for label, action in actions.items():
+        name = find_sign(label, wanted)
+        if name is not None or action != action_of(label, {}):
+            wanted[name or label] = action
+    if wanted != control.actions:
+        control = validate(ControlConfig, {**control.model_dump(exclude_unset=True), "actions": wanted})
     signs = config.signs.model_copy(update={"model": model})
     return config.model_copy(update={"signs": signs, "control": control})
+
+
+def _version(path: Path) -> _Version:
+    try:
+        status = path.stat()
+    except OSError:
+        return None
+    return status.st_mtime_ns, status.st_size
 
 
 def _person(name: str) -> str:

@@ -21,6 +21,7 @@ from handsteer.dashboard.access import HEADERS, Access, AccessMiddleware
 from handsteer.dashboard.audit import PageAudit
 from handsteer.dashboard.camera import FrameSocket, PictureNode, PictureResponse
 from handsteer.dashboard.drive_page import DrivePage
+from handsteer.dashboard.lesson_files import serve_lesson_files
 from handsteer.dashboard.lesson_page import LessonPage
 from handsteer.dashboard.lessons import Lessons
 from handsteer.dashboard.limits import Connections, UnconnectedPages, limit_log
@@ -230,6 +231,7 @@ def _application() -> FastAPI:
         await application.state.dashboard.webcam.serve(socket)
 
     serve_recordings(application, lambda: application.state.dashboard.context.recordings)
+    serve_lesson_files(application, lambda: application.state.dashboard.context.lessons)
     unconnected = UnconnectedPages()
 
     @ui.page("/")

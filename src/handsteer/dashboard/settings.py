@@ -65,6 +65,11 @@ class Settings:
         self._lock = threading.RLock()
 
     @property
+    def running(self) -> Config:
+        """The nodes' configuration."""
+        return self._running()
+
+    @property
     def is_saved(self) -> bool:
         """Whether the file contains the wanted parameters."""
         return self.wanted == self._saved
@@ -125,6 +130,36 @@ class Settings:
             self.revision += 1
             self._on_save(done)
             return done
+
+    def keep(self, values: Values) -> str:
+        """Write these values to the file, and change nothing else in it; return a sentence on what was done.
+
+        The file need not have been read before. Running and wanted parameters stay.
+
+        Raises:
+            ConfigError: The file cannot be read or written, or is invalid, or would be with these values.
+        """
+        with self._lock:
+            file = SettingsFile(self.file.path, is_read=self.file.path.exists())
+            before = changed(file.load()) if file.is_read else {}
+            config = loaded({**before, **values})
+            is_current = self.file.is_current
+            done = file.save(nested(changed(config)))
+            if is_current:
+                self.file.load()
+                self._saved = config
+            self.revision += 1
+            self._on_save(done)
+            return done
+
+    def in_file(self, field: Field) -> Any:
+        """Return the value in the file, or its default.
+
+        Raises:
+            ConfigError: The file cannot be read, or is invalid.
+        """
+        path = self.file.path
+        return field.value_in(SettingsFile(path, is_read=True).load() if path.exists() else Config())
 
     def load(self) -> None:
         """Adopt the parameters in the file as the wanted ones.
@@ -226,6 +261,11 @@ class SettingsFile:
     def is_read(self) -> bool:
         """Whether its parameters were read or saved."""
         return self._known is not None
+
+    @property
+    def is_current(self) -> bool:
+        """Whether nothing in the file is unknown: it is as it was read or saved, or does not exist."""
+        return self._content() == self._known
 
     def load(self) -> Config:
         """Return the parameters in the file, with defaults for the rest.

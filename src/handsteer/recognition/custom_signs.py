@@ -180,6 +180,14 @@ def save_custom_model(model: CustomModel, path: Path) -> None:
     Raises:
         ModelError: It cannot be written.
     """
+    try:
+        _FILE.write(path, model_arrays(model))
+    except OSError as error:
+        raise ModelError(f"cannot write the model of taught signs {path}: {error.strerror}") from None
+
+
+def model_arrays(model: CustomModel) -> Arrays:
+    """Return the arrays of the file of ``model``, without its format."""
     content = {
         "taught": np.array(model.labels),
         "depth": np.array(model.depth),
@@ -187,10 +195,7 @@ def save_custom_model(model: CustomModel, path: Path) -> None:
         "thresholds": model.thresholds,
         "trained_on": np.array(json.dumps(model.trained_on, sort_keys=True)),
     }
-    try:
-        _FILE.write(path, content | to_arrays(model.network, model.novelty))
-    except OSError as error:
-        raise ModelError(f"cannot write the model of taught signs {path}: {error.strerror}") from None
+    return content | to_arrays(model.network, model.novelty)
 
 
 def load_custom_model(path: Path) -> CustomModel:
@@ -202,12 +207,13 @@ def load_custom_model(path: Path) -> CustomModel:
     """
     arrays = _FILE.read(path)
     try:
-        return _built(arrays)
+        return model_from(arrays)
     except (KeyError, ValueError, TypeError, AttributeError, ArithmeticError, RecursionError, DatasetError) as error:
         raise _FILE.damaged(path, error) from None
 
 
-def _built(arrays: Arrays) -> CustomModel:
+def model_from(arrays: Arrays) -> CustomModel:
+    """Return the model of the arrays of an untrusted file; errors of many types are raised for damaged ones."""
     depth = _DEPTHS[str(arrays["depth"])]
     network, novelty = from_arrays(arrays, FEATURE_COUNTS[depth])
     labels = tuple(str(label) for label in arrays["taught"])

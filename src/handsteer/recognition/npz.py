@@ -46,15 +46,15 @@ class NpzFormat:
         self._missing = missing
         self._corrupt = corrupt
 
-    def read(self, path: Path) -> Arrays:
-        """Return the arrays of the file ``path``, of this kind and version.
+    def read(self, path: Path, most_bytes: int = LARGEST_BYTES) -> Arrays:
+        """Return the arrays of the file ``path``, of this kind and version, with at most ``most_bytes`` together.
 
         Raises:
             HandsteerError: It cannot be read, or is not such a file; ``missing`` or ``corrupt``.
         """
         try:
             with zipfile.ZipFile(path) as file:
-                _check_sizes(file)
+                _check_sizes(file, most_bytes)
                 arrays = {entry.filename.removesuffix(".npy"): _array(file, entry) for entry in file.infolist()}
         except OSError as error:
             reason = error.strerror or error
@@ -94,14 +94,14 @@ class _RefusedError(Exception):
     pass
 
 
-def _check_sizes(file: zipfile.ZipFile) -> None:
+def _check_sizes(file: zipfile.ZipFile, most_bytes: int) -> None:
     """Check the sizes in the directory of ``file``; no more than that is decompressed of any entry."""
     entries = file.infolist()
     if len(entries) > MOST_ARRAYS:
         raise _RefusedError(f"it has {len(entries)} arrays")
     size = sum(entry.file_size for entry in entries)
-    if size > LARGEST_BYTES:
-        raise _RefusedError(f"its arrays have {size / 1e6:.0f} MB, and should have at most {LARGEST_BYTES / 1e6:.0f}")
+    if size > most_bytes:
+        raise _RefusedError(f"its arrays have {size / 1e6:.0f} MB, and should have at most {most_bytes / 1e6:.0f}")
 
 
 def _array(file: zipfile.ZipFile, entry: zipfile.ZipInfo) -> NDArray[Any]:

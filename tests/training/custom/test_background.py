@@ -25,7 +25,7 @@ def test_a_process_of_its_own_learns_the_same_and_tells_how_far_it_is() -> None:
 
 
 def test_what_cannot_be_learnt_is_told() -> None:
-    with pytest.raises(TrainingError, match="too little data for Peace: 1 takes"):
+    with pytest.raises(TrainingError, match="too little data for Peace: 1 take"):
         BackgroundTraining(Dataset(PEACE.takes[:1])).run()
 
 

@@ -9,7 +9,7 @@ from handsteer.errors import TrainingError
 from handsteer.recognition.custom_signs import CustomClassifier, CustomModel
 from handsteer.recognition.hand import Hand
 from handsteer.recognition.shipped_signs import ShippedClassifier, load_model
-from handsteer.training.custom.dataset import Dataset, Take
+from handsteer.training.custom.dataset import Dataset, Take, typical_hand
 from handsteer.training.custom.report import TrainingReport
 from handsteer.training.custom.train import train_signs
 from handsteer.types import NONE, SIGNS
@@ -115,7 +115,7 @@ def test_landmarks_without_depth_are_learnt_from_the_image_and_sides_are_kept() 
     [
         (Dataset(), "there is no new sign to learn, only nothing at all"),
         (Dataset((take(NONE, "Go"), take("Stop"))), "there is no new sign to learn, only NONE, Stop"),
-        (Dataset((take("Hi", "Peace"),)), "too little data for Hi: 1 takes with 90 hands; at least 2 takes"),
+        (Dataset((take("Hi", "Peace"),)), "too little data for Hi: 1 take with 90 hands; at least 2 takes"),
         (
             Dataset((take("Hi", "Peace", hands=4), take("Hi", "Peace", hands=4))),
             "too little data for Hi: 2 takes with 8 hands; at least 2 takes with 10 hands",
@@ -136,6 +136,47 @@ def test_a_side_of_a_sign_that_is_not_there_is_refused() -> None:
 
 
 @pytest.mark.slow
-def test_signs_that_look_alike_are_refused() -> None:
-    with pytest.raises(TrainingError, match="looks like"):
-        train_signs(Dataset((*takes("Hi", "Peace", count=3), *takes("Ho", "Peace", count=3, seed=9))), SHIPPED)
+def test_what_can_be_learnt_is_learnt_and_the_rest_is_left_out_with_a_reason() -> None:
+    data = Dataset(
+        (
+            *takes("Hi", "Peace", count=3),
+            *takes("Ho", "Peace", count=3, seed=9),
+            *takes("Call", count=3, seed=20),
+            *takes("Wave", "Stop", count=2, seed=30),
+            take("Once", "Three"),
+            *takes("Old", "Four", count=2, seed=40),
+        ),
+        frozenset({"Old"}),
+    )
+    model, report = train_signs(data, SHIPPED)
+    left = {each.label: each.why for each in report.left_out}
+    assert set(model.labels) | set(left) == {"Hi", "Ho", "Call", "Wave", "Once", "Old"}
+    assert len({"Hi", "Ho"} & set(model.labels)) == 1
+    assert left["Old"] == "Old is disabled"
+    assert "looks like Stop" in left["Wave"]
+    assert left["Once"].startswith("too little data for Once: 1 take")
+    assert any(each.startswith(("Hi looks like Ho", "Ho looks like Hi")) for each in left.values())
+    assert report.as_dict()["left_out"] == left
+    classifier = CustomClassifier(SHIPPED, model)
+    assert told(classifier, shown("Call", 40)).count("Call") >= 38
+
+
+@pytest.mark.slow
+def test_takes_with_hands_that_are_not_recognised_are_named(learnt: Learnt) -> None:
+    wrong = take("Call", "Peace", hands=30, seed=70)
+    data = Dataset((*takes("Peace"), *takes("Call", seed=20), wrong))
+    _, report = train_signs(data, SHIPPED)
+    worst = report.mistakes[0]
+    assert (worst.take, worst.shown) == (10, "Call")
+    assert worst.seen in ("Peace", NONE)
+    assert 0 <= worst.hand < 30
+    assert sum(each.hands.count for each in report.mistakes if each.take == 10) > 30
+    assert all(each.hands.count <= 0.2 * each.hands.of for each in learnt[1].mistakes)
+
+
+def test_the_typical_hand_is_none_of_the_odd_ones() -> None:
+    random = np.random.default_rng(5)
+    hands = [shaken("Peace", random) for _ in range(9)]
+    assert typical_hand([shaken("Stop", random), *hands, shaken("Go", random)]) in range(1, 10)
+    mixed = [hands[0], *(other_hand(hand) for hand in hands[1:])]
+    assert typical_hand(mixed) == typical_hand(hands)

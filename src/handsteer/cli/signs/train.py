@@ -96,7 +96,9 @@ def train(
     from handsteer.training.custom.train import train_signs
 
     check_writable("--output", output, TrainingError)
-    takes = [take for path in datasets or (_DATASET,) for take in load_dataset(path).takes]
+    parts = [load_dataset(path) for path in datasets or (_DATASET,)]
+    takes = tuple(take for part in parts for take in part.takes)
+    dataset = Dataset(takes, frozenset().union(*(part.disabled for part in parts)))
     with tqdm(unit=" steps", file=sys.stderr, disable=not sys.stderr.isatty()) as bar:
 
         def progress(done: int, of: int) -> None:
@@ -104,9 +106,11 @@ def train(
             bar.update(done - bar.n)
 
         shipped = open_classifier(SignsConfig())
-        model, report = train_signs(Dataset(tuple(takes)), shipped, sided=tuple(sided or ()), progress=progress)
+        model, report = train_signs(dataset, shipped, sided=tuple(sided or ()), progress=progress)
     save_custom_model(model, output)
     print(json_format.dumps({"model": str(output), **report.as_dict()}) if json else teaching_tables(report))
+    for each in report.left_out:
+        say(f"left out: {each.why}")
     for sign in report.signs:
         if sign.recall is not None and (sign.recall.rate or 0) < _LOW_RECALL:
             say(f"{sign.summary.label} is recognised poorly: collect more takes, in every way you will show it")

@@ -121,6 +121,12 @@ class Collector:
         """Collect one more take, to replace a deleted one."""
         self._left += 1
 
+    def finish(self) -> Status:
+        """End the current take now, or the countdown before it, and collect no more."""
+        status = self._end(self._elapsed_s) if self._recording else Status("done", 0.0, 0)
+        self._left = 0
+        return status
+
     def _record(self, hand: Hand | None) -> Status:
         if hand is not None:
             self._hands.append(hand)

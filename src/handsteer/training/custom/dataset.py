@@ -1,7 +1,7 @@
 """The dataset file for teaching signs: raw landmarks with labels and persons, described in ``docs/dataset.md``."""
 
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from pathlib import Path
@@ -72,9 +72,15 @@ class Take:
 
 @dataclass(frozen=True)
 class Dataset:
-    """Takes in the order in which they were added."""
+    """Takes in the order in which they were added.
+
+    Attributes:
+        takes: The takes.
+        disabled: Labels of signs that are not to be learnt; their takes are kept.
+    """
 
     takes: tuple[Take, ...] = ()
+    disabled: frozenset[str] = frozenset()
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -87,7 +93,7 @@ class Dataset:
 
     def with_takes(self, takes: Iterable[Take]) -> "Dataset":
         """Return this dataset with ``takes`` added."""
-        return Dataset((*self.takes, *takes))
+        return Dataset((*self.takes, *takes), self.disabled)
 
     def without_last(self) -> "Dataset":
         """Return this dataset without its last take.
@@ -97,7 +103,7 @@ class Dataset:
         """
         if not self.takes:
             raise DatasetError("there is no take to undo")
-        return Dataset(self.takes[:-1])
+        return Dataset(self.takes[:-1], self.disabled)
 
 
 def load_dataset(path: Path) -> Dataset:
@@ -108,7 +114,7 @@ def load_dataset(path: Path) -> Dataset:
     """
     arrays = _FILE.read(path)
     try:
-        return Dataset(tuple(_takes(arrays)))
+        return dataset_from(arrays)
     except (KeyError, ValueError, TypeError, IndexError, ArithmeticError, RecursionError, DatasetError) as error:
         raise _FILE.damaged(path, error) from None
 
@@ -119,9 +125,18 @@ def save_dataset(dataset: Dataset, path: Path) -> None:
     Raises:
         DatasetError: It cannot be written.
     """
+    try:
+        _FILE.write(path, dataset_arrays(dataset))
+    except OSError as error:
+        raise DatasetError(f"cannot write the dataset {path}: {error.strerror}") from None
+
+
+def dataset_arrays(dataset: Dataset) -> Arrays:
+    """Return the arrays of the file of ``dataset``, without its format."""
     hands = [hand for take in dataset.takes for hand in take.hands]
     facts = [{name: getattr(take, name) for name in _FACTS} for take in dataset.takes]
-    arrays = {
+    disabled = {"disabled": np.array(sorted(dataset.disabled))} if dataset.disabled else {}
+    return disabled | {
         "takes": np.array(json.dumps(facts, ensure_ascii=False)),
         "take": np.repeat(np.arange(len(facts)), [len(take.hands) for take in dataset.takes]).astype(np.int32),
         "time_s": np.array([time_s for take in dataset.takes for time_s in take.times_s], np.float32),
@@ -132,10 +147,29 @@ def save_dataset(dataset: Dataset, path: Path) -> None:
         "presence": np.array([hand.presence for hand in hands], np.float32),
         "image_size": np.array([hand.image_size for hand in hands], np.int32).reshape(-1, 2),
     }
-    try:
-        _FILE.write(path, arrays)
-    except OSError as error:
-        raise DatasetError(f"cannot write the dataset {path}: {error.strerror}") from None
+
+
+def dataset_from(arrays: Arrays) -> Dataset:
+    """Return the dataset of the arrays of an untrusted file; errors of many types are raised for damaged ones."""
+    disabled = frozenset(str(label) for label in arrays.get("disabled", ()))
+    if any(label_for(label) != label for label in disabled):
+        raise ValueError("a disabled sign is not named as signs are")
+    return Dataset(tuple(_takes(arrays)), disabled)
+
+
+def typical_hand(hands: Sequence[Hand], *, sided: bool = False) -> int:
+    """Return the index of the hand of ``hands`` that is nearest to their mean shape in the image.
+
+    Args:
+        hands: At least one.
+        sided: Whether left hands are to be compared as they are, instead of mirrored.
+    """
+    points = np.array([hand.pixels[:, :2] for hand in hands], np.float64)
+    if not sided:
+        points[[hand.handedness == "Left" for hand in hands], :, 0] *= -1
+    points -= points.mean(axis=1, keepdims=True)
+    points /= np.maximum(np.linalg.norm(points, axis=(1, 2), keepdims=True), 1e-9)
+    return int(np.linalg.norm(points - points.mean(axis=0), axis=(1, 2)).argmin())
 
 
 def _stacked(points: list[NDArray[np.float32]]) -> NDArray[np.float32]:

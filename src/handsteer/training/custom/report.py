@@ -40,14 +40,26 @@ def custom_labels(dataset: Dataset, sided: Sequence[str]) -> tuple[str, ...]:
     return labels
 
 
-def check_enough(dataset: Dataset, labels: Sequence[str]) -> None:
-    """Raise TrainingError unless there are enough takes and hands of each of ``labels``."""
-    for summary in summarise(dataset):
-        if summary.label in labels and (summary.takes < _LEAST_TAKES or summary.rows < _LEAST_ROWS):
-            raise TrainingError(
-                f"too little data for {summary.label}: {summary.takes} takes with {summary.rows} hands; at least "
-                f"{_LEAST_TAKES} takes with {_LEAST_ROWS} hands are needed; five takes of 3 s are good"
-            )
+@dataclass(frozen=True)
+class LeftOut:
+    """A sign that was not learnt, and why, as a sentence without a full stop."""
+
+    label: str
+    why: str
+
+
+def too_small(dataset: Dataset, labels: Sequence[str]) -> tuple[LeftOut, ...]:
+    """Return which of ``labels`` have too few takes or hands to be learnt."""
+    return tuple(
+        LeftOut(
+            summary.label,
+            f"too little data for {summary.label}: {summary.takes} {'take' if summary.takes == 1 else 'takes'} with "
+            f"{summary.rows} hands; at least "
+            f"{_LEAST_TAKES} takes with {_LEAST_ROWS} hands are needed; five takes of 3 s are good",
+        )
+        for summary in summarise(dataset)
+        if summary.label in labels and (summary.takes < _LEAST_TAKES or summary.rows < _LEAST_ROWS)
+    )
 
 
 @dataclass(frozen=True)
@@ -73,32 +85,40 @@ def lookalikes(dataset: Dataset, labels: Sequence[str], shipped: Classifier) -> 
     return tuple(found)
 
 
-def check_not_known(found: Sequence[Lookalike]) -> None:
-    """Raise TrainingError if a new sign is often recognised as a known one."""
-    for each in found:
-        share = each.hands.rate or 0.0
-        if share > _KNOWN_SHARE:
-            raise TrainingError(
-                f"{each.label} looks like {each.sign}: {share:.0%} of its hands are recognised as that already; "
-                f"teach another shape, or give {each.sign} another action"
-            )
+def too_known(found: Sequence[Lookalike]) -> tuple[LeftOut, ...]:
+    """Return the new signs that are often recognised as a known one."""
+    return tuple(
+        LeftOut(
+            each.label,
+            f"{each.label} looks like {each.sign}: {share:.0%} of its hands are recognised as that already; "
+            f"teach another shape, or give {each.sign} another action",
+        )
+        for each in found
+        for share in [each.hands.rate or 0.0]
+        if share > _KNOWN_SHARE
+    )
 
 
-def check_distinguished(likeliest: Confusion) -> None:
-    """Raise TrainingError if a sign is often confused with another.
+def most_confused(likeliest: Confusion) -> LeftOut | None:
+    """Return the sign that is most often confused with another, if that is too often.
 
     ``likeliest`` has the likeliest signs of held-out hands, regardless of thresholds.
     """
     *labels, _ = likeliest.labels
-    for row, label in enumerate(labels):
-        shown = sum(likeliest.counts[row])
-        for column, other in enumerate(labels):
-            share = likeliest.counts[row][column] / shown if shown else 0.0
-            if row != column and share > _CONFUSED_SHARE:
-                raise TrainingError(
-                    f"{label} looks like {other}: {share:.0%} of its held-out hands look more like that; "
-                    f"teach shapes that differ more, or name both by --sided if one is the mirror image of the other"
-                )
+    shares: list[tuple[float, str, str]] = [
+        (count / sum(row), label, other)
+        for label, row in zip(labels, likeliest.counts, strict=False)
+        for other, count in zip(labels, row, strict=False)
+        if label != other and sum(row) > 0
+    ]
+    share, label, other = max(shares, default=(0.0, "", ""), key=lambda each: each[0])
+    if share <= _CONFUSED_SHARE:
+        return None
+    why = (
+        f"{label} looks like {other}: {share:.0%} of its held-out hands look more like that; "
+        f"teach shapes that differ more, or name both by --sided if one is the mirror image of the other"
+    )
+    return LeftOut(label, why)
 
 
 @dataclass(frozen=True)
@@ -167,6 +187,25 @@ class CustomSignFigures:
 
 
 @dataclass(frozen=True)
+class Mistake:
+    """Held-out hands of one take that were recognised as another sign, or as none.
+
+    Attributes:
+        take: Index of the take in the dataset.
+        hand: Index of one of these hands in the take.
+        shown: The sign of the take.
+        seen: The recognised sign.
+        hands: How many of the take's hands; each counts once as shown, and once mirrored unless the sign is sided.
+    """
+
+    take: int
+    hand: int
+    shown: str
+    seen: str
+    hands: Share
+
+
+@dataclass(frozen=True)
 class TrainingReport:
     """How well the signs were learnt.
 
@@ -176,6 +215,8 @@ class TrainingReport:
         confusion: Held-out rows, both hands, by true and recognised sign.
         made: Of synthetic hands of all shapes, how many are recognised as one of the signs; some truly show it.
         known: Hands of the takes that are recognised as a shipped sign, which overrides the taught one.
+        left_out: Signs of the dataset that were not learnt.
+        mistakes: The takes with hands that were not recognised, the worst first.
     """
 
     signs: tuple[CustomSignFigures, ...]
@@ -183,6 +224,8 @@ class TrainingReport:
     confusion: Confusion
     made: Share
     known: tuple[Lookalike, ...] = ()
+    left_out: tuple[LeftOut, ...] = ()
+    mistakes: tuple[Mistake, ...] = ()
 
     def as_dict(self) -> dict[str, Any]:
         """Return the figures as plain values, for JSON."""
@@ -192,6 +235,7 @@ class TrainingReport:
             "confusion": self.confusion.as_dict(),
             "made_hands": self.made.as_dict(),
             "known": [{"sign": each.label, "told": each.sign, **each.hands.as_dict()} for each in self.known],
+            "left_out": {each.label: each.why for each in self.left_out},
         }
 
 
@@ -217,11 +261,16 @@ def mistakes(report: TrainingReport) -> list[str]:
         if count and shown != seen
     ]
     found += [
-        (hands.rate or 0.0, f"{each.label} is mistaken for {each.sign} {hands.count} of {hands.of} times")
-        for each in report.known
-        for hands in [each.hands]
+        (each.hands.rate or 0.0, words) for each, words in zip(report.known, lookalike_words(report), strict=True)
     ]
     return [words for _, words in sorted(found, key=lambda item: -item[0])]
+
+
+def lookalike_words(report: TrainingReport) -> list[str]:
+    """Return which taught signs are recognised as shipped ones, and how often."""
+    return [
+        f"{each.label} is mistaken for {each.sign} {each.hands.count} of {each.hands.of} times" for each in report.known
+    ]
 
 
 def _sign(seen: str) -> str:

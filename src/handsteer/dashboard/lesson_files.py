@@ -1,0 +1,108 @@
+"""Files of a lesson: what a browser downloads and uploads."""
+
+import asyncio
+import tempfile
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from pathlib import Path
+from typing import BinaryIO, Final
+
+from fastapi import FastAPI
+from starlette.background import BackgroundTask
+from starlette.requests import ClientDisconnect, Request
+from starlette.responses import FileResponse, PlainTextResponse, Response, StreamingResponse
+
+from handsteer.dashboard.lesson import Lesson
+from handsteer.dashboard.lessons import Lessons
+from handsteer.dashboard.socket_events import is_page_of
+from handsteer.training.custom.shared import LARGEST_SHARED_BYTES, takes_as_csv
+
+LESSON_PATH: Final = "/lesson"
+_UPLOAD_TIMEOUT_S: Final = 120.0
+_TOO_LARGE: Final = f"The file is too large: a file of taught signs has at most {LARGEST_SHARED_BYTES // 1_000_000} MB."
+
+
+def serve_lesson_files(application: FastAPI, lessons: Callable[[], Lessons | None]) -> None:
+    """Serve the files of the lesson of ``lessons``, each only to the browser of the viewer who teaches."""
+    uploading = threading.Lock()
+
+    def teaching(viewer: str, request: Request) -> Lessons | None:
+        current = lessons()
+        is_taught = current is not None and is_page_of(viewer, request.scope) and current.node(viewer) is not None
+        return current if is_taught else None
+
+    @application.get(f"{LESSON_PATH}/signs.npz")
+    def signs(request: Request, viewer: str = "") -> Response:
+        current = teaching(viewer, request)
+        return _missing() if current is None else _shared(current, viewer)
+
+    @application.get(f"{LESSON_PATH}/takes.csv")
+    def takes(request: Request, viewer: str = "") -> Response:
+        current = teaching(viewer, request)
+        node = current.node(viewer) if current is not None else None
+        if node is None:
+            return _missing()
+        headers = {"Content-Disposition": 'attachment; filename="takes.csv"'}
+        return StreamingResponse(
+            _encoded(takes_as_csv(node.do(Lesson.dataset))), media_type="text/csv", headers=headers
+        )
+
+    @application.post(f"{LESSON_PATH}/signs")
+    async def upload(request: Request, viewer: str = "") -> Response:
+        current = teaching(viewer, request)
+        if current is None:
+            return _missing()
+        if not uploading.acquire(blocking=False):
+            return PlainTextResponse("another file is being uploaded", 409)
+        try:
+            return await _receive(current, viewer, request)
+        finally:
+            uploading.release()
+
+
+async def _receive(lessons: Lessons, viewer: str, request: Request) -> Response:
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "signs.npz"
+        with path.open("wb") as file, suppress(TimeoutError, ClientDisconnect):
+            async with asyncio.timeout(_UPLOAD_TIMEOUT_S):
+                if not await _write(request, file):
+                    node = lessons.node(viewer)
+                    if node is not None:
+                        node.do(lambda lesson: lesson.say(_TOO_LARGE))
+                    return PlainTextResponse(_TOO_LARGE, 413)
+        await asyncio.to_thread(lessons.take_file, viewer, path)
+    return Response(status_code=204)
+
+
+async def _write(request: Request, file: BinaryIO) -> bool:
+    """Write the body of ``request`` to ``file``; return whether it is small enough."""
+    size = 0
+    async for part in request.stream():
+        size += len(part)
+        if size > LARGEST_SHARED_BYTES:
+            return False
+        file.write(part)
+    return True
+
+
+def _shared(lessons: Lessons, viewer: str) -> Response:
+    folder = tempfile.TemporaryDirectory()
+    path = Path(folder.name) / "signs.npz"
+    if not lessons.share(viewer, path):
+        folder.cleanup()
+        return _missing()
+    return FileResponse(
+        path,
+        media_type="application/octet-stream",
+        filename="handsteer-signs.npz",
+        background=BackgroundTask(folder.cleanup),
+    )
+
+
+def _encoded(lines: Iterator[str]) -> Iterator[bytes]:
+    return (line.encode() for line in lines)
+
+
+def _missing() -> Response:
+    return PlainTextResponse("there is no such lesson", 404)
