@@ -35,12 +35,12 @@ def test_shows_what_is_seen_and_what_the_robot_does(visit: Visit) -> None:
 @pytest.mark.parametrize("visit", ["NONE:600"], indirect=True)
 def test_drives_while_the_pad_is_held_and_stops_when_it_is_let_go(visit: Visit) -> None:
     robot = visit.graph.robot
-    visit.wait_until(lambda: visit.text(".banner .reason") == "no hand is in view")
+    visit.wait_until(lambda: visit.text(".banner .reason") == "No hand is in view")
     pad = visit.page.locator(".pad")
     pad.focus()
     visit.page.keyboard.down("ArrowUp")
     visit.wait_until(lambda: robot.state.linear_mps > 0.2)
-    visit.wait_until(lambda: visit.text(".banner .reason") == "steered by hand")
+    visit.wait_until(lambda: visit.text(".banner .reason") == "Steered by hand")
     visit.page.keyboard.up("ArrowUp")
     visit.wait_until(lambda: robot.state.linear_mps == pytest.approx(0, abs=0.01))
 
@@ -73,7 +73,7 @@ def test_stop_holds_until_it_is_reset_and_a_reset_alone_moves_nothing(visit: Vis
     assert robot.state.linear_mps == pytest.approx(0, abs=0.01)
 
     page.get_by_role("button", name="Reset").click()
-    visit.wait_until(lambda: "moves once Stop is shown" in visit.text(".banner .reason"))
+    visit.wait_until(lambda: "how Stop or lower your hand" in visit.text(".banner .reason"))
     page.wait_for_timeout(500)
     assert robot.state.linear_mps == pytest.approx(0, abs=0.01)
     assert visit.troubles == []

@@ -111,7 +111,7 @@ def drive(visit: Visit) -> None:
     page.locator(".banner .headline", has_text="Standing").wait_for()
     # A webcam that has left shows nothing, not even that no hand is there: the robot's own camera does.
     page.get_by_role("button", name="Use the robot's camera").click()
-    visit.wait_until(lambda: "no hand" in visit.text(".banner") and "disarmed" not in visit.text(".banner"))
+    visit.wait_until(lambda: "No hand" in visit.text(".banner") and "Ready" not in visit.text(".banner"))
     page.get_by_role("button", name="Use this device's camera").click()
     visit.wait_until(lambda: visit.text(".camera .sign") == "Two")
     visit.wait_until(lambda: robot.state.angular_radps > 0.2)

@@ -109,7 +109,7 @@ def test_a_slider_drives_until_it_is_at_zero_or_the_page_is_left(visit: Visit) -
     set_slider(visit)
     page.keyboard.press("Space")
     visit.wait_until(lambda: visit.text(".banner .headline") == "Stopped" and slider(page) == 0)
-    assert visit.text(".banner .reason") == "stopped by you, until you reset it"
+    assert visit.text(".banner .reason") == "Stopped by you, until you reset it"
     assert page.get_by_role("button", name=FASTER).is_disabled()
     visit.wait_until(lambda: stands(visit))
     assert visit.troubles == []
@@ -177,7 +177,7 @@ def test_another_topic_is_steered_past_the_control_and_stops_as_well() -> None:
             visit.wait_until(lambda: "is no topic's name" in visit.text(".steer .trouble"))
             choose(visit, topic.name)
             visit.wait_until(lambda: "Past the control" in visit.text(".topic-words"))
-            reason = f"steered by hand, straight on {topic.name}"
+            reason = f"Steered by hand, straight on {topic.name}"
             visit.wait_until(lambda: steered(visit) and visit.text(".banner .reason") == reason)
             visit.wait_until(lambda: steered(visit) and speed(visit) > 0.02)
             visit.page.keyboard.press("Space")

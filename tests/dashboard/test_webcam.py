@@ -74,7 +74,7 @@ def wait_for_words(page: Page, selector: str, words: str) -> None:
 
 def test_the_browsers_webcam_drives_until_its_page_is_closed(graph: Graph, url: str, browser: Browser) -> None:
     page = show(browser, url)
-    wait_for_words(page, ".banner", "no hand is in view")
+    wait_for_words(page, ".banner", "No hand is in view")
     page.get_by_text("Use this device's camera").click()
     wait_for_words(page, ".camera .sign", "Forward")
     wait_for_words(page, ".source", "browser's camera")
@@ -87,9 +87,9 @@ def test_the_browsers_webcam_drives_until_its_page_is_closed(graph: Graph, url: 
     wait_until_stands(graph)
     # The robot's own camera does not come back by itself, whatever it sees.
     assert graph.cameras.source == "browser"
-    wait_for_words(second, ".banner", "no frame")
+    wait_for_words(second, ".banner", "No frame")
     second.get_by_text("Use the robot's camera").click()
-    wait_for_words(second, ".banner", "no hand seen for")
+    wait_for_words(second, ".banner", "No hand seen for")
 
 
 def wait_until_stands(graph: Graph) -> None:

@@ -41,7 +41,7 @@ gates:
 def looking_at(world: object) -> Iterator[Visit]:
     """Show the page with ``world``."""
     with visiting("NONE:600", steering=True, robot={"world": str(world)}) as visit:
-        visit.wait_until(lambda: visit.text(".banner .reason") == "no hand is in view")
+        visit.wait_until(lambda: visit.text(".banner .reason") == "No hand is in view")
         yield visit
 
 

@@ -64,6 +64,11 @@ def button(words: str, on_click: Callable[[], object] | None = None, label: str 
     return element.on("click", on_click) if on_click else element
 
 
+def sentence(words: str) -> str:
+    """Return ``words`` with a capital at the start."""
+    return words[:1].upper() + words[1:]
+
+
 def switch(element: ui.element, name: str, *, on: bool) -> None:
     """Add the class ``name`` to ``element``, or remove it."""
     element.classes(add=name if on else "", remove="" if on else name)
@@ -133,7 +138,7 @@ class Banner:
     def update(self, state: PageState) -> None:
         """Show ``state``."""
         self._headline.set_text(state.headline)
-        self._reason.set_text(state.reason)
+        self._reason.set_text(sentence(state.reason))
         self._spoken.set_text(spoken(state))
         self._warning.set_text("; ".join(state.warnings))
         switch(self._warning, "hidden", on=not state.warnings)

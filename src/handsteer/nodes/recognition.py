@@ -31,7 +31,7 @@ from handsteer.messages import (
 from handsteer.nodes.base import Node
 from handsteer.nodes.status import RecognitionStatus
 from handsteer.nodes.supervision import StopKeeper
-from handsteer.nodes.timing import CALM_S, FrameAge, LatencyLog, Recording, StallGuard
+from handsteer.nodes.timing import CALM_S, TOO_SLOW, FrameAge, LatencyLog, Recording, StallGuard
 from handsteer.recognition.hand import Classifier
 from handsteer.recognition.hand_joystick import HandJoystick
 from handsteer.recognition.recognizer import Recognition, Recognizer
@@ -99,7 +99,7 @@ class HandSignRecognitionNode(Node):
         self._last_frame_s = clock.now()
         self._last_sign_s = clock.now()
         self._last_hand_s: float | None = None
-        self._age = FrameAge(config.max_frame_age)
+        self._age = FrameAge(config.max_frame_age, one_clock=transport.is_one_machine)
         self._freshness = Freshness(config.max_frame_age)
         self._stall_guard = StallGuard(config.max_frame_age, clock.now())
         self._recording = Recording(config.recorded, config.max_frame_age)
@@ -218,7 +218,7 @@ class HandSignRecognitionNode(Node):
             return None
         self._recognizer.reset()
         self._joystick.reset()
-        return f"a frame was {age_s:.1f} s old when its sign was known: was this process stalled?"
+        return f"{TOO_SLOW}: a picture was {age_s:.1f} s old when its sign was known"
 
     def _take_images(self) -> Subscription:
         if self._compressed:
