@@ -73,7 +73,7 @@ def test_a_sign_is_taught_from_the_browsers_webcam_and_drives(
 
 def teach(visit: Visit) -> None:
     page = visit.page
-    page.get_by_role("button", name="Use this device's camera").click()
+    page.get_by_role("button", name="Use my camera").click()
     begin(visit, "Two")
     press(visit, "Record")
     page.locator(".countdown").wait_for()
@@ -112,7 +112,7 @@ def drive(visit: Visit) -> None:
     # A webcam that has left shows nothing, not even that no hand is there: the robot's own camera does.
     page.get_by_role("button", name="Use the robot's camera").click()
     visit.wait_until(lambda: "No hand" in visit.text(".banner") and "Ready" not in visit.text(".banner"))
-    page.get_by_role("button", name="Use this device's camera").click()
+    page.get_by_role("button", name="Use my camera").click()
     visit.wait_until(lambda: visit.text(".camera .sign") == "Two")
     visit.wait_until(lambda: robot.state.angular_radps > 0.2)
 

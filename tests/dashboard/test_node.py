@@ -307,6 +307,20 @@ def test_who_has_just_let_go_is_who_steered_until_the_control_has_noticed(bench:
     assert bench.node.state("me").viewers.steered == ""
 
 
+def test_a_page_of_the_drivers_own_browser_gets_the_seat_at_once() -> None:
+    bench = Bench()
+    audit = PageAudit(bench.transport, bench.clock)
+    bench.node = DashboardNode(bench.transport, bench.clock, bench.steering, audit=audit)
+    for page, session in (("drive", "one"), ("settings", "one"), ("other", "two")):
+        audit.introduce(page, session, "192.0.2.7")
+    bench.node.ask_to_drive("drive")
+    bench.node.ask_to_drive("other")
+    assert bench.node.lease.driver == "drive"
+    bench.node.lease.answer("drive", hand_over=False)
+    bench.node.ask_to_drive("settings")
+    assert bench.node.lease.driver == "settings"
+
+
 def test_who_pressed_stop_on_another_page_of_the_same_browser_is_you() -> None:
     bench = Bench()
     audit = PageAudit(bench.transport, bench.clock)

@@ -191,6 +191,14 @@ class DashboardNode(Node):
                 self._steering.reset()
             self._audit.say("reset_pressed", viewer, "pressed Reset")
 
+    def ask_to_drive(self, viewer: str) -> None:
+        """Request the control lease; a page of the driver's own browser gets it at once."""
+        self.lease.ask(viewer, self.clock.now())
+        driver = self.lease.driver
+        is_own = driver is not None and self._audit.person_of(driver) == self._audit.person_of(viewer)
+        if driver is not None and is_own and self.lease.status_of(viewer, self.clock.now()).asked:
+            self.lease.answer(driver, hand_over=True)
+
     def leave(self, viewer: str) -> None:
         """Stop if ``viewer`` is steering, and release its lease."""
         self.release(viewer)
