@@ -84,6 +84,7 @@ def test_whoever_watches_may_stop_but_only_the_driver_resets(visit: Visit) -> No
     first, second = visit.page, visit.another_page()
     first.locator(".lease .role", has_text="you drive").wait_for()
     second.goto(first.url)
+    second.locator(".lease .role", has_text="another viewer drives").wait_for()
     second.get_by_role("button", name="Stop the robot").click()
     for page in (first, second):
         page.locator(".banner .headline", has_text="Stopped").wait_for()

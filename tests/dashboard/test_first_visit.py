@@ -2,7 +2,7 @@ from dataclasses import replace
 
 import pytest
 
-from handsteer.dashboard.first_visit import refusal, steps_done
+from handsteer.dashboard.first_visit import NOT_BEGUN, refusal, steps_done
 from handsteer.dashboard.state import Observed, compose
 from handsteer.types import Velocity
 
@@ -18,6 +18,12 @@ def test_a_step_is_ticked_by_what_happens_and_only_in_order() -> None:
     assert [steps_done(1, state) for state in (seen, stands, drives)] == [1, 1, 2]
     assert [steps_done(2, state) for state in (drives, stopping, stands)] == [2, 2, 3]
     assert steps_done(3, stands) == 3
+
+
+def test_what_the_demo_hand_has_just_shown_is_no_step() -> None:
+    shown = replace(IDLE, seen="Forward")
+    drives = replace(IDLE, seen="Go", driver="signs", mood="driving")
+    assert [steps_done(NOT_BEGUN, state) for state in (shown, drives, IDLE)] == [NOT_BEGUN, NOT_BEGUN, 0]
 
 
 def test_what_was_steered_by_hand_is_not_a_step_by_signs() -> None:

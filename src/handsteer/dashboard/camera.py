@@ -19,7 +19,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from handsteer.clock import Clock
 from handsteer.dashboard.first_visit import DEMO_CAMERA, CameraOffer, Coach
 from handsteer.dashboard.legend import DRAWN
-from handsteer.dashboard.page import PICTURE_PATH, Page, box, switch, text
+from handsteer.dashboard.page import PICTURE_PATH, Page, box, sentence, switch, text
 from handsteer.dashboard.remote_graph import RemoteGraph
 from handsteer.dashboard.socket_events import is_page_of
 from handsteer.dashboard.state import PageState
@@ -236,7 +236,7 @@ class CameraPanel:
         percent = round(100 * state.confidence) if state.seen != NONE else 0
         self._percent.set_text(f"{percent} %" if percent else "")
         self._confidence.style(f"width: {percent}%")
-        self._no_picture.set_text(state.no_picture)
+        self._no_picture.set_text(sentence(state.no_picture))
         switch(self._veil, "off", on=not state.no_picture)
         self._caption.set_text("demo hand" if state.camera == DEMO_CAMERA else "as in a mirror")
         if self._offer is not None:

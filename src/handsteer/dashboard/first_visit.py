@@ -88,14 +88,19 @@ _STEPS: Final = (
 _DONE: Final = "You can drive. The page lists all signs below."
 
 
+NOT_BEGUN: Final = -1
+"""Until neutral is seen: what the robot does may still be the demo hand's."""
+
+
 def steps_done(done: int, state: PageState) -> int:
-    """Return how many of the three steps are done in ``state``, after ``done`` of them."""
-    has_happened = (
+    """Return how many of the three steps are done in ``state``, after ``done`` of them or :data:`NOT_BEGUN`."""
+    happens = (
+        state.seen != FORWARD and state.mood != "driving",
         state.seen == FORWARD,
         state.driver == "signs" and state.mood == "driving" and not state.measured.is_rest,
         state.sign == STOP and state.measured.is_rest,
     )
-    return done + 1 if done < len(has_happened) and has_happened[done] else done
+    return done + 1 if done < len(_STEPS) and happens[done + 1] else done
 
 
 class Coach:
@@ -103,7 +108,7 @@ class Coach:
 
     def __init__(self, page: Page) -> None:
         self._page = page
-        self._done = 0
+        self._done = NOT_BEGUN
         self._steps: list[ui.element] = []
         with box("coach") as self._box:
             with ui.element("ol"):
@@ -118,9 +123,11 @@ class Coach:
 
     def update(self, state: PageState, *, is_driver: bool) -> None:
         """Show ``state``, and tick what has been done."""
-        is_live = is_driver and not state.no_picture and state.camera != DEMO_CAMERA and not state.is_joystick
+        is_live = is_driver and state.camera not in ("", DEMO_CAMERA) and not state.is_joystick
         switch(self._box, "off", on=not is_live)
-        done = steps_done(self._done, state) if is_live else self._done
+        if self._done == len(_STEPS):
+            return
+        done = steps_done(self._done, state) if is_live else NOT_BEGUN
         if done == self._done:
             return
         self._done = done
@@ -132,5 +139,5 @@ class Coach:
     def _mark(self) -> None:
         for number, step in enumerate(self._steps):
             switch(step, "done", on=number < self._done)
-            is_next = number == self._done
+            is_next = number == max(0, self._done)
             step.props('aria-current="step"' if is_next else "", remove="" if is_next else "aria-current")
