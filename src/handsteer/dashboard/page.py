@@ -155,7 +155,7 @@ class Banner:
                 self._reason = text("reason", "Waiting for the first report")
             self._warning = text("warning hidden", "")
             with box("buttons"):
-                self._reset = button("Reset", reset, "Reset: let the robot be driven again")
+                self._reset = button("Reset", reset, "Reset: let the robot be driven again").classes("hidden")
                 stop = button("Stop", halt, "Stop the robot (space key)").classes("stop")
                 stop.props('aria-keyshortcuts="Space"')
         ui.on("space", halt)

@@ -166,7 +166,7 @@ class HandSignRecognitionNode(Node):
         if self._refused is not None:
             self._refused = self._recording.hint(began_s) or self._refused
         if self._refused is None and self._stall_guard.distrusts(began_s):
-            self._refused = "this process was stalled, and frames may have waited meanwhile"
+            self._refused = f"{TOO_SLOW}: pictures may have waited"
         image = picture_of(received.message)
         if self._refused is None:
             self._look_at(image, received, began_s, captured_s)
