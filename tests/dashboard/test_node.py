@@ -266,8 +266,10 @@ def test_a_node_runs_only_while_somebody_watches() -> None:
     assert not wanted
     first = watched.join("me")
     assert watched.join("you") is first
+    assert not watched.is_watched_only_by("me")
     assert watched.join("me") is first
     watched.leave("me")
+    assert watched.is_watched_only_by("you")
     wanted = reports.has_subscribers
     assert wanted
     watched.leave("you")
