@@ -55,6 +55,7 @@ def opened(script: str) -> Iterator[Page]:
         try:
             browser = launch(playwright)
             page = browser.new_page(viewport={"width": WIDTH, "height": HEIGHT}, color_scheme="light")
+            page.add_init_script("localStorage.setItem('handsteer-demo', 'seen')")  # the hand in full
             page.goto(url)
             page.wait_for_selector(".world canvas")
             graph.start()

@@ -64,7 +64,7 @@ def describe_seen(sign: str, seen: str, *, is_hand_in_view: bool) -> str:
         return "no hand is in view"
     if seen == NONE:
         return "the hand shows none of the signs"
-    return f"{sign} is shown" if sign == seen else f"{seen} is not confirmed yet"
+    return f"{sign} is shown" if sign == seen else f"hold {seen} a moment longer"
 
 
 Action = Literal["forward", "backward", "turn_left", "turn_right", "stop", "go", "turbo", "next_robot"]
@@ -140,6 +140,11 @@ class Velocity:
     def is_zero(self) -> bool:
         """Whether the robot is to stop."""
         return self.linear_mps == 0.0 and self.angular_radps == 0.0
+
+    @property
+    def is_rest(self) -> bool:
+        """Whether a measured velocity is about zero: standing robots measure up to 0.02 m/s and 0.05 rad/s."""
+        return abs(self.linear_mps) <= 0.02 and abs(self.angular_radps) <= 0.05
 
     @property
     def is_finite(self) -> bool:

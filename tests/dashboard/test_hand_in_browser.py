@@ -68,7 +68,7 @@ def test_a_ring_fills_while_an_open_palm_engages_the_hand() -> None:
             for progress in (0.0, 0.4, 0.8, 0.0):
                 wait_until(progress, partial(is_filled, progress))
             wait_until(0.0, lambda: page.locator(".banner .headline").inner_text() == "Disengaged")
-            assert page.locator(".banner .reason").inner_text() == "until an open palm is held for 1 s"
+            assert page.locator(".banner .reason").inner_text() == "Hold an open palm for 1 s to begin"
             assert page.get_by_role("progressbar", name="Engaged", exact=True).is_visible()
             assert ring.evaluate("ring => getComputedStyle(ring).transitionProperty") == "none"
             assert faults(page) == []
@@ -112,7 +112,7 @@ def test_the_hand_drives_as_a_joystick_and_the_picture_shows_the_stick(handednes
         camera={"width": 640, "height": 480, "fps": 10},
     ) as visit:
         visit.wait_until(lambda: visit.text(".camera .sign") == "Stop" and greens(visit) < 20)
-        reason = "driven by the hand as a joystick"
+        reason = "Driven by the hand as a joystick"
         visit.wait_until(lambda: visit.text(".banner .reason") == reason and visit.text(".mux .holds") == "Joystick")
         visit.wait_until(lambda: greens(visit) > 100)
         assert visit.text(".world .fact b") == "your hand"

@@ -94,7 +94,7 @@ def test_a_sign_is_taught_from_the_browsers_webcam_and_drives(
     # A machine that draws the world in software, and has little time, is slow to send its camera's frames.
     patient: dict[str, Any] = {"signs": {"max_frame_age": 2.0, "dropout_hold": 1.0}, "control": {"sign_timeout": 2.0}}
     with visiting("NONE:600", "/teach", webcam=two_fingers, teach=plan, **patient) as visit:
-        visit.page.get_by_role("button", name="Use this device's camera").click()
+        visit.page.get_by_role("button", name="Use my camera").click()
         card = begin(visit, "Zwei")
         teach(visit, card)
         keep(visit, card, tmp_path)
@@ -175,8 +175,8 @@ def drive(visit: Visit) -> None:
     page.locator(".sign-tile", has_text="Two").locator("svg.landmarks").wait_for()
     # A webcam that has left shows nothing, not even that no hand is there: the robot's own camera does.
     page.get_by_role("button", name="Use the robot's camera").click()
-    visit.wait_until(lambda: "no hand" in visit.text(".banner") and "disarmed" not in visit.text(".banner"))
-    page.get_by_role("button", name="Use this device's camera").click()
+    visit.wait_until(lambda: "No hand" in visit.text(".banner") and "Ready" not in visit.text(".banner"))
+    page.get_by_role("button", name="Use my camera").click()
     visit.wait_until(lambda: visit.text(".camera .sign") == "Two")
     visit.wait_until(lambda: robot.state.angular_radps > 0.2)
 

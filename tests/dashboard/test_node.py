@@ -7,6 +7,7 @@ import pytest
 from handsteer.clock import SteppedClock
 from handsteer.config import ControlConfig
 from handsteer.control.explain import Reason
+from handsteer.dashboard.audit import PageAudit
 from handsteer.dashboard.node import HOLD_TIMEOUT_S, DashboardNode
 from handsteer.dashboard.viewers import OnDemandNode
 from handsteer.errors import TransportError
@@ -265,8 +266,10 @@ def test_a_node_runs_only_while_somebody_watches() -> None:
     assert not wanted
     first = watched.join("me")
     assert watched.join("you") is first
+    assert not watched.is_watched_only_by("me")
     assert watched.join("me") is first
     watched.leave("me")
+    assert watched.is_watched_only_by("you")
     wanted = reports.has_subscribers
     assert wanted
     watched.leave("you")
@@ -295,6 +298,40 @@ def test_tells_each_viewer_who_steers_and_who_stopped(bench: Bench) -> None:
     assert bench.node.state("me").reason == "stopped by another viewer, until you reset it"
     bench.node.reset("me")
     assert bench.node.state("me").viewers.stopped == ""
+
+
+def test_who_has_just_let_go_is_who_steered_until_the_control_has_noticed(bench: Bench) -> None:
+    bench.node.steer("me", 0.1, 0.0)
+    bench.node.release("me")
+    assert bench.node.state("me").viewers.steers == ""
+    assert bench.node.state("me").viewers.steered == "you"
+    bench.step(1.1)
+    assert bench.node.state("me").viewers.steered == ""
+
+
+def test_a_page_of_the_drivers_own_browser_gets_the_seat_at_once() -> None:
+    bench = Bench()
+    audit = PageAudit(bench.transport, bench.clock)
+    bench.node = DashboardNode(bench.transport, bench.clock, bench.steering, audit=audit)
+    for page, session in (("drive", "one"), ("settings", "one"), ("other", "two")):
+        audit.introduce(page, session, "192.0.2.7")
+    bench.node.ask_to_drive("drive")
+    bench.node.ask_to_drive("other")
+    assert bench.node.lease.driver == "drive"
+    bench.node.lease.answer("drive", hand_over=False)
+    bench.node.ask_to_drive("settings")
+    assert bench.node.lease.driver == "settings"
+
+
+def test_who_pressed_stop_on_another_page_of_the_same_browser_is_you() -> None:
+    bench = Bench()
+    audit = PageAudit(bench.transport, bench.clock)
+    bench.node = DashboardNode(bench.transport, bench.clock, bench.steering, audit=audit)
+    for page, session in (("drive", "one"), ("settings", "one"), ("other", "two")):
+        audit.introduce(page, session, "192.0.2.7")
+    bench.node.halt("drive")
+    audit.forget("drive")
+    assert [bench.node.state(page).viewers.stopped for page in ("settings", "other")] == ["you", "another viewer"]
 
 
 def test_keeps_the_velocities_and_gaps_where_nothing_was_said(bench: Bench) -> None:

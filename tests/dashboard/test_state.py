@@ -60,11 +60,11 @@ DISENGAGED = ControlStatus(Reason("disengaged", "1"), "signs", engaged=False, en
         ((control(NO_SIGN), NO_HAND), ("standing", "Standing", "no hand is in view")),
         (
             (control(NO_SIGN), RecognitionStatus(seen="Forward", handedness="Left")),
-            ("standing", "Standing", "Forward is not confirmed yet"),
+            ("standing", "Standing", "hold Forward a moment longer"),
         ),
         (
             (DISARMED, NO_HAND),
-            ("standing", "Standing", "disarmed (no sign came), moves once Stop is shown, or no hand"),
+            ("standing", "Ready", "show Stop or lower your hand to begin (no sign came)"),
         ),
         (
             (DISARMED, RecognitionStatus(refused="the picture is black")),
@@ -74,14 +74,14 @@ DISENGAGED = ControlStatus(Reason("disengaged", "1"), "signs", engaged=False, en
             (control(Reason("stop_sign", "Stop")), RecognitionStatus("Stop", seen="Stop", handedness="Left")),
             ("standing", "Standing", "the Stop sign is shown"),
         ),
-        ((DISENGAGED, NO_HAND), ("standing", "Disengaged", "until an open palm is held for 1 s")),
+        ((DISENGAGED, NO_HAND), ("standing", "Disengaged", "hold an open palm for 1 s to begin")),
         (
             (DISENGAGED, RecognitionStatus(no_frame_s=2.0), UNPLUGGED),
             ("trouble", "Standing", "/dev/video0 was unplugged"),
         ),
         (
             (replace(DISENGAGED, reason=Reason("disengaged", "1", "turtle1")), NO_HAND),
-            ("standing", "Disengaged", "turtle1 is disengaged, until an open palm is held for 1 s"),
+            ("standing", "Disengaged", "hold an open palm for 1 s to begin with turtle1"),
         ),
         (
             (replace(DISENGAGED, reason=Reason("steered_at_zero"), source="steering"), NO_HAND),
@@ -121,6 +121,26 @@ def test_says_in_a_sentence_what_the_robot_does_and_why(
     statuses: tuple[Status, ...], says: tuple[str, str, str]
 ) -> None:
     assert explain(reporting(*statuses)) == says
+
+
+@pytest.mark.parametrize(
+    ("status", "headline"),
+    [
+        (control(NO_SIGN), "Standing"),
+        (DISARMED, "Ready"),
+        (DISENGAGED, "Disengaged"),
+        (ControlStatus(Reason("stopped"), stopped=True), "Stopped"),
+    ],
+)
+def test_is_stopping_until_the_measured_speed_is_about_zero(status: ControlStatus, headline: str) -> None:
+    for measured, came_s, said in (
+        (Velocity(0.38, 0.0), 0.0, "Stopping"),
+        (Velocity(0.0, -0.3), 0.0, "Stopping"),
+        (Velocity(0.01, 0.04), 0.0, headline),
+        (Velocity(0.38, 0.0), -2.0, headline),
+    ):
+        state = compose(observed(status, NO_HAND, measured=measured, measured_came_s=came_s), 0.1)
+        assert state.headline == said
 
 
 def test_composes_the_figures() -> None:
@@ -242,10 +262,11 @@ def test_a_stop_is_said_once_the_control_obeys_it_or_when_there_is_no_control() 
     [
         (False, "none", Viewers(), None),
         (False, "signs", Viewers(), "Signs"),
-        (False, "steering", Viewers(steers="you"), "By hand: you"),
-        (False, "steering", Viewers(steers="another viewer"), "By hand: another viewer"),
+        (False, "steering", Viewers(steers="you", steered="you"), "By hand: you"),
+        (False, "steering", Viewers(steered="you"), "By hand: you"),
+        (False, "steering", Viewers(steered="another viewer"), "By hand: another viewer"),
         (False, "steering", Viewers(), "By hand: another node"),
-        (False, "signs", Viewers(steers="you", topic="/cmd_vel"), "By hand: you"),
+        (False, "signs", Viewers(steers="you", steered="you", topic="/cmd_vel"), "By hand: you"),
         (True, "steering", Viewers(steers="you", stopped="another viewer"), "Stop: another viewer"),
         (True, "signs", Viewers(), "Stop"),
     ],

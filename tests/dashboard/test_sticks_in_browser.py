@@ -150,7 +150,9 @@ def phone(visit: Visit, script: str = "") -> Iterator[Page]:
     if script:
         page.add_init_script(script)
     page.goto(visit.page.url)
-    page.locator(".lease .role", has_text="nobody drives").wait_for(state="attached")
+    page.get_by_role("button", name="Ask to drive").click()
+    visit.page.get_by_role("button", name="Hand over").click()
+    page.locator(".steer.yours").wait_for()
     try:
         yield page
     finally:

@@ -19,6 +19,7 @@ class Domain:
     """
 
     crosses_network = False
+    is_one_machine = True
 
     def __init__(self) -> None:
         self._types = TopicTypes()

@@ -322,11 +322,11 @@ def test_says_that_it_is_stopped_and_then_disarmed_and_how_it_moves_again(bench:
     assert says() == "standing: stopped, until it is reset"
     stop(bench, False)
     bench.show("Forward")
-    assert says() == "standing: disarmed, moves once Stop is shown, or no hand"
+    assert says() == "ready: show Stop or lower your hand to begin"
     bench.steering.steer(0.5, 0.0)
     stop(bench, True)
     stop(bench, False)
-    assert says() == "standing: disarmed, steers once the steering has been released"
+    assert says() == "standing: release the steering to begin"
     bench.steering.release()
     assert says() == "standing: steered by hand, at zero"
 
@@ -456,12 +456,12 @@ def test_it_says_whether_another_robot_was_selected_or_something_failed() -> Non
     assert bench.reason() == "driving: Forward"
     bench.choose("r2")
     bench.show("Forward", 5)
-    assert bench.reason() == "standing: r2 is disarmed (it was selected), moves once Stop is shown, or no hand"
+    assert bench.reason() == "ready: show Stop or lower your hand to begin with r2 (it was selected)"
     bench.show("NONE", 30)
     bench.show("Forward", 5)
     assert bench.moving() == ["r2"]
     bench.run(1.0)
-    assert bench.reason() == "standing: r2 is disarmed (no sign came), moves once Stop is shown, or no hand"
+    assert bench.reason() == "ready: show Stop or lower your hand to begin with r2 (no sign came)"
 
 
 def test_a_robot_that_is_not_there_is_not_selected(caplog: pytest.LogCaptureFixture) -> None:
@@ -542,6 +542,11 @@ def test_a_robot_that_is_let_grow_slowly_is_not_said_to_stand() -> None:
         bench.run(0.05)
     assert statuses[-1].status[0].message == "driving: steered by hand"
     assert twists[-1].linear.x == pytest.approx(0.15, abs=0.02)
+    for speed_mps, says in ((0.1, "stopping"), (0.01, "standing")):
+        steering.publish(twist(0.0, 0.0))
+        odom.publish(odometry(twist(speed_mps, 0.0)))
+        bench.run(0.12)
+        assert statuses[-1].status[0].message == f"{says}: steered by hand, at zero"
 
 
 def odometry(moving: Twist) -> Odometry:
@@ -696,7 +701,7 @@ def test_nothing_moves_before_an_open_palm_engaged_the_hand() -> None:
     bench.show(*["Forward"] * 30)
     assert set(bench.commands) == {(0, 0)}
     reported = {pair.key: pair.value for pair in diagnostics[-1].status[0].values}
-    assert diagnostics[-1].status[0].message == "standing: disengaged, until an open palm is held for 1 s"
+    assert diagnostics[-1].status[0].message == "disengaged: hold an open palm for 1 s to begin"
     assert reported["engaged"] == "False"
     bench.show(*["Stop"] * 32, "Forward")
     assert bench.last() == (0.01, 0)

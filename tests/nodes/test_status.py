@@ -18,7 +18,7 @@ OK, WARN, ERROR = 0, 1, 2
         (RecognitionStatus(seen="NONE", no_hand_s=0.42), OK, "no hand seen for 0.4 s"),
         (RecognitionStatus(seen="NONE", no_hand_s=12.3), OK, "no hand seen for 12 s"),
         (RecognitionStatus(seen="NONE", handedness="Left"), OK, "the hand shows none of the signs"),
-        (RecognitionStatus(seen="Go", handedness="Left"), OK, "Go is not confirmed yet"),
+        (RecognitionStatus(seen="Go", handedness="Left"), OK, "hold Go a moment longer"),
         (RecognitionStatus("Go", seen="Go", handedness="Left"), OK, "Go is shown"),
         (RecognitionStatus(refused="the picture is black"), WARN, "the picture is black"),
         (RecognitionStatus(no_frame_s=2.0), WARN, "no frame for 2.0 s"),

@@ -95,6 +95,11 @@ def test_a_clock_that_is_far_ahead_is_refused_in_words(ahead_s: float) -> None:
     assert why == f"frames are stamped {ahead_s:.1f} s ahead of our clock: are the clocks of the machines synchronised?"
 
 
+def test_an_old_frame_of_this_machine_is_not_blamed_on_clocks() -> None:
+    age = FrameAge(LIMIT_S, one_clock=True)
+    assert age.why_refused(0.5, 0.0) == "This computer is too slow or busy: pictures arrive 0.5 s late"
+
+
 def test_an_old_frame_is_told_though_its_clock_is_ahead() -> None:
     (_, (_, why)) = ages([0.02, 0.42], 0.3)
     assert why is not None

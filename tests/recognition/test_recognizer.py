@@ -30,9 +30,9 @@ def test_reasons_on_the_way_to_a_sign() -> None:
     assert [step.sign for step in steps] == [NONE, NONE, NONE, NONE, FORWARD]
     assert [step.reason for step in steps] == [
         "no hand is in view",
-        "Forward is not confirmed yet",
-        "Forward is not confirmed yet",
-        "Forward is not confirmed yet",
+        "hold Forward a moment longer",
+        "hold Forward a moment longer",
+        "hold Forward a moment longer",
         "Forward is shown",
     ]
     assert steps[0].hand is None

@@ -32,9 +32,9 @@ _SENTENCES: dict[ReasonCode, str] = {
     "steered": "steered by hand",
     "joystick": "driven by the hand as a joystick",
     "stopped": "stopped, until it is reset",
-    "disarmed": "disarmed{}, moves once Stop is shown, or no hand",
-    "disengaged": "disengaged, until an open palm is held for {} s",
-    "steering_disarmed": "disarmed, steers once the steering has been released",
+    "disarmed": "show Stop or lower your hand to begin{}",
+    "disengaged": "hold an open palm for {} s to begin",
+    "steering_disarmed": "release the steering to begin",
     "no_image": "{}",
     "no_scan": "{}",
     "obstacle": "stopped before an {}",
@@ -46,6 +46,9 @@ _SENTENCES: dict[ReasonCode, str] = {
     "stop_sign": "the {} sign is shown",
     "not_started": "no sign has set it in motion yet",
 }
+
+State = Literal["driving", "standing", "stopping", "ready", "disengaged"]
+"""What the robot does, in a word: ``stopping`` until it stands, ``ready`` when it waits for neutral."""
 
 
 @dataclass(frozen=True)
@@ -69,17 +72,28 @@ class Reason:
         """Whether the robot is to move."""
         return self.code in ("sign", "steered", "joystick")
 
+    def state(self, *, is_moving: bool = False) -> State:
+        """Return what the robot does, if it is measured to move as ``is_moving`` says."""
+        if self.is_driving:
+            return "driving"
+        if is_moving:
+            return "stopping"
+        return "ready" if self.code == "disarmed" else "disengaged" if self.code == "disengaged" else "standing"
+
     @property
     def explanation(self) -> str:
         """The reason in words, without what the robot does, as ``no sign is seen``."""
-        detail = f" ({self.detail})" if self.code == "disarmed" and self.detail else self.detail
-        robot = f"{self.robot} is " if self.robot else ""
+        robot = f" with {self.robot}" if self.robot else ""
+        detail = self.detail
+        if self.code == "disarmed":
+            detail = f"{robot} ({detail})" if detail else robot
+            robot = ""
         slowed = f", slowed: {self.slowed}" if self.slowed else ""
-        return f"{robot}{_SENTENCES[self.code].format(detail)}{slowed}"
+        return f"{_SENTENCES[self.code].format(detail)}{robot}{slowed}"
 
     def __str__(self) -> str:
         """Return a sentence, as ``standing: no sign is seen``."""
-        return f"{'driving' if self.is_driving else 'standing'}: {self.explanation}"
+        return f"{self.state()}: {self.explanation}"
 
 
 def effect_of(action: Action, rule: ControlConfig) -> str:

@@ -60,6 +60,10 @@ class PageAudit:
         """Return the name of ``viewer``, such as ``viewer 1 (127.0.0.1)``."""
         return self._names.get(viewer, _UNKNOWN)
 
+    def person_of(self, viewer: str) -> str:
+        """Return what is the same for all pages of one browser, even of those that it has left."""
+        return self._names.get(viewer, viewer)
+
     def say(self, code: AuditCode, viewer: str, sentence: str, about: str = "", level: int = INFO) -> None:
         """Publish what ``viewer`` does."""
         with self._lock:

@@ -17,8 +17,9 @@ from starlette.types import Receive, Scope, Send
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from handsteer.clock import Clock
+from handsteer.dashboard.first_visit import DEMO_CAMERA, CameraOffer, Coach
 from handsteer.dashboard.legend import DRAWN
-from handsteer.dashboard.page import PICTURE_PATH, Page, box, button, read_words, switch, text
+from handsteer.dashboard.page import PICTURE_PATH, Page, box, sentence, switch, text
 from handsteer.dashboard.remote_graph import RemoteGraph
 from handsteer.dashboard.socket_events import is_page_of
 from handsteer.dashboard.state import PageState
@@ -191,13 +192,14 @@ class CameraPanel:
     Args:
         page: Shows the panel.
         graph: The graph whose camera can be chosen; None if there is no choice.
+        coaches: Whether a new driver is shown how to drive.
 
     Attributes:
         stage: Holds the picture and its overlays.
     """
 
-    def __init__(self, page: Page, graph: RemoteGraph | None) -> None:
-        self._page, self._graph = page, graph
+    def __init__(self, page: Page, graph: RemoteGraph | None, *, coaches: bool = False) -> None:
+        self._page = page
         with ui.element("section").classes("card viewer camera"):
             with box("stage") as self.stage:
                 # Lazy, because otherwise the page would count as loaded only with its first picture.
@@ -205,12 +207,11 @@ class CameraPanel:
                 picture.props(f'src="{PICTURE_PATH}"')
                 with box("veil") as self._veil:
                     self._no_picture = text("", "waiting for the first picture")
-                text("caption", "as in a mirror")
-                with box("engage hidden") as self._engage:
-                    self._engaging = box("ring").props('role="progressbar" aria-label="Engaged" aria-valuemax="100"')
-                    with self._engaging:
-                        ui.html(DRAWN[STOP][1], sanitize=False)
-                    text("", "Hold an open palm")
+                self._caption = text("caption", "as in a mirror")
+                with box("overlay"):
+                    self._engaging, self._engage = _engage_ring()
+                    self._coach = Coach(page) if coaches else None
+                    self._offer = CameraOffer(page, graph) if graph is not None else None
             with box("foot"):
                 self._ring = box("ring").props('role="progressbar" aria-label="Confirmed" aria-valuemax="100"')
                 self._sign = text("sign", "No sign")
@@ -218,13 +219,6 @@ class CameraPanel:
                     self._confidence = box("")
                 self._percent = text("percent", "")
                 self._hand = text("hand", "")
-            if graph is not None:
-                with box("foot choice"):
-                    browser = f'data-camera="browser" data-viewer="{page.client.id}"'
-                    self._browser = button("Use this device's camera").props(browser)
-                    self._own = button("Use the robot's camera", self._use_own).props('data-camera="own"')
-                    self._status = text("trouble", "").props('role="alert"')
-                ui.on("webcam", lambda event: self._status.set_text(read_words(event.args)))
 
     def update(self, state: PageState) -> None:
         """Show ``state``."""
@@ -242,13 +236,20 @@ class CameraPanel:
         percent = round(100 * state.confidence) if state.seen != NONE else 0
         self._percent.set_text(f"{percent} %" if percent else "")
         self._confidence.style(f"width: {percent}%")
-        self._no_picture.set_text(state.no_picture)
+        self._no_picture.set_text(sentence(state.no_picture))
         switch(self._veil, "off", on=not state.no_picture)
-        if self._graph is not None:
-            source = self._graph.state.camera_source
-            switch(self._browser, "hidden", on=source == "browser" and self._graph.state.has_browser)
-            switch(self._own, "hidden", on=source == "own")
+        self._caption.set_text("demo hand" if state.camera == DEMO_CAMERA else "as in a mirror")
+        if self._offer is not None:
+            self._offer.update(state)
+        if self._coach is not None and (node := self._page.node):
+            self._coach.update(state, is_driver=self._page.lease(node).role == "driver")
 
-    def _use_own(self) -> None:
-        if self._graph is not None and self._page.drives():
-            self._graph.choose_camera("own")
+
+def _engage_ring() -> tuple[ui.element, ui.element]:
+    """Create the ring that shows how far an open palm has engaged the hand; return it, and what to hide with it."""
+    with box("engage hidden") as element:
+        ring = box("ring").props('role="progressbar" aria-label="Engaged" aria-valuemax="100"')
+        with ring:
+            ui.html(DRAWN[STOP][1], sanitize=False)
+        text("", "Hold an open palm")
+    return ring, element

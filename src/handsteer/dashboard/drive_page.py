@@ -7,10 +7,10 @@ from nicegui import ui
 from handsteer.dashboard.camera import CameraPanel
 from handsteer.dashboard.legend import LegendPanel
 from handsteer.dashboard.node import DashboardNode
-from handsteer.dashboard.page import STATIC, UNKNOWN, Page, PageContext, box, card, tag, text
+from handsteer.dashboard.page import STATIC, Page, PageContext, box, card, tag, text
 from handsteer.dashboard.record_panel import RecordPanel
 from handsteer.dashboard.state import PageState
-from handsteer.dashboard.steer_panel import SteerPanel
+from handsteer.dashboard.steer_panel import SteerPanel, TopicPanel
 from handsteer.dashboard.world_panel import WorldPanel
 from handsteer.dashboard.world_state import SPAN_S, Sample, VelocityHistory
 from handsteer.types import Velocity
@@ -25,15 +25,15 @@ class DrivePage(Page):
     def __init__(self, context: PageContext) -> None:
         super().__init__(context, "/", "drive.css", "steer.css", "steer.js", "sticks.js", "world.css", "webcam.js")
         graph = context.graph
-        self._camera = CameraPanel(self, graph)
+        self._camera = CameraPanel(self, graph, coaches=True)
         self._world = WorldPanel(self, graph)
         with box("panels"):
             self._velocity = VelocityPanel()
-            self._timing = TimingPanel()
             self._recording = (
                 RecordPanel(self, graph, context.recordings) if graph is not None and context.recordings else None
             )
-            self._steering = SteerPanel(self, has_topics=graph is None)
+            self._steering = SteerPanel(self)
+            self._topic = TopicPanel(self, self._steering, has_choice=graph is None)
             self._legend = LegendPanel(self, context.settings)
         self._updates = 0
 
@@ -41,7 +41,7 @@ class DrivePage(Page):
         """Show changes."""
         super().show(node, state)
         self._world.update(state, node.world)
-        for panel in (self._camera, self._velocity, self._timing, self._legend):
+        for panel in (self._camera, self._velocity, self._topic, self._legend):
             panel.update(state)
         self._steering.update(state, self.lease(node))
         if self._recording is not None:
@@ -49,34 +49,6 @@ class DrivePage(Page):
         self._updates += 1
         if self._updates % _PLOT_EVERY == 0:
             self._velocity.draw(node.history, node.clock.now())
-
-
-class TimingPanel:
-    """Latency and frame rate."""
-
-    def __init__(self) -> None:
-        with card("Camera to command", "panel timing"), box("figures"):
-            self._median = _figure("ms", "median")
-            self._p99 = _figure("ms", "99 of 100 below")
-            self._fps = _figure("frames/s", "camera")
-
-    def update(self, state: PageState) -> None:
-        """Show ``state``."""
-        for label, value in (
-            (self._median, state.latency_median_ms),
-            (self._p99, state.latency_p99_ms),
-            (self._fps, state.fps),
-        ):
-            label.set_text(UNKNOWN if value is None else f"{value:.1f}")
-
-
-def _figure(unit: str, name: str) -> ui.label:
-    with box("figure"):
-        with box(""):
-            value = text("value", UNKNOWN).style("display: inline")
-            text("unit", unit).style("display: inline")
-        text("name", name)
-    return value
 
 
 Row = tuple[float, float | None, float | None]
@@ -101,16 +73,13 @@ class VelocityPanel:
 
     def __init__(self) -> None:
         self._sent: int | None = None
-        with card("Velocity", "panel velocity"):
+        with card(f"Velocity, last {SPAN_S:.0f} s", "panel velocity"):
             self._linear = _Axis("Linear", "m/s", least=0.2, ends=("forward", "backward"), begin=self._begin)
             # Left is positive (REP 103) and drawn upwards.
             self._angular = _Axis("Angular", "rad/s", least=0.5, ends=("left", "right"), begin=self._begin)
-            with box("scale"):
-                text("", "30 s ago")
-                with box("key"):
-                    tag("span", "commanded", "commanded")
-                    tag("span", "measured", "measured")
-                text("", "now")
+            with box("key"):
+                tag("span", "commanded", "commanded")
+                tag("span", "measured", "measured")
 
     def update(self, state: PageState) -> None:
         """Show ``state``."""

@@ -28,7 +28,7 @@ def mux_inputs(state: PageState) -> tuple[MuxInput, ...]:
     by_air = not state.stopped and not by_hand and state.driver in ("signs", "joystick")
     return (
         MuxInput("Stop", state.stopped, state.viewers.stopped),
-        MuxInput("By hand", by_hand, state.viewers.steers or "another node"),
+        MuxInput("By hand", by_hand, state.viewers.steered or "another node"),
         MuxInput("Joystick" if state.is_joystick else "Signs", by_air),
     )
 

@@ -64,6 +64,8 @@ _FRAME_COUNTS_KEPT = 6
 _ODOMETRY_KEPT = 16
 _ODOMETRY_HOLDS_S = 0.5
 _SCAN_HOLDS_S = 1.0
+# Longer than the control takes to notice that steering has ended, and to report it.
+_STEERED_S = 1.0
 
 
 class DashboardNode(Node):
@@ -108,8 +110,9 @@ class DashboardNode(Node):
         self._steering = steering
         self._lock = threading.RLock()  # guards the steering viewer and its topic; the server's thread uses them too
         self._holder: tuple[str, float] | None = None
+        self._steered: tuple[str, float] | None = None  # who steered last, and when
         self._stopper: str | None = None
-        self._odometry_came_s = self._scan_came_s = -math.inf
+        self._scan_came_s = -math.inf
         self.subscribe(DIAGNOSTICS, self._on_diagnostics, key=_reporter)
         # A subscriber would count as a robot that takes a Twist, so the control's report is used.
         self._believes_control = cmd_vel.or_type is not None and isinstance(transport, KnowsTypes)
@@ -125,11 +128,12 @@ class DashboardNode(Node):
 
     def state(self, viewer: str = "") -> PageState:
         """Return the state to show to ``viewer``."""
-        now, holder = self.clock.now(), self._holder
+        now, holder, steered = self.clock.now(), self._holder, self._steered
         may_reset = self.lease.status_of(viewer, now).role != "watcher"
         viewers = Viewers(
-            steers=_person(holder and holder[0], viewer),
-            stopped=_person(self._stopper, viewer),
+            steers=self._person(holder and self._audit.person_of(holder[0]), viewer),
+            steered=self._person(steered[0] if steered and now - steered[1] < _STEERED_S else None, viewer),
+            stopped=self._person(self._stopper, viewer),
             may_reset=may_reset,
             topic=self._steering.topic if self._steering.is_direct else "",
             stands=self._steering.is_stopped,
@@ -146,6 +150,7 @@ class DashboardNode(Node):
                 if self._holder is None:
                     self._audit.say("steers", viewer, "steers by hand")
                 self._holder = (viewer, self.clock.now())
+                self._steered = (self._audit.person_of(viewer), self.clock.now())
                 self._steering.steer(linear_mps, angular_radps)
 
     def release(self, viewer: str) -> None:
@@ -174,7 +179,7 @@ class DashboardNode(Node):
         """Stop the robot, whether or not ``viewer`` drives."""
         with self._lock:
             self._holder = None
-            self._stopper = viewer or None
+            self._stopper = self._audit.person_of(viewer) or None
             self._steering.halt()
         self._audit.say("stop_pressed", viewer, "pressed Stop", level=WARN)
 
@@ -186,6 +191,14 @@ class DashboardNode(Node):
                 self._steering.reset()
             self._audit.say("reset_pressed", viewer, "pressed Reset")
 
+    def ask_to_drive(self, viewer: str) -> None:
+        """Request the control lease; a page of the driver's own browser gets it at once."""
+        self.lease.ask(viewer, self.clock.now())
+        driver = self.lease.driver
+        is_own = driver is not None and self._audit.person_of(driver) == self._audit.person_of(viewer)
+        if driver is not None and is_own and self.lease.status_of(viewer, self.clock.now()).asked:
+            self.lease.answer(driver, hand_over=True)
+
     def leave(self, viewer: str) -> None:
         """Stop if ``viewer`` is steering, and release its lease."""
         self.release(viewer)
@@ -196,6 +209,9 @@ class DashboardNode(Node):
         with self._lock:
             if self._holder is not None:
                 self.release(self._holder[0])
+
+    def _person(self, who: str | None, viewer: str) -> Person:
+        return "" if not who else "you" if who == self._audit.person_of(viewer) else "another viewer"
 
     def _watch(self) -> None:
         self.lease.tick(self.clock.now())
@@ -209,7 +225,7 @@ class DashboardNode(Node):
     def _sample(self) -> None:
         now, observed = self.clock.now(), self._observed
         commanded = observed.command if now - observed.command_came_s < COMMAND_HOLDS_S else None
-        measured = observed.measured if now - self._odometry_came_s < _ODOMETRY_HOLDS_S else None
+        measured = observed.measured if now - observed.measured_came_s < _ODOMETRY_HOLDS_S else None
         self.history.add(Sample(now, commanded, measured))
 
     def _on_diagnostics(self, received: Received[DiagnosticArray]) -> None:
@@ -259,8 +275,7 @@ class DashboardNode(Node):
     def _on_odometry(self, received: Received[Odometry]) -> None:
         odometry = received.message
         measured = Velocity(odometry.twist.twist.linear.x, odometry.twist.twist.angular.z)
-        self._observed = replace(self._observed, measured=measured)
-        self._odometry_came_s = self.clock.now()
+        self._observed = replace(self._observed, measured=measured, measured_came_s=self.clock.now())
         pose = _pose_of(odometry)
         self._odometry.append((to_seconds(odometry.header.stamp), pose))
         robot = place_in_world(*self._truth, pose) if self._truth else pose
@@ -286,10 +301,6 @@ class DashboardNode(Node):
 
     def _on_description(self, received: Received[String]) -> None:
         self.world = replace(self.world, description=received.message.data)
-
-
-def _person(who: str | None, viewer: str) -> Person:
-    return "" if not who else "you" if who == viewer else "another viewer"
 
 
 def _drawn(markers: tuple[Marker, ...]) -> list[tuple[object, ...]]:

@@ -64,6 +64,11 @@ def button(words: str, on_click: Callable[[], object] | None = None, label: str 
     return element.on("click", on_click) if on_click else element
 
 
+def sentence(words: str) -> str:
+    """Return ``words`` with a capital at the start."""
+    return words[:1].upper() + words[1:]
+
+
 def switch(element: ui.element, name: str, *, on: bool) -> None:
     """Add the class ``name`` to ``element``, or remove it."""
     element.classes(add=name if on else "", remove="" if on else name)
@@ -83,26 +88,51 @@ class LeasePanel:
         answer: Called with True to hand it over, with False to keep it.
     """
 
-    _WORDS: ClassVar[dict[Role, str]] = {"driver": "you drive", "watcher": "you watch", "free": "nobody drives"}
+    _WORDS: ClassVar[dict[Role, str]] = {
+        "driver": "you drive",
+        "watcher": "you watch: another viewer drives",
+        "free": "no viewer drives",
+    }
 
     def __init__(self, ask: Callable[[], None], answer: Callable[[bool], None]) -> None:
         with box("lease"):
             self._question = text("question", "")
             self._words = text("role chip", "")
-            self._ask = button("Ask to drive", ask)
-            self._yes = button("Hand over", lambda: answer(True))
-            self._no = button("Keep", lambda: answer(False))
+            self._ask = button("Ask to drive", ask).classes("hidden")
+            self._yes = button("Hand over", lambda: answer(True)).classes("hidden")
+            self._no = button("Keep", lambda: answer(False)).classes("hidden")
 
     def update(self, place: LeaseStatus) -> None:
         """Show the lease as this viewer sees it."""
         is_driver = place.role == "driver"
-        asks = f"Somebody asks to drive; unanswered, they do in {place.left_s:.0f} s"
+        asks = f"Another viewer asks to drive, and does in {place.left_s:.0f} s without an answer"
         waits = f"You drive in {place.left_s:.0f} s, or sooner"
         self._question.set_text((asks if is_driver else waits) if place.asked else "")
         self._words.set_text(self._WORDS[place.role])
+        switch(self._words, "driver", on=is_driver)
         switch(self._ask, "hidden", on=is_driver or place.asked)
         for answer in (self._yes, self._no):
             switch(answer, "hidden", on=not (is_driver and place.asked))
+
+
+class TimingLine:
+    """Reaction time from the capture of a picture to the command, and the camera's frame rate."""
+
+    def __init__(self) -> None:
+        with box("timing"):
+            text("name", "Reaction time: typical / slowest 1 %")
+            self._times = text("value times", "")
+            self._rate = text("value rate", "")
+
+    def update(self, state: PageState) -> None:
+        """Show ``state``."""
+        typical, slowest = (_rounded(value) for value in (state.latency_median_ms, state.latency_p99_ms))
+        self._times.set_text(f"{typical} / {slowest} ms")
+        self._rate.set_text(f"{_rounded(state.fps)} frames/s")
+
+
+def _rounded(value: float | None) -> str:
+    return UNKNOWN if value is None else f"{value:.0f}"
 
 
 _TIME = re.compile(r" for \d+(\.\d+)? s\b")
@@ -120,11 +150,12 @@ class Banner:
         with ui.element("section").classes("card banner") as self._banner:
             self._spoken = text("spoken", "").props('role="status"')
             box("lamp")
-            self._headline = text("headline", "Starting")
-            self._reason = text("reason", "waiting for the first report")
+            with box("words"):
+                self._headline = text("headline", "Starting")
+                self._reason = text("reason", "Waiting for the first report")
             self._warning = text("warning hidden", "")
             with box("buttons"):
-                self._reset = button("Reset", reset, "Reset: let the robot be driven again")
+                self._reset = button("Reset", reset, "Reset: let the robot be driven again").classes("hidden")
                 stop = button("Stop", halt, "Stop the robot (space key)").classes("stop")
                 stop.props('aria-keyshortcuts="Space"')
         ui.on("space", halt)
@@ -133,9 +164,12 @@ class Banner:
     def update(self, state: PageState) -> None:
         """Show ``state``."""
         self._headline.set_text(state.headline)
-        self._reason.set_text(state.reason)
+        if (reason := sentence(state.reason)) != self._reason.text:
+            self._reason.set_text(reason)
+            self._reason.props["title"] = reason  # where it does not fit
         self._spoken.set_text(spoken(state))
         self._warning.set_text("; ".join(state.warnings))
+        self._warning.props["title"] = self._warning.text
         switch(self._warning, "hidden", on=not state.warnings)
         switch(self._reset, "hidden", on=not state.stopped)
         if state.mood != self._mood:
@@ -214,6 +248,7 @@ class Page:
     def show(self, node: DashboardNode, state: PageState) -> None:
         """Show changes, ten times a second; pages extend this."""
         self._driving.update(self.lease(node))
+        self._timing.update(state)
         self._source.set_text(state.camera)
         recording = self._context.graph.state.recording if self._context.graph is not None else None
         is_on = recording is not None and recording.ended_s is None
@@ -254,12 +289,11 @@ class Page:
     def _top(self, path: str) -> None:
         with ui.element("header").classes("top"):
             ui.html(ICON, sanitize=False)
-            with ui.element("div"):
-                ui.html("<h1>handsteer</h1>", sanitize=False)
-                ui.label("drive a robot with your hand signs").classes("tagline")
+            tag("h1", "", "handsteer")
             with ui.element("nav").classes("links"):
                 for target, name in _LINKS:
                     ui.link(name, target).props('aria-current="page"' if target == path else "")
+            self._timing = TimingLine()
             with ui.element("div").classes("right"):
                 self._driving = LeasePanel(self._ask, self._answer)
                 self._recorded = text("recorded hidden", "").props('title="A recording is being made"')
@@ -270,6 +304,8 @@ class Page:
     def _update(self) -> None:
         node = self.node
         if node is not None and self._reads():
+            if self._context.node.is_watched_only_by(self.client.id):
+                node.lease.take(self.client.id, node.clock.now())
             self.show(node, node.state(self.client.id))
 
     def _reads(self) -> bool:
@@ -288,7 +324,7 @@ class Page:
         self.do(lambda node, viewer: node.reset(viewer))
 
     def _ask(self) -> None:
-        self.do(lambda node, viewer: node.lease.ask(viewer, node.clock.now()))
+        self.do(lambda node, viewer: node.ask_to_drive(viewer))
 
     def _answer(self, hand_over: bool) -> None:
         self.do(lambda node, viewer: node.lease.answer(viewer, hand_over=hand_over))

@@ -8,7 +8,7 @@ from typing import Literal, TypeVar
 from handsteer.config import ControlConfig
 from handsteer.control.twist_mux import Source
 from handsteer.nodes.status import ERROR, OK, CameraStatus, ControlStatus, RecognitionStatus, RobotStatus, Status
-from handsteer.timeouts import ROBOT_S
+from handsteer.timeouts import ODOMETRY_S, ROBOT_S
 from handsteer.types import NONE, SIGNS, ZERO, CourseState, Velocity
 
 S = TypeVar("S", bound=Status)
@@ -45,6 +45,7 @@ class Viewers:
 
     Attributes:
         steers: The viewer who steers.
+        steered: The viewer who steers, or did a moment ago, when the control's report may be older.
         stopped: The viewer who pressed Stop last.
         may_reset: Whether this viewer may reset Stop.
         topic: The topic of steering that bypasses the control; empty otherwise.
@@ -52,6 +53,7 @@ class Viewers:
     """
 
     steers: Person = ""
+    steered: Person = ""
     stopped: Person = ""
     may_reset: bool = True
     topic: str = ""
@@ -70,6 +72,7 @@ class Observed:
         command: The last velocity command.
         command_came_s: Its time of arrival in seconds of the graph's clock.
         measured: The velocity from odometry.
+        measured_came_s: Its time of arrival, likewise.
         frame_counts: Times and frame counters of the camera's last reports, oldest first.
     """
 
@@ -77,7 +80,12 @@ class Observed:
     command: Velocity = ZERO
     command_came_s: float = -math.inf
     measured: Velocity = ZERO
+    measured_came_s: float = -math.inf
     frame_counts: Sequence[tuple[float, float]] = ()
+
+    def is_moving(self, now_s: float) -> bool:
+        """Return whether the robot is measured to move at ``now_s``."""
+        return now_s - self.measured_came_s < ODOMETRY_S and not self.measured.is_rest
 
     def last(self, kind: type[S], since_s: float = -math.inf) -> S | None:
         """Return the last status of this type; None if it was not reported at ``since_s`` or later."""
@@ -181,7 +189,7 @@ def compose(observed: Observed, now_s: float, viewers: Viewers = NOBODY) -> Page
     reporting = Reporting.at(now_s, observed)
     seen, control = reporting.recognition or RecognitionStatus(), reporting.control or ControlStatus()
     robot = reporting.robot or RobotStatus()
-    mood, headline, reason = explain(reporting, viewers)
+    mood, headline, reason = explain(reporting, viewers, is_moving=observed.is_moving(now_s))
     # What was last known of a node that has fallen silent.
     stopped = is_stopped(reporting.control, viewers)
     last_seen, last_control = observed.last(RecognitionStatus), observed.last(ControlStatus)
@@ -241,7 +249,7 @@ def confirmed(recognition: RecognitionStatus) -> float:
     return max(0.0, min(recognition.progress, 1.0))
 
 
-def explain(reporting: Reporting, viewers: Viewers = NOBODY) -> tuple[Mood, str, str]:
+def explain(reporting: Reporting, viewers: Viewers = NOBODY, *, is_moving: bool = False) -> tuple[Mood, str, str]:
     """Return in words what the robot does and why: mood, headline, reason.
 
     The control reports whether the robot is commanded to move. If it is not, because no sign is confirmed, the reason
@@ -250,6 +258,7 @@ def explain(reporting: Reporting, viewers: Viewers = NOBODY) -> tuple[Mood, str,
     Args:
         reporting: The status of each node that is not silent.
         viewers: The viewers' activity, which the control does not know.
+        is_moving: Whether the robot is measured to move.
     """
     if viewers.topic and viewers.steers:
         return "driving", "Driving", f"steered by hand, straight on {viewers.topic}"
@@ -261,21 +270,26 @@ def explain(reporting: Reporting, viewers: Viewers = NOBODY) -> tuple[Mood, str,
         return "trouble", "Trouble", f"the robot {robot.message}"
     if control is None or stopped:
         by = f"stopped by {viewers.stopped}" if viewers.stopped else "stopped"
-        return "trouble", "Stopped", f"{by}, until {'you reset' if viewers.may_reset else 'the driver resets'} it"
+        return (
+            "trouble",
+            "Stopping" if is_moving else "Stopped",
+            f"{by}, until {'you reset' if viewers.may_reset else 'the driver resets'} it",
+        )
     reason = control.explanation
     if control.linear_mps or control.angular_radps:
         return "driving", "Driving", reason if robot.level == OK else f"{reason}, but the robot {robot.message}"
-    return _explain_standing(control, reporting)
+    mood, upstream = _why_standing(control, reporting)
+    # What lies upstream is why it stands, whatever the control waits for.
+    state = control.reason.state() if control.reason and not upstream else "standing"
+    return mood, "Stopping" if is_moving else state.capitalize(), upstream or reason
 
 
-def _explain_standing(control: ControlStatus, reporting: Reporting) -> tuple[Mood, str, str]:
+def _why_standing(control: ControlStatus, reporting: Reporting) -> tuple[Mood, str | None]:
     mood, upstream = ("standing", None) if control.source == "steering" else _why_no_sign(reporting)
     is_about_signs = control.armed and control.engaged and control.source != "joystick"
     if not is_about_signs and reporting.recognition is not None and reporting.recognition.seen is not None:
         upstream = None
-    if upstream is None and control.reason is not None and control.reason.code == "disengaged":
-        return mood, "Disengaged", control.explanation.removeprefix("disengaged, ")
-    return mood, "Standing", upstream or control.explanation
+    return mood, upstream
 
 
 def _why_no_sign(reporting: Reporting) -> tuple[Mood, str | None]:

@@ -32,10 +32,9 @@ class SteerPanel:
 
     Args:
         page: Shows the panel.
-        has_topics: Whether the viewer may choose another topic to steer on.
     """
 
-    def __init__(self, page: Page, *, has_topics: bool) -> None:
+    def __init__(self, page: Page) -> None:
         self._page = page
         self._input = SteeringInput()
         with card("Steer by hand", "panel steer") as self._card:
@@ -56,9 +55,8 @@ class SteerPanel:
                     self._linear = _Slider("Linear", "m/s", _SLIDER_MPS, self._slide, upright=True)
                     with box("across"):
                         self._angular = _Slider("Angular", "rad/s", _SLIDER_RADPS, self._slide, upright=False)
-                        self._topic = _TopicBox(self._steer_on if has_topics else None)
             with box("last"):
-                button("Both to 0", self._release)
+                button("Both to 0", self.release)
                 self._hint = text("hint", _HINTS["free"])
             self._sticks = text("sticks", "").props('role="status"')
         self._show_speed()
@@ -66,13 +64,12 @@ class SteerPanel:
         ui.on(
             "sliders_held", lambda event: self._steer(self._input.keep_sliders(_sent_ms(event.args), time.monotonic()))
         )
-        ui.on("let_go", self._release)
+        ui.on("let_go", self.release)
         ui.on("sticks", lambda event: self._sticks.set_text(read_words(event.args)))
 
     def update(self, state: PageState, lease: LeaseStatus) -> None:
         """Show ``state`` to a viewer with ``lease``; sliders of others, and of a stopped robot, are at 0."""
         self._mux.update(state)
-        self._topic.update(state)
         self._input.end_if_silent(time.monotonic())
         can_steer = lease.role != "watcher" and not state.stopped
         if not can_steer:
@@ -87,7 +84,7 @@ class SteerPanel:
         switch(self._hint, "late", on=self._input.is_late)
         switch(self._card, "yours", on=lease.role == "driver")
 
-    def _release(self) -> None:
+    def release(self) -> None:
         """Stop steering from this page and set the sliders to zero."""
         self._input.sliders = ZERO
         self._show_sliders()
@@ -103,7 +100,7 @@ class SteerPanel:
         if wanted == self._input.sliders:
             return
         if wanted.is_zero:
-            self._release()
+            self.release()
         else:
             self._input.slide(wanted, time.monotonic())
             self._show_sliders()
@@ -112,10 +109,6 @@ class SteerPanel:
         self._show_sliders()
         if wanted is not None:
             self._page.do(lambda node, viewer: node.steer(viewer, wanted.linear_mps, wanted.angular_radps))
-
-    def _steer_on(self, topic: str) -> None:
-        self._release()
-        self._page.do(lambda node, viewer: node.steer_on(viewer, topic))
 
     def _show_sliders(self) -> None:
         self._linear.show(self._input.sliders.linear_mps)
@@ -209,22 +202,28 @@ class _Slider:
         self._change()
 
 
-class _TopicBox:
-    """The steering topic's name, and its consequences; without ``choose``, there is no choice."""
+class TopicPanel:
+    """The name of the steering topic, and its consequences.
 
-    def __init__(self, choose: Callable[[str], None] | None) -> None:
-        self._choose = choose
+    Args:
+        page: Shows the panel.
+        steering: Is released before the topic changes.
+        has_choice: Whether the viewer may choose another topic.
+    """
+
+    def __init__(self, page: Page, steering: SteerPanel, *, has_choice: bool) -> None:
+        self._page, self._steering = page, steering
         self._shown = ""
-        with box("topic"):
+        with card("Steering topic", "panel topic"):
             self._name = ui.input("topic", value=STEERING_CMD_VEL.name).props("dense outlined")
             self._name.props(f"maxlength={_LONGEST_TOPIC} spellcheck=false autocapitalize=off")
-            if choose is None:
-                self._name.props("readonly")
-            else:
+            if has_choice:
                 self._name.on("keydown.enter", self._use)
                 button("Use", self._use, "Steer on this topic")
-        self._note = text("topic-words", "")
-        self._error = text("trouble", "").props('role="alert"')
+            else:
+                self._name.props("readonly")
+            self._note = text("topic-words", "")
+            self._error = text("trouble", "").props('role="alert"')
 
     def update(self, state: PageState) -> None:
         """Show ``state``."""
@@ -242,9 +241,10 @@ class _TopicBox:
         switch(self._note, "direct", on=bool(topic))
 
     def _use(self) -> None:
-        if self._choose is not None:
-            self._error.set_text("")
-            try:
-                self._choose(str(self._name.value)[:_LONGEST_TOPIC].strip())
-            except TransportError as error:
-                self._error.set_text(str(error))
+        topic = str(self._name.value)[:_LONGEST_TOPIC].strip()
+        self._steering.release()
+        self._error.set_text("")
+        try:
+            self._page.do(lambda node, viewer: node.steer_on(viewer, topic))
+        except TransportError as error:
+            self._error.set_text(str(error))

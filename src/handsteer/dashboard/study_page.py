@@ -50,7 +50,7 @@ class StudyPage(Page):
             with box("side"):
                 self._card = _StudyCard(context.study, self)
                 self._camera = CameraPanel(self, context.graph)
-                self._steering = SteerPanel(self, has_topics=False)
+                self._steering = SteerPanel(self)
             self._world = WorldPanel(self, context.graph)
         self._classes = ""
         self.client.on_disconnect(self._abandon)

@@ -72,6 +72,11 @@ class ControlLease:
         """Return whether ``viewer`` has the lease."""
         return self._driver == viewer
 
+    @property
+    def driver(self) -> str | None:
+        """The viewer who has the lease; None if there is none."""
+        return self._driver
+
     def ask(self, viewer: str, now_s: float) -> None:
         """Request the lease; ignored while another request is pending."""
         with self._lock:
@@ -158,6 +163,11 @@ class OnDemandNode(Generic[N]):
     def is_watched_by(self, viewer: Hashable) -> bool:
         """Return whether ``viewer`` has joined, and has neither left nor been disconnected by :meth:`close`."""
         return viewer in self._viewers
+
+    def is_watched_only_by(self, viewer: Hashable) -> bool:
+        """Return whether ``viewer`` is watching, and no other viewer is."""
+        with self._lock:
+            return self._viewers == {viewer}
 
     def leave(self, viewer: Hashable) -> None:
         """Remove ``viewer``; has no effect if it has not joined."""

@@ -32,7 +32,7 @@ from handsteer.nodes.selection import NEXT, Selection
 from handsteer.nodes.status import ControlStatus
 from handsteer.nodes.supervision import Rivals, StopKeeper
 from handsteer.nodes.timing import CALM_S, LatencyLog, StallGuard
-from handsteer.timeouts import ENGAGE_S
+from handsteer.timeouts import ENGAGE_S, ODOMETRY_S
 from handsteer.transports.base import Call, Received, Transport
 from handsteer.transports.commands import Commands
 from handsteer.types import NONE, ZERO, Stick, Velocity, action_of
@@ -98,6 +98,7 @@ class HandSignControlNode(Node):
         self._following = Following() if arming and not config.robots else None
         self._arming = arming
         self._measured = MeasuredVelocity()
+        self._moved: tuple[float, bool] | None = None
         self._commanded = ZERO
         self._last_step_s = clock.now()
         rule = collision_monitor or CollisionMonitorConfig()
@@ -215,6 +216,7 @@ class HandSignControlNode(Node):
         assert self._following is not None
         measured = self._measured.read(received.message)
         self._following.note(self._commanded if measured is None else measured)
+        self._moved = (self.clock.now(), measured is None or not measured.is_rest)
 
     def _watch(self) -> None:
         elapsed_s = self._elapsed()
@@ -296,6 +298,7 @@ class HandSignControlNode(Node):
             engage_progress=round(self._safety.engagement.progress, 2),
             linear_mps=round(velocity.linear_mps, 3),
             angular_radps=round(velocity.angular_radps, 3),
+            moving=self._is_moving,
             robot=self._selection.fleet.selected if self._selection else None,
             blind=bool(self._monitor.why_blind()),
             obstacle_m=self._monitor.obstacle_m,
@@ -304,6 +307,12 @@ class HandSignControlNode(Node):
             latency_p99_ms=round(self.latency.percentile_ms(99), 1) if is_measured else None,
             rule=self._config,
         )
+
+    @property
+    def _is_moving(self) -> bool | None:
+        if self._moved is None or self.clock.now() - self._moved[0] > ODOMETRY_S:
+            return None
+        return self._moved[1]
 
     @property
     def _reason(self) -> Reason:

@@ -164,6 +164,10 @@ class _JournalTransport:
     def crosses_network(self) -> bool:
         return self._transport.crosses_network
 
+    @property
+    def is_one_machine(self) -> bool:
+        return self._transport.is_one_machine
+
     def advertise(self, node: str, topic: Topic[M]) -> Publisher[M]:
         return _JournalPublisher(self._transport.advertise(node, topic), topic.name, self._journal)
 

@@ -31,7 +31,7 @@ from handsteer.messages import (
 from handsteer.nodes.base import Node
 from handsteer.nodes.status import RecognitionStatus
 from handsteer.nodes.supervision import StopKeeper
-from handsteer.nodes.timing import CALM_S, FrameAge, LatencyLog, Recording, StallGuard
+from handsteer.nodes.timing import CALM_S, TOO_SLOW, FrameAge, LatencyLog, Recording, StallGuard
 from handsteer.recognition.hand import Classifier
 from handsteer.recognition.hand_joystick import HandJoystick
 from handsteer.recognition.recognizer import Recognition, Recognizer
@@ -99,7 +99,7 @@ class HandSignRecognitionNode(Node):
         self._last_frame_s = clock.now()
         self._last_sign_s = clock.now()
         self._last_hand_s: float | None = None
-        self._age = FrameAge(config.max_frame_age)
+        self._age = FrameAge(config.max_frame_age, one_clock=transport.is_one_machine)
         self._freshness = Freshness(config.max_frame_age)
         self._stall_guard = StallGuard(config.max_frame_age, clock.now())
         self._recording = Recording(config.recorded, config.max_frame_age)
@@ -166,7 +166,7 @@ class HandSignRecognitionNode(Node):
         if self._refused is not None:
             self._refused = self._recording.hint(began_s) or self._refused
         if self._refused is None and self._stall_guard.distrusts(began_s):
-            self._refused = "this process was stalled, and frames may have waited meanwhile"
+            self._refused = f"{TOO_SLOW}: pictures may have waited"
         image = picture_of(received.message)
         if self._refused is None:
             self._look_at(image, received, began_s, captured_s)
@@ -218,7 +218,7 @@ class HandSignRecognitionNode(Node):
             return None
         self._recognizer.reset()
         self._joystick.reset()
-        return f"a frame was {age_s:.1f} s old when its sign was known: was this process stalled?"
+        return f"{TOO_SLOW}: a picture was {age_s:.1f} s old when its sign was known"
 
     def _take_images(self) -> Subscription:
         if self._compressed:

@@ -147,6 +147,7 @@ class ControlStatus(Status):
         engage_progress: Progress of engaging, 0 to 1.
         linear_mps: Commanded forward velocity.
         angular_radps: Commanded angular velocity, left positive.
+        moving: Whether the robot is measured to move; None if it is unknown.
         robot: The selected one of several robots; None if there is one.
         blind: Whether laser scans are required and missing.
         obstacle_m: Distance of the obstacle that limits the robot; None if none does.
@@ -166,6 +167,7 @@ class ControlStatus(Status):
     engage_progress: float = 1.0
     linear_mps: float = 0.0
     angular_radps: float = 0.0
+    moving: bool | None = None
     robot: str | None = None
     blind: bool = False
     obstacle_m: float | None = None
@@ -182,7 +184,9 @@ class ControlStatus(Status):
     @property
     def message(self) -> str:
         """A sentence for people."""
-        return str(self.reason) if self.reason else "gives no reason"
+        if self.reason is None:
+            return "gives no reason"
+        return f"{self.reason.state(is_moving=bool(self.moving))}: {self.reason.explanation}"
 
     @property
     def explanation(self) -> str:

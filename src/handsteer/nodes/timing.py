@@ -53,6 +53,8 @@ class StallGuard:
         return self._in_burst
 
 
+TOO_SLOW = "This computer is too slow or busy"
+
 _LEAK = 0.001
 """Decay of a clock offset, in seconds per second: far more than clocks drift, far less than delays last."""
 
@@ -67,6 +69,7 @@ class FrameAge:
 
     Args:
         limit_s: Maximum age of a frame in seconds; frames that are further ahead are refused too.
+        one_clock: Whether camera and this node certainly share a clock, so that an old stamp shows a delay.
 
     Attributes:
         limit_s: As above; may be changed.
@@ -74,8 +77,9 @@ class FrameAge:
         ahead_s: Lower bound of the offset by which the camera's clock is ahead of ours.
     """
 
-    def __init__(self, limit_s: float) -> None:
+    def __init__(self, limit_s: float, *, one_clock: bool = False) -> None:
         self.limit_s = limit_s
+        self._one_clock = one_clock
         self._noted_s: float | None = None
         self._watch = ClockWatch(in_step=True)
         self.age_s = 0.0
@@ -102,6 +106,8 @@ class FrameAge:
         self.age_s = by_stamp_s + self.ahead_s
         if self.age_s <= self.limit_s:
             return None
+        if self._one_clock:
+            return f"{TOO_SLOW}: pictures arrive {self.age_s:.1f} s late"
         ahead = f" by a clock that is {self.ahead_s:.1f} s ahead of ours" if self.ahead_s >= 0.05 else ""
         return f"frames come {self.age_s:.1f} s after their stamp{ahead}: are the clocks of the machines synchronised?"
 

@@ -56,6 +56,7 @@ class ReplayTransport:
     """
 
     crosses_network = False
+    is_one_machine = True
 
     def __init__(self) -> None:
         self.published: list[tuple[str, Any, float | None]] = []

@@ -87,6 +87,7 @@ class FaultTransport:
         carries_capture_times: bool = True,
     ) -> None:
         self.crosses_network = inner.crosses_network
+        self.is_one_machine = inner.is_one_machine
         self._inner = inner
         self._clock = clock
         self._guards = guards

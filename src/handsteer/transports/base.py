@@ -86,6 +86,11 @@ class Transport(Protocol):
         """Whether it may carry messages to other machines, so that compressed images are preferable."""
         ...
 
+    @property
+    def is_one_machine(self) -> bool:
+        """Whether all nodes are certainly on this machine, so that they share a clock."""
+        ...
+
     def advertise(self, node: str, topic: Topic[M]) -> Publisher[M]:
         """Return a publisher of ``topic`` for the node named ``node``.
 

@@ -165,6 +165,7 @@ class BaseTransport(ABC):
     """
 
     crosses_network = False
+    is_one_machine = False
 
     def __init__(self, publishers: MutableSet[BasePublisher[Any]]) -> None:
         self._types = TopicTypes()
@@ -230,6 +231,8 @@ class BaseTransport(ABC):
 
 class InProcessTransport(BaseTransport):
     """Passes messages by reference, on the publisher's thread."""
+
+    is_one_machine = True
 
     def __init__(self) -> None:
         super().__init__(weakref.WeakSet())

@@ -1,4 +1,4 @@
-// What needs the browser: stopping the robot by a key, and remembering light or dark.
+// What needs the browser: stopping the robot by a key, and remembering light or dark, and what a first visit has shown.
 
 // Anywhere except in text inputs; a focused button would otherwise take the space key as a click.
 document.addEventListener("keydown", (event) => {
@@ -14,6 +14,18 @@ document.addEventListener("click", (event) => {
   if (!event.target.closest?.(".theme")) return;
   Quasar.Dark.toggle();
   localStorage.setItem("handsteer-dark", Quasar.Dark.isActive);
+});
+// data-demo and data-coach on the root show what is new to this browser.
+for (const name of ["demo", "coach"]) {
+  if (!localStorage.getItem(`handsteer-${name}`)) document.documentElement.dataset[name] = "new";
+}
+function noteSeen(name, shownMs = 0) {
+  localStorage.setItem(`handsteer-${name}`, "seen");
+  setTimeout(() => delete document.documentElement.dataset[name], shownMs);
+}
+document.addEventListener("click", (event) => {
+  const seen = event.target.closest?.("[data-seen]")?.dataset.seen;
+  if (seen) noteSeen(seen);
 });
 window.addEventListener("load", () => {
   const dark = localStorage.getItem("handsteer-dark");

@@ -1,23 +1,18 @@
 // Sends this browser's webcam to handsteer: the newest picture, whenever the last one has arrived.
 
-const WHY_NOT = {
-  NotAllowedError: "the browser was told not to give its camera away: allow it beside the address, then try again",
-  NotFoundError: "this device has no camera",
-  NotReadableError: "another program uses the camera",
-};
-
 const LOOK_MS = 10;
 
 let giving = null; // {stream, video, sender, shown} while the camera is in use
 
-function sayCamera(state, words = "") {
-  emitEvent("webcam", { state, words });
+// The server has the sentence for each "why"; "words" are its own.
+function sayCamera(state, told = {}) {
+  emitEvent("webcam", { state, ...told });
 }
 
 async function giveCamera(viewer) {
   if (giving) return;
   if (!navigator.mediaDevices?.getUserMedia) {
-    sayCamera("off", "browsers give a camera only to pages from https or localhost: docs/page.md says how");
+    sayCamera("off", { why: "insecure" });
     return;
   }
   giving = { video: document.createElement("video") };
@@ -27,10 +22,10 @@ async function giveCamera(viewer) {
     Object.assign(giving.video, { muted: true, playsInline: true, srcObject: giving.stream });
     await giving.video.play();
   } catch (problem) {
-    keepCamera(WHY_NOT[problem.name] ?? `the browser gives no camera: ${problem.message}`);
+    keepCamera({ why: problem.name });
     return;
   }
-  for (const track of giving.stream.getTracks()) track.onended = () => keepCamera("the camera was taken away");
+  for (const track of giving.stream.getTracks()) track.onended = () => keepCamera({ why: "ended" });
   sendFrames(viewer);
 }
 
@@ -43,7 +38,7 @@ function sendFrames(viewer) {
   const sender = giving.sender = new Worker("/assets/webcam-sender.js");
   sender.postMessage({ address: address.href });
   sender.onmessage = ({ data }) => {
-    if (data.closed !== undefined) keepCamera(data.closed);
+    if (data.closed !== undefined) keepCamera({ words: data.closed });
     else whenNew(video, send);
   };
   const send = async () => {
@@ -52,6 +47,7 @@ function sendFrames(viewer) {
     sender.postMessage({ picture, capturedMs }, [picture]);
   };
   sayCamera("on");
+  noteSeen("demo");
 }
 
 // A picture sent twice would only look newer than it is.
@@ -71,13 +67,13 @@ function picturesOf(video) {
   return video.mozPaintedFrames || video.getVideoPlaybackQuality?.().totalVideoFrames || video.currentTime;
 }
 
-function keepCamera(words = "") {
+function keepCamera(told = {}) {
   if (!giving) return;
   const { stream, sender } = giving;
   giving = null;
   for (const track of stream?.getTracks() ?? []) track.stop();
   sender?.terminate();
-  sayCamera("off", words);
+  sayCamera("off", told);
 }
 
 document.addEventListener("click", (event) => {

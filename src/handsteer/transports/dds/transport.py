@@ -40,7 +40,8 @@ class DdsTransport(WireTransport):
     def __init__(self, name: NodeName, clock: Clock) -> None:
         super().__init__(name, clock)
         self._participant = Participant(network(os.environ), name)
-        self.crosses_network = not self._participant.is_local
+        self.is_one_machine = self._participant.is_local
+        self.crosses_network = not self.is_one_machine
 
     def close(self) -> None:
         """Leave the domain; may be called twice."""

@@ -1,0 +1,143 @@
+"""What a first visit shows on the camera's picture: the offer of one's own camera, and three steps to drive by signs.
+
+The browser remembers what was done or dismissed (``static/page.js``); it hides what it has seen.
+"""
+
+from typing import Final
+
+from nicegui import ui
+
+from handsteer.dashboard.legend import DRAWN
+from handsteer.dashboard.page import Page, box, button, switch, tag, text
+from handsteer.dashboard.remote_graph import RemoteGraph
+from handsteer.dashboard.state import PageState
+from handsteer.types import FORWARD, STOP
+
+DEMO_CAMERA: Final = "virtual hand"
+"""Name of the camera that draws a hand."""
+
+_DEMO: Final = (
+    "It shows the signs in turn, and the robot obeys. With your own camera you drive: your browser asks for it first, "
+    "choose Allow. The pictures go only to the computer that runs handsteer."
+)
+_REFUSALS: Final = {
+    "NotAllowedError": (
+        "The browser refused the camera. Allow it by the camera or lock symbol next to the page's address, then press "
+        "Use my camera again."
+    ),
+    "NotFoundError": "The browser says: this device has no camera. Plug one in, or open this page on a phone.",
+    "NotReadableError": "Another program uses the camera. Close that program, then press Use my camera again.",
+    "insecure": (
+        "Browsers give a camera only to pages from this computer or over https. Open the page on the computer that "
+        "runs handsteer, or set up https: docs/page.md says how."
+    ),
+    "ended": "The camera was disconnected, or another program took it. Press Use my camera to go on.",
+}
+_LONGEST_WORDS: Final = 200
+
+
+def refusal(sent: object) -> str:
+    """Return what to do about a camera that a browser does not give, or that the server refused."""
+    if not isinstance(sent, dict):
+        return ""
+    why, words = sent.get("why"), sent.get("words")
+    if isinstance(why, str) and why:
+        return _REFUSALS.get(why, f"The browser gives no camera ({why[:_LONGEST_WORDS]}): try another browser.")
+    return words[:_LONGEST_WORDS] if isinstance(words, str) else ""
+
+
+class CameraOffer:
+    """Chooses between the graph's camera and the browser's, and says first that a demo hand is shown.
+
+    Args:
+        page: Shows the offer.
+        graph: The graph whose camera is chosen.
+    """
+
+    def __init__(self, page: Page, graph: RemoteGraph) -> None:
+        self._page, self._graph = page, graph
+        with box("offer") as self._box:
+            with box("intro"):
+                tag("h2", "", "This is a demo hand, not yours")
+                text("", _DEMO)
+            self._refusal = text("trouble", "").props('role="alert"')
+            with box("choices"):
+                self._browser = button("Use my camera").classes("primary")
+                self._browser.props(f'data-camera="browser" data-viewer="{page.client.id}"')
+                self._own = button("Use the robot's camera", self._use_own).props('data-camera="own"')
+                button("Keep watching").classes("keep").props('data-seen="demo"')
+        ui.on("webcam", lambda event: self._refusal.set_text(refusal(event.args)))
+
+    def update(self, state: PageState) -> None:
+        """Show ``state``."""
+        source = self._graph.state.camera_source
+        switch(self._box, "demo", on=state.camera == DEMO_CAMERA)
+        switch(self._browser, "hidden", on=source == "browser" and self._graph.state.has_browser)
+        switch(self._own, "hidden", on=source == "own")
+
+    def _use_own(self) -> None:
+        if self._page.drives():
+            self._graph.choose_camera("own")
+
+
+_STEPS: Final = (
+    (FORWARD, "Show Forward: index finger up"),
+    (FORWARD, "Hold it until the robot drives"),
+    (STOP, "Show Stop: open palm"),
+)
+_DONE: Final = "You can drive. The page lists all signs below."
+
+
+NOT_BEGUN: Final = -1
+"""Until neutral is seen: what the robot does may still be the demo hand's."""
+
+
+def steps_done(done: int, state: PageState) -> int:
+    """Return how many of the three steps are done in ``state``, after ``done`` of them or :data:`NOT_BEGUN`."""
+    happens = (
+        state.seen != FORWARD and state.mood != "driving",
+        state.seen == FORWARD,
+        state.driver == "signs" and state.mood == "driving" and not state.measured.is_rest,
+        state.sign == STOP and state.measured.is_rest,
+    )
+    return done + 1 if done < len(_STEPS) and happens[done + 1] else done
+
+
+class Coach:
+    """Three steps to drive by signs, each ticked by what really happens; for the driver, once."""
+
+    def __init__(self, page: Page) -> None:
+        self._page = page
+        self._done = NOT_BEGUN
+        self._steps: list[ui.element] = []
+        with box("coach") as self._box:
+            with ui.element("ol"):
+                for sign, words in _STEPS:
+                    with ui.element("li") as step:
+                        ui.html(DRAWN[sign][1], sanitize=False)
+                        text("", words)
+                    self._steps.append(step)
+            self._end = text("end", "").props('role="status"')
+            button("Skip", label="Skip these steps").props('data-seen="coach"')
+        self._mark()
+
+    def update(self, state: PageState, *, is_driver: bool) -> None:
+        """Show ``state``, and tick what has been done."""
+        is_live = is_driver and state.camera not in ("", DEMO_CAMERA) and not state.is_joystick
+        switch(self._box, "off", on=not is_live)
+        if self._done == len(_STEPS):
+            return
+        done = steps_done(self._done, state) if is_live else NOT_BEGUN
+        if done == self._done:
+            return
+        self._done = done
+        self._mark()
+        if done == len(_STEPS):
+            self._end.set_text(_DONE)
+            self._page.client.run_javascript("noteSeen('coach', 8000)")
+
+    def _mark(self) -> None:
+        for number, step in enumerate(self._steps):
+            switch(step, "done", on=number < self._done)
+            is_next = number == max(0, self._done)
+            step.props('aria-current="step"' if is_next else "", remove="" if is_next else "aria-current")
