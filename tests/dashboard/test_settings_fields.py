@@ -65,7 +65,7 @@ def test_what_is_wrong_is_said_in_the_words_for_a_file(tmp_path: Path, path: str
     file = tmp_path / "wrong.yaml"
     section, name = path.split(".")
     file.write_text(f"{section}: {{{name}: {text or repr('')}}}\n")
-    of_file = message(load, file).removesuffix(f" (also read: {file})")
+    of_file = message(load, file).removeprefix(f"{file}, line 1: ")
     assert message(FIELDS[path].parse, text.strip("'")) == of_file
 
 
