@@ -5,12 +5,16 @@ import numpy as np
 import pytest
 
 from handsteer.bench.courses import COURSES, open_course, place_at
+from handsteer.bench.laps import run_lap
 from handsteer.config import RobotConfig
 from handsteer.robots.course import crosses
 from handsteer.robots.simulated import SimulatedRobot
+from handsteer.robots.world import load_world, shipped_worlds
+
+SHIPPED = [name for name in shipped_worlds() if load_world(name).gates]
 
 
-@pytest.mark.parametrize("name", COURSES)
+@pytest.mark.parametrize("name", SHIPPED)
 def test_the_ideal_path_passes_all_gates_in_order_and_touches_nothing(name: str) -> None:
     course = open_course(name)
     poses = [place_at(course.path, index) for index in range(len(course.path.s))]
@@ -23,7 +27,18 @@ def test_the_ideal_path_passes_all_gates_in_order_and_touches_nothing(name: str)
     assert course.clearances[low:high].min() > 0.0
 
 
-@pytest.mark.parametrize("name", COURSES)
+def test_the_bench_drives_shipped_courses() -> None:
+    assert set(COURSES) <= set(SHIPPED)
+
+
+@pytest.mark.parametrize("name", sorted(set(SHIPPED) - {"slalom"}))
+def test_an_operator_finishes_each_course_without_a_bump(name: str) -> None:
+    lap = run_lap(name, "pad", 1)
+    assert lap.finished
+    assert (lap.missed, lap.bumps) == (0, 0)
+
+
+@pytest.mark.parametrize("name", SHIPPED)
 def test_the_robot_starts_free_of_obstacles(name: str) -> None:
     SimulatedRobot(RobotConfig(world=name))
 

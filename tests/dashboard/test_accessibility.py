@@ -20,13 +20,13 @@ def faults(page: Page) -> list[str]:
     return [f"{fault['help']}: {node['html']}" for fault in found for node in fault["nodes"]]
 
 
-@pytest.mark.parametrize("path", ["/", "/teach", "/settings"])
+@pytest.mark.parametrize("path", ["/", "/world", "/teach", "/settings"])
 def test_a_page_is_there_for_all_in_light_and_dark_and_on_a_phone(path: str) -> None:
     with visiting("Forward:600", path, camera={"fps": 5}, robot={"world": "slalom"}) as visit:
         page = visit.page
-        if path == "/":
-            page.get_by_role("button", name="Edit world").click()
-            page.get_by_role("button", name="Add a box").wait_for()
+        if path == "/world":
+            page.get_by_role("button", name="Add a box").click()
+            page.get_by_label("length [m]").wait_for()
         assert faults(page) == []
         page.locator(".theme").click()
         visit.wait_until(lambda: "body--dark" in (page.locator("body").get_attribute("class") or ""))

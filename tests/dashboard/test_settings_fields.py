@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from handsteer.config import Config, load
-from handsteer.dashboard.settings_fields import FIELDS, LONGEST_TEXT, MASK, Field
+from handsteer.dashboard.settings_fields import COMMON, FIELDS, FORM, LONGEST_TEXT, MASK, SECTION_TITLES, Field
 from handsteer.errors import ConfigError
 from handsteer.types import ACTIONS
 
@@ -175,3 +175,11 @@ def test_paths_of_keys_are_for_the_driver() -> None:
     assert field.show(Path("key.pem")) == "key.pem"
     assert field.show(Path("key.pem"), to_driver=False) == MASK
     assert field.show(None, to_driver=False) == ""
+
+
+def test_common_parameters_are_fields_and_every_section_has_a_title() -> None:
+    assert set(COMMON) <= set(FIELDS)
+    assert set(SECTION_TITLES) == set(FORM)
+    assert FIELDS["control.max_linear"].title == "Top speed"
+    assert FIELDS["robot.cmd_vel_topic"].title == "Command velocity topic"
+    assert FIELDS["signs.confirm_time"].matches("recognising counts")

@@ -48,7 +48,18 @@ def test_the_driver_sets_what_the_robot_does_and_saves_it(tmp_path: Path, monkey
         field.press("Enter")
         visit.wait_until(lambda: graph.config.control.max_linear == 0.4)
         expect(row(page, "control.max_linear")).to_contain_text("changed")
+        expect(row(page, "control.max_linear")).to_contain_text("default 1")
         expect(page.locator(".lease .role")).to_have_text("you drive")
+
+        # What differs from the default is marked, here and in the index; a link unfolds its section and leads to it.
+        index = page.get_by_role("navigation", name="Sections")
+        expect(index.get_by_role("link", name="Common")).to_contain_text("4")
+        page.set_viewport_size({"width": 1440, "height": 900})
+        expect(of(page, "landmarks.refine_new_hands")).to_be_hidden()
+        index.get_by_role("link", name="Finding hands").click()
+        expect(of(page, "landmarks.refine_new_hands")).to_be_in_viewport()
+        expect(index.get_by_role("link", name="Finding hands")).to_have_attribute("aria-current", "true")
+        expect(index.get_by_role("link", name="Common")).not_to_have_attribute("aria-current", "true")
 
         of(page, "landmarks.refine_new_hands").click()
         expect(row(page, "landmarks.refine_new_hands")).to_contain_text("waits for the next start")
@@ -57,6 +68,7 @@ def test_the_driver_sets_what_the_robot_does_and_saves_it(tmp_path: Path, monkey
         page.get_by_role("option", name="turtlebot4").click()
         expect(of(page, "robot.max_linear")).to_have_value("0.306")
 
+        index.get_by_role("link", name="Robot").click()
         of(page, "robot.cmd_vel_type").click()
         page.get_by_role("option", name="twist", exact=True).click()
         expect(row(page, "robot.cmd_vel_type")).to_contain_text("changed")
@@ -80,8 +92,14 @@ def test_the_driver_sets_what_the_robot_does_and_saves_it(tmp_path: Path, monkey
 
         page.get_by_label("Set control.max_linear to its default").click()
         expect(of(page, "control.max_linear")).to_have_value("0.306")
-        page.set_viewport_size({"width": 360, "height": 740})
-        assert page.evaluate("document.documentElement.scrollWidth") <= 360
+        expect(row(page, "robot.preset")).to_contain_text("default none")
+        for width, height in ((1440, 900), (390, 844), (360, 740)):
+            page.set_viewport_size({"width": width, "height": height})
+            assert page.evaluate("document.documentElement.scrollWidth") <= width
+        page.get_by_text("Sections", exact=True).click()
+        index.get_by_role("link", name="Foxglove").click()
+        expect(of(page, "foxglove.port")).to_be_in_viewport()
+        expect(index).to_be_hidden()  # the menu closes
         assert visit.troubles == []
 
 

@@ -131,7 +131,7 @@ def test_a_person_is_led_through_by_hand_and_pad_and_a_killed_study_continues(st
     study.press("Continue")
     study.says("Practice lap 1 of 1")
     assert not page.locator(".steer").is_visible()
-    assert not page.get_by_role("button", name="Edit world").is_visible()
+    assert not page.get_by_role("link", name="Edit world").is_visible()
     study.press("Begin lap")
     study.says("Drive through the yellow gate")
     study.press("Drive again")

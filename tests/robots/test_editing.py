@@ -8,9 +8,22 @@ from hypothesis import strategies as st
 from handsteer.config import RobotConfig
 from handsteer.errors import WorldError
 from handsteer.robots import Shape
-from handsteer.robots.editing import MOST_OBSTACLES, add, edit, footprint_m, free_place, remove
+from handsteer.robots.editing import (
+    MOST_OBSTACLES,
+    add,
+    add_gate,
+    add_wall,
+    edit,
+    footprint_m,
+    free_place,
+    heading,
+    numeric_properties,
+    put,
+    remove,
+    reorder,
+)
 from handsteer.robots.simulated import SimulatedRobot
-from handsteer.robots.world import Box, World, load_world
+from handsteer.robots.world import Box, Thing, World, load_world
 from handsteer.types import Pose2D
 
 START = Pose2D(0.0, 0.0, 0.0)
@@ -30,6 +43,17 @@ def test_a_name_that_was_given_up_is_taken_again() -> None:
     assert [thing.name for thing in world.obstacles] == ["box 2", "box 1"]
 
 
+def floor_under(thing: Thing) -> list[tuple[float, float]]:
+    """Return points all over the floor that ``thing`` covers."""
+    (x, y), (length, width, _) = thing.position, thing.extent
+    cosine, sine = math.cos(thing.yaw), math.sin(thing.yaw)
+    parts = [part / 40 - 0.5 for part in range(41)]
+    places = [(length * along, width * across) for along in parts for across in parts]
+    if thing.shape != "box":
+        places = [place for place in places if math.hypot(*place) <= length / 2]
+    return [(x + along * cosine - across * sine, y + along * sine + across * cosine) for along, across in places]
+
+
 @given(
     shapes=st.lists(st.sampled_from(SHAPES), max_size=8),
     robot=st.builds(Pose2D, st.floats(-5, 5), st.floats(-5, 5), st.floats(-4, 4)),
@@ -44,7 +68,7 @@ def test_what_is_added_touches_neither_the_robot_nor_its_start_nor_other_things(
         for x, y in ((robot.x, robot.y), (0.0, 0.0)):
             assert math.dist(place, (x, y)) > radius_m + 0.35
         for thing in world.obstacles:
-            assert math.dist(place, thing.position) > radius_m + footprint_m(thing)
+            assert min(math.dist(place, point) for point in floor_under(thing)) > radius_m
         world = add(world, shape, robot)
         assert world.obstacles[-1].position == place
 
@@ -164,3 +188,39 @@ def test_another_world_is_entered_at_its_start() -> None:
     with pytest.raises(WorldError, match="'a' overlaps the robot"):
         robot.enter(World.model_validate({"obstacles": [on_start]}))
     assert robot.world == load_world("slalom")
+
+
+def test_a_wall_goes_from_its_start_to_its_end() -> None:
+    wall = add_wall(World(), (1.0, 1.0), (1.0, 3.0)).obstacles[0]
+    assert (wall.name, wall.position, wall.extent) == ("wall 1", (1.0, 2.0), (2.0, 0.1, 0.5))
+    assert wall.yaw == pytest.approx(math.pi / 2, abs=1e-3)
+
+
+def test_walls_without_length_or_end_are_refused() -> None:
+    with pytest.raises(WorldError, match="size"):
+        add_wall(World(), (1.0, 1.0), (1.0, 1.0))
+    with pytest.raises(WorldError, match="size"):
+        add_wall(World(), (-900.0, 1.0), (900.0, 1.0))
+    with pytest.raises(WorldError, match=r"0\.1 m apart"):
+        add_gate(World(), (1.0, 1.0), (1.0, 1.0))
+
+
+def test_gates_are_moved_changed_ordered_and_removed_and_a_path_for_others_is_dropped() -> None:
+    world = add_gate(add_gate(load_world("maze"), (1.0, 4.5), (1.0, 3.5)), (2.0, 4.5), (2.0, 3.5))
+    assert [gate.name for gate in world.gates][-2:] == ["gate 1", "gate 5"]
+    assert world.path == ()
+    gate = world.gates[-1]
+    assert heading(gate) == 0.0
+    assert edit(world, "gate 5", put(gate, (3.0, 0.0)), "gates").gates[-1].left == (3.0, 0.5)
+    width, turn = numeric_properties(gate)[2:]
+    assert edit(world, "gate 5", width.fields(2.0), "gates").gates[-1].left == (2.0, 5.0)
+    turned = edit(world, "gate 5", turn.fields(90.0), "gates").gates[-1]
+    assert (turned.left, turned.right) == ((1.5, 4.0), (2.5, 4.0))
+    assert [gate.name for gate in reorder(world, "gate 5", -1).gates][-2:] == ["gate 5", "gate 1"]
+    assert reorder(reorder(world, "start", -1), "gate 5", 1) == world
+    assert "gate 5" not in [gate.name for gate in remove(world, "gate 5", "gates").gates]
+
+
+def test_what_is_added_stays_on_the_robots_side_of_long_walls() -> None:
+    x, y = add(load_world("obstacles"), "box", START).obstacles[-1].position
+    assert max(abs(x), abs(y)) < 5.0

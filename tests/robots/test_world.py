@@ -17,7 +17,7 @@ def thing(fields: str) -> str:
 
 
 def test_shipped_worlds() -> None:
-    courses = ["figure-eight", "maze", "parking", "slalom", "stop-line"]
+    courses = ["doors", "figure-eight", "maze", "parking", "roundabout", "slalom", "stop-line", "warehouse"]
     assert shipped_worlds() == sorted(["empty", "obstacles", *courses])
     assert all(load_world(name).gates for name in courses)
     assert load_world("empty").obstacles == ()

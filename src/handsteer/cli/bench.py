@@ -53,7 +53,8 @@ def bench(
     Parameters
     ----------
     course
-        Course to drive: slalom, figure-eight, stop-line, parking, maze, or a world file with gates; may be repeated.
+        Course to drive: slalom, figure-eight, stop-line, parking, maze, doors, roundabout, warehouse, or a world file
+        with gates; may be repeated. By default, the first five are driven.
     interface
         signs, signs_per_second, cruise, joystick, pad, keys, sliders or gamepad; may be repeated. All by default.
     seeds

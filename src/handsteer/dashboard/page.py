@@ -182,7 +182,7 @@ WEBCAM_PATH = "/camera"
 ASSETS_PATH = "/assets"
 
 _ASSET = {"css": '<link rel="stylesheet" href="{}">', "js": '<script src="{}" defer></script>'}
-_LINKS = (("/", "Drive"), ("/teach", "Teach"), ("/settings", "Settings"))
+_LINKS = (("/", "Drive"), ("/world", "World"), ("/teach", "Teach"), ("/settings", "Settings"))
 _PERIOD_S = 0.1
 _ACK_PATIENCE_S = 5.0
 """A browser acknowledges received messages every 3 s; after this time without one, sending pauses until the next."""

@@ -137,6 +137,8 @@ class RemoteGraph:
         steering: Runs in this process; not started.
         study: What the page leads a participant through, if anything.
         audit: Publishes what viewers do.
+        world_name: Name of the world that was loaded last.
+        saved_world: Its content when it was loaded or saved.
     """
 
     clock: Clock
@@ -144,6 +146,8 @@ class RemoteGraph:
     steering: SteeringNode
     study: Task | None
     audit: PageAudit
+    world_name: str
+    saved_world: World | None
 
     def __init__(self, pipe: Pipe) -> None:
         self.transport = PipedTransport(pipe)
@@ -166,6 +170,7 @@ class RemoteGraph:
                 self.state, self.clock, file, self.study = self._begun.result(_LOOK_PERIOD_S)
             except TimeoutError:
                 continue
+            self.world_name, self.saved_world = Path(self.config.robot.world).name, self.state.world
             self.audit = PageAudit(self.transport, self.clock)
             self.steering = make_steering(self.config, self.transport, self.clock)
             return file

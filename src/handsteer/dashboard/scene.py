@@ -1,26 +1,23 @@
 """The 3D view: a fixed world, the robot that drives in it, and a camera that follows the robot.
 
-The world is fixed so that its things can be dragged. The camera moves in the browser, so that viewers can also turn and
-zoom it.
+The camera moves in the browser, so that viewers can also turn and zoom it.
 """
 
 import logging
 import math
 from collections import defaultdict
-from collections.abc import Awaitable, Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Literal
 
 import numpy as np
 from nicegui import ui
 from nicegui.elements.scene.scene_object3d import Object3D
-from nicegui.events import SceneDragEventArguments
 from numpy.typing import NDArray
 
 from handsteer.dashboard.page import STATIC
 from handsteer.dashboard.world_state import TRAIL_POINTS, Point, Trail, WorldState
 from handsteer.errors import WorldError
 from handsteer.messages import Marker, Quaternion
-from handsteer.nodes.world_markers import OBSTACLES
 from handsteer.robots.description import Joint, Vector, joints, visuals
 
 View = Literal["orbit", "follow", "top"]
@@ -29,8 +26,6 @@ View = Literal["orbit", "follow", "top"]
 _LINES = "#2b3c63"
 _FLOOR_RADIUS_M = 12
 _LINE_WIDTH_M = 0.015
-_RING_SCALE = 1.35
-_SMALLEST_RING_M = 0.3
 _TURNING = {"continuous", "revolute"}
 
 log = logging.getLogger(__name__)
@@ -45,14 +40,11 @@ class WorldView:
         self._shown = WorldState()
         self._obstacles: dict[tuple[str, int], tuple[int, Object3D]] = {}
         self._view: View = "orbit"
-        self._editable = False
-        self._chosen: int | None = None
         with self._scene:
             with self._scene.group() as self._floor:
                 _draw_floor(self._scene)
             self._trail = TrailLine([], TRAIL_POINTS, 0.05).material("#7aa7ff", 0.75, "both").move(z=0.004)
             self._scan = ScanDots([], 0.05, 0.16).material("#ff6a5e")
-            self._ring = self._scene.ring(0.44, 0.5, 48).material("#ffd24a", 1.0, "both").visible(False)
             self._robot = RobotRig(self._scene)
         # After the scene's own handler, which would move the camera.
         self._scene.on("init", lambda: self._robot.look(self._view))
@@ -71,48 +63,11 @@ class WorldView:
             self._scan.show(world.scan)
         if world.markers is not shown.markers:
             self._show_obstacles(world.markers)
-            self._show_ring()
 
     def look(self, view: View) -> None:
         """Move the camera to the start of ``view``."""
         self._view = view
         self._robot.look(view)
-
-    def edit(self, *, on: bool) -> None:
-        """Enable or disable dragging of obstacles."""
-        self._editable = on
-        for (namespace, _), (_, shape) in self._obstacles.items():
-            shape.draggable(on and namespace == OBSTACLES)
-        self.choose(None)
-
-    def choose(self, index: int | None) -> None:
-        """Mark an obstacle with a ring, or none."""
-        self._chosen = index
-        self._show_ring()
-
-    def on_drag(self, pick: Callable[[int], None], drop: Callable[[int, float, float], Awaitable[None]]) -> None:
-        """Call ``pick`` with the index of an obstacle that is dragged, and ``drop`` with its new x and y in metres."""
-
-        def picked(event: SceneDragEventArguments) -> None:
-            if (index := self._index(event.object_id)) is not None:
-                pick(index)
-
-        async def dropped(event: SceneDragEventArguments) -> None:
-            if (index := self._index(event.object_id)) is not None:
-                await drop(index, event.x, event.y)
-
-        self._scene.on_drag_start(picked).on_drag_end(dropped)
-
-    def _index(self, object_id: object) -> int | None:
-        found = (index for (_, index), (_, shape) in self._obstacles.items() if shape.id == object_id)
-        return next(found, None) if self._editable else None
-
-    def _show_ring(self) -> None:
-        chosen = [marker for marker in self._shown.markers if (marker.ns, marker.id) == (OBSTACLES, self._chosen)]
-        self._ring.visible(bool(chosen))
-        for marker in chosen:
-            size = max(_RING_SCALE * math.hypot(marker.scale.x, marker.scale.y), _SMALLEST_RING_M)
-            self._ring.move(marker.pose.position.x, marker.pose.position.y, 0.02).scale(size, size, 1.0)
 
     def _draw_robot(self, description: str) -> None:
         for link in self._robot.children:
@@ -148,7 +103,7 @@ class WorldView:
         for key, marker in known.items():
             if key not in self._obstacles:
                 with self._scene:
-                    made = _SHAPES[marker.type](self._scene).draggable(self._editable and key[0] == OBSTACLES)
+                    made = _SHAPES[marker.type](self._scene)
                 self._obstacles[key] = (marker.type, made)
             _place(self._obstacles[key][1], marker)
 

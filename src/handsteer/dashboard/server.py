@@ -34,6 +34,7 @@ from handsteer.dashboard.settings_page import SettingsPage
 from handsteer.dashboard.socket_events import SocketEvents
 from handsteer.dashboard.study_page import StudyPage
 from handsteer.dashboard.viewers import OnDemandNode
+from handsteer.dashboard.world_page import WorldPage
 from handsteer.dashboard.world_state import VelocityHistory
 from handsteer.errors import DashboardError
 from handsteer.making import cmd_vel_topic
@@ -241,6 +242,10 @@ def _application() -> FastAPI:
     @ui.page("/settings")
     def settings() -> None:
         unconnected.add(SettingsPage(application.state.dashboard.context).client)
+
+    @ui.page("/world")
+    def world() -> None:
+        unconnected.add(WorldPage(application.state.dashboard.context).client)
 
     @ui.page("/teach")
     def teach() -> None:

@@ -94,7 +94,7 @@ class Settings:
 
     def default(self, field: Field) -> Any:
         """Return the default value, which may depend on the selected robot."""
-        return field.value_in(self._defaults)
+        return field.value_in(Config() if field in _ROBOT else self._defaults)
 
     def set(self, field: Field, text: str) -> None:
         """Set a parameter to the value of ``text``.

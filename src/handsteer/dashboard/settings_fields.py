@@ -22,6 +22,44 @@ LONGEST_TEXT = 2000
 MASK = "•••"
 """Replaces hidden parts: passwords in the address of a camera."""
 
+SECTION_TITLES: Mapping[str, str] = MappingProxyType(
+    {
+        "camera": "Camera",
+        "virtual_hand": "Virtual hand",
+        "landmarks": "Finding hands",
+        "signs": "Recognising signs",
+        "joystick": "Hand as a joystick",
+        "joy": "Gamepad messages",
+        "control": "Driving",
+        "collision_monitor": "Obstacles",
+        "robot": "Robot",
+        "teach": "Teaching signs",
+        "recording": "Recordings and audit",
+        "dashboard": "This page",
+        "foxglove": "Foxglove",
+    }
+)
+"""Titles of the configuration's sections."""
+
+COMMON: Mapping[str, str] = MappingProxyType(
+    {
+        "control.mode": "What the hand is",
+        "control.rule": "How signs drive",
+        "control.max_linear": "Top speed",
+        "control.max_angular": "Top turning speed",
+        "signs.confirm_time": "Time until a sign counts",
+        "signs.min_confidence": "Threshold of a sign",
+        "camera.source": "Camera",
+        "camera.width": "Picture width",
+        "camera.height": "Picture height",
+        "robot.preset": "Known robot",
+        "robot.world": "World",
+        "collision_monitor.enabled": "Slow down before obstacles",
+    }
+)
+"""The parameters that people change most, in the order of the page, and their titles."""
+
+_WORDS = {"cmd": "command", "id": "ID", "max": "maximum", "min": "minimum", "odom": "odometry", "vel": "velocity"}
 _FOR_THE_DRIVER = frozenset({"dashboard.certificate", "dashboard.private_key"})
 _WITH_UNIT = re.compile(r"(.*?)(?: \[([^\]]+)\])?")
 _PASSWORD = re.compile(
@@ -37,6 +75,7 @@ class Field:
         section: Its section of the configuration.
         name: Its name in the section.
         path: The full name, such as ``control.max_linear``.
+        title: A plain name, such as "Top speed".
         text: A one-line description.
         unit: The unit of its values; empty if none.
         allowed: Its range or choices in words; empty if unrestricted.
@@ -53,6 +92,7 @@ class Field:
         described = _WITH_UNIT.fullmatch(known.text)
         assert described is not None
         self.section, self.name, self.path = section, name, f"{section}.{name}"
+        self.title = COMMON.get(self.path) or _title(name)
         self.text, self.unit = described.group(1), described.group(2) or ""
         self.allowed = _allowed(known)
         self.kind = _kind(annotation, known)
@@ -62,7 +102,8 @@ class Field:
 
     def matches(self, words: str) -> bool:
         """Return whether its name or description contains each of ``words``, ignoring case."""
-        content = f"{self.path} {self.path.replace('_', ' ')} {self.text} {self.unit}".casefold()
+        names = f"{self.path} {self.path.replace('_', ' ')} {self.title} {SECTION_TITLES[self.section]}"
+        content = f"{names} {self.text} {self.unit}".casefold()
         return all(word in content for word in words.casefold().split())
 
     def value_in(self, config: Config) -> Any:
@@ -130,6 +171,11 @@ class Field:
         if len(parts) != len(shown) or _host(text) != _host(MASK.join(shown)):
             raise ConfigError(f"{self.path}: this is another address, so {MASK} should be its password")
         return "".join(part + password for part, password in zip(parts, [*passwords, ""], strict=True))
+
+
+def _title(name: str) -> str:
+    words = " ".join(_WORDS.get(word, word) for word in name.split("_"))
+    return words[0].upper() + words[1:]
 
 
 def _kind(annotation: Any, known: Description) -> FieldKind:

@@ -1,20 +1,21 @@
 """The page ``/settings``: every parameter, its meaning, and its value."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 from nicegui import ui
 
 from handsteer.dashboard.node import DashboardNode
-from handsteer.dashboard.page import Page, PageContext, box, button, card, switch, tag, text
+from handsteer.dashboard.page import Page, PageContext, box, button, switch, tag, text
 from handsteer.dashboard.settings import Settings
-from handsteer.dashboard.settings_fields import FORM, Field
+from handsteer.dashboard.settings_fields import COMMON, FIELDS, FORM, SECTION_TITLES, Field
+from handsteer.dashboard.settings_row import Row
 from handsteer.dashboard.state import PageState
-from handsteer.errors import ConfigError, HandsteerError
+from handsteer.errors import HandsteerError
 from handsteer.parameters import section_model
 
-_NONE = "none"
 _LONGEST_SEARCH = 100
-_STYLE = "outlined dense hide-bottom-space no-error-icon"
+_OPEN = frozenset({"common", "camera", "signs", "control"})
+"""Groups that are unfolded at first."""
 _ELSEWHERE = (
     "Here are no settings: this process only serves the page. Each node has its own, where it runs; `ros2 param list` "
     "and `ros2 param set` show and set them in ROS 2, `handsteer NODE --config FILE` reads them at its start."
@@ -25,7 +26,7 @@ class SettingsPage(Page):
     """Sets all parameters; viewers who do not drive can read them."""
 
     def __init__(self, context: PageContext) -> None:
-        super().__init__(context, "/settings", "settings.css")
+        super().__init__(context, "/settings", "settings.css", "settings.js")
         self._panel: SettingsPanel | None = None
         if context.settings is None:
             with ui.element("section").classes("card panel"):
@@ -53,22 +54,28 @@ class SettingsPanel:
         self._settings = settings
         self._drives = drives
         self._shown: tuple[object, ...] = ()
-        self._rows: list[_Row] = []
-        self._cards: dict[str, ui.element] = {}
+        self._groups: list[_Group] = []
         self._toolbar()
-        with box("sections"):
-            for section, fields in FORM.items():
-                with box("") as self._cards[section], card(section, "panel section"):
-                    text("meaning", (section_model(section).__doc__ or "").partition("\n")[0])
-                    self._rows += [_Row(field, settings, self._change) for field in fields]
-            self._nothing = text("nothing hidden", "No parameter has this in its name or description.")
+        with box("settings"):
+            # Unfolded by settings.js on wide screens.
+            with ui.element("details").classes("index"):
+                tag("summary", "", "Sections")
+                index = ui.element("nav").props('aria-label="Sections"')
+            with box("sections"):
+                common = tuple(FIELDS[path] for path in COMMON)
+                self._group("common", "Common", "The parameters that are changed most.", common, index)
+                for section, fields in FORM.items():
+                    meaning = (section_model(section).__doc__ or "").partition("\n")[0]
+                    rest = tuple(field for field in fields if field.path not in COMMON)
+                    self._group(section, SECTION_TITLES[section], meaning, rest, index)
+                self._nothing = text("nothing hidden", "No parameter has this in its name or description.")
 
     def update(self, *, to_driver: bool, editable: bool) -> None:
         """Show the values; they are ``editable`` if this viewer drives (``to_driver``) or the lease is free."""
         settings = self._settings
         settings.follow()
         shown = (settings.revision, to_driver, editable)
-        for row in self._rows:
+        for row in self._rows():
             if shown != self._shown or row.is_due:
                 row.update(to_driver=to_driver, editable=editable)
         if shown == self._shown:
@@ -124,137 +131,76 @@ class SettingsPanel:
 
     def _reset_all(self) -> None:
         self._change(
-            lambda: self._settings.reset(*(row.field for row in self._rows)), "all is as by default; not saved"
+            lambda: self._settings.reset(*(row.field for row in self._rows())), "all is as by default; not saved"
         )
+
+    def _group(self, name: str, title: str, meaning: str, fields: tuple[Field, ...], index: ui.element) -> None:
+        with index:
+            link = ui.link(title, f"#{name}")
+        self._groups.append(_Group(name, title, meaning, link))
+        with self._groups[-1].body:
+            if len(fields) < len(FORM.get(name, ())):
+                ui.link("Some parameters of this section are under Common.", "#common").classes("elsewhere")
+            self._groups[-1].rows += [Row(field, self._settings, self._change) for field in fields]
+
+    def _rows(self) -> Iterator[Row]:
+        return (row for group in self._groups for row in group.rows)
 
     def _filter(self) -> None:
         words = self._search.value[:_LONGEST_SEARCH] if isinstance(self._search.value, str) else ""
-        found: set[str] = set()
-        for row in self._rows:
+        found = 0
+        for row in self._rows():
             is_wanted = row.field.matches(words) and (not self._only.value or self._settings.is_changed(row.field))
             switch(row.element, "hidden", on=not is_wanted)
-            if is_wanted:
-                found.add(row.field.section)
-        for section, element in self._cards.items():
-            switch(element, "hidden", on=section not in found)
-        switch(self._nothing, "hidden", on=bool(found))
+            row.is_found = is_wanted
+            found += is_wanted
+        for group in self._groups:
+            group.update(self._settings, searched=bool(words.strip() or self._only.value))
+        switch(self._nothing, "hidden", on=found > 0)
 
 
-class _Row:
-    """One parameter: its meaning, its value, and a reset to its default."""
+class _Group:
+    """A card of rows that can be folded, and its link in the index.
 
-    def __init__(self, field: Field, settings: Settings, change: Callable[[Callable[[], object]], str | None]) -> None:
-        self.field = field
-        self._settings = settings
-        self._change = change
-        self._is_edited = False
-        self._is_updating = False
-        self._shown: tuple[object, ...] = ()
-        with box("setting") as self.element:
-            with box("about"):
-                with box("title"):
-                    tag("h3", "name", field.name)
-                    self._changed = text("mark", "changed")
-                    self._waits = text("mark waits", "waits for the next start")
-                text("doc", f"{field.text}.")
-                self._facts = text("facts", "")
-            with box("value"):
-                self._input = self._make_input()
-                if field.unit:
-                    text("unit", field.unit)
-                self._reset = button("Default", self._to_default, f"Set {field.path} to its default")
+    Args:
+        name: The section's name in the file, or ``common``; the anchor that the link leads to.
+        title: Its title.
+        meaning: A line on it.
+        link: Its link.
 
-    @property
-    def is_due(self) -> bool:
-        """Whether the value needs to be shown again."""
-        return not self._shown
+    Attributes:
+        body: Contains the rows.
+        rows: Its rows.
+    """
 
-    def update(self, *, to_driver: bool, editable: bool) -> None:
-        """Show the value, unless it is being edited."""
-        field, settings = self.field, self._settings
-        value, default = field.show(field.value_in(settings.wanted), to_driver=to_driver), settings.default(field)
-        is_changed, waits = settings.is_changed(field), settings.waits(field)
-        shown = (value, default, is_changed, waits, editable)
-        if shown == self._shown:
-            return
-        self._shown = shown
-        if not self._is_edited:
-            self._is_updating = True  # not a change by the viewer
-            if isinstance(self._input, ui.switch):
-                self._input.set_value(value == "true")
-            else:
-                self._input.set_value(value)
-            self._is_updating = False
-        self._facts.set_text(_facts(field, default))
-        switch(self._changed, "hidden", on=not is_changed)
-        switch(self._waits, "hidden", on=not waits)
-        switch(self._reset, "hidden", on=not (is_changed and editable))
-        if isinstance(self._input, ui.switch):
-            self._input.set_enabled(editable)
+    def __init__(self, name: str, title: str, meaning: str, link: ui.link) -> None:
+        self.rows: list[Row] = []
+        self._link = link
+        self._is_open = name in _OPEN
+        with ui.element("details").classes("card panel section").props(f'id="{name}"') as self._card:
+            with ui.element("summary"):
+                tag("h2", "", title)
+                if name in FORM:
+                    text("raw", name)
+                self._changed = text("mark", "")
+                text("meaning", meaning)
+            self.body = box("rows")
+        with link:
+            self._count = tag("span", "count", "")
+        self._unfold(on=self._is_open)
+
+    def update(self, settings: Settings, *, searched: bool) -> None:
+        """Show how many values differ from the default; while ``searched``, unfold it if it has a row to show."""
+        count = sum(settings.is_changed(row.field) for row in self.rows)
+        self._changed.set_text(f"{count} changed" if count else "")
+        self._count.set_text(str(count or ""))
+        is_found = any(row.is_found for row in self.rows)
+        switch(self._card, "hidden", on=not is_found)
+        switch(self._link, "hidden", on=not is_found)
+        self._unfold(on=is_found if searched else self._is_open)
+
+    def _unfold(self, *, on: bool) -> None:
+        if on:
+            self._card.props("open")
         else:
-            self._input.props["readonly"] = not editable
-
-    def _make_input(self) -> ui.input | ui.select | ui.switch:
-        field = self.field
-        label = f'aria-label="{field.path}"'
-        if field.kind == "switch":
-            return ui.switch(on_change=self._take).props(label)
-        if field.kind == "choice":
-            options = {**({"": _NONE} if field.optional else {}), **{choice: choice for choice in field.choices}}
-            select = ui.select(options, on_change=self._take).without_auto_validation()
-            return select.props(f"{_STYLE} options-dense {label}")
-        keyboard = 'inputmode="decimal"' if field.kind == "number" else ""
-        line = ui.input(validation=self._check).props(f"{_STYLE} {keyboard} {label}")
-        line.on("blur", self._take).on("keydown.enter", self._take).on("keydown.escape", self._give_up)
-        return line
-
-    @property
-    def _text(self) -> str:
-        value = self._input.value
-        return str(value).lower() if isinstance(value, bool) else value if isinstance(value, str) else ""
-
-    @property
-    def _is_current(self) -> bool:
-        return bool(self._shown) and self._text == self._shown[0]
-
-    def _check(self, _value: object) -> str | None:
-        """Validate the text at each key; return an error message, or None."""
-        if self._is_current:
-            return None
-        self._is_edited = True
-        try:
-            self.field.parse(self._text, self.field.value_in(self._settings.wanted))
-        except ConfigError as error:
-            return self._without_name(str(error))
-        return None
-
-    def _take(self) -> None:
-        if self._is_updating:
-            return
-        if self._is_current:
-            self._give_up()
-            return
-        entered = self._text
-        error = self._change(lambda: self._settings.set(self.field, entered))
-        self._give_up(error)
-        # Invalid text stays to be corrected; an invalid choice returns to the value that is set.
-        self._is_edited = error is not None and isinstance(self._input, ui.input)
-
-    def _to_default(self) -> None:
-        self._give_up(self._change(lambda: self._settings.reset(self.field)))
-
-    def _give_up(self, error: str | None = None) -> None:
-        """End the edit, show ``error``, and then the value that is set."""
-        self._is_edited = False
-        self._shown = ()
-        if not isinstance(self._input, ui.switch):
-            self._input.error = error and self._without_name(error)
-
-    def _without_name(self, error: str) -> str:
-        return error.removeprefix(self.field.path).removeprefix(": ")
-
-
-def _facts(field: Field, default: object) -> str:
-    allowed = "" if field.kind == "choice" or not field.allowed else f"{field.allowed} {field.unit}".strip()
-    when = "takes effect at once" if field.live else "read at the start"
-    return " · ".join(part for part in (allowed, f"default {field.show(default) or _NONE}", when) if part)
+            self._card.props(remove="open")

@@ -1,32 +1,48 @@
-"""The world editor: adds, changes and removes things; loads and saves worlds."""
+"""The world editor: adds, moves, changes and removes things and gates; loads and saves worlds."""
 
 import asyncio
 import math
-from collections.abc import Awaitable, Callable
-from concurrent.futures import Future
+from collections.abc import Callable
 from functools import partial
 from typing import Any, get_args
 
 from nicegui import ui
 
-from handsteer.dashboard.page import Page, box, button, switch, tag, text
-from handsteer.dashboard.remote_graph import RemoteGraph
-from handsteer.dashboard.scene import WorldView
+from handsteer.dashboard.page import box, button, switch, text
+from handsteer.dashboard.world_desk import WorldDesk
+from handsteer.dashboard.world_form import ThingForm
+from handsteer.dashboard.world_plan import Tool, WorldPlan, read_tool
 from handsteer.errors import WorldError
 from handsteer.robots import Shape
-from handsteer.robots.editing import MOST_OBSTACLES, Change, add, edit, numeric_properties, remove
-from handsteer.robots.world import Thing, World, load_world, parse_world, shipped_worlds, write_world
+from handsteer.robots.editing import (
+    MOST_OBSTACLES,
+    Change,
+    Place,
+    Section,
+    add,
+    add_gate,
+    add_wall,
+    edit,
+    place,
+    put,
+    remove,
+    reorder,
+)
+from handsteer.robots.world import Gate, Thing, World, load_world, parse_world, shipped_worlds, write_world
 from handsteer.types import Pose2D
 
 LARGEST_FILE_BYTES = 64 * 1024
 """Largest world file accepted from a browser; 200 things need half of it."""
 
-_ANSWER_TIMEOUT_S = 5.0
 _LEAST_MOVE_M = 0.02
 _FARTHEST_M = 1000
-_DEBOUNCE_MS = 600
-_DIGITS = 3
 _SELECT = "outlined dense options-dense"
+_TOOLS: dict[Tool, tuple[str, str]] = {
+    "move": ("Move", "Press a thing and drag it; press the floor and drag it to move the plan."),
+    "wall": ("Wall", "Press where the wall begins, drag to where it ends, and release."),
+    "gate": ("Gate", "Press at the gate's left post, drag to its right post, and release: it is passed forward."),
+}
+_NOTHING = "Choose a thing on the plan or in this list to change its size, place or colour."
 
 _READ_FILE = f"""async (event) => {{
     const file = event.target.files[0];
@@ -39,112 +55,150 @@ class WorldEditor:
     """Edits the world of a simulated robot, for the driver.
 
     Args:
-        page: Shows the editor.
-        graph: The robot's graph; None if it cannot be accessed.
-        view: Shows the world.
+        desk: Changes the world.
+        plan: Shows it.
+        show: Shows a message.
 
     Attributes:
-        is_open: Whether the world is being edited.
         robot: Pose of the robot; new things are placed near it.
     """
 
-    def __init__(self, page: Page, graph: RemoteGraph | None, view: WorldView) -> None:
-        self._page, self._graph, self._view = page, graph, view
-        self._chosen: str | None = None
-        self.is_open = False
+    def __init__(self, desk: WorldDesk, plan: WorldPlan, show: Callable[[str], object]) -> None:
+        self._desk, self._plan, self._show = desk, plan, show
+        self._chosen: tuple[Section, str] | None = None
+        self._world: World | None = None
         self.robot = Pose2D(0.0, 0.0, 0.0)
-        with box("editor off") as self._box:
-            with box("row"):
-                tag("h2", "", "Add")
-                for shape in get_args(Shape):
-                    button(shape.capitalize(), partial(self._add, shape), f"Add a {shape}")
-            with box("row"):
-                tag("h2", "", "Thing")
-                self._things = ui.select([], on_change=self._on_choice)
-                self._things.props(f'{_SELECT} aria-label="Which thing to change"')
-                self._delete = button("Delete", self._remove, "Delete the chosen thing")
-            self._form = _ThingForm(self._edit)
-            with box("row"):
-                tag("h2", "", "World")
-                self._worlds = ui.select(shipped_worlds(), value=shipped_worlds()[0])
-                self._worlds.props(f'{_SELECT} aria-label="Which world to load"')
-                button("Load", self._load, "Load the chosen world")
-                file = ui.element("input").classes("file")
-                file.props('type="file" accept=".yaml,.yml" aria-label="World file" tabindex="-1"')
-                file.on("change", lambda event: self._open_file(event.args), js_handler=_READ_FILE)
-                button("Open file").on("click", js_handler=f"() => getHtmlElement({file.id}).click()")
-                button("Save file", self._save)
-        self._message = text("message", "").props('role="status"')
+        plan.on("pick", lambda event: self.pick(event.args))
+        plan.on("drop", lambda event: self.drop(event.args))
+        plan.on("draw", lambda event: self.draw(event.args))
+        plan.on("key", lambda event: self._on_key(event.args))
 
-    def open(self) -> bool:
-        """Start editing; return False and show why if that is not possible."""
-        if self._changeable() is None:
-            return False
-        self._set_open("Drag things where you want them, or choose one and change its figures.", on=True)
-        self._refresh()
-        return True
+    def tools(self) -> None:
+        """Make the buttons that add things."""
+        self._tools: dict[Tool, ui.element] = {}
+        with box("row tools").props('role="group" aria-label="Tool"'):
+            for tool, (name, _) in _TOOLS.items():
+                self._tools[tool] = button(name, partial(self._use, tool))
+        self._hint = text("hint", "")
+        with box("row add").props('role="group" aria-label="Add"'):
+            for shape in get_args(Shape):
+                button(f"+ {shape.capitalize()}", partial(self._add, shape), f"Add a {shape}")
+        self._use("move")
 
-    def close(self, why: str) -> None:
-        """Stop editing, and show ``why``."""
-        self._set_open(why, on=False)
+    def properties(self) -> None:
+        """Make the inputs of the chosen thing."""
+        self._things = ui.select({}, on_change=self._on_choice)
+        self._things.props(f'{_SELECT} aria-label="Which thing to change"')
+        self._nothing = text("hint", _NOTHING)
+        self._form = ThingForm(self._edit)
+        with box("row"):
+            self._earlier = button("Earlier", partial(self._reorder, -1), "Pass this gate earlier")
+            self._later = button("Later", partial(self._reorder, 1), "Pass this gate later")
+            self._delete = button("Delete", self._remove, "Delete the chosen thing")
+        self._show_choice()
 
-    def pick(self, index: int) -> None:
-        """Select the obstacle with this index."""
-        if (world := self._world) and index < len(world.obstacles):
-            self._things.set_value(world.obstacles[index].name)
+    def files(self) -> None:
+        """Make the inputs that load and save worlds."""
+        self._worlds = ui.select(shipped_worlds(), value=shipped_worlds()[0])
+        self._worlds.props(f'{_SELECT} aria-label="Which world to load"')
+        button("Load", self._load, "Load the chosen world")
+        file = ui.element("input").classes("file")
+        file.props('type="file" accept=".yaml,.yml" aria-label="World file" tabindex="-1"')
+        file.on("change", lambda event: self._open_file(event.args), js_handler=_READ_FILE)
+        button("Open file").on("click", js_handler=f"() => getHtmlElement({file.id}).click()")
+        button("Save file", self._save)
 
-    async def drop(self, index: int, x: float, y: float) -> None:
-        """Move the obstacle with this index to x and y in metres, unless it is already there."""
-        world = self._world
-        # A browser may send anything.
-        is_place = all(isinstance(value, int | float) and abs(value) <= _FARTHEST_M for value in (x, y))
-        if world is None or index >= len(world.obstacles) or not is_place:
+    def update(self) -> None:
+        """Show the world, if it has changed."""
+        world = self._desk.world
+        if world is not None and world is not self._world:
+            fit, self._world = self._world is None, world
+            self._desk.follow()
+            self._plan.show(world, fit=fit)
+            self._refresh()
+
+    def pick(self, sent: object) -> None:
+        """Select the thing or gate that a browser names."""
+        if found := self._named(sent):
+            self._things.set_value(_key(*found))
+
+    async def drop(self, sent: object) -> None:
+        """Move the thing or gate that a browser names, unless it is already there."""
+        found, to = self._named(sent), _read_place(sent, "x", "y")
+        thing = self._thing(found)
+        if found is None or thing is None or to is None:
             return
-        thing = world.obstacles[index]
-        if math.dist(thing.position, (x, y)) > _LEAST_MOVE_M:
-            await self._edit(thing.name, {"position": (round(x, 2), round(y, 2))})
+        if math.dist(place(thing), to) > _LEAST_MOVE_M:
+            await self._edit(found[1], put(thing, to), found[0])
+        self._plan.update()  # a refused thing returns
 
-    async def restart(self) -> None:
-        """Move the robot and all things to their start positions."""
-        if graph := self._changeable():
-            await self._wait_for(graph.reset(), "The robot and all things are where they started.")
+    async def draw(self, sent: object) -> None:
+        """Add the wall or gate that a browser sends."""
+        values = sent if isinstance(sent, dict) else {}
+        start, end = (_read_place(values.get(key), 0, 1) for key in ("from", "to"))
+        tool = read_tool(values.get("tool"))
+        if start is None or end is None:
+            return
+        if tool == "wall":
+            await self._add_last(partial(add_wall, start=start, end=end), "obstacles")
+        elif tool == "gate":
+            await self._add_last(partial(add_gate, left=start, right=end), "gates")
 
-    def _set_open(self, message: str, *, on: bool) -> None:
-        self.is_open = on
-        switch(self._box, "off", on=not on)
-        self._view.edit(on=on)
-        self._message.set_text(message)
+    async def _on_key(self, sent: object) -> None:
+        actions = {"undo": self._desk.undo, "redo": self._desk.redo, "delete": self._remove}
+        if isinstance(sent, str) and sent in actions:
+            await actions[sent]()
 
-    @property
-    def _world(self) -> World | None:
-        return self._graph.state.world if self._graph else None
+    def _use(self, tool: Tool) -> None:
+        self._plan.use(tool)
+        self._hint.set_text(_TOOLS[tool][1])
+        for each, element in self._tools.items():
+            element.props(f'aria-pressed="{"true" if each == tool else "false"}"')
 
-    def _changeable(self) -> RemoteGraph | None:
-        """Return the graph if this viewer may change its world; show why not otherwise."""
-        if self._graph is None:
-            why = "The robot runs in another process; its world can be edited on the page of `handsteer run` only."
-        elif self._world is None:
-            why = "This is a real robot: its world cannot be edited, nor can it be put back by a button."
-        elif not self._page.drives():
-            why = "Somebody else drives: ask to drive before you change the world."
-        else:
-            return self._graph
-        self._message.set_text(why)
+    def _named(self, sent: object) -> tuple[Section, str] | None:
+        """Return section and name of what a browser names by its index, which may be anything."""
+        values = sent if isinstance(sent, dict) else {}
+        index, section = values.get("index"), values.get("section")
+        for each in _sections(self._desk.world):
+            things = each[1]
+            if each[0] == section and isinstance(index, int) and 0 <= index < len(things):
+                return each[0], things[index].name
+        return None
+
+    def _thing(self, key: tuple[Section, str] | None) -> Thing | Gate | None:
+        found = self._place_of(key)
+        return None if found is None else dict(_sections(self._desk.world))[found[0]][found[1]]
+
+    def _place_of(self, key: tuple[Section, str] | None) -> tuple[Section, int] | None:
+        for section, things in _sections(self._desk.world):
+            for index, thing in enumerate(things):
+                if (section, thing.name) == key:
+                    return section, index
         return None
 
     async def _add(self, shape: Shape) -> None:
-        known = {thing.name for thing in self._world.obstacles} if self._world else set()
-        if await self._change(partial(add, shape=shape, robot=self.robot), "") and self._world is not None:
-            new = [thing.name for thing in self._world.obstacles if thing.name not in known]
-            self._things.set_value(new[-1] if new else None)
-            self._message.set_text(f"Added {new[-1]}." if new else "")
+        await self._add_last(partial(add, shape=shape, robot=self.robot), "obstacles")
 
-    async def _edit(self, name: str, fields: dict[str, Any]) -> None:
-        await self._change(partial(edit, name=name, fields=fields), "")
+    async def _add_last(self, change: Change, section: Section) -> None:
+        if await self._desk.change(change):
+            self.update()
+            if things := dict(_sections(self._desk.world))[section]:
+                self._things.set_value(_key(section, things[-1].name))
+                self._show(f"Added {things[-1].name}.")
+
+    async def _edit(self, name: str, fields: dict[str, Any], section: Section | None = None) -> None:
+        section = section or (self._chosen[0] if self._chosen else "obstacles")
+        await self._desk.change(partial(edit, name=name, fields=fields, section=section))
+        self._refresh()  # the inputs show what is, not what was refused
+
+    async def _reorder(self, step: int) -> None:
+        if self._chosen:
+            await self._desk.change(partial(reorder, name=self._chosen[1], step=step))
 
     async def _remove(self) -> None:
-        if name := self._chosen:
-            await self._change(partial(remove, name=name), f"Deleted {name}.")
+        if self._chosen:
+            section, name = self._chosen
+            await self._desk.change(partial(remove, name=name, section=section), f"Deleted {name}.")
 
     async def _load(self) -> None:
         name = self._worlds.value
@@ -152,7 +206,7 @@ class WorldEditor:
             await self._enter(load_world(name), name)
 
     async def _open_file(self, sent: object) -> None:
-        if self._changeable() is None:
+        if self._desk.changeable() is None:
             return
         try:
             name, content = read_file(sent)
@@ -160,54 +214,66 @@ class WorldEditor:
             if len(world.obstacles) > MOST_OBSTACLES:
                 raise WorldError(f"{name}: has {len(world.obstacles)} things; the page takes {MOST_OBSTACLES} at most")
         except WorldError as error:
-            self._message.set_text(str(error))
+            self._show(str(error))
         else:
             await self._enter(world, name)
 
-    def _save(self) -> None:
-        if world := self._world:
-            ui.download.content(write_world(world), "world.yaml", "application/yaml")
-
     async def _enter(self, world: World, name: str) -> None:
-        if graph := self._changeable():
-            await self._wait_for(graph.enter_world(world), f"Loaded {name}; the robot is at the start.")
+        await self._desk.enter(world, name)
+        self._world = None  # shown again, to fit
+        self.update()
 
-    async def _change(self, change: Change, done: str) -> bool:
-        graph = self._changeable()
-        return graph is not None and await self._wait_for(graph.change_world(change), done)
-
-    async def _wait_for(self, change: Future[None], done: str) -> bool:
-        """Return whether ``change`` succeeded; show ``done``, or the error."""
-        try:
-            await asyncio.wait_for(asyncio.wrap_future(change), _ANSWER_TIMEOUT_S)
-        except WorldError as error:
-            done, succeeded = str(error), False
-        except TimeoutError:
-            done, succeeded = "The robot does not answer; nothing has changed.", False
-        else:
-            succeeded = True
-        self._refresh()
-        self._message.set_text(done)
-        return succeeded
+    def _save(self) -> None:
+        graph, world = self._desk.graph, self._desk.world
+        if graph is not None and world is not None:
+            name = graph.world_name.removesuffix(".yaml").removesuffix(".yml")
+            ui.download.content(write_world(world), f"{name}.yaml", "application/yaml")
+            graph.saved_world = world
 
     def _refresh(self) -> None:
-        names = [thing.name for thing in self._world.obstacles] if self._world else []
-        value = self._chosen if self._chosen in names else None
+        names = {_key(section, thing.name): thing.name for section, of in _sections(self._desk.world) for thing in of}
+        value = _key(*self._chosen) if self._place_of(self._chosen) and self._chosen else None
         if names != self._things.options or value != self._things.value:
             self._things.set_options(names, value=value)
         self._show_choice()
 
     def _on_choice(self) -> None:
-        self._chosen = self._things.value
+        found = (
+            (section, thing.name)
+            for section, things in _sections(self._desk.world)
+            for thing in things
+            if _key(section, thing.name) == self._things.value
+        )
+        self._chosen = next(found, None)
         self._show_choice()
 
     def _show_choice(self) -> None:
-        things = self._world.obstacles if self._world else ()
-        index = next((at for at, thing in enumerate(things) if thing.name == self._chosen), None)
-        self._form.show(None if index is None else things[index])
-        switch(self._delete, "hidden", on=index is None)
-        if self.is_open:
-            self._view.choose(index)
+        thing = self._thing(self._chosen)
+        self._form.show(thing)
+        self._plan.choose(self._place_of(self._chosen))
+        switch(self._nothing, "hidden", on=thing is not None)
+        switch(self._delete, "hidden", on=thing is None)
+        for each in (self._earlier, self._later):
+            switch(each, "hidden", on=not isinstance(thing, Gate))
+
+
+def _sections(world: World | None) -> tuple[tuple[Section, tuple[Thing | Gate, ...]], ...]:
+    return () if world is None else (("obstacles", world.obstacles), ("gates", world.gates))
+
+
+def _key(section: Section, name: str) -> str:
+    return f"{section} {name}"
+
+
+def _read_place(sent: Any, x: str | int, y: str | int) -> Place | None:
+    """Return x and y in metres, to 1 mm, from what a browser sent, which may be anything; None if they are no place."""
+    try:
+        values = (sent[x], sent[y])
+    except (TypeError, KeyError, IndexError):
+        return None
+    if not all(isinstance(value, int | float) and abs(value) <= _FARTHEST_M for value in values):
+        return None
+    return round(float(values[0]), 3), round(float(values[1]), 3)
 
 
 def read_file(sent: object) -> tuple[str, str]:
@@ -224,57 +290,3 @@ def read_file(sent: object) -> tuple[str, str]:
     if content is None or len(content.encode(errors="replace")) > LARGEST_FILE_BYTES:
         raise WorldError(f"{name}: is larger than {LARGEST_FILE_BYTES // 1024} kB, which no world should be")
     return name, content
-
-
-class _ThingForm:
-    """Inputs for one thing; calls ``edit`` with its name and the changed fields immediately."""
-
-    def __init__(self, edit: Callable[[str, dict[str, Any]], Awaitable[None]]) -> None:
-        self._edit = edit
-        self._shown: Thing | None = None
-        self._numbers: list[ui.number] = []
-        self._box = box("row form")
-
-    def show(self, thing: Thing | None) -> None:
-        """Show the current values of ``thing``, replacing rejected input; nothing for None."""
-        before, self._shown = self._shown, thing
-        if thing is None:
-            self._box.clear()
-            return
-        if before is None or (before.name, before.shape) != (thing.name, thing.shape):
-            self._build(thing)
-        else:  # The inputs are reused, so that the focused one keeps the focus.
-            for number, each in zip(self._numbers, numeric_properties(thing), strict=True):
-                number.set_value(round(each.value, _DIGITS))
-            self._movable.set_value(thing.movable)
-        switch(self._numbers[-1], "off", on=not thing.movable)  # a fixed thing's mass has no effect
-
-    def _build(self, thing: Thing) -> None:
-        self._box.clear()
-        with self._box:
-            self._numbers = []
-            for index, each in enumerate(numeric_properties(thing)):
-                number = ui.number(each.name, value=round(each.value, _DIGITS), step=each.step)
-                number.on_value_change(lambda event, index=index: self._on_number(index, event.value))
-                self._numbers.append(number.props(f"outlined dense debounce={_DEBOUNCE_MS}"))
-            with ui.element("label").classes("field"):
-                ui.label("colour")
-                # An attribute, not a property, which would be set again while the viewer chooses a colour.
-                colour = ui.element("input").props(f'type="color" ^value="{thing.colour}"')
-                colour.on("change", lambda event: self._on_field("colour", event.args), js_handler=_EMIT_VALUE)
-            self._movable = ui.checkbox("can be pushed", value=thing.movable)
-            self._movable.on_value_change(lambda event: self._on_field("movable", bool(event.value)))
-
-    async def _on_number(self, index: int, value: float | None) -> None:
-        if self._shown is None or value is None:
-            return
-        each = numeric_properties(self._shown)[index]
-        if round(value, _DIGITS) != round(each.value, _DIGITS):
-            await self._edit(self._shown.name, each.fields(value))
-
-    async def _on_field(self, name: str, value: object) -> None:
-        if self._shown is not None and value != getattr(self._shown, name):
-            await self._edit(self._shown.name, {name: value})
-
-
-_EMIT_VALUE = "(event) => emit(event.target.value)"

@@ -1,4 +1,4 @@
-"""The world card: the 3D view with its controls, the course, and the editor."""
+"""The world card: the 3D view with its controls, and the course."""
 
 from functools import partial
 
@@ -8,7 +8,7 @@ from handsteer.dashboard.page import UNKNOWN, Page, box, button, switch, tag, te
 from handsteer.dashboard.remote_graph import RemoteGraph
 from handsteer.dashboard.scene import View, WorldView
 from handsteer.dashboard.state import PageState
-from handsteer.dashboard.world_editor import WorldEditor
+from handsteer.dashboard.world_desk import WorldDesk
 from handsteer.dashboard.world_state import WorldState
 from handsteer.types import BUMP_S, MISS_S, CourseState, stopwatch
 
@@ -30,7 +30,6 @@ class WorldPanel:
     """
 
     def __init__(self, page: Page, graph: RemoteGraph | None) -> None:
-        self._page = page
         self._collisions: int | None = None
         self._flashes = 0
         self._views: dict[View, ui.element] = {}
@@ -44,28 +43,23 @@ class WorldPanel:
                 self._course = _CourseLine()
                 with box("tools"):
                     restart = button("Back to start")
-                    self._edit = button("Edit world", self._toggle).props('aria-expanded="false"')
+                    ui.link("Edit world", "/world").classes("text-button")
             with box("foot"):
                 self._driver = _fact("driven by")
                 self._path = _fact("path")
                 self._bumps = _fact("bumps")
-            self._editor = WorldEditor(page, graph, self._view)
-            restart.on("click", self._editor.restart)
-            self._view.on_drag(self._editor.pick, self._editor.drop)
+            message = text("message", "").props('role="status"')
+            restart.on("click", WorldDesk(page, graph, message.set_text).restart)
         self._look("orbit")
 
     def update(self, state: PageState, world: WorldState) -> None:
         """Show ``state`` and ``world``."""
         self._view.update(world)
-        self._editor.robot = world.robot
         self._driver.set_text(_DRIVERS.get(state.driver, state.driver))
         self._path.set_text(UNKNOWN if state.path_length_m is None else f"{state.path_length_m:.1f} m")
         self._bumps.set_text(UNKNOWN if state.collisions is None else str(state.collisions))
         self._course.update(state.course)
         self._flash(state.collisions)
-        node = self._page.node
-        if self._editor.is_open and node is not None and self._page.lease(node).role == "watcher":
-            self._close("Somebody else drives now, so the world is theirs to edit.")
 
     def _look(self, view: View) -> None:
         """Move the camera to the start of ``view``."""
@@ -74,19 +68,6 @@ class WorldPanel:
             self._views[name].props(f'aria-pressed="{"true" if name == view else "false"}"')
             if name == view:
                 self._caption.set_text(hint)
-
-    def _toggle(self) -> None:
-        if self._editor.is_open:
-            self._close("")
-        elif self._editor.open():
-            self._edit.props('aria-expanded="true"')
-            switch(self._stage, "editing", on=True)
-            self._look("top")
-
-    def _close(self, why: str) -> None:
-        self._editor.close(why)
-        self._edit.props('aria-expanded="false"')
-        switch(self._stage, "editing", on=False)
 
     def _flash(self, collisions: int | None) -> None:
         before, self._collisions = self._collisions, collisions

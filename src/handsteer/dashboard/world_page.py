@@ -1,0 +1,71 @@
+"""The page ``/world``: edits the world of the simulated robot, seen from above."""
+
+from nicegui import ui
+
+from handsteer.dashboard.node import DashboardNode
+from handsteer.dashboard.page import Page, PageContext, box, button, switch, tag, text
+from handsteer.dashboard.state import PageState
+from handsteer.dashboard.world_desk import WorldDesk
+from handsteer.dashboard.world_editor import WorldEditor
+from handsteer.dashboard.world_plan import WorldPlan
+
+_STOPS = "A change stops the robot, and it stays stopped until you press Reset."
+
+
+class WorldPage(Page):
+    """Edits the world; nothing on it steers the robot."""
+
+    def __init__(self, context: PageContext) -> None:
+        super().__init__(context, "/world", "world-editor.css")
+        graph = context.graph
+        with box("world-editor"):
+            with ui.element("section").classes("card panel bar"):
+                self._name = tag("h2", "name", "World")
+                self._saved = text("saved", "")
+                self._undo = button("Undo", label="Undo the last change (Ctrl-Z)")
+                self._redo = button("Redo", label="Make the change again (Ctrl-Shift-Z)")
+                files = box("files")
+                self._message = text("message", _STOPS).props('role="status"')
+            self._desk = desk = WorldDesk(self, graph, self._message.set_text)
+            self._undo.on("click", desk.undo)
+            self._redo.on("click", desk.redo)
+            with ui.element("section").classes("card plan-card").props('aria-label="Plan"'):
+                self._plan = plan = WorldPlan()
+                with box("zoom").props('role="group" aria-label="View"'):
+                    button("Fit", self._fit, "Show the whole world")
+                    button("+", lambda: plan.run_method("zoom", 0.8), "Zoom in")
+                    button("-", lambda: plan.run_method("zoom", 1.25), "Zoom out")
+            self._editor = WorldEditor(desk, plan, self._message.set_text)
+            with box("side"):
+                with ui.element("section").classes("card panel"):
+                    tag("h2", "", "Add and move")
+                    self._editor.tools()
+                    snap = ui.switch("snap to 0.1 m and 15°", value=True)
+                    snap.on_value_change(lambda event: plan.snap(on=bool(event.value)))
+                with ui.element("section").classes("card panel"):
+                    tag("h2", "", "Chosen thing")
+                    self._editor.properties()
+            with files:
+                self._editor.files()
+        if desk.world is None:
+            desk.changeable()  # shows why not
+
+    def show(self, node: DashboardNode, state: PageState) -> None:
+        """Show changes."""
+        super().show(node, state)
+        self._editor.robot = node.world.robot
+        self._plan.go(node.world.robot)
+        self._editor.update()
+        graph, world, history = self._desk.graph, self._desk.world, self._desk.history
+        if graph is not None and world is not None:
+            is_saved = graph.saved_world == world
+            self._name.set_text(graph.world_name)
+            self._saved.set_text("no unsaved changes" if is_saved else "unsaved changes")
+            switch(self._saved, "unsaved", on=not is_saved)
+        for element, target in ((self._undo, history.before()), (self._redo, history.after())):
+            element.props["disabled"] = target is None
+
+    def _fit(self) -> None:
+        if self._desk.world is not None:
+            self._plan.show(self._desk.world, fit=True)
+        self._plan.run_method("fit")
