@@ -10,7 +10,7 @@ from typing import Any
 import uvicorn
 from fastapi import FastAPI
 from nicegui import app, core, ui
-from starlette.responses import Response
+from starlette.responses import JSONResponse, Response
 from starlette.staticfiles import StaticFiles
 from starlette.websockets import WebSocket
 
@@ -26,7 +26,16 @@ from handsteer.dashboard.lesson_page import LessonPage
 from handsteer.dashboard.lessons import Lessons
 from handsteer.dashboard.limits import Connections, UnconnectedPages, limit_log
 from handsteer.dashboard.node import DashboardNode
-from handsteer.dashboard.page import ASSETS_PATH, ICON, PICTURE_PATH, STATIC, WEBCAM_PATH, PageContext
+from handsteer.dashboard.page import (
+    ASSETS_PATH,
+    ICON,
+    MANIFEST,
+    MANIFEST_PATH,
+    PICTURE_PATH,
+    STATIC,
+    WEBCAM_PATH,
+    PageContext,
+)
 from handsteer.dashboard.recordings import Recordings, serve_recordings
 from handsteer.dashboard.remote_graph import RemoteGraph
 from handsteer.dashboard.settings import DEFAULT_FILE, Settings, SettingsFile
@@ -225,6 +234,10 @@ def _application() -> FastAPI:
     @application.get(PICTURE_PATH)
     async def picture() -> Response:
         return PictureResponse(application.state.dashboard.pictures)
+
+    @application.get(MANIFEST_PATH)
+    def manifest() -> Response:
+        return JSONResponse(MANIFEST, media_type="application/manifest+json")
 
     @application.websocket(WEBCAM_PATH)
     async def webcam(socket: WebSocket) -> None:
