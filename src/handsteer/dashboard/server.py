@@ -40,6 +40,7 @@ from handsteer.dashboard.recordings import Recordings, serve_recordings
 from handsteer.dashboard.remote_graph import RemoteGraph
 from handsteer.dashboard.settings import DEFAULT_FILE, Settings, SettingsFile
 from handsteer.dashboard.settings_page import SettingsPage
+from handsteer.dashboard.sign_pictures import serve_sign_pictures
 from handsteer.dashboard.socket_events import SocketEvents
 from handsteer.dashboard.study_page import StudyPage
 from handsteer.dashboard.viewers import OnDemandNode
@@ -243,6 +244,7 @@ def _application() -> FastAPI:
     async def webcam(socket: WebSocket) -> None:
         await application.state.dashboard.webcam.serve(socket)
 
+    serve_sign_pictures(application)
     serve_recordings(application, lambda: application.state.dashboard.context.recordings)
     serve_lesson_files(application, lambda: application.state.dashboard.context.lessons)
     unconnected = UnconnectedPages()
