@@ -1,5 +1,5 @@
 from handsteer.config import ControlConfig
-from handsteer.dashboard.legend import active_entry, joystick_legend, legend
+from handsteer.dashboard.legend import active_entry, bars_of, joystick_legend, legend
 from handsteer.dashboard.state import Observed, PageState, Report, compose
 from handsteer.nodes.status import ControlStatus, RecognitionStatus, Status
 from handsteer.types import SIGNS, Velocity
@@ -65,3 +65,14 @@ def test_a_taught_sign_has_its_own_drawing() -> None:
     peace, call = legend(("Peace", "Call"), None, {"Peace": "<svg>peace</svg>"})
     assert (peace.pose, peace.drawing) == ("taught", "<svg>peace</svg>")
     assert call.drawing.startswith("<svg")
+
+
+def test_each_sign_has_a_bar_and_the_threshold_its_place() -> None:
+    def bars(status: RecognitionStatus) -> tuple[tuple[int, ...], int]:
+        return bars_of(compose(Observed({RecognitionStatus: Report(status, 0.0)}), 0.1))
+
+    signs = ("Go", "Peace")
+    seen = RecognitionStatus(signs=signs, confidences=(0.031, 0.97), min_confidence=0.7)
+    assert bars(seen) == ((4, 96), 70)
+    assert bars(RecognitionStatus(signs=signs)) == ((0, 0), 80), "no hand, and what is built in"
+    assert bars(RecognitionStatus(signs=signs, confidences=(7.0, -1.0, 0.5))) == ((100, 0), 80)

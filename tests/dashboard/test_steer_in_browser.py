@@ -16,6 +16,8 @@ from tests.dashboard.visits import NEEDS_A_BROWSER, PATIENCE_MS, Visit, visiting
 pytestmark = NEEDS_A_BROWSER
 
 FASTER, LINEAR_TO_0 = "faster forward", "Linear to 0"
+# The largest value of a line of the plot of the linear velocity.
+REACH = "line => Math.max(...(uPlot.sync('velocity').plots[0]?.data[line] ?? []), 0)"
 BLUR = "window.dispatchEvent(new Event('blur'))"
 
 
@@ -117,13 +119,12 @@ def test_letters_drive_wherever_the_focus_is_and_the_plot_shows_it(visit: Visit)
     visit.wait_until(lambda: stands(visit))
 
     def reach(line: str) -> float:
-        path = page.locator(f".axis:has-text('Linear') .plot .{line}").get_attribute("d") or ""
-        return max((50 - float(point.split(" ")[1]) for point in path.replace("M", "L").split("L") if point), default=0)
+        return float(page.evaluate(REACH, ["time", "commanded", "measured"].index(line)))
 
-    visit.wait_until(lambda: reach("commanded") > 15)
-    visit.wait_until(lambda: reach("measured") > 15)
+    visit.wait_until(lambda: reach("commanded") > 0.1)
+    visit.wait_until(lambda: reach("measured") > 0.1)
     page.reload()
-    visit.wait_until(lambda: reach("measured") > 15)
+    visit.wait_until(lambda: reach("measured") > 0.1)
     assert visit.troubles == []
 
 

@@ -20,7 +20,9 @@ from handsteer.messages import (
     Image,
     Time,
 )
+from handsteer.nodes.diagnostics import read_status
 from handsteer.nodes.recognition import HandSignRecognitionNode
+from handsteer.nodes.status import RecognitionStatus
 from handsteer.parameters import NodeParameters
 from handsteer.recognition.custom_signs import save_custom_model
 from handsteer.recognition.hand import Hand, RecordedLandmarker
@@ -245,6 +247,11 @@ def test_diagnostics_tell_what_is_seen(bench: RecognitionBench) -> None:
     seen = statuses[-1].status[0]
     assert seen.message == "Forward is shown"
     assert {value.key: value.value for value in seen.values}["sign"] == "Forward"
+    status = read_status(seen)
+    assert isinstance(status, RecognitionStatus)
+    assert len(status.confidences) == len(status.signs)
+    assert max(zip(status.confidences, status.signs, strict=True)) == (status.confidence, "Forward")
+    assert status.min_confidence == SignsConfig().min_confidence
     bench.run(2.0)
     assert statuses[-1].status[0].message.startswith("no frame for")
 

@@ -30,6 +30,7 @@ _CONTENT: Final = {
     "connect-src": "'self'",
     "worker-src": "'self'",
     "media-src": "'self' blob:",
+    "manifest-src": "'self'",
     "form-action": "'none'",
     "base-uri": "'none'",
     "frame-ancestors": "'none'",

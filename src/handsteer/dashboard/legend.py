@@ -1,18 +1,21 @@
 """The card that shows what the hand does: the signs, or the hand as a joystick, as drawings with their effect."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from types import MappingProxyType
+from typing import Final
+from urllib.parse import quote
 
 from nicegui import ui
 
-from handsteer.config import ControlConfig
+from handsteer.config import ControlConfig, SignsConfig
 from handsteer.control.explain import effect_words, figures_of
 from handsteer.dashboard.hand_drawing import taught_drawings
 from handsteer.dashboard.page import Page, box, button, switch, tag, text
 from handsteer.dashboard.settings import Settings
 from handsteer.dashboard.settings_fields import FIELDS
+from handsteer.dashboard.sign_pictures import SIGN_PATH
 from handsteer.dashboard.state import PageState
 from handsteer.errors import ConfigError
 from handsteer.types import (
@@ -113,6 +116,11 @@ def joystick_legend(rule: ControlConfig) -> tuple[LegendEntry, ...]:
     )
 
 
+_SHOW: Final = "Show how to hold the hand"
+_STEP: Final = 2
+"""Step of the bars in percent, so that small changes are not sent."""
+_DEFAULTS: Final = SignsConfig()
+
 _STEPS = {STOP: "Open the hand", GO: "Close the fist"}
 
 
@@ -144,7 +152,8 @@ class LegendPanel:
         self._shown: tuple[LegendEntry, ...] = ()
         self._signs: tuple[str, ...] = SIGNS
         self._taught: Mapping[str, str] = {}
-        self._tiles: dict[str, ui.element] = {}
+        self._tiles: dict[str, _Tile] = {}
+        self._bars: Bars = ((), 0)
         self._choices: dict[str, ui.element] = {}
         with ui.element("section").classes("card panel legend"):
             with box("head"):
@@ -166,17 +175,22 @@ class LegendPanel:
             self._title.set_text(_TITLES[mode])
             for name, choice in self._choices.items():
                 choice.props(f'aria-pressed="{str(name == mode).lower()}"')
-        if state.signs != self._signs and self._settings is not None:
-            self._signs, self._taught = state.signs, taught_drawings(self._settings.running.signs)
+        is_new = state.signs != self._signs
+        if is_new:
+            self._bars = ((), 0)
+            self._signs = state.signs
+            if self._settings is not None:
+                self._taught = taught_drawings(self._settings.running.signs)
         signs = legend(state.signs, state.rule, self._taught)
         entries = joystick_legend(state.rule) if state.rule and state.is_joystick else signs
-        if entries != self._shown:
+        if entries != self._shown or is_new:
             self._fill(entries)
         active = active_entry(state)
         if active != self._active:
             for name in {self._active, active} & self._tiles.keys():
-                switch(self._tiles[name], "seen", on=name == active)
+                switch(self._tiles[name].element, "seen", on=name == active)
             self._active = active
+        self._show_bars(state)
 
     def _choose(self, mode: str) -> None:
         """Change the mode, if this viewer drives; it is not saved to the file."""
@@ -192,21 +206,91 @@ class LegendPanel:
                 trouble = str(error)
         self._trouble.set_text(trouble)
 
+    def _show_bars(self, state: PageState) -> None:
+        """Show how confidently each sign is recognised; one message for all bars, because it changes at each update."""
+        bars = bars_of(state)
+        if bars == self._bars:
+            return
+        shown, self._bars = self._bars[0], bars
+        shares, least = bars
+        changed = [f"--bar-{n}: {share}%" for n, share in enumerate(shares) if shown[n : n + 1] != (share,)]
+        self._box.style("; ".join([*changed, f"--least: {least}%"]))
+
+    def _open(self, sign: str) -> None:
+        """Show how to hold the hand for ``sign`` in its tile, or close it again; one tile is open at a time."""
+        for name, tile in self._tiles.items():
+            tile.open(on=name == sign and not tile.is_open)
+
     def _fill(self, entries: tuple[LegendEntry, ...]) -> None:
         self._shown = entries
         self._active = ""
         self._box.clear()
         with self._box:
-            self._tiles = {entry.sign: _tile(entry) for entry in entries}
+            self._tiles = {
+                entry.sign: _Tile(
+                    entry, self._signs.index(entry.sign) if entry.sign in self._signs else None, self._open
+                )
+                for entry in entries
+            }
 
 
-def _tile(entry: LegendEntry) -> ui.element:
-    with box("sign-tile") as tile:
-        ui.html(entry.drawing, sanitize=False)
-        with box("words"):
-            text("name", entry.sign)
-            text("pose", entry.pose)
-            text("effect", entry.effect)
-            if entry.figures:
-                text("figures", entry.figures)
-    return tile
+Bars = tuple[tuple[int, ...], int]
+"""The length of the bar of each sign, and the place of the threshold, in percent."""
+
+
+def bars_of(state: PageState) -> Bars:
+    """Return the bars of ``state``: how confidently each of its signs is recognised."""
+    confidences = state.confidences or (0.0,) * len(state.signs)
+    shares = tuple(_STEP * round(100 * max(0.0, min(share, 1.0)) / _STEP) for share in confidences)
+    least = _DEFAULTS.min_confidence if state.min_confidence is None else state.min_confidence
+    return shares[: len(state.signs)], round(100 * least)
+
+
+class _Tile:
+    """One sign; opened, it shows how to hold the hand.
+
+    Args:
+        entry: What it shows.
+        number: The number of its bar; None without one.
+        on_click: Called with the sign.
+    """
+
+    def __init__(self, entry: LegendEntry, number: int | None, on_click: Callable[[str], None]) -> None:
+        self.is_open = False
+        self._entry = entry
+        with ui.element("button" if number is not None else "div").classes("sign-tile") as self.element:
+            self._picture = box("picture")
+            with self._picture:
+                ui.html(entry.drawing, sanitize=False)
+            with box("words"):
+                text("name", entry.sign)
+                text("pose", entry.pose)
+                text("effect", entry.effect)
+                if entry.figures:
+                    text("figures", entry.figures)
+                if number is not None:
+                    with box("meter live").style(f"--share: var(--bar-{number}, 0%)"):
+                        box("")
+                        ui.element("i")
+        if number is not None:
+            self.element.props(f'type="button" aria-expanded="false" title="{_SHOW}"')
+            self.element.on("click", lambda: on_click(entry.sign))
+
+    def open(self, *, on: bool) -> None:
+        """Show the virtual hand in the place of the drawing, or the drawing again; a taught sign has its drawing."""
+        if on == self.is_open:
+            return
+        self.is_open = on
+        switch(self.element, "open", on=on)
+        self.element.props(f'aria-expanded="{str(on).lower()}"')
+        if self._entry.sign not in DRAWN:
+            return
+        self._picture.clear()
+        with self._picture:
+            ui.html(_animation(self._entry.sign) if on else self._entry.drawing, sanitize=False)
+
+
+def _animation(sign: str) -> str:
+    path = f"{SIGN_PATH}/{quote(sign)}.webp"
+    still = f'<source media="(prefers-reduced-motion: reduce)" srcset="{path}?still=true">'
+    return f'<picture>{still}<img src="{path}" alt="" width="120" height="120"></picture>'

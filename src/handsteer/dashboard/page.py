@@ -181,6 +181,33 @@ PICTURE_PATH = "/camera.mjpg"
 WEBCAM_PATH = "/camera"
 ASSETS_PATH = "/assets"
 
+MANIFEST_PATH = "/handsteer.webmanifest"
+MANIFEST = {
+    "name": "handsteer",
+    "short_name": "handsteer",
+    "description": "Drive a mobile robot with your hand signs",
+    "id": "/",
+    "start_url": "/",
+    "scope": "/",
+    "display": "standalone",
+    "background_color": "#eef1f8",
+    "theme_color": "#eef1f8",
+    "icons": [
+        {"src": f"{ASSETS_PATH}/icons/icon-192.png", "sizes": "192x192", "type": "image/png"},
+        {"src": f"{ASSETS_PATH}/icons/icon-512.png", "sizes": "512x512", "type": "image/png"},
+        {"src": f"{ASSETS_PATH}/icons/icon-full.png", "sizes": "512x512", "type": "image/png", "purpose": "maskable"},
+    ],
+}
+"""With this browsers install the page as an app; it has no token, because the browser keeps that as a cookie."""
+
+# With credentials: the cookie gives access. The colours are those of the ground, light and dark.
+_INSTALLABLE = (
+    f'<link rel="manifest" href="{MANIFEST_PATH}" crossorigin="use-credentials">'
+    f'<link rel="apple-touch-icon" href="{ASSETS_PATH}/icons/icon-full.png">'
+    '<meta name="theme-color" content="#eef1f8" media="(prefers-color-scheme: light)">'
+    '<meta name="theme-color" content="#0a0f1c" media="(prefers-color-scheme: dark)">'
+)
+
 _ASSET = {"css": '<link rel="stylesheet" href="{}">', "js": '<script src="{}" defer></script>'}
 _LINKS = (("/", "Drive"), ("/world", "World"), ("/teach", "Teach"), ("/settings", "Settings"))
 _PERIOD_S = 0.1
@@ -238,6 +265,7 @@ class Page:
         self.client.on_disconnect(self._leave)
         self.client.on_delete(self._leave)
         self.client.on_delete(self._forget)
+        ui.add_head_html(_INSTALLABLE)
         for name in ("page.css", "page.js", *assets):
             ui.add_head_html(_ASSET[name.rpartition(".")[2]].format(f"{ASSETS_PATH}/{name}"))
         self._top(path)

@@ -10,7 +10,7 @@ from typing import Any
 import uvicorn
 from fastapi import FastAPI
 from nicegui import app, core, ui
-from starlette.responses import Response
+from starlette.responses import JSONResponse, Response
 from starlette.staticfiles import StaticFiles
 from starlette.websockets import WebSocket
 
@@ -26,11 +26,21 @@ from handsteer.dashboard.lesson_page import LessonPage
 from handsteer.dashboard.lessons import Lessons
 from handsteer.dashboard.limits import Connections, UnconnectedPages, limit_log
 from handsteer.dashboard.node import DashboardNode
-from handsteer.dashboard.page import ASSETS_PATH, ICON, PICTURE_PATH, STATIC, WEBCAM_PATH, PageContext
+from handsteer.dashboard.page import (
+    ASSETS_PATH,
+    ICON,
+    MANIFEST,
+    MANIFEST_PATH,
+    PICTURE_PATH,
+    STATIC,
+    WEBCAM_PATH,
+    PageContext,
+)
 from handsteer.dashboard.recordings import Recordings, serve_recordings
 from handsteer.dashboard.remote_graph import RemoteGraph
 from handsteer.dashboard.settings import DEFAULT_FILE, Settings, SettingsFile
 from handsteer.dashboard.settings_page import SettingsPage
+from handsteer.dashboard.sign_pictures import serve_sign_pictures
 from handsteer.dashboard.socket_events import SocketEvents
 from handsteer.dashboard.study_page import StudyPage
 from handsteer.dashboard.viewers import OnDemandNode
@@ -227,10 +237,15 @@ def _application() -> FastAPI:
     async def picture() -> Response:
         return PictureResponse(application.state.dashboard.pictures)
 
+    @application.get(MANIFEST_PATH)
+    def manifest() -> Response:
+        return JSONResponse(MANIFEST, media_type="application/manifest+json")
+
     @application.websocket(WEBCAM_PATH)
     async def webcam(socket: WebSocket) -> None:
         await application.state.dashboard.webcam.serve(socket)
 
+    serve_sign_pictures(application)
     serve_recordings(application, lambda: application.state.dashboard.context.recordings)
     serve_lesson_files(application, lambda: application.state.dashboard.context.lessons)
     unconnected = UnconnectedPages()

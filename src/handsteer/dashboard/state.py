@@ -127,6 +127,8 @@ class PageState:
         sign: The confirmed sign.
         seen: The sign in the newest frame alone.
         confidence: Of ``seen``, 0 to 1.
+        confidences: Of each of ``signs`` in the newest frame, 0 to 1, in the same order; empty if unknown.
+        min_confidence: The smallest confidence that counts; None if unknown.
         handedness: ``Left``, ``Right`` or empty.
         signs: The signs that can be recognised, as last reported.
         rule: Configures the signs' actions, as last reported by the control; None if unknown.
@@ -177,6 +179,8 @@ class PageState:
     course: CourseState | None = None
     engaging: float | None = None
     warnings: tuple[str, ...] = ()
+    confidences: tuple[float, ...] = ()
+    min_confidence: float | None = None
 
     @property
     def is_joystick(self) -> bool:
@@ -220,6 +224,8 @@ def compose(observed: Observed, now_s: float, viewers: Viewers = NOBODY) -> Page
         max_angular_radps=control.rule.max_angular if control.rule else None,
         course=robot.course,
         engaging=None if control.engaged or stopped else max(0.0, min(control.engage_progress, 1.0)),
+        confidences=seen.confidences,
+        min_confidence=seen.min_confidence,
         warnings=tuple(dict.fromkeys(warning for warning in (control.warning, robot.warning) if warning)),
     )
 

@@ -276,6 +276,8 @@ class HandSignRecognitionNode(Node):
             signs=self._recognizer.signs,
             seen=seen.seen,
             confidence=round(seen.confidence, 2),
+            confidences=tuple(round(each, 2) for each in self._recognizer.confidences(seen)),
+            min_confidence=self._config.min_confidence,
             progress=round(seen.progress, 2),
             handedness=seen.hand.handedness if seen.hand else "",
             no_hand_s=round(now - (self._last_hand_s or 0.0), 1) if is_hand_lost else None,

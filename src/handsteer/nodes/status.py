@@ -87,6 +87,8 @@ class RecognitionStatus(Status):
         signs: The signs that can be recognised.
         seen: The sign in the newest frame alone; None without frames.
         confidence: Of ``seen``, 0 to 1.
+        confidences: Of each of ``signs`` in the newest frame, 0 to 1, in the same order; empty without a hand.
+        min_confidence: The smallest confidence that counts.
         progress: Progress of confirming ``seen``, 0 to 1.
         handedness: Of the active hand; empty if there is none.
         no_hand_s: Time since a hand was seen; None if one is in view, or none was seen yet.
@@ -105,6 +107,8 @@ class RecognitionStatus(Status):
     signs: tuple[str, ...] = ()
     seen: str | None = None
     confidence: float = 0.0
+    confidences: tuple[float, ...] = ()
+    min_confidence: float | None = None
     progress: float = 0.0
     handedness: Handedness | Literal[""] = ""
     no_hand_s: float | None = None

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from handsteer.config import Config, SignsConfig
 from handsteer.recognition.custom_signs import CustomClassifier, load_custom_model
 from handsteer.recognition.debouncer import Debouncer, Evidence
+from handsteer.recognition.features import PALM, directions
 from handsteer.recognition.hand import CONNECTIONS, Classifier, Hand, Landmarker, SignGuess
 from handsteer.recognition.hand_selector import HandPosition, HandSelector
 from handsteer.recognition.landmark_models import find_pair
@@ -113,6 +114,13 @@ class Recognizer:
         """The recognised signs, without ``NONE``."""
         return self._classifier.signs
 
+    def confidences(self, recognition: Recognition) -> tuple[float, ...]:
+        """Return the confidence of each of :attr:`signs` in ``recognition``, 0 to 1; empty without a hand."""
+        if recognition.hand is None:
+            return ()
+        chances, confidence = recognition.likelihoods, self._classifier.confidence
+        return tuple(confidence(sign, chances.get(sign, 0.0)) for sign in self.signs)
+
     def recognize(self, image: NDArray[np.uint8]) -> Recognition:
         """Return the recognition of one picture alone; resets the stream before and after.
 
@@ -191,8 +199,14 @@ class Recognizer:
 
 
 def annotate(image: NDArray[np.uint8], recognition: Recognition) -> NDArray[np.uint8]:
-    """Return a mirrored copy of ``image``, (height, width, 3) uint8, BGR, with the hand's skeleton and the sign."""
+    """Return a mirrored copy of ``image``, (height, width, 3) uint8, BGR, that shows what was recognised.
+
+    It has the hand's skeleton, the palm's direction, the sign, and a ring around the palm that fills while the sign is
+    confirmed.
+    """
     picture = draw_hand(image, recognition.hand)
+    if recognition.hand is not None:
+        _draw_palm(picture, recognition.hand, recognition)
     if recognition.seen != NONE:
         _draw_label(picture, recognition)
     return picture
@@ -206,11 +220,33 @@ def draw_hand(image: NDArray[np.uint8], hand: Hand | None) -> NDArray[np.uint8]:
     return picture
 
 
-def _draw_skeleton(picture: NDArray[np.uint8], pixels: NDArray[np.float32]) -> None:
-    height, width = picture.shape[:2]
-    x = width - 1 - pixels[:, 0]
+def _mirrored(picture: NDArray[np.uint8], pixels: NDArray[np.floating]) -> list[tuple[int, int]]:
+    """Return the places of (n, 2) pixels in the mirrored ``picture``."""
+    width = picture.shape[1]
+    points = np.stack([width - 1 - pixels[:, 0], pixels[:, 1]], axis=1)
     # Landmarks may lie far outside the frame; OpenCV requires coordinates that fit 16 bits.
-    points = np.stack([x, pixels[:, 1]], axis=1).clip(-width, 2 * width).round().astype(int).tolist()
+    return [(x, y) for x, y in points.clip(-width, 2 * width).round().astype(int).tolist()]
+
+
+def _draw_palm(picture: NDArray[np.uint8], hand: Hand, recognition: Recognition) -> None:
+    """Draw the palm's direction, and around the palm the progress of confirming the sign."""
+    pixels = hand.pixels[:, :2]
+    direction = directions(pixels[None])[2][0]
+    palm = pixels[PALM].mean(axis=0)
+    centre, tip = _mirrored(picture, np.stack([palm, palm + 0.55 * direction]))
+    thickness = max(1, picture.shape[0] // 240)
+    colour = _colour(recognition) if recognition.seen != NONE else _BONE
+    cv2.arrowedLine(picture, centre, tip, colour, thickness, cv2.LINE_AA, tipLength=0.3)
+    radius = min(round(0.34 * float(np.hypot(*direction))), picture.shape[0])
+    if recognition.seen != NONE and radius > 0:
+        share = 1.0 if recognition.sign == recognition.seen else recognition.progress
+        cv2.circle(picture, centre, radius, (60, 60, 60), thickness, cv2.LINE_AA)
+        cv2.ellipse(picture, centre, (radius, radius), -90, 0, 360 * share, colour, 2 * thickness, cv2.LINE_AA)
+
+
+def _draw_skeleton(picture: NDArray[np.uint8], pixels: NDArray[np.float32]) -> None:
+    points = _mirrored(picture, pixels)
+    height = picture.shape[0]
     thickness = max(1, height // 240)
     for begin, end in CONNECTIONS:
         cv2.line(picture, points[begin], points[end], _BONE, thickness, cv2.LINE_AA)
@@ -220,9 +256,12 @@ def _draw_skeleton(picture: NDArray[np.uint8], pixels: NDArray[np.float32]) -> N
 
 def _draw_label(picture: NDArray[np.uint8], recognition: Recognition) -> None:
     scale = picture.shape[0] / 480
-    colour = _COUNTS if recognition.sign == recognition.seen else _WAITS
-    text = f"{recognition.seen} {recognition.confidence:.0%}"
+    colour, text = _colour(recognition), recognition.seen
     origin = (round(16 * scale), round(40 * scale))
     # An anti-aliased outline would double the drawing time for little visible effect.
     for ink, thickness, line in (((0, 0, 0), 5, cv2.LINE_8), (colour, 2, cv2.LINE_AA)):
         cv2.putText(picture, text, origin, cv2.FONT_HERSHEY_SIMPLEX, scale, ink, max(1, round(thickness * scale)), line)
+
+
+def _colour(recognition: Recognition) -> tuple[int, int, int]:
+    return _COUNTS if recognition.sign == recognition.seen else _WAITS
