@@ -17,10 +17,12 @@ from starlette.types import Receive, Scope, Send
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from handsteer.clock import Clock
+from handsteer.dashboard.camera_choices import CameraChoices
 from handsteer.dashboard.first_visit import DEMO_CAMERA, CameraOffer, Coach
 from handsteer.dashboard.legend import DRAWN
 from handsteer.dashboard.page import PICTURE_PATH, Page, box, sentence, switch, text
 from handsteer.dashboard.remote_graph import RemoteGraph
+from handsteer.dashboard.settings import Settings
 from handsteer.dashboard.socket_events import is_page_of
 from handsteer.dashboard.state import PageState
 from handsteer.dashboard.viewers import OnDemandNode
@@ -192,13 +194,16 @@ class CameraPanel:
     Args:
         page: Shows the panel.
         graph: The graph whose camera can be chosen; None if there is no choice.
+        settings: Those of the graph, to be changed next to the picture; None if they cannot.
         coaches: Whether a new driver is shown how to drive.
 
     Attributes:
         stage: Holds the picture and its overlays.
     """
 
-    def __init__(self, page: Page, graph: RemoteGraph | None, *, coaches: bool = False) -> None:
+    def __init__(
+        self, page: Page, graph: RemoteGraph | None, *, settings: Settings | None = None, coaches: bool = False
+    ) -> None:
         self._page = page
         with ui.element("section").classes("card viewer camera"):
             with box("stage") as self.stage:
@@ -219,6 +224,7 @@ class CameraPanel:
                     self._confidence = box("")
                 self._percent = text("percent", "")
                 self._hand = text("hand", "")
+                self._choices = CameraChoices(page, settings) if settings is not None else None
 
     def update(self, state: PageState) -> None:
         """Show ``state``."""
@@ -239,6 +245,8 @@ class CameraPanel:
         self._no_picture.set_text(sentence(state.no_picture))
         switch(self._veil, "off", on=not state.no_picture)
         self._caption.set_text("demo hand" if state.camera == DEMO_CAMERA else "as in a mirror")
+        if self._choices is not None:
+            self._choices.update(state)
         if self._offer is not None:
             self._offer.update(state)
         if self._coach is not None and (node := self._page.node):

@@ -23,7 +23,7 @@ class DrivePage(Page):
             context, "/", "drive.css", "steer.css", "steer.js", "sticks.js", "world.css", "webcam.js", *_PLOTS
         )
         graph = context.graph
-        self._camera = CameraPanel(self, graph, coaches=True)
+        self._camera = CameraPanel(self, graph, settings=context.settings, coaches=True)
         self._world = WorldPanel(self, graph)
         with box("panels"):
             self._velocity = VelocityPanel()

@@ -15,18 +15,47 @@ async function giveCamera(viewer) {
     sayCamera("off", { why: "insecure" });
     return;
   }
-  giving = { video: document.createElement("video") };
+  const mine = giving = { video: document.createElement("video") };
   try {
-    const wanted = { width: { ideal: 640 }, height: { ideal: 480 }, frameRate: { ideal: 30 } };
-    giving.stream = await navigator.mediaDevices.getUserMedia({ video: wanted, audio: false });
-    Object.assign(giving.video, { muted: true, playsInline: true, srcObject: giving.stream });
-    await giving.video.play();
+    await openCamera();
   } catch (problem) {
-    keepCamera({ why: problem.name });
+    if (giving === mine) keepCamera({ why: problem.name });
     return;
   }
-  for (const track of giving.stream.getTracks()) track.onended = () => keepCamera({ why: "ended" });
-  sendFrames(viewer);
+  if (giving === mine) sendFrames(viewer);
+}
+
+// Opens the chosen camera of this device, and then releases the one before; without it another is taken.
+async function openCamera() {
+  const device = document.getElementById("browser-camera")?.value;
+  const [width, height] = (document.getElementById("browser-size")?.value ?? "640x480").split("x");
+  const wanted = { width: { ideal: +width }, height: { ideal: +height }, frameRate: { ideal: 30 } };
+  if (device) wanted.deviceId = { ideal: device };
+  const mine = giving, before = mine.stream;
+  const stream = await navigator.mediaDevices.getUserMedia({ video: wanted, audio: false });
+  if (giving !== mine) {
+    for (const track of stream.getTracks()) track.stop();
+    return;
+  }
+  mine.stream = stream;
+  for (const track of before?.getTracks() ?? []) {
+    track.onended = null;
+    track.stop();
+  }
+  Object.assign(mine.video, { muted: true, playsInline: true, srcObject: stream });
+  await mine.video.play();
+  for (const track of stream.getTracks()) track.onended = () => keepCamera({ why: "ended" });
+  listCameras();
+}
+
+// The names are known only once a camera was allowed.
+async function listCameras() {
+  const select = document.getElementById("browser-camera");
+  if (!select || !navigator.mediaDevices?.enumerateDevices) return;
+  const chosen = select.value;
+  const found = (await navigator.mediaDevices.enumerateDevices()).filter((each) => each.kind === "videoinput" && each.deviceId && each.label);
+  select.replaceChildren(select.options[0], ...found.map((each) => new Option(each.label, each.deviceId)));
+  select.value = found.some((each) => each.deviceId === chosen) ? chosen : "";
 }
 
 function sendFrames(viewer) {
@@ -81,5 +110,8 @@ document.addEventListener("click", (event) => {
   if (!button) return;
   if (button.dataset.camera === "browser") giveCamera(button.dataset.viewer);
   else keepCamera();
+});
+document.addEventListener("change", (event) => {
+  if (["browser-camera", "browser-size"].includes(event.target.id) && giving) openCamera().catch((problem) => keepCamera({ why: problem.name }));
 });
 window.addEventListener("pagehide", () => keepCamera());

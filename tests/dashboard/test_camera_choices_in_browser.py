@@ -1,0 +1,51 @@
+"""The choices next to the picture in a real browser: another camera or size while it is in use, and the threshold."""
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from tests.dashboard.visits import NEEDS_A_BROWSER, visiting
+
+pytestmark = NEEDS_A_BROWSER
+
+NAMES = "[...document.querySelectorAll('#browser-camera option')].slice(1).map((each) => each.textContent)"
+
+
+def test_the_browsers_camera_and_its_size_can_change_while_it_is_in_use(tmp_path: Path) -> None:
+    clip, random = tmp_path / "grey.mjpeg", np.random.default_rng(0)
+    pictures = (random.integers(80, 120, (480, 640, 3)).astype(np.uint8) for _ in range(5))
+    clip.write_bytes(b"".join(cv2.imencode(".jpg", each)[1].tobytes() for each in pictures))
+    with visiting("NONE:600", webcam=clip, camera={"fps": 5}) as visit:
+        page, camera = visit.page, visit.graph.camera
+        page.get_by_role("button", name="Use my camera").click()
+        page.locator(".camera-choices summary").click()
+        visit.wait_until(lambda: len(page.evaluate(NAMES)) > 0)
+        visit.wait_until(lambda: visit.graph.cameras.browser.is_given)
+        for choice, value in (("browser-camera", page.evaluate(NAMES)[0]), ("browser-size", "320x240")):
+            page.locator(f"#{choice}").select_option(label=value)
+            page.wait_for_function("size => giving.video.videoWidth === size", arg=320 if value == "320x240" else 640)
+            frames = camera.frames
+            visit.wait_until(lambda frames=frames: camera.frames > frames + 3)  # type: ignore[misc]
+            assert visit.graph.cameras.source == "browser"
+        assert visit.troubles == []
+
+
+def test_the_threshold_changes_at_once_and_only_for_the_driver() -> None:
+    with visiting("Forward:600", camera={"fps": 5}) as visit:
+        page = visit.page
+        page.locator(".camera-choices summary").click()
+        visit.wait_until(lambda: visit.text(".lease .role") == "you drive")
+        slider = page.locator(".choices-panel .q-slider__track-container")
+        slider.press("ArrowRight")
+        visit.wait_until(lambda: visit.graph.config.signs.min_confidence == 0.85)
+        page.get_by_text("A sign counts from a confidence of 85%").wait_for()
+
+        other = visit.another_page()
+        other.goto(page.url)
+        other.locator(".camera-choices summary").click()
+        other.get_by_text("A sign counts from a confidence of 85%").wait_for()
+        other.locator(".choices-panel .q-slider__track-container").press("ArrowLeft")
+        other.get_by_text("Only the driver can change it").wait_for()
+        assert visit.graph.config.signs.min_confidence == 0.85
+        assert visit.troubles == []
