@@ -46,7 +46,7 @@ def stop_is_in_view_wherever(page: Page) -> bool:
     return True
 
 
-@pytest.mark.parametrize("path", ["/", "/teach", "/settings", "/study"])
+@pytest.mark.parametrize("path", ["/", "/world", "/teach", "/settings", "/study"])
 def test_stop_and_state_are_in_view_at_every_scroll_position_and_no_page_is_too_wide(path: str) -> None:
     with visiting("Forward:600", path, camera={"fps": 5}) as visit:
         page = visit.page

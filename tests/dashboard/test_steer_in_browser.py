@@ -103,7 +103,7 @@ def test_a_slider_drives_until_it_is_at_zero_or_the_page_is_left(visit: Visit) -
     page.keyboard.press("Space")
     visit.wait_until(lambda: visit.text(".banner .headline") == "Stopped" and slider(page) == 0)
     assert visit.text(".banner .reason") == "Stopped by you, until you reset it"
-    assert page.get_by_role("button", name=FASTER).is_disabled()
+    assert page.get_by_role("button", name=FASTER, exact=True).is_disabled()
     visit.wait_until(lambda: stands(visit))
     assert visit.troubles == []
 
@@ -137,7 +137,7 @@ def test_sliders_of_who_watches_do_nothing(visit: Visit) -> None:
     second.wait_for_timeout(500)
     assert stands(visit), "who does not drive is not taken at a letter's word"
     second.keyboard.up("KeyW")
-    assert second.get_by_role("button", name=FASTER).is_disabled()
+    assert second.get_by_role("button", name=FASTER, exact=True).is_disabled()
     assert second.locator(".slider.linear .q-slider").get_attribute("aria-disabled") == "true"
     second.evaluate(
         """() => {

@@ -32,7 +32,7 @@ class CameraChoices:
             tag("summary", "text-button", "Adjust")
             with box("choices-panel"):
                 with ui.element("label"):
-                    tag("span", "", "Camera of this device, for Use my camera")
+                    tag("span", "", "Camera of this device")
                     with ui.element("select").props('id="browser-camera"'):
                         tag("option", "", "The browser chooses").props('value=""')
                 text("note", _DEVICES)

@@ -72,8 +72,11 @@ function sendFrames(viewer) {
   };
   const send = async () => {
     const capturedMs = performance.now();
-    const picture = await createImageBitmap(video);
-    sender.postMessage({ picture, capturedMs }, [picture]);
+    // While another camera is opened, there may be no picture.
+    const picture = await createImageBitmap(video).catch(() => null);
+    if (giving?.sender !== sender) return;
+    if (picture) sender.postMessage({ picture, capturedMs }, [picture]);
+    else whenNew(video, send);
   };
   sayCamera("on");
   noteSeen("demo");
