@@ -8,6 +8,9 @@ from typing import Final
 STALE_S: Final = 0.35
 """Older frames, signs and steering commands are ignored. In seconds, as all that follow."""
 
+HOLD_TIMEOUT_S: Final = 0.3
+"""Steering from the page or from another program ends when it has not been repeated for this long."""
+
 ROBOT_S: Final = 0.4
 """A robot without commands for this long brakes on its own; longer than :data:`STALE_S`, so that a zero comes first."""
 

@@ -8,7 +8,7 @@ from handsteer.clock import SteppedClock
 from handsteer.config import ControlConfig
 from handsteer.control.explain import Reason
 from handsteer.dashboard.audit import PageAudit
-from handsteer.dashboard.node import HOLD_TIMEOUT_S, DashboardNode
+from handsteer.dashboard.node import DashboardNode
 from handsteer.dashboard.viewers import OnDemandNode
 from handsteer.errors import TransportError
 from handsteer.messages import (
@@ -42,6 +42,7 @@ from handsteer.nodes.diagnostics import write_status
 from handsteer.nodes.status import CameraStatus, ControlStatus, RecognitionStatus, RobotStatus, Status
 from handsteer.nodes.steering import SteeringNode
 from handsteer.robots.description import robot_description
+from handsteer.timeouts import HOLD_TIMEOUT_S
 from handsteer.transports.base import Publisher, Received
 from handsteer.transports.in_process import InProcessTransport
 from handsteer.types import CourseState, Pose2D, Velocity

@@ -13,11 +13,12 @@ from handsteer.clock import RealClock
 from handsteer.config import FoxgloveConfig, load
 from handsteer.dashboard.page_process import PageProcess
 from handsteer.graph import Graph
-from handsteer.live.driving import CONFIRM_S, HOLD_TIMEOUT_S, Driving, OwnSeat, SharedSeat
+from handsteer.live.driving import CONFIRM_S, Driving, OwnSeat, SharedSeat
 from handsteer.live.process import LiveProcess
 from handsteer.live.server import LiveServer
 from handsteer.messages import AUDIT, STEERING_CMD_VEL, Twist, Vector3
 from handsteer.nodes.steering import SteeringNode
+from handsteer.timeouts import HOLD_TIMEOUT_S
 from handsteer.transports.in_process import InProcessTransport
 from handsteer.transports.ros2.encoding import encode
 from handsteer.types import ZERO, Velocity

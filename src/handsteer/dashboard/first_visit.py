@@ -8,7 +8,7 @@ from typing import Final
 from nicegui import ui
 
 from handsteer.dashboard.legend import DRAWN
-from handsteer.dashboard.page import Page, box, button, switch, tag, text
+from handsteer.dashboard.page import Page, box, button, read_words, switch, tag, text
 from handsteer.dashboard.remote_graph import RemoteGraph
 from handsteer.dashboard.state import PageState
 from handsteer.types import FORWARD, STOP
@@ -33,17 +33,17 @@ _REFUSALS: Final = {
     ),
     "ended": "The camera was disconnected, or another program took it. Press Use my camera to go on.",
 }
-_LONGEST_WORDS: Final = 200
+_LONGEST_REASON: Final = 200
 
 
 def refusal(sent: object) -> str:
     """Return what to do about a camera that a browser does not give, or that the server refused."""
     if not isinstance(sent, dict):
         return ""
-    why, words = sent.get("why"), sent.get("words")
+    why = sent.get("why")
     if isinstance(why, str) and why:
-        return _REFUSALS.get(why, f"The browser gives no camera ({why[:_LONGEST_WORDS]}): try another browser.")
-    return words[:_LONGEST_WORDS] if isinstance(words, str) else ""
+        return _REFUSALS.get(why, f"The browser gives no camera ({why[:_LONGEST_REASON]}): try another browser.")
+    return read_words(sent)
 
 
 class CameraOffer:

@@ -103,11 +103,6 @@ class Lessons:
         return self._config().signs.model or self._plan.model
 
     @property
-    def dataset_path(self) -> Path:
-        """The file that takes are written to."""
-        return self._plan.dataset
-
-    @property
     def takes_wanted(self) -> int:
         """Number of takes of a sign."""
         return self._plan.takes

@@ -53,11 +53,9 @@ from handsteer.nodes.base import Node
 from handsteer.nodes.diagnostics import read_status, split_reporter
 from handsteer.nodes.status import CameraStatus, ControlStatus, RobotStatus
 from handsteer.nodes.steering import SteeringNode
+from handsteer.timeouts import HOLD_TIMEOUT_S
 from handsteer.transports.base import KnowsTypes, Received, Transport
 from handsteer.types import Pose2D, Velocity
-
-HOLD_TIMEOUT_S = 0.3
-"""Steering ends when the page has not repeated it for this long: the tab was closed, or the network lost."""
 
 _WATCH_PERIOD_S = 0.05
 _FRAME_COUNTS_KEPT = 6
@@ -143,7 +141,7 @@ class DashboardNode(Node):
     def steer(self, viewer: str, linear_mps: float, angular_radps: float) -> None:
         """Drive at this velocity if ``viewer`` has the control lease or the lease is free.
 
-        The command holds while the viewer repeats it within :data:`HOLD_TIMEOUT_S`.
+        The command holds while the viewer repeats it within :data:`~handsteer.timeouts.HOLD_TIMEOUT_S`.
         """
         if self.lease.take(viewer, self.clock.now()):
             with self._lock:

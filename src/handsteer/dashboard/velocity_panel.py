@@ -86,7 +86,7 @@ class _Axis:
         with box("axis"):
             with box("line"):
                 text("name", name)
-                self._commanded = text("told", "")
+                self._commanded = text("commanded-value", "")
                 self._measured = text("value", "0.00")
                 text("unit", unit)
             with box("frame"):

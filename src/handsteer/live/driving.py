@@ -6,10 +6,8 @@ from collections.abc import Callable
 from typing import Final, Protocol
 
 from handsteer.nodes.steering import SteeringNode
+from handsteer.timeouts import HOLD_TIMEOUT_S
 from handsteer.types import Velocity
-
-HOLD_TIMEOUT_S: Final = 0.3
-"""Steering ends when a program has sent no command for this long."""
 
 CONFIRM_S: Final = 0.2
 """After a pause, commands count once they have come for this long: those that a network held back come all at once."""
@@ -100,9 +98,10 @@ class Driving:
         steering.every(_WATCH_PERIOD_S, self._watch)
 
     def command(self, program: str, wanted: Velocity, *, is_late: bool = False) -> bool:
-        """Drive at ``wanted`` if ``program`` has the seat, until :data:`HOLD_TIMEOUT_S` after its last command.
+        """Drive at ``wanted`` if ``program`` has the seat.
 
-        A program without the seat asks for it.
+        This ends :data:`~handsteer.timeouts.HOLD_TIMEOUT_S` after its last command. A program without the seat asks
+        for it.
 
         Args:
             program: Name of the program.

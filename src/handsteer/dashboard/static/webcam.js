@@ -5,14 +5,14 @@ const LOOK_MS = 10;
 let giving = null; // {stream, video, sender, shown} while the camera is in use
 
 // The server has the sentence for each "why"; "words" are its own.
-function sayCamera(state, told = {}) {
-  emitEvent("webcam", { state, ...told });
+function reportCamera(state, detail = {}) {
+  emitEvent("webcam", { state, ...detail });
 }
 
 async function giveCamera(viewer) {
   if (giving) return;
   if (!navigator.mediaDevices?.getUserMedia) {
-    sayCamera("off", { why: "insecure" });
+    reportCamera("off", { why: "insecure" });
     return;
   }
   const mine = giving = { video: document.createElement("video") };
@@ -78,7 +78,7 @@ function sendFrames(viewer) {
     if (picture) sender.postMessage({ picture, capturedMs }, [picture]);
     else whenNew(video, send);
   };
-  sayCamera("on");
+  reportCamera("on");
   noteSeen("demo");
 }
 
@@ -99,13 +99,13 @@ function picturesOf(video) {
   return video.mozPaintedFrames || video.getVideoPlaybackQuality?.().totalVideoFrames || video.currentTime;
 }
 
-function keepCamera(told = {}) {
+function keepCamera(detail = {}) {
   if (!giving) return;
   const { stream, sender } = giving;
   giving = null;
   for (const track of stream?.getTracks() ?? []) track.stop();
   sender?.terminate();
-  sayCamera("off", told);
+  reportCamera("off", detail);
 }
 
 document.addEventListener("click", (event) => {
