@@ -17,7 +17,7 @@ from handsteer.cameras.browser import BrowserCamera
 from handsteer.cameras.files import read_photo
 from handsteer.clock import SteppedClock
 from handsteer.config import Config, ControlConfig, load
-from handsteer.dashboard.page import read_words
+from handsteer.dashboard.elements import read_words
 from handsteer.dashboard.settings_fields import FIELDS
 from handsteer.dashboard.steering_input import SteeringInput, read_deflection, read_number
 from handsteer.dashboard.world_editor import read_file

@@ -18,9 +18,10 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from handsteer.clock import Clock
 from handsteer.dashboard.camera_choices import CameraChoices
+from handsteer.dashboard.elements import box, sentence, switch, text
 from handsteer.dashboard.first_visit import DEMO_CAMERA, CameraOffer, Coach
 from handsteer.dashboard.legend import DRAWN
-from handsteer.dashboard.page import PICTURE_PATH, Page, box, sentence, switch, text
+from handsteer.dashboard.page import PICTURE_PATH, Page
 from handsteer.dashboard.remote_graph import RemoteGraph
 from handsteer.dashboard.settings import Settings
 from handsteer.dashboard.socket_events import is_page_of

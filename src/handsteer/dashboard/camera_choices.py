@@ -4,7 +4,8 @@ from typing import Any, Final
 
 from nicegui import ui
 
-from handsteer.dashboard.page import Page, box, tag, text
+from handsteer.dashboard.elements import box, tag, text
+from handsteer.dashboard.page import Page
 from handsteer.dashboard.settings import Settings
 from handsteer.dashboard.settings_fields import FIELDS
 from handsteer.dashboard.state import PageState

@@ -1,9 +1,10 @@
 """The page ``/``: camera, recognised sign, robot state, world, and manual steering."""
 
 from handsteer.dashboard.camera import CameraPanel
+from handsteer.dashboard.elements import box
 from handsteer.dashboard.legend import LegendPanel
 from handsteer.dashboard.node import DashboardNode
-from handsteer.dashboard.page import Page, PageContext, box
+from handsteer.dashboard.page import Page, PageContext
 from handsteer.dashboard.record_panel import RecordPanel
 from handsteer.dashboard.state import PageState
 from handsteer.dashboard.steer_panel import SteerPanel, TopicPanel

@@ -7,8 +7,9 @@ from typing import Final
 
 from nicegui import ui
 
+from handsteer.dashboard.elements import box, button, read_words, switch, tag, text
 from handsteer.dashboard.legend import DRAWN
-from handsteer.dashboard.page import Page, box, button, read_words, switch, tag, text
+from handsteer.dashboard.page import Page
 from handsteer.dashboard.remote_graph import RemoteGraph
 from handsteer.dashboard.state import PageState
 from handsteer.types import FORWARD, STOP

@@ -11,8 +11,9 @@ from nicegui import ui
 
 from handsteer.config import ControlConfig, SignsConfig
 from handsteer.control.explain import effect_words, figures_of
+from handsteer.dashboard.elements import box, button, switch, tag, text
 from handsteer.dashboard.hand_drawing import taught_drawings
-from handsteer.dashboard.page import Page, box, button, switch, tag, text
+from handsteer.dashboard.page import Page
 from handsteer.dashboard.settings import Settings
 from handsteer.dashboard.settings_fields import FIELDS
 from handsteer.dashboard.sign_pictures import SIGN_PATH

@@ -5,13 +5,14 @@ from typing import Final
 from nicegui import ui
 
 from handsteer.dashboard.camera import CameraPanel
+from handsteer.dashboard.elements import box, card, switch, text
 from handsteer.dashboard.lesson import Lesson
 from handsteer.dashboard.lesson_cards import ClassCards
 from handsteer.dashboard.lesson_panels import LessonPanel, StartPanel, ViewerLesson
 from handsteer.dashboard.lesson_report import ReportPanel
 from handsteer.dashboard.lesson_state import LessonState, instruction
 from handsteer.dashboard.node import DashboardNode
-from handsteer.dashboard.page import Page, PageContext, box, card, switch, text
+from handsteer.dashboard.page import Page, PageContext
 from handsteer.dashboard.state import PageState
 
 _ELSEWHERE: Final = (

@@ -7,6 +7,7 @@ from typing import Final, TypeVar
 
 from nicegui import ui
 
+from handsteer.dashboard.elements import box, button, switch, tag, text
 from handsteer.dashboard.hand_drawing import taught_drawings
 from handsteer.dashboard.legend import DRAWN
 from handsteer.dashboard.lesson import Lesson
@@ -14,7 +15,7 @@ from handsteer.dashboard.lesson_files import LESSON_PATH
 from handsteer.dashboard.lesson_node import LessonNode
 from handsteer.dashboard.lesson_state import LessonState, outcome
 from handsteer.dashboard.lessons import Lessons
-from handsteer.dashboard.page import Page, box, button, switch, tag, text
+from handsteer.dashboard.page import Page
 from handsteer.dashboard.settings import Settings
 from handsteer.dashboard.settings_fields import FIELDS
 from handsteer.errors import HandsteerError

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from handsteer.dashboard.page import box, switch, text
+from handsteer.dashboard.elements import box, switch, text
 from handsteer.dashboard.state import PageState
 
 

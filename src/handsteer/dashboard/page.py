@@ -1,181 +1,27 @@
-"""What all pages share: basic elements, the head with links, the control lease, and the banner with the Stop button."""
+"""What all pages share: the head with links, the bar with the state and Stop, and the timer that updates them."""
 
-import re
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import ClassVar
 
 from nicegui import ui
 
 from handsteer.dashboard.access import SESSION
 from handsteer.dashboard.audit import PageAudit
+from handsteer.dashboard.elements import switch, tag, text
 from handsteer.dashboard.lessons import Lessons
 from handsteer.dashboard.node import DashboardNode
 from handsteer.dashboard.recordings import Recordings, duration_text
 from handsteer.dashboard.remote_graph import RemoteGraph
 from handsteer.dashboard.settings import Settings
 from handsteer.dashboard.state import PageState
-from handsteer.dashboard.viewers import LeaseStatus, OnDemandNode, Role
+from handsteer.dashboard.status_bar import Banner, LeasePanel, TimingLine
+from handsteer.dashboard.viewers import LeaseStatus, OnDemandNode
 from handsteer.study.session import Session
 
 STATIC = Path(__file__).parent / "static"
 """Scripts and styles of the pages."""
-
-UNKNOWN = "--"
-"""Shown for an unknown value."""
-
-_LONGEST_WORDS = 200
-
-
-@contextmanager
-def card(title: str, classes: str) -> Iterator[ui.element]:
-    """Put the elements created within into a card with a heading; yield the card."""
-    with ui.element("section").classes(f"card {classes}") as element:
-        tag("h2", "", title)
-        yield element
-
-
-def box(classes: str) -> ui.element:
-    """Return an empty ``div``."""
-    return ui.element("div").classes(classes)
-
-
-def text(classes: str, words: str) -> ui.label:
-    """Return a ``div`` with ``words``."""
-    return ui.label(words).classes(classes)
-
-
-def tag(name: str, classes: str, words: str) -> ui.label:
-    """Return an element of the tag ``name`` with ``words``."""
-    label = ui.label(words).classes(classes)
-    label.tag = name
-    return label
-
-
-def button(words: str, on_click: Callable[[], object] | None = None, label: str = "") -> ui.element:
-    """Return a button with ``words``, and an ``aria-label`` for screen readers if they need more."""
-    with ui.element("button").classes("text-button").props('type="button"') as element:
-        ui.label(words).style("display: inline")
-    if label:
-        element.props(f'aria-label="{label}"')
-    return element.on("click", on_click) if on_click else element
-
-
-def sentence(words: str) -> str:
-    """Return ``words`` with a capital at the start."""
-    return words[:1].upper() + words[1:]
-
-
-def switch(element: ui.element, name: str, *, on: bool) -> None:
-    """Add the class ``name`` to ``element``, or remove it."""
-    element.classes(add=name if on else "", remove="" if on else name)
-
-
-def read_words(sent: object) -> str:
-    """Return the sentence that a browser sent, for its own page; empty if it is invalid."""
-    words = sent.get("words") if isinstance(sent, dict) else None
-    return words[:_LONGEST_WORDS] if isinstance(words, str) else ""
-
-
-class LeasePanel:
-    """Whether this viewer drives, and buttons to request or hand over the control lease.
-
-    Args:
-        ask: Called to request the lease.
-        answer: Called with True to hand it over, with False to keep it.
-    """
-
-    _WORDS: ClassVar[dict[Role, str]] = {
-        "driver": "you drive",
-        "watcher": "you watch: another viewer drives",
-        "free": "no viewer drives",
-    }
-
-    def __init__(self, ask: Callable[[], None], answer: Callable[[bool], None]) -> None:
-        with box("lease"):
-            self._question = text("question", "")
-            self._words = text("role chip", "")
-            self._ask = button("Ask to drive", ask).classes("hidden")
-            self._yes = button("Hand over", lambda: answer(True)).classes("hidden")
-            self._no = button("Keep", lambda: answer(False)).classes("hidden")
-
-    def update(self, place: LeaseStatus) -> None:
-        """Show the lease as this viewer sees it."""
-        is_driver = place.role == "driver"
-        asks = f"Another viewer asks to drive, and does in {place.left_s:.0f} s without an answer"
-        waits = f"You drive in {place.left_s:.0f} s, or sooner"
-        self._question.set_text((asks if is_driver else waits) if place.asked else "")
-        self._words.set_text(self._WORDS[place.role])
-        switch(self._words, "driver", on=is_driver)
-        switch(self._ask, "hidden", on=is_driver or place.asked)
-        for answer in (self._yes, self._no):
-            switch(answer, "hidden", on=not (is_driver and place.asked))
-
-
-class TimingLine:
-    """Reaction time from the capture of a picture to the command, and the camera's frame rate."""
-
-    def __init__(self) -> None:
-        with box("timing"):
-            text("name", "Reaction time: typical / slowest 1 %")
-            self._times = text("value times", "")
-            self._rate = text("value rate", "")
-
-    def update(self, state: PageState) -> None:
-        """Show ``state``."""
-        typical, slowest = (_rounded(value) for value in (state.latency_median_ms, state.latency_p99_ms))
-        self._times.set_text(f"{typical} / {slowest} ms")
-        self._rate.set_text(f"{_rounded(state.fps)} frames/s")
-
-
-def _rounded(value: float | None) -> str:
-    return UNKNOWN if value is None else f"{value:.0f}"
-
-
-_TIME = re.compile(r" for \d+(\.\d+)? s\b")
-
-
-def spoken(state: PageState) -> str:
-    """Return the banner's sentence for a screen reader, without times, which would be read out at each change."""
-    return ". ".join([f"{state.headline}: {_TIME.sub('', state.reason)}", *state.warnings])
-
-
-class Banner:
-    """A sentence that reports what the robot does, and why, and buttons that call ``halt`` and ``reset``."""
-
-    def __init__(self, halt: Callable[[], None], reset: Callable[[], None]) -> None:
-        with ui.element("section").classes("card banner") as self._banner:
-            self._spoken = text("spoken", "").props('role="status"')
-            box("lamp")
-            with box("words"):
-                self._headline = text("headline", "Starting")
-                self._reason = text("reason", "Waiting for the first report")
-            self._warning = text("warning hidden", "")
-            with box("buttons"):
-                self._reset = button("Reset", reset, "Reset: let the robot be driven again").classes("hidden")
-                stop = button("Stop", halt, "Stop the robot (space key)").classes("stop")
-                stop.props('aria-keyshortcuts="Space"')
-        ui.on("space", halt)
-        self._mood = ""
-
-    def update(self, state: PageState) -> None:
-        """Show ``state``."""
-        self._headline.set_text(state.headline)
-        if (reason := sentence(state.reason)) != self._reason.text:
-            self._reason.set_text(reason)
-            self._reason.props["title"] = reason  # where it does not fit
-        self._spoken.set_text(spoken(state))
-        self._warning.set_text("; ".join(state.warnings))
-        self._warning.props["title"] = self._warning.text
-        switch(self._warning, "hidden", on=not state.warnings)
-        switch(self._reset, "hidden", on=not state.stopped)
-        if state.mood != self._mood:
-            self._banner.classes(remove=self._mood, add=state.mood)
-            self._mood = state.mood
-
 
 PICTURE_PATH = "/camera.mjpg"
 WEBCAM_PATH = "/camera"

@@ -7,7 +7,8 @@ from contextlib import suppress
 
 from nicegui import ui
 
-from handsteer.dashboard.page import Page, box, button, card, switch, text
+from handsteer.dashboard.elements import box, button, card, switch, text
+from handsteer.dashboard.page import Page
 from handsteer.dashboard.recordings import RECORDINGS_PATH, Recordings, duration_text, size_text
 from handsteer.dashboard.remote_graph import RemoteGraph
 from handsteer.dashboard.viewers import LeaseStatus

@@ -4,8 +4,9 @@ from collections.abc import Callable, Iterator
 
 from nicegui import ui
 
+from handsteer.dashboard.elements import box, button, switch, tag, text
 from handsteer.dashboard.node import DashboardNode
-from handsteer.dashboard.page import Page, PageContext, box, button, switch, tag, text
+from handsteer.dashboard.page import Page, PageContext
 from handsteer.dashboard.settings import Settings
 from handsteer.dashboard.settings_fields import COMMON, FIELDS, FORM, SECTION_TITLES, Field
 from handsteer.dashboard.settings_row import Row

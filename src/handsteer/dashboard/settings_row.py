@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 from nicegui import ui
 
-from handsteer.dashboard.page import box, button, switch, tag, text
+from handsteer.dashboard.elements import box, button, switch, tag, text
 from handsteer.dashboard.settings import Settings
 from handsteer.dashboard.settings_fields import Field
 from handsteer.errors import ConfigError

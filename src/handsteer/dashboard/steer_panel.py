@@ -5,8 +5,9 @@ from collections.abc import Callable
 
 from nicegui import ui
 
+from handsteer.dashboard.elements import box, button, card, read_words, switch, text
 from handsteer.dashboard.mux_row import MuxRow
-from handsteer.dashboard.page import Page, box, button, card, read_words, switch, text
+from handsteer.dashboard.page import Page
 from handsteer.dashboard.state import PageState
 from handsteer.dashboard.steering_input import SteeringInput, read_deflection, read_number
 from handsteer.dashboard.viewers import LeaseStatus

@@ -10,8 +10,9 @@ from nicegui import ui
 from nicegui.events import GenericEventArguments
 
 from handsteer.dashboard.camera import CameraPanel
+from handsteer.dashboard.elements import box, button, card, tag, text
 from handsteer.dashboard.node import DashboardNode
-from handsteer.dashboard.page import Page, PageContext, box, button, card, tag, text
+from handsteer.dashboard.page import Page, PageContext
 from handsteer.dashboard.remote_graph import RemoteGraph
 from handsteer.dashboard.state import PageState
 from handsteer.dashboard.steer_panel import SteerPanel

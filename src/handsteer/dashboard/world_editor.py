@@ -8,7 +8,7 @@ from typing import Any, get_args
 
 from nicegui import ui
 
-from handsteer.dashboard.page import box, button, switch, text
+from handsteer.dashboard.elements import box, button, switch, text
 from handsteer.dashboard.world_desk import WorldDesk
 from handsteer.dashboard.world_form import ThingForm
 from handsteer.dashboard.world_plan import Tool, WorldPlan, read_tool

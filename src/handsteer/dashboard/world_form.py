@@ -5,7 +5,7 @@ from typing import Any
 
 from nicegui import ui
 
-from handsteer.dashboard.page import box, switch
+from handsteer.dashboard.elements import box, switch
 from handsteer.robots.editing import numeric_properties
 from handsteer.robots.world import Gate, Thing
 

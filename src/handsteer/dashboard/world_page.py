@@ -2,8 +2,9 @@
 
 from nicegui import ui
 
+from handsteer.dashboard.elements import box, button, switch, tag, text
 from handsteer.dashboard.node import DashboardNode
-from handsteer.dashboard.page import Page, PageContext, box, button, switch, tag, text
+from handsteer.dashboard.page import Page, PageContext
 from handsteer.dashboard.state import PageState
 from handsteer.dashboard.world_desk import WorldDesk
 from handsteer.dashboard.world_editor import WorldEditor

@@ -4,10 +4,12 @@ from functools import partial
 
 from nicegui import ui
 
-from handsteer.dashboard.page import UNKNOWN, Page, box, button, switch, tag, text
+from handsteer.dashboard.elements import box, button, switch, tag, text
+from handsteer.dashboard.page import Page
 from handsteer.dashboard.remote_graph import RemoteGraph
 from handsteer.dashboard.scene import View, WorldView
 from handsteer.dashboard.state import PageState
+from handsteer.dashboard.status_bar import UNKNOWN
 from handsteer.dashboard.world_desk import WorldDesk
 from handsteer.dashboard.world_state import WorldState
 from handsteer.types import BUMP_S, MISS_S, CourseState, stopwatch
