@@ -13,7 +13,7 @@ import pytest
 from hypothesis import settings
 
 from handsteer.clock import SteppedClock
-from handsteer.config import Config, VirtualHandConfig
+from handsteer.config import DEFAULT_FILE, Config, VirtualHandConfig
 from handsteer.graph import Graph
 from tests.ros1.graph import Ros1Graph, ros1_graph
 
@@ -75,6 +75,12 @@ atexit.register(shutil.rmtree, os.environ["XDG_STATE_HOME"], ignore_errors=True)
 
 # Whoever starts the tests by nohup lets them, and all that they start, ignore SIGHUP; nodes are tested by it.
 signal.signal(signal.SIGHUP, signal.SIG_DFL)
+
+
+def pytest_configure() -> None:
+    """Refuse to start where ``handsteer run`` would read a file of parameters that is not the tests'."""
+    if DEFAULT_FILE.exists():
+        raise pytest.UsageError(f"move {DEFAULT_FILE.absolute()} away: the runs of the tests would read it")
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

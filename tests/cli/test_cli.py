@@ -127,6 +127,24 @@ def test_a_headless_run_prints_one_json_summary(capsys: pytest.CaptureFixture[st
     assert {"fps", "latency_median_ms", "signs", "final_pose", "path_length_m", "contacts"} <= set(summary)
 
 
+def test_a_run_reads_the_file_that_the_page_saves_to_unless_another_is_named(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "other.yaml").write_text("robot: {world: warehouse}")
+    arguments = ["run", "--fast", "--duration", "0.1", *VIRTUAL]
+    Path("handsteer.yaml").write_text("control: {linear_step: 7}")
+    with pytest.raises(SystemExit) as caught:
+        main(arguments)
+    assert caught.value.code == 2
+    said = capsys.readouterr().err
+    assert f"parameters from {tmp_path / 'handsteer.yaml'}" in said
+    assert re.search(r"handsteer\.yaml, line 1: control\.linear_step: 7 should be less than or equal to 1", said)
+    prints(capsys, *arguments, "--config", "other.yaml")
+    Path("handsteer.yaml").write_text("")  # as saved, when all is as by default
+    prints(capsys, *arguments)
+
+
 def test_a_fast_run_takes_the_same_way_each_time(capsys: pytest.CaptureFixture[str]) -> None:
     arguments = ["run", "--fast", *VIRTUAL, "--duration", "2", "--json"]
     assert prints(capsys, *arguments) == prints(capsys, *arguments)

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from handsteer.cli.app import ConfigFile, Flag, Parameters, loads
+from handsteer.cli.running import default_file
 from handsteer.cli.running import settings as make_settings
 from handsteer.errors import ConfigError, did_you_mean
 
@@ -73,11 +74,13 @@ def run(
         Print a summary in JSON at the end, and nothing else.
     config_file
         YAML file with parameters, each of which is an option too: `handsteer parameters`. Options override the file.
+        Without it, handsteer.yaml of the working directory, if there is one; the page saves to it.
     """
     from handsteer.cli.drive import drive, linked, summary_text
     from handsteer.cli.models import fetch_missing
 
     headless = headless or fast
+    config_file = config_file or default_file()
     shorthand = {
         "camera": {"source": camera},
         "robot": {**_robot(robot), "world": world},

@@ -62,6 +62,16 @@ def settings(
     return config.load(file, base or {}, service or {}, short, given or {})
 
 
+def default_file() -> Path | None:
+    """Return the file that a start without --config reads, and print its name; None if it does not exist."""
+    from handsteer.config import DEFAULT_FILE  # this module is loaded for help too
+
+    if not DEFAULT_FILE.exists():
+        return None
+    say(f"parameters from {DEFAULT_FILE.absolute()}")
+    return DEFAULT_FILE
+
+
 def check_writable(option: str, path: Path, error: type[HandsteerError]) -> None:
     """Check that the file ``path``, which ``option`` names, can be written, before the work rather than after it.
 

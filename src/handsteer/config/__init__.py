@@ -26,6 +26,7 @@ from handsteer.errors import ConfigError, did_you_mean
 from handsteer.types import CmdVelType
 
 __all__ = [
+    "DEFAULT_FILE",
     "CameraConfig",
     "CollisionMonitorConfig",
     "Config",
@@ -48,6 +49,9 @@ __all__ = [
     "load",
     "validate",
 ]
+
+DEFAULT_FILE = Path("handsteer.yaml")
+"""Read by ``handsteer run`` from the working directory, and saved to by the page, if no other file is named."""
 
 S = TypeVar("S", bound=Section)
 _LONGEST_SHOWN = 200

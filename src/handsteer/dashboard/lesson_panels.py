@@ -192,9 +192,9 @@ class AlwaysPanel:
             kept = None
             self._lesson.message = f"{error}."
         is_kept = kept is not None and running is not None and _full(kept) == _full(running)
-        file = self._settings.file.path
+        file = self._settings.file
         self._words.set_text(
-            f"These signs are in {file}. Use them at every start by: handsteer run --config {file}"
+            f"These signs are in {file.path}. Use them at every start by: {file.start_command}"
             if is_kept
             else "These signs are in use until handsteer ends."
         )

@@ -11,14 +11,13 @@ from typing import Any
 import yaml
 
 from handsteer import plain_yaml
-from handsteer.config import Config, cmd_vel_type, load
+from handsteer.config import DEFAULT_FILE, Config, cmd_vel_type, load
 from handsteer.dashboard.settings_fields import FIELDS, FORM, Field
 from handsteer.errors import ConfigError, HandsteerError
 from handsteer.hand.script import parse_script
 from handsteer.parameters import plain
 from handsteer.robots.world import load_world
 
-DEFAULT_FILE = Path("handsteer.yaml")
 """Default file for settings, in the working directory."""
 
 _COMMENT = re.compile(r"(^|\s)#", re.MULTILINE)
@@ -256,6 +255,11 @@ class SettingsFile:
     def __init__(self, path: Path, *, is_read: bool) -> None:
         self.path = path.absolute()
         self._known = self._content() if is_read else None
+
+    @property
+    def start_command(self) -> str:
+        """The command that starts with its parameters."""
+        return "handsteer run" if self.path == DEFAULT_FILE.absolute() else f"handsteer run --config {self.path}"
 
     @property
     def is_read(self) -> bool:

@@ -82,8 +82,10 @@ class SettingsPanel:
         if shown == self._shown:
             return
         self._shown = shown
-        path = settings.file.path if to_driver else settings.file.path.name
-        self._place.set_text(f"The file is {path}; the next start reads it by: handsteer run --config {path}")
+        file = settings.file
+        path = file.path if to_driver else file.path.name
+        command = file.start_command if to_driver else "handsteer run"
+        self._place.set_text(f"The file is {path}; the next start reads it by: {command}")
         saved = "as in the file" if settings.file.is_read else "all is as by default"
         self._state.set_text(saved if settings.is_saved else "not saved yet")
         for each in (self._save, self._load, self._reset):
