@@ -21,11 +21,12 @@ camera:
   source: /dev/video2
 ```
 
-and run `handsteer run --config my.yaml`; without `--config` it reads `handsteer.yaml` of the working directory, if there
-is one. Each parameter is also a command line option, such as `--control.max-linear 0.5`, and `handsteer parameters`
-lists them; options override the file, and the file overrides the defaults. A node in a ROS graph also accepts ROS
-parameters, such as `_max_linear:=0.5` (ROS 1) or `--ros-args -p max_linear:=0.5` (ROS 2); they override the file, and
-options override them. Unknown names and values out of range are rejected with exit code 2, before anything moves.
+and run `handsteer run --config my.yaml`; without `--config` it reads `handsteer.yaml` of the working directory, if
+there is one. Each parameter is also a command line option, such as `--control.max-linear 0.5`, and `handsteer
+parameters` lists them; options override the file, and the file overrides the defaults. A node in a ROS graph also
+accepts ROS parameters, such as `_max_linear:=0.5` (ROS 1) or `--ros-args -p max_linear:=0.5` (ROS 2); they override
+the file, and options override them. Unknown names and values out of range are rejected with exit code 2, before
+anything moves.
 
 Parameters marked with * can change while a node runs ([ros2.md](ros2.md#parameters-of-a-running-node)); the others are
 read at start-up.
