@@ -3,7 +3,7 @@
 import base64
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from itertools import pairwise
 from pathlib import Path
@@ -13,6 +13,7 @@ import cv2
 import numpy as np
 from chromium import launch
 from playwright.sync_api import Page, sync_playwright
+from slalom_lap import COURSE, SlalomLap
 
 from handsteer.config import load
 from handsteer.dashboard.page_process import PageProcess
@@ -21,23 +22,28 @@ from handsteer.graph import Graph
 
 IMAGES = Path(__file__).resolve().parents[1] / "docs" / "images"
 PICTURE, ANIMATION = IMAGES / "page.png", IMAGES / "drive.webp"
-WIDTH, HEIGHT = 1280, 800
-LARGEST_BYTES = {PICTURE: 400_000, ANIMATION: 1_500_000}
+WIDTH, HEIGHT = 1440, 900
+LARGEST_BYTES = {PICTURE: 400_000, ANIMATION: 1_000_000}
 DRIVEN_M = 1.0
 PATIENCE_MS = 120_000
 
-SHOWN_S, FRAMES_PER_S = 15.0, 6.0
+LONGEST_S, END_MS, FRAMES_PER_S = 60.0, 1500, 6.0
 SHOWN_WIDTH = 800
 QUALITY = 60
 
-COURSE = "Stop:2 Forward:3 Turn Left:1.5 Forward:3 Turn Right:1.5 Go:1 Backward:2 Stop:2"
+SIGNS = "Forward:6 Turn Left:1 Forward:3"
 
 
 def main() -> None:
-    with opened("Forward:6 Turn Left:1 Forward:3") as page:
+    with opened({"camera": {"source": "virtual"}, "virtual_hand": {"script": SIGNS}}) as (page, graph):
+        graph.start()
         take(page, PICTURE)
-    with opened(COURSE) as page:
-        record(page, ANIMATION)
+    with opened({"camera": {"source": "browser"}, "control": {"mode": "joystick"}, "robot": {"world": COURSE}}) as (
+        page,
+        graph,
+    ):
+        graph.start()
+        record_lap(page, graph, ANIMATION)
     for path, largest in LARGEST_BYTES.items():
         size = path.stat().st_size
         if size > largest:
@@ -46,20 +52,22 @@ def main() -> None:
 
 
 @contextmanager
-def opened(script: str) -> Iterator[Page]:
-    """Show the page of a graph whose virtual hand shows ``script``."""
-    hand = {"camera": {"source": "virtual"}, "virtual_hand": {"script": script}}
-    with Graph(load(base={**hand, "dashboard": {"port": 0}}), steering=False) as graph, sync_playwright() as playwright:
+def opened(sections: dict[str, Any]) -> Iterator[tuple[Page, Graph]]:
+    """Show the page of a graph with these parameters, which is not started."""
+    config = load(base={**sections, "dashboard": {"port": 0}})
+    with Graph(config, steering=False) as graph, sync_playwright() as playwright:
         dashboard = PageProcess()
         url = dashboard.serve(graph)
         try:
             browser = launch(playwright)
             page = browser.new_page(viewport={"width": WIDTH, "height": HEIGHT}, color_scheme="light")
-            page.add_init_script("localStorage.setItem('handsteer-demo', 'seen')")  # the hand in full
+            # The hand in full, and no first steps.
+            page.add_init_script(
+                "for (const name of ['demo', 'coach']) localStorage.setItem(`handsteer-${name}`, 'seen')"
+            )
             page.goto(url)
             page.wait_for_selector(".world canvas")
-            graph.start()
-            yield page
+            yield page, graph
             browser.close()
         finally:
             dashboard.stop()
@@ -82,25 +90,45 @@ def take(page: Page, path: Path) -> None:
     page.screenshot(path=path)
 
 
-def record(page: Page, path: Path) -> None:
-    """Save ``page`` from the first sign on as an animation in real time."""
-    page.wait_for_function("document.querySelector('.camera .sign').textContent === 'Stop'", timeout=PATIENCE_MS)
+def record_lap(page: Page, graph: Graph, path: Path) -> None:
+    """Save ``page`` while a simulated operator drives the slalom, as an animation in real time."""
+    page.locator(".world").get_by_role("button", name="Follow").click()
+    lap, end_s = SlalomLap(graph), time.monotonic() + LONGEST_S
+    lap.start()
+    try:
+        animate(shots(page, lambda: time.monotonic() > end_s or is_finished(graph)), path)
+    finally:
+        lap.stop()
+    course = graph.robot.course
+    if course is None or course.phase != "finished" or course.missed:
+        sys.exit(f"the lap was not driven well: {course}; is the machine busy? Try again")
+
+
+def is_finished(graph: Graph) -> bool:
+    """Return whether the robot has reached the end of its course."""
+    return graph.robot.course is not None and graph.robot.course.phase == "finished"
+
+
+def shots(page: Page, is_over: Callable[[], bool]) -> list[tuple[float, bytes]]:
+    """Return the pictures of ``page`` until a second after ``is_over``, each with its time in seconds."""
     frames: list[tuple[float, bytes]] = []
-    end_s = time.monotonic() + SHOWN_S
+    has_ended = False
     devtools = page.context.new_cdp_session(page)
 
     def keep(frame: dict[str, Any]) -> None:
         frames.append((frame["metadata"]["timestamp"], base64.b64decode(frame["data"])))
-        if time.monotonic() < end_s:
+        if not has_ended:
             devtools.send("Page.screencastFrameAck", {"sessionId": frame["sessionId"]})
 
     devtools.on("Page.screencastFrame", keep)
     devtools.send("Page.startScreencast", {"format": "jpeg", "quality": 95, "maxWidth": WIDTH, "maxHeight": HEIGHT})
-    while time.monotonic() < end_s:
+    while not is_over():
         page.wait_for_timeout(50)
+    page.wait_for_timeout(END_MS)
+    has_ended = True
     devtools.send("Page.stopScreencast")
     devtools.detach()
-    animate(thinned(frames), path)
+    return thinned(frames)
 
 
 def thinned(frames: list[tuple[float, bytes]]) -> list[tuple[float, bytes]]:

@@ -117,11 +117,14 @@ class ByHand:
         view: The hand as it is seen.
         slips: How often the operator errs.
         random: Source of times, slips and tremor.
+
+    Attributes:
+        hand: The operator's hand.
     """
 
     def __init__(self, view: HandView, slips: Slips, random: np.random.Generator) -> None:
         self.delay_s = HAND_S
-        self._hand = OperatorsHand(random, slips, CHOICES)
+        self.hand = OperatorsHand(random, slips, CHOICES)
         self._view = view
 
 
@@ -145,23 +148,23 @@ class Signs(ByHand):
     @property
     def changes(self) -> int:
         """How often the sign has changed."""
-        return self._hand.changes
+        return self.hand.changes
 
     def want(self, wanted: Velocity) -> None:
         """Choose a sign, ten times a second; a sign that has just been begun is shown first, unless it is to stop."""
         self._calls += 1
         if self._calls % 2:
             return
-        sign = self._choice.best(self._hand.intended, wanted)
-        if sign != self._hand.intended and (self._shown_s >= _PATIENCE_S or sign == STOP):
-            self._hand.show(sign)
+        sign = self._choice.best(self.hand.intended, wanted)
+        if sign != self.hand.intended and (self._shown_s >= _PATIENCE_S or sign == STOP):
+            self.hand.show(sign)
             self._shown_s = 0.0
 
     def step(self) -> Velocity | None:
         """Advance time by one tick; return the command of a new frame."""
         self._shown_s += TICK_S
-        self._hand.step(TICK_S)
-        velocity = self._view.step(self._hand)
+        self.hand.step(TICK_S)
+        velocity = self._view.step(self.hand)
         if velocity is not None:
             self._choice.note(self._view.sign, self._view.since_s)
         return velocity
@@ -186,7 +189,7 @@ class Joystick(ByHand):
     @property
     def changes(self) -> int:
         """How often the aim of the fist, or the sign, has changed."""
-        return self._hand.changes + self._moves
+        return self.hand.changes + self._moves
 
     def want(self, wanted: Velocity) -> None:
         """Move the fist, if it is held and the change is worth it; else hold it first."""
@@ -205,23 +208,23 @@ class Joystick(ByHand):
         self._moves += 1
         forward, left = (moved_for(share, self._config) * PALM_M for share in aim)
         # The camera is in front of the person: the person's left is the image's right.
-        self._hand.reach(np.array([left, -forward]))
+        self.hand.reach(np.array([left, -forward]))
 
     def step(self) -> Velocity | None:
         """Advance time by one tick; return the command of a new frame."""
-        self._hand.step(TICK_S)
-        return self._view.step(self._hand)
+        self.hand.step(TICK_S)
+        return self._view.step(self.hand)
 
     def _grab(self) -> None:
         """Open the hand, back at its place, and then close it; and again if it is not held a second later."""
         self._aim = (0.0, 0.0)
-        if self._hand.intended == STOP:
+        if self.hand.intended == STOP:
             if self._shown_s >= _OPEN_S:
-                self._hand.show(GO)
+                self.hand.show(GO)
                 self._shown_s = 0.0
-        elif self._hand.intended == NONE or self._shown_s >= 1.0 or self._was_held:
-            self._hand.reach(np.zeros(2))
-            self._hand.show(STOP)
+        elif self.hand.intended == NONE or self._shown_s >= 1.0 or self._was_held:
+            self.hand.reach(np.zeros(2))
+            self.hand.show(STOP)
             self._shown_s = 0.0
         self._was_held = False
 

@@ -1,0 +1,75 @@
+"""A simulated operator who drives a running graph: a rendered hand, as a joystick, in front of the browser's camera."""
+
+import struct
+import threading
+import time
+
+import cv2
+import numpy as np
+
+from handsteer.bench.courses import open_course
+from handsteer.bench.hand_interfaces import Joystick
+from handsteer.bench.hand_view import HandCamera, HandView, LandmarkErrors
+from handsteer.bench.hands import Slips
+from handsteer.bench.interfaces import TICK_S
+from handsteer.bench.laps import KINDS
+from handsteer.bench.operator import DECISION_S, REACTION_S, Operator, Seen
+from handsteer.graph import Graph
+from handsteer.hand.poses import Pinhole
+from handsteer.types import Velocity
+
+COURSE = "slalom"
+FRAMES_PER_S = 20.0
+SEED = 4
+
+
+class SlalomLap:
+    """Drives ``graph`` through the slalom, from :meth:`start` to :meth:`stop`.
+
+    Args:
+        graph: Its camera source is ``browser``, its world the slalom, and its control's mode ``joystick``.
+    """
+
+    def __init__(self, graph: Graph) -> None:
+        config, skill = graph.config, KINDS["joystick"].skill
+        self._graph = graph
+        view = HandView(config, "landmarks", LandmarkErrors(), SEED)
+        self._interface = Joystick(config, skill, view, Slips(0.0, 0.0), np.random.default_rng(SEED))
+        self._operator = Operator(open_course(COURSE), skill, REACTION_S, np.random.default_rng(SEED))
+        self._camera = HandCamera(Pinhole.webcam(config.camera.width, config.camera.height), SEED)
+        self._ended = threading.Event()
+        self._thread = threading.Thread(target=self._drive, name="operator", daemon=True)
+
+    def start(self) -> None:
+        """Begin to send pictures of the hand, in real time."""
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Take the hand away."""
+        self._ended.set()
+        self._thread.join()
+
+    def _drive(self) -> None:
+        began_s = time.monotonic()
+        ticks = decided = sent = 0
+        while not self._ended.wait(TICK_S / 2):
+            now_s = time.monotonic() - began_s
+            while (ticks + 1) * TICK_S <= now_s:
+                ticks += 1
+                if ticks * TICK_S >= decided * DECISION_S:
+                    decided += 1
+                    self._decide()
+                self._interface.step()
+            if now_s * FRAMES_PER_S >= sent:
+                sent = int(now_s * FRAMES_PER_S) + 1
+                self._send(now_s)
+
+    def _decide(self) -> None:
+        state = self._graph.robot.state
+        speed = Velocity(state.linear_mps, state.angular_radps)
+        self._interface.want(self._operator.decide(Seen(state.truth, speed, bool(state.contacts))))
+
+    def _send(self, now_s: float) -> None:
+        picture = self._camera.picture(self._interface.hand.pose(), now_s)
+        _, jpeg = cv2.imencode(".jpg", picture)
+        self._graph.cameras.browser.offer(struct.pack("<d", 1e3 * time.time()) + jpeg.tobytes())
