@@ -1,4 +1,4 @@
-"""A simulated operator who drives a running graph: a rendered hand, as a joystick, in front of the browser's camera."""
+"""A simulated operator of a running graph: a rendered hand, as a joystick, in front of the browser's camera."""
 
 import struct
 import threading

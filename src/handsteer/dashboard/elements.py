@@ -2,8 +2,12 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
 from nicegui import ui
+
+STATIC = Path(__file__).parent / "static"
+"""Scripts and styles of the pages."""
 
 _LONGEST_WORDS = 200
 
@@ -33,6 +37,11 @@ def tag(name: str, classes: str, words: str) -> ui.label:
     return label
 
 
+def identifier(classes: str, words: str) -> ui.label:
+    """Return a ``div`` with a name, such as a topic's or a file's, which is the same in all languages."""
+    return text(classes, words).props("translate=no")
+
+
 def button(words: str, on_click: Callable[[], object] | None = None, label: str = "") -> ui.element:
     """Return a button with ``words``, and an ``aria-label`` for screen readers if they need more."""
     with ui.element("button").classes("text-button").props('type="button"') as element:
@@ -50,6 +59,15 @@ def sentence(words: str) -> str:
 def switch(element: ui.element, name: str, *, on: bool) -> None:
     """Add the class ``name`` to ``element``, or remove it."""
     element.classes(add=name if on else "", remove="" if on else name)
+
+
+def set_property(element: ui.element, name: str, value: object) -> None:
+    """Set a property of ``element``.
+
+    Setting it by ``props`` sends it to the browser, which then draws the whole page, even if it is the same as before.
+    """
+    if element.props.get(name) != value:
+        element.props[name] = value
 
 
 def read_words(sent: object) -> str:

@@ -14,7 +14,7 @@ from nicegui import ui
 from nicegui.elements.scene.scene_object3d import Object3D
 from numpy.typing import NDArray
 
-from handsteer.dashboard.page import STATIC
+from handsteer.dashboard.elements import STATIC
 from handsteer.dashboard.world_state import TRAIL_POINTS, Point, Trail, WorldState
 from handsteer.errors import WorldError
 from handsteer.messages import Marker, Quaternion

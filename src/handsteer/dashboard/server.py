@@ -16,29 +16,21 @@ from starlette.websockets import WebSocket
 
 from handsteer.cameras.browser import LARGEST_BYTES
 from handsteer.clock import Clock
-from handsteer.config import DashboardConfig
+from handsteer.config import DEFAULT_FILE, DashboardConfig
 from handsteer.dashboard.access import HEADERS, Access, AccessMiddleware
 from handsteer.dashboard.audit import PageAudit
 from handsteer.dashboard.camera import FrameSocket, PictureNode, PictureResponse
 from handsteer.dashboard.drive_page import DrivePage
+from handsteer.dashboard.elements import STATIC
 from handsteer.dashboard.lesson_files import serve_lesson_files
 from handsteer.dashboard.lesson_page import LessonPage
 from handsteer.dashboard.lessons import Lessons
 from handsteer.dashboard.limits import Connections, UnconnectedPages, limit_log
 from handsteer.dashboard.node import DashboardNode
-from handsteer.dashboard.page import (
-    ASSETS_PATH,
-    ICON,
-    MANIFEST,
-    MANIFEST_PATH,
-    PICTURE_PATH,
-    STATIC,
-    WEBCAM_PATH,
-    PageContext,
-)
+from handsteer.dashboard.page import ASSETS_PATH, ICON, MANIFEST, MANIFEST_PATH, PICTURE_PATH, WEBCAM_PATH, PageContext
 from handsteer.dashboard.recordings import Recordings, serve_recordings
 from handsteer.dashboard.remote_graph import RemoteGraph
-from handsteer.dashboard.settings import DEFAULT_FILE, Settings, SettingsFile
+from handsteer.dashboard.settings import Settings, SettingsFile
 from handsteer.dashboard.settings_page import SettingsPage
 from handsteer.dashboard.sign_pictures import serve_sign_pictures
 from handsteer.dashboard.socket_events import SocketEvents
@@ -77,7 +69,7 @@ class Dashboard:
         cmd_vel: The topic of the displayed commands.
         graph: What pages can change in addition to topics; nothing by default.
         file: The YAML file that the graph's parameters were read from, which settings are saved to; by default
-            :data:`~handsteer.dashboard.settings.DEFAULT_FILE`.
+            :data:`~handsteer.config.DEFAULT_FILE`.
 
     Raises:
         ConfigError: The file can no longer be read.

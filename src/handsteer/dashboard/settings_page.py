@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator
 
 from nicegui import ui
 
-from handsteer.dashboard.elements import box, button, switch, tag, text
+from handsteer.dashboard.elements import box, button, identifier, switch, tag, text
 from handsteer.dashboard.node import DashboardNode
 from handsteer.dashboard.page import Page, PageContext
 from handsteer.dashboard.settings import Settings
@@ -70,6 +70,8 @@ class SettingsPanel:
                     rest = tuple(field for field in fields if field.path not in COMMON)
                     self._group(section, SECTION_TITLES[section], meaning, rest, index)
                 self._nothing = text("nothing hidden", "No parameter has this in its name or description.")
+        # As most viewers see it, so that the page is complete when it is served; changes follow.
+        self.update(to_driver=False, editable=True)
 
     def update(self, *, to_driver: bool, editable: bool) -> None:
         """Show the values; they are ``editable`` if this viewer drives (``to_driver``) or the lease is free."""
@@ -184,7 +186,7 @@ class _Group:
             with ui.element("summary"):
                 tag("h2", "", title)
                 if name in FORM:
-                    text("raw", name)
+                    identifier("raw", name)
                 self._changed = text("mark", "")
                 text("meaning", meaning)
             self.body = box("rows")

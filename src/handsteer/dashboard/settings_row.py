@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 from nicegui import ui
 
-from handsteer.dashboard.elements import box, button, switch, tag, text
+from handsteer.dashboard.elements import box, button, identifier, switch, tag, text
 from handsteer.dashboard.settings import Settings
 from handsteer.dashboard.settings_fields import Field
 from handsteer.errors import ConfigError
@@ -39,7 +39,7 @@ class Row:
             with box("about"):
                 with box("title"):
                     tag("h3", "name", field.title)
-                    text("raw", field.path)
+                    identifier("raw", field.path)
                     self._changed = text("mark", "changed")
                     self._waits = text("mark waits", "waits for the next start")
                 with box("doc"):
@@ -82,16 +82,22 @@ class Row:
 
     def _make_input(self) -> ui.input | ui.select | ui.switch:
         field = self.field
+        # Given here, because each value that is set later is a message, for which the browser draws all rows again.
+        value = field.show(field.value_in(self._settings.wanted), to_driver=False)
         label = f'aria-label="{field.path}"'
         unit = f'suffix="{field.unit}"' if field.unit else ""
         if field.kind == "switch":
-            return ui.switch(on_change=self._take).props(label)
+            return ui.switch(value=value == "true", on_change=self._take).props(label)
         if field.kind == "choice":
             options = {**({"": _NONE} if field.optional else {}), **{choice: choice for choice in field.choices}}
-            select = ui.select(options, on_change=self._take).without_auto_validation()
-            return select.props(f"{_STYLE} options-dense {label}")
+            select = ui.select(options, value=value, on_change=self._take).without_auto_validation()
+            return select.props(f"{_STYLE} options-dense popup-content-class=identifiers {label}")
         keyboard = 'inputmode="decimal"' if field.kind == "number" else ""
-        line = ui.input(validation=self._check).props(f"{_STYLE} {keyboard} {unit} {label}")
+        line = (
+            ui.input(value=value, validation=self._check)
+            .without_auto_validation()
+            .props(f"{_STYLE} {keyboard} {unit} {label}")
+        )
         line.on("blur", self._take).on("keydown.enter", self._take).on("keydown.escape", self._give_up)
         return line
 

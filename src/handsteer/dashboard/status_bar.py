@@ -1,12 +1,14 @@
 """What the top of every page shows: the control lease, the reaction time, and the banner with the Stop button."""
 
+import math
 import re
+import time
 from collections.abc import Callable
 from typing import ClassVar
 
 from nicegui import ui
 
-from handsteer.dashboard.elements import box, button, sentence, switch, text
+from handsteer.dashboard.elements import box, button, sentence, set_property, switch, text
 from handsteer.dashboard.state import PageState
 from handsteer.dashboard.viewers import LeaseStatus, Role
 
@@ -50,9 +52,13 @@ class LeasePanel:
 
 
 class TimingLine:
-    """Reaction time from the capture of a picture to the command, and the camera's frame rate."""
+    """Reaction time from the capture of a picture to the command, and the camera's frame rate.
+
+    It changes once a second: more often, it could not be read, and each change costs a browser the drawing of the page.
+    """
 
     def __init__(self) -> None:
+        self._due_s = -math.inf
         with box("timing"):
             text("name", "Reaction time: typical / slowest 1 %")
             self._times = text("value times", "")
@@ -60,6 +66,9 @@ class TimingLine:
 
     def update(self, state: PageState) -> None:
         """Show ``state``."""
+        if time.monotonic() < self._due_s:
+            return
+        self._due_s = time.monotonic() + 1.0
         typical, slowest = (_rounded(value) for value in (state.latency_median_ms, state.latency_p99_ms))
         self._times.set_text(f"{typical} / {slowest} ms")
         self._rate.set_text(f"{_rounded(state.fps)} frames/s")
@@ -98,12 +107,10 @@ class Banner:
     def update(self, state: PageState) -> None:
         """Show ``state``."""
         self._headline.set_text(state.headline)
-        if (reason := sentence(state.reason)) != self._reason.text:
-            self._reason.set_text(reason)
-            self._reason.props["title"] = reason  # where it does not fit
+        for label, words in ((self._reason, sentence(state.reason)), (self._warning, "; ".join(state.warnings))):
+            label.set_text(words)
+            set_property(label, "title", words)  # where it does not fit
         self._spoken.set_text(spoken(state))
-        self._warning.set_text("; ".join(state.warnings))
-        self._warning.props["title"] = self._warning.text
         switch(self._warning, "hidden", on=not state.warnings)
         switch(self._reset, "hidden", on=not state.stopped)
         if state.mood != self._mood:

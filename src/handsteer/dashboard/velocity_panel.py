@@ -5,8 +5,7 @@ from typing import Final
 
 from nicegui import ui
 
-from handsteer.dashboard.elements import box, card, tag, text
-from handsteer.dashboard.page import STATIC
+from handsteer.dashboard.elements import STATIC, box, card, tag, text
 from handsteer.dashboard.state import PageState
 from handsteer.dashboard.world_state import SPAN_S, Sample, VelocityHistory
 from handsteer.types import Velocity

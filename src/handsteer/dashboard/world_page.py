@@ -2,7 +2,7 @@
 
 from nicegui import ui
 
-from handsteer.dashboard.elements import box, button, switch, tag, text
+from handsteer.dashboard.elements import box, button, set_property, switch, tag, text
 from handsteer.dashboard.node import DashboardNode
 from handsteer.dashboard.page import Page, PageContext
 from handsteer.dashboard.state import PageState
@@ -64,7 +64,7 @@ class WorldPage(Page):
             self._saved.set_text("no unsaved changes" if is_saved else "unsaved changes")
             switch(self._saved, "unsaved", on=not is_saved)
         for element, target in ((self._undo, history.before()), (self._redo, history.after())):
-            element.props["disabled"] = target is None
+            set_property(element, "disabled", target is None)
 
     def _fit(self) -> None:
         if self._desk.world is not None:

@@ -5,7 +5,7 @@ from typing import Any, Literal, get_args
 
 from nicegui import ui
 
-from handsteer.dashboard.page import STATIC
+from handsteer.dashboard.elements import STATIC
 from handsteer.robots.editing import Place, Section, heading, place
 from handsteer.robots.world import Gate, Thing, World
 from handsteer.types import Pose2D
