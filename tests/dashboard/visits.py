@@ -99,6 +99,7 @@ def visiting(
     *,
     steering: bool = False,
     study: Task | None = None,
+    locale: str = "en-US",
     **sections: dict[str, Any],
 ) -> Iterator[Visit]:
     """Show a page of a whole graph that sees the virtual hand; the hand begins once the browser shows the page.
@@ -109,6 +110,7 @@ def visiting(
         webcam: The video that the browser takes for its own camera.
         steering: Whether the graph has a node ``steering`` beside that of the page.
         study: What the page leads a participant through.
+        locale: The browser's language.
         sections: Further configuration by section.
     """
     base = {
@@ -119,7 +121,7 @@ def visiting(
     with Graph(load(None, base, sections), steering=steering) as graph, a_browser(webcam) as browser:
         served = PageProcess()
         url = served.serve(graph, study=study).removesuffix("/study")
-        visit = Visit(browser.new_page(viewport=WINDOW), graph)
+        visit = Visit(browser.new_page(viewport=WINDOW, locale=locale), graph)
         try:
             visit.page.set_default_timeout(PATIENCE_MS)
             visit.page.on("console", visit.note_message)

@@ -1,15 +1,16 @@
 """What all pages share: the head with links, the bar with the state and Stop, and the timer that updates them."""
 
+import copy
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 
 from nicegui import ui
 
 from handsteer.dashboard.access import SESSION
 from handsteer.dashboard.audit import PageAudit
 from handsteer.dashboard.elements import switch, tag, text
+from handsteer.dashboard.languages import ENGLISH, preferred_language
 from handsteer.dashboard.lessons import Lessons
 from handsteer.dashboard.node import DashboardNode
 from handsteer.dashboard.recordings import Recordings, duration_text
@@ -19,9 +20,6 @@ from handsteer.dashboard.state import PageState
 from handsteer.dashboard.status_bar import Banner, LeasePanel, TimingLine
 from handsteer.dashboard.viewers import LeaseStatus, OnDemandNode
 from handsteer.study.session import Session
-
-STATIC = Path(__file__).parent / "static"
-"""Scripts and styles of the pages."""
 
 PICTURE_PATH = "/camera.mjpg"
 WEBCAM_PATH = "/camera"
@@ -55,6 +53,8 @@ _INSTALLABLE = (
 )
 
 _ASSET = {"css": '<link rel="stylesheet" href="{}">', "js": '<script src="{}" defer></script>'}
+# Not deferred: they translate the page while the browser reads it.
+_TRANSLATED = '<script src="{0}/languages/{1}.js"></script><script src="{0}/translate.js"></script>'
 _LINKS = (("/", "Drive"), ("/world", "World"), ("/teach", "Teach"), ("/settings", "Settings"))
 _PERIOD_S = 0.1
 _ACK_PATIENCE_S = 5.0
@@ -112,6 +112,7 @@ class Page:
         self.client.on_delete(self._leave)
         self.client.on_delete(self._forget)
         ui.add_head_html(_INSTALLABLE)
+        self._speak(preferred_language(self.client.request.headers.get("accept-language", "")))
         for name in ("page.css", "page.js", *assets):
             ui.add_head_html(_ASSET[name.rpartition(".")[2]].format(f"{ASSETS_PATH}/{name}"))
         self._top(path)
@@ -156,6 +157,13 @@ class Page:
             session = request.scope.get("state", {}).get(SESSION, "")
             audit.introduce(self.client.id, session, request.client.host if request.client else "")
 
+    def _speak(self, language: str) -> None:
+        if language != ENGLISH:
+            # For this client only: all clients of a path share the page. Quasar's and NiceGUI's own words follow it.
+            self.client.page = copy.copy(self.client.page)
+            self.client.page.language = language  # type: ignore[assignment]
+            ui.add_head_html(_TRANSLATED.format(ASSETS_PATH, language))
+
     def _forget(self) -> None:
         if self._context.audit is not None:
             self._context.audit.forget(self.client.id)
@@ -163,7 +171,7 @@ class Page:
     def _top(self, path: str) -> None:
         with ui.element("header").classes("top"):
             ui.html(ICON, sanitize=False)
-            tag("h1", "", "handsteer")
+            tag("h1", "", "handsteer").props("translate=no")
             with ui.element("nav").classes("links"):
                 for target, name in _LINKS:
                     ui.link(name, target).props('aria-current="page"' if target == path else "")

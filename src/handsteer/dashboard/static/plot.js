@@ -113,7 +113,7 @@ export default {
         ],
         axes: [
           { ...axis, size: this.times ? 18 : 4, gap: 2, space: 80, values: (_, splits) => splits.map((at) => (this.times ? `${+at.toFixed(2)} s` : "")) },
-          { ...axis, size: 34, gap: 4, splits: () => [-this.most, 0, this.most] },
+          { ...axis, size: 34, gap: 4, splits: () => [-this.most, 0, this.most], values: (_, splits) => splits.map((at) => `${+at.toFixed(2)}`) },
         ],
         hooks: {
           setCursor: [(plot) => this.read(plot)],
