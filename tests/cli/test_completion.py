@@ -36,7 +36,7 @@ def script(tmp_path_factory: pytest.TempPathFactory) -> Path:
     ("before", "word", "expected"),
     [
         ("handsteer", "rec", {"recognize", "recognition", "record"}),
-        ("handsteer signs", "", {"list", "evaluate", "collect", "import", "train"}),
+        ("handsteer signs", "", {"list", "evaluate", "collect", "import", "train", "export"}),
         ("handsteer run", "--head", {"--headless"}),
         ("handsteer run", "--control.max-lin", {"--control.max-linear", "--control.max-linear-jerk"}),
         ("handsteer run --control.mode", "", {"signs", "joystick"}),

@@ -1,6 +1,7 @@
 """A sign is taught from the command line, as its users do."""
 
 import json
+import sys
 from pathlib import Path
 
 import cv2
@@ -11,8 +12,11 @@ from handsteer.cameras.virtual import VirtualHandCamera
 from handsteer.cli import main
 from handsteer.clock import SteppedClock
 from handsteer.config import VirtualHandConfig
+from handsteer.recognition.custom_signs import save_custom_model
 from handsteer.training.custom.dataset import Dataset, load_dataset, save_dataset
+from handsteer.training.custom.onnx_file import as_onnx
 from tests.cli.test_cli import fails, prints
+from tests.recognition.models import model
 from tests.training.custom.takes import takes
 from tests.training.custom.test_keypoint_csv import row, written
 
@@ -130,6 +134,12 @@ def test_rows_of_others_are_imported(capsys: pytest.CaptureFixture[str]) -> None
         (["collect", "--label", "Hi", "--from", "a.mcap", "--at", "1"], "there is no recording a.mcap"),
         (["evaluate", "hi.npz"], "the sign 'Hi' is not known; the signs are Stop, Forward"),
         (["evaluate", "gone.npz"], "cannot read the dataset of signs gone.npz"),
+        (["export", "gone.npz", "mine.onnx"], "cannot read the model of taught signs gone.npz"),
+        (["export", "bad.npz", "mine.onnx"], "bad.npz: not a model of taught signs, or damaged"),
+        (["export", "hi.npz", "mine.onnx"], "hi.npz: a damaged model of taught signs"),
+        (["export", "hi.npz", "bad.npz"], "bad.npz exists already: give another name, nothing is overwritten"),
+        (["export", "hi.npz", "gone/mine.onnx"], "OUTPUT: there is no folder"),
+        (["export", "hi.npz"], "OUTPUT"),
         (["list", "--signs.model", "bad.npz"], "bad.npz: not a model of taught signs, or damaged"),
         (["list", "--signs.model", "gone.npz"], "cannot read the model of taught signs gone.npz"),
     ],
@@ -159,6 +169,26 @@ def test_what_cannot_be_written_is_said_before_the_work(capsys: pytest.CaptureFi
     for verb in (["collect", "--label", "Hi", "--dataset"], ["train", "--output"]):
         assert f"{tmp_path} is a folder: give the name of a file" in fails(capsys, "signs", *verb, str(tmp_path))
         assert "cannot write /proc/my.npz: " in fails(capsys, "signs", *verb, "/proc/my.npz")
+    assert "cannot write /proc/my.onnx: " in fails(capsys, "signs", "export", "gone.npz", "/proc/my.onnx")
+
+
+def test_a_model_is_exported(capsys: pytest.CaptureFixture[str]) -> None:
+    save_custom_model(model(), Path("mine.npz"))
+    with pytest.raises(SystemExit) as ended:
+        main(["signs", "export", "mine.npz", "mine.onnx"])
+    assert ended.value.code == 0
+    assert capsys.readouterr().err == "handsteer: Hi, Ho: as ONNX in mine.onnx\n"
+    assert Path("mine.onnx").read_bytes() == as_onnx(model())
+
+
+def test_without_the_package_onnx_it_is_named(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "onnx", None)
+    for name in ("onnx_file", "onnx_graph"):
+        monkeypatch.delitem(sys.modules, f"handsteer.training.custom.{name}", raising=False)
+    said = fails(capsys, "signs", "export", "mine.npz", "mine.onnx")
+    assert said == "the export as ONNX needs the package onnx: run pip install 'handsteer[onnx]'"
 
 
 def test_photos_without_a_hand_are_named(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:

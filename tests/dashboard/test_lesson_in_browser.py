@@ -14,6 +14,7 @@ from handsteer.cameras.files import video_frames
 from handsteer.config import load
 from handsteer.recognition.custom_signs import load_custom_model
 from handsteer.training.custom.dataset import load_dataset
+from handsteer.training.custom.onnx_file import as_onnx
 from handsteer.training.custom.shared import LARGEST_SHARED_BYTES
 from tests.dashboard.test_accessibility import faults
 from tests.dashboard.visits import NEEDS_A_BROWSER, PATIENCE_MS, Visit, visiting
@@ -122,6 +123,7 @@ def teach(visit: Visit, card: Locator) -> None:
     card.get_by_role("heading", name="Two").wait_for()
     assert card.locator(".take svg.landmarks .finger").count() == 15
     assert percent(card) == 0, "nothing is learnt yet"
+    assert not page.get_by_role("link", name="Download the model as ONNX").is_visible(), "there is no model yet"
     press(visit, "Train")
     page.get_by_role("progressbar", name="Training").wait_for()
 
@@ -140,10 +142,15 @@ def keep(visit: Visit, card: Locator, folder: Path) -> None:
     with page.expect_download() as download:
         page.get_by_role("link", name="Download the takes as a table").click()
     assert download.value.path().read_text().startswith("label,person,session,take,time_s")
+    with page.expect_download() as download:
+        page.get_by_role("link", name="Download the model as ONNX").click()
+    exported = download.value.path().read_bytes()
     press(visit, "Keep")
     page.locator(".tools .message", has_text="Kept, and in use").wait_for()
     assert [take.label for take in load_dataset(folder / "signs.npz").takes] == ["Two"] * 3
-    assert load_custom_model(folder / "mine.npz").labels == ("Two",)
+    learnt = load_custom_model(folder / "mine.npz")
+    assert learnt.labels == ("Two",)
+    assert exported == as_onnx(learnt)
     page.get_by_role("button", name="Reset").click()
     page.locator(".tools .message", has_text="stands until the lesson is over").wait_for()
     assert visit.text(".banner .headline") == "Stopped"

@@ -64,4 +64,5 @@ def test_where_the_graph_is_elsewhere_the_page_says_so(site: Site) -> None:
     answer = site.get("/teach")
     assert answer.status == 200
     assert b"handsteer signs collect" in answer.read()
-    assert site.get("/lesson/signs.npz?viewer=x").status == 404
+    for name in ("signs.npz", "takes.csv", "signs.onnx"):
+        assert site.get(f"/lesson/{name}?viewer=x").status == 404

@@ -1,9 +1,10 @@
 """Files of a lesson: what a browser downloads and uploads."""
 
 import asyncio
+import importlib.util
 import tempfile
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from typing import BinaryIO, Final
@@ -16,9 +17,14 @@ from starlette.responses import FileResponse, PlainTextResponse, Response, Strea
 from handsteer.dashboard.lesson import Lesson
 from handsteer.dashboard.lessons import Lessons
 from handsteer.dashboard.socket_events import is_page_of
+from handsteer.recognition.custom_signs import CustomModel
+from handsteer.training.custom.dataset import Dataset
 from handsteer.training.custom.shared import LARGEST_SHARED_BYTES, takes_as_csv
 
 LESSON_PATH: Final = "/lesson"
+CAN_EXPORT: Final = importlib.util.find_spec("onnx") is not None
+"""Whether the package for the export as ONNX is installed."""
+
 _UPLOAD_TIMEOUT_S: Final = 120.0
 _TOO_LARGE: Final = f"The file is too large: a file of taught signs has at most {LARGEST_SHARED_BYTES // 1_000_000} MB."
 
@@ -41,12 +47,14 @@ def serve_lesson_files(application: FastAPI, lessons: Callable[[], Lessons | Non
     def takes(request: Request, viewer: str = "") -> Response:
         current = teaching(viewer, request)
         node = current.node(viewer) if current is not None else None
-        if node is None:
-            return _missing()
-        headers = {"Content-Disposition": 'attachment; filename="takes.csv"'}
-        return StreamingResponse(
-            _encoded(takes_as_csv(node.do(Lesson.dataset))), media_type="text/csv", headers=headers
-        )
+        return _missing() if node is None else _as_csv(node.do(Lesson.dataset))
+
+    @application.get(f"{LESSON_PATH}/signs.onnx")
+    def onnx(request: Request, viewer: str = "") -> Response:
+        current = teaching(viewer, request)
+        node = current.node(viewer) if current is not None else None
+        model = node.state.model if node is not None else None
+        return _missing() if model is None or not CAN_EXPORT else _as_onnx(model)
 
     @application.post(f"{LESSON_PATH}/signs")
     async def upload(request: Request, viewer: str = "") -> Response:
@@ -100,8 +108,20 @@ def _shared(lessons: Lessons, viewer: str) -> Response:
     )
 
 
-def _encoded(lines: Iterator[str]) -> Iterator[bytes]:
-    return (line.encode() for line in lines)
+def _as_csv(dataset: Dataset) -> Response:
+    lines = (line.encode() for line in takes_as_csv(dataset))
+    return StreamingResponse(lines, media_type="text/csv", headers=_attached("takes.csv"))
+
+
+def _as_onnx(model: CustomModel) -> Response:
+    from handsteer.training.custom.onnx_file import as_onnx  # noqa: PLC0415
+
+    headers = _attached("handsteer-signs.onnx")
+    return Response(as_onnx(model), media_type="application/octet-stream", headers=headers)
+
+
+def _attached(name: str) -> dict[str, str]:
+    return {"Content-Disposition": f'attachment; filename="{name}"'}
 
 
 def _missing() -> Response:

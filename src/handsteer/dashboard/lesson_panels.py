@@ -11,7 +11,7 @@ from handsteer.dashboard.elements import box, button, switch, tag, text
 from handsteer.dashboard.hand_drawing import taught_drawings
 from handsteer.dashboard.legend import DRAWN
 from handsteer.dashboard.lesson import Lesson
-from handsteer.dashboard.lesson_files import LESSON_PATH
+from handsteer.dashboard.lesson_files import CAN_EXPORT, LESSON_PATH
 from handsteer.dashboard.lesson_node import LessonNode
 from handsteer.dashboard.lesson_state import LessonState, outcome
 from handsteer.dashboard.lessons import Lessons
@@ -246,6 +246,7 @@ class LessonPanel:
                     viewer = f"viewer={lesson.viewer}"
                     _download("Download", f"{LESSON_PATH}/signs.npz?{viewer}", "Download takes and model as one file")
                     _download("CSV", f"{LESSON_PATH}/takes.csv?{viewer}", "Download the takes as a table, CSV")
+                    self._onnx = _download("ONNX", f"{LESSON_PATH}/signs.onnx?{viewer}", "Download the model as ONNX")
                     button("Upload", label="Upload a file of taught signs").props("data-choose")
                     file = ui.element("input").props(
                         f'type=file accept=".npz" data-upload="{LESSON_PATH}/signs?{viewer}"'
@@ -272,6 +273,7 @@ class LessonPanel:
         to_keep = state.is_fresh and state.is_changed
         switch(self._train, "primary", on=not to_keep)
         switch(self._keep, "primary", on=to_keep)
+        switch(self._onnx, "hidden", on=state.model is None or not CAN_EXPORT)
         set_words(self._undo, state.undo)
         switch(self._undo, "hidden", on=not state.undo or not is_idle)
         self._hint.set_text("" if state.is_training else state.hint)
@@ -310,6 +312,7 @@ def _enable(element: ui.element, *, on: bool) -> None:
     element.props(remove="disabled") if on else element.props("disabled")
 
 
-def _download(words: str, address: str, label: str) -> None:
-    with ui.element("a").classes("text-button").props(f'href="{address}" download aria-label="{label}"'):
+def _download(words: str, address: str, label: str) -> ui.element:
+    with ui.element("a").classes("text-button").props(f'href="{address}" download aria-label="{label}"') as link:
         ui.label(words).style("display: inline")
+    return link

@@ -20,9 +20,10 @@ PALM: Final = [WRIST, *KNUCKLES]
 _DIGITS: Final = np.array(
     [[0, 1, 2, 3, 4], [0, 5, 6, 7, 8], [0, 9, 10, 11, 12], [0, 13, 14, 15, 16], [0, 17, 18, 19, 20]]
 )
-_BONE_ENDS: Final = (_DIGITS[:, 1:].ravel(), _DIGITS[:, :-1].ravel())
+BONE_ENDS: Final = (_DIGITS[:, 1:].ravel(), _DIGITS[:, :-1].ravel())
+"""Landmarks at the far and the near ends of the 20 bones, digit by digit."""
 
-_PAIRS: Final = np.array(
+PAIRS: Final = np.array(
     [
         *((tip, WRIST) for tip in (4, 8, 12, 16, 20)),
         *((tip, tip - 3) for tip in (4, 8, 12, 16, 20)),
@@ -37,7 +38,7 @@ _PAIRS: Final = np.array(
 """Pairs of landmarks whose distances distinguish shapes."""
 
 BEND_COUNT: Final = 15
-PAIR_COUNT: Final = len(_PAIRS)
+PAIR_COUNT: Final = len(PAIRS)
 COUNT: Final = BEND_COUNT + 2 * PAIR_COUNT + 1
 """Number of features."""
 
@@ -104,7 +105,7 @@ def _in_metres(pixels: Array, world: Array) -> Array:
 
 def bone_bends(points: Array) -> Array:
     """Return (n, 15) angles between adjacent bones of (n, 21, 2 or 3) landmarks, in radians, digit by digit."""
-    bones = points[:, _BONE_ENDS[0]] - points[:, _BONE_ENDS[1]]
+    bones = points[:, BONE_ENDS[0]] - points[:, BONE_ENDS[1]]
     bones = (bones / np.maximum(np.linalg.norm(bones, axis=2, keepdims=True), 1e-9)).reshape(-1, 5, 4, bones.shape[2])
     cosines = (bones[:, :, 1:] * bones[:, :, :-1]).sum(axis=3)
     angles: Array = np.arccos(np.clip(cosines, -1.0, 1.0)).reshape(-1, 15)
@@ -113,6 +114,6 @@ def bone_bends(points: Array) -> Array:
 
 def pair_distances(points: Array) -> Array:
     """Return (n, :data:`PAIR_COUNT`) distances that distinguish shapes of (n, 21, 2 or 3) landmarks, in their unit."""
-    gaps = points[:, _PAIRS[:, 0]] - points[:, _PAIRS[:, 1]]
+    gaps = points[:, PAIRS[:, 0]] - points[:, PAIRS[:, 1]]
     lengths: Array = np.sqrt((gaps**2).sum(axis=2))
     return lengths
