@@ -4,7 +4,11 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+import pytest
+from playwright.sync_api import Page
 
+from handsteer.cameras import choose
+from handsteer.cameras.choice import OWN
 from tests.dashboard.visits import NEEDS_A_BROWSER, visiting
 
 pytestmark = NEEDS_A_BROWSER
@@ -31,6 +35,53 @@ def test_the_browsers_camera_and_its_size_can_change_while_it_is_in_use(tmp_path
         assert visit.troubles == []
 
 
+def option(page: Page, select: str) -> str:
+    """Return the shown option of a list."""
+    shown: str = page.locator(select).evaluate("each => each.selectedOptions[0].textContent")
+    return shown
+
+
+def test_the_driver_changes_the_cameras_of_the_computer_and_the_robot_waits_for_neutral(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path, random = tmp_path / "clip.avi", np.random.default_rng(0)
+    video = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 5, (320, 240))
+    for _ in range(5):
+        video.write(random.integers(80, 120, (240, 320, 3)).astype(np.uint8))
+    video.release()
+    with visiting("Forward:600", camera={"source": str(path)}) as visit:
+        page, graph = visit.page, visit.graph
+        visit.wait_until(lambda: visit.text(".lease .role") == "you drive")
+        monkeypatch.setattr(choose, "webcams", lambda: ["/dev/video97"])  # found when the panel is opened
+        page.locator(".camera-choices summary").click()
+        visit.wait_until(lambda: page.locator("#machine-camera option").count() == 3)
+        assert option(page, "#machine-camera") == "clip.avi"
+        page.locator("#machine-camera").select_option(label="/dev/video97")
+        page.get_by_text("There is no webcam /dev/video97").wait_for()
+        assert (option(page, "#machine-camera"), graph.cameras.source) == ("clip.avi", OWN)
+
+        page.locator("#machine-camera").select_option(label="Virtual hand")
+        visit.wait_until(lambda: visit.text(".source") == "virtual hand")
+        visit.wait_until(lambda: visit.text(".camera .sign") == "Forward")
+        visit.wait_until(lambda: "the camera was changed" in visit.text(".banner"))
+        assert graph.robot.state.linear_mps == pytest.approx(0, abs=0.01)
+        assert not page.locator("#machine-size").is_visible(), "only webcams are asked for a resolution"
+
+        other = visit.another_page()
+        other.goto(page.url)
+        other.locator(".camera-choices summary").click()
+        other.locator("#machine-camera").select_option(label="clip.avi")
+        other.locator(".choices-panel").get_by_text("Only the driver can change it").wait_for()
+        assert option(other, "#machine-camera") == "Virtual hand"
+        assert graph.cameras.source == "virtual"
+
+        page.locator(".camera-choices summary").click()  # the panel covers the picture
+        page.get_by_role("button", name="Back to clip.avi").click()
+        visit.wait_until(lambda: visit.text(".source") == "clip.avi")
+        visit.wait_until(lambda: option(page, "#machine-camera") == "clip.avi")
+        assert visit.troubles == []
+
+
 def test_the_threshold_changes_at_once_and_only_for_the_driver() -> None:
     with visiting("Forward:600", camera={"fps": 5}) as visit:
         page = visit.page
@@ -48,4 +99,8 @@ def test_the_threshold_changes_at_once_and_only_for_the_driver() -> None:
         other.locator(".choices-panel .q-slider__track-container").press("ArrowLeft")
         other.get_by_text("Only the driver can change it").wait_for()
         assert visit.graph.config.signs.min_confidence == 0.85
+
+        page.get_by_text("The camera looks the way I look").click()
+        visit.wait_until(lambda: visit.graph.config.signs.swap_sides)
+        visit.wait_until(lambda: other.get_by_role("checkbox", name="The camera looks").is_checked())
         assert visit.troubles == []

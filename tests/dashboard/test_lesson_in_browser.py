@@ -174,7 +174,7 @@ def drive(visit: Visit) -> None:
     page.locator(".banner .headline", has_text="Standing").wait_for()
     page.locator(".sign-tile", has_text="Two").locator("svg.landmarks").wait_for()
     # A webcam that has left shows nothing, not even that no hand is there: the robot's own camera does.
-    page.get_by_role("button", name="Use the robot's camera").click()
+    page.get_by_role("button", name="Back to the virtual hand").click()
     visit.wait_until(lambda: "No hand" in visit.text(".banner") and "Ready" not in visit.text(".banner"))
     page.get_by_role("button", name="Use my camera").click()
     visit.wait_until(lambda: visit.text(".camera .sign") == "Two")
