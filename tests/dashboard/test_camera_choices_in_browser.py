@@ -75,7 +75,6 @@ def test_the_driver_changes_the_cameras_of_the_computer_and_the_robot_waits_for_
         assert option(other, "#machine-camera") == "Virtual hand"
         assert graph.cameras.source == "virtual"
 
-        page.locator(".camera-choices summary").click()  # the panel covers the picture
         page.get_by_role("button", name="Back to clip.avi").click()
         visit.wait_until(lambda: visit.text(".source") == "clip.avi")
         visit.wait_until(lambda: option(page, "#machine-camera") == "clip.avi")

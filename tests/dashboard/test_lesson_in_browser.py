@@ -21,6 +21,7 @@ from tests.dashboard.visits import NEEDS_A_BROWSER, PATIENCE_MS, Visit, visiting
 pytestmark = NEEDS_A_BROWSER
 
 TRAINING_MS = 5 * PATIENCE_MS
+EMPTY_FRAMES = 30
 
 
 @pytest.fixture
@@ -31,6 +32,11 @@ def two_fingers(data_dir: Path, tmp_path: Path) -> Path:
         for frame in video_frames(data_dir / "videos" / "CoderEnko007_hand_544x960.mp4"):
             if 2.4 <= frame.captured_s < 4.2:
                 out.write(cv2.imencode(".jpg", landscape(frame.image))[1].tobytes())
+        # Without a hand for longer than neutral takes: each camera has to see it first.
+        empty, random = np.full((480, 640, 3), 110, np.uint8), np.random.default_rng(0)
+        for _ in range(EMPTY_FRAMES):
+            noisy = empty + random.integers(0, 9, empty.shape).astype(np.uint8)
+            out.write(cv2.imencode(".jpg", noisy)[1].tobytes())
     return path
 
 
