@@ -9,6 +9,8 @@ from playwright.sync_api import Page
 
 from handsteer.cameras import choose
 from handsteer.cameras.choice import OWN
+from handsteer.messages import CAMERA_CHANGED
+from tests.dashboard.test_accessibility import faults
 from tests.dashboard.visits import NEEDS_A_BROWSER, visiting
 
 pytestmark = NEEDS_A_BROWSER
@@ -26,13 +28,41 @@ def test_the_browsers_camera_and_its_size_can_change_while_it_is_in_use(tmp_path
         page.locator(".camera-choices summary").click()
         visit.wait_until(lambda: len(page.evaluate(NAMES)) > 0)
         visit.wait_until(lambda: visit.graph.cameras.browser.is_given)
+        changes: list[str] = []
+        visit.graph.transport.subscribe("test", CAMERA_CHANGED, lambda got: changes.append(got.message.data))
         for choice, value in (("browser-camera", page.evaluate(NAMES)[0]), ("browser-size", "320x240")):
             page.locator(f"#{choice}").select_option(label=value)
             page.wait_for_function("size => giving.video.videoWidth === size", arg=320 if value == "320x240" else 640)
+            # Before the first frame of the other one, so that the robot waits for neutral.
+            visit.wait_until(lambda: bool(changes))
+            changes.clear()
             frames = camera.frames
             visit.wait_until(lambda frames=frames: camera.frames > frames + 3)  # type: ignore[misc]
             assert visit.graph.cameras.source == "browser"
         assert visit.troubles == []
+
+
+TOO_SMALL = """() => [...document.querySelectorAll(".camera-choices :is(summary, select, .q-slider, .q-checkbox)")]
+    .map((each) => [each.id || each.className, each.getBoundingClientRect()])
+    .filter(([_, box]) => box.height > 0 && box.height < 44).map(([name]) => name)"""
+
+
+def test_the_panel_covers_neither_the_hand_nor_more_than_the_screen_and_fingers_can_use_it() -> None:
+    with visiting("Forward:600", camera={"fps": 5}) as visit:
+        page = visit.page
+        page.locator(".camera-choices summary").click()
+        panel, picture = page.locator(".choices-panel"), page.locator(".camera .stage")
+        for width, height in ((1440, 900), (1000, 600), (390, 844)):
+            page.set_viewport_size({"width": width, "height": height})
+            visit.wait_until(lambda: page.evaluate("document.documentElement.scrollWidth <= innerWidth"))
+            visit.wait_until(lambda width=width: page.evaluate("innerWidth") == width)  # type: ignore[misc]
+            inner, hand = panel.bounding_box(), picture.bounding_box()
+            assert inner is not None
+            assert hand is not None
+            assert inner["x"] + inner["width"] <= width
+            assert inner["x"] >= hand["x"] + hand["width"] or inner["y"] >= hand["y"] + hand["height"]
+            assert faults(page) == []
+        assert page.evaluate(TOO_SMALL) == []
 
 
 def option(page: Page, select: str) -> str:

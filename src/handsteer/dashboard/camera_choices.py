@@ -9,6 +9,7 @@ from handsteer.audit import without_passwords
 from handsteer.cameras import VIRTUAL_HAND
 from handsteer.cameras.choice import BROWSER, CameraChoice, Size
 from handsteer.dashboard.elements import box, sentence, tag, text
+from handsteer.dashboard.first_visit import NOT_THE_DRIVER
 from handsteer.dashboard.page import Page
 from handsteer.dashboard.remote_graph import RemoteGraph
 from handsteer.dashboard.settings import Settings
@@ -18,7 +19,6 @@ from handsteer.errors import ConfigError, HandsteerError
 
 _THRESHOLD: Final = FIELDS["signs.min_confidence"]
 _SWAP_SIDES: Final = FIELDS["signs.swap_sides"]
-_NOT_THE_DRIVER: Final = "Only the driver can change it: ask to drive first."
 _NOT_IN_USE: Final = "None: a browser's camera is used"
 _STOPS: Final = "A change stops the robot; then lower your hand to begin."
 _DEVICES: Final = "The list is complete once the browser has allowed a camera."
@@ -101,7 +101,7 @@ class CameraChoices:
 
     def _set(self, field: Field, value: str) -> bool:
         """Set a parameter, or say why not; return whether it is set."""
-        trouble = "" if self._page.drives() else _NOT_THE_DRIVER
+        trouble = "" if self._page.drives() else NOT_THE_DRIVER
         if not trouble:
             try:
                 self._settings.set(field, value)
@@ -179,7 +179,7 @@ class _MachineCameras:
             await self._use(self._graph.state.camera_source, self._sizes[number])
 
     async def _use(self, source: str, size: Size) -> None:
-        trouble = _NOT_THE_DRIVER
+        trouble = NOT_THE_DRIVER
         if self._page.drives():
             self._trouble.set_text("")
             self._progress.set_text(f"Opening {self._graph.camera_name(source)} …")

@@ -36,6 +36,7 @@ _REFUSALS: Final = {
     ),
     "ended": "The camera was disconnected, or another program took it. Press Use my camera to go on.",
 }
+NOT_THE_DRIVER: Final = "Only the driver can change it: ask to drive first."
 _LONGEST_REASON: Final = 200
 
 
@@ -80,8 +81,9 @@ class CameraOffer:
         switch(self._own, "hidden", on=source == OWN or not has_own)
 
     async def _use_own(self) -> None:
-        trouble = ""
+        trouble = NOT_THE_DRIVER
         if self._page.drives():
+            trouble = ""
             try:
                 await asyncio.wrap_future(self._graph.choose_camera(OWN))
             except HandsteerError as error:
