@@ -228,7 +228,8 @@ class RemoteGraph:
         if source == BROWSER:
             return "the camera of a browser"
         names = {each.source: each.name for each in self.state.cameras}
-        return names.get(source, "the robot's camera").replace(VIRTUAL_HAND, f"the {VIRTUAL_HAND}")
+        name = names.get(source, "the robot's camera")
+        return f"the {name}" if name == VIRTUAL_HAND else name
 
     def find_cameras(self) -> Future[None]:
         """Look again for the cameras of the graph's machine."""
