@@ -16,10 +16,12 @@ the hand's sign, :mod:`handsteer.control` converts it to a velocity, and :mod:`h
 import logging
 import math
 from collections.abc import Callable
+from concurrent.futures import Future
 from pathlib import Path
 from typing import Any
 
 from handsteer.audit import setting_changes
+from handsteer.cameras.choice import Size
 from handsteer.clock import Clock, RealClock, SteppedClock
 from handsteer.config import Config
 from handsteer.errors import ConfigError
@@ -33,6 +35,7 @@ from handsteer.making import (
     open_cameras,
 )
 from handsteer.messages import (
+    CAMERA_CHANGED,
     GESTURE_JOY,
     HAND_SIGN,
     IMAGE_ANNOTATED,
@@ -42,6 +45,7 @@ from handsteer.messages import (
     RECORDED,
     SCAN,
     STEERING_CMD_VEL,
+    String,
     Topic,
 )
 from handsteer.nodes.auditing import Auditor
@@ -99,9 +103,17 @@ class Graph:
         noted = tuple((journal.transport, journal.clock) for journal in journals)
         self.robot = make_robot(config, *wires, link, cmd_vel=cmd_vel, odom=ODOM, scan=SCAN)
         self.recognition = make_recognition(
-            config, *noted[0], image=IMAGE_RAW, compressed=IMAGE_COMPRESSED, sign=HAND_SIGN, joy=GESTURE_JOY
+            config,
+            *noted[0],
+            image=IMAGE_RAW,
+            compressed=IMAGE_COMPRESSED,
+            sign=HAND_SIGN,
+            joy=GESTURE_JOY,
+            camera_changed=CAMERA_CHANGED,
         )
         self.cameras = open_cameras(config, self.clock)
+        self.cameras.on_change = self._tell_of_camera
+        self._camera_changed = self.transport.advertise("my_camera", CAMERA_CHANGED)
         self.camera = make_camera(config, *wires, self.cameras, image=IMAGE_RAW, compressed=IMAGE_COMPRESSED)
         self.control = make_control(
             config,
@@ -109,6 +121,7 @@ class Graph:
             simulated=config.robot.kind == "sim",
             sign=HAND_SIGN,
             joy=GESTURE_JOY,
+            camera_changed=CAMERA_CHANGED,
             steering=STEERING_CMD_VEL,
             cmd_vel=cmd_vel,
             odom=ODOM,
@@ -119,7 +132,7 @@ class Graph:
         self.recognition.journal, self.control.journal = journals
         self._auditor = Auditor(self.transport, _NAME, self.clock)
         self._cmd_vel = cmd_vel
-        recorded = (IMAGE_COMPRESSED, cmd_vel, *((SCAN,) if config.collision_monitor.enabled else ()))
+        recorded = (CAMERA_CHANGED, IMAGE_COMPRESSED, cmd_vel, *((SCAN,) if config.collision_monitor.enabled else ()))
         self.recording = RunRecording(*wires, self._auditor, (self.recognition, self.control), recorded)
         self._link = link
         self._began_s = self.clock.now()
@@ -205,6 +218,17 @@ class Graph:
             self._auditor.say(event, self.clock.now())
         for node in self.nodes:
             node.reconfigure(config)
+        if config.signs.swap_sides != before.signs.swap_sides:
+            self._tell_of_camera()
+
+    def choose_camera(self, source: str, size: Size | None = None, is_far: bool = False) -> Future[None]:
+        """Select a camera; the robot stops, and needs neutral before it moves again. May be called from any thread.
+
+        Args, result and errors are those of :meth:`~handsteer.cameras.choice.ChoiceOfCameras.choose`.
+        """
+        done = self.cameras.choose(source, size, is_far)
+        self.camera.reconfigure(self.config)
+        return done
 
     def run_stepped(self, duration_s: float = math.inf) -> None:
         """Run all nodes in turn on this thread, as fast as possible, on the graph's stepped clock.
@@ -249,6 +273,10 @@ class Graph:
     def end_recording(self, by: str = _NAME) -> None:
         """End the recording, if there is one; ``by`` is who ends it, for the audit. May be called from any thread."""
         self.recording.end(by)
+
+    def _tell_of_camera(self) -> None:
+        self.recognition.is_camera_far = self.cameras.is_far
+        self._camera_changed.publish(String(data=self.cameras.name), self.clock.now())
 
     def summary(self) -> Summary:
         """Return the statistics of the run so far."""

@@ -113,6 +113,11 @@ def jpeg_picture(message: CompressedImage) -> NDArray[np.uint8]:
         raise FrameError(f"a compressed image, format {message.format[:60]!r}: {error}") from None
 
 
+def mirrored(bgr: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Return a copy of ``bgr``, (height, width, 3) uint8, with left and right swapped."""
+    return np.asarray(cv2.flip(bgr, 1), np.uint8)
+
+
 def encode_jpeg(bgr: NDArray[np.uint8], quality: int = 80) -> NDArray[np.uint8]:
     """Return ``bgr``, (height, width, 3) uint8, as the bytes of a JPEG file in an (n,) uint8 array."""
     done, data = cv2.imencode(".jpg", bgr, [cv2.IMWRITE_JPEG_QUALITY, quality])

@@ -19,7 +19,7 @@ from handsteer.types import NONE, find_sign
 
 if TYPE_CHECKING:
     from handsteer.cameras import Camera
-    from handsteer.cameras.browser import ChoiceOfCameras
+    from handsteer.cameras.choice import ChoiceOfCameras
     from handsteer.nodes.camera import CameraNode
     from handsteer.nodes.control import HandSignControlNode
     from handsteer.nodes.recognition import HandSignRecognitionNode
@@ -56,16 +56,19 @@ def make_camera(
 
 
 def open_cameras(config: Config, clock: Clock) -> "ChoiceOfCameras":
-    """Return this machine's own camera and the browser's, one of which is selected at a time.
+    """Return this machine's cameras and the browser's, one of which is selected at a time.
 
     Raises:
         CameraError: The machine's own camera cannot be used.
     """
-    from handsteer.cameras.browser import BrowserCamera, ChoiceOfCameras, NoCamera
+    from handsteer.cameras.browser import BrowserCamera, NoCamera
+    from handsteer.cameras.choice import BROWSER, OWN, ChoiceOfCameras
+    from handsteer.cameras.choose import MachineCameras
 
-    if config.camera.source == "browser":
-        return ChoiceOfCameras(NoCamera(), BrowserCamera(clock), "browser")
-    return ChoiceOfCameras(_open_camera(config, clock), BrowserCamera(clock))
+    has_own = config.camera.source != "browser"
+    own = _open_camera(config, clock) if has_own else NoCamera()
+    machine = MachineCameras(config.camera, config.virtual_hand, clock, own)
+    return ChoiceOfCameras(own, BrowserCamera(clock), machine, OWN if has_own else BROWSER)
 
 
 def _open_camera(config: Config, clock: Clock) -> "Camera":

@@ -183,6 +183,8 @@ def is_released(message: Joy) -> bool:
 # The functions of topics are no lambdas, so that a topic can be pickled for another process.
 IMAGE_RAW = Topic("/image_raw", Image)
 IMAGE_COMPRESSED = Topic("/image_raw/compressed", CompressedImage, beneath=IMAGE_RAW)
+# The name of the camera whose pictures follow, when another one was chosen; captured when it was.
+CAMERA_CHANGED = Topic("/camera_changed", String)
 CAMERA_INFO = Topic("/camera_info", CameraInfo, beneath=IMAGE_RAW)
 # Each sign changes the speed by one step, so none may be lost when several arrive at once.
 HAND_SIGN = Topic(

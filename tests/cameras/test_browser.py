@@ -5,10 +5,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from handsteer.cameras import Camera, Frame
-from handsteer.cameras.browser import LARGEST_BYTES, BrowserCamera, ChoiceOfCameras, NoCamera
-from handsteer.cameras.virtual import VirtualHandCamera
+from handsteer.cameras.browser import LARGEST_BYTES, BrowserCamera
+from handsteer.cameras.choice import BROWSER, ChoiceOfCameras
+from handsteer.cameras.choose import MachineCameras, open_camera
 from handsteer.clock import SteppedClock
-from handsteer.config import VirtualHandConfig
+from handsteer.config import CameraConfig, VirtualHandConfig
 from handsteer.errors import FrameError
 from tests.contracts.camera_contract import CameraContract
 from tests.fuzz import corpus
@@ -25,7 +26,8 @@ class Sending:
     def __init__(self, clock: SteppedClock) -> None:
         self._clock = clock
         self._cameras = choice(clock)
-        self._cameras.choose("browser")
+        self._cameras.choose(BROWSER)
+        self._cameras.read()
         self.name, self.period_s = self._cameras.name, self._cameras.period_s
         self.close = self._cameras.close
 
@@ -35,8 +37,9 @@ class Sending:
 
 
 def choice(clock: SteppedClock) -> ChoiceOfCameras:
-    own = VirtualHandCamera(VirtualHandConfig(), width=64, height=48, fps=30, clock=clock)
-    return ChoiceOfCameras(own, BrowserCamera(clock))
+    config, hand = CameraConfig(source="virtual", width=64, height=48), VirtualHandConfig()
+    own = open_camera(config, hand, clock)
+    return ChoiceOfCameras(own, BrowserCamera(clock), MachineCameras(config, hand, clock, own))
 
 
 class TestBrowserCamera(CameraContract):
@@ -90,32 +93,6 @@ def test_another_browser_starts_with_a_clock_of_its_own() -> None:
     frame = browser.read(0.0)
     assert frame is not None
     assert frame.captured_s == pytest.approx(100.0)
-
-
-def test_the_machines_own_camera_comes_back_only_when_it_is_chosen() -> None:
-    cameras = choice(SteppedClock(0.0))
-    assert (cameras.source, cameras.name) == ("own", "virtual hand")
-    assert cameras.read() is not None
-    cameras.choose("browser")
-    assert (cameras.source, cameras.name) == ("browser", "browser's camera")
-    assert cameras.read() is None
-    cameras.choose("own")
-    assert cameras.read() is not None
-
-
-def test_a_device_is_closed_while_the_browser_is_chosen_so_that_it_keeps_no_old_frame() -> None:
-    class Device(NoCamera):
-        closed = 0
-
-        def close(self) -> None:
-            self.closed += 1
-
-    device = Device()
-    cameras = ChoiceOfCameras(device, BrowserCamera(SteppedClock(0.0)))
-    cameras.choose("browser")
-    cameras.read()
-    cameras.read()
-    assert device.closed == 1
 
 
 @pytest.mark.parametrize(

@@ -1,3 +1,4 @@
+import struct
 import subprocess
 from pathlib import Path
 from typing import Any
@@ -7,7 +8,7 @@ import numpy as np
 import pytest
 
 from handsteer.cameras import Camera
-from handsteer.cameras.webcam import Webcam, is_address, is_device
+from handsteer.cameras.webcam import Webcam, captures, is_address, is_device
 from handsteer.clock import SteppedClock
 from handsteer.errors import CameraInUse, CameraLost, CameraNotFound, CameraUnreadable
 from tests.contracts.camera_contract import CameraContract
@@ -131,3 +132,18 @@ def test_a_camera_whose_pictures_become_far_too_large_is_lost() -> None:
 def test_what_a_source_is() -> None:
     assert [is_device(source) for source in ("0", "12", "/dev/video0", "clip.mp4")] == [True, True, True, False]
     assert [is_address(source) for source in ("rtsp://a/b", "http://a", "/dev/video0")] == [True, True, False]
+
+
+@pytest.mark.parametrize(
+    ("of_driver", "of_device", "expected"),
+    [
+        (0x84A00001, 0x04200001, True),  # the first device file of a usual webcam
+        (0x84A00001, 0x04A00000, False),  # its second one, with metadata only
+        (0x00000001, 0, True),  # an old driver, without capabilities of the device
+        (0x80001000, 0x00001000, True),  # several planes
+        (0x80000002, 0x00000002, False),  # an output
+    ],
+)
+def test_a_device_captures_by_its_own_capabilities(of_driver: int, of_device: int, expected: bool) -> None:
+    about = (b"uvcvideo", b"Webcam", b"usb-0000:00:14.0-1", 0x060100)  # driver, card, bus and version
+    assert captures(struct.pack("=16s32s32sIII12x", *about, of_driver, of_device)) is expected

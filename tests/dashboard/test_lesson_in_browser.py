@@ -22,6 +22,7 @@ from tests.dashboard.visits import NEEDS_A_BROWSER, PATIENCE_MS, Visit, visiting
 pytestmark = NEEDS_A_BROWSER
 
 TRAINING_MS = 5 * PATIENCE_MS
+EMPTY_FRAMES = 30
 
 
 @pytest.fixture
@@ -32,6 +33,11 @@ def two_fingers(data_dir: Path, tmp_path: Path) -> Path:
         for frame in video_frames(data_dir / "videos" / "CoderEnko007_hand_544x960.mp4"):
             if 2.4 <= frame.captured_s < 4.2:
                 out.write(cv2.imencode(".jpg", landscape(frame.image))[1].tobytes())
+        # Without a hand for longer than neutral takes: each camera has to see it first.
+        empty, random = np.full((480, 640, 3), 110, np.uint8), np.random.default_rng(0)
+        for _ in range(EMPTY_FRAMES):
+            noisy = empty + random.integers(0, 9, empty.shape).astype(np.uint8)
+            out.write(cv2.imencode(".jpg", noisy)[1].tobytes())
     return path
 
 
@@ -181,7 +187,7 @@ def drive(visit: Visit) -> None:
     page.locator(".banner .headline", has_text="Standing").wait_for()
     page.locator(".sign-tile", has_text="Two").locator("svg.landmarks").wait_for()
     # A webcam that has left shows nothing, not even that no hand is there: the robot's own camera does.
-    page.get_by_role("button", name="Use the robot's camera").click()
+    page.get_by_role("button", name="Back to the virtual hand").click()
     visit.wait_until(lambda: "No hand" in visit.text(".banner") and "Ready" not in visit.text(".banner"))
     page.get_by_role("button", name="Use my camera").click()
     visit.wait_until(lambda: visit.text(".camera .sign") == "Two")

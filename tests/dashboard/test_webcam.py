@@ -12,16 +12,17 @@ from playwright.sync_api import Browser, Page
 from handsteer.config import load
 from handsteer.dashboard.page_process import PageProcess
 from handsteer.graph import Graph
+from handsteer.types import FORWARD, STOP
 from tests.dashboard.browsers import a_browser
 from tests.dashboard.visits import NEEDS_A_BROWSER, PATIENCE_MS, WINDOW
 
 pytestmark = NEEDS_A_BROWSER
 
 
-def recording(slideshow: Path, sign: str, path: Path) -> Path:
-    """Write the frames of the slide show with ``sign`` as a file that Chromium takes for a webcam."""
+def recording(slideshow: Path, signs: tuple[str, ...], path: Path) -> Path:
+    """Write the frames of the slide show with ``signs`` as a file that Chromium takes for a webcam."""
     with slideshow.with_suffix(".labels.csv").open() as file:
-        wanted = {int(row["frame"]) for row in csv.DictReader(file) if row["sign"] == sign}
+        wanted = {int(row["frame"]) for row in csv.DictReader(file) if row["sign"] in signs}
     video = cv2.VideoCapture(str(slideshow))
     with path.open("wb") as out:
         for number in range(max(wanted) + 1):
@@ -54,7 +55,7 @@ def url(graph: Graph) -> Iterator[str]:
 
 @pytest.fixture
 def browser(slideshow: Path, tmp_path: Path) -> Iterator[Browser]:
-    webcam = recording(slideshow, "Forward", tmp_path / "forward.mjpeg")
+    webcam = recording(slideshow, (STOP, FORWARD), tmp_path / "forward.mjpeg")
     with a_browser(webcam) as browser:
         yield browser
 
@@ -79,7 +80,7 @@ def test_the_browsers_webcam_drives_until_its_page_is_closed(graph: Graph, url: 
     wait_for_words(page, ".camera .sign", "Forward")
     wait_for_words(page, ".source", "browser's camera")
     wait_for_words(page, ".banner .headline", "Driving")
-    assert page.get_by_text("Use the robot's camera").is_visible()
+    assert page.get_by_text("Back to the virtual hand").is_visible()
 
     second = show(browser, url)
     second.get_by_text("Use my camera").wait_for(state="hidden")
@@ -88,7 +89,7 @@ def test_the_browsers_webcam_drives_until_its_page_is_closed(graph: Graph, url: 
     # The robot's own camera does not come back by itself, whatever it sees.
     assert graph.cameras.source == "browser"
     wait_for_words(second, ".banner", "No frame")
-    second.get_by_text("Use the robot's camera").click()
+    second.get_by_text("Back to the virtual hand").click()
     wait_for_words(second, ".banner", "No hand seen for")
 
 

@@ -5,6 +5,7 @@ import pytest
 
 from handsteer.cameras.choose import uncalibrated
 from handsteer.clock import to_seconds
+from handsteer.config import Config
 from handsteer.errors import CameraLost
 from handsteer.images import bgr_image
 from handsteer.messages import CAMERA_INFO, DIAGNOSTICS, IMAGE_COMPRESSED, IMAGE_RAW, CameraInfo
@@ -58,6 +59,55 @@ def test_camera_info_says_with_each_image_what_is_known(caplog: pytest.LogCaptur
     assert np.any(of(lens).k)
     assert not np.any(of(replace(lens, width=65)).k)
     assert "the calibration is for pictures of 65 x 48, and these have 64 x 48: it is not used" in caplog.text
+
+
+class Several(FaultyCamera):
+    """A camera that becomes another one, as a choice of cameras does."""
+
+    def become(self, name: str, period_s: float | None, *events: Event) -> None:
+        self.name, self.period_s = name, period_s  # type: ignore[assignment]
+        self._events = iter(events)
+
+
+def several(*events: Event, calibration: CameraInfo | None = None) -> tuple[Bench, CameraNode, Several]:
+    bench = Bench()
+    camera = Several(events, bench.clock, period_s=0.1)
+    bench.nodes = [node := CameraNode(bench.transport, bench.clock, camera, calibration=calibration)]
+    return bench, node, camera
+
+
+def test_the_pace_and_the_report_are_those_of_the_camera_in_use() -> None:
+    bench, _, camera = several(ONE, TWO)
+    images, diagnostics = bench.record(IMAGE_RAW), bench.record(DIAGNOSTICS)
+    bench.run(0.15)
+    assert len(images) == 2
+    camera.become("webcam 1", 0.5, THREE, None, None, None, None)
+    bench.run(0.9)
+    assert len(images) == 3
+    assert diagnostics[-1].status[0].message == "webcam 1: delivers frames"
+    camera.become("webcam 2", 0.5, *[None] * 9)
+    bench.run(1.0)
+    assert diagnostics[-1].status[0].message == "webcam 2: waiting for the first frame"
+
+
+def test_the_calibration_is_not_used_for_another_camera() -> None:
+    lens = replace(uncalibrated(64, 48), k=np.eye(3).reshape(-1))
+    bench, _, camera = several(ONE, TWO, calibration=lens)
+    infos = bench.record(CAMERA_INFO)
+    bench.run(0.05)
+    camera.become("webcam 1", 0.1, THREE, FOUR)
+    bench.run(0.2)
+    assert [bool(np.any(info.k)) for info in infos] == [True, False, False]
+
+
+def test_another_camera_does_not_wait_for_the_next_try_of_a_lost_one() -> None:
+    bench, node, camera = several(ONE, LOST, LOST, LOST, LOST)
+    images = bench.record(IMAGE_RAW)
+    bench.run(4.0)
+    camera.become("webcam 1", 0.1, TWO, THREE)
+    node.reconfigure(Config())
+    bench.run(0.05)
+    assert len(images) == 2
 
 
 def test_a_lost_camera_is_tried_again_with_growing_pauses(caplog: pytest.LogCaptureFixture) -> None:

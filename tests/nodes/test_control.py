@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from handsteer.config import Config, ControlConfig, JoyConfig
 from handsteer.messages import (
+    CAMERA_CHANGED,
     CMD_VEL,
     DIAGNOSTICS,
     GESTURE_JOY,
@@ -50,7 +51,9 @@ class ControlBench(Bench):
     def __init__(self, config: ControlConfig | None = None, *, arming: bool = False, engage: bool = False) -> None:
         super().__init__()
         config = config or ControlConfig()
-        self.control = HandSignControlNode(self.transport, self.clock, config, arming=arming, engage=engage)
+        self.control = HandSignControlNode(
+            self.transport, self.clock, config, arming=arming, engage=engage, camera_changed=CAMERA_CHANGED
+        )
         self.steering = SteeringNode(self.transport, self.clock)
         self.nodes = [self.steering, self.control]
         self.signs = self.transport.advertise("recognition", HAND_SIGN)
@@ -666,6 +669,45 @@ def test_the_mode_can_change_and_then_neutral_comes_first(bench: ControlBench) -
     assert bench.last() == (0, 0)
     bench.show("Stop", "Forward")
     assert bench.last() == (0.01, 0)
+
+
+def change_camera(bench: ControlBench) -> None:
+    bench.transport.advertise("my_camera", CAMERA_CHANGED).publish(String(data="webcam 0"), bench.clock.now())
+    bench.run(0.0)
+
+
+def test_another_camera_stops_the_robot_until_neutral_is_seen_by_it(bench: ControlBench) -> None:
+    bench.show(*["Forward"] * 3)
+    change_camera(bench)
+    assert bench.last() == (0, 0)
+    bench.show(*["Forward"] * 5)
+    assert set(bench.commands[3:]) == {(0, 0)}
+    assert bench.control._report().message == ("ready: show Stop or lower your hand to begin (the camera was changed)")
+    bench.show("Stop", "Forward")
+    assert bench.last() == (0.01, 0)
+
+
+def test_a_neutral_of_the_camera_before_is_not_one_of_the_other(bench: ControlBench) -> None:
+    bench.show(*["Forward"] * 3)
+    change_camera(bench)
+    bench.show(*["Stop"] * 2, age_s=0.2)  # their frames were captured before the change
+    bench.show(*["Forward"] * 5)
+    assert set(bench.commands[3:]) == {(0, 0)}
+
+
+def test_another_camera_stops_steering_and_the_joystick_too() -> None:
+    for joystick in (False, True):
+        bench = ControlBench(JOYSTICK)
+        if joystick:
+            bench.hold(RELEASED, AHEAD, AHEAD)
+        else:
+            bench.steering.steer(0.3, 0.0)
+            bench.run(0.1)
+        assert bench.last()[0] > 0
+        change_camera(bench)
+        done = len(bench.commands)
+        bench.hold(*[AHEAD] * 5) if joystick else bench.run(0.2)
+        assert set(bench.commands[done - 1 :]) == {(0, 0)}
 
 
 def test_a_gamepad_goes_before_the_hand_while_its_button_is_held() -> None:

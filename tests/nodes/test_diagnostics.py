@@ -48,6 +48,7 @@ STATUSES = st.one_of(
         processing_p99_ms=st.none() | NUMBERS,
         frame_age_ms=st.none() | NUMBERS,
         clock_ahead_ms=st.none() | NUMBERS,
+        sides_swapped=st.booleans(),
     ),
     st.builds(
         ControlStatus,

@@ -8,8 +8,9 @@ import pytest
 from handsteer.cameras.files import SensorNoise
 from handsteer.config import Config, SignsConfig
 from handsteer.errors import ConfigError
-from handsteer.images import image_message, jpeg_message
+from handsteer.images import bgr_image, image_message, jpeg_message
 from handsteer.messages import (
+    CAMERA_CHANGED,
     DIAGNOSTICS,
     GESTURE_JOY,
     HAND_SIGN,
@@ -18,6 +19,7 @@ from handsteer.messages import (
     IMAGE_RAW,
     Header,
     Image,
+    String,
     Time,
 )
 from handsteer.nodes.diagnostics import read_status
@@ -48,7 +50,13 @@ class RecognitionBench(Bench):
         landmarker = RecordedLandmarker([[each] for each in hands or [hand or show_sign(FORWARD)] * 100])
         recognizer = Recognizer(Config(signs=config), landmarker=landmarker, classifier=ShippedClassifier(load_model()))
         self.node = HandSignRecognitionNode(
-            self.transport, self.clock, recognizer, config, annotate, open_classifier=open_classifier
+            self.transport,
+            self.clock,
+            recognizer,
+            config,
+            annotate,
+            open_classifier=open_classifier,
+            camera_changed=CAMERA_CHANGED,
         )
         self.nodes = [self.node]
         self.images = self.transport.advertise("camera", IMAGE_RAW)
@@ -263,6 +271,42 @@ def test_tells_for_how_long_no_hand_was_seen(bench: RecognitionBench) -> None:
     assert statuses[-1].status[0].message == "no hand seen for 0.4 s"
     bench.show(frames=150)
     assert statuses[-1].status[0].message == "no hand seen for 5 s"
+
+
+def test_of_another_camera_a_sign_is_confirmed_anew(bench: RecognitionBench) -> None:
+    bench.show(frames=6)
+    bench.signs.clear()
+    changed = bench.transport.advertise("my_camera", CAMERA_CHANGED)
+    changed.publish(String(data="webcam 0"), bench.clock.now())
+    bench.show(frames=2, age_s=0.2)
+    assert bench.names == [], "what the camera before has seen does not count"
+    bench.show(frames=6)
+    assert bench.names == ["NONE"] * 3 + ["Forward"] * 3
+
+
+def test_with_swapped_sides_the_annotated_picture_is_not_mirrored_and_the_hand_is_the_real_one() -> None:
+    bench = RecognitionBench(SignsConfig(swap_sides=True))
+    annotated, statuses = bench.record(IMAGE_ANNOTATED), bench.record(DIAGNOSTICS)
+    half = NOISE.on(GREY, 0.0)
+    half[400:, :320] += 100  # below the hand
+    bench.show(image_message(half, HEADER))
+    picture = bgr_image(annotated[0])
+    assert picture[440:, :300].mean() > picture[440:, 340:].mean() + 90
+    bench.run(0.1)
+    status = read_status(statuses[-1].status[0])
+    assert isinstance(status, RecognitionStatus)
+    assert (status.handedness, status.sides_swapped) == ("Left", True)
+
+
+def test_late_frames_of_a_browser_on_another_machine_are_blamed_on_its_network_or_device() -> None:
+    bench = RecognitionBench()
+    bench.node.is_camera_far = True
+    statuses = bench.record(DIAGNOSTICS)
+    bench.show(frames=20, age_s=0.5)
+    assert set(bench.names) == {"NONE"}
+    assert statuses[-1].status[0].message == (
+        "Pictures of that device's camera arrive 0.5 s late: the network or that device may be slow"
+    )
 
 
 def test_frames_that_come_late_are_told_from_none() -> None:

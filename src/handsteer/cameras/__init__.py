@@ -2,7 +2,7 @@
 
 import os
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Final, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +10,10 @@ from numpy.typing import NDArray
 # OpenCV's own messages about devices and files repeat our errors in other terms. It reads these variables once.
 os.environ.setdefault("OPENCV_LOG_LEVEL", "OFF")
 os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
+
+
+VIRTUAL_HAND: Final = "virtual hand"
+"""Name of the camera that draws a hand."""
 
 
 @dataclass(frozen=True)

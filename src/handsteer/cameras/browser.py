@@ -4,14 +4,11 @@ import math
 import struct
 import threading
 import time
-from typing import Literal
 
-from handsteer.cameras import Camera, Frame
+from handsteer.cameras import Frame
 from handsteer.clock import Clock
 from handsteer.errors import FrameError
 from handsteer.picture_files import decode, size_of
-
-Source = Literal["own", "browser"]
 
 LARGEST_BYTES = 1_000_000
 """Limit for one encoded frame."""
@@ -93,67 +90,6 @@ class NoCamera:
 
     def close(self) -> None:
         """Do nothing."""
-
-
-class ChoiceOfCameras:
-    """A :class:`~handsteer.cameras.Camera` that reads from this machine's camera or from the browser's.
-
-    When a browser leaves, there is no automatic change to the machine's own camera, because anything may be in front of
-    it: there are no frames until a camera is selected again.
-
-    Args:
-        own: The machine's own camera; its device is closed while the browser's is selected, or it would keep old
-            frames.
-        browser: The browser's camera.
-        source: The initial selection.
-    """
-
-    def __init__(self, own: Camera, browser: BrowserCamera, source: Source = "own") -> None:
-        self._own = own
-        self._source = source
-        self._own_is_open = True
-        self.browser = browser
-
-    @property
-    def source(self) -> Source:
-        """The selected source."""
-        return self._source
-
-    @property
-    def name(self) -> str:
-        """Name of the selected camera."""
-        return self.browser.name if self._source == "browser" else self._own.name
-
-    @property
-    def period_s(self) -> float | None:
-        """Frame period of the machine's own camera."""
-        return self._own.period_s
-
-    def choose(self, source: Source) -> None:
-        """Select ``source``; may be called from any thread."""
-        self.browser.forget()
-        self._source = source
-
-    def read(self) -> Frame | None:
-        """Return the newest frame of the selected camera, or None if there is none now.
-
-        Raises:
-            CameraLost: The machine's own camera stopped delivering frames.
-            EndOfStream: Its file has ended and ends the run.
-        """
-        if self._source == "own":
-            self._own_is_open = True
-            return self._own.read()
-        if self._own.period_s is not None:
-            return self.browser.read(0.0)  # waiting would delay a reader that paces itself
-        if self._own_is_open:
-            self._own.close()
-            self._own_is_open = False
-        return self.browser.read()
-
-    def close(self) -> None:
-        """Release the devices; may be called twice."""
-        self._own.close()
 
 
 def check_frame(data: bytes) -> float:

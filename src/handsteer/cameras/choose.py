@@ -1,17 +1,19 @@
-"""Opens the camera that a source names, and reads its calibration."""
+"""Finds this machine's cameras, opens the one that a source names, and reads its calibration."""
 
 import logging
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlsplit
 
 import numpy as np
 from numpy.typing import NDArray
 
 from handsteer import plain_yaml
-from handsteer.cameras import Camera
+from handsteer.cameras import VIRTUAL_HAND, Camera
+from handsteer.cameras.choice import OWN, CameraChoice, Size
 from handsteer.cameras.files import PHOTO_SUFFIXES, PhotoFolder, VideoFile
-from handsteer.cameras.webcam import Webcam, is_address, is_device, webcams
+from handsteer.cameras.webcam import Webcam, device_path, is_address, is_device, name_of, webcams
 from handsteer.clock import Clock
 from handsteer.config import CameraConfig, VirtualHandConfig
 from handsteer.errors import CameraError, CameraNotFound
@@ -77,6 +79,57 @@ def _file(path: Path, config: CameraConfig, clock: Clock) -> Camera:
     if path.is_dir() or path.suffix.lower() in PHOTO_SUFFIXES:
         return PhotoFolder(path, clock, photo_duration_s=config.photo_duration, fps=config.fps, at_end=config.at_end)
     return VideoFile(path, clock, config.at_end)
+
+
+class MachineCameras:
+    """The cameras of this machine that can be chosen while nodes run: the own one, the virtual hand, and the webcams.
+
+    Args:
+        config: Names the own camera, and the resolution and rate that webcams are asked for.
+        virtual_hand: The virtual hand.
+        clock: Stamps the frames.
+        own: The camera that ``config`` names, opened.
+
+    Attributes:
+        own: The own camera; None if ``config`` names that of a browser.
+        size: The configured resolution.
+    """
+
+    def __init__(self, config: CameraConfig, virtual_hand: VirtualHandConfig, clock: Clock, own: Camera) -> None:
+        self.size: Size = (config.width, config.height)
+        self._config, self._virtual_hand, self._clock = config, virtual_hand, clock
+        self._source = own.source if isinstance(own, Webcam) else config.source
+        is_webcam = is_device(self._source)
+        self.own = None if config.source == "browser" else CameraChoice(OWN, _shown(own.name), is_webcam)
+
+    def find(self) -> tuple[CameraChoice, ...]:
+        """Return the cameras that can be chosen now, the own one first."""
+        own = () if self.own is None else (self.own,)
+        virtual = () if self.own is not None and self.own.name == VIRTUAL_HAND else (_VIRTUAL,)
+        known = device_path(self._source) if is_device(self._source) else None
+        others = [source for source in webcams() if device_path(source) != known]
+        return (*own, *virtual, *(CameraChoice(source, name_of(source), has_sizes=True) for source in others))
+
+    def open(self, source: str, size: Size) -> Camera:
+        """Open the camera of a choice.
+
+        Raises:
+            HandsteerError: It cannot be used.
+        """
+        source = self._source if source == OWN else source
+        width, height = size if is_device(source) else self.size
+        of = {"source": source, "width": width, "height": height}
+        return open_camera(self._config.model_copy(update=of), self._virtual_hand, self._clock)
+
+
+_VIRTUAL = CameraChoice("virtual", VIRTUAL_HAND)
+
+
+def _shown(name: str) -> str:
+    """Return the name of a camera without folders, and without what an address has besides the host."""
+    if is_address(name):
+        return f"{urlsplit(name).scheme}://{urlsplit(name).hostname or ''}"
+    return name if is_device(name) else Path(name).name
 
 
 def uncalibrated(width: int, height: int) -> CameraInfo:

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from handsteer.cameras import Frame
+from handsteer.cameras import VIRTUAL_HAND, Frame
 from handsteer.cameras.files import SensorNoise
 from handsteer.clock import Clock
 from handsteer.config import VirtualHandConfig
@@ -41,7 +41,7 @@ class VirtualHandCamera:
         PoseError: The script is invalid.
     """
 
-    name = "virtual hand"
+    name = VIRTUAL_HAND
 
     def __init__(self, config: VirtualHandConfig, *, width: int, height: int, fps: float, clock: Clock) -> None:
         self.period_s = 1.0 / fps

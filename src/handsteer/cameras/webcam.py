@@ -2,6 +2,7 @@
 
 import os
 import platform
+import struct
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -17,6 +18,14 @@ from handsteer.picture_files import MOST_PIXELS
 _OPEN_TIMEOUT_MS = 5000
 _READ_TIMEOUT_MS = 2000
 _FIRST_FRAME_TRIES = 10
+
+_DEVICES = Path("/dev")
+# From linux/videodev2.h: VIDIOC_QUERYCAP, and the fields capabilities and device_caps of its struct.
+_QUERY_CAPABILITY = 0x80685600
+_CAPABILITY_BYTES = 104
+_CAPABILITIES = struct.Struct("=84xII")
+# V4L2_CAP_VIDEO_CAPTURE or _MPLANE; V4L2_CAP_DEVICE_CAPS
+_CAPTURES, _HAS_OWN = 0x1001, 0x80000000
 
 
 class Capture(Protocol):
@@ -42,6 +51,10 @@ class Webcam:
         fps: Requested frames per second.
         open_capture: Opens the device; tests inject faults here.
 
+    Attributes:
+        name: Name for people.
+        source: As above.
+
     Raises:
         CameraNotFound: There is no such device, or the address does not respond.
         CameraInUse: Another program uses the device.
@@ -60,8 +73,8 @@ class Webcam:
         fps: float = 30.0,
         open_capture: Callable[[str], Capture] | None = None,
     ) -> None:
-        self.name = f"webcam {source}" if source.isdigit() else source
-        self._source = source
+        self.name = name_of(source)
+        self.source = source
         self._clock = clock
         self._settings = {
             cv2.CAP_PROP_FRAME_WIDTH: width,
@@ -106,11 +119,11 @@ class Webcam:
 
     def _open(self) -> Frame:
         if self._open_capture is _open_capture:
-            _check_device(self._source)
-        capture = self._open_capture(self._source)
+            _check_device(self.source)
+        capture = self._open_capture(self.source)
         if not capture.isOpened():
             capture.release()
-            raise _why_closed(self._source)
+            raise _why_closed(self.source)
         for prop, value in self._settings.items():
             capture.set(prop, value)
         self._capture = capture
@@ -121,7 +134,7 @@ class Webcam:
                 return frame
             time.sleep(0.02)
         self.close()
-        raise _why_closed(self._source)
+        raise _why_closed(self.source)
 
     def _grab(self) -> Frame | None:
         assert self._capture is not None
@@ -155,10 +168,30 @@ def is_device(source: str) -> bool:
 
 def webcams() -> list[str]:
     """Return the webcams that this machine seems to have, as sources; on other systems than Linux, the first two."""
-    devices = sorted(Path("/dev").glob("video*"), key=lambda path: (len(path.name), path.name))
+    devices = sorted(_DEVICES.glob("video*"), key=lambda path: (len(path.name), path.name))
     if devices or platform.system() == "Linux":
-        return [str(path) for path in devices]
+        return [str(path) for path in devices if _may_capture(path)]
     return ["0", "1"]
+
+
+def captures(capability: bytes) -> bool:
+    """Return whether a ``struct v4l2_capability`` is of a device that captures pictures."""
+    of_driver, of_device = _CAPABILITIES.unpack_from(capability)
+    return bool((of_device if of_driver & _HAS_OWN else of_driver) & _CAPTURES)
+
+
+def _may_capture(device: Path) -> bool:
+    """Return False for the second device file of many webcams, which delivers only metadata."""
+    try:
+        import fcntl  # noqa: PLC0415 - not on Windows
+
+        file = os.open(device, os.O_RDONLY | os.O_NONBLOCK)
+        try:
+            return captures(fcntl.ioctl(file, _QUERY_CAPABILITY, bytes(_CAPABILITY_BYTES)))
+        finally:
+            os.close(file)
+    except (OSError, ImportError):
+        return True  # opening it as a camera fails with the reason
 
 
 def _open_capture(source: str) -> Capture:
@@ -168,7 +201,13 @@ def _open_capture(source: str) -> Capture:
     return cv2.VideoCapture(int(source)) if source.isdigit() else cv2.VideoCapture(source)
 
 
-def _device_path(source: str) -> Path:
+def name_of(source: str) -> str:
+    """Return the name for people of the webcam or address ``source``."""
+    return f"webcam {source}" if source.isdigit() else source
+
+
+def device_path(source: str) -> Path:
+    """Return the device file of a webcam on Linux."""
     return Path(f"/dev/video{source}") if source.isdigit() else Path(source)
 
 
@@ -176,7 +215,7 @@ def _check_device(source: str) -> None:
     """Check a device before OpenCV opens it, because OpenCV reports only success or failure."""
     if is_address(source) or platform.system() != "Linux":
         return
-    path = _device_path(source)
+    path = device_path(source)
     if not path.exists():
         found = ", ".join(webcams())
         there = f"there is {found}" if found else "this machine has no webcam; the camera 'virtual' needs none"
@@ -188,7 +227,7 @@ def _check_device(source: str) -> None:
 def _why_closed(source: str) -> CameraError:
     if is_address(source):
         return CameraNotFound(f"no picture comes from {source}: check the address, and that the camera is on")
-    path = _device_path(source)
+    path = device_path(source)
     holder = _holder(path)
     if holder:
         return CameraInUse(f"{path} is in use by {holder}: close that program, or choose another camera")

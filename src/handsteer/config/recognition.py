@@ -114,6 +114,11 @@ class SignsConfig(Section):
         description="How long the selected hand must show no sign before another hand with a sign is selected [s]",
     )
     max_frame_age: float = live(STALE_S, gt=0, le=10, description="Older frames are ignored [s]")
+    swap_sides: bool = live(
+        False,
+        description="Swap left and right of each frame before recognition, for a camera that looks the way the driver "
+        "looks, as from behind or on the head; a turn is then the one that the driver shows",
+    )
     recorded: Recorded = Field(
         "auto",
         description="Whether to accept frames with old stamps, as in recordings: auto accepts those of rosbag play; "

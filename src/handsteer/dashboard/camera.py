@@ -13,13 +13,15 @@ import numpy as np
 from nicegui import ui
 from numpy.typing import NDArray
 from starlette.responses import StreamingResponse
-from starlette.types import Receive, Scope, Send
+from starlette.types import Message, Receive, Scope, Send
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
+from handsteer.cameras import VIRTUAL_HAND
+from handsteer.cameras.choice import BROWSER
 from handsteer.clock import Clock
 from handsteer.dashboard.camera_choices import CameraChoices
 from handsteer.dashboard.elements import box, sentence, switch, text
-from handsteer.dashboard.first_visit import DEMO_CAMERA, CameraOffer, Coach
+from handsteer.dashboard.first_visit import CameraOffer, Coach
 from handsteer.dashboard.legend import DRAWN
 from handsteer.dashboard.page import PICTURE_PATH, Page
 from handsteer.dashboard.remote_graph import RemoteGraph
@@ -27,10 +29,11 @@ from handsteer.dashboard.settings import Settings
 from handsteer.dashboard.socket_events import is_page_of
 from handsteer.dashboard.state import PageState
 from handsteer.dashboard.viewers import OnDemandNode
-from handsteer.errors import FrameError
+from handsteer.errors import CameraError, FrameError
 from handsteer.images import bgr_image, encode_jpeg
 from handsteer.messages import IMAGE_ANNOTATED, Image
 from handsteer.nodes.base import Node
+from handsteer.transports.addresses import is_loopback
 from handsteer.transports.base import Received, Transport
 from handsteer.types import NONE, STOP
 
@@ -40,6 +43,10 @@ FRAMES_PER_S = 30.0
 NEXT = "next"
 """Sent to the browser to request another frame; at most one is in transit."""
 
+_CHANGED = "changed"
+"""Sent by the browser when its following frames are those of another camera of its device."""
+
+_ANOTHER_CAMERA = 1000
 _NOT_A_FRAME, _NOT_THE_DRIVER, _NO_CAMERA_HERE, _BUSY = 4400, 4403, 4404, 4409
 
 
@@ -74,19 +81,43 @@ class FrameSocket:
                 self._in_use.release()
 
     async def _receive(self, socket: WebSocket, graph: RemoteGraph, viewer: str) -> None:
-        graph.choose_camera("browser")
-        loop = asyncio.get_running_loop()
+        loop, changed = asyncio.get_running_loop(), True
         try:
             while self._drives(viewer):
+                if changed:
+                    await asyncio.wrap_future(graph.choose_camera(BROWSER, is_far=is_far(socket.scope)))
+                elif graph.state.camera_source != BROWSER:
+                    await socket.close(_ANOTHER_CAMERA)
+                    return
                 began_s = loop.time()
-                graph.offer_frame(await socket.receive_bytes())
-                await asyncio.sleep(max(0.0, began_s + 1 / FRAMES_PER_S - loop.time()))
-                await socket.send_text(NEXT)
+                message = await socket.receive()
+                changed = message.get("text") == _CHANGED
+                if not changed:
+                    graph.offer_frame(_frame_of(message))
+                    await asyncio.sleep(max(0.0, began_s + 1 / FRAMES_PER_S - loop.time()))
+                    await socket.send_text(NEXT)
             await socket.close(_NOT_THE_DRIVER, "another viewer drives now")
+        except CameraError:
+            await socket.close(_ANOTHER_CAMERA)
         except FrameError as error:
             await socket.close(_NOT_A_FRAME, str(error))
-        except (WebSocketDisconnect, KeyError):  # it has left, or sent text instead of a frame
+        except WebSocketDisconnect:
             pass
+
+
+def _frame_of(message: Message) -> bytes:
+    if message["type"] != "websocket.receive":
+        raise WebSocketDisconnect
+    frame = message.get("bytes")
+    if not isinstance(frame, bytes):
+        raise FrameError("text instead of a frame")
+    return frame
+
+
+def is_far(scope: Scope) -> bool:
+    """Return whether the client of a connection is on another machine, as far as the addresses tell."""
+    client, server = (scope.get(end) or ("",) for end in ("client", "server"))
+    return not (is_loopback(client[0]) or client[0] == server[0])
 
 
 BYTES_PER_S = 2_000_000
@@ -209,7 +240,7 @@ class CameraPanel:
         with ui.element("section").classes("card viewer camera"):
             with box("stage") as self.stage:
                 # Lazy, because otherwise the page would count as loaded only with its first picture.
-                picture = ui.element("img").props('loading="lazy" alt="What the camera sees, mirrored"')
+                picture = ui.element("img").props('loading="lazy" alt="What the camera sees"')
                 picture.props(f'src="{PICTURE_PATH}"')
                 with box("veil") as self._veil:
                     self._no_picture = text("", "waiting for the first picture")
@@ -225,7 +256,9 @@ class CameraPanel:
                     self._confidence = box("")
                 self._percent = text("percent", "")
                 self._hand = text("hand", "")
-                self._choices = CameraChoices(page, settings) if settings is not None else None
+                self._choices = (
+                    CameraChoices(page, graph, settings) if graph is not None and settings is not None else None
+                )
 
     def update(self, state: PageState) -> None:
         """Show ``state``."""
@@ -245,7 +278,8 @@ class CameraPanel:
         self._confidence.style(f"width: {percent}%")
         self._no_picture.set_text(sentence(state.no_picture))
         switch(self._veil, "off", on=not state.no_picture)
-        self._caption.set_text("demo hand" if state.camera == DEMO_CAMERA else "as in a mirror")
+        view = "as the camera sees it" if state.sides_swapped else "as in a mirror"
+        self._caption.set_text("demo hand" if state.camera == VIRTUAL_HAND else view)
         if self._choices is not None:
             self._choices.update(state)
         if self._offer is not None:

@@ -3,19 +3,21 @@
 The browser remembers what was done or dismissed (``static/page.js``); it hides what it has seen.
 """
 
+import asyncio
 from typing import Final
 
 from nicegui import ui
 
-from handsteer.dashboard.elements import box, button, read_words, switch, tag, text
+from handsteer.audit import without_passwords
+from handsteer.cameras import VIRTUAL_HAND
+from handsteer.cameras.choice import BROWSER, OWN
+from handsteer.dashboard.elements import box, button, read_words, sentence, switch, tag, text
 from handsteer.dashboard.legend import DRAWN
 from handsteer.dashboard.page import Page
 from handsteer.dashboard.remote_graph import RemoteGraph
 from handsteer.dashboard.state import PageState
+from handsteer.errors import HandsteerError
 from handsteer.types import FORWARD, STOP
-
-DEMO_CAMERA: Final = "virtual hand"
-"""Name of the camera that draws a hand."""
 
 _DEMO: Final = (
     "It shows the signs in turn, and the robot obeys. With your own camera you drive: your browser asks for it first, "
@@ -34,6 +36,7 @@ _REFUSALS: Final = {
     ),
     "ended": "The camera was disconnected, or another program took it. Press Use my camera to go on.",
 }
+NOT_THE_DRIVER: Final = "Only the driver can change it: ask to drive first."
 _LONGEST_REASON: Final = 200
 
 
@@ -65,20 +68,27 @@ class CameraOffer:
             with box("choices"):
                 self._browser = button("Use my camera").classes("primary")
                 self._browser.props(f'data-camera="browser" data-viewer="{page.client.id}"')
-                self._own = button("Use the robot's camera", self._use_own).props('data-camera="own"')
+                self._own = button(f"Back to {graph.camera_name(OWN)}", self._use_own).props('data-camera="own"')
                 button("Keep watching").classes("keep").props('data-seen="demo"')
         ui.on("webcam", lambda event: self._refusal.set_text(refusal(event.args)))
 
     def update(self, state: PageState) -> None:
         """Show ``state``."""
         source = self._graph.state.camera_source
-        switch(self._box, "demo", on=state.camera == DEMO_CAMERA)
-        switch(self._browser, "hidden", on=source == "browser" and self._graph.state.has_browser)
-        switch(self._own, "hidden", on=source == "own")
+        switch(self._box, "demo", on=state.camera == VIRTUAL_HAND)
+        switch(self._browser, "hidden", on=source == BROWSER and self._graph.state.has_browser)
+        has_own = any(each.source == OWN for each in self._graph.state.cameras)
+        switch(self._own, "hidden", on=source == OWN or not has_own)
 
-    def _use_own(self) -> None:
+    async def _use_own(self) -> None:
+        trouble = NOT_THE_DRIVER
         if self._page.drives():
-            self._graph.choose_camera("own")
+            trouble = ""
+            try:
+                await asyncio.wrap_future(self._graph.choose_camera(OWN))
+            except HandsteerError as error:
+                trouble = f"{sentence(without_passwords(str(error)))}."
+        self._refusal.set_text(trouble)
 
 
 _STEPS: Final = (
@@ -124,7 +134,7 @@ class Coach:
 
     def update(self, state: PageState, *, is_driver: bool) -> None:
         """Show ``state``, and tick what has been done."""
-        is_live = is_driver and state.camera not in ("", DEMO_CAMERA) and not state.is_joystick
+        is_live = is_driver and state.camera not in ("", VIRTUAL_HAND) and not state.is_joystick
         switch(self._box, "off", on=not is_live)
         if self._done == len(_STEPS):
             return

@@ -13,7 +13,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from handsteer.cameras.browser import Source, check_frame
+from handsteer.audit import AuditCode
+from handsteer.cameras import VIRTUAL_HAND
+from handsteer.cameras.browser import check_frame
+from handsteer.cameras.choice import BROWSER, OWN, CameraChoice, Size
 from handsteer.clock import Clock
 from handsteer.config import Config
 from handsteer.dashboard.audit import PageAudit
@@ -37,14 +40,19 @@ class GraphState:
     Attributes:
         config: The nodes' configuration.
         world: The robot's world with all things at their start positions; None for a real robot.
-        camera_source: The selected camera.
+        camera_source: The selected camera, :data:`~handsteer.cameras.choice.OWN`,
+            :data:`~handsteer.cameras.choice.BROWSER`, or the source of one of ``cameras``.
+        camera_size: The resolution that webcams of the graph's machine are asked for, in pixels.
+        cameras: The cameras of the graph's machine that can be chosen, as last found.
         has_browser: Whether a browser has sent frames since the last one was forgotten.
         recording: The recording that is being made, or the last one; None if there was none.
     """
 
     config: Config
     world: World | None
-    camera_source: Source
+    camera_source: str
+    camera_size: Size
+    cameras: tuple[CameraChoice, ...]
     has_browser: bool
     recording: RecordingState | None = None
 
@@ -65,15 +73,17 @@ class GraphServer:
         self._gateway = Gateway(pipe, graph.transport)
         self._sent = self._state()
         self._sending = threading.Lock()
-        # Files are opened and closed on a thread of their own: the pipe also carries Stop.
+        # Files and devices are opened on threads of their own: the pipe also carries Stop.
         self._recording = ThreadPoolExecutor(1, "recording")
+        self._finding = ThreadPoolExecutor(1, "cameras")
         graph.recording.on_change = self._send_state
         self._actions: dict[str, Callable[..., Future[None] | None]] = {
             "reconfigure": graph.reconfigure,
             "change_world": graph.robot.change_world,
             "enter_world": graph.robot.enter_world,
             "reset": graph.robot.reset,
-            "choose_camera": graph.cameras.choose,
+            "choose_camera": graph.choose_camera,
+            "find_cameras": lambda: self._finding.submit(graph.cameras.find),
             "forget_browser": graph.cameras.browser.forget,
             "record": lambda by: self._recording.submit(self._record, by),
             "end_recording": lambda by: self._recording.submit(graph.end_recording, by),
@@ -86,6 +96,7 @@ class GraphServer:
         """Close the page's publishers and subscriptions."""
         self._gateway.close()
         self._recording.shutdown(wait=False)
+        self._finding.shutdown(wait=False)
 
     def _record(self, by: str) -> None:
         folder = RecordingFolder(self._graph.config.recording.folder)
@@ -94,7 +105,8 @@ class GraphServer:
     def _state(self) -> GraphState:
         graph = self._graph
         cameras, recording = graph.cameras, graph.recording.state
-        return GraphState(graph.config, graph.robot.world, cameras.source, cameras.browser.is_given, recording)
+        chosen = (cameras.source, cameras.size, cameras.choices)
+        return GraphState(graph.config, graph.robot.world, *chosen, cameras.browser.is_given, recording)
 
     def _send_state(self) -> None:
         with self._sending:
@@ -205,11 +217,23 @@ class RemoteGraph:
         """Move the robot and all things to their start positions."""
         return self._told(self._request("reset"), "put the robot and all things back to the start")
 
-    def choose_camera(self, source: Source) -> None:
-        """Read frames from ``source`` from now on."""
-        self._request("choose_camera", source)
-        name = "the camera of a browser" if source == "browser" else "the robot's camera"
-        self.audit.say_of_driver("camera_chosen", f"chose {name}", source)
+    def choose_camera(self, source: str, size: Size | None = None, *, is_far: bool = False) -> Future[None]:
+        """Read frames from ``source`` from now on; see :meth:`~handsteer.graph.Graph.choose_camera`."""
+        name = self.camera_name(source)
+        future = self._request("choose_camera", source, size, is_far)
+        return self._told(future, f"chose {name}", "camera_chosen", source if source in (OWN, BROWSER) else name)
+
+    def camera_name(self, source: str) -> str:
+        """Return the name of a camera for people, as it is used in a sentence."""
+        if source == BROWSER:
+            return "the camera of a browser"
+        names = {each.source: each.name for each in self.state.cameras}
+        name = names.get(source, "the robot's camera")
+        return f"the {name}" if name == VIRTUAL_HAND else name
+
+    def find_cameras(self) -> Future[None]:
+        """Look again for the cameras of the graph's machine."""
+        return self._request("find_cameras")
 
     def offer_frame(self, data: bytes) -> None:
         """Send a frame of a browser's camera, see :class:`~handsteer.cameras.browser.BrowserCamera`.
@@ -232,12 +256,14 @@ class RemoteGraph:
         """End the recording, if there is one."""
         return self._request("end_recording", self.audit.driver)
 
-    def _told(self, future: Future[None], sentence: str) -> Future[None]:
-        """Return ``future``, whose success is published on the audit as the driver's change of the world."""
+    def _told(
+        self, future: Future[None], sentence: str, code: AuditCode = "world_changed", about: str = ""
+    ) -> Future[None]:
+        """Return ``future``, whose success is published on the audit as the driver's change."""
 
         def tell(done: Future[None]) -> None:
             if not done.cancelled() and done.exception() is None:
-                self.audit.say_of_driver("world_changed", sentence)
+                self.audit.say_of_driver(code, sentence, about)
 
         future.add_done_callback(tell)
         return future

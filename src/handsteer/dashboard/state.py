@@ -149,6 +149,7 @@ class PageState:
         max_angular_radps: Likewise, for turning.
         course: Progress on the world's course; None without one.
         engaging: Progress of engaging the hand, 0 to 1; None if it is engaged, or cannot be.
+        sides_swapped: Whether the picture is as the camera sees it, because recognition swaps left and right.
         warnings: Problems that do not stop operation, such as two nodes that command one robot; a sentence each.
     """
 
@@ -181,6 +182,7 @@ class PageState:
     warnings: tuple[str, ...] = ()
     confidences: tuple[float, ...] = ()
     min_confidence: float | None = None
+    sides_swapped: bool = False
 
     @property
     def is_joystick(self) -> bool:
@@ -226,6 +228,7 @@ def compose(observed: Observed, now_s: float, viewers: Viewers = NOBODY) -> Page
         engaging=None if control.engaged or stopped else max(0.0, min(control.engage_progress, 1.0)),
         confidences=seen.confidences,
         min_confidence=seen.min_confidence,
+        sides_swapped=last_seen is not None and last_seen.sides_swapped,
         warnings=tuple(dict.fromkeys(warning for warning in (control.warning, robot.warning) if warning)),
     )
 

@@ -7,6 +7,7 @@ from handsteer.cameras import Camera, EndOfStream, Frame
 from handsteer.cameras.choose import uncalibrated
 from handsteer.cameras.freshness import Freshness
 from handsteer.clock import Clock
+from handsteer.config import Config
 from handsteer.errors import CameraError
 from handsteer.images import camera_jpeg_message, image_message, jpeg_message
 from handsteer.messages import (
@@ -39,9 +40,10 @@ class CameraNode(Node):
     A picture that equals the previous one is not published.
 
     Args:
-        camera: Delivers the frames.
+        camera: Delivers the frames; it may change its name and pace.
         frame_id: Coordinate frame of the images.
-        calibration: Calibration of the lens, for pictures of its size; None if there is none.
+        calibration: Calibration of the camera that ``camera`` is at first, for pictures of its size; None if there is
+            none.
         image: Topic of the frames.
         compressed: Topic of the same as JPEG, on demand.
 
@@ -66,6 +68,7 @@ class CameraNode(Node):
         self._camera = camera
         self._frame_id = frame_id
         self._calibration = calibration
+        self._calibrated = camera.name
         self._fits = True
         self._retry_s = _FIRST_RETRY_S
         self._status = CameraStatus(camera.name)
@@ -84,6 +87,11 @@ class CameraNode(Node):
         """Whether frames are read at a fixed period instead of when a device has them."""
         return self._camera.period_s is not None
 
+    def on_reconfigure(self, config: Config) -> None:
+        """Read a lost camera again at once: another one may have been chosen instead."""
+        if self._status.state == "lost":
+            self._reading.due_s = self.clock.now()
+
     def on_stop(self) -> None:
         """Release the device, unless a read is in progress: OpenCV would crash. The end of the process releases it."""
         if not self.stuck:
@@ -100,8 +108,17 @@ class CameraNode(Node):
         except CameraError as error:
             self._lose(error)
         else:
+            self._follow_choice()
             if frame is not None and self._is_new(frame):
                 self._publish(frame)
+
+    def _follow_choice(self) -> None:
+        """Keep the pace of the selected camera, and report on it."""
+        self._reading.period_s = self._camera.period_s or 0.0
+        if self._camera.name != self._status.camera:
+            self._status = CameraStatus(self._camera.name)
+            self._retry_s = _FIRST_RETRY_S
+            self._last_read_s = self.clock.now()
 
     def _publish(self, frame: Frame) -> None:
         if self._retry_s > _FIRST_RETRY_S or self._is_frozen:
@@ -118,9 +135,9 @@ class CameraNode(Node):
             self._info.publish(replace(self._info_for(frame), header=header), frame.captured_s)
 
     def _info_for(self, frame: Frame) -> CameraInfo:
-        """Return the calibration, or that of an uncalibrated camera if its size differs from the picture's."""
+        """Return the calibration, or that of an uncalibrated camera if its camera or size is not the picture's."""
         height, width = frame.image.shape[:2]
-        known = self._calibration
+        known = self._calibration if self._camera.name == self._calibrated else None
         fits = known is not None and (known.width, known.height) == (width, height)
         if known is not None and self._fits and not fits:
             log.warning(

@@ -1,6 +1,7 @@
 """The node ``hand_sign_control``, which publishes a velocity per sign, or per frame of the hand as a joystick."""
 
 import logging
+import math
 from typing import Any
 
 from handsteer.clock import Clock
@@ -63,6 +64,7 @@ class HandSignControlNode(Node):
         engage: Whether the hand drives nothing before an open palm engaged it.
         sign: Topic of the signs.
         joy: Topic of the hand as a joystick.
+        camera_changed: Topic on which it is published that another camera was chosen; none where it cannot be.
         steering: Topic of steering commands, which override signs.
         odom: Topic of the robot's odometry.
         scan: Topic of its laser scans.
@@ -86,6 +88,7 @@ class HandSignControlNode(Node):
         engage: bool = False,
         sign: Topic[String] = HAND_SIGN,
         joy: Topic[Joy] = GESTURE_JOY,
+        camera_changed: Topic[String] | None = None,
         steering: Topic[Twist] = STEERING_CMD_VEL,
         odom: Topic[Odometry] = ODOM,
         scan: Topic[LaserScan] = SCAN,
@@ -101,6 +104,7 @@ class HandSignControlNode(Node):
         self._moved: tuple[float, bool] | None = None
         self._commanded = ZERO
         self._last_step_s = clock.now()
+        self._camera_since_s = -math.inf
         rule = collision_monitor or CollisionMonitorConfig()
         self._monitor = CollisionMonitor(self, rule, self._mux.hold_back, scan, odom)
         self._stall_guard = StallGuard(config.sign_timeout, clock.now())
@@ -112,6 +116,8 @@ class HandSignControlNode(Node):
         self._rivals = Rivals(self, [sign, *(self._selection.topics if self._selection else [cmd_vel])])
         self._audit = ControlAudit(self.auditor, lambda: self._published_by(STOP)[1])
         StopKeeper(self, self._on_stop_or_reset)
+        if camera_changed is not None:
+            self.subscribe(camera_changed, self._on_other_camera)
         self.subscribe(steering, self._on_steering)
         self.subscribe(sign, self._on_sign)
         self._joysticks = Joysticks(self, joy, self._on_stick, gamepad or JoyConfig(), self._on_gamepad)
@@ -174,6 +180,13 @@ class HandSignControlNode(Node):
         self._publish(self._control.step(elapsed_s, sign=sign), received.captured_s)
         self._calm_down()
 
+    def _on_other_camera(self, received: Received[String]) -> None:
+        """Stop, and wait for neutral in a frame of the other camera."""
+        self._camera_since_s = self.clock.now() if received.captured_s is None else received.captured_s
+        self._safety.disarm("the camera was changed")
+        self._publish(self._control.halt())
+        self._look_for_changes(self.clock.now())
+
     def _on_stick(self, stick: Stick, received: Received[Joy]) -> None:
         if self._is_stale(received):
             self._obey_late(is_stop=not stick.held)
@@ -188,10 +201,11 @@ class HandSignControlNode(Node):
         self._steer(stick.forward * self._config.max_linear, stick.left * self._config.max_angular, received)
 
     def _is_stale(self, received: Received[Any]) -> bool:
-        """Return whether a message shows what was seen too long ago; the watchdog then keeps running."""
+        """Return whether a message shows what is too old, or was seen by another camera; the watchdog keeps running."""
         captured_s = received.captured_s
         is_old = captured_s is not None and self.clock.now() - captured_s > self._config.sign_timeout
-        return is_old or received.is_late
+        is_of_other = captured_s is not None and captured_s < self._camera_since_s
+        return is_old or is_of_other or received.is_late
 
     def _on_steering(self, received: Received[Twist]) -> None:
         self._steer(received.message.linear.x, received.message.angular.z, received)

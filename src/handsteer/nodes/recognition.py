@@ -13,7 +13,7 @@ from handsteer.cameras.freshness import Freshness
 from handsteer.clock import Clock
 from handsteer.config import Config, SignsConfig
 from handsteer.errors import ConfigError, ModelError
-from handsteer.images import bgr_image, image_message, jpeg_picture
+from handsteer.images import bgr_image, image_message, jpeg_picture, mirrored
 from handsteer.messages import (
     GESTURE_JOY,
     HAND_SIGN,
@@ -31,12 +31,12 @@ from handsteer.messages import (
 from handsteer.nodes.base import Node
 from handsteer.nodes.status import RecognitionStatus
 from handsteer.nodes.supervision import StopKeeper
-from handsteer.nodes.timing import CALM_S, TOO_SLOW, FrameAge, LatencyLog, Recording, StallGuard
-from handsteer.recognition.hand import Classifier
+from handsteer.nodes.timing import CALM_S, TOO_SLOW, FrameAge, LatencyLog, Recording, StallGuard, far_and_late
+from handsteer.recognition.hand import Classifier, Hand
 from handsteer.recognition.hand_joystick import HandJoystick
 from handsteer.recognition.recognizer import Recognition, Recognizer
 from handsteer.transports.base import Received, Subscription, Transport
-from handsteer.types import NONE, RELEASED
+from handsteer.types import NONE, RELEASED, Handedness
 
 _WATCH_PERIOD_S = 0.02
 # Longer than FAULT_GAP_S, so that the control does not take these ``NONE`` for processed frames.
@@ -64,10 +64,13 @@ class HandSignRecognitionNode(Node):
         compressed: Topic of the same as JPEG.
         sign: Topic of the signs.
         joy: Topic of the hand as a joystick.
+        camera_changed: Topic on which it is published that another camera was chosen; none where it cannot be.
 
     Attributes:
         counts: Number of frames per confirmed sign.
         processing: Processing time of each frame.
+        is_camera_far: Whether the frames are those of a browser on another machine, which late ones are explained with;
+            may be set on any thread.
     """
 
     def __init__(
@@ -84,10 +87,12 @@ class HandSignRecognitionNode(Node):
         compressed: Topic[CompressedImage] = IMAGE_COMPRESSED,
         sign: Topic[String] = HAND_SIGN,
         joy: Topic[Joy] = GESTURE_JOY,
+        camera_changed: Topic[String] | None = None,
     ) -> None:
         super().__init__("hand_sign_recognition", transport, clock)
         self.counts: dict[str, int] = {}
         self.processing = LatencyLog()
+        self.is_camera_far = False
         self._recognizer = recognizer
         self._config = config
         self._joystick = joystick or HandJoystick()
@@ -106,6 +111,7 @@ class HandSignRecognitionNode(Node):
         self._refused: str | None = None
         self._refused_s = -math.inf
         self._recognition: Recognition | None = None
+        self._camera_since_s = -math.inf
         StopKeeper(self)
         self._sign = self.publisher(sign)
         self._joy = self.publisher(joy)
@@ -113,6 +119,8 @@ class HandSignRecognitionNode(Node):
         self._frames, self._jpegs = image, compressed
         wanted = config.image_transport
         self._compressed = wanted == "compressed" or (wanted == "auto" and transport.crosses_network)
+        if camera_changed is not None:
+            self.subscribe(camera_changed, self._on_other_camera)
         self._images = self._take_images()
         self._chooses = wanted == "auto"
         self._wants_compressed = False
@@ -156,18 +164,29 @@ class HandSignRecognitionNode(Node):
             return False  # the model stays loaded after its file is deleted
         return version != mine
 
+    def _on_other_camera(self, received: Received[String]) -> None:
+        """Forget the hand, and what it showed to the camera before."""
+        self._camera_since_s = self.clock.now() if received.captured_s is None else received.captured_s
+        self._recognizer.reset()
+        self._joystick.reset()
+        self._recognition = None
+
     def _on_frame(self, received: Received[M], picture_of: Callable[[M], NDArray[np.uint8]]) -> None:
         began_s = self.clock.now()
         captured_s = received.captured_s if received.captured_s is not None else began_s
         self._stall_guard.note(began_s)
         if self._recording.follows(began_s, captured_s, by_player=received.by_player):
             captured_s = began_s
-        self._refused = self._age.why_refused(began_s, captured_s)
+        self._refused = self._age.why_refused(began_s, captured_s, is_far=self.is_camera_far)
         if self._refused is not None:
             self._refused = self._recording.hint(began_s) or self._refused
+        if self._refused is None and captured_s < self._camera_since_s:
+            self._refused = "a picture of the camera before"
         if self._refused is None and self._stall_guard.distrusts(began_s):
             self._refused = f"{TOO_SLOW}: pictures may have waited"
         image = picture_of(received.message)
+        if self._config.swap_sides:
+            image = mirrored(image)
         if self._refused is None:
             self._look_at(image, received, began_s, captured_s)
         else:
@@ -213,11 +232,14 @@ class HandSignRecognitionNode(Node):
 
     def _why_too_late(self, began_s: float) -> str | None:
         """Return why a fresh frame has no sign: this process was stopped or stalled while it was processed."""
-        age_s = max(0.0, self._age.age_s) + self.clock.now() - began_s
+        came_s = max(0.0, self._age.age_s)
+        age_s = came_s + self.clock.now() - began_s
         if age_s <= self._config.max_frame_age:
             return None
         self._recognizer.reset()
         self._joystick.reset()
+        if self.is_camera_far and came_s > age_s / 2:
+            return far_and_late(came_s)
         return f"{TOO_SLOW}: a picture was {age_s:.1f} s old when its sign was known"
 
     def _take_images(self) -> Subscription:
@@ -279,7 +301,8 @@ class HandSignRecognitionNode(Node):
             confidences=tuple(round(each, 2) for each in self._recognizer.confidences(seen)),
             min_confidence=self._config.min_confidence,
             progress=round(seen.progress, 2),
-            handedness=seen.hand.handedness if seen.hand else "",
+            handedness=self._handedness(seen.hand) if seen.hand else "",
+            sides_swapped=self._config.swap_sides,
             no_hand_s=round(now - (self._last_hand_s or 0.0), 1) if is_hand_lost else None,
             processing_ms=round(self.processing.percentile_ms(50), 1),
             processing_p99_ms=round(self.processing.percentile_ms(99), 1),
@@ -287,6 +310,11 @@ class HandSignRecognitionNode(Node):
             frame_age_ms=round(self._age.age_s * 1000),
             clock_ahead_ms=round(self._age.ahead_s * 1000),
         )
+
+    def _handedness(self, hand: Hand) -> Handedness:
+        if not self._config.swap_sides:
+            return hand.handedness
+        return "Left" if hand.handedness == "Right" else "Right"
 
 
 _GONE = (-1, -1)

@@ -99,6 +99,7 @@ class RecognitionStatus(Status):
         recording: Whether frames are followed as a recording's.
         frame_age_ms: Age of the last frame.
         clock_ahead_ms: By how much the camera's clock is ahead, at least.
+        sides_swapped: Whether left and right of the frames are swapped, so that the annotated picture is not mirrored.
     """
 
     node: ClassVar[str] = "hand_sign_recognition"
@@ -119,6 +120,7 @@ class RecognitionStatus(Status):
     recording: bool | None = None
     frame_age_ms: float | None = None
     clock_ahead_ms: float | None = None
+    sides_swapped: bool = False
 
     @property
     def level(self) -> int:

@@ -85,12 +85,13 @@ class FrameAge:
         self.age_s = 0.0
         self.ahead_s = 0.0
 
-    def why_refused(self, now_s: float, captured_s: float) -> str | None:
+    def why_refused(self, now_s: float, captured_s: float, *, is_far: bool = False) -> str | None:
         """Return why a frame received now must not be used, in words; None if it is fresh.
 
         Args:
             now_s: Current time, in seconds of the graph's clock.
             captured_s: The frame's stamp, in seconds of the same clock.
+            is_far: Whether it comes from a browser on another machine.
         """
         elapsed_s = 0.0 if self._noted_s is None else now_s - self._noted_s
         self._noted_s = now_s
@@ -106,10 +107,17 @@ class FrameAge:
         self.age_s = by_stamp_s + self.ahead_s
         if self.age_s <= self.limit_s:
             return None
+        if is_far:
+            return far_and_late(self.age_s)
         if self._one_clock:
             return f"{TOO_SLOW}: pictures arrive {self.age_s:.1f} s late"
         ahead = f" by a clock that is {self.ahead_s:.1f} s ahead of ours" if self.ahead_s >= 0.05 else ""
         return f"frames come {self.age_s:.1f} s after their stamp{ahead}: are the clocks of the machines synchronised?"
+
+
+def far_and_late(age_s: float) -> str:
+    """Return in words that pictures of a browser's camera on another machine arrive ``age_s`` seconds late."""
+    return f"Pictures of that device's camera arrive {age_s:.1f} s late: the network or that device may be slow"
 
 
 def _clock_change(set_by_s: float) -> str:

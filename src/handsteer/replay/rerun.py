@@ -14,7 +14,7 @@ from pydantic import ValidationError
 from handsteer.config import Config
 from handsteer.errors import RecordingError
 from handsteer.making import cmd_vel_topic, make_control, make_recognition
-from handsteer.messages import CMD_VEL, GESTURE_JOY, HAND_SIGN, IMAGE_COMPRESSED
+from handsteer.messages import CAMERA_CHANGED, CMD_VEL, GESTURE_JOY, HAND_SIGN, IMAGE_COMPRESSED
 from handsteer.nodes.base import Node
 from handsteer.nodes.journal import JOURNALS
 from handsteer.recordings.recorded import Recorded, Recording
@@ -129,14 +129,21 @@ def rerun(file: Recording, config: Config, source: Source = "frames") -> Iterato
         looks_at_jpegs = config.model_copy(
             update={"signs": config.signs.model_copy(update={"image_transport": "compressed"})}
         )
-        for result in _rerun(file, RECOGNITION, lambda *wires: make_recognition(looks_at_jpegs, *wires), None):
+        for result in _rerun(
+            file,
+            RECOGNITION,
+            lambda *wires: make_recognition(looks_at_jpegs, *wires, camera_changed=CAMERA_CHANGED),
+            None,
+        ):
             outputs.add(result)
             yield result
     is_simulated = config.robot.kind == "sim"
     yield from _rerun(
         file,
         CONTROL,
-        lambda *wires: make_control(config, *wires, simulated=is_simulated, cmd_vel=cmd_vel_topic(config)),
+        lambda *wires: make_control(
+            config, *wires, simulated=is_simulated, cmd_vel=cmd_vel_topic(config), camera_changed=CAMERA_CHANGED
+        ),
         outputs,
     )
 

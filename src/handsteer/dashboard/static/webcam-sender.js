@@ -4,16 +4,22 @@ const MOST_PIXELS = 640 * 480, QUALITY = 0.8, HEADER_BYTES = 8;
 
 let socket = null;
 let canvas = null;
+let sent = Promise.resolve(); // once the last picture is sent
 
 onmessage = ({ data }) => {
   if (data.address) connect(data.address);
-  else send(data.picture, data.capturedMs);
+  else if (data.changed) sent = sent.finally(() => post("changed"));
+  else sent = send(data.picture, data.capturedMs);
 };
+
+function post(message) {
+  if (socket.readyState === WebSocket.OPEN) socket.send(message);
+}
 
 function connect(address) {
   socket = new WebSocket(address);
   socket.onopen = socket.onmessage = () => postMessage({});
-  socket.onclose = (event) => postMessage({ closed: event.reason || "the connection was lost" });
+  socket.onclose = (event) => postMessage({ closed: event.code === 1000 ? "" : event.reason || "the connection was lost" });
 }
 
 async function send(picture, capturedMs) {
@@ -26,5 +32,5 @@ async function send(picture, capturedMs) {
   const frame = new Uint8Array(HEADER_BYTES + jpeg.size);
   new DataView(frame.buffer).setFloat64(0, capturedMs, true);
   frame.set(new Uint8Array(await jpeg.arrayBuffer()), HEADER_BYTES);
-  if (socket.readyState === WebSocket.OPEN) socket.send(frame);
+  post(frame);
 }

@@ -44,6 +44,7 @@ async function openCamera() {
   }
   Object.assign(mine.video, { muted: true, playsInline: true, srcObject: stream });
   await mine.video.play();
+  mine.sender?.postMessage({ changed: true });
   for (const track of stream.getTracks()) track.onended = () => keepCamera({ why: "ended" });
   listCameras();
 }
