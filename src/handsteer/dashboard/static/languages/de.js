@@ -22,6 +22,31 @@ const WORDS = {
   // The 3D view
   "WebGL context lost. Click to re-initialize.": "Die 3D-Ansicht ist verloren gegangen. Klicke, um sie neu zu zeichnen.",
 
+  // The camera
+  "Back to {}": "Zurück zu {}",
+  "Camera of the computer that runs handsteer": "Kamera des Computers, auf dem handsteer läuft",
+  "None: a browser's camera is used": "Keine: die Kamera eines Browsers wird genutzt",
+  "A change stops the robot; then lower your hand to begin.": "Ein Wechsel hält den Roboter an; senke dann die Hand, um zu beginnen.",
+  "The size of its picture is read at the start: camera.width and camera.height.": "Die Größe ihres Bilds wird beim Start gelesen: camera.width und camera.height.",
+  "A file or an address has a resolution of its own.": "Eine Datei oder Adresse hat ihre eigene Auflösung.",
+  "Opening {} …": "Öffne {} …",
+  "The camera looks the way I look": "Die Kamera blickt, wohin ich blicke",
+  "From behind me, or on my head: left and right of the picture are swapped.": "Von hinten oder auf meinem Kopf: links und rechts im Bild werden getauscht.",
+  "as the camera sees it": "wie die Kamera es sieht",
+  "What the camera sees": "Was die Kamera sieht",
+  "the camera was changed": "die Kamera wurde gewechselt",
+  "a picture of the camera before": "ein Bild der vorigen Kamera",
+  "Pictures of that device's camera arrive # s late: the network or that device may be slow": "Bilder der Kamera jenes Geräts kommen # s zu spät: das Netz oder das Gerät könnte langsam sein",
+  "this camera is not in the list any more: open the list again": "diese Kamera ist nicht mehr in der Liste: öffne die Liste noch einmal",
+  "another camera was chosen meanwhile": "inzwischen wurde eine andere Kamera gewählt",
+  "the camera of a browser": "die Kamera eines Browsers",
+  "the robot's camera": "Roboterkamera",
+  "the virtual hand": "der virtuellen Hand",
+  "Swap sides": "Seiten tauschen",
+  "Swap left and right of each frame before recognition, for a camera that looks the way the driver looks, as from behind or on the head; a turn is then the one that the driver shows.": "Links und rechts jedes Bilds vor der Erkennung tauschen, für eine Kamera, die wie die fahrende Person blickt, etwa von hinten oder auf dem Kopf; gedreht wird dann, wie sie es zeigt.",
+  "Download the model as ONNX": "Das Modell als ONNX herunterladen",
+  "ONNX": "ONNX",
+
   // The banner: what the robot does, and the buttons
   "Starting": "Startet",
   "Waiting for the first report": "Wartet auf die erste Meldung",
@@ -135,7 +160,6 @@ const WORDS = {
   "waits until Stop is shown, or no hand": "wartet, bis Stopp gezeigt wird, oder keine Hand",
 
   // The camera's picture and the recognised sign
-  "What the camera sees, mirrored": "Was die Kamera sieht, gespiegelt",
   "waiting for the first picture": "wartet auf das erste Bild",
   "as in a mirror": "wie im Spiegel",
   "demo hand": "Demo-Hand",
@@ -240,7 +264,6 @@ const WORDS = {
   "This is a demo hand, not yours": "Das ist eine Demo-Hand, nicht deine",
   "It shows the signs in turn, and the robot obeys. With your own camera you drive: your browser asks for it first, choose Allow. The pictures go only to the computer that runs handsteer.": "Sie zeigt die Zeichen der Reihe nach, und der Roboter gehorcht. Mit deiner eigenen Kamera fährst du: dein Browser fragt zuerst, wähle „Zulassen“. Die Bilder gehen nur an den Computer, auf dem handsteer läuft.",
   "Use my camera": "Meine Kamera nutzen",
-  "Use the robot's camera": "Roboterkamera nutzen",
   "Keep watching": "Weiter zusehen",
   "The browser refused the camera. Allow it by the camera or lock symbol next to the page's address, then press Use my camera again.": "Der Browser hat die Kamera abgelehnt. Erlaube sie über das Kamera- oder Schlosssymbol neben der Adresse der Seite, dann drücke noch einmal Meine Kamera nutzen.",
   "The browser says: this device has no camera. Plug one in, or open this page on a phone.": "Der Browser sagt: dieses Gerät hat keine Kamera. Schließe eine an, oder öffne diese Seite auf einem Telefon.",
