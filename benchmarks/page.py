@@ -1,11 +1,11 @@
 """Cost of the page, and the time in which the robot stops after its driver is gone.
 
-Run ``python benchmarks/page.py``, optionally with the names of parts: ``bytes``, ``viewers``, ``deaf``, ``gone``. The
-whole graph runs in this process, its page in another, at 640x480 and 30 frames per second. A real Chromium measures
-bytes and stopping times. The cost of viewers is measured with simple clients in their own process, which receive
-pictures, metrics, the 3D view and the plots like a browser but draw nothing, because drawing on the same processors
-would dominate. For the same reason the camera is then a film of the virtual hand; ``--camera virtual`` draws it live.
-Rounds without, with one and with four viewers alternate, so that a busy machine slows all alike.
+Run ``python benchmarks/page.py``, optionally with the names of parts: ``opening``, ``bytes``, ``viewers``, ``deaf``,
+``gone``. The whole graph runs in this process, its page in another, at 640x480 and 30 frames per second. A real
+Chromium measures bytes and times. The cost of viewers is measured with simple clients in their own process, which
+receive pictures, metrics, the 3D view and the plots like a browser but draw nothing, because drawing on the same
+processors would dominate. For the same reason the camera is then a film of the virtual hand; ``--camera virtual``
+draws it live. Rounds without, with one and with four viewers alternate, so that a busy machine slows all alike.
 """
 
 import argparse
@@ -47,6 +47,14 @@ LIMIT_SLOWER = 0.10
 LIMIT_STOP_MS = 500
 PATIENCE_S = 60.0
 SETTLED_S = 1.0
+# The state of the robot, the camera's picture, the world and the pad are there.
+USABLE = """() => {
+    const picture = document.querySelector(".camera img");
+    const ready = picture?.naturalWidth > 0 && document.querySelector(".world canvas") && document.querySelector(".pad")
+        && document.querySelector(".banner .headline")?.textContent !== "Starting";
+    if (ready) window.usable ??= performance.now();
+    return ready;
+}"""
 DRIVE = "Forward:3 Turn Left:3 Stop:2"
 FILM_S, FILM_FPS = 8, 30
 ACK_PERIOD_S = 3.0  # as NiceGUI's own script does
@@ -139,6 +147,24 @@ def visit(chrome: Browser, port: int) -> Page:
 
 def load_now() -> str:
     return f"load {os.getloadavg()[0]:.1f}"
+
+
+def time_opening(trials: int) -> None:
+    """Print how long a browser that has never seen the page takes to paint it, and until one can drive with it."""
+    times: list[tuple[float, float]] = []
+    with served(DRIVE) as page, browser() as chrome:
+        time.sleep(3.0)
+        for _ in range(trials):
+            tab = chrome.new_context(viewport={"width": 1440, "height": 900}).new_page()
+            tab.goto(page.url)
+            tab.wait_for_function(USABLE, timeout=PATIENCE_S * 1000, polling=20)
+            times.append(tab.evaluate("[performance.getEntriesByName('first-contentful-paint')[0].startTime, usable]"))
+            tab.context.close()
+    (paint, usable), (latest_paint, latest_usable) = np.median(times, axis=0), np.max(times, axis=0)
+    print(
+        f"opening: first paint after {paint / 1e3:.2f} s (at most {latest_paint / 1e3:.2f}, limit 1), usable after "
+        f"{usable / 1e3:.2f} s (at most {latest_usable / 1e3:.2f}, limit 2.5), {trials} visits, {load_now()}"
+    )
 
 
 def count_bytes(duration_s: float) -> None:
@@ -327,7 +353,7 @@ async def read_page(port: int, joined: threading.Semaphore) -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description="Measure the cost of the page.")
-    parser.add_argument("parts", nargs="*", help="bytes, viewers, deaf, gone; all of them by default")
+    parser.add_argument("parts", nargs="*", help="opening, bytes, viewers, deaf, gone; all of them by default")
     parser.add_argument("--rounds", type=int, default=5, help="rounds per number of viewers")
     parser.add_argument("--duration", type=float, default=10.0, help="seconds per measurement")
     parser.add_argument("--trials", type=int, default=20, help="trials per kind of loss")
@@ -344,6 +370,7 @@ def main() -> None:
             camera = str(Path(folder) / "film.avi")
             film(Path(camera), DRIVE)
         parts = {
+            "opening": lambda: time_opening(options.rounds),
             "bytes": lambda: count_bytes(2 * options.duration),
             "viewers": lambda: count_viewers(options.rounds, options.duration, camera),
             "deaf": lambda: count_deaf(options.rounds, options.duration, camera),
