@@ -92,7 +92,7 @@ def test_whoever_watches_may_stop_but_only_the_driver_resets(visit: Visit) -> No
     second.wait_for_timeout(500)
     assert second.locator(".banner .headline").inner_text() == "Stopped"
     first.get_by_role("button", name="Reset").click()
-    first.locator(".banner .headline", has_text="Standing").wait_for()
+    first.locator(".banner .headline", has_text="Ready").wait_for()
 
 
 @pytest.mark.parametrize("visit", ["NONE:600"], indirect=True)

@@ -111,6 +111,7 @@ def test_the_hand_drives_as_a_joystick_and_the_picture_shows_the_stick(handednes
         virtual_hand={"handedness": handedness},
         camera={"width": 640, "height": 480, "fps": 10},
     ) as visit:
+        visit.page.get_by_role("button", name="Keep watching").click()  # which covers the picture
         visit.wait_until(lambda: visit.text(".camera .sign") == "Stop" and greens(visit) < 20)
         reason = "Driven by the hand as a joystick"
         visit.wait_until(lambda: visit.text(".banner .reason") == reason and visit.text(".mux .holds") == "Joystick")
