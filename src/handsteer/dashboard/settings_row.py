@@ -93,11 +93,7 @@ class Row:
             select = ui.select(options, value=value, on_change=self._take).without_auto_validation()
             return select.props(f"{_STYLE} options-dense popup-content-class=identifiers {label}")
         keyboard = 'inputmode="decimal"' if field.kind == "number" else ""
-        line = (
-            ui.input(value=value, validation=self._check)
-            .without_auto_validation()
-            .props(f"{_STYLE} {keyboard} {unit} {label}")
-        )
+        line = ui.input(value=value, validation=self._check).props(f"{_STYLE} {keyboard} {unit} {label}")
         line.on("blur", self._take).on("keydown.enter", self._take).on("keydown.escape", self._give_up)
         return line
 
