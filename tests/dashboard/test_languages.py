@@ -2,6 +2,7 @@
 
 import json
 import re
+from functools import cache
 
 import pytest
 from hypothesis import given
@@ -16,6 +17,7 @@ OTHERS = sorted(LANGUAGES - {"en"})
 PLACE = re.compile(r"\{\}|#")
 
 
+@cache
 def catalogue(language: str) -> dict[str, str]:
     lines = (STATIC / "languages" / f"{language}.js").read_text(encoding="utf-8").splitlines()
     content = "\n".join(line for line in lines if not line.strip().startswith("//"))

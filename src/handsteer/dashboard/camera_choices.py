@@ -5,11 +5,10 @@ from typing import Any, Final
 
 from nicegui import ui
 
-from handsteer.audit import without_passwords
 from handsteer.cameras import VIRTUAL_HAND
 from handsteer.cameras.choice import BROWSER, CameraChoice, Size
 from handsteer.dashboard.elements import box, sentence, tag, text
-from handsteer.dashboard.first_visit import NOT_THE_DRIVER
+from handsteer.dashboard.first_visit import NOT_THE_DRIVER, why_not
 from handsteer.dashboard.page import Page
 from handsteer.dashboard.remote_graph import RemoteGraph
 from handsteer.dashboard.settings import Settings
@@ -186,7 +185,7 @@ class _MachineCameras:
             try:
                 await asyncio.wrap_future(self._graph.choose_camera(source, size))
             except HandsteerError as error:
-                trouble = f"{sentence(without_passwords(str(error)))}."
+                trouble = why_not(error)
             else:
                 trouble = ""
             self._progress.set_text("")

@@ -50,6 +50,11 @@ def refusal(sent: object) -> str:
     return read_words(sent)
 
 
+def why_not(error: HandsteerError) -> str:
+    """Return a sentence for viewers on a camera that cannot be used."""
+    return f"{sentence(without_passwords(str(error)))}."
+
+
 class CameraOffer:
     """Chooses between the graph's camera and the browser's, and says first that a demo hand is shown.
 
@@ -87,7 +92,7 @@ class CameraOffer:
             try:
                 await asyncio.wrap_future(self._graph.choose_camera(OWN))
             except HandsteerError as error:
-                trouble = f"{sentence(without_passwords(str(error)))}."
+                trouble = why_not(error)
         self._refusal.set_text(trouble)
 
 

@@ -235,7 +235,8 @@ class TopicPanel:
         self._shown = shown
         self._name.set_value(shown)
         self._note.set_text(
-            f"Past the control: signs may drive meanwhile. Stop holds here too. {STEERING_CMD_VEL.name} goes back."
+            "Past the control: signs may drive at the same time. Stop works here too. "
+            f"{STEERING_CMD_VEL.name} goes back."
             if topic
             else "Goes through the control, before the hand."
         )

@@ -17,7 +17,6 @@ const WORDS = {
   "Reaction time: typical / slowest # %": "Reaktionszeit: typisch / langsamste # %",
   "# frames/s": "# Bilder/s",
   "Drive a mobile robot with your hand signs": "Fahre einen mobilen Roboter mit deinen Handzeichen",
-  "Dashboard": "Dashboard",
 
   // The 3D view
   "WebGL context lost. Click to re-initialize.": "Die 3D-Ansicht ist verloren gegangen. Klicke, um sie neu zu zeichnen.",
@@ -38,7 +37,7 @@ const WORDS = {
   "a picture of the camera before": "ein Bild der vorigen Kamera",
   "Pictures of that device's camera arrive # s late: the network or that device may be slow": "Bilder der Kamera jenes Geräts kommen # s zu spät: das Netz oder das Gerät könnte langsam sein",
   "this camera is not in the list any more: open the list again": "diese Kamera ist nicht mehr in der Liste: öffne die Liste noch einmal",
-  "another camera was chosen meanwhile": "inzwischen wurde eine andere Kamera gewählt",
+  "another camera was chosen before this one was opened": "eine andere Kamera wurde gewählt, bevor diese geöffnet war",
   "the camera of a browser": "die Kamera eines Browsers",
   "the robot's camera": "Roboterkamera",
   "the virtual hand": "der virtuellen Hand",
@@ -469,7 +468,7 @@ const WORDS = {
   "topic": "Topic",
   "Use": "Nutzen",
   "Steer on this topic": "Auf diesem Topic steuern",
-  "Past the control: signs may drive meanwhile. Stop holds here too. {} goes back.": "An der Steuerung vorbei: Zeichen können währenddessen fahren. Stopp gilt auch hier. {} führt zurück.",
+  "Past the control: signs may drive at the same time. Stop works here too. {} goes back.": "An der Steuerung vorbei: Zeichen können währenddessen fahren. Stopp gilt auch hier. {} führt zurück.",
   "Goes through the control, before the hand.": "Geht durch die Steuerung, vor der Hand.",
   "only the driver can choose the topic: ask to drive first": "nur wer fährt, kann das Topic wählen: frage zuerst das Steuer an",
   "the robot is stopped: reset it, then choose the topic": "der Roboter ist gestoppt: setze ihn zurück, dann wähle das Topic",
