@@ -1,4 +1,4 @@
-"""Makes the README's pictures of the page in headless Chromium, while the virtual hand drives the robot."""
+"""Makes the README's pictures of the page in headless Chromium, while a rendered hand drives the robot."""
 
 import base64
 import sys

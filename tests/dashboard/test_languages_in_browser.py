@@ -12,7 +12,7 @@ GERMAN = {"Driving": "Fahrt", "Stopped": "Gestoppt", "Stop": "Stopp", "Reset": "
 
 
 def english_left(visit: Visit) -> list[str]:
-    """Return the texts that were shown without a translation, and the words that fields show."""
+    """Return the texts that were shown without a translation."""
     left: list[str] = visit.page.evaluate("[...window.untranslated]")
     return sorted(left)
 
