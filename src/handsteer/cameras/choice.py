@@ -136,7 +136,7 @@ class ChoiceOfCameras:
         with self._lock:
             before, self._wanted = self._wanted, wanted
         if before is not None:
-            before.done.set_exception(CameraError("another camera was chosen before this one was opened"))
+            before.done.set_exception(CameraError("another camera was chosen meanwhile"))
         self.browser.forget()
         self.on_change()
         return wanted.done

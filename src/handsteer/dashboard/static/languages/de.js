@@ -37,7 +37,7 @@ const WORDS = {
   "a picture of the camera before": "ein Bild der vorigen Kamera",
   "Pictures of that device's camera arrive # s late: the network or that device may be slow": "Bilder der Kamera jenes Geräts kommen # s zu spät: das Netz oder das Gerät könnte langsam sein",
   "this camera is not in the list any more: open the list again": "diese Kamera ist nicht mehr in der Liste: öffne die Liste noch einmal",
-  "another camera was chosen before this one was opened": "eine andere Kamera wurde gewählt, bevor diese geöffnet war",
+  "another camera was chosen meanwhile": "inzwischen wurde eine andere Kamera gewählt",
   "the camera of a browser": "die Kamera eines Browsers",
   "the robot's camera": "Roboterkamera",
   "the virtual hand": "der virtuellen Hand",
