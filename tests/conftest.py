@@ -39,8 +39,8 @@ RUN_AGAIN = (
     "tests/transports",
 )
 """Where a slow test that fails is run once more, one with a browser twice more: these drive real processes in real
-time, which a machine that is busy with other things may upset. What is wrong fails each time; the last line of a run counts
-what was run again."""
+time, which a machine that is busy with other things may upset. What is wrong fails each time; the last line of a run
+counts what was run again."""
 
 DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 
