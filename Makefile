@@ -47,10 +47,10 @@ check: lint models
 	@HANDSTEER_FUZZ_CASES=200 $(BIN)/pytest -n $(WORKERS) --dist loadgroup -m "not (slow or browser)" $(ARGS)
 
 test: lint models
-	@HANDSTEER_STEPS=20000 $(BIN)/pytest -n auto --dist loadfile -m "$(PLAIN)" --durations=10 $(ARGS)
+	@HANDSTEER_STEPS=20000 $(BIN)/pytest -n auto --dist loadgroup -m "$(PLAIN)" --durations=10 $(ARGS)
 
 test-all: lint models
-	@HANDSTEER_STEPS=20000 $(BIN)/pytest -n auto --dist loadfile --durations=30 $(ARGS)
+	@HANDSTEER_STEPS=20000 $(BIN)/pytest -n auto --dist loadgroup --durations=30 $(ARGS)
 
 lint: $(BIN)/.dev
 	@$(BIN)/ruff format --check .
@@ -66,13 +66,13 @@ ros1: $(BIN)/.dev
 	@scripts/setup-ros1
 
 test-ros1: $(BIN)/.dev models
-	@$(BIN)/pytest -n auto --dist loadfile -m ros1 $(ARGS)
+	@$(BIN)/pytest -n auto --dist loadgroup -m ros1 $(ARGS)
 
 ros2: $(BIN)/.dev
 	@scripts/setup-ros2
 
 test-ros2: $(BIN)/.dev models
-	@$(BIN)/pytest -n auto --dist loadfile -m ros2 $(ARGS)
+	@$(BIN)/pytest -n auto --dist loadgroup -m ros2 $(ARGS)
 
 models: | $(BIN)/.run
 	@$(BIN)/handsteer models > /dev/null

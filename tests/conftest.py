@@ -85,8 +85,15 @@ def pytest_configure() -> None:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark what is in :data:`RUN_AGAIN`, and what makes networks by the fixtures that make them."""
+    """Mark what is in :data:`RUN_AGAIN`, what makes networks by the fixtures that make them, and what runs together.
+
+    With ``--dist loadgroup``, one process runs the tests of a file, and one all that need a browser: only one browser
+    at a time shows pages, for which others would wait.
+    """
     for item in items:
+        if not item.get_closest_marker("xdist_group"):
+            group = "browser" if item.get_closest_marker("browser") else item.nodeid.partition("::")[0]
+            item.add_marker(pytest.mark.xdist_group(group))
         if set(getattr(item, "fixturenames", ())) & _NETWORKS:
             item.add_marker(pytest.mark.netns)
         if item.get_closest_marker("slow") and item.nodeid.startswith(RUN_AGAIN):

@@ -22,7 +22,7 @@ from tests.dashboard.visits import NEEDS_A_BROWSER, PATIENCE_MS, Visit, visiting
 pytestmark = NEEDS_A_BROWSER
 
 TRAINING_MS = 5 * PATIENCE_MS
-EMPTY_FRAMES = 30
+EMPTY_FRAMES = 60
 
 
 @pytest.fixture
