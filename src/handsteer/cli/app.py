@@ -6,6 +6,7 @@ verb names the modules it works with by :func:`loads`.
 
 import importlib
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
@@ -21,6 +22,31 @@ Flag = Annotated[bool, Parameter(negative="", show_default=False)]
 Parameters = Annotated[dict[str, Any] | None, Parameter(parse=False)]
 """Options with the full name of a parameter, such as --control.max-linear, by section."""
 ConfigFile = Annotated[Path | None, Parameter(name="--config")]
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class PageOptions:
+    """Options of the verbs that serve the page.
+
+    Parameters
+    ----------
+    host
+        Address that the page is served on; 0.0.0.0 makes it reachable from other machines, with a token.
+    port
+        Port of the page; 0 picks a free one.
+    token
+        Require the token in the printed address from this machine too; for machines with several users.
+    """
+
+    host: str | None = None
+    port: int | None = None
+    token: Flag = False
+
+    def parameters(self) -> dict[str, object]:
+        """Return them as parameters of the section ``dashboard``; None is not given."""
+        return {"host": self.host, "port": self.port, "token": "always" if self.token else None}
+
 
 V = TypeVar("V", bound=Callable[..., int | None])
 

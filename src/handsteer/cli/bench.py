@@ -2,6 +2,7 @@
 
 import json as json_format
 import os
+from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -14,6 +15,8 @@ from handsteer.errors import BenchError, needing
 
 if TYPE_CHECKING:
     from handsteer.bench.cells import Cell, CellResult, Estimate
+    from handsteer.bench.laps import Conditions
+    from handsteer.config import Config
 
 Words = Annotated[list[str] | None, Parameter(negative="")]
 
@@ -23,6 +26,44 @@ _HEAD = (
 )
 
 
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Varied:
+    """Under which conditions laps are driven.
+
+    Parameters
+    ----------
+    through
+        landmarks of the virtual hand, with the errors measured on people; or pictures of it, which take longer.
+    latency
+        Added delay in the loop, half of it each way, in ms.
+    fps
+        Frames per second of the camera of the hand.
+    sweep
+        Vary one condition, such as latency=0,250,500,750 (ms), fps=10,15,30,60, errors=0,1,2,4 (factor on the errors
+        of landmarks and operator) or reaction=150,250,400 (ms); may be repeated.
+    """
+
+    through: Literal["landmarks", "pictures"] = "landmarks"
+    latency: float = 0.0
+    fps: float = 30.0
+    sweep: Words = None
+
+    def sweeps(self) -> "list[tuple[str, list[float]]]":
+        """Return each condition that is varied, with its values."""
+        from handsteer.bench.cells import parse_sweep
+
+        return [parse_sweep(text) for text in self.sweep or ()]
+
+    def conditions(self) -> "list[Conditions]":
+        """Return all conditions to drive under."""
+        from handsteer.bench.cells import with_factor
+        from handsteer.bench.laps import Conditions
+
+        base = Conditions(latency_s=self.latency / 1000, fps=self.fps, through=self.through)
+        return [with_factor(base, factor, value) for factor, values in self.sweeps() for value in values] or [base]
+
+
 @loads("handsteer.cli.table", "handsteer.config", "tqdm")
 def bench(
     *,
@@ -30,10 +71,7 @@ def bench(
     interface: Words = None,
     seeds: int = 20,
     first_seed: int = 0,
-    through: Literal["landmarks", "pictures"] = "landmarks",
-    latency: float = 0.0,
-    fps: float = 30.0,
-    sweep: Words = None,
+    varied: Varied = Varied(),
     jobs: int | None = None,
     json: Path | None = None,
     plots: Path | None = None,
@@ -61,15 +99,6 @@ def bench(
         Number of laps of each cell.
     first_seed
         Seed of the first lap; the same seeds give the same laps.
-    through
-        landmarks of the virtual hand, with the errors measured on people; or pictures of it, which take longer.
-    latency
-        Added delay in the loop, half of it each way, in ms.
-    fps
-        Frames per second of the camera of the hand.
-    sweep
-        Vary one condition, such as latency=0,250,500,750 (ms), fps=10,15,30,60, errors=0,1,2,4 (factor on the errors
-        of landmarks and operator) or reaction=150,250,400 (ms); may be repeated.
     jobs
         Number of processes; by default one per processor. It does not change the results.
     json
@@ -79,44 +108,51 @@ def bench(
     config_file
         YAML file with parameters of handsteer, such as control.rule; options override it.
     """
-    from tqdm import tqdm
-
-    if not 1 <= seeds <= 10_000 or first_seed < 0:
-        raise BenchError(f"--seeds: {seeds} should be 1 to 10,000, and --first-seed, {first_seed}, not negative")
-    if jobs is not None and jobs < 1:
-        raise BenchError(f"--jobs: {jobs} should be at least 1")
+    _check(seeds, first_seed, jobs)
     with needing("the simulated robot", "sim", "mujoco", "xacro"):
-        from handsteer.bench import cells as of_cells  # needs the simulator
-        from handsteer.bench.courses import COURSES
-        from handsteer.bench.laps import INTERFACES, Conditions
+        from handsteer.bench.laps import INTERFACES
     if json is not None:
         check_writable("--json", json, BenchError)
     drawing = _open_plots(plots)
-    base = Conditions(latency_s=latency / 1000, fps=fps, through=through)
-    sweeps = [of_cells.parse_sweep(text) for text in sweep or ()]
-    varied = [of_cells.with_factor(base, factor, value) for factor, values in sweeps for value in values] or [base]
-    cells = [
-        of_cells.Cell(name, of, conditions)
-        for name in course or COURSES
-        for of in interface or INTERFACES
-        for conditions in varied
-    ]
-    numbers = range(first_seed, first_seed + seeds)
-    with tqdm(total=len(dict.fromkeys(cells)) * seeds, unit="lap", disable=None) as bar:
-        results = of_cells.run_cells(
-            cells,
-            numbers,
-            jobs=jobs or os.cpu_count() or 1,
-            config=settings(config_file, parameters),
-            progress=bar.update,
-        )
+    cells = _cells(course, interface or list(INTERFACES), varied)
+    results = _drive(cells, range(first_seed, first_seed + seeds), jobs, settings(config_file, parameters))
     print(bench_table(results))
     if json is not None:
         _write(json, json_format.dumps([result.as_dict() for result in results], indent=1))
     if drawing is not None and plots is not None:
-        for path in drawing.write_plots(results, sweeps, plots):
+        for path in drawing.write_plots(results, varied.sweeps(), plots):
             say(f"wrote {path}")
     return 0
+
+
+def _check(seeds: int, first_seed: int, jobs: int | None) -> None:
+    if not 1 <= seeds <= 10_000 or first_seed < 0:
+        raise BenchError(f"--seeds: {seeds} should be 1 to 10,000, and --first-seed, {first_seed}, not negative")
+    if jobs is not None and jobs < 1:
+        raise BenchError(f"--jobs: {jobs} should be at least 1")
+
+
+def _cells(courses: list[str] | None, interfaces: list[str], varied: Varied) -> "list[Cell]":
+    from handsteer.bench.cells import Cell
+    from handsteer.bench.courses import COURSES
+
+    conditions = varied.conditions()
+    return [
+        Cell(course, interface, each)
+        for course in courses or COURSES
+        for interface in interfaces
+        for each in conditions
+    ]
+
+
+def _drive(cells: "list[Cell]", seeds: range, jobs: int | None, config: "Config") -> "list[CellResult]":
+    """Drive all laps, with a progress bar."""
+    from tqdm import tqdm
+
+    from handsteer.bench.cells import run_cells
+
+    with tqdm(total=len(dict.fromkeys(cells)) * len(seeds), unit="lap", disable=None) as bar:
+        return run_cells(cells, seeds, jobs=jobs or os.cpu_count() or 1, config=config, progress=bar.update)
 
 
 def bench_table(results: "list[CellResult]") -> str:

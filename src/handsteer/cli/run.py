@@ -1,10 +1,13 @@
 """``handsteer run``: drive the robot."""
 
 import json as json_format
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from handsteer.cli.app import ConfigFile, Flag, Parameters, loads
+from cyclopts import Parameter
+
+from handsteer.cli.app import ConfigFile, Flag, PageOptions, Parameters, loads
 from handsteer.cli.running import default_file
 from handsteer.cli.running import settings as make_settings
 from handsteer.errors import ConfigError, did_you_mean
@@ -13,18 +16,75 @@ if TYPE_CHECKING:
     from handsteer.config import Config
 
 
+@Parameter(name="*")
+@dataclass(frozen=True)
+class CameraAndRobot:
+    """What drives, and what is driven.
+
+    Parameters
+    ----------
+    camera
+        auto, virtual, browser (of the device that shows the page), a webcam's index or /dev/videoN, an address (rtsp,
+        http), a video file or a folder of photos.
+    robot
+        sim, the simulated robot. For a real one that subscribes to cmd_vel: ros2 (rclpy), dds or zenoh (ROS 2 without
+        a ROS installation), auto (ros2 if installed, else dds) or ros1. Or a preset of topics and limits, with auto:
+        turtlebot3_burger, turtlebot3_waffle, turtlebot4 or turtlesim.
+    world
+        Name of a shipped world, or a YAML file.
+    """
+
+    camera: str | None = None
+    robot: str | None = None
+    world: str | None = None
+
+    def parameters(self) -> dict[str, dict[str, str | None]]:
+        """Return them as parameters by section; None is not given."""
+        return {"camera": {"source": self.camera}, "robot": {**_robot(self.robot), "world": self.world}}
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Mode:
+    """How long a run lasts, and whether it serves the page.
+
+    Parameters
+    ----------
+    headless
+        Run without the page.
+    duration
+        End after this many seconds.
+    fast
+        Run as fast as possible on simulated time, without the page; the same input gives the same commands.
+    """
+
+    headless: Flag = False
+    duration: float | None = None
+    fast: Flag = False
+
+    @property
+    def has_page(self) -> bool:
+        """Whether it serves the page."""
+        return not (self.headless or self.fast)
+
+    def check(self, config: "Config") -> None:
+        """Raise a ConfigError if ``config`` or the duration does not fit it."""
+        if not self.has_page and config.camera.source == "browser":
+            raise ConfigError("--camera browser needs the page, which --headless and --fast leave out")
+        if self.fast and config.foxglove.port >= 0:
+            raise ConfigError(
+                "--foxglove shows a run in real time: leave out --fast, or record the run and open the file"
+            )
+        if self.duration is not None and not self.duration > 0:
+            raise ConfigError(f"--duration: {self.duration:g} should be greater than 0 seconds")
+
+
 @loads("handsteer.cli.drive", "handsteer.cli.models")
 def run(
     *ros_args: str,
-    camera: str | None = None,
-    robot: str | None = None,
-    world: str | None = None,
-    host: str | None = None,
-    port: int | None = None,
-    token: Flag = False,
-    headless: Flag = False,
-    duration: float | None = None,
-    fast: Flag = False,
+    what: CameraAndRobot = CameraAndRobot(),
+    page: PageOptions = PageOptions(),  # noqa: B008 - it is frozen
+    mode: Mode = Mode(),
     record: Path | None = None,
     foxglove: int | None = None,
     json: Flag = False,
@@ -44,27 +104,6 @@ def run(
     ros_args
         ROS arguments, for a real robot. ROS 2: --ros-args -r cmd_vel:=/base/cmd_vel -r __ns:=/r1.
         ROS 1: cmd_vel:=/base/cmd_vel.
-    camera
-        auto, virtual, browser (of the device that shows the page), a webcam's index or /dev/videoN, an address (rtsp,
-        http), a video file or a folder of photos.
-    robot
-        sim, the simulated robot. For a real one that subscribes to cmd_vel: ros2 (rclpy), dds or zenoh (ROS 2 without
-        a ROS installation), auto (ros2 if installed, else dds) or ros1. Or a preset of topics and limits, with auto:
-        turtlebot3_burger, turtlebot3_waffle, turtlebot4 or turtlesim.
-    world
-        Name of a shipped world, or a YAML file.
-    host
-        Address that the page is served on; 0.0.0.0 makes it reachable from other machines, with a token.
-    port
-        Port of the page; 0 picks a free one.
-    token
-        Require the token in the printed address from this machine too; for machines with several users.
-    headless
-        Run without the page.
-    duration
-        End after this many seconds.
-    fast
-        Run as fast as possible on simulated time, without the page; the same input gives the same commands.
     record
         Record all topics to this MCAP file, which must not exist yet, for `handsteer replay` and `handsteer report`.
     foxglove
@@ -79,28 +118,19 @@ def run(
     from handsteer.cli.drive import drive, linked, summary_text
     from handsteer.cli.models import fetch_missing
 
-    headless = headless or fast
     config_file = config_file or default_file()
-    shorthand = {
-        "camera": {"source": camera},
-        "robot": {**_robot(robot), "world": world},
-        "dashboard": {"host": host, "port": port, "token": "always" if token else None},
-        "foxglove": {"port": foxglove},
-    }
-    base = {"camera": {"at_end": "end"}} if headless else {}
+    shorthand = {**what.parameters(), "dashboard": page.parameters(), "foxglove": {"port": foxglove}}
+    base = {} if mode.has_page else {"camera": {"at_end": "end"}}
 
     def settle(service: dict[str, Any]) -> "Config":
         return make_settings(config_file, parameters, shorthand, base, service)
 
-    if headless and settle({}).camera.source == "browser":
-        raise ConfigError("--camera browser needs the page, which --headless and --fast leave out")
-    if fast and settle({}).foxglove.port >= 0:
-        raise ConfigError("--foxglove shows a run in real time: leave out --fast, or record the run and open the file")
-    if duration is not None and not duration > 0:
-        raise ConfigError(f"--duration: {duration:g} should be greater than 0 seconds")
+    mode.check(settle({}))
     fetch_missing(settle({}).landmarks.model)
-    with linked(settle, ros_args, fast=fast) as (settings, link):
-        summary = drive(settings, link, duration, config_file, record=record, headless=headless, fast=fast)
+    with linked(settle, ros_args, fast=mode.fast) as (settings, link):
+        summary = drive(
+            settings, link, mode.duration, config_file, record=record, headless=not mode.has_page, fast=mode.fast
+        )
     print(json_format.dumps(summary.as_dict()) if json else summary_text(summary))
     return 0
 

@@ -1,16 +1,16 @@
 """``handsteer study``: lead people through a study on the page."""
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from handsteer.cli.app import ConfigFile, Flag, loads
+from handsteer.cli.app import ConfigFile, PageOptions, loads
 from handsteer.cli.running import say
 from handsteer.cli.running import settings as make_settings
 from handsteer.errors import StudyError
 
 if TYPE_CHECKING:
     from handsteer.study.plan import Plan
-    from handsteer.study.session import Task
 
 
 @loads("handsteer.cli.drive", "handsteer.cli.models", "handsteer.study.results")
@@ -20,9 +20,7 @@ def study(
     participant: str | None = None,
     results: Path | None = None,
     camera: str | None = None,
-    host: str | None = None,
-    port: int | None = None,
-    token: Flag = False,
+    page: PageOptions = PageOptions(),  # noqa: B008 - it is frozen
     config_file: ConfigFile = None,
 ) -> int:
     """Lead a person through the interfaces and courses of a plan on the page, and write CSV.
@@ -42,12 +40,6 @@ def study(
         Folder of the results; by default the name of the plan's file with -results, in the working directory.
     camera
         auto, virtual, browser (of the device that shows the page), a webcam's index or /dev/videoN, or an address.
-    host
-        Address that the page is served on; 0.0.0.0 makes it reachable from other machines, with a token.
-    port
-        Port of the page; 0 picks a free one.
-    token
-        Require the token in the printed address from this machine too; for machines with several users.
     config_file
         YAML file with parameters; options override it, and the plan overrides both.
     """
@@ -63,26 +55,24 @@ def study(
     shorthand = {
         "robot": {"world": course_file(first, plan)},
         "camera": {"source": camera},
-        "dashboard": {"host": host, "port": port, "token": "always" if token else None},
+        "dashboard": page.parameters(),
     }
     base = make_settings(config_file, None, shorthand).model_dump(exclude_unset=True)
-    courses = load_courses(the_plan, plan)
-    configs = load_configs(the_plan, plan, base)
+    courses, configs = load_courses(the_plan, plan), load_configs(the_plan, plan, base)
     folder = results or Path(f"{plan.stem}-results")
 
-    def task(person: str) -> "Task":
-        return Task(the_plan, person, courses, configs, folder)
-
+    task = partial(Task, the_plan, courses=courses, configs=configs, results=folder)
     if participant is None:
         _list(the_plan, {person: Session(task(person)).progress for person in the_plan.participants})
         return 0
     done, steps = Session(task(participant)).progress
     if done == steps:
         raise StudyError(f"{participant} has done all of {plan}: the results are in {folder}")
-    fetch_missing(next(iter(configs.values())).landmarks.model)
+    first_config = next(iter(configs.values()))
+    fetch_missing(first_config.landmarks.model)
     prepare(folder)
     say(f"{participant}: {done} of {steps} laps and forms are done; the results are written to {folder}")
-    drive(next(iter(configs.values())), study=task(participant))
+    drive(first_config, study=task(participant))
     return 0
 
 

@@ -4,6 +4,7 @@ import functools
 import ssl
 import threading
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +28,16 @@ from handsteer.dashboard.lesson_page import LessonPage
 from handsteer.dashboard.lessons import Lessons
 from handsteer.dashboard.limits import Connections, UnconnectedPages, limit_log
 from handsteer.dashboard.node import DashboardNode
-from handsteer.dashboard.page import ASSETS_PATH, ICON, MANIFEST, MANIFEST_PATH, PICTURE_PATH, WEBCAM_PATH, PageContext
+from handsteer.dashboard.page import (
+    ASSETS_PATH,
+    ICON,
+    MANIFEST,
+    MANIFEST_PATH,
+    PICTURE_PATH,
+    WEBCAM_PATH,
+    Page,
+    PageContext,
+)
 from handsteer.dashboard.recordings import Recordings, serve_recordings
 from handsteer.dashboard.remote_graph import RemoteGraph
 from handsteer.dashboard.settings import Settings, SettingsFile
@@ -52,6 +62,8 @@ _STOP_TIMEOUT_S = 3.0
 _GRACE_S = 0.4
 # Limits what the system buffers for a slow viewer; more would only be older pictures.
 _SEND_BUFFER_BYTES = 256 * 1024
+
+_PAGES = {"/": DrivePage, "/settings": SettingsPage, "/world": WorldPage, "/teach": LessonPage, "/study": StudyPage}
 
 _one_at_a_time = threading.Lock()
 
@@ -242,26 +254,13 @@ def _application() -> FastAPI:
     serve_lesson_files(application, lambda: application.state.dashboard.context.lessons)
     unconnected = UnconnectedPages()
 
-    @ui.page("/")
-    def index() -> None:
-        unconnected.add(DrivePage(application.state.dashboard.context).client)
+    def serve(path: str, page: Callable[[PageContext], Page]) -> None:
+        @ui.page(path)
+        def shown() -> None:
+            unconnected.add(page(application.state.dashboard.context).client)
 
-    @ui.page("/settings")
-    def settings() -> None:
-        unconnected.add(SettingsPage(application.state.dashboard.context).client)
-
-    @ui.page("/world")
-    def world() -> None:
-        unconnected.add(WorldPage(application.state.dashboard.context).client)
-
-    @ui.page("/teach")
-    def teach() -> None:
-        unconnected.add(LessonPage(application.state.dashboard.context).client)
-
-    @ui.page("/study")
-    def study() -> None:
-        unconnected.add(StudyPage(application.state.dashboard.context).client)
-
+    for path, page in _PAGES.items():
+        serve(path, page)
     ui.run_with(
         application,
         title="handsteer",

@@ -1,5 +1,6 @@
 """``handsteer signs collect`` and ``import``: examples of a sign to be learnt."""
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
@@ -10,6 +11,61 @@ from handsteer.cli.running import check_writable, settings
 from handsteer.errors import DatasetError
 
 
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Takes:
+    """How takes are recorded from a camera.
+
+    Parameters
+    ----------
+    takes
+        Number of takes; a recording is used as a whole.
+    take_time
+        Duration of each take, in seconds.
+    countdown
+        Countdown before each take, in seconds.
+    hold
+        Record while the space key is held, without a countdown.
+    """
+
+    takes: int = 5
+    take_time: float = 3.0
+    countdown: float = 3.0
+    hold: Flag = False
+
+    def check(self) -> None:
+        """Raise a DatasetError for a value beyond its range."""
+        if not 1 <= self.takes <= 1000:
+            raise DatasetError(f"--takes: {self.takes} should be from 1 to 1000")
+        if not 0.2 <= self.take_time <= 60:
+            raise DatasetError(f"--take-time: {self.take_time:g} should be from 0.2 to 60 seconds")
+        if not 0 <= self.countdown <= 60:
+            raise DatasetError(f"--countdown: {self.countdown:g} should be from 0 to 60 seconds")
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Moments:
+    """Parts of a recording that become takes.
+
+    Parameters
+    ----------
+    from_
+        Recording of a drive: each moment that --at names becomes a take.
+    at
+        Times in the recording, in seconds since it began, as `handsteer replay` and `report` print them: 12.4, which
+        takes half a second around it, or 12.4-13.0.
+    """
+
+    from_: Annotated[Path | None, Parameter(name="--from")] = None
+    at: Annotated[list[str] | None, Parameter(consume_multiple=True, negative="")] = None
+
+    def check(self) -> None:
+        """Raise a DatasetError if one was given without the other."""
+        if (self.from_ is None) != (self.at is None):
+            raise DatasetError("--from needs --at and --at needs --from: a recording, and its moments in seconds")
+
+
 @loads("handsteer.cli.signs.collecting")
 def collect(
     *,
@@ -18,12 +74,8 @@ def collect(
     camera: str | None = None,
     person: str = "me",
     session: str | None = None,
-    takes: int = 5,
-    take_time: float = 3.0,
-    countdown: float = 3.0,
-    from_: Annotated[Path | None, Parameter(name="--from")] = None,
-    at: Annotated[list[str] | None, Parameter(consume_multiple=True, negative="")] = None,
-    hold: Flag = False,
+    takes: Takes = Takes(),
+    moments: Moments = Moments(),
     undo: Flag = False,
     config_file: ConfigFile = None,
     parameters: Parameters = None,
@@ -54,19 +106,6 @@ def collect(
         Who shows it. With several persons, the signs are tested on persons that they were not learnt from.
     session
         Name of the session; by default the date and time.
-    takes
-        Number of takes; a recording is used as a whole.
-    take_time
-        Duration of each take, in seconds.
-    countdown
-        Countdown before each take, in seconds.
-    from_
-        Recording of a drive: each moment that --at names becomes a take.
-    at
-        Times in the recording, in seconds since it began, as `handsteer replay` and `report` print them: 12.4, which
-        takes half a second around it, or 12.4-13.0.
-    hold
-        Record while the space key is held, without a countdown.
     undo
         Remove the last take from the file.
     config_file
@@ -80,22 +119,12 @@ def collect(
         return 0
     if label is None:
         raise DatasetError("--label is missing: name the sign, as in --label Hi")
-    if (from_ is None) != (at is None):
-        raise DatasetError("--from needs --at and --at needs --from: a recording, and its moments in seconds")
-    _check(takes, take_time, countdown)
+    moments.check()
+    takes.check()
     check_writable("--dataset", dataset, DatasetError)
-    plan = Plan(label, dataset, person, session, takes, take_time, countdown, hold=hold)
-    collect_takes(config, plan, from_, at or [])
+    plan = Plan(label, dataset, person, session, takes.takes, takes.take_time, takes.countdown, hold=takes.hold)
+    collect_takes(config, plan, moments.from_, moments.at or [])
     return 0
-
-
-def _check(takes: int, take_s: float, countdown_s: float) -> None:
-    if not 1 <= takes <= 1000:
-        raise DatasetError(f"--takes: {takes} should be from 1 to 1000")
-    if not 0.2 <= take_s <= 60:
-        raise DatasetError(f"--take-time: {take_s:g} should be from 0.2 to 60 seconds")
-    if not 0 <= countdown_s <= 60:
-        raise DatasetError(f"--countdown: {countdown_s:g} should be from 0 to 60 seconds")
 
 
 @loads("handsteer.cli.signs.collecting", "handsteer.training.custom.keypoint_csv")
