@@ -118,12 +118,18 @@ def cmd_vel_topic(config: Config) -> Topic[Any]:
 
 
 def make_control(
-    config: Config, transport: Transport, clock: Clock, *, simulated: bool = False, **topics: Topic[Any]
+    config: Config,
+    transport: Transport,
+    clock: Clock,
+    *,
+    simulated: bool = False,
+    others_keep_stop: bool = False,
+    **topics: Topic[Any],
 ) -> "HandSignControlNode":
     """Return the node ``hand_sign_control``.
 
     ``simulated`` is whether the robot is known to be simulated; ``control.arming`` and ``control.engage`` are then off
-    if they are ``auto``.
+    if they are ``auto``. ``others_keep_stop`` is whether nodes of other processes may remember a Stop.
 
     Raises:
         ConfigError: Control and robot are configured with different types of commands.
@@ -142,6 +148,7 @@ def make_control(
         gamepad=config.joy,
         arming=is_on(config.control.arming),
         engage=is_on(config.control.engage),
+        others_keep_stop=others_keep_stop,
         **topics,
     )
 

@@ -4,12 +4,24 @@ import pytest
 
 from handsteer.config import ControlConfig, RobotConfig
 from handsteer.making import open_robot
-from handsteer.messages import CMD_VEL, DIAGNOSTICS, HAND_SIGN, STOP, STOPPED, Bool, DiagnosticStatus, String
+from handsteer.messages import (
+    CMD_VEL,
+    DIAGNOSTICS,
+    HAND_SIGN,
+    STEERING_CMD_VEL,
+    STOP,
+    STOPPED,
+    Bool,
+    DiagnosticStatus,
+    String,
+    twist,
+)
 from handsteer.nodes.base import Node
 from handsteer.nodes.control import HandSignControlNode
 from handsteer.nodes.robot import RobotNode
 from handsteer.nodes.supervision import StopKeeper
 from handsteer.robots.simulated import SimulatedRobot
+from handsteer.timeouts import HEAR_STOP_S
 from tests.nodes.stepping import Bench
 
 
@@ -64,6 +76,47 @@ def test_a_reset_that_one_has_missed_undoes_no_stop_and_a_stop_that_one_has_miss
     word.publish(Bool(data=False))
     bench.run(0.1)
     assert bench.speed_after("Stop", "Forward") == 0.0
+
+
+class TestBesideOtherProcesses:
+    """The word of others on a Stop may arrive some seconds after the signs do, as over Fast DDS."""
+
+    @pytest.fixture
+    def started(self, bench: KeeperBench) -> KeeperBench:
+        control = HandSignControlNode(bench.transport, bench.clock, ControlConfig(), others_keep_stop=True)
+        bench.nodes = [bench.other, control]
+        bench.run(0.1)
+        return bench
+
+    def test_nothing_moves_before_their_word_and_a_late_one_still_stops(self, started: KeeperBench) -> None:
+        assert started.speed_after(*["Forward"] * 60) == 0.0
+        started.transport.advertise("far", STOPPED).publish(Bool(data=True))
+        assert started.speed_after(*["Forward"] * 60, "Stop", "Forward") == 0.0
+
+    def test_their_word_that_there_is_no_stop_is_believed_at_once(self, started: KeeperBench) -> None:
+        assert started.speed_after("Forward", "Forward") == 0.0
+        started.transport.advertise("far", STOPPED).publish(Bool(data=False))
+        assert started.speed_after("Forward") > 0.0
+
+    def test_it_waits_no_longer_than_their_word_can_take(self, started: KeeperBench) -> None:
+        assert started.speed_after(*["Forward"] * round(30 * (HEAR_STOP_S - 0.2))) == 0.0
+        assert started.speed_after(*["Forward"] * 9) > 0.0
+
+    def test_the_steering_waits_too(self, started: KeeperBench) -> None:
+        steering = started.transport.advertise("steering", STEERING_CMD_VEL)
+        for _ in range(5):
+            steering.publish(twist(0.2, 0.0))
+            started.run(0.05)
+        assert started.twists[-1].linear.x == 0.0
+
+    def test_alone_it_follows_at_once(self) -> None:
+        bench = Bench()
+        twists = bench.record(CMD_VEL)
+        signs = bench.transport.advertise("recognition", HAND_SIGN)
+        bench.nodes = [HandSignControlNode(bench.transport, bench.clock, ControlConfig(), others_keep_stop=True)]
+        signs.publish(String(data="Forward"), 0.0)
+        bench.run(0.01)
+        assert twists[-1].linear.x > 0.0
 
 
 def test_it_is_said_once_however_often_stop_is(bench: KeeperBench) -> None:

@@ -5,6 +5,7 @@ import logging
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -79,7 +80,7 @@ class Job:
 JOBS = {
     "camera": Job("my_camera", "camera", making.make_camera),
     "recognition": Job("hand_sign_recognition", "signs", making.make_recognition),
-    "control": Job("hand_sign_control", "control", making.make_control),
+    "control": Job("hand_sign_control", "control", partial(making.make_control, others_keep_stop=True)),
     "robot": Job("robot", "robot", making.make_robot),
     "steering": Job("steering", "dashboard", making.make_steering, companion=_served),
 }

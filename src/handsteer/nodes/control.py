@@ -62,6 +62,8 @@ class HandSignControlNode(Node):
         arming: Whether nothing moves before neutral was seen, or while no robot is subscribed
             (:mod:`handsteer.control.safety`).
         engage: Whether the hand drives nothing before an open palm engaged it.
+        others_keep_stop: Whether nodes of other processes may remember a Stop from before the start; nothing moves
+            before one of them was heard, for at most :data:`~handsteer.timeouts.HEAR_STOP_S`.
         sign: Topic of the signs.
         joy: Topic of the hand as a joystick.
         camera_changed: Topic on which it is published that another camera was chosen; none where it cannot be.
@@ -86,6 +88,7 @@ class HandSignControlNode(Node):
         gamepad: JoyConfig | None = None,
         arming: bool = False,
         engage: bool = False,
+        others_keep_stop: bool = False,
         sign: Topic[String] = HAND_SIGN,
         joy: Topic[Joy] = GESTURE_JOY,
         camera_changed: Topic[String] | None = None,
@@ -115,7 +118,8 @@ class HandSignControlNode(Node):
         self._cmd_vel = self._selection.commands if self._selection else self._commands(cmd_vel)
         self._rivals = Rivals(self, [sign, *(self._selection.topics if self._selection else [cmd_vel])])
         self._audit = ControlAudit(self.auditor, lambda: self._published_by(STOP)[1])
-        StopKeeper(self, self._on_stop_or_reset)
+        stops = StopKeeper(self, self._on_stop_or_reset)
+        self._stops = stops if others_keep_stop else None
         if camera_changed is not None:
             self.subscribe(camera_changed, self._on_other_camera)
         self.subscribe(steering, self._on_steering)
@@ -170,6 +174,9 @@ class HandSignControlNode(Node):
         return self.transport.topic_name(topic), ", ".join(publishers) or "no known node"
 
     def _on_sign(self, received: Received[String]) -> None:
+        if self._waits_for_others():
+            self._publish(ZERO, received.captured_s)
+            return
         if self._is_stale(received):
             self._obey_late(is_stop=action_of(received.message.data, self._config.actions) == "stop")
             return
@@ -188,6 +195,9 @@ class HandSignControlNode(Node):
         self._look_for_changes(self.clock.now())
 
     def _on_stick(self, stick: Stick, received: Received[Joy]) -> None:
+        if self._waits_for_others():
+            self._publish(ZERO, received.captured_s)
+            return
         if self._is_stale(received):
             self._obey_late(is_stop=not stick.held)
             return
@@ -211,6 +221,9 @@ class HandSignControlNode(Node):
         self._steer(received.message.linear.x, received.message.angular.z, received)
 
     def _steer(self, linear_mps: float, angular_radps: float, received: Received[Any]) -> None:
+        if self._waits_for_others():
+            self._publish(ZERO)
+            return
         wanted = Velocity(linear_mps, angular_radps)
         if received.is_late:
             self._obey_late(is_stop=wanted.is_zero)
@@ -220,6 +233,9 @@ class HandSignControlNode(Node):
         self._look_after_the_robot(elapsed_s)
         self._publish(self._control.step(elapsed_s, steering=steering))
         self._look_for_changes(self._last_step_s)
+
+    def _waits_for_others(self) -> bool:
+        return self._stops is not None and self._stops.waits_for_others
 
     def _obey_late(self, *, is_stop: bool) -> None:
         """Stop for a late sign or command; it does not show what is seen now, so it does not arm."""
@@ -333,9 +349,14 @@ class HandSignControlNode(Node):
         safety = self._safety
         if safety.is_stopped:
             return Reason("stopped")
+        if self._waits_for_others():
+            return Reason("starting")
         if why_blind := self._monitor.why_blind():
             return Reason("no_scan", why_blind)
-        source, why = self._mux.source, safety.signs_wait
+        return self._reason_by_input()
+
+    def _reason_by_input(self) -> Reason:
+        safety, source, why = self._safety, self._mux.source, self._safety.signs_wait
         robot = self._selection.fleet.selected if self._selection else ""
         if source == "steering" and safety.steering_waits:
             return Reason("steering_disarmed", robot=robot)

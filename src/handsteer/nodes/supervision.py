@@ -6,6 +6,7 @@ from typing import Any
 
 from handsteer.messages import STOP, STOPPED, Bool, Topic
 from handsteer.nodes.base import Node
+from handsteer.timeouts import HEAR_STOP_S
 from handsteer.transports.base import UNNAMED, Received, many_publishers
 
 log = logging.getLogger(__name__)
@@ -29,23 +30,36 @@ class StopKeeper:
 
     def __init__(self, node: Node, on_stop: Callable[[bool], None] | None = None) -> None:
         self._on_stop = on_stop
+        self._node = node
+        self._waits_until_s: float | None = node.clock.now() + HEAR_STOP_S
         self._is_stopped: bool | None = None
         self._stopped = node.publisher(STOPPED)
         # Several nodes publish at once: one's true must not be replaced by another's false.
         node.subscribe(STOPPED, self._on_word_of_others, key=lambda message: bool(message.data))
         node.subscribe(STOP, self._on_stop_or_reset)
 
+    @property
+    def waits_for_others(self) -> bool:
+        """Whether other nodes publish ``/stopped``, and this one may not have received it since its start."""
+        if self._waits_until_s is None:
+            return False
+        if self._node.clock.now() >= self._waits_until_s:
+            self._waits_until_s = None
+            return False
+        return len(self._node.transport.publishers_of(STOPPED)) > 1  # one is its own
+
     def _on_stop_or_reset(self, received: Received[Bool]) -> None:
         self._take(bool(received.message.data))
 
     def _on_word_of_others(self, received: Received[Bool]) -> None:
         # A node that missed a reset must not undo a Stop by its false; resets are accepted from /stop only.
+        self._waits_until_s = None
         if received.message.data and not self._is_stopped:
             self._take(True)
 
     def _take(self, is_stopped: bool) -> None:
         is_news = is_stopped != self._is_stopped
-        self._is_stopped = is_stopped
+        self._is_stopped, self._waits_until_s = is_stopped, None
         if self._on_stop is not None:
             self._on_stop(is_stopped)
         if is_news:

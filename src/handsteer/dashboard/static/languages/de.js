@@ -89,6 +89,7 @@ const WORDS = {
   "show Stop or lower your hand to begin with {}": "zeige Stopp oder senke die Hand, um zu beginnen, mit {}",
   "show Stop or lower your hand to begin with {} ({})": "zeige Stopp oder senke die Hand, um zu beginnen, mit {} ({})",
   "has just started": "gerade gestartet",
+  "has just started: whether the robot was stopped before is not known yet": "gerade gestartet: ob der Roboter zuvor gestoppt wurde, ist noch nicht bekannt",
   "no sign came": "es kam kein Zeichen",
   "it was selected": "er wurde gewählt",
   "recognition had no frame": "die Erkennung hatte kein Bild",
