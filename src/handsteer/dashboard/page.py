@@ -52,20 +52,22 @@ _INSTALLABLE = (
     '<meta name="theme-color" content="#0a0f1c" media="(prefers-color-scheme: dark)">'
 )
 
-_ASSET = {"css": '<link rel="stylesheet" href="{}">', "js": '<script src="{}" defer></script>'}
-# Not deferred: they translate the page while the browser reads it.
-_TRANSLATED = '<script src="{0}/languages/{1}.js"></script><script src="{0}/translate.js"></script>'
-_LINKS = (("/", "Drive"), ("/world", "World"), ("/teach", "Teach"), ("/settings", "Settings"))
-_PERIOD_S = 0.1
-_ACK_PATIENCE_S = 5.0
-"""A browser acknowledges received messages every 3 s; after this time without one, sending pauses until the next."""
-
 ICON = (
     '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 64 64"><rect width="64" height="64" rx="16" fill="#2457d6"/>'
     '<g fill="none" stroke="#fff" stroke-linecap="round" stroke-width="6"><path d="M24 30V12M32 28V18M40 29V22"/>'
     '<path d="M18 34v-2a4 4 0 0 1 4-4h18a5 5 0 0 1 5 5v7a11 11 0 0 1-11 11h-5a11 11 0 0 1-11-11z" fill="#fff"/></g>'
     "</svg>"
 )
+_ASSET = {"css": '<link rel="stylesheet" href="{}">', "js": '<script src="{}" defer></script>'}
+# Not deferred: they translate the page while the browser reads it.
+_TRANSLATED = '<script src="{0}/languages/{1}.js"></script><script src="{0}/translate.js"></script>'
+# What the browser draws while it still loads the scripts that draw everything else.
+_LOADING = f'<div class="loading" aria-hidden="true" translate="no">{ICON}<b>handsteer</b></div>'
+_LINKS = (("/", "Drive"), ("/world", "World"), ("/teach", "Teach"), ("/settings", "Settings"))
+_PERIOD_S = 0.1
+_ACK_PATIENCE_S = 5.0
+"""A browser acknowledges received messages every 3 s; after this time without one, sending pauses until the next."""
+
 _THEME_ICON = (
     '<svg viewBox="0 0 24 24" fill="none" stroke="currentColor" stroke-width="2" aria-hidden="true">'
     '<circle cx="12" cy="12" r="9"/><path d="M12 3a9 9 0 0 1 0 18z" fill="currentColor"/></svg>'
@@ -112,6 +114,7 @@ class Page:
         self.client.on_delete(self._leave)
         self.client.on_delete(self._forget)
         ui.add_head_html(_INSTALLABLE)
+        ui.add_body_html(_LOADING)
         self._speak(preferred_language(self.client.request.headers.get("accept-language", "")))
         for name in ("page.css", "page.js", *assets):
             ui.add_head_html(_ASSET[name.rpartition(".")[2]].format(f"{ASSETS_PATH}/{name}"))
