@@ -21,9 +21,7 @@ SOURCES = [
         path
         for folder in ("src", "examples", "ros", "scripts")
         for path in (ROOT / folder).rglob("*")
-        if path.suffix in {"", ".py", ".launch", ".md", ".sh", ".toml", ".xml", ".yaml"}
-        and path.is_file()
-        and not {"dashboard", "synthetic"} & {*path.parts}
+        if path.suffix in {"", ".py", ".launch", ".md", ".sh", ".toml", ".xml", ".yaml"} and path.is_file()
     ),
 ]
 

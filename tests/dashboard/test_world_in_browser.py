@@ -303,10 +303,10 @@ def test_the_course_counts_gates_and_bumps_and_only_the_driver_edits(tmp_path: P
         press(other, "Back to start")
         other.wait_for_timeout(500)
         assert robot.state.truth.x > 1.0
-        other.locator(".world .message", has_text="Somebody else drives").wait_for()
+        other.locator(".world .message", has_text="Another viewer drives").wait_for()
         other.goto(f"{page.url.rstrip('/')}/world")
         other.get_by_role("button", name="Add a box").click()
-        other.locator(".bar .message", has_text="Somebody else drives").wait_for()
+        other.locator(".bar .message", has_text="Another viewer drives").wait_for()
         assert robot.world == read_world(world)
         other.close()
 

@@ -278,7 +278,7 @@ class _Tile:
             self.element.on("click", lambda: on_click(entry.sign))
 
     def open(self, *, on: bool) -> None:
-        """Show the virtual hand in the place of the drawing, or the drawing again; a taught sign has its drawing."""
+        """Show the virtual hand instead of the drawing, or the drawing again; a taught sign has its drawing."""
         if on == self.is_open:
             return
         self.is_open = on

@@ -38,7 +38,7 @@ class MuxRow:
 
     def __init__(self) -> None:
         with box("mux").props('role="group" aria-label="The active input; the first one overrides the others"'):
-            text("name", "Who drives")
+            text("name", "Active input")
             self._chips = [text("source chip", name) for name in ("Stop", "By hand", "Signs")]
 
     def update(self, state: PageState) -> None:

@@ -60,7 +60,7 @@ class Viewers:
     stands: bool = False
 
 
-NOBODY = Viewers()
+NO_VIEWERS = Viewers()
 
 
 @dataclass(frozen=True)
@@ -190,7 +190,7 @@ class PageState:
         return self.rule is not None and self.rule.mode == "joystick"
 
 
-def compose(observed: Observed, now_s: float, viewers: Viewers = NOBODY) -> PageState:
+def compose(observed: Observed, now_s: float, viewers: Viewers = NO_VIEWERS) -> PageState:
     """Return the page's state at ``now_s``, in seconds of the graph's clock, as one of its ``viewers`` sees it."""
     reporting = Reporting.at(now_s, observed)
     seen, control = reporting.recognition or RecognitionStatus(), reporting.control or ControlStatus()
@@ -258,7 +258,7 @@ def confirmed(recognition: RecognitionStatus) -> float:
     return max(0.0, min(recognition.progress, 1.0))
 
 
-def explain(reporting: Reporting, viewers: Viewers = NOBODY, *, is_moving: bool = False) -> tuple[Mood, str, str]:
+def explain(reporting: Reporting, viewers: Viewers = NO_VIEWERS, *, is_moving: bool = False) -> tuple[Mood, str, str]:
     """Return in words what the robot does and why: mood, headline, reason.
 
     The control reports whether the robot is commanded to move. If it is not, because no sign is confirmed, the reason

@@ -95,7 +95,7 @@ class WorldDesk:
         elif self.world is None:
             why = "This is a real robot: its world cannot be edited, nor can it be put back by a button."
         elif not self._page.drives():
-            why = "Somebody else drives: ask to drive before you change the world."
+            why = "Another viewer drives: ask to drive before you change the world."
         else:
             return self.graph
         self._show(why)

@@ -40,12 +40,12 @@ _THUMB_STATES: Final = np.array(
     ],
     float,
 )
-OUT, BESIDE, FOLDED, ACROSS, OPPOSITE = range(5)
+OUT, ALONGSIDE, FOLDED, ACROSS, OPPOSITE = range(5)
 
 _S, _C, _H = STRAIGHT, CURLED, HALF
 _KNOWN: Final = (
     (_S, _S, _C, _C, ACROSS),  # peace
-    (_S, _S, _C, _C, BESIDE),
+    (_S, _S, _C, _C, ALONGSIDE),
     (_S, _S, _S, _C, ACROSS),  # three
     (_S, _S, _C, _C, OUT),  # three with the thumb
     (_C, _S, _S, _S, OPPOSITE),  # three of OK
@@ -65,13 +65,13 @@ _KNOWN: Final = (
     (_H, _S, _S, _S, OPPOSITE),  # OK
     (_H, _H, _H, _H, OPPOSITE),  # holding something
     (_H, _H, _H, _H, OUT),  # claw
-    (_H, _H, _H, _H, BESIDE),
+    (_H, _H, _H, _H, ALONGSIDE),
 )
 
 
 def open_hand(count: int, random: Random) -> Array:
     """Return (count, 23) angles of an open hand, fingers together or apart, the thumb along them or extended."""
-    angles = _posed(np.full((count, 4), STRAIGHT), _choice([OUT, BESIDE], [0.7, 0.3], count, random), random)
+    angles = _posed(np.full((count, 4), STRAIGHT), _choice([OUT, ALONGSIDE], [0.7, 0.3], count, random), random)
     _bend_together(angles, random, mcp=10, pip=6)
     apart = random.uniform(-0.2, 1.3, (count, 1))
     angles[:, _spreads()] += np.radians([6.0, 0.0, -7.0, -15.0]) * apart
@@ -82,7 +82,7 @@ def index_up(count: int, random: Random) -> Array:
     """Return (count, 23) angles of a pointing index finger, the others closed, some loosely."""
     states = np.full((count, 4), STRAIGHT)
     states[:, 1:] = _choice([CURLED, LOOSE, HOOKED], [0.6, 0.3, 0.1], count, random)[:, None]
-    thumbs = _choice([FOLDED, ACROSS, OPPOSITE, BESIDE, OUT], [0.35, 0.25, 0.2, 0.15, 0.05], count, random)
+    thumbs = _choice([FOLDED, ACROSS, OPPOSITE, ALONGSIDE, OUT], [0.35, 0.25, 0.2, 0.15, 0.05], count, random)
     angles = _posed(states, thumbs, random)
     angles[:, _FIRST_FINGER + 1] += np.radians(random.normal(4, 10, count))
     return angles
@@ -91,7 +91,7 @@ def index_up(count: int, random: Random) -> Array:
 def thumb_out(count: int, random: Random) -> Array:
     """Return (count, 23) angles of a fist with the thumb extended, tightly or loosely closed."""
     states = np.repeat(_choice([CURLED, LOOSE, HOOKED], [0.7, 0.2, 0.1], count, random)[:, None], 4, axis=1)
-    angles = _posed(states, _choice([OUT, BESIDE], [0.85, 0.15], count, random), random)
+    angles = _posed(states, _choice([OUT, ALONGSIDE], [0.85, 0.15], count, random), random)
     _bend_together(angles, random, mcp=10, pip=10)
     return angles
 
@@ -99,7 +99,7 @@ def thumb_out(count: int, random: Random) -> Array:
 def fist(count: int, random: Random) -> Array:
     """Return (count, 23) angles of a fist, the thumb over the fingers, along them or inside."""
     states = np.repeat(_choice([CURLED, LOOSE], [0.8, 0.2], count, random)[:, None], 4, axis=1)
-    angles = _posed(states, _choice([FOLDED, ACROSS, BESIDE], [0.45, 0.2, 0.35], count, random), random)
+    angles = _posed(states, _choice([FOLDED, ACROSS, ALONGSIDE], [0.45, 0.2, 0.35], count, random), random)
     _bend_together(angles, random, mcp=10, pip=8)
     return angles
 

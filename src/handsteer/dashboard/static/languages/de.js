@@ -374,7 +374,7 @@ const WORDS = {
   // Changes of the world, and what came of them
   "The robot runs in another process; its world can be edited on the page of `handsteer run` only.": "Der Roboter läuft in einem anderen Prozess; seine Welt lässt sich nur auf der Seite von `handsteer run` ändern.",
   "This is a real robot: its world cannot be edited, nor can it be put back by a button.": "Das ist ein echter Roboter: seine Welt lässt sich nicht ändern, und kein Knopf setzt ihn zurück.",
-  "Somebody else drives: ask to drive before you change the world.": "Jemand anderes fährt: frage das Steuer an, bevor du die Welt änderst.",
+  "Another viewer drives: ask to drive before you change the world.": "Jemand anderes fährt: frage das Steuer an, bevor du die Welt änderst.",
   "The robot and all things are where they started.": "Der Roboter und alle Objekte stehen wieder am Start.",
   "Loaded {}; the robot is at the start.": "{} geladen; der Roboter steht am Start.",
   "Undone.": "Rückgängig gemacht.",
@@ -459,7 +459,7 @@ const WORDS = {
   "right": "rechts",
   "max": "max",
   "min": "min",
-  "Who drives": "Wer fährt",
+  "Active input": "Aktive Eingabe",
   "The active input; the first one overrides the others": "Die aktive Eingabe; die erste geht den anderen vor",
   "By hand": "Von Hand",
   "you": "du",
