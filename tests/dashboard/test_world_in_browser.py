@@ -142,6 +142,32 @@ def test_the_wheels_turn_as_the_joint_states_say() -> None:
         assert visit.troubles == []
 
 
+def drawn(page: Page) -> int:
+    """Return how often the view was drawn."""
+    count: int = page.evaluate(
+        """() => getElement(Number(document.querySelector(".nicegui-scene").id.slice(1))).renderer.info.render.frame"""
+    )
+    return count
+
+
+def draws_in_a_second(page: Page) -> int:
+    before = drawn(page)
+    page.wait_for_timeout(1000)
+    return drawn(page) - before
+
+
+def test_a_view_in_which_nothing_moves_is_hardly_drawn() -> None:
+    with looking_at("empty") as visit:
+        visit.wait_until(lambda: draws_in_a_second(visit.page) <= 2)  # 20 if all were drawn, however busy it is
+        visit.steer_until(0.2, 0.5, lambda: draws_in_a_second(visit.page) > 2)
+        visit.graph.steering.release()
+        visit.wait_until(lambda: draws_in_a_second(visit.page) <= 2)
+        before = drawn(visit.page)
+        visit.page.get_by_role("button", name="Follow").click()
+        visit.wait_until(lambda: drawn(visit.page) > before)
+        assert visit.troubles == []
+
+
 @contextmanager
 def editing(world: object) -> Iterator[Visit]:
     """Show the editor with ``world``."""

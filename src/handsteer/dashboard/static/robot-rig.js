@@ -13,6 +13,33 @@ const PLACES = {
   top: { camera: [0, -0.01, 13], target: [0, 0, 0] }, // slightly south, so that north is up
 };
 
+const IDLE_MS = 1000; // a view in which nothing moves is drawn this often
+
+// Everything that a picture of the view depends on, as numbers.
+function state(scene, camera, canvas) {
+  const found = [canvas.width, canvas.height, ...camera.matrixWorld.elements, ...camera.projectionMatrix.elements];
+  scene.traverseVisible(({ id, matrixWorld, geometry, material }) => {
+    found.push(id, ...matrixWorld.elements, geometry?.id, material?.version, material?.opacity, material?.color?.getHex());
+  });
+  return found;
+}
+
+// NiceGUI draws the view 20 times a second, which takes half a processor where there is no graphics card.
+function drawChangesOnly(renderer) {
+  const draw = renderer.render.bind(renderer);
+  let drawn = [];
+  let drawn_ms = -Infinity;
+  renderer.render = (scene, camera) => {
+    scene.updateMatrixWorld();
+    camera.updateMatrixWorld();
+    const now = state(scene, camera, renderer.domElement);
+    const isSame = now.length === drawn.length && now.every((value, index) => value === drawn[index]);
+    if (isSame && performance.now() - drawn_ms < IDLE_MS) return;
+    [drawn, drawn_ms] = [now, performance.now()];
+    draw(scene, camera);
+  };
+}
+
 const shortest = (turn) => Math.atan2(Math.sin(turn), Math.cos(turn));
 
 export default class RobotRig {
@@ -23,6 +50,8 @@ export default class RobotRig {
     this.mesh = new THREE.Group();
     this.control(joints);
     this.stand({ x, y, yaw, angles });
+    const { renderer } = getElement(scene) ?? {};
+    if (renderer) drawChangesOnly(renderer); // without WebGL there is none
     return this.mesh;
   }
 

@@ -7,7 +7,9 @@ export default class Trail {
     this.width = width;
     this.points = [];
     // Basic, so that it looks the same from all sides. Not culled: its bounds would need repeated computation.
-    this.mesh = new THREE.Mesh(new THREE.BufferGeometry(), new THREE.MeshBasicMaterial({ transparent: true }));
+    const material = new THREE.MeshBasicMaterial({ transparent: true });
+    material.forceSinglePass = true; // it is flat; in two passes it would be compiled again for each picture
+    this.mesh = new THREE.Mesh(new THREE.BufferGeometry(), material);
     this.mesh.frustumCulled = false;
     this.extend(points);
     return this.mesh;
