@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from typing import Any
 
-from handsteer.cli.app import ConfigFile, Flag, Parameters, loads
+from handsteer.cli.app import ConfigFile, PageOptions, Parameters, loads
 from handsteer.cli.running import say, signals_ignored
 from handsteer.errors import ConfigError, did_you_mean, needing
 
@@ -129,9 +129,7 @@ def robot(
 def steering(
     *ros_args: str,
     transport: str,
-    host: str | None = None,
-    port: int | None = None,
-    token: Flag = False,
+    page: PageOptions = PageOptions(),  # noqa: B008 - it is frozen
     config_file: ConfigFile = None,
     parameters: Parameters = None,
 ) -> int:
@@ -148,17 +146,11 @@ def steering(
         ROS 2: --ros-args -r topic:=other -r __node:=name -r __ns:=/namespace -p parameter:=value --params-file file.
     transport
         ros2 (rclpy), dds or zenoh (ROS 2 without a ROS installation), auto (ros2 if installed, else dds), or ros1.
-    host
-        Address that the page is served on; 0.0.0.0 makes it reachable from other machines, with a token.
-    port
-        Port of the page; 0 picks a free one.
-    token
-        Require the token in the printed address from this machine too; for machines with several users.
     config_file
         YAML file with parameters, each of which is an option too: `handsteer parameters`. ROS parameters override the
         file, and options override both.
     """
-    short = {"dashboard": {"host": host, "port": port, "token": "always" if token else None}}
+    short = {"dashboard": page.parameters()}
     return _run("steering", transport, ros_args, file=config_file, given=parameters, shorthand=short)
 
 
