@@ -158,7 +158,7 @@ def draws_in_a_second(page: Page) -> int:
 
 def test_a_view_in_which_nothing_moves_is_hardly_drawn() -> None:
     with looking_at("empty") as visit:
-        visit.wait_until(lambda: draws_in_a_second(visit.page) <= 2)  # 20 if all were drawn, however busy it is
+        visit.wait_until(lambda: draws_in_a_second(visit.page) <= 2)  # 20 if all were drawn; 11 were on a busy machine
         visit.steer_until(0.2, 0.5, lambda: draws_in_a_second(visit.page) > 2)
         visit.graph.steering.release()
         visit.wait_until(lambda: draws_in_a_second(visit.page) <= 2)

@@ -1,6 +1,7 @@
 """Attached to nodes: keeping the state of Stop, and reporting topics that several nodes publish."""
 
 import logging
+import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -31,7 +32,7 @@ class StopKeeper:
     def __init__(self, node: Node, on_stop: Callable[[bool], None] | None = None) -> None:
         self._on_stop = on_stop
         self._node = node
-        self._waits_until_s: float | None = node.clock.now() + HEAR_STOP_S
+        self._waits_until_s = node.clock.now() + HEAR_STOP_S
         self._is_stopped: bool | None = None
         self._stopped = node.publisher(STOPPED)
         # Several nodes publish at once: one's true must not be replaced by another's false.
@@ -41,10 +42,7 @@ class StopKeeper:
     @property
     def waits_for_others(self) -> bool:
         """Whether other nodes publish ``/stopped``, and this one may not have received it since its start."""
-        if self._waits_until_s is None:
-            return False
         if self._node.clock.now() >= self._waits_until_s:
-            self._waits_until_s = None
             return False
         return len(self._node.transport.publishers_of(STOPPED)) > 1  # one is its own
 
@@ -52,14 +50,14 @@ class StopKeeper:
         self._take(bool(received.message.data))
 
     def _on_word_of_others(self, received: Received[Bool]) -> None:
+        self._waits_until_s = -math.inf
         # A node that missed a reset must not undo a Stop by its false; resets are accepted from /stop only.
-        self._waits_until_s = None
         if received.message.data and not self._is_stopped:
             self._take(True)
 
     def _take(self, is_stopped: bool) -> None:
         is_news = is_stopped != self._is_stopped
-        self._is_stopped, self._waits_until_s = is_stopped, None
+        self._is_stopped, self._waits_until_s = is_stopped, -math.inf
         if self._on_stop is not None:
             self._on_stop(is_stopped)
         if is_news:
