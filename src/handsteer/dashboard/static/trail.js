@@ -8,7 +8,7 @@ export default class Trail {
     this.points = [];
     // Basic, so that it looks the same from all sides. Not culled: its bounds would need repeated computation.
     const material = new THREE.MeshBasicMaterial({ transparent: true });
-    material.forceSinglePass = true; // it is flat; in two passes it would be compiled again for each picture
+    material.forceSinglePass = true; // it is flat; two passes would change its version with each picture
     this.mesh = new THREE.Mesh(new THREE.BufferGeometry(), material);
     this.mesh.frustumCulled = false;
     this.extend(points);
