@@ -5,6 +5,8 @@ BIN := $(VENV)/bin
 ARGS ?=
 # Cases per fuzzer; `make test` runs 1,000.
 CASES ?= 100000
+# As many containers set: pytest would then rewrite every test file again for each worker.
+unexport PYTHONDONTWRITEBYTECODE
 # The matrices are small and tests run in parallel, so NumPy's threads would only wait for each other.
 export OPENBLAS_NUM_THREADS := 1
 

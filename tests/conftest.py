@@ -84,6 +84,7 @@ def pytest_configure() -> None:
         raise pytest.UsageError(f"move {DEFAULT_FILE.absolute()} away: the runs of the tests would read it")
 
 
+@pytest.hookimpl(tryfirst=True)  # pytest-xdist reads the groups in the same hook
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Mark what is in :data:`RUN_AGAIN`, what makes networks by the fixtures that make them, and what runs together.
 
@@ -118,7 +119,14 @@ def pytest_runtest_teardown(item: pytest.Item, nextitem: pytest.Item | None) -> 
 
 
 @pytest.fixture(scope="module")
-def ros1(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Ros1Graph]:
-    """A ROS 1 graph with a master of its own; mark the tests that use it ``ros1``."""
+def ros1_master(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Ros1Graph]:
+    """A ROS 1 graph with a master of its own."""
     with ros1_graph(tmp_path_factory.mktemp("ros")) as graph:
         yield graph
+
+
+@pytest.fixture
+def ros1(ros1_master: Ros1Graph) -> Iterator[Ros1Graph]:
+    """A ROS 1 graph for one test; mark the tests that use it ``ros1``."""
+    with ros1_master.test():
+        yield ros1_master
