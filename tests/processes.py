@@ -1,17 +1,19 @@
 """Processes that a test starts, talks to and ends."""
 
+import contextlib
 import json
 import select
 import signal
 import socket
 import subprocess
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, Self, TypeVar
 
 START_S = 60.0
 """Long, for a machine that is busy with other tests; everything waits for conditions, not for this."""
+_END_S = 5.0
 
 
 def free_port() -> int:
@@ -65,6 +67,12 @@ class Process:
         """Wait until it has ended; return its exit code."""
         return self.popen.wait(timeout_s)
 
+    def ask_to_end(self) -> None:
+        """Send it SIGTERM, also where it is frozen."""
+        if self.running:
+            self.signal(signal.SIGTERM)
+            self.signal(signal.SIGCONT)
+
     def kill(self) -> None:
         """End it at once, whatever it does."""
         if self.running:
@@ -87,6 +95,11 @@ class Peer(Process):
         self.popen.stdin.flush()
         return json.loads(self._line())
 
+    def ask_to_end(self) -> None:
+        """Give no more orders, after which it ends."""
+        assert self.popen.stdin is not None
+        self.popen.stdin.close()
+
     def _line(self) -> str:
         assert self.popen.stdout is not None
         # One answer an order, so that nothing is left in Python's own buffer, which select does not see.
@@ -94,6 +107,48 @@ class Peer(Process):
         line = str(self.popen.stdout.readline())
         assert line, f"the peer has ended: {self.text}"
         return line.strip()
+
+
+P = TypeVar("P", bound=Process)
+
+
+class Processes:
+    """The processes that tests start in one graph, and which end with it.
+
+    Args:
+        home: Folder for what they print.
+    """
+
+    def __init__(self, home: Path) -> None:
+        self._home = home
+        self._processes: list[Process] = []
+
+    def adopt(self, process: P) -> P:
+        """End ``process`` with the others."""
+        self._processes.append(process)
+        return process
+
+    def log(self, kind: str = "process") -> Path:
+        """Return where the next process prints to."""
+        return self._home / f"{kind}_{len(self._processes)}.log"
+
+    def stop(self) -> None:
+        """End all processes."""
+        for process in self._processes:
+            process.kill()
+
+    @contextlib.contextmanager
+    def test(self) -> Iterator[Self]:
+        """End what is started within this block, as else all nodes of a module's tests would run side by side."""
+        before = len(self._processes)
+        yield self
+        mine = self._processes[before:]
+        for process in mine:
+            process.ask_to_end()
+        for process in mine:
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                process.code(_END_S)
+            process.kill()
 
 
 def as_tests_drive(verb: str, options: tuple[str, ...]) -> tuple[str, ...]:

@@ -8,9 +8,9 @@ import sys
 import tempfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any, Self
+from typing import Any
 
-from tests.processes import Peer, Process, as_tests_drive, eventually
+from tests.processes import Peer, Process, Processes, as_tests_drive, eventually
 
 PEER = Path(__file__).with_name("peer.py")
 # Domains above have their ports among those that the system gives to others.
@@ -43,7 +43,7 @@ def free_domain() -> int:
     raise AssertionError("all DDS domains are taken by other tests")
 
 
-class DdsGraph:
+class DdsGraph(Processes):
     """The processes of a test in a domain, with one plain DDS program among them that looks on.
 
     Attributes:
@@ -61,9 +61,8 @@ class DdsGraph:
     python = sys.executable
 
     def __init__(self, home: Path, peer: Sequence[str] = (sys.executable, str(PEER))) -> None:
-        self._home = home
+        super().__init__(home)
         self._peer_command = list(peer)
-        self._processes: list[Process] = []
         self.domain = free_domain()
         self.env = {**os.environ, "ROS_DOMAIN_ID": str(self.domain), "PYTHONUNBUFFERED": "1"}
         for inherited in ROS_VARIABLES:
@@ -71,40 +70,17 @@ class DdsGraph:
         self.env["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"  # ours by default, but not ROS 2's
         self.peer = self.start_peer()
 
-    def stop(self) -> None:
-        """End all processes."""
-        for process in self._processes:
-            process.kill()
-
-    @contextlib.contextmanager
-    def test(self) -> Iterator[Self]:
-        """End what is started within this block, as else all nodes of a module's tests would run side by side."""
-        before = len(self._processes)
-        yield self
-        for process in self._processes[before:]:
-            process.kill()
-
     def start_peer(self, machine: str = "") -> Peer:
         """Start a plain program, as ``tests/dds/peer.py`` tells; wait until it is ready.
 
         Args:
             machine: Name of the machine that it says it is on, if that is not this one.
         """
-        log = self._home / f"peer_{len(self._processes)}.log"
-        peer = Peer([*self._peer_command, str(self.domain), "", machine], self.env, log)
-        self._processes.append(peer)
-        return peer
-
-    def adopt(self, process: Process) -> None:
-        """End ``process`` with the others."""
-        self._processes.append(process)
+        return self.adopt(Peer([*self._peer_command, str(self.domain), "", machine], self.env, self.log("peer")))
 
     def handsteer(self, *arguments: str) -> Process:
         """Start ``handsteer`` with ``arguments`` in this domain."""
-        log = self._home / f"process_{len(self._processes)}.log"
-        process = Process([self.python, "-m", "handsteer", *arguments], self.env, log)
-        self._processes.append(process)
-        return process
+        return self.adopt(Process([self.python, "-m", "handsteer", *arguments], self.env, self.log()))
 
     def node(self, verb: str, *arguments: str, name: str, ros: tuple[str, ...] = ()) -> Process:
         """Start one of handsteer's nodes and wait until it is in the graph under ``name``."""

@@ -17,7 +17,7 @@ pytest.importorskip("cyclonedds")
 from tests.contracts.node_contract import CMD_VEL
 from tests.dds.graph import PEER, ROS_VARIABLES, free_domain
 from tests.distributed.network import Machine, NoNamespacesError, two_machines
-from tests.processes import Peer, Process, as_tests_drive, eventually
+from tests.processes import Peer, Process, Processes, as_tests_drive, eventually
 
 SUBNET = (
     "<CycloneDDS><Domain><Discovery><ParticipantIndex>auto</ParticipantIndex>"
@@ -27,32 +27,25 @@ SIGN = "/gesture/hand_sign"
 pytestmark = pytest.mark.slow
 
 
-class Meeting:
+class Meeting(Processes):
     """A control of ours, with nothing said of the network, and a plain program, each on a machine."""
 
     def __init__(self, home: Path, domain: int, ours: list[str], theirs: list[str]) -> None:
         kept = {name: value for name, value in os.environ.items() if name not in ROS_VARIABLES}
         self._env = {**kept, "ROS_DOMAIN_ID": str(domain), "PYTHONUNBUFFERED": "1"}
-        self._home, self._ours, self._theirs, self._domain = home, ours, theirs, domain
-        self._processes: list[Process] = []
+        self._ours, self._theirs, self._domain = ours, theirs, domain
+        super().__init__(home)
 
     def control(self) -> Process:
         words = [*self._ours, sys.executable, "-m", "handsteer", "control", "--transport", "dds"]
-        process = Process([*words, *as_tests_drive("control", ())], self._env, self._home / "control.log")
-        self._processes.append(process)
-        return process
+        return self.adopt(Process([*words, *as_tests_drive("control", ())], self._env, self.log()))
 
     def peer(self, machine: list[str] | None = None) -> Peer:
         words = [*(self._theirs if machine is None else machine), sys.executable, str(PEER), str(self._domain), SUBNET]
-        peer = Peer(words, self._env, self._home / f"peer_{len(self._processes)}.log")
-        self._processes.append(peer)
+        peer = self.adopt(Peer(words, self._env, self.log("peer")))
         peer.ask("record", topic=CMD_VEL, type="Twist", fields=["linear.x"])
         peer.ask("advertise", topic=SIGN, type="String")
         return peer
-
-    def close(self) -> None:
-        for process in self._processes:
-            process.kill()
 
 
 def drives(peer: Peer) -> bool:
@@ -76,7 +69,7 @@ def test_who_looks_at_the_subnet_is_met_on_one_machine(tmp_path: Path, first: st
         control.signal(signal.SIGTERM)
         assert control.code() == 0
     finally:
-        meeting.close()
+        meeting.stop()
 
 
 @pytest.mark.netns
@@ -92,7 +85,7 @@ def test_another_machine_is_kept_out_and_does_not_keep_us_apart(tmp_path: Path) 
             assert stranger.ask("listeners", topic=SIGN) == 0
             assert stranger.ask("get", topic=CMD_VEL) == []
         finally:
-            meeting.close()
+            meeting.stop()
 
     on_two_machines(tmp_path, met)
 
@@ -104,23 +97,18 @@ def test_on_one_machine_we_go_on_when_the_network_goes(tmp_path: Path) -> None:
     def met(here: Machine, _there: Machine) -> None:
         meeting = Meeting(tmp_path, 4, here.command(), [])
         try:
-            robot = Process(
-                here.command(sys.executable, "-m", "handsteer", "robot", "--transport", "dds"),
-                meeting._env,
-                tmp_path / "robot.log",
-            )
-            meeting._processes.append(robot)
+            robot = here.command(sys.executable, "-m", "handsteer", "robot", "--transport", "dds")
+            meeting.adopt(Process(robot, meeting._env, meeting.log()))
             meeting.control()
             peer = meeting.peer(here.command())
             eventually(lambda: drives(peer), 20.0, what="all to meet")
             here.run("ip", "link", "set", "link0", "down")
             here.run("ip", "address", "flush", "dev", "link0")
             since = [*here.command(), sys.executable, "-c", HEARD]
-            heard = Process(since, meeting._env, tmp_path / "heard.log")
-            meeting._processes.append(heard)
+            heard = meeting.adopt(Process(since, meeting._env, meeting.log()))
             assert heard.code(30.0) == 0, heard.text
         finally:
-            meeting.close()
+            meeting.stop()
 
     on_two_machines(tmp_path, met)
 

@@ -20,9 +20,15 @@ DOUBLE, STRING = 3, 4
 
 
 @pytest.fixture(scope="module")
-def dds(tmp_path_factory: pytest.TempPathFactory) -> Iterator[DdsGraph]:
+def dds_domain(tmp_path_factory: pytest.TempPathFactory) -> Iterator[DdsGraph]:
     with dds_graph(tmp_path_factory.mktemp("dds")) as graph:
         yield graph
+
+
+@pytest.fixture
+def dds(dds_domain: DdsGraph) -> Iterator[DdsGraph]:
+    with dds_domain.test():
+        yield dds_domain
 
 
 def ask(dds: DdsGraph, node: str, service: str, kind: str, **fields: Any) -> Any:

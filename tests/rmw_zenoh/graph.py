@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from tests.processes import Peer, Process, as_tests_drive, eventually, free_port
+from tests.processes import Peer, Process, Processes, as_tests_drive, eventually, free_port
 
 PEER = Path(__file__).with_name("peer.py")
 DOMAIN = 7
@@ -20,7 +20,7 @@ _VARIABLES = (
 )
 
 
-class ZenohGraph:
+class ZenohGraph(Processes):
     """The processes of a test around a router, with one plain Zenoh program among them that looks on.
 
     Args:
@@ -34,8 +34,7 @@ class ZenohGraph:
     """
 
     def __init__(self, home: Path, mode: str = "peer") -> None:
-        self._home = home
-        self._processes: list[Process] = []
+        super().__init__(home)
         self.endpoint = f"tcp/127.0.0.1:{free_port()}"
         plain = {name: value for name, value in os.environ.items() if name not in _VARIABLES}
         self.env = {**plain, "ROS_DOMAIN_ID": str(DOMAIN), "PYTHONUNBUFFERED": "1"}
@@ -43,11 +42,6 @@ class ZenohGraph:
         self.env["ZENOH_CONFIG_OVERRIDE"] = f'mode="{mode}";connect/endpoints=["{self.endpoint}"]'
         self._mode = mode
         self.peer = self.start_peer()
-
-    def stop(self) -> None:
-        """End all processes."""
-        for process in self._processes:
-            process.kill()
 
     def start_router(self) -> Process:
         """Start the router; wait until it listens."""
@@ -60,9 +54,7 @@ class ZenohGraph:
     def start_peer(self) -> Peer:
         """Start a plain program; wait until it is ready."""
         command = [sys.executable, str(PEER), self.endpoint, str(DOMAIN)]
-        peer = Peer(command, {**self.env, "PEER_CONFIG": f'mode="{self._mode}"'}, self._log())
-        self._processes.append(peer)
-        return peer
+        return self.adopt(Peer(command, {**self.env, "PEER_CONFIG": f'mode="{self._mode}"'}, self.log("peer")))
 
     def handsteer(self, *arguments: str, **env: str) -> Process:
         """Start ``handsteer`` with ``arguments`` in this network."""
@@ -86,12 +78,7 @@ class ZenohGraph:
         return topic in self.nodes()[node]["MP"]
 
     def _start(self, arguments: list[str], env: dict[str, str]) -> Process:
-        process = Process([sys.executable, "-m", "handsteer", *arguments], env, self._log())
-        self._processes.append(process)
-        return process
-
-    def _log(self) -> Path:
-        return self._home / f"process_{len(self._processes)}.log"
+        return self.adopt(Process([sys.executable, "-m", "handsteer", *arguments], env, self.log()))
 
 
 @contextlib.contextmanager

@@ -10,12 +10,12 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from tests.processes import Peer, Process, as_tests_drive, eventually, free_port
+from tests.processes import Peer, Process, Processes, as_tests_drive, eventually, free_port
 
 PEER = Path(__file__).with_name("peer.py")
 
 
-class Ros1Graph:
+class Ros1Graph(Processes):
     """A ``roscore`` on a free port, and the processes that a test starts in its graph.
 
     Attributes:
@@ -24,8 +24,7 @@ class Ros1Graph:
     """
 
     def __init__(self, home: Path) -> None:
-        self._home = home
-        self._processes: list[Process] = []
+        super().__init__(home)
         self._core: subprocess.Popen[bytes] | None = None
         self.uri = ""
         self.env: dict[str, str] = {}
@@ -64,8 +63,7 @@ class Ros1Graph:
 
     def stop(self) -> None:
         """End all processes, the master last."""
-        for process in self._processes:
-            process.kill()
+        super().stop()
         self.stop_master()
 
     def stop_master(self) -> None:
@@ -114,9 +112,7 @@ class Ros1Graph:
 
     def run(self, *command: str) -> Process:
         """Start a process in this graph."""
-        process = Process(list(command), self.env, self._home / f"process_{len(self._processes)}.log")
-        self._processes.append(process)
-        return process
+        return self.adopt(Process(list(command), self.env, self.log()))
 
     def handsteer(self, *arguments: str) -> Process:
         """Start ``handsteer`` with ``arguments`` in this graph."""
@@ -132,9 +128,7 @@ class Ros1Graph:
 
     def peer(self, *arguments: str) -> Peer:
         """Start a plain rospy node, as ``tests/ros1/peer.py`` tells; wait until it is ready."""
-        peer = Peer([sys.executable, str(PEER), *arguments], self.env, self._home / f"peer_{len(self._processes)}.log")
-        self._processes.append(peer)
-        return peer
+        return self.adopt(Peer([sys.executable, str(PEER), *arguments], self.env, self.log("peer")))
 
 
 @contextlib.contextmanager

@@ -97,17 +97,12 @@ class LaunchGraph(Ros1Graph):
 
     def launch(self, package: str, file: str, *args: str, **env: str) -> Launch:
         """Start ``roslaunch``; the caller waits for whatever it needs."""
-        log = self._home / f"launch_{len(self._processes)}.log"
-        launch = Launch(["roslaunch", "--wait", package, file, *args], {**self.env, **env}, log)
-        self._processes.append(launch)
-        return launch
+        words = ["roslaunch", "--wait", package, file, *args]
+        return self.adopt(Launch(words, {**self.env, **env}, self.log("launch")))
 
     def launch_file(self, file: Path, *args: str) -> Launch:
         """Start ``roslaunch`` on a file that is in no package."""
-        log = self._home / f"launch_{len(self._processes)}.log"
-        launch = Launch(["roslaunch", "--wait", str(file), *args], self.env, log)
-        self._processes.append(launch)
-        return launch
+        return self.adopt(Launch(["roslaunch", "--wait", str(file), *args], self.env, self.log("launch")))
 
     def record(self, topics: dict[str, str]) -> Recorder:
         """Note what comes on ``topics``, given as type by name."""

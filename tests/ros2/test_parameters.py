@@ -30,9 +30,15 @@ SERVICES = {
 
 
 @pytest.fixture(scope="module")
-def ros2(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Ros2Graph]:
+def ros2_domain(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Ros2Graph]:
     with ros2_graph(tmp_path_factory.mktemp("ros2"), "ros2") as graph:
         yield graph
+
+
+@pytest.fixture
+def ros2(ros2_domain: Ros2Graph) -> Iterator[Ros2Graph]:
+    with ros2_domain.test():
+        yield ros2_domain
 
 
 def ask(ros2: Ros2Graph, node: str, call: str, *arguments: Any) -> Any:
