@@ -10,6 +10,7 @@ from handsteer.errors import PackageMissing, needing
 VIRTUAL = ("--camera", "virtual", "--camera.width", "320", "--camera.height", "240", "--duration", "5")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("module", "command", "says"),
     [

@@ -105,6 +105,7 @@ def test_a_camera_that_fails_to_open_says_why_and_the_one_before_needs_neutral_t
         assert drive.graph.cameras.name == VIRTUAL_HAND
 
 
+@pytest.mark.slow
 def test_a_recording_in_which_the_camera_changes_is_replayed_bit_for_bit(forward: Path, tmp_path: Path) -> None:
     path = tmp_path / "drive.mcap"
     drive = Drive(forward, path)

@@ -8,6 +8,7 @@ from handsteer.errors import BenchError
 CELL = Cell("stop-line", "pad")
 
 
+@pytest.mark.slow
 def test_results_do_not_depend_on_the_number_of_processes() -> None:
     cells = [CELL, Cell("stop-line", "pad", Conditions(latency_s=0.25))]
     assert run_cells(cells, range(2), jobs=2) == run_cells(cells, range(2))

@@ -8,6 +8,7 @@ from handsteer.bench.laps import INTERFACES, Conditions, run_lap
 from handsteer.errors import BenchError, WorldError
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("interface", INTERFACES)
 def test_the_same_seed_gives_the_same_lap_in_another_process(interface: str) -> None:
     lap = run_lap("stop-line", interface, 7)

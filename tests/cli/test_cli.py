@@ -103,6 +103,7 @@ def test_a_missing_model_says_how_to_get_it(
     assert "handsteer models" in fails(capsys, "run", "--headless", "--camera", "virtual")
 
 
+@pytest.mark.slow
 def test_a_port_in_use_names_the_port(capsys: pytest.CaptureFixture[str]) -> None:
     with socket.socket() as other:
         other.bind(("127.0.0.1", 0))
@@ -145,6 +146,7 @@ def test_a_run_reads_the_file_that_the_page_saves_to_unless_another_is_named(
     prints(capsys, *arguments)
 
 
+@pytest.mark.slow
 def test_a_fast_run_takes_the_same_way_each_time(capsys: pytest.CaptureFixture[str]) -> None:
     arguments = ["run", "--fast", *VIRTUAL, "--duration", "2", "--json"]
     assert prints(capsys, *arguments) == prints(capsys, *arguments)

@@ -53,6 +53,7 @@ def test_bash_completes(script: Path, before: str, word: str, expected: set[str]
     assert done.stderr == ""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
 def test_a_shell_can_read_its_script(capsys: pytest.CaptureFixture[str], shell: str, tmp_path: Path) -> None:
     text = prints(capsys, "completion", shell)

@@ -66,12 +66,14 @@ def test_a_recording_ends_with_ctrl_c_and_is_whole(tmp_path: Path) -> None:
     assert file.problem is None
 
 
+@pytest.mark.slow
 def test_a_replay_says_that_all_is_the_same(recording: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run("replay", str(recording)) == 0
     assert "241 frames, 241 signs, " in (printed := capsys.readouterr().out)
     assert printed.endswith("; all the same, bit for bit\n")
 
 
+@pytest.mark.slow
 def test_a_replay_lists_what_differs_with_its_pictures(
     recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -72,6 +72,7 @@ def test_evaluate_prints_json_and_flips_and_turns(capsys: pytest.CaptureFixture[
     assert turned["false_commands"]["kinds"]["thumb_up"]["of"] == 2
 
 
+@pytest.mark.slow
 def test_several_sources_and_views_are_compared_in_one_run(
     capsys: pytest.CaptureFixture[str], few: Path, clip: Path
 ) -> None:

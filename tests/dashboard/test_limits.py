@@ -69,6 +69,7 @@ def test_who_is_known_is_not_sent_away_for_strangers(site: Site) -> None:
     pictures.close()
 
 
+@pytest.mark.slow
 def test_a_connection_on_which_nothing_is_said_is_closed(site: Site) -> None:
     with crowd(site.port, 1) as (silent,):
         eventually(lambda: not is_open(silent), limits.FIRST_REQUEST_S + PATIENCE_S)

@@ -71,6 +71,7 @@ class Driven:
             assert self.news.wait_for(lambda: condition(self.speeds[begun:]), timeout_s), self.speeds
 
 
+@pytest.mark.slow
 def test_all_pages_are_served_from_another_process() -> None:
     with served() as (_, page, url):
         for path in ("/", "/teach", "/settings", "/study"):
@@ -78,6 +79,7 @@ def test_all_pages_are_served_from_another_process() -> None:
         assert page.process.pid != os.getpid()
 
 
+@pytest.mark.slow
 def test_a_page_that_stands_still_holds_up_neither_commands_nor_stop() -> None:
     with served("Forward:600") as (graph, page, _):
         driven = Driven(graph)
@@ -92,6 +94,7 @@ def test_a_page_that_stands_still_holds_up_neither_commands_nor_stop() -> None:
             page.process.send_signal(signal.SIGCONT)
 
 
+@pytest.mark.slow
 def test_a_page_that_dies_is_told() -> None:
     with served() as (graph, page, _):
         graph.start()
@@ -101,6 +104,7 @@ def test_a_page_that_dies_is_told() -> None:
         assert "ended (exit code -9), so the robot was commanded to stop" in str(page.why_gone())
 
 
+@pytest.mark.slow
 def test_a_run_ends_with_its_page_and_leaves_the_robot_standing(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "handsteer", "run", "--camera", "virtual", "--port", "0"]
     run = Process([*command, "--dashboard.no-open-browser"], dict(os.environ), tmp_path / "log")
@@ -134,6 +138,7 @@ def _runs(pid: int) -> bool:
         return False
 
 
+@pytest.mark.slow
 def test_a_port_in_use_is_said_by_the_process_that_asked_for_the_page() -> None:
     with socket.socket() as other:
         other.bind(("127.0.0.1", 0))

@@ -23,6 +23,7 @@ def look(domain: DdsGraph) -> dict[str, Any]:
     return dict(json.loads(done.stdout))
 
 
+@pytest.mark.slow
 def test_nodes_topics_and_what_is_amiss(tmp_path: Path) -> None:
     with dds_graph(tmp_path) as domain:
         domain.node("control", name="/hand_sign_control")

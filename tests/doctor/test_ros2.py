@@ -142,6 +142,7 @@ def test_two_publishers_of_a_velocity(alone: Doctor, tmp_path: Path) -> None:
         eventually(lambda: words in alone.says(), what=words)
 
 
+@pytest.mark.slow
 def test_all_ports_of_a_domain_are_taken(here: Doctor) -> None:
     domain = free_domain()
     first = 7400 + 250 * domain + 10

@@ -129,6 +129,7 @@ def test_fetching_mends_what_is_damaged_and_keeps_what_is_right(folder: Path, in
     assert right.stat().st_mtime_ns == before
 
 
+@pytest.mark.slow
 def test_two_processes_may_fetch_at_once(folder: Path, index: Path) -> None:
     command = [
         sys.executable,

@@ -31,6 +31,7 @@ def test_it_plays_the_recorded_pictures_at_their_rate(recording: Path) -> None:
         camera.read()
 
 
+@pytest.mark.slow
 def test_a_recording_of_a_camera_of_jpegs_has_the_cameras_own_files(recording: Path, tmp_path: Path) -> None:
     path = tmp_path / "again.mcap"
     camera = CameraConfig(source=str(recording), at_end="end")
@@ -55,6 +56,7 @@ def test_it_begins_again_or_holds(recording: Path) -> None:
     assert frames[241:] == [None, None]
 
 
+@pytest.mark.slow
 def test_a_graph_sees_the_recorded_signs_again(recording: Path, tmp_path: Path) -> None:
     config = Config(camera=CameraConfig(source=str(as_ros1(recording, tmp_path / "drive.bag")), at_end="end"))
     with Graph(config, SteppedClock()) as graph:

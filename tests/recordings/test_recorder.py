@@ -82,6 +82,7 @@ def test_one_recording_at_a_time(tmp_path: Path) -> None:
     assert McapFile(tmp_path / "b.mcap").problem is None
 
 
+@pytest.mark.slow
 def test_a_full_disk_ends_the_recording_and_driving_goes_on(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     # The largest size of a file stands for a full disk: the write fails in the middle.
     limits = resource.getrlimit(resource.RLIMIT_FSIZE)

@@ -18,6 +18,7 @@ def replayed(path: Path, config: Config, source: Source = "frames") -> tuple[Com
     return comparison, list(compare(rerun_by_time(recording, config, source), comparison, recording.began_s))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("source", ["frames", "signs"])
 def test_a_bag_of_another_recorder_gives_the_same_within_a_tolerance(
     source: Source, recording: Path, tmp_path: Path
@@ -29,6 +30,7 @@ def test_a_bag_of_another_recorder_gives_the_same_within_a_tolerance(
     assert comparison.commands > 200
 
 
+@pytest.mark.slow
 def test_other_parameters_give_the_moments_that_differ(recording: Path, tmp_path: Path) -> None:
     config = Config(signs=SignsConfig(confirm_time=1.0))
     comparison, moments = replayed(as_ros1(recording, tmp_path / "drive.bag"), config)

@@ -158,6 +158,7 @@ def test_latencies_are_from_the_capture_of_a_frame_to_its_command(recording: Pat
     assert (stand.sign, stand.reason, stand.has_led) == ("Stop", "the Stop sign is shown", True)
 
 
+@pytest.mark.slow
 def test_a_course_gives_gates_a_lap_and_a_map(course: Path) -> None:
     facts = facts_of(course)
     (lap,) = facts.laps
@@ -174,6 +175,7 @@ def test_a_course_gives_gates_a_lap_and_a_map(course: Path) -> None:
     assert np.abs(path[:, 2]).max() < 0.2
 
 
+@pytest.mark.slow
 def test_a_stop_by_the_page_is_counted_and_is_a_reason(course: Path) -> None:
     facts = facts_of(course)
     assert facts.stops == 1

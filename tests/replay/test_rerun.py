@@ -26,6 +26,7 @@ def changed(path: Path, section: str, **values: object) -> Config:
     return config.model_copy(update={section: part})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("source", ["frames", "signs"])
 def test_the_same_software_gives_the_same_signs_and_commands(source: Source, recording: Path) -> None:
     comparison, moments = replayed(recording, source=source)
@@ -67,6 +68,7 @@ def test_a_recording_that_began_in_mid_run_can_be_replayed(tmp_path: Path) -> No
     assert Counter(moment.what for moment in moments)["sign"] < comparison.signs / 4
 
 
+@pytest.mark.slow
 def test_other_parameters_give_the_moments_that_differ(recording: Path) -> None:
     comparison, moments = replayed(recording, changed(recording, "control", max_linear=0.2))
     assert {moment.what for moment in moments} == {"command"}
@@ -77,6 +79,7 @@ def test_other_parameters_give_the_moments_that_differ(recording: Path) -> None:
     assert first.replayed == "0.200 m/s, 0.000 rad/s"
 
 
+@pytest.mark.slow
 def test_a_model_that_sees_less_gives_the_frames_where_it_does(recording: Path) -> None:
     comparison, moments = replayed(recording, changed(recording, "signs", confirm_time=0.5))
     signs = [moment for moment in moments if moment.what == "sign"]
@@ -98,6 +101,7 @@ def test_without_a_journal_it_says_so(recording: Path, tmp_path: Path) -> None:
         recorded_config(file)
 
 
+@pytest.mark.slow
 def test_a_recording_that_was_cut_off_is_replayed_up_to_there(recording: Path, tmp_path: Path) -> None:
     cut = tmp_path / "cut.mcap"
     cut.write_bytes(recording.read_bytes()[: recording.stat().st_size * 2 // 3])

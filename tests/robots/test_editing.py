@@ -54,6 +54,7 @@ def floor_under(thing: Thing) -> list[tuple[float, float]]:
     return [(x + along * cosine - across * sine, y + along * sine + across * cosine) for along, across in places]
 
 
+@pytest.mark.slow
 @given(
     shapes=st.lists(st.sampled_from(SHAPES), max_size=8),
     robot=st.builds(Pose2D, st.floats(-5, 5), st.floats(-5, 5), st.floats(-4, 4)),

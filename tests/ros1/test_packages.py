@@ -85,12 +85,14 @@ def test_launch_files_take_the_args_of_the_course_and_describe_each(launch: tupl
     assert all(described.values()), said
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("launch", LAUNCHES, ids=lambda value: value[1])
 def test_a_namespace_takes_all_nodes_and_parameters_along(launch: tuple[str, str]) -> None:
     assert nodes(*launch, ROS_NAMESPACE="r1") == {f"/r1{node}" for node in LAUNCHES[launch]}
     assert all(name.startswith("/r1/") for name in parameters(*launch, ROS_NAMESPACE="r1"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("launch", "window"),
     [
@@ -107,6 +109,7 @@ def test_windows_open_where_there_is_a_display_or_they_are_asked_for(launch: tup
     assert f"/{window}" not in nodes(*launch, f"{arg}:=false", DISPLAY=":0")
 
 
+@pytest.mark.slow
 def test_roslaunchs_own_words_for_a_namespace_work() -> None:
     launch = ("ros_mobile_robot", "drive_robot.launch")
     assert nodes(*launch, "__ns:=r1") == {"/r1/robot", "/r1/robot_state_publisher"}
@@ -141,6 +144,7 @@ def test_the_robot_is_described_by_the_xacro_that_handsteer_simulates() -> None:
     assert "/r1/robot_description" in parameters(*launch, ROS_NAMESPACE="r1")
 
 
+@pytest.mark.slow
 def test_gazebo_gets_the_same_robot_with_motors(tmp_path: Path) -> None:
     stand_in = tmp_path / "gazebo_ros"
     (stand_in / "launch").mkdir(parents=True)

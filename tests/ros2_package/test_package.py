@@ -102,6 +102,7 @@ def test_an_executable_is_the_node_with_all_words_of_a_launch(installed: Path, t
     assert "ROS parameter /r1/hand_sign_control/linear_step: 7 should be less than or equal to 1" in done.stderr
 
 
+@pytest.mark.slow
 def test_without_a_program_that_is_named_it_runs_in_ros2s_own_python(installed: Path) -> None:
     words = ["--transport", "dds", "--ros-args", "-p", "linear_step:=7"]
     done = run(installed, *words, HANDSTEER="", PATH="/nowhere")

@@ -173,6 +173,7 @@ for number in range(int(sys.argv[2]), 10**9):
 """
 
 
+@pytest.mark.slow
 def test_what_a_killed_process_had_written_is_there_and_continues(tmp_path: Path) -> None:
     first = 0
     for _ in range(3):

@@ -29,6 +29,7 @@ def test_what_cannot_be_learnt_is_told() -> None:
         BackgroundTraining(Dataset(PEACE.takes[:1])).run()
 
 
+@pytest.mark.slow
 def test_a_training_that_is_cancelled_comes_to_nothing() -> None:
     training = BackgroundTraining(PEACE)
     begun = threading.Event()

@@ -42,6 +42,7 @@ class TestZenoh(TransportContract):
         assert session.transport.full_name("my_camera") == "r1/tests: my_camera"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("module", ["zenoh", "xxhash"])
 def test_without_zenoh_it_says_what_to_install(module: str) -> None:
     program = f"import sys; sys.modules['{module}'] = None; from handsteer.cli import main; main(sys.argv[1:])"
