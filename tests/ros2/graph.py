@@ -1,15 +1,23 @@
 """A domain of a real ROS 2 for a test: its rclpy, with Fast DDS, looks at our nodes."""
 
 import contextlib
+import shutil
 import sys
+import sysconfig
 from collections.abc import Iterator
 from pathlib import Path
+
+import pytest
 
 from tests.dds.graph import DdsGraph
 
 PEER = Path(__file__).with_name("peer.py")
 PYTHON = Path(sys.prefix) / "ros2" / "bin" / "python"
 """Made by ``make ros2``."""
+needs_tf2_msgs = pytest.mark.skipif(
+    not (shutil.which("g++") and Path(sysconfig.get_path("include"), "Python.h").exists()),
+    reason="make ros2 needs g++ and Python's headers for tf2_msgs",
+)
 
 
 class Ros2Graph(DdsGraph):

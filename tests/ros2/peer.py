@@ -39,6 +39,10 @@ TYPES = {
     kind.__name__: kind
     for kind in (Bool, Clock, CompressedImage, Image, Joy, Log, Odometry, String, Twist, TwistStamped)
 }
+with suppress(ImportError):  # not built where there is no compiler
+    from tf2_msgs.msg import TFMessage
+
+    TYPES["TFMessage"] = TFMessage
 
 rclpy.init()
 node = rclpy.create_node("looker")
@@ -67,8 +71,12 @@ def record(order: dict[str, Any]) -> bool:
     return True
 
 
+def part(of: Any, name: str) -> Any:
+    return of[int(name)] if name.isdigit() else getattr(of, name)
+
+
 def value(message: Any, path: str) -> Any:
-    found = reduce(getattr, path.split("."), message)
+    found = reduce(part, path.split("."), message)
     if isinstance(found, Time):
         return found.sec + found.nanosec / 1e9
     if isinstance(message, Joy) and not isinstance(found, (str, Time)):

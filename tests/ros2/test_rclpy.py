@@ -1,5 +1,6 @@
 """What our nodes have of rclpy, as nodes of a real ROS 2: services, overrides of profiles, the log."""
 
+import os
 import signal
 from collections.abc import Iterator
 from pathlib import Path
@@ -28,6 +29,15 @@ def ros2_domain(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Ros2Graph]
 def ros2(ros2_domain: Ros2Graph) -> Iterator[Ros2Graph]:
     with ros2_domain.test():
         yield ros2_domain
+
+
+@pytest.fixture
+def without_tf2_msgs(ros2: Ros2Graph, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Ros2Graph:
+    """A ROS 2 that lacks tf2_msgs: a module of that name is found first."""
+    (tmp_path / "tf2_msgs.py").touch()
+    before = ros2.env.get("PYTHONPATH", "").split(os.pathsep)
+    monkeypatch.setitem(ros2.env, "PYTHONPATH", os.pathsep.join([str(tmp_path), *filter(None, before)]))
+    return ros2
 
 
 def test_a_stop_and_a_reset_can_be_called(ros2: Ros2Graph) -> None:
@@ -70,7 +80,8 @@ def test_what_is_asked_of_a_profile_is_done(ros2: Ros2Graph) -> None:
     assert [end["reliability"] for end in ends if end["kind"] == "publisher"] == ["BEST_EFFORT"]
 
 
-def test_what_this_ros2_lacks_is_said_once_and_the_robot_drives_without(ros2: Ros2Graph) -> None:
+def test_what_this_ros2_lacks_is_said_once_and_the_robot_drives_without(without_tf2_msgs: Ros2Graph) -> None:
+    ros2 = without_tf2_msgs
     robot = ros2.node("robot", name="/bare/robot", ros=("-r", "__ns:=/bare"))
     eventually(lambda: ros2.publishes("/bare/robot", f"/bare{ODOM}"))
     said = "/tf is left out: this ROS 2 lacks the package tf2_msgs"
@@ -78,8 +89,9 @@ def test_what_this_ros2_lacks_is_said_once_and_the_robot_drives_without(ros2: Ro
     assert robot.text.count(said) == 1
 
 
-def test_what_a_node_logs_is_on_rosout(ros2: Ros2Graph) -> None:
+def test_what_a_node_logs_is_on_rosout(without_tf2_msgs: Ros2Graph) -> None:
     """The log is latched: what was said before anybody listened is told, too."""
+    ros2 = without_tf2_msgs
     robot = ros2.node("robot", name="/told/robot", ros=("-r", "__ns:=/told"))
     eventually(lambda: "/tf is left out" in robot.text)
     ros2.peer.ask("record", topic="/rosout", type="Log", fields=["level", "name", "msg"], latched=True)
@@ -87,7 +99,8 @@ def test_what_a_node_logs_is_on_rosout(ros2: Ros2Graph) -> None:
     assert (logged[0][0], logged[0][2].partition(" ")[0]) == (30, "/tf")
 
 
-def test_it_logs_as_much_as_it_is_told(ros2: Ros2Graph) -> None:
+def test_it_logs_as_much_as_it_is_told(without_tf2_msgs: Ros2Graph) -> None:
+    ros2 = without_tf2_msgs
     words = ("-r", "__ns:=/hush", "--log-level", "error")
     robot = ros2.node("robot", name="/hush/robot", ros=words)
     eventually(lambda: ros2.publishes("/hush/robot", f"/hush{ODOM}"))

@@ -22,7 +22,7 @@ from tests.contracts.node_contract import (
 )
 from tests.dds.driver import NODE, SCRIPT, DdsDriver, driving_chain
 from tests.processes import eventually
-from tests.ros2.graph import PYTHON, Ros2Graph, ros2_graph
+from tests.ros2.graph import PYTHON, Ros2Graph, needs_tf2_msgs, ros2_graph
 
 pytest.importorskip("cyclonedds")
 pytestmark = [
@@ -144,6 +144,45 @@ def test_a_robot_follows_the_twists_of_rclpy(ros2: Ros2Graph) -> None:
 
     eventually(turns, 20.0, what="the robot to turn")
     eventually(lambda: abs(peer.ask("get", topic=f"/lone{ODOM}")[-1][1][0]) < 0.01, 5.0, what="the robot to stand")
+
+
+@needs_tf2_msgs
+def test_rclpy_gets_the_frames_of_a_robot_that_drives_as_its_odometry_says(fresh: Ros2Graph) -> None:
+    peer = fresh.peer
+    ends = ["header.stamp", "header.frame_id", "child_frame_id"]
+    place = [["translation.x", "position.x"], ["translation.y", "position.y"]]
+    place += [[f"rotation.{axis}", f"orientation.{axis}"] for axis in "xyzw"]
+    in_frame = [f"transforms.0.{field}" for field in [*ends, *(f"transform.{name}" for name, _ in place)]]
+    in_pose = [*ends, *(f"pose.pose.{name}" for _, name in place)]
+    peer.ask("record", topic="/tf", type="TFMessage", fields=[*in_frame, "transforms"])
+    peer.ask("record", topic=ODOM, type="Odometry", fields=in_pose)
+    peer.ask("advertise", topic=CMD_VEL, type="Twist")
+    fresh.node("robot", "--world", "empty", name="/robot")
+    eventually(lambda: peer.ask("listeners", topic=CMD_VEL) > 0)
+
+    def has_driven() -> bool:
+        peer.ask("publish", topic=CMD_VEL, values={"linear.x": 0.3, "angular.z": 0.5}, count=10, period_s=0.05)
+        frames = peer.ask("get", topic="/tf")
+        return bool(frames and frames[-1][1][3] > 0.2)
+
+    eventually(has_driven, what="the frame of the robot to move")
+    frames = {stamp: values for _, (stamp, *values, count) in peer.ask("get", topic="/tf") if count == 1}
+    poses = {stamp: values for _, (stamp, *values) in peer.ask("get", topic=ODOM)}
+    both = sorted(frames.keys() & poses.keys())
+    assert len(both) > 10
+    assert [frames[stamp] for stamp in both] == [poses[stamp] for stamp in both]
+    assert {tuple(values[:2]) for values in frames.values()} == {("odom", "base_link")}
+    described = [end for end in peer.ask("endpoints", topic="/tf") if end["kind"] == "publisher"]
+    assert described == [
+        {
+            "kind": "publisher",
+            "node": "/robot",
+            "type": "tf2_msgs/msg/TFMessage",
+            "hash": "RIHS01_e369d0f05a23ae52508854b66f6aa0437f3449d652e8cbf22d5abe85d020f087",
+            "reliability": "RELIABLE",
+            "durability": "VOLATILE",
+        }
+    ]
 
 
 def test_pictures_of_a_ros2_camera_are_recognised(ros2: Ros2Graph) -> None:

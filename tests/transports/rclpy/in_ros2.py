@@ -1,6 +1,7 @@
 """The transport by rclpy, where rclpy is: ``test_in_ros2.py`` runs this by the Python of ``make ros2``."""
 
 import logging
+import sys
 import time
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -82,7 +83,10 @@ class TestRclpy(TransportContract):
         assert session.transport.full_name("my_camera") == "r1/tests: my_camera"
 
 
-def test_a_type_that_this_ros2_lacks_is_said_once_and_left_out(joined: Join, capfd: pytest.CaptureFixture[str]) -> None:
+def test_a_type_that_this_ros2_lacks_is_said_once_and_left_out(
+    joined: Join, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "tf2_msgs.msg", None)
     transport = joined().transport
     publisher = transport.advertise("robot", TF)
     transport.subscribe("listener", TF, lambda _: None)

@@ -1,0 +1,59 @@
+"""What the ROS 2 set-up builds by itself, and what it says where it cannot."""
+
+import os
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from tests.ros2.graph import PYTHON, needs_tf2_msgs
+
+SCRIPT = Path(__file__).resolve().parents[1] / "scripts" / "build_tf2_msgs.py"
+LINKED_WITHIN = ("lib", "python3.*", "site-packages")
+
+pytestmark = [
+    pytest.mark.ros2,
+    pytest.mark.slow,
+    pytest.mark.skipif(not PYTHON.exists(), reason="no ROS 2 here: make ros2 installs one for the tests"),
+]
+
+
+@pytest.fixture
+def ros2(tmp_path: Path) -> Path:
+    """An environment that has all of ``make ros2`` by links, but tf2_msgs."""
+    folder = tmp_path / "ros2"
+    link(PYTHON.parents[1], folder)
+    return folder
+
+
+def link(source: Path, target: Path) -> None:
+    target.mkdir()
+    for entry in source.iterdir():
+        if any(map(entry.match, LINKED_WITHIN)):
+            link(entry, target / entry.name)
+        elif "tf2_msgs" not in entry.name:
+            (target / entry.name).symlink_to(entry)
+
+
+def run(ros2: Path, *words: str, **env: str) -> subprocess.CompletedProcess[str]:
+    command = [str(ros2 / "bin" / "python"), *words]
+    return subprocess.run(command, env=os.environ | env, capture_output=True, text=True, timeout=300, check=False)
+
+
+@needs_tf2_msgs
+def test_tf2_msgs_is_built_and_can_be_built_again(ros2: Path) -> None:
+    assert run(ros2, "-c", "import tf2_msgs").returncode
+    for _ in range(2):
+        done = run(ros2, str(SCRIPT))
+        assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+        used = run(ros2, "-c", "from tf2_msgs.msg import TFMessage; print(TFMessage(), TFMessage.__module__)")
+        assert used.stdout == "tf2_msgs.msg.TFMessage(transforms=[]) tf2_msgs.msg._tf_message\n", used.stderr
+
+
+def test_without_a_compiler_one_line_says_what_is_left_out(ros2: Path, tmp_path: Path) -> None:
+    done = run(ros2, str(SCRIPT), PATH=str(tmp_path))
+    assert done.returncode == 1
+    assert done.stderr.splitlines() == [
+        "ROS 2 set-up: /tf is left out: there is no C++ compiler: install g++ and repeat make ros2"
+    ]
+    assert run(ros2, "-c", "import tf2_msgs").returncode
