@@ -10,8 +10,7 @@ unexport PYTHONDONTWRITEBYTECODE
 # The matrices are small and tests run in parallel, so NumPy's threads would only wait for each other.
 export OPENBLAS_NUM_THREADS := 1
 
-# Many of the fast tests wait for processes: one worker more than processors keeps these busy. Slow ones are left a
-# processor each, as they drive in real time.
+# Many tests wait for processes, or for what takes its time: one worker more than processors keeps these busy.
 WORKERS ?= $(shell expr $$(getconf _NPROCESSORS_ONLN) + 1)
 PLAIN := not (ros1 or ros2 or netns or exhaustive)
 
@@ -49,10 +48,10 @@ check: lint models
 	@HANDSTEER_FUZZ_CASES=200 $(BIN)/pytest -n $(WORKERS) --dist loadgroup -m "not (slow or browser)" $(ARGS)
 
 test: lint models
-	@HANDSTEER_STEPS=20000 $(BIN)/pytest -n auto --dist loadgroup -m "$(PLAIN)" --durations=10 $(ARGS)
+	@HANDSTEER_STEPS=20000 $(BIN)/pytest -n $(WORKERS) --dist loadgroup -m "$(PLAIN)" --durations=10 $(ARGS)
 
 test-all: lint models
-	@HANDSTEER_STEPS=20000 $(BIN)/pytest -n auto --dist loadgroup --durations=30 $(ARGS)
+	@HANDSTEER_STEPS=20000 $(BIN)/pytest -n $(WORKERS) --dist loadgroup --durations=30 $(ARGS)
 
 lint: $(BIN)/.dev
 	@$(BIN)/ruff format --check .

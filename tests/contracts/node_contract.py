@@ -16,6 +16,8 @@ CMD_VEL = "/robot_diff_drive_controller/cmd_vel"
 ODOM = "/robot_diff_drive_controller/odom"
 FORWARD = ("--camera", "virtual", "--camera.width", "320", "--camera.height", "240", "--camera.fps", "15")
 """A small and slow virtual camera, as several run on one machine; the transport's own words set its script."""
+PATIENT = ("--control.sign-timeout", "5")
+"""For a control whose signs a busy machine may delay, where that is not the subject."""
 LIMIT_S = 0.5
 """From the death of any node to a zero velocity at the robot."""
 _SEEN_S = 0.05
@@ -78,7 +80,7 @@ class ControlContract:
         raise NotImplementedError
 
     def test_exactly_one_twist_a_sign_with_the_values_of_the_course(self, drive: MakeDriver) -> None:
-        driver = drive()
+        driver = drive(*PATIENT)
         driver.show("Forward", count=5)
         for sign in ("Turn Left", "Go", "Dance", "Turn Right", "Backward", "Stop", "Forward", "NONE"):
             driver.show(sign)
@@ -89,12 +91,12 @@ class ControlContract:
         assert len(driver.twists) == len(grown) + len(kept)
 
     def test_signs_that_come_all_at_once_count_each(self, drive: MakeDriver) -> None:
-        driver = drive()
+        driver = drive(*PATIENT)
         driver.show("Forward", count=5, period_s=0.0)
         driver.expect(*[(round(0.01 * n, 6), 0.0) for n in range(1, 6)])
 
     def test_speed_is_bounded_and_does_not_wind_up(self, drive: MakeDriver) -> None:
-        driver = drive(parameters={"max_linear": 0.1, "linear_step": 0.04})
+        driver = drive(*PATIENT, parameters={"max_linear": 0.1, "linear_step": 0.04})
         driver.show("Forward", count=60, period_s=0.01)
         driver.show("Backward")
         driver.expect((0.04, 0.0), (0.08, 0.0), *[(0.1, 0.0)] * 58, (0.06, 0.0))
@@ -115,7 +117,7 @@ class ControlContract:
     def test_options_go_before_parameters_before_the_file(self, drive: MakeDriver, tmp_path: Any) -> None:
         file = tmp_path / "my.yaml"
         file.write_text("control: {linear_step: 0.02, angular_step: 0.2, max_linear: 3.0}\n")
-        options = ("--config", str(file), "--control.angular-step=0.4")
+        options = (*PATIENT, "--config", str(file), "--control.angular-step=0.4")
         driver = drive(*options, parameters={"linear_step": 0.03, "angular_step": 0.3})
         driver.show("Forward")
         driver.show("Turn Left")
@@ -130,7 +132,7 @@ class ControlContract:
 
     @pytest.mark.parametrize("name", ["INT", "TERM", "HUP", "QUIT", "ABRT", "TSTP", "USR1", "ALRM"])
     def test_one_zero_at_exit(self, drive: MakeDriver, name: str) -> None:
-        driver = drive("--control.sign-timeout", "5")
+        driver = drive(*PATIENT)
         driver.show("Forward", count=2)
         driver.expect((0.01, 0.0), (0.02, 0.0))
         driver.process.signal(signal.Signals[f"SIG{name}"])

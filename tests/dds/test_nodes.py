@@ -14,6 +14,7 @@ from tests.contracts.node_contract import (
     CMD_VEL,
     FORWARD,
     ODOM,
+    PATIENT,
     ChainContract,
     ControlContract,
     MakeDriver,
@@ -50,7 +51,7 @@ def test_parameters_come_from_files_too(dds: DdsGraph, tmp_path: Path) -> None:
     file = tmp_path / "ros.yaml"
     file.write_text(f"/**/{NODE}: {{ros__parameters: {{linear_step: 0.02, angular_step: 0.2}}}}\n")
     words = ("-r", "__ns:=/filed", "--params-file", str(file), "-p", "linear_step:=0.03")
-    dds.node("control", "--control.angular-step=0.4", name=f"/filed/{NODE}", ros=words)
+    dds.node("control", *PATIENT, "--control.angular-step=0.4", name=f"/filed/{NODE}", ros=words)
     cmd_vel, signs = f"/filed{CMD_VEL}", "/filed/gesture/hand_sign"
     record_twists(dds.peer, cmd_vel)
     dds.peer.ask("advertise", topic=signs, type="String")
