@@ -16,9 +16,11 @@ _FLAGS = (
     "--disable-background-networking",
     "--disable-component-update",
     "--disable-sync",
-    # WebGL in software.
+    # WebGL in software; the page around it as without a graphics card, else it too is drawn by WebGL's means, which
+    # takes as much of a processor again.
     "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader",
+    "--disable-gpu-compositing",
 )
 _PR_CAPBSET_DROP, _CAP_SYS_NICE = 24, 23
 
