@@ -3,7 +3,7 @@
 import pytest
 
 from tests.dashboard.test_accessibility import faults
-from tests.dashboard.test_layout_in_browser import DESKTOP, PHONE, fits, stop_is_in_view_wherever
+from tests.dashboard.test_layout_in_browser import DESKTOP, PHONE, fits, rows_have_room, stop_is_in_view_wherever
 from tests.dashboard.visits import NEEDS_A_BROWSER, Visit, visiting
 
 pytestmark = NEEDS_A_BROWSER
@@ -28,6 +28,7 @@ def test_all_words_of_a_page_are_in_the_language_of_the_browser_and_fit(path: st
         visit.wait_until(lambda: headline(visit) == GERMAN["Driving"])
         assert page.locator("html").get_attribute("lang") == "de"
         assert faults(page) == []
+        assert path != "/" or rows_have_room(page)
         page.evaluate("for (const folded of document.querySelectorAll('details')) folded.open = true")
         for size in (DESKTOP, PHONE):
             page.set_viewport_size(size)

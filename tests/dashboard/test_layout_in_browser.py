@@ -8,6 +8,7 @@ from tests.dashboard.visits import NEEDS_A_BROWSER, Visit, visiting
 pytestmark = NEEDS_A_BROWSER
 
 DESKTOP: ViewportSize = {"width": 1440, "height": 900}
+LAPTOP: ViewportSize = {"width": 1280, "height": 800}
 TABLET: ViewportSize = {"width": 768, "height": 1024}
 PHONE: ViewportSize = {"width": 390, "height": 844}
 SEEN = "for (const name of ['demo', 'coach']) localStorage.setItem(`handsteer-${name}`, 'seen')"
@@ -23,6 +24,14 @@ IN_VIEW = """() => {
 SCROLL_TO = (
     "part => scrollTo({ top: part * (document.documentElement.scrollHeight - innerHeight), behavior: 'instant' })"
 )
+# Whether each row of a card has room for all that is in it, and the key of the plots none of their title's.
+ROWS_HAVE_ROOM = """() => {
+    const text = document.createRange();
+    text.selectNodeContents(document.querySelector(".velocity h2"));
+    const key = document.querySelector(".velocity .key").getBoundingClientRect();
+    return text.getBoundingClientRect().right < key.left
+        && [...document.querySelectorAll(".panel > *, .foot")].every((row) => row.scrollWidth <= row.clientWidth + 1);
+}"""
 BAR_PX = "document.querySelector('.banner').getBoundingClientRect().bottom"
 SHIFTS = """() => {
     window.shifted = 0;
@@ -35,6 +44,15 @@ SHIFTS = """() => {
 def fits(page: Page) -> bool:
     """Return whether nothing is wider than the screen."""
     return bool(page.evaluate("document.documentElement.scrollWidth <= innerWidth"))
+
+
+def rows_have_room(page: Page) -> bool:
+    """Return whether nothing in the rows of the cards is cut off or covered, on common screens."""
+    for size in (DESKTOP, LAPTOP):
+        page.set_viewport_size(size)
+        if not page.evaluate(ROWS_HAVE_ROOM):
+            return False
+    return True
 
 
 def stop_is_in_view_wherever(page: Page) -> bool:
@@ -81,6 +99,7 @@ def test_all_that_one_drives_by_fits_a_screen_without_scrolling() -> None:
         assert foot is not None
         assert camera["height"] == pytest.approx(world["height"], abs=1)
         assert foot["y"] + foot["height"] == pytest.approx(world["y"] + world["height"], abs=2)
+        assert rows_have_room(page)
 
 
 @pytest.mark.parametrize("size", [DESKTOP, PHONE], ids=["desktop", "phone"])
