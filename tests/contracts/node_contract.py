@@ -151,21 +151,33 @@ class ControlContract:
         assert set(driver.twists[3:]) == {(0.0, 0.0)}
 
     def test_a_hand_that_is_up_at_the_start_moves_nothing_before_neutral_was_seen(self, drive: MakeDriver) -> None:
-        driver = drive("--control.arming", "auto")
+        driver = drive(*PATIENT, "--control.arming", "auto")
         driver.show("Forward", count=60)
         eventually(lambda: len(driver.twists) >= 60, what="a twist for each sign")
         assert set(driver.twists) == {(0.0, 0.0)}
         driver.show("NONE", count=40)
         driver.show("Forward", count=5)
         eventually(lambda: driver.twists[-1] == (0.05, 0.0), what="the robot to be driven")
+
+    def test_after_a_camera_that_hung_nothing_moves_before_neutral_was_seen(self, drive: MakeDriver) -> None:
+        driver = drive("--control.arming", "auto")
+
+        def drives_after(neutral: str, count: int) -> bool:
+            """Show neutral and then Forward, between which a busy machine may leave too long a pause."""
+            seen = len(driver.twists)
+            driver.show(neutral, count=count)
+            driver.show("Forward", count=5)
+            eventually(lambda: len(driver.twists) >= seen + count + 5, what="a twist for each sign")
+            return driver.twists[-1][0] > 0.0
+
+        eventually(lambda: drives_after("NONE", 40), what="the robot to be driven")
         driver.show("Stop")
-        time.sleep(0.6)  # as a camera that hangs
+        time.sleep(0.6)
+        seen = len(driver.twists)
         driver.show("Forward", count=5)
-        eventually(lambda: len(driver.twists) >= 112, what="a twist for each sign, and a zero")
-        assert driver.twists[-1] == (0.0, 0.0)
-        driver.show("Stop")
-        driver.show("Forward")
-        eventually(lambda: driver.twists[-1] == (0.01, 0.0), what="the robot to be driven")
+        eventually(lambda: len(driver.twists) >= seen + 5, what="a twist for each sign")
+        assert set(driver.twists[seen:]) == {(0.0, 0.0)}
+        eventually(lambda: drives_after("Stop", 1), what="the robot to be driven")
 
     def test_a_second_publisher_of_commands_is_said(self, drive: MakeDriver) -> None:
         driver = drive()

@@ -20,7 +20,8 @@ NAMES = "[...document.querySelectorAll('#browser-camera option')].slice(1).map((
 
 def test_the_browsers_camera_and_its_size_can_change_while_it_is_in_use(tmp_path: Path) -> None:
     clip, random = tmp_path / "grey.mjpeg", np.random.default_rng(0)
-    pictures = (random.integers(80, 120, (480, 640, 3)).astype(np.uint8) for _ in range(5))
+    # Many: a loop of few is taken for a frozen camera.
+    pictures = (random.integers(80, 120, (480, 640, 3)).astype(np.uint8) for _ in range(31))
     clip.write_bytes(b"".join(cv2.imencode(".jpg", each)[1].tobytes() for each in pictures))
     with visiting("NONE:600", webcam=clip, camera={"fps": 5}) as visit:
         page, camera = visit.page, visit.graph.camera
