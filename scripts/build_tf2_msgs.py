@@ -1,7 +1,8 @@
 """Builds the message package tf2_msgs, without which there is no /tf, in .venv/ros2, whose wheels lack it.
 
 Runs on the Python there, for scripts/setup-ros2. The generators of ROS 2, which are among the wheels, write the code,
-and a C++ compiler makes one extension module of it, with type support for Fast DDS only, the middleware of the wheels.
+and a C++ compiler makes one extension module of it, with the type supports that Fast DDS, the wheels' middleware, uses:
+its own and introspection.
 If something is missing or fails, tf2_msgs is not there afterwards, and the exit code is 1.
 """
 

@@ -17,7 +17,7 @@ _FLAGS = (
     "--disable-component-update",
     "--disable-sync",
     # WebGL in software; the page around it as without a graphics card, else it too is drawn by WebGL's means, which
-    # takes as much of a processor again.
+    # takes half a processor more while the robot drives.
     "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader",
     "--disable-gpu-compositing",

@@ -41,15 +41,15 @@ RELIABLE_10, RELIABLE_1, LATCHED_1 = "::,10:,:,:,,", "::,1:,:,:,,", ":1:,1:,:,:,
 
 
 @pytest.fixture(scope="module")
-def router(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ZenohGraph]:
+def zenoh_network(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ZenohGraph]:
     with zenoh_graph(tmp_path_factory.mktemp("zenoh")) as graph:
         yield graph
 
 
 @pytest.fixture
-def network(router: ZenohGraph) -> Iterator[ZenohGraph]:
-    with router.test():
-        yield router
+def network(zenoh_network: ZenohGraph) -> Iterator[ZenohGraph]:
+    with zenoh_network.test():
+        yield zenoh_network
 
 
 class ZenohDriver(DdsDriver):
