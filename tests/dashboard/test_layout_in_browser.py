@@ -8,7 +8,7 @@ from tests.dashboard.visits import NEEDS_A_BROWSER, Visit, visiting
 pytestmark = NEEDS_A_BROWSER
 
 DESKTOP: ViewportSize = {"width": 1440, "height": 900}
-LAPTOP: ViewportSize = {"width": 1280, "height": 800}
+LAPTOPS: list[ViewportSize] = [{"width": 1366, "height": 768}, {"width": 1280, "height": 800}]
 TABLET: ViewportSize = {"width": 768, "height": 1024}
 PHONE: ViewportSize = {"width": 390, "height": 844}
 SEEN = "for (const name of ['demo', 'coach']) localStorage.setItem(`handsteer-${name}`, 'seen')"
@@ -28,8 +28,8 @@ SCROLL_TO = (
 ROWS_HAVE_ROOM = """() => {
     const text = document.createRange();
     text.selectNodeContents(document.querySelector(".velocity h2"));
-    const key = document.querySelector(".velocity .key").getBoundingClientRect();
-    return text.getBoundingClientRect().right < key.left
+    const key = document.querySelector(".velocity .key").getBoundingClientRect(), title = text.getBoundingClientRect();
+    return (title.right < key.left || title.bottom <= key.top)
         && [...document.querySelectorAll(".panel > *, .foot")].every((row) => row.scrollWidth <= row.clientWidth + 1);
 }"""
 BAR_PX = "document.querySelector('.banner').getBoundingClientRect().bottom"
@@ -48,7 +48,7 @@ def fits(page: Page) -> bool:
 
 def rows_have_room(page: Page) -> bool:
     """Return whether nothing in the rows of the cards is cut off or covered, on common screens."""
-    for size in (DESKTOP, LAPTOP):
+    for size in (DESKTOP, *LAPTOPS):
         page.set_viewport_size(size)
         if not page.evaluate(ROWS_HAVE_ROOM):
             return False
