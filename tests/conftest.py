@@ -42,6 +42,9 @@ RUN_AGAIN = (
 time, which a machine that is busy with other things may upset. What is wrong fails each time; the last line of a run
 counts what was run again."""
 
+LONG_VALUE = 100
+"""Longer texts, in characters, are not part of a test's name."""
+
 DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 
 
@@ -100,6 +103,14 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         if item.get_closest_marker("slow") and item.nodeid.startswith(RUN_AGAIN):
             reruns = 2 if item.get_closest_marker("browser") else 1  # drawn in software, next to other tests
             item.add_marker(pytest.mark.flaky(reruns=reruns, reruns_delay=3))
+
+
+def pytest_make_parametrize_id(val: object, argname: str) -> str | None:
+    """Keep bytes and long texts out of the names of tests.
+
+    An archive holds the second it was made in, so that workers would collect tests of different names.
+    """
+    return argname if isinstance(val, bytes) or (isinstance(val, str) and len(val) > LONG_VALUE) else None
 
 
 def pytest_runtest_setup(item: pytest.Item) -> None:
