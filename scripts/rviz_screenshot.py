@@ -15,12 +15,15 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
+import cv2
+
 ROOT = Path(__file__).resolve().parents[1]
 PICTURE = ROOT / "docs" / "images" / "rviz.png"
 SIZE = "1280x800"
 LARGEST_BYTES = 400_000
 DRIVEN_M = 1.0
 PATIENCE_S = 240.0
+DRAWN = 20  # of 255; the screen is black where no window is, the view's background has 48
 PROGRAMS = ("roscore", "roslaunch", "rostopic", "rviz", "Xvfb", "import")
 ODOM = "/robot_diff_drive_controller/odom"
 
@@ -47,7 +50,8 @@ def main(path: Path) -> None:
         }
         run(process(["roscore", "-p", port], env))
         until(lambda: not subprocess.run(["rostopic", "list"], env=env, capture_output=True, check=False).returncode)
-        script = "Forward:6 Turn Left:1 Forward:3"
+        # Neutral now and then: on a busy machine, the control may stop for late signs, and waits for it.
+        script = "Stop:1 Forward:6 Turn Left:1 Forward:3"
         subprocess.run(["rosparam", "set", "/my_camera/virtual_hand/script", script], env=env, check=True)
         drive = ["ros_hand_gesture_recognition", "sign_control.launch", "camera_name:=virtual", "show_image:=false"]
         run(process(["roslaunch", "ros_mobile_robot", "drive_robot.launch", "rviz:=true"], env))
@@ -55,7 +59,7 @@ def main(path: Path) -> None:
         until(lambda: "/rviz" in subscribers("/gesture/image_annotated", env))
         until(lambda: driven_m(env) >= DRIVEN_M)
         path.parent.mkdir(parents=True, exist_ok=True)
-        subprocess.run(["import", "-window", "root", "+dither", "-colors", "255", str(path)], env=env, check=True)
+        until(lambda: is_drawn(path, env))
     size = path.stat().st_size
     if size > LARGEST_BYTES:
         sys.exit(f"{path} has {size} bytes, more than {LARGEST_BYTES}")
@@ -99,6 +103,13 @@ def subscribers(topic: str, env: dict[str, str]) -> str:
     """Return the subscribers of ``topic``, as printed by rostopic."""
     said = subprocess.run(["rostopic", "info", topic], env=env, capture_output=True, text=True, check=False).stdout
     return said.partition("Subscribers:")[2]
+
+
+def is_drawn(path: Path, env: dict[str, str]) -> bool:
+    """Take the picture; return whether RViz has drawn its view of the world in it, dark grey where nothing is."""
+    subprocess.run(["import", "-window", "root", "+dither", "-colors", "255", str(path)], env=env, check=True)
+    picture = cv2.imread(str(path))
+    return picture is not None and bool(picture[100:700, 450:1100].mean() > DRAWN)
 
 
 def driven_m(env: dict[str, str]) -> float:
