@@ -104,7 +104,7 @@ def test_all_that_one_drives_by_fits_a_screen_without_scrolling() -> None:
 
 @pytest.mark.parametrize("size", [DESKTOP, PHONE], ids=["desktop", "phone"])
 def test_nothing_jumps_while_the_robot_drives(size: ViewportSize) -> None:
-    script = "Forward:2 Turn Left:2 Go:1 NONE:1 Backward:2 Stop:1"
+    script = "Forward:1.5 Turn Left:1.5 Go:1 NONE:0.5 Backward:1.5 Stop:1"
     with visiting(script, camera={"fps": 10}) as visit:
         page = visit.page
         page.add_init_script(SEEN)
