@@ -6,11 +6,24 @@ import select
 import signal
 import socket
 import subprocess
+import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, Self, TypeVar
 
+from tests.preloaded import Preloaded
+
+NODES = (
+    "handsteer.cli.app",
+    "handsteer.cli.one_node",
+    "handsteer.making",
+    "handsteer.nodes.control",
+    "handsteer.cameras.virtual",
+    "handsteer.recognition.recognizer",
+    "handsteer.robots.simulated",
+)
+"""What handsteer's nodes import, but for their transport."""
 START_S = 60.0
 """Long, for a machine that is busy with other tests; everything waits for conditions, not for this."""
 _END_S = 5.0
@@ -33,12 +46,27 @@ def eventually(condition: Callable[[], Any], timeout_s: float = START_S, what: s
 
 
 class Process:
-    """A process, and what it says."""
+    """A process, and what it says.
 
-    def __init__(self, command: list[str], env: dict[str, str], log: Path, **pipes: Any) -> None:
+    Args:
+        command: What to start.
+        env: Its environment.
+        log: What it prints goes to this file.
+        modules: What to have imported before it starts, if it is a Python program: see :mod:`tests.preloaded`.
+        pipes: Other arguments of ``subprocess.Popen``.
+    """
+
+    def __init__(
+        self, command: list[str], env: dict[str, str], log: Path, modules: Sequence[str] = (), **pipes: Any
+    ) -> None:
         self._log = log
         with log.open("wb") as file:
-            self.popen = subprocess.Popen(command, env=env, **{"stdout": file, "stderr": file, **pipes})
+            files = {"stdout": file, "stderr": file, **pipes}
+            self.popen: subprocess.Popen[Any] | Preloaded
+            if modules and sys.platform == "linux" and "LD_PRELOAD" not in env:
+                self.popen = Preloaded(command, env, modules, **files)
+            else:
+                self.popen = subprocess.Popen(command, env=env, **files)
 
     @property
     def text(self) -> str:
@@ -84,8 +112,8 @@ class Process:
 class Peer(Process):
     """A plain program that knows nothing of handsteer: it takes orders as lines of JSON and tells what it gets."""
 
-    def __init__(self, command: list[str], env: dict[str, str], log: Path) -> None:
-        super().__init__(command, env, log, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    def __init__(self, command: list[str], env: dict[str, str], log: Path, modules: Sequence[str] = ()) -> None:
+        super().__init__(command, env, log, modules, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
         assert self._line() == "ready", self.text
 
     def ask(self, order: str, **details: Any) -> Any:

@@ -65,7 +65,8 @@ class Driver(ABC):
     def expect(self, *wanted: tuple[float, float]) -> None:
         """Wait for these twists; fail when others come."""
         eventually(lambda: len(self.twists) >= len(wanted), 10.0, what=f"{len(wanted)} twists")
-        assert self.twists[: len(wanted)] == list(wanted)
+        twists = self.twists
+        assert twists[: len(wanted)] == list(wanted), twists
 
 
 MakeDriver = Callable[..., Driver]

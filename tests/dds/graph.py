@@ -10,9 +10,10 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from tests.processes import Peer, Process, Processes, as_tests_drive, eventually
+from tests.processes import NODES, Peer, Process, Processes, as_tests_drive, eventually
 
 PEER = Path(__file__).with_name("peer.py")
+MODULES = {"dds": "handsteer.transports.dds.transport", "ros2": "handsteer.transports.rclpy.session"}
 # Domains above have their ports among those that the system gives to others.
 _LARGEST_DOMAIN = 100
 # Whoever was killed is still in its domain for others, for ten seconds.
@@ -76,11 +77,13 @@ class DdsGraph(Processes):
         Args:
             machine: Name of the machine that it says it is on, if that is not this one.
         """
-        return self.adopt(Peer([*self._peer_command, str(self.domain), "", machine], self.env, self.log("peer")))
+        command = [*self._peer_command, str(self.domain), "", machine]
+        return self.adopt(Peer(command, self.env, self.log("peer"), ("cyclonedds.domain", "rclpy")))
 
     def handsteer(self, *arguments: str) -> Process:
         """Start ``handsteer`` with ``arguments`` in this domain."""
-        return self.adopt(Process([self.python, "-m", "handsteer", *arguments], self.env, self.log()))
+        command = [self.python, "-m", "handsteer", *arguments]
+        return self.adopt(Process(command, self.env, self.log(), (*NODES, MODULES[self.transport])))
 
     def node(self, verb: str, *arguments: str, name: str, ros: tuple[str, ...] = ()) -> Process:
         """Start one of handsteer's nodes and wait until it is in the graph under ``name``."""

@@ -7,9 +7,10 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from tests.processes import Peer, Process, Processes, as_tests_drive, eventually, free_port
+from tests.processes import NODES, Peer, Process, Processes, as_tests_drive, eventually, free_port
 
 PEER = Path(__file__).with_name("peer.py")
+MODULES = (*NODES, "handsteer.transports.zenoh.transport")
 DOMAIN = 7
 _VARIABLES = (
     "ZENOH_CONFIG_OVERRIDE",
@@ -54,7 +55,9 @@ class ZenohGraph(Processes):
     def start_peer(self) -> Peer:
         """Start a plain program; wait until it is ready."""
         command = [sys.executable, str(PEER), self.endpoint, str(DOMAIN)]
-        return self.adopt(Peer(command, {**self.env, "PEER_CONFIG": f'mode="{self._mode}"'}, self.log("peer")))
+        return self.adopt(
+            Peer(command, {**self.env, "PEER_CONFIG": f'mode="{self._mode}"'}, self.log("peer"), ("zenoh",))
+        )
 
     def handsteer(self, *arguments: str, **env: str) -> Process:
         """Start ``handsteer`` with ``arguments`` in this network."""
@@ -78,7 +81,7 @@ class ZenohGraph(Processes):
         return topic in self.nodes()[node]["MP"]
 
     def _start(self, arguments: list[str], env: dict[str, str]) -> Process:
-        return self.adopt(Process([sys.executable, "-m", "handsteer", *arguments], env, self.log()))
+        return self.adopt(Process([sys.executable, "-m", "handsteer", *arguments], env, self.log(), MODULES))
 
 
 @contextlib.contextmanager

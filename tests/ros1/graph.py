@@ -10,9 +10,12 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from tests.processes import Peer, Process, Processes, as_tests_drive, eventually, free_port
+from tests.processes import NODES, Peer, Process, Processes, as_tests_drive, eventually, free_port
 
 PEER = Path(__file__).with_name("peer.py")
+ROSPY = ("rosgraph.xmlrpc", "rosgraph.roslogging", "roscpp.srv", "rosgraph_msgs.msg", "roslib.message", "rospkg")
+"""What rospy imports; it reads the namespace of the command line while it is imported itself."""
+MODULES = (*NODES, *ROSPY, "handsteer.transports.ros1.conversion")
 
 
 class Ros1Graph(Processes):
@@ -95,6 +98,13 @@ class Ros1Graph(Processes):
         listeners: dict[str, list[str]] = dict(state[1])
         return listeners.get(topic, [])
 
+    def connected(self, node: str, topic: str) -> list[str]:
+        """Return the full names of the nodes to which ``node`` sends ``topic``: the master knows no connections."""
+        _, _, uri = self.master.lookupNode("/test", node)
+        interface: Any = xmlrpc.client.ServerProxy(uri)
+        _, _, info = interface.getBusInfo("/test")
+        return [other for _, other, direction, _, name, *_ in info if (direction, name) == ("o", topic)]
+
     def talkers(self, topic: str) -> list[str]:
         """Return the full names of the nodes that publish ``topic``."""
         _, _, state = self.master.getSystemState("/test")
@@ -116,7 +126,7 @@ class Ros1Graph(Processes):
 
     def handsteer(self, *arguments: str) -> Process:
         """Start ``handsteer`` with ``arguments`` in this graph."""
-        return self.run(sys.executable, "-m", "handsteer", *arguments)
+        return self.adopt(Process([sys.executable, "-m", "handsteer", *arguments], self.env, self.log(), MODULES))
 
     def node(self, verb: str, *arguments: str, name: str = "") -> Process:
         """Start one of handsteer's nodes and wait until it is in the graph under ``name``."""
@@ -128,7 +138,7 @@ class Ros1Graph(Processes):
 
     def peer(self, *arguments: str) -> Peer:
         """Start a plain rospy node, as ``tests/ros1/peer.py`` tells; wait until it is ready."""
-        return self.adopt(Peer([sys.executable, str(PEER), *arguments], self.env, self.log("peer")))
+        return self.adopt(Peer([sys.executable, str(PEER), *arguments], self.env, self.log("peer"), ROSPY))
 
 
 @contextlib.contextmanager

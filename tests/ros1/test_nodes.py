@@ -51,7 +51,7 @@ class Ros1Driver(Driver):
         self._peer.ask("advertise", topic="gesture/joy", package="sensor_msgs", type="Joy")
         heard = "gesture/joy" if (parameters or {}).get("mode") == "joystick" else "gesture/hand_sign"
         eventually(lambda: self._peer.ask("listeners", topic=heard) > 0)
-        eventually(lambda: graph.listeners(f"{self.namespace}{CMD_VEL}"))
+        eventually(lambda: graph.connected(name, f"{self.namespace}{CMD_VEL}"))
 
     def show(self, sign: str, count: int = 1, period_s: float = 0.02) -> None:
         values = {"data": sign}
