@@ -38,21 +38,21 @@ def main(arguments: list[str] | None = None) -> None:
 
 
 def _run(words: list[str]) -> int:
-    # The full command line takes 0.1 s more to load.
-    if _has_only_ros1_arguments(words):
-        # Imports leave no garbage, and searching for it takes a tenth of the start.
-        gc.disable()
-        # pydantic would search all installed packages for plugins.
-        os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
-        try:
+    # Imports leave no garbage, and searching for it takes a tenth of the start. What runs then enables it.
+    gc.disable()
+    # pydantic would search all installed packages for plugins.
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
+    try:
+        # The full command line takes 0.1 s more to load.
+        if _has_only_ros1_arguments(words):
             from handsteer.cli.one_node import run_ros1
 
             return run_ros1(words[0], words[3:])
-        finally:
-            gc.enable()
-    from handsteer.cli.app import run
+        from handsteer.cli.app import run
 
-    return run(words)
+        return run(words)
+    finally:
+        gc.enable()
 
 
 def _has_only_ros1_arguments(words: list[str]) -> bool:

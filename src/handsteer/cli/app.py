@@ -4,6 +4,7 @@ Only what help needs is loaded here and at the top of each verb's file, so that 
 verb names the modules it works with by :func:`loads`.
 """
 
+import gc
 import importlib
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -122,6 +123,7 @@ def _run(words: list[str]) -> int:
         return fail(f"{words[0]} takes no parameters of the configuration; see handsteer {words[0]} --help")
     for module in _LOADS.get(verb, ()):
         importlib.import_module(module)
+    gc.enable()
     # The verb is loaded; from here on, an interrupt must clean up what it started.
     signals.interrupt_on_signals()
     return int(verb(*given.args, **given.kwargs) or 0)

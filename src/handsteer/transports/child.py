@@ -4,10 +4,10 @@ import contextlib
 import logging
 import logging.handlers
 import os
-import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from subprocess import PIPE, Popen, TimeoutExpired
 from typing import Final
 
 from handsteer.errors import HandsteerError
@@ -34,10 +34,10 @@ class Child:
 
     def __init__(self, module: str) -> None:
         path = os.pathsep.join(filter(None, [str(_ROOT), os.environ.get("PYTHONPATH")]))
-        self.process = subprocess.Popen(
+        self.process = Popen(
             [sys.executable, "-P", "-m", module],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
+            stdin=PIPE,
+            stdout=PIPE,
             env={**os.environ, "PYTHONPATH": path},
             start_new_session=True,
         )
@@ -64,13 +64,13 @@ class Child:
             self.process.kill()
         try:
             self.process.wait(_STOP_TIMEOUT_S)
-        except subprocess.TimeoutExpired:
+        except TimeoutExpired:
             self.process.kill()
             self.process.wait()
 
     def exit_code(self) -> int | None:
         """Return the exit code of a process that has ended; None if it does not end within a second."""
-        with contextlib.suppress(subprocess.TimeoutExpired):
+        with contextlib.suppress(TimeoutExpired):
             self.process.wait(_EXIT_TIMEOUT_S)
         return self.process.poll()
 
