@@ -62,13 +62,14 @@ class Preloaded:
     """What tests use of :class:`subprocess.Popen`, of a Python program that starts at once.
 
     Args:
-        command: An interpreter, then ``-m`` and a module, or a script, then its arguments.
+        command: An interpreter, ``-P`` or not, then ``-m`` and a module, or a script, then its arguments.
         env: The whole environment.
         modules: What to import before the program starts; those that are not installed are left out.
-        stdin: A file, or ``subprocess.PIPE``.
-        stdout: A file, or ``subprocess.PIPE``.
-        stderr: A file.
-        text: Pipes are of text; nothing else is made.
+        stdin: A file, or ``subprocess.PIPE``; as ours, if none is given.
+        stdout: A file, or ``subprocess.PIPE``; as ours, if none is given.
+        stderr: A file; as ours, if none is given.
+        text: Whether pipes are of text.
+        start_new_session: Whether signals of the terminal do not reach it.
 
     Attributes:
         pid: Its process ID.
@@ -83,28 +84,34 @@ class Preloaded:
         env: dict[str, str],
         modules: Sequence[str],
         *,
-        stdin: int | IO[bytes] = subprocess.DEVNULL,
-        stdout: int | IO[bytes],
-        stderr: IO[bytes],
-        text: bool = True,
+        stdin: int | IO[bytes] = 0,
+        stdout: int | IO[bytes] = 1,
+        stderr: int | IO[bytes] = 2,
+        text: bool = False,
+        start_new_session: bool = False,
     ) -> None:
-        assert text, "pipes of bytes are not made here"
         self.returncode: int | None = None
-        self.stdin: IO[str] | None = None
-        self.stdout: IO[str] | None = None
+        self.stdin: IO[Any] | None = None
+        self.stdout: IO[Any] | None = None
         self._waiting = threading.Lock()
         python, *words = command
-        request = {"words": words, "env": env, "cwd": str(Path.cwd()), "modules": list(modules)}
+        request = {
+            "words": words,
+            "env": env,
+            "cwd": str(Path.cwd()),
+            "modules": list(modules),
+            "start_new_session": start_new_session,
+        }
         key = (python, *(env.get(name) for name in _LIBRARIES))
         with contextlib.ExitStack() as theirs:
-            if stdin == subprocess.DEVNULL:
-                stdin = theirs.enter_context(Path(os.devnull).open("rb"))
-            elif stdin == subprocess.PIPE:
+            if stdin == subprocess.PIPE:
                 reading, writing = os.pipe()
-                stdin, self.stdin = theirs.enter_context(os.fdopen(reading, "rb")), os.fdopen(writing, "w")
+                stdin = theirs.enter_context(os.fdopen(reading, "rb"))
+                self.stdin = os.fdopen(writing, "w" if text else "wb")
             if stdout == subprocess.PIPE:
                 reading, writing = os.pipe()
-                self.stdout, stdout = os.fdopen(reading), theirs.enter_context(os.fdopen(writing, "wb"))
+                stdout = theirs.enter_context(os.fdopen(writing, "wb"))
+                self.stdout = os.fdopen(reading, "r" if text else "rb")
             files = [file if isinstance(file, int) else file.fileno() for file in (stdin, stdout, stderr)]
             with _lock:
                 if key not in _forks:
@@ -170,6 +177,8 @@ def _serve(channel: socket.socket) -> list[str]:
 
 
 def _become(request: dict[str, Any], files: list[int]) -> list[str]:
+    if request["start_new_session"]:
+        os.setsid()
     for number, file in enumerate(files):
         os.dup2(file, number)
         os.close(file)
@@ -185,10 +194,13 @@ def _become(request: dict[str, Any], files: list[int]) -> list[str]:
 
 def _program(words: list[str]) -> Callable[[], object]:
     """Return what runs the module or the script of ``words``, with its own arguments and folder in place."""
+    keeps_path = words[0] == "-P"
+    words = words[keeps_path:]
     if words[0] == "-m":
         module = words[1]
         sys.argv = [module, *words[2:]]
-        sys.path.insert(0, str(Path.cwd()))
+        if not keeps_path:
+            sys.path.insert(0, str(Path.cwd()))
         return lambda: runpy.run_module(module, run_name="__main__", alter_sys=True)
     sys.argv = words
     sys.path.insert(0, str(Path(words[0]).resolve().parent))

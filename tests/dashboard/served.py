@@ -4,7 +4,9 @@ import http.client
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from typing import Any
+from unittest import mock
 from urllib.parse import urlsplit
 
 import numpy as np
@@ -12,14 +14,17 @@ from numpy.typing import NDArray
 
 from handsteer.clock import RealClock
 from handsteer.config import DashboardConfig
+from handsteer.dashboard.page_process import PageProcess
 from handsteer.dashboard.remote_graph import GraphServer, RemoteGraph
 from handsteer.dashboard.server import Dashboard
 from handsteer.graph import Graph
 from handsteer.images import image_message
 from handsteer.messages import DIAGNOSTICS, IMAGE_ANNOTATED, Header
 from handsteer.nodes.steering import SteeringNode
+from handsteer.transports import child
 from handsteer.transports.in_process import InProcessTransport
 from tests.dashboard.network import cookies_of
+from tests.preloaded import Preloaded
 from tests.transports.test_piped import joined
 
 PATIENCE_S = 20.0
@@ -78,3 +83,9 @@ class Site:
         self.dashboard.stop()
         self._ended.set()
         self._camera.join()
+
+
+def page_process() -> PageProcess:
+    """Return a page's process that has loaded its libraries already."""
+    with mock.patch.object(child, "Popen", partial(Preloaded, modules=("handsteer.dashboard.server",))):
+        return PageProcess()

@@ -8,9 +8,9 @@ import pytest
 from playwright.sync_api import Error, Frame
 
 from handsteer.config import load
-from handsteer.dashboard.page_process import PageProcess
 from handsteer.graph import Graph
 from tests.dashboard.browsers import a_browser
+from tests.dashboard.served import page_process
 from tests.dashboard.visits import NEEDS_A_BROWSER, PATIENCE_MS, WINDOW
 
 pytestmark = NEEDS_A_BROWSER
@@ -32,7 +32,7 @@ def url() -> Iterator[str]:
     )
     with Graph(config, steering=False) as graph:
         graph.start()
-        page = PageProcess()
+        page = page_process()
         try:
             yield page.serve(graph)
         finally:

@@ -10,10 +10,10 @@ import pytest
 from playwright.sync_api import Browser, Page
 
 from handsteer.config import load
-from handsteer.dashboard.page_process import PageProcess
 from handsteer.graph import Graph
 from handsteer.types import FORWARD, STOP
 from tests.dashboard.browsers import a_browser
+from tests.dashboard.served import page_process
 from tests.dashboard.visits import NEEDS_A_BROWSER, PATIENCE_MS, WINDOW
 
 pytestmark = NEEDS_A_BROWSER
@@ -46,7 +46,7 @@ def graph() -> Iterator[Graph]:
 
 @pytest.fixture
 def url(graph: Graph) -> Iterator[str]:
-    page = PageProcess()
+    page = page_process()
     try:
         yield page.serve(graph)
     finally:

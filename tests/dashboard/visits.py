@@ -14,10 +14,10 @@ from playwright.sync_api import ConsoleMessage, Page, Request, ViewportSize
 from scripts import chromium
 
 from handsteer.config import load
-from handsteer.dashboard.page_process import PageProcess
 from handsteer.graph import Graph
 from handsteer.study.session import Task
 from tests.dashboard.browsers import a_browser
+from tests.dashboard.served import page_process
 
 log = logging.getLogger(__name__)
 
@@ -120,7 +120,7 @@ def visiting(
         "dashboard": {"port": 0},
     }
     with Graph(load(None, base, sections), steering=steering) as graph, a_browser(webcam) as browser:
-        served = PageProcess()
+        served = page_process()
         url = served.serve(graph, study=study).removesuffix("/study")
         visit = Visit(browser.new_page(viewport=WINDOW, locale=locale), graph)
         try:
