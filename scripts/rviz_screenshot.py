@@ -10,6 +10,7 @@ import socket
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
@@ -51,13 +52,14 @@ def main(path: Path) -> None:
         run(process(["roscore", "-p", port], env))
         until(lambda: not subprocess.run(["rostopic", "list"], env=env, capture_output=True, check=False).returncode)
         # Neutral now and then: on a busy machine, the control may stop for late signs, and waits for it.
-        script = "Stop:1 Forward:6 Turn Left:1 Forward:3"
+        script = "Stop:1 Forward:20"
         subprocess.run(["rosparam", "set", "/my_camera/virtual_hand/script", script], env=env, check=True)
         drive = ["ros_hand_gesture_recognition", "sign_control.launch", "camera_name:=virtual", "show_image:=false"]
         run(process(["roslaunch", "ros_mobile_robot", "drive_robot.launch", "rviz:=true"], env))
-        run(process(["roslaunch", *drive], env))
+        # Or the robot might be anywhere before it is drawn.
         until(lambda: "/rviz" in subscribers("/gesture/image_annotated", env))
-        until(lambda: driven_m(env) >= DRIVEN_M)
+        run(process(["roslaunch", *drive], env))
+        wait_until_driven(env)
         path.parent.mkdir(parents=True, exist_ok=True)
         until(lambda: is_drawn(path, env))
     size = path.stat().st_size
@@ -112,11 +114,18 @@ def is_drawn(path: Path, env: dict[str, str]) -> bool:
     return picture is not None and bool(picture[100:700, 450:1100].mean() > DRAWN)
 
 
-def driven_m(env: dict[str, str]) -> float:
-    """Return the x coordinate of the robot, in metres."""
-    command = ["rostopic", "echo", "-n", "1", f"{ODOM}/pose/pose/position/x"]
-    said = subprocess.run(command, env=env, capture_output=True, text=True, check=False).stdout.split()
-    return float(said[0]) if said else 0.0
+def wait_until_driven(env: dict[str, str]) -> None:
+    """Wait until the robot has driven ahead."""
+    command = ["rostopic", "echo", f"{ODOM}/pose/pose/position/x"]
+    with subprocess.Popen(command, env=env, stdout=subprocess.PIPE, text=True) as echo:
+        patience = threading.Timer(PATIENCE_S, echo.kill)
+        patience.start()
+        assert echo.stdout is not None
+        driven = any(line != "---\n" and float(line) >= DRIVEN_M for line in echo.stdout)
+        patience.cancel()
+        echo.kill()
+    if not driven:
+        sys.exit(f"the robot has not driven {DRIVEN_M:g} m within {PATIENCE_S:g} s")
 
 
 if __name__ == "__main__":
