@@ -32,6 +32,8 @@ class _Forks:
     def __init__(self, python: str, env: dict[str, str]) -> None:
         self._channel, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         with theirs:
+            for end in (self._channel, theirs):
+                end.setblocking(True)  # rospy sets a timeout for all sockets of a process
             command = [python, __file__, str(theirs.fileno())]
             self._process = subprocess.Popen(command, env=env, pass_fds=[theirs.fileno()], stdin=subprocess.DEVNULL)
         atexit.register(self._end)
