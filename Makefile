@@ -10,8 +10,8 @@ unexport PYTHONDONTWRITEBYTECODE
 # The matrices are small and tests run in parallel, so NumPy's threads would only wait for each other.
 export OPENBLAS_NUM_THREADS := 1
 
-# Many tests wait for processes, or for what takes its time: two workers more than processors keep these busy.
-WORKERS ?= $(shell expr $$(getconf _NPROCESSORS_ONLN) + 2)
+# Many tests wait for processes, or for what takes its time: one worker more than processors keeps these busy.
+WORKERS ?= $(shell expr $$(getconf _NPROCESSORS_ONLN) + 1)
 PLAIN := not (ros1 or ros2 or netns or exhaustive)
 
 .PHONY: help run check test test-all ros1 test-ros1 ros2 test-ros2 lint fuzz format lock bench bench-drive bench-signs signs-model landmark-model models docs site faults soak screenshots \

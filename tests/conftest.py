@@ -101,7 +101,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         if set(getattr(item, "fixturenames", ())) & _NETWORKS:
             item.add_marker(pytest.mark.netns)
         if item.get_closest_marker("slow") and item.nodeid.startswith(RUN_AGAIN):
-            reruns = 0 if item.get_closest_marker("browser") else 0  # drawn in software, next to other tests
+            reruns = 2 if item.get_closest_marker("browser") else 1  # drawn in software, next to other tests
             item.add_marker(pytest.mark.flaky(reruns=reruns, reruns_delay=3))
 
 
