@@ -50,18 +50,19 @@ def main(path: Path) -> None:
             "ROS_PACKAGE_PATH": str(ROOT / "ros"),
         }
         run(process(["roscore", "-p", port], env))
-        until(lambda: not subprocess.run(["rostopic", "list"], env=env, capture_output=True, check=False).returncode)
+        master = ["rostopic", "list"]
+        until("roscore", lambda: not subprocess.run(master, env=env, capture_output=True, check=False).returncode)
         # Neutral now and then: on a busy machine, the control may stop for late signs, and waits for it.
         script = "Stop:1 Forward:20"
         subprocess.run(["rosparam", "set", "/my_camera/virtual_hand/script", script], env=env, check=True)
         drive = ["ros_hand_gesture_recognition", "sign_control.launch", "camera_name:=virtual", "show_image:=false"]
         run(process(["roslaunch", "ros_mobile_robot", "drive_robot.launch", "rviz:=true"], env))
         # Or the robot might be anywhere before it is drawn.
-        until(lambda: "/rviz" in subscribers("/gesture/image_annotated", env))
+        until("RViz", lambda: "/rviz" in subscribers("/gesture/image_annotated", env))
         run(process(["roslaunch", *drive], env))
         wait_until_driven(env)
         path.parent.mkdir(parents=True, exist_ok=True)
-        until(lambda: is_drawn(path, env))
+        until("RViz's view", lambda: is_drawn(path, env))
     size = path.stat().st_size
     if size > LARGEST_BYTES:
         sys.exit(f"{path} has {size} bytes, more than {LARGEST_BYTES}")
@@ -92,12 +93,12 @@ def process(command: list[str], env: dict[str, str], pass_fds: tuple[int, ...] =
         running.wait(60)
 
 
-def until(condition: Callable[[], bool]) -> None:
+def until(what: str, condition: Callable[[], bool]) -> None:
     """Wait until ``condition`` holds."""
     end_s = time.monotonic() + PATIENCE_S
     while not condition():
         if time.monotonic() > end_s:
-            sys.exit(f"not ready after {PATIENCE_S:g} s")
+            sys.exit(f"{what} is not ready after {PATIENCE_S:g} s")
         time.sleep(0.2)
 
 

@@ -156,7 +156,7 @@ def test_a_fast_run_takes_the_same_way_each_time(capsys: pytest.CaptureFixture[s
 def test_a_file_plays_once_in_a_headless_run(capsys: pytest.CaptureFixture[str], slideshow: Path) -> None:
     summary = json.loads(prints(capsys, "run", "--headless", "--camera", str(slideshow), "--json"))
     assert summary["frames"] == 270
-    assert summary["duration_s"] == pytest.approx(22.5, abs=2.0)
+    assert 22.0 < summary["duration_s"] < 45.0  # as long as the video, or more where the machine is busy
     assert sum(summary["signs"].values()) > 0  # how many is a matter of the machine's speed: --fast leaves none out
 
 

@@ -125,7 +125,7 @@ class ControlContract:
         driver.expect((0.03, 0.0), (0.03, 0.4))
 
     def test_zero_when_signs_stop_then_silence(self, drive: MakeDriver) -> None:
-        driver = drive()
+        driver = drive("--control.sign-timeout", "2")  # longer than a busy machine pauses between two signs
         driver.show("Forward", count=2)
         driver.expect((0.01, 0.0), (0.02, 0.0), (0.0, 0.0))
         time.sleep(0.6)
@@ -168,15 +168,16 @@ class ControlContract:
             seen = len(driver.twists)
             driver.show(neutral, count=count)
             driver.show("Forward", count=5)
-            eventually(lambda: len(driver.twists) >= seen + count + 5, what="a twist for each sign")
-            return driver.twists[-1][0] > 0.0
+            time.sleep(0.3)  # signs that come late are not answered, so there is nothing to wait for
+            return any(speed > 0.0 for speed, _ in driver.twists[seen:])
 
         eventually(lambda: drives_after("NONE", 40), what="the robot to be driven")
         driver.show("Stop")
         time.sleep(0.6)
         seen = len(driver.twists)
         driver.show("Forward", count=5)
-        eventually(lambda: len(driver.twists) >= seen + 5, what="a twist for each sign")
+        eventually(lambda: len(driver.twists) > seen, what="an answer")
+        time.sleep(0.3)
         assert set(driver.twists[seen:]) == {(0.0, 0.0)}
         eventually(lambda: drives_after("Stop", 1), what="the robot to be driven")
 
