@@ -7,8 +7,11 @@ from collections.abc import Iterator
 import pytest
 
 from handsteer.errors import TransportError
-from handsteer.transports.ros1.master import Lifeline, Master, MasterGone
 from tests.processes import free_port
+
+pytest.importorskip("rosgraph")
+
+from handsteer.transports.ros1.master import Lifeline, Master, MasterGone  # it imports rosgraph
 
 
 @pytest.fixture
