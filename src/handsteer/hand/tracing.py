@@ -178,7 +178,9 @@ class _Bundle:
         weights *= along
         normals -= self._axis.swapaxes(1, 2) @ weights
         normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), np.float32(1e-6))
-        above, _ = _smooth_least(self._each(points + normals * _SKY_M)[0])
+        raised = points.copy()
+        raised += normals * _SKY_M
+        above, _ = _smooth_least(self._each(raised)[0])
         sky = np.clip((above - distance) / _SKY_M, 0.0, 1.0)
         clearance = np.minimum(clearance, distance)
         return travelled[:, 0], normals, materials, clearance[:, 0], sky[:, 0]
@@ -300,4 +302,7 @@ def _smooth_least(distances: Float) -> tuple[Float, Float]:
     np.exp(weights, out=weights)
     total = weights.sum(axis=1, keepdims=True)
     weights /= total
-    return nearest - np.float32(BLEND_M) * np.log(total), weights
+    np.log(total, out=total)
+    total *= np.float32(BLEND_M)
+    nearest -= total
+    return nearest, weights
