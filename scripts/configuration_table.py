@@ -1,5 +1,6 @@
 """Writes docs/configuration.md from the configuration models: each parameter with its default, range and meaning."""
 
+import inspect
 import sys
 from pathlib import Path
 from typing import Any, Literal, get_args, get_origin
@@ -47,7 +48,7 @@ def _section(name: str, section: Any) -> str:
     head = [
         f"## {name}",
         "",
-        section.__doc__ or "",
+        inspect.cleandoc(section.__doc__ or ""),
         "",
         "| parameter | default | allowed | meaning |",
         "|---|---|---|---|",
