@@ -1,7 +1,7 @@
 import math
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from handsteer.config import ControlConfig
@@ -182,11 +182,12 @@ def test_a_robot_that_was_held_back_does_not_speed_up_by_itself(cruising: Cruise
 
 
 @given(steps)
+@example([(FORWARD, 0.0), (TURN_RIGHT, 0.125), (FORWARD, 0.125), (NONE, 0.03125), (None, 0.1875), (FORWARD, 0.0)])
 def test_cruise_is_within_limits_and_no_message_makes_it_faster_than_time_does(
     shown: list[tuple[str | None, float]],
 ) -> None:
     control = CruiseControl(CRUISE)
-    before = ZERO
+    before, interrupted = ZERO, False
     for sign, dt_s in shown:
         control.step(sign, dt_s)
         now = control.velocity
@@ -196,5 +197,7 @@ def test_cruise_is_within_limits_and_no_message_makes_it_faster_than_time_does(
         assert abs(now.linear_mps) - abs(before.linear_mps) <= CRUISE.cruise_acceleration * CRUISE.sign_timeout + 1e-6
         if sign in {STOP, NONE}:
             assert now == ZERO
-        if sign != NONE:  # after which it continues from where it was
+        # After NONE, with or without a pause, it continues from where it was.
+        interrupted = sign == NONE or (sign is None and interrupted)
+        if not interrupted:
             before = now
