@@ -17,7 +17,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import IO, Any
 
@@ -190,12 +190,13 @@ def _become(request: dict[str, Any], files: list[int]) -> list[str]:
     if os.environ.get("PYTHONUNBUFFERED"):
         for text in (sys.stdout, sys.stderr):
             text.reconfigure(write_through=True)  # type: ignore[union-attr]
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     words: list[str] = request["words"]
     return words
 
 
-def _program(words: list[str]) -> Callable[[], object]:
-    """Return what runs the module or the script of ``words``, with its own arguments and folder in place."""
+def _run(words: list[str]) -> None:
+    """Run the module or the script of ``words``, with its own arguments and folder in place."""
     keeps_path = words[0] == "-P"
     words = words[keeps_path:]
     if words[0] == "-m":
@@ -203,15 +204,14 @@ def _program(words: list[str]) -> Callable[[], object]:
         sys.argv = [module, *words[2:]]
         if not keeps_path:
             sys.path.insert(0, str(Path.cwd()))
-        return lambda: runpy.run_module(module, run_name="__main__", alter_sys=True)
-    sys.argv = words
-    sys.path.insert(0, str(Path(words[0]).resolve().parent))
-    return lambda: runpy.run_path(words[0], run_name="__main__")
+        runpy.run_module(module, run_name="__main__", alter_sys=True)
+    else:
+        sys.argv = words
+        sys.path.insert(0, str(Path(words[0]).resolve().parent))
+        runpy.run_path(words[0], run_name="__main__")
 
 
 if __name__ == "__main__":
     del sys.path[0]  # the tests' folders are named as what they test
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C of who runs the tests; it ends when its channel does
-    run = _program(_serve(socket.socket(fileno=int(sys.argv[1]))))
-    signal.signal(signal.SIGINT, signal.default_int_handler)
-    run()
+    _run(_serve(socket.socket(fileno=int(sys.argv[1]))))
