@@ -12,6 +12,8 @@ export OPENBLAS_NUM_THREADS := 1
 
 # Many tests wait for processes, or for what takes its time: one worker more than processors keeps these busy.
 WORKERS ?= $(shell expr $$(getconf _NPROCESSORS_ONLN) + 1)
+# The tests come in an order of their own, the longest first.
+PARALLEL = -n $(WORKERS) --dist loadgroup --no-loadscope-reorder
 PLAIN := not (ros1 or ros2 or netns or exhaustive)
 
 .PHONY: help run check test test-all ros1 test-ros1 ros2 test-ros2 lint fuzz format lock bench bench-drive bench-signs signs-model landmark-model models docs site faults soak screenshots \
@@ -45,13 +47,13 @@ run: $(BIN)/.run models
 	@$(BIN)/handsteer run $(ARGS)
 
 check: lint models
-	@HANDSTEER_FUZZ_CASES=200 $(BIN)/pytest -n $(WORKERS) --dist loadgroup -m "not (slow or browser)" $(ARGS)
+	@HANDSTEER_FUZZ_CASES=200 $(BIN)/pytest $(PARALLEL) -m "not (slow or browser)" $(ARGS)
 
 test: lint models
-	@HANDSTEER_STEPS=20000 $(BIN)/pytest -n $(WORKERS) --dist loadgroup -m "$(PLAIN)" --durations=10 $(ARGS)
+	@HANDSTEER_STEPS=5000 $(BIN)/pytest $(PARALLEL) -m "$(PLAIN)" --durations=10 $(ARGS)
 
 test-all: lint models
-	@HANDSTEER_STEPS=20000 $(BIN)/pytest -n $(WORKERS) --dist loadgroup --durations=30 $(ARGS)
+	@HANDSTEER_STEPS=20000 $(BIN)/pytest $(PARALLEL) --durations=30 $(ARGS)
 
 lint: $(BIN)/.dev
 	@$(BIN)/ruff format --check .
@@ -67,13 +69,13 @@ ros1: $(BIN)/.dev
 	@scripts/setup-ros1
 
 test-ros1: $(BIN)/.dev models
-	@$(BIN)/pytest -n auto --dist loadgroup -m ros1 $(ARGS)
+	@$(BIN)/pytest $(PARALLEL) -m ros1 $(ARGS)
 
 ros2: $(BIN)/.dev
 	@scripts/setup-ros2
 
 test-ros2: $(BIN)/.dev models
-	@$(BIN)/pytest -n auto --dist loadgroup -m ros2 $(ARGS)
+	@$(BIN)/pytest $(PARALLEL) -m ros2 $(ARGS)
 
 models: | $(BIN)/.run
 	@$(BIN)/handsteer models > /dev/null

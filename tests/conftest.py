@@ -42,8 +42,14 @@ RUN_AGAIN = (
 time, which a machine that is busy with other things may upset. What is wrong fails each time; the last line of a run
 counts what was run again."""
 
+BROWSERS = 2
+"""How many processes run the tests with browsers."""
+
 LONG_VALUE = 100
 """Longer texts, in characters, are not part of a test's name."""
+
+LONGEST_REASON = 3000
+"""The end of a failure that is printed of a test that was run again, in characters."""
 
 DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 
@@ -91,18 +97,34 @@ def pytest_configure() -> None:
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Mark what is in :data:`RUN_AGAIN`, what makes networks by the fixtures that make them, and what runs together.
 
-    With ``--dist loadgroup``, one process runs the tests of a file, and one all that need a browser: only one browser
-    at a time shows pages, for which others would wait.
+    With ``--dist loadgroup``, one process runs the tests of a file, and :data:`BROWSERS` those that need a browser, of
+    which each would draw pages without a graphics card. What takes longest comes first, so that no process is left
+    with it at the end: groups with browsers, then those with other slow tests.
     """
+    pages = sorted({item.path for item in items if item.get_closest_marker("browser")})
+    ranks: dict[str, int] = {}
     for item in items:
         if not item.get_closest_marker("xdist_group"):
-            group = "browser" if item.get_closest_marker("browser") else item.nodeid.partition("::")[0]
+            browser = item.get_closest_marker("browser")
+            group = f"browser {pages.index(item.path) % BROWSERS}" if browser else item.nodeid.partition("::")[0]
             item.add_marker(pytest.mark.xdist_group(group))
         if set(getattr(item, "fixturenames", ())) & _NETWORKS:
             item.add_marker(pytest.mark.netns)
         if item.get_closest_marker("slow") and item.nodeid.startswith(RUN_AGAIN):
             reruns = 2 if item.get_closest_marker("browser") else 1  # drawn in software, next to other tests
             item.add_marker(pytest.mark.flaky(reruns=reruns, reruns_delay=3))
+        ranks[_group(item)] = max(ranks.get(_group(item), 0), _rank(item))
+    items.sort(key=lambda item: -ranks[_group(item)])
+
+
+def _group(item: pytest.Item) -> str:
+    marker = item.get_closest_marker("xdist_group")
+    assert marker is not None
+    return str(marker.args[0])
+
+
+def _rank(item: pytest.Item) -> int:
+    return 2 if item.get_closest_marker("browser") else 1 if item.get_closest_marker("slow") else 0
 
 
 def pytest_make_parametrize_id(val: object, argname: str) -> str | None:
@@ -127,6 +149,13 @@ def pytest_runtest_teardown(item: pytest.Item, nextitem: pytest.Item | None) -> 
         from tests.dashboard.browsers import close_shared  # noqa: PLC0415 - most files need no browser
 
         close_shared()
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """Print why tests were run again: else the failure of a first try is lost."""
+    for report in terminalreporter.stats.get("rerun", ()):
+        terminalreporter.section(f"run again: {report.nodeid}", sep="_")
+        terminalreporter.write_line(report.longreprtext[-LONGEST_REASON:])
 
 
 @pytest.fixture(scope="module")

@@ -1,35 +1,13 @@
-"""One Chromium for all tests of a process, with nothing kept from one to the next.
-
-Only one process at a time shows pages: without a graphics card, two that draw the 3D view take all of a small machine.
-"""
+"""One Chromium for all tests of a process, with nothing kept from one to the next."""
 
 import atexit
-import fcntl
-import tempfile
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 
 from playwright.sync_api import Browser, Playwright, sync_playwright
 from scripts import chromium
-
-_LOCK = Path(tempfile.gettempdir()) / "handsteer-tests-browser.lock"
-_depth = 0
-
-
-@contextmanager
-def alone() -> Iterator[None]:
-    """Wait until no other process of the tests shows pages, and keep them from it meanwhile."""
-    global _depth  # noqa: PLW0603
-    with ExitStack() as stack:
-        if _depth == 0:
-            fcntl.flock(stack.enter_context(_LOCK.open("w")), fcntl.LOCK_EX)
-        _depth += 1
-        try:
-            yield
-        finally:
-            _depth -= 1
 
 
 @contextmanager
@@ -39,23 +17,22 @@ def a_browser(webcam: Path | None = None) -> Iterator[Browser]:
     Args:
         webcam: The video that it takes for its webcam; such a browser is started for it alone.
     """
-    with alone():
-        if webcam is not None:
-            browser = chromium.launch(_playwright(), webcam)
-            try:
-                yield browser
-            finally:
-                browser.close()
-            return
-        browser = _shared()
-        if not browser.is_connected():  # a test has crashed it
-            _shared.cache_clear()
-            browser = _shared()
+    if webcam is not None:
+        browser = chromium.launch(_playwright(), webcam)
         try:
             yield browser
         finally:
-            for context in browser.contexts:
-                context.close()
+            browser.close()
+        return
+    browser = _shared()
+    if not browser.is_connected():  # a test has crashed it
+        _shared.cache_clear()
+        browser = _shared()
+    try:
+        yield browser
+    finally:
+        for context in browser.contexts:
+            context.close()
 
 
 def close_shared() -> None:

@@ -1,6 +1,7 @@
 """Random histories over the real recognition, control and relay in stepped time: never a motion without a live reason.
 
-``make check`` takes 4,000 steps, ``make test`` 20,000, ``make soak`` a million: HANDSTEER_STEPS says how many.
+HANDSTEER_STEPS says how many steps: ``make check`` takes 4,000, ``make test`` 5,000, ``make test-all`` 20,000 and
+``make soak`` a million.
 """
 
 import logging

@@ -56,7 +56,7 @@ def report(sign: str, hand: Handedness, outcome: Outcome) -> None:
     )
 
 
-@pytest.mark.parametrize("hand", ["Right", "Left"])
+@pytest.mark.parametrize("hand", ["Right", pytest.param("Left", marks=pytest.mark.exhaustive)])
 @pytest.mark.parametrize("sign", SIGNS)
 def test_random_views_are_found_where_they_are(sign: str, hand: Handedness) -> None:
     outcome = look_at(sign, hand, VIEWS, NEAR_M)
@@ -67,6 +67,7 @@ def test_random_views_are_found_where_they_are(sign: str, hand: Handedness) -> N
     assert outcome.read[sign] >= 0.8 * len(outcome.errors)
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("hand", ["Right", "Left"])
 @pytest.mark.parametrize("sign", SIGNS)
 def test_most_views_are_found_from_further_away(sign: str, hand: Handedness) -> None:
