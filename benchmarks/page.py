@@ -26,7 +26,7 @@ from urllib.parse import urlsplit
 import cv2
 import numpy as np
 import socketio
-from playwright.sync_api import Browser, Page, sync_playwright
+from playwright.sync_api import Browser, Page
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # for the relay and the browser that the tests use
 
@@ -130,7 +130,7 @@ def film(path: Path, script: str, fps: int = FILM_FPS) -> None:
 
 @contextmanager
 def browser() -> Iterator[Browser]:
-    with sync_playwright() as playwright:
+    with chromium.playwright() as playwright:
         chrome = chromium.launch(playwright)
         try:
             yield chrome

@@ -3,9 +3,11 @@
 import ctypes
 import shutil
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
-from playwright.sync_api import Browser, Playwright
+from playwright.sync_api import Browser, Playwright, sync_playwright
 
 NAMES = ("chromium", "chromium-browser", "google-chrome")
 
@@ -30,11 +32,24 @@ def find() -> str | None:
     return next((path for name in NAMES if (path := shutil.which(name))), None)
 
 
+@contextmanager
+def playwright() -> Iterator[Playwright]:
+    """Give Playwright, of which :func:`launch` starts Chromium.
+
+    As root, Chromium raises the priority of its rendering, which takes all processors here, above the graph's; what
+    Playwright starts may not.
+    """
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(_PR_CAPBSET_DROP, _CAP_SYS_NICE)
+    with sync_playwright() as started:
+        yield started
+
+
 def launch(playwright: Playwright, webcam: Path | None = None) -> Browser:
     """Return a Chromium with a fresh profile and software WebGL.
 
     Args:
-        playwright: Starts it.
+        playwright: What :func:`playwright` gives.
         webcam: Motion JPEG file (``.mjpeg``) that its webcam plays in a loop; no webcam without it.
 
     Raises:
@@ -43,9 +58,6 @@ def launch(playwright: Playwright, webcam: Path | None = None) -> Browser:
     path = find()
     if path is None:
         raise FileNotFoundError(f"no browser found: install one of {', '.join(NAMES)}")
-    if sys.platform == "linux":
-        # As root, Chromium raises the priority of its rendering, which takes all processors here, above the graph's.
-        ctypes.CDLL(None).prctl(_PR_CAPBSET_DROP, _CAP_SYS_NICE)
     flags = [*_FLAGS]
     if webcam is not None:
         flags += ["--use-fake-device-for-media-stream", "--use-fake-ui-for-media-stream"]

@@ -1,7 +1,6 @@
 """Draws the icons of the installed page from its SVG: python scripts/icons.py."""
 
 import chromium
-from playwright.sync_api import sync_playwright
 
 from handsteer.dashboard.elements import STATIC
 from handsteer.dashboard.page import ICON
@@ -13,7 +12,7 @@ _FILES = {"icon-192": (192, ICON), "icon-512": (512, ICON), "icon-full": (512, _
 
 def main() -> None:
     """Write the files."""
-    with sync_playwright() as playwright:
+    with chromium.playwright() as playwright:
         page = chromium.launch(playwright).new_page()
         for name, (size, drawing) in _FILES.items():
             page.set_viewport_size({"width": size, "height": size})

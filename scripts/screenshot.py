@@ -9,10 +9,10 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+import chromium
 import cv2
 import numpy as np
-from chromium import launch
-from playwright.sync_api import Page, sync_playwright
+from playwright.sync_api import Page
 from slalom_lap import COURSE, SlalomLap
 
 from handsteer.config import load
@@ -55,11 +55,11 @@ def main() -> None:
 def opened(sections: dict[str, Any]) -> Iterator[tuple[Page, Graph]]:
     """Show the page of a graph with these parameters, which is not started."""
     config = load(base={**sections, "dashboard": {"port": 0}})
-    with Graph(config, steering=False) as graph, sync_playwright() as playwright:
+    with Graph(config, steering=False) as graph, chromium.playwright() as playwright:
         dashboard = PageProcess()
         url = dashboard.serve(graph)
         try:
-            browser = launch(playwright)
+            browser = chromium.launch(playwright)
             page = browser.new_page(viewport={"width": WIDTH, "height": HEIGHT}, color_scheme="light")
             # The hand in full, and no first steps.
             page.add_init_script(

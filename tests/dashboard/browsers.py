@@ -2,11 +2,11 @@
 
 import atexit
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from functools import cache
 from pathlib import Path
 
-from playwright.sync_api import Browser, Playwright, sync_playwright
+from playwright.sync_api import Browser, Playwright
 from scripts import chromium
 
 
@@ -44,9 +44,9 @@ def close_shared() -> None:
 
 @cache
 def _playwright() -> Playwright:
-    playwright = sync_playwright().start()
-    atexit.register(playwright.stop)
-    return playwright
+    stack = ExitStack()
+    atexit.register(stack.close)
+    return stack.enter_context(chromium.playwright())
 
 
 @cache
