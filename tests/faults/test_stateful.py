@@ -21,8 +21,8 @@ from handsteer.nodes.control import HandSignControlNode
 from handsteer.nodes.recognition import HandSignRecognitionNode
 from handsteer.recognition.recognizer import annotate, open_classifier
 from handsteer.robots.command_limiter import CommandLimiter
-from handsteer.robots.diff_drive import Velocity
 from handsteer.transports.base import Received
+from handsteer.types import Velocity
 from tests.faults.domain import Domain
 from tests.faults.painted import FPS, PaintedCamera, painted_recognizer
 from tests.faults.rules import Rules

@@ -115,10 +115,6 @@ class Robot(Protocol):
         """Return the nodes that command it in a graph of its own, this one included; empty without such a graph."""
         ...
 
-    def reset(self) -> None:
-        """Reset the robot and the obstacles to the start."""
-        ...
-
     def close(self) -> None:
         """Stop and release all resources; may be called twice."""
         ...

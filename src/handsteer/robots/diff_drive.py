@@ -8,15 +8,7 @@ import math
 from dataclasses import dataclass
 
 from handsteer.config import RobotConfig
-from handsteer.types import Pose2D
-
-
-@dataclass(frozen=True)
-class Velocity:
-    """A velocity on the floor: forward in m/s, and turning in rad/s, left positive (REP 103)."""
-
-    linear_mps: float = 0.0
-    angular_radps: float = 0.0
+from handsteer.types import ZERO, Pose2D, Velocity
 
 
 @dataclass(frozen=True)
@@ -29,9 +21,9 @@ class DriveState:
         velocity: The velocity commanded to the wheels now, within all limits.
     """
 
-    target: Velocity = Velocity()
+    target: Velocity = ZERO
     target_age_s: float = 0.0
-    velocity: Velocity = Velocity()
+    velocity: Velocity = ZERO
 
 
 def step(state: DriveState, command: Velocity | None, dt_s: float, config: RobotConfig) -> DriveState:
@@ -47,8 +39,8 @@ def step(state: DriveState, command: Velocity | None, dt_s: float, config: Robot
     if command is None:
         target, age_s = state.target, state.target_age_s + dt_s
     else:
-        target, age_s = (command if _is_finite(command) else Velocity()), 0.0
-    wanted = target if age_s < config.cmd_vel_timeout else Velocity()
+        target, age_s = (command if command.is_finite else ZERO), 0.0
+    wanted = target if age_s < config.cmd_vel_timeout else ZERO
     velocity = Velocity(
         _limit(wanted.linear_mps, state.velocity.linear_mps, config.max_linear, config.max_linear_acceleration * dt_s),
         _limit(
@@ -94,10 +86,6 @@ def integrate(pose: Pose2D, left: float, right: float, config: RobotConfig) -> P
         pose.y + chord * math.sin(pose.yaw + half_turn),
         math.remainder(pose.yaw + moved.angular_radps, math.tau),
     )
-
-
-def _is_finite(velocity: Velocity) -> bool:
-    return math.isfinite(velocity.linear_mps) and math.isfinite(velocity.angular_radps)
 
 
 def _limit(wanted: float, now: float, highest: float, largest_change: float) -> float:

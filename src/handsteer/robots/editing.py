@@ -56,11 +56,15 @@ class InWorld(Robot, Protocol):
     def change(self, world: World) -> None:
         """Stop the robot where it is, and replace the world around it by ``world``.
 
-        Things that are the same in both worlds stay where they are.
+        Things that are the same in both worlds stay where they are, even if they were pushed.
 
         Raises:
             WorldError: Something new would overlap the robot or its start; nothing has changed.
         """
+        ...
+
+    def reset(self) -> None:
+        """Reset the robot, the obstacles, odometry and collisions; the time continues."""
         ...
 
     def reset_odometry(self) -> None:
@@ -74,11 +78,9 @@ def add(world: World, shape: Shape, robot: Pose2D) -> World:
     Raises:
         WorldError: There are too many already.
     """
-    if len(world.obstacles) >= MOST_OBSTACLES:
-        raise WorldError(f"the world is full: {MOST_OBSTACLES} things are the most that can be put in by hand")
     fields = {"name": unique_name(world, shape), "shape": shape, "position": (0.0, 0.0), **_NEW[shape]}
     radius = footprint_m(_checked(world, [fields]).obstacles[-1])
-    return _checked(world, [*_dumped(world), {**fields, "position": free_place(world, robot, radius)}])
+    return _with_thing(world, {**fields, "position": free_place(world, robot, radius)})
 
 
 def add_wall(world: World, start: Place, end: Place) -> World:
@@ -87,13 +89,11 @@ def add_wall(world: World, start: Place, end: Place) -> World:
     Raises:
         WorldError: There are too many things already, or the wall is too short or too long.
     """
-    if len(world.obstacles) >= MOST_OBSTACLES:
-        raise WorldError(f"the world is full: {MOST_OBSTACLES} things are the most that can be put in by hand")
     (x, y), (to_x, to_y) = start, end
     size = (round(math.dist(start, end), 3), _WALL_WIDTH_M, _WALL_HEIGHT_M)
     fields: dict[str, Any] = {"name": unique_name(world, "wall"), "shape": "box", "size": size, "colour": "#9aa3b2"}
     fields |= {"position": _rounded(((x + to_x) / 2, (y + to_y) / 2)), "yaw": round(math.atan2(to_y - y, to_x - x), 4)}
-    return _checked(world, [*_dumped(world), fields])
+    return _with_thing(world, fields)
 
 
 def add_gate(world: World, left: Place, right: Place) -> World:
@@ -294,6 +294,12 @@ def _index(world: World, name: str, section: Section) -> int:
 
 def _dumped(world: World, section: Section = "obstacles") -> list[dict[str, Any]]:
     return [thing.model_dump() for thing in _things(world, section)]
+
+
+def _with_thing(world: World, fields: dict[str, Any]) -> World:
+    if len(world.obstacles) >= MOST_OBSTACLES:
+        raise WorldError(f"the world is full: {MOST_OBSTACLES} things are the most that can be put in by hand")
+    return _checked(world, [*_dumped(world), fields])
 
 
 def _checked(world: World, things: list[dict[str, Any]], section: Section = "obstacles") -> World:

@@ -10,12 +10,11 @@ from typing import Any
 from handsteer.config import RobotConfig
 from handsteer.messages import CMD_VEL, LaserScan, Odometry, Topic, TurtlePose, type_name, yaw_of
 from handsteer.robots import Obstacle, RangeScan, RobotState
-from handsteer.robots.command_limiter import ZERO, CommandLimiter
+from handsteer.robots.command_limiter import CommandLimiter
 from handsteer.robots.description import robot_description
-from handsteer.robots.diff_drive import Velocity
 from handsteer.transports.base import Received, Session
 from handsteer.transports.commands import Commands
-from handsteer.types import Pose2D
+from handsteer.types import ZERO, Pose2D, Velocity
 
 log = logging.getLogger(__name__)
 
@@ -134,10 +133,6 @@ class RemoteRobot:
     def commanders(self) -> list[str]:
         """Return the nodes that publish on its command topic."""
         return self._session.transport.publishers_of(self._topic)
-
-    def reset(self) -> None:
-        """Stop it where it is; a real robot cannot be moved back."""
-        self.command(0.0, 0.0)
 
     def close(self) -> None:
         """Send several zeros; may be called twice."""
