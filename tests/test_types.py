@@ -3,8 +3,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from handsteer.config import ControlConfig
+from handsteer.control import TwistMux
 from handsteer.control.sign_control import SignControl
-from handsteer.control.twist_mux import TwistMux
 from handsteer.types import (
     ACTIONS,
     EFFECTS,
