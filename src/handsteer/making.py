@@ -92,20 +92,12 @@ def make_recognition(
     """
     from handsteer.nodes.recognition import HandSignRecognitionNode
     from handsteer.recognition.hand_joystick import HandJoystick
-    from handsteer.recognition.recognizer import Recognizer, annotate, open_classifier
+    from handsteer.recognition.recognizer import Recognizer
 
     recognizer = Recognizer(config)
     _warn_of_unknown_signs(config, recognizer.signs)
-    return HandSignRecognitionNode(
-        transport,
-        clock,
-        recognizer,
-        config.signs,
-        annotate,
-        joystick=HandJoystick(config.joystick),
-        open_classifier=open_classifier,
-        **topics,
-    )
+    joystick = HandJoystick(config.joystick)
+    return HandSignRecognitionNode(transport, clock, recognizer, config.signs, joystick=joystick, **topics)
 
 
 def cmd_vel_topic(config: Config) -> Topic[Any]:

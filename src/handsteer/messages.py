@@ -180,11 +180,11 @@ def twist(linear_mps: float, angular_radps: float) -> Twist:
     return Twist(linear=Vector3(linear_mps, 0.0, 0.0), angular=Vector3(0.0, 0.0, angular_radps))
 
 
-def cmd_vel(kind: CmdVelType, topic: Topic[Any] = CMD_VEL) -> Topic[Any]:
-    """Return ``topic``, a topic of velocity commands, with messages of ``kind``."""
+def cmd_vel(kind: CmdVelType) -> Topic[Any]:
+    """Return the topic of velocity commands with messages of ``kind``."""
     kinds = {"twist": (Twist, None), "twist_stamped": (TwistStamped, None), "auto": (Twist, TwistStamped)}
     of, instead = kinds[kind]
-    return replace(topic, type=of, or_type=instead)
+    return replace(CMD_VEL, type=of, or_type=instead)
 
 
 def command(topic: Topic[Any], linear_mps: float, angular_radps: float, stamp: Time, frame_id: str) -> Any:

@@ -26,10 +26,6 @@ _LOOK_PERIOD_S = 0.5
 log = logging.getLogger(__name__)
 
 
-def _alone(_node: Any, _config: Config) -> AbstractContextManager[None]:
-    return nullcontext()
-
-
 @contextmanager
 def _served(node: Any, config: Config) -> Iterator[None]:
     # The page's libraries take a second to load, which the other nodes do not need.
@@ -70,7 +66,7 @@ class Job:
     file: Path | None = None
     given: dict[str, Any] | None = None
     shorthand: dict[str, Any] | None = None
-    companion: Callable[[Any, Config], AbstractContextManager[None]] = _alone
+    companion: Callable[[Any, Config], AbstractContextManager[None]] = lambda *_: nullcontext()
 
     def settings(self, service: dict[str, Any] | None = None) -> Config:
         """Return the parameters; ``service`` are those from the graph."""
@@ -86,15 +82,10 @@ JOBS = {
 }
 
 
-def load(verb: str) -> None:
-    """Import a node's module, before signals can interrupt the import."""
-    importlib.import_module(f"handsteer.nodes.{verb}")
-
-
 def run_ros1(verb: str, words: Sequence[str]) -> int:
     """Run a node with ROS 1 arguments only; return the exit code."""
     set_up_logging()
-    load(verb)
+    importlib.import_module(f"handsteer.nodes.{verb}")  # before signals can interrupt the import
     signals.interrupt_on_signals()
     return exit_code(lambda: run(JOBS[verb], "ros1", tuple(words)))
 

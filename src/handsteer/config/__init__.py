@@ -216,8 +216,8 @@ def cmd_vel_type(config: Config) -> CmdVelType:
     return robot if control == "auto" else control
 
 
-def validate(section: type[S], values: Any, where: str = "") -> S:
-    """Return ``section`` built from ``values``; ``where`` is added to the message of an error.
+def validate(section: type[S], values: Any) -> S:
+    """Return ``section`` built from ``values``.
 
     Raises:
         ConfigError: A field is unknown, of a wrong type or out of range.
@@ -225,7 +225,7 @@ def validate(section: type[S], values: Any, where: str = "") -> S:
     try:
         return section.model_validate(values)
     except ValidationError as error:
-        raise ConfigError(describe(error, section) + where) from None
+        raise ConfigError(describe(error, section)) from None
 
 
 def describe(error: ValidationError, section: type[Section] | None = None) -> str:
