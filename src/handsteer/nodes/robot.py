@@ -73,8 +73,7 @@ class RobotNode(Node):
         robot: The robot to drive.
         config: Names of the coordinate frames, and whether to publish ``/clock``.
         cmd_vel: Topic of the commands, with Twist or TwistStamped.
-        odom: Topic of the odometry.
-        scan: Topic of the laser scans.
+        odom, scan: Topics of the odometry and the laser scans.
 
     Attributes:
         state: The robot's newest state.

@@ -3,12 +3,12 @@
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Literal, Protocol, runtime_checkable
+from typing import Any, Literal
 
 from pydantic import ValidationError
 
 from handsteer.errors import WorldError
-from handsteer.robots import Robot, Shape
+from handsteer.robots import Shape
 from handsteer.robots.world import Box, Cylinder, Gate, Sphere, Thing, World, describe_problem
 from handsteer.types import Pose2D
 
@@ -32,44 +32,6 @@ _WALL_WIDTH_M, _WALL_HEIGHT_M = 0.1, 0.5
 _ROBOT_RADIUS_M = 0.4
 _GAP_M = 0.1
 _RING_M = 0.5
-
-
-@runtime_checkable
-class InWorld(Robot, Protocol):
-    """A robot in a world that can be changed, such as a simulated one.
-
-    Attributes:
-        world: Its world, with all things in their initial places.
-    """
-
-    @property
-    def world(self) -> World: ...  # noqa: D102
-
-    def enter(self, world: World) -> None:
-        """Move the robot to the start of another world; odometry and collisions are reset to 0.
-
-        Raises:
-            WorldError: The world cannot be used; nothing has changed.
-        """
-        ...
-
-    def change(self, world: World) -> None:
-        """Stop the robot where it is, and replace the world around it by ``world``.
-
-        Things that are the same in both worlds stay where they are, even if they were pushed.
-
-        Raises:
-            WorldError: Something new would overlap the robot or its start; nothing has changed.
-        """
-        ...
-
-    def reset(self) -> None:
-        """Reset the robot, the obstacles, odometry and collisions; the time continues."""
-        ...
-
-    def reset_odometry(self) -> None:
-        """Set the odometry to 0 without moving the robot."""
-        ...
 
 
 def add(world: World, shape: Shape, robot: Pose2D) -> World:

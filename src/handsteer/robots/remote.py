@@ -153,14 +153,14 @@ class RemoteRobot:
 
     def _send(self, velocity: Velocity | None) -> None:
         if velocity is not None:
-            self._cmd_vel.send(*_numbers(velocity))
+            self._cmd_vel.send(velocity.linear_mps, velocity.angular_radps)
 
     def _on_odometry(self, received: Received[Any]) -> None:
         message = received.message
         read = _of_turtle if self._config.odom_type == "turtlesim_pose" else _of_odometry
         seen = read(message, self._session.clock.now())
         pose = seen.pose
-        self._senseless = not all(map(math.isfinite, (pose.x, pose.y, pose.yaw, *_numbers(seen.velocity))))
+        self._senseless = not (seen.velocity.is_finite and all(map(math.isfinite, (pose.x, pose.y, pose.yaw))))
         if not self._senseless:
             self._seen = seen
 
@@ -204,7 +204,3 @@ def _of_odometry(message: Odometry, at_s: float) -> _Seen:
 def _of_turtle(message: TurtlePose, at_s: float) -> _Seen:
     velocity = Velocity(message.linear_velocity, message.angular_velocity)
     return _Seen(Pose2D(message.x, message.y, message.theta), velocity, at_s)
-
-
-def _numbers(velocity: Velocity) -> tuple[float, float]:
-    return velocity.linear_mps, velocity.angular_radps

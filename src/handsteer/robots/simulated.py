@@ -107,7 +107,7 @@ class SimulatedRobot:
         return []
 
     def enter(self, world: World) -> None:
-        """Move the robot to the start of another world: see :class:`~handsteer.robots.editing.InWorld`."""
+        """Move the robot to the start of another world: see :class:`~handsteer.robots.InWorld`."""
         model = compile_model(self.description, world)
         if touched := _touched_at_start(model, world):
             raise WorldError(_at_start(touched[0]))
