@@ -7,14 +7,13 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
 from cyclopts import Parameter
 
 from handsteer.cli.app import PageOptions, Parameters, Transport, loads
-from handsteer.cli.running import say, signals_ignored
+from handsteer.cli.running import say, settings, signals_ignored
 from handsteer.errors import ConfigError, did_you_mean, needing
 
 _MOST = 30
@@ -57,8 +56,7 @@ def camera(
     camera
         auto, virtual, a webcam's index or /dev/videoN, an address (rtsp, http), a video file or a folder of photos.
     """
-    short = {"camera": {"source": camera}}
-    return _run("camera", transport, ros_args, file=config_file, given=parameters, shorthand=short)
+    return _run("camera", transport, ros_args, config_file, parameters, camera={"source": camera})
 
 
 @loads("handsteer.cli.one_node", "handsteer.nodes.recognition")
@@ -71,7 +69,7 @@ def recognition(
       handsteer recognition --transport auto
       handsteer recognition --transport ros1 image_raw:=/front/image_raw
     """
-    return _run("recognition", transport, ros_args, file=config_file, given=parameters)
+    return _run("recognition", transport, ros_args, config_file, parameters)
 
 
 @loads("handsteer.cli.one_node", "handsteer.nodes.control")
@@ -84,7 +82,7 @@ def control(
       handsteer control --transport auto --ros-args -p max_linear:=0.5
       handsteer control --transport ros1 _max_linear:=0.5
     """
-    return _run("control", transport, ros_args, file=config_file, given=parameters)
+    return _run("control", transport, ros_args, config_file, parameters)
 
 
 @loads("handsteer.cli.one_node", "handsteer.nodes.robot")
@@ -106,8 +104,7 @@ def robot(
     world
         Name of a shipped world, or a YAML file.
     """
-    short = {"robot": {"world": world}}
-    return _run("robot", transport, ros_args, file=config_file, given=parameters, shorthand=short)
+    return _run("robot", transport, ros_args, config_file, parameters, robot={"world": world})
 
 
 @loads("handsteer.cli.one_node", "handsteer.nodes.steering")
@@ -124,15 +121,20 @@ def steering(
       handsteer steering --transport auto
       handsteer steering --transport ros1 --port 9000
     """
-    short = {"dashboard": page.parameters()}
-    return _run("steering", transport, ros_args, file=config_file, given=parameters, shorthand=short)
+    return _run("steering", transport, ros_args, config_file, parameters, dashboard=page.parameters())
 
 
-def _run(verb: str, transport: str, words: tuple[str, ...], **settings: Any) -> int:
-    """Run the node of ``verb``; ``settings`` replace fields of its :class:`~handsteer.cli.one_node.Job`."""
-    from handsteer.cli.one_node import JOBS, run
+def _run(
+    verb: str,
+    transport: str,
+    words: tuple[str, ...],
+    file: Path | None,
+    given: dict[str, Any] | None,
+    **shorthand: dict[str, Any],
+) -> int:
+    from handsteer.cli.one_node import run
 
-    return run(replace(JOBS[verb], **settings), transport, words)
+    return run(verb, transport, words, lambda service: settings(file, given, shorthand, service=service))
 
 
 def zenoh_router(*, listen: str | None = None) -> int:
