@@ -3,12 +3,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from handsteer.config import ControlConfig
+from handsteer.control import TwistMux
 from handsteer.control.sign_control import SignControl
-from handsteer.control.twist_mux import TwistMux
-from handsteer.messages import STOPPING_SIGNS
 from handsteer.types import (
     ACTIONS,
-    ALWAYS_STOP,
     EFFECTS,
     FORWARD,
     GO,
@@ -29,10 +27,6 @@ DT = 1 / 30
 
 def config(**values: object) -> ControlConfig:
     return ControlConfig.model_validate(values)
-
-
-def test_what_always_stops_is_what_comes_through_however_late() -> None:
-    assert ALWAYS_STOP == STOPPING_SIGNS
 
 
 def test_without_a_table_the_motion_signs_are_the_built_in_ones() -> None:

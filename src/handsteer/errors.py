@@ -1,32 +1,5 @@
 """Every error that handsteer raises on purpose.
 
-::
-
-    HandsteerError
-    ├── ConfigError            a configuration value or file is wrong
-    ├── CameraError            a camera cannot be used
-    │   ├── CameraNotFound     there is no such device, file, folder or address
-    │   ├── CameraInUse        the device exists, but another program uses it
-    │   ├── CameraUnreadable   it opens, but delivers no picture
-    │   └── CameraLost         it stopped delivering pictures; worth trying again
-    ├── FrameError             an image has a shape or type that cannot be used
-    ├── ModelError             a model file (landmarks or signs) cannot be used
-    │   ├── ModelMissing       the file is not on this machine
-    │   └── ModelCorrupt       the file is damaged or not the expected one
-    ├── EvaluationError        signs cannot be evaluated: no such photos or video, or the report cannot be written
-    │   └── LabelError         the labels of photos or of a video are missing or wrong
-    ├── DatasetError           a dataset of signs, or its sources, cannot be used
-    ├── TrainingError          signs cannot be learnt from a dataset
-    ├── PoseError              a hand pose or a script of signs is wrong
-    ├── WorldError             a world file or robot description is wrong
-    ├── BenchError             a lap of the bench cannot be driven, or a world is no course
-    ├── StudyError             the plan of a study, its results or an answer are wrong
-    ├── RecordingError         a recording cannot be written, read or replayed
-    ├── TransportError         a topic cannot be published or subscribed to
-    ├── DashboardError         the web page cannot be served
-    ├── LiveError              topics cannot be served to other programs, or a program asks for them wrongly
-    └── PackageMissing         a Python package that is needed is not installed
-
 A message is one line that reports what was wrong, where, and what would be right. Only :mod:`handsteer.cli` prints one
 and exits (with code 2).
 """
@@ -48,7 +21,7 @@ class CameraError(HandsteerError):
     """A camera cannot be used."""
 
 
-class CameraNotFound(CameraError):  # noqa: N818 - reads as the tree above
+class CameraNotFound(CameraError):  # noqa: N818 - its base has the suffix
     """There is no such device, file, folder or address."""
 
 

@@ -1,7 +1,8 @@
 """Constructs each node of the graph from a configuration, on the standard topics unless others are given.
 
-``topics`` of each function are those of the node's constructor, such as ``image`` or ``cmd_vel``. The imports are in
-the functions, so that a process with one node does not load what others need.
+``topics`` of each function are those of the node's constructor, such as ``image`` or ``cmd_vel``. A ConfigError is
+raised if control and robot are configured with different types of commands. The imports are in the functions, so that a
+process with one node does not load what others need.
 """
 # ruff: noqa: PLC0415
 
@@ -92,28 +93,16 @@ def make_recognition(
     """
     from handsteer.nodes.recognition import HandSignRecognitionNode
     from handsteer.recognition.hand_joystick import HandJoystick
-    from handsteer.recognition.recognizer import Recognizer, annotate, open_classifier
+    from handsteer.recognition.recognizer import Recognizer
 
     recognizer = Recognizer(config)
     _warn_of_unknown_signs(config, recognizer.signs)
-    return HandSignRecognitionNode(
-        transport,
-        clock,
-        recognizer,
-        config.signs,
-        annotate,
-        joystick=HandJoystick(config.joystick),
-        open_classifier=open_classifier,
-        **topics,
-    )
+    joystick = HandJoystick(config.joystick)
+    return HandSignRecognitionNode(transport, clock, recognizer, config.signs, joystick=joystick, **topics)
 
 
 def cmd_vel_topic(config: Config) -> Topic[Any]:
-    """Return the topic of the commands from control to robot, with Twist or TwistStamped.
-
-    Raises:
-        ConfigError: Control and robot are configured with different types.
-    """
+    """Return the topic of the commands from control to robot, with Twist or TwistStamped."""
     return cmd_vel(cmd_vel_type(config))
 
 
@@ -130,9 +119,6 @@ def make_control(
 
     ``simulated`` is whether the robot is known to be simulated; ``control.arming`` and ``control.engage`` are then off
     if they are ``auto``. ``others_keep_stop`` is whether nodes of other processes may remember a Stop.
-
-    Raises:
-        ConfigError: Control and robot are configured with different types of commands.
     """
     from handsteer.nodes.control import HandSignControlNode
 
@@ -158,11 +144,7 @@ def make_robot(
 ) -> "RobotNode":
     """Return the node ``robot``; one that publishes ``/clock`` runs on real time, not on its own ``/clock``.
 
-    ``link`` is this process in the graph of a real robot.
-
-    Raises:
-        ConfigError: The robot is real, and there is no link to it.
-        WorldError: The world of a simulated robot cannot be used.
+    Arguments and errors are those of :func:`open_robot`.
     """
     from handsteer.nodes.robot import RobotNode
 
@@ -209,11 +191,7 @@ def make_steering(
     cmd_vel: Topic[Any] | None = None,
     steering: Topic[Twist] = STEERING_CMD_VEL,
 ) -> "SteeringNode":
-    """Return the node ``steering``, whose methods are called to steer by hand, as the page does.
-
-    Raises:
-        ConfigError: Control and robot are configured with different types of commands.
-    """
+    """Return the node ``steering``, whose methods are called to steer by hand, as the page does."""
     from handsteer.nodes.steering import SteeringNode
 
     return SteeringNode(transport, clock, config.control, cmd_vel or cmd_vel_topic(config), steering=steering)

@@ -11,96 +11,47 @@ from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Generic, TypeVar
 
 import numpy as np
-from rosbags.typesys.stores.ros2_jazzy import builtin_interfaces__msg__Duration as Duration
-from rosbags.typesys.stores.ros2_jazzy import builtin_interfaces__msg__Time as Time
-from rosbags.typesys.stores.ros2_jazzy import diagnostic_msgs__msg__DiagnosticArray as DiagnosticArray
-from rosbags.typesys.stores.ros2_jazzy import diagnostic_msgs__msg__DiagnosticStatus as DiagnosticStatus
-from rosbags.typesys.stores.ros2_jazzy import diagnostic_msgs__msg__KeyValue as KeyValue
-from rosbags.typesys.stores.ros2_jazzy import geometry_msgs__msg__Point as Point
-from rosbags.typesys.stores.ros2_jazzy import geometry_msgs__msg__Pose as Pose
-from rosbags.typesys.stores.ros2_jazzy import geometry_msgs__msg__PoseWithCovariance as PoseWithCovariance
-from rosbags.typesys.stores.ros2_jazzy import geometry_msgs__msg__Quaternion as Quaternion
-from rosbags.typesys.stores.ros2_jazzy import geometry_msgs__msg__Transform as Transform
-from rosbags.typesys.stores.ros2_jazzy import geometry_msgs__msg__TransformStamped as TransformStamped
-from rosbags.typesys.stores.ros2_jazzy import geometry_msgs__msg__Twist as Twist
-from rosbags.typesys.stores.ros2_jazzy import geometry_msgs__msg__TwistStamped as TwistStamped
-from rosbags.typesys.stores.ros2_jazzy import geometry_msgs__msg__TwistWithCovariance as TwistWithCovariance
-from rosbags.typesys.stores.ros2_jazzy import geometry_msgs__msg__Vector3 as Vector3
-from rosbags.typesys.stores.ros2_jazzy import nav_msgs__msg__Odometry as Odometry
-from rosbags.typesys.stores.ros2_jazzy import rcl_interfaces__msg__Log as Log
-from rosbags.typesys.stores.ros2_jazzy import rcl_interfaces__msg__ParameterEvent as ParameterEvent
-from rosbags.typesys.stores.ros2_jazzy import rosgraph_msgs__msg__Clock as ClockMessage
-from rosbags.typesys.stores.ros2_jazzy import sensor_msgs__msg__CameraInfo as CameraInfo
-from rosbags.typesys.stores.ros2_jazzy import sensor_msgs__msg__CompressedImage as CompressedImage
-from rosbags.typesys.stores.ros2_jazzy import sensor_msgs__msg__Image as Image
-from rosbags.typesys.stores.ros2_jazzy import sensor_msgs__msg__JointState as JointState
-from rosbags.typesys.stores.ros2_jazzy import sensor_msgs__msg__Joy as Joy
-from rosbags.typesys.stores.ros2_jazzy import sensor_msgs__msg__LaserScan as LaserScan
-from rosbags.typesys.stores.ros2_jazzy import sensor_msgs__msg__RegionOfInterest as RegionOfInterest
-from rosbags.typesys.stores.ros2_jazzy import std_msgs__msg__Bool as Bool
-from rosbags.typesys.stores.ros2_jazzy import std_msgs__msg__ColorRGBA as ColorRGBA
-from rosbags.typesys.stores.ros2_jazzy import std_msgs__msg__Header as Header
-from rosbags.typesys.stores.ros2_jazzy import std_msgs__msg__String as String
-from rosbags.typesys.stores.ros2_jazzy import tf2_msgs__msg__TFMessage as TFMessage
-from rosbags.typesys.stores.ros2_jazzy import visualization_msgs__msg__Marker as Marker
-from rosbags.typesys.stores.ros2_jazzy import visualization_msgs__msg__MarkerArray as MarkerArray
-from rosbags.typesys.stores.ros2_jazzy import visualization_msgs__msg__MeshFile as MeshFile
+from rosbags.typesys.stores import ros2_jazzy as ros2
 
 from handsteer.timeouts import STALE_S
-from handsteer.types import RELEASED, CmdVelType, Stick
+from handsteer.types import ALWAYS_STOP, RELEASED, CmdVelType, Stick
 
-__all__ = [
-    "Bool",
-    "CameraInfo",
-    "ClockMessage",
-    "ColorRGBA",
-    "CompressedImage",
-    "DiagnosticArray",
-    "DiagnosticStatus",
-    "Duration",
-    "Header",
-    "Image",
-    "JointState",
-    "Joy",
-    "KeyValue",
-    "LaserScan",
-    "Log",
-    "Marker",
-    "MarkerArray",
-    "MeshFile",
-    "Odometry",
-    "ParameterEvent",
-    "Point",
-    "Pose",
-    "PoseWithCovariance",
-    "Quaternion",
-    "RegionOfInterest",
-    "String",
-    "TFMessage",
-    "Time",
-    "Topic",
-    "Transform",
-    "TransformStamped",
-    "TurtlePose",
-    "Twist",
-    "TwistStamped",
-    "TwistWithCovariance",
-    "Vector3",
-    "cmd_vel",
-    "command",
-    "is_zero",
-    "joy_of",
-    "stick_in",
-    "twist",
-    "twist_in",
-    "type_name",
-    "yaw_of",
-]
+Duration = ros2.builtin_interfaces__msg__Duration
+Time = ros2.builtin_interfaces__msg__Time
+DiagnosticArray = ros2.diagnostic_msgs__msg__DiagnosticArray
+DiagnosticStatus = ros2.diagnostic_msgs__msg__DiagnosticStatus
+KeyValue = ros2.diagnostic_msgs__msg__KeyValue
+Point = ros2.geometry_msgs__msg__Point
+Pose = ros2.geometry_msgs__msg__Pose
+PoseWithCovariance = ros2.geometry_msgs__msg__PoseWithCovariance
+Quaternion = ros2.geometry_msgs__msg__Quaternion
+Transform = ros2.geometry_msgs__msg__Transform
+TransformStamped = ros2.geometry_msgs__msg__TransformStamped
+Twist = ros2.geometry_msgs__msg__Twist
+TwistStamped = ros2.geometry_msgs__msg__TwistStamped
+TwistWithCovariance = ros2.geometry_msgs__msg__TwistWithCovariance
+Vector3 = ros2.geometry_msgs__msg__Vector3
+Odometry = ros2.nav_msgs__msg__Odometry
+Log = ros2.rcl_interfaces__msg__Log
+ParameterEvent = ros2.rcl_interfaces__msg__ParameterEvent
+ClockMessage = ros2.rosgraph_msgs__msg__Clock
+CameraInfo = ros2.sensor_msgs__msg__CameraInfo
+CompressedImage = ros2.sensor_msgs__msg__CompressedImage
+Image = ros2.sensor_msgs__msg__Image
+JointState = ros2.sensor_msgs__msg__JointState
+Joy = ros2.sensor_msgs__msg__Joy
+LaserScan = ros2.sensor_msgs__msg__LaserScan
+RegionOfInterest = ros2.sensor_msgs__msg__RegionOfInterest
+Bool = ros2.std_msgs__msg__Bool
+ColorRGBA = ros2.std_msgs__msg__ColorRGBA
+Header = ros2.std_msgs__msg__Header
+String = ros2.std_msgs__msg__String
+TFMessage = ros2.tf2_msgs__msg__TFMessage
+Marker = ros2.visualization_msgs__msg__Marker
+MarkerArray = ros2.visualization_msgs__msg__MarkerArray
+MeshFile = ros2.visualization_msgs__msg__MeshFile
 
 M = TypeVar("M")
-
-STOPPING_SIGNS = frozenset({"Stop", "NONE"})
-"""Signs that stop the robot in every configuration, as in handsteer.types."""
 
 
 @dataclass
@@ -172,7 +123,7 @@ def is_zero(message: "Twist | TwistStamped") -> bool:
 
 def is_stopping(sign: String) -> bool:
     """Return whether a sign stops the robot in every configuration."""
-    return sign.data in STOPPING_SIGNS
+    return sign.data in ALWAYS_STOP
 
 
 def is_released(message: Joy) -> bool:
@@ -187,13 +138,7 @@ IMAGE_COMPRESSED = Topic("/image_raw/compressed", CompressedImage, beneath=IMAGE
 CAMERA_CHANGED = Topic("/camera_changed", String)
 CAMERA_INFO = Topic("/camera_info", CameraInfo, beneath=IMAGE_RAW)
 # Each sign changes the speed by one step, so none may be lost when several arrive at once.
-HAND_SIGN = Topic(
-    "/gesture/hand_sign",
-    String,
-    depth=10,
-    lifespan_s=STALE_S,
-    stops=is_stopping,
-)
+HAND_SIGN = Topic("/gesture/hand_sign", String, depth=10, lifespan_s=STALE_S, stops=is_stopping)
 # The hand as a joystick: axes left and forward, -1 to 1, and button 0 while it is held.
 GESTURE_JOY = Topic("/gesture/joy", Joy, lifespan_s=STALE_S, stops=is_released)
 # A gamepad, from ROS's joy.
@@ -235,11 +180,11 @@ def twist(linear_mps: float, angular_radps: float) -> Twist:
     return Twist(linear=Vector3(linear_mps, 0.0, 0.0), angular=Vector3(0.0, 0.0, angular_radps))
 
 
-def cmd_vel(kind: CmdVelType, topic: Topic[Any] = CMD_VEL) -> Topic[Any]:
-    """Return ``topic``, a topic of velocity commands, with messages of ``kind``."""
+def cmd_vel(kind: CmdVelType) -> Topic[Any]:
+    """Return the topic of velocity commands with messages of ``kind``."""
     kinds = {"twist": (Twist, None), "twist_stamped": (TwistStamped, None), "auto": (Twist, TwistStamped)}
     of, instead = kinds[kind]
-    return replace(topic, type=of, or_type=instead)
+    return replace(CMD_VEL, type=of, or_type=instead)
 
 
 def command(topic: Topic[Any], linear_mps: float, angular_radps: float, stamp: Time, frame_id: str) -> Any:

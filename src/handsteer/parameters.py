@@ -29,19 +29,12 @@ _KINDS: dict[Any, Kind] = {
     Path: "string",
     tuple[str, ...]: "strings",
 }
-_FITTING: dict[Kind, tuple[type, ...]] = {
-    "bool": (bool,),
-    "integer": (int,),
-    "double": (float, int),
-    "string": (str,),
-    "strings": (list,),
-}
-_WORDS: dict[Kind, str] = {
-    "bool": "true or false",
-    "integer": "a whole number",
-    "double": "a number",
-    "string": "a text",
-    "strings": "a list of texts",
+_VALUES: dict[Kind, tuple[tuple[type, ...], str]] = {
+    "bool": ((bool,), "true or false"),
+    "integer": ((int,), "a whole number"),
+    "double": ((float, int), "a number"),
+    "string": ((str,), "a text"),
+    "strings": ((list,), "a list of texts"),
 }
 _USED_TOGETHER = {
     "camera": ("virtual_hand",),
@@ -245,8 +238,9 @@ class NodeParameters:
             table.pop(key, None)
             return
         kind = describe(place.model, place.field).kind
-        if not isinstance(value, _FITTING[kind]) or (isinstance(value, bool) and kind != "bool"):
-            raise ConfigError(f"{name}: {value!r} should be {_WORDS[kind]}")
+        types, words = _VALUES[kind]
+        if not isinstance(value, types) or (isinstance(value, bool) and kind != "bool"):
+            raise ConfigError(f"{name}: {value!r} should be {words}")
         table[key] = value
 
     def _names_file(self, name: str) -> bool:

@@ -162,6 +162,14 @@ class Velocity:
 ZERO = Velocity()
 
 
+def changed_towards(wanted: Velocity, now: Velocity, most: Velocity) -> Velocity:
+    """Return the velocity nearest to ``wanted`` whose parts differ from those of ``now`` by at most ``most``, >= 0."""
+    return Velocity(
+        max(now.linear_mps - most.linear_mps, min(wanted.linear_mps, now.linear_mps + most.linear_mps)),
+        max(now.angular_radps - most.angular_radps, min(wanted.angular_radps, now.angular_radps + most.angular_radps)),
+    )
+
+
 @dataclass(frozen=True)
 class Stick:
     """State of a joystick: whether it is held, and its deflection, each -1 to 1; 0 while it is not held.

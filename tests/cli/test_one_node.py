@@ -9,7 +9,7 @@ import pytest
 from tests.processes import free_port
 from tests.recognition.test_imports import loaded_by
 
-BEGIN = "from handsteer.cli.one_node import load\nload({verb!r})\n"
+BEGIN = "import handsteer.cli.one_node, handsteer.nodes.{verb}\n"
 
 
 @pytest.mark.parametrize("verb", ["control", "recognition"])

@@ -1,12 +1,147 @@
 import math
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from handsteer.config import ControlConfig
-from handsteer.control import Control
-from handsteer.types import ZERO, Velocity
+from handsteer.control import Control, TwistMux
+from handsteer.types import FORWARD, GO, NONE, STOP, ZERO, Velocity
 
 DT = 1 / 30
+
+
+def test_steering_takes_over_at_once_and_signs_are_kept_out() -> None:
+    driver = TwistMux(ControlConfig())
+    driver.step(DT, sign=FORWARD)
+    assert driver.step(DT, steering=Velocity(0.4, 1.0)) == Velocity(0.4, 1.0)
+    assert driver.source == "steering"
+    assert driver.step(DT, sign=FORWARD) is None
+    assert driver.velocity == Velocity(0.4, 1.0)
+
+
+def test_when_steering_ends_one_zero_goes_out_and_signs_start_from_standing() -> None:
+    driver = TwistMux(ControlConfig(steering_timeout=0.3))
+    for _ in range(20):
+        driver.step(DT, sign=FORWARD)
+    driver.step(DT, steering=Velocity(0.4, 0.0))
+    said = [driver.step(0.1) for _ in range(10)]
+    assert [velocity for velocity in said if velocity is not None] == [ZERO]
+    assert driver.source == "none"
+    assert driver.step(DT, sign=FORWARD) == Velocity(0.01, 0.0)
+
+
+@pytest.mark.parametrize("wanted", [Velocity(math.nan, 0.0), Velocity(0.0, math.inf), Velocity(-math.inf, math.nan)])
+def test_steering_that_is_no_number_means_zero(wanted: Velocity) -> None:
+    assert TwistMux(ControlConfig()).step(DT, steering=wanted) == ZERO
+
+
+def test_steering_is_clamped() -> None:
+    driver = TwistMux(ControlConfig(max_linear=0.5, max_angular=1.0))
+    assert driver.step(DT, steering=Velocity(-9.0, 9.0)) == Velocity(-0.5, 1.0)
+
+
+@pytest.mark.parametrize("dt_s", [math.nan, math.inf, -1.0])
+def test_broken_time_stops_whoever_drives(dt_s: float) -> None:
+    driver = TwistMux(ControlConfig())
+    driver.step(DT, steering=Velocity(0.4, 0.0))
+    assert driver.step(dt_s) == ZERO
+    assert driver.step(dt_s) is None
+
+
+def test_reasons_say_why_the_robot_stands() -> None:
+    driver = TwistMux(ControlConfig())
+    assert str(driver.reason) == "standing: no sign has come for 0.35 s"
+    reasons = []
+    for sign in (NONE, STOP, FORWARD):
+        driver.step(DT, sign=sign)
+        reasons.append(str(driver.reason))
+    driver.step(DT, steering=Velocity(0.1, 0.0))
+    reasons.append(str(driver.reason))
+    assert reasons == [
+        "standing: no sign is seen",
+        "standing: the Stop sign is shown",
+        "driving: Forward",
+        "driving: steered by hand",
+    ]
+
+
+@given(
+    st.lists(
+        st.tuples(
+            st.floats(0, 0.3),
+            st.one_of(st.none(), st.sampled_from([FORWARD, STOP, NONE])),
+            st.one_of(st.none(), st.builds(Velocity, st.floats(), st.floats())),
+        ),
+        max_size=100,
+    )
+)
+def test_whatever_comes_the_command_is_finite_and_within_limits(
+    inputs: list[tuple[float, str | None, Velocity | None]],
+) -> None:
+    config = ControlConfig()
+    driver = TwistMux(config)
+    for dt_s, sign, steering in inputs:
+        velocity = driver.step(dt_s, sign=sign, steering=steering)
+        if velocity is not None:
+            assert velocity.is_finite
+            assert abs(velocity.linear_mps) <= config.max_linear
+            assert abs(velocity.angular_radps) <= config.max_angular
+
+
+def test_a_lower_limit_is_commanded_at_once() -> None:
+    driver = TwistMux(ControlConfig(linear_step=0.5))
+    driver.step(DT, sign=FORWARD)
+    assert driver.reconfigure(ControlConfig(max_linear=0.2)) == Velocity(0.2, 0.0)
+    assert driver.step(DT, sign=GO) == Velocity(0.2, 0.0)
+
+
+def test_a_higher_limit_says_nothing_and_speeds_up_nothing() -> None:
+    driver = TwistMux(ControlConfig(linear_step=0.5, max_linear=0.2))
+    driver.step(DT, sign=FORWARD)
+    assert driver.reconfigure(ControlConfig(max_linear=10.0)) is None
+    assert driver.step(DT, sign=GO) == Velocity(0.2, 0.0)
+
+
+def test_steering_is_clamped_by_a_lower_limit_at_once() -> None:
+    driver = TwistMux(ControlConfig())
+    driver.step(DT, steering=Velocity(-0.8, 1.0))
+    assert driver.reconfigure(ControlConfig(max_linear=0.1, max_angular=0.5)) == Velocity(-0.1, 0.5)
+    assert driver.source == "steering"
+
+
+SIGNS = st.sampled_from([FORWARD, "Backward", "Turn Left", "Turn Right", GO, "Peace", STOP, NONE, None])
+SPEEDS = st.floats(0.01, 3.0)
+
+
+@given(
+    before=st.lists(SIGNS, max_size=20),
+    steering=st.none() | st.builds(Velocity, st.floats(-5, 5), st.floats(-5, 5)),
+    limits=st.tuples(SPEEDS, SPEEDS),
+    ramp=st.sampled_from(["per_message", "per_second"]),
+    action=st.sampled_from(["turbo", "stop", "forward"]),
+)
+def test_no_configuration_sets_a_robot_in_motion_or_makes_it_faster(
+    before: list[str | None], steering: Velocity | None, limits: tuple[float, float], ramp: str, action: str
+) -> None:
+    driver = TwistMux(ControlConfig(linear_step=0.4, angular_step=0.4, actions={"Peace": "turbo"}))
+    for sign in before:
+        driver.step(DT, sign=sign)
+    if steering is not None:
+        driver.step(DT, steering=steering)
+    was, source = driver.velocity, driver.source
+    config = ControlConfig.model_validate(
+        {"max_linear": limits[0], "max_angular": limits[1], "ramp": ramp, "actions": {"Peace": action}}
+    )
+    said = driver.reconfigure(config)
+    now = driver.velocity
+    assert abs(now.linear_mps) <= min(abs(was.linear_mps), limits[0])
+    assert abs(now.angular_radps) <= min(abs(was.angular_radps), limits[1])
+    assert now.linear_mps * was.linear_mps >= 0
+    assert now.angular_radps * was.angular_radps >= 0
+    assert said == (now if now != was else None)
+    assert driver.source == source
+    assert driver.step(0.0) is None
 
 
 def drives(control: Control) -> Velocity:

@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from handsteer.config import ControlConfig
+from handsteer.control import Source
 from handsteer.control.explain import Reason
-from handsteer.control.twist_mux import Source
 from handsteer.dashboard.mux_row import mux_inputs
 from handsteer.dashboard.state import (
     STALE_S,

@@ -3,8 +3,8 @@
 from handsteer.clock import Clock
 from handsteer.config import RobotConfig
 from handsteer.robots import Obstacle, RangeScan, RobotState
-from handsteer.robots.diff_drive import DriveState, Velocity, integrate, step, wheel_speeds
-from handsteer.types import Pose2D
+from handsteer.robots.diff_drive import DriveState, integrate, step, wheel_speeds
+from handsteer.types import Pose2D, Velocity
 
 _DT_S = 0.02
 
@@ -69,9 +69,6 @@ class Base:
 
     def commanders(self) -> list[str]:
         return []
-
-    def reset(self) -> None:
-        self.command(0.0, 0.0)
 
     def close(self) -> None:
         self.command(0.0, 0.0)

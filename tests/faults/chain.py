@@ -33,7 +33,6 @@ from handsteer.nodes.recognition import HandSignRecognitionNode
 from handsteer.nodes.robot import RobotNode
 from handsteer.nodes.steering import SteeringNode
 from handsteer.parameters import NodeParameters
-from handsteer.recognition.recognizer import annotate, open_classifier
 from handsteer.robots import Robot
 from handsteer.robots.remote import RemoteRobot
 from handsteer.testing.fault_transport import FaultTransport
@@ -176,9 +175,7 @@ class Chain:
 
     def _recognition(self) -> Node:
         config = SignsConfig()
-        return HandSignRecognitionNode(
-            self.faults, self.clock, painted_recognizer(config), config, annotate, open_classifier=open_classifier
-        )
+        return HandSignRecognitionNode(self.faults, self.clock, painted_recognizer(config), config)
 
 
 class _Page(Node):

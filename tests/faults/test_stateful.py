@@ -20,10 +20,9 @@ from handsteer.messages import CMD_VEL, IMAGE_RAW, STEERING_CMD_VEL, STOP, Bool,
 from handsteer.nodes.base import Node
 from handsteer.nodes.control import HandSignControlNode
 from handsteer.nodes.recognition import HandSignRecognitionNode
-from handsteer.recognition.recognizer import annotate, open_classifier
 from handsteer.robots.command_limiter import CommandLimiter
-from handsteer.robots.diff_drive import Velocity
 from handsteer.transports.base import Received
+from handsteer.types import Velocity
 from tests.faults.domain import Domain
 from tests.faults.painted import FPS, PaintedCamera, painted_recognizer
 from tests.faults.rules import Rules
@@ -96,9 +95,7 @@ class Graph:
 
     def _recognition(self) -> Node:
         config = SignsConfig()
-        return HandSignRecognitionNode(
-            self.domain, self.clock, painted_recognizer(config), config, annotate, open_classifier=open_classifier
-        )
+        return HandSignRecognitionNode(self.domain, self.clock, painted_recognizer(config), config)
 
     def _control(self) -> Node:
         config = ControlConfig.model_validate({"linear_step": 0.2, "angular_step": 0.2})

@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 
 from handsteer.clock import to_stamp
 from handsteer.config import ControlConfig
+from handsteer.control import Source
 from handsteer.control.explain import Reason, ReasonCode, effect_of
-from handsteer.control.twist_mux import Source
 from handsteer.messages import DiagnosticStatus, KeyValue
 from handsteer.nodes.diagnostics import read_status, split_reporter, write_status
 from handsteer.nodes.status import CameraStatus, ControlStatus, RecognitionStatus, RobotStatus, Status

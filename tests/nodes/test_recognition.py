@@ -28,7 +28,7 @@ from handsteer.nodes.status import RecognitionStatus
 from handsteer.parameters import NodeParameters
 from handsteer.recognition.custom_signs import save_custom_model
 from handsteer.recognition.hand import Hand, RecordedLandmarker
-from handsteer.recognition.recognizer import Recognition, Recognizer, annotate, open_classifier
+from handsteer.recognition.recognizer import Recognition, Recognizer
 from handsteer.recognition.shipped_signs import ShippedClassifier, load_model
 from handsteer.types import FORWARD
 from tests.nodes.stepping import Bench
@@ -54,8 +54,6 @@ class RecognitionBench(Bench):
             self.clock,
             recognizer,
             config,
-            annotate,
-            open_classifier=open_classifier,
             camera_changed=CAMERA_CHANGED,
         )
         self.nodes = [self.node]

@@ -5,8 +5,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from handsteer.config import RobotConfig
-from handsteer.robots.command_limiter import ZERO, CommandLimiter
-from handsteer.robots.diff_drive import Velocity
+from handsteer.robots.command_limiter import CommandLimiter
+from handsteer.types import ZERO, Velocity
 
 CONFIG = RobotConfig(max_linear=1.0, max_linear_acceleration=0.5, max_angular=2.0, max_angular_acceleration=4.0)
 DT_S = 0.02

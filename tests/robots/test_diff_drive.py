@@ -5,8 +5,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from handsteer.config import RobotConfig
-from handsteer.robots.diff_drive import DriveState, Velocity, integrate, step, velocity_of, wheel_speeds
-from handsteer.types import Pose2D
+from handsteer.robots.diff_drive import DriveState, integrate, step, velocity_of, wheel_speeds
+from handsteer.types import Pose2D, Velocity
 
 CONFIG = RobotConfig()
 STILL = Velocity()

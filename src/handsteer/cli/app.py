@@ -23,6 +23,13 @@ Flag = Annotated[bool, Parameter(negative="", show_default=False)]
 Parameters = Annotated[dict[str, Any] | None, Parameter(parse=False)]
 """Options with the full name of a parameter, such as --control.max-linear, by section."""
 ConfigFile = Annotated[Path | None, Parameter(name="--config")]
+Transport = Annotated[
+    str,
+    Parameter(
+        help="ros2 (rclpy), dds or zenoh (ROS 2 without a ROS installation), auto (ros2 if installed, else dds), or "
+        "ros1."
+    ),
+]
 
 
 @Parameter(name="*")
@@ -80,9 +87,9 @@ app = App(
     result_action="return_value",
 )
 # Named, not imported: a verb's module is loaded when it is used.
-for verb in ("run", "recognize", "study", "parameters", "completion"):
+for verb in ("run", "recognize", "study", "parameters"):
     app.command(f"handsteer.cli.{verb}:{verb}", name=verb, help_epilogue="")
-for verb in ("models", "doctor", "ros"):
+for verb in ("completion", "models", "doctor", "ros"):
     app.command(f"handsteer.cli.installation:{verb}", name=verb, help_epilogue="")
 for verb in ("record", "replay", "report"):
     app.command(f"handsteer.cli.recordings:{verb}", name=verb, help_epilogue="")

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from cyclopts import Parameter
 
 from handsteer.cli.app import ConfigFile, Parameters, loads
-from handsteer.cli.running import check_writable, say, settings
+from handsteer.cli.running import check_writable, say, settings, table
 from handsteer.errors import BenchError, needing
 
 if TYPE_CHECKING:
@@ -64,7 +64,7 @@ class Varied:
         return [with_factor(base, factor, value) for factor, values in self.sweeps() for value in values] or [base]
 
 
-@loads("handsteer.cli.table", "handsteer.config", "tqdm")
+@loads("handsteer.config", "rich.table", "tqdm")
 def bench(
     *,
     course: Words = None,
@@ -157,8 +157,6 @@ def _drive(cells: "list[Cell]", seeds: range, jobs: int | None, config: "Config"
 
 def bench_table(results: "list[CellResult]") -> str:
     """Return the results as a table, a row for each cell."""
-    from handsteer.cli.table import table
-
     return table(_HEAD, [_row(result) for result in results], text_columns=3)
 
 

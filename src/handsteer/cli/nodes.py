@@ -7,24 +7,42 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import replace
-from typing import Any
+from pathlib import Path
+from typing import Annotated, Any
 
-from handsteer.cli.app import ConfigFile, PageOptions, Parameters, loads
-from handsteer.cli.running import say, signals_ignored
+from cyclopts import Parameter
+
+from handsteer.cli.app import PageOptions, Parameters, Transport, loads
+from handsteer.cli.running import say, settings, signals_ignored
 from handsteer.errors import ConfigError, did_you_mean, needing
 
 _MOST = 30
 _LOOK_PERIOD_S = 0.2
 _END_TIMEOUT_S = 3.0
 
+RosArgument = Annotated[
+    str,
+    Parameter(
+        help="ROS arguments. ROS 1: topic:=other, __name:=name, __ns:=namespace, _parameter:=value.\n"
+        "ROS 2: --ros-args -r topic:=other -r __node:=name -r __ns:=/namespace -p parameter:=value --params-file file."
+    ),
+]
+NodeFile = Annotated[
+    Path | None,
+    Parameter(
+        name="--config",
+        help="YAML file with parameters, each of which is an option too: `handsteer parameters`. ROS parameters "
+        "override the\nfile, and options override both.",
+    ),
+]
+
 
 @loads("handsteer.cli.one_node", "handsteer.nodes.camera")
 def camera(
-    *ros_args: str,
-    transport: str,
+    *ros_args: RosArgument,
+    transport: Transport,
     camera: str | None = None,
-    config_file: ConfigFile = None,
+    config_file: NodeFile = None,
     parameters: Parameters = None,
 ) -> int:
     """Publish a camera's frames on image_raw.
@@ -35,71 +53,44 @@ def camera(
 
     Parameters
     ----------
-    ros_args
-        ROS arguments. ROS 1: topic:=other, __name:=name, __ns:=namespace, _parameter:=value.
-        ROS 2: --ros-args -r topic:=other -r __node:=name -r __ns:=/namespace -p parameter:=value --params-file file.
-    transport
-        ros2 (rclpy), dds or zenoh (ROS 2 without a ROS installation), auto (ros2 if installed, else dds), or ros1.
     camera
         auto, virtual, a webcam's index or /dev/videoN, an address (rtsp, http), a video file or a folder of photos.
-    config_file
-        YAML file with parameters, each of which is an option too: `handsteer parameters`. ROS parameters override the
-        file, and options override both.
     """
-    short = {"camera": {"source": camera}}
-    return _run("camera", transport, ros_args, file=config_file, given=parameters, shorthand=short)
+    return _run("camera", transport, ros_args, config_file, parameters, camera={"source": camera})
 
 
 @loads("handsteer.cli.one_node", "handsteer.nodes.recognition")
-def recognition(*ros_args: str, transport: str, config_file: ConfigFile = None, parameters: Parameters = None) -> int:
+def recognition(
+    *ros_args: RosArgument, transport: Transport, config_file: NodeFile = None, parameters: Parameters = None
+) -> int:
     """Recognise the sign in each frame of image_raw, and publish it on gesture/hand_sign.
 
     For example:
       handsteer recognition --transport auto
       handsteer recognition --transport ros1 image_raw:=/front/image_raw
-
-    Parameters
-    ----------
-    ros_args
-        ROS arguments. ROS 1: topic:=other, __name:=name, __ns:=namespace, _parameter:=value.
-        ROS 2: --ros-args -r topic:=other -r __node:=name -r __ns:=/namespace -p parameter:=value --params-file file.
-    transport
-        ros2 (rclpy), dds or zenoh (ROS 2 without a ROS installation), auto (ros2 if installed, else dds), or ros1.
-    config_file
-        YAML file with parameters, each of which is an option too: `handsteer parameters`. ROS parameters override the
-        file, and options override both.
     """
-    return _run("recognition", transport, ros_args, file=config_file, given=parameters)
+    return _run("recognition", transport, ros_args, config_file, parameters)
 
 
 @loads("handsteer.cli.one_node", "handsteer.nodes.control")
-def control(*ros_args: str, transport: str, config_file: ConfigFile = None, parameters: Parameters = None) -> int:
+def control(
+    *ros_args: RosArgument, transport: Transport, config_file: NodeFile = None, parameters: Parameters = None
+) -> int:
     """Convert the signs on gesture/hand_sign to velocities on robot_diff_drive_controller/cmd_vel.
 
     For example:
       handsteer control --transport auto --ros-args -p max_linear:=0.5
       handsteer control --transport ros1 _max_linear:=0.5
-
-    Parameters
-    ----------
-    ros_args
-        ROS arguments. ROS 1: topic:=other, __name:=name, __ns:=namespace, _parameter:=value.
-        ROS 2: --ros-args -r topic:=other -r __node:=name -r __ns:=/namespace -p parameter:=value --params-file file.
-    transport
-        ros2 (rclpy), dds or zenoh (ROS 2 without a ROS installation), auto (ros2 if installed, else dds), or ros1.
-    config_file
-        YAML file with parameters, each of which is an option too: `handsteer parameters`. ROS parameters override the
-        file, and options override both.
     """
-    return _run("control", transport, ros_args, file=config_file, given=parameters)
+    return _run("control", transport, ros_args, config_file, parameters)
 
 
 @loads("handsteer.cli.one_node", "handsteer.nodes.robot")
 def robot(
-    *ros_args: str,
-    transport: str,
+    *ros_args: RosArgument,
+    transport: Transport,
     world: str | None = None,
-    config_file: ConfigFile = None,
+    config_file: NodeFile = None,
     parameters: Parameters = None,
 ) -> int:
     """Simulate a robot that follows robot_diff_drive_controller/cmd_vel.
@@ -110,27 +101,18 @@ def robot(
 
     Parameters
     ----------
-    ros_args
-        ROS arguments. ROS 1: topic:=other, __name:=name, __ns:=namespace, _parameter:=value.
-        ROS 2: --ros-args -r topic:=other -r __node:=name -r __ns:=/namespace -p parameter:=value --params-file file.
-    transport
-        ros2 (rclpy), dds or zenoh (ROS 2 without a ROS installation), auto (ros2 if installed, else dds), or ros1.
     world
         Name of a shipped world, or a YAML file.
-    config_file
-        YAML file with parameters, each of which is an option too: `handsteer parameters`. ROS parameters override the
-        file, and options override both.
     """
-    short = {"robot": {"world": world}}
-    return _run("robot", transport, ros_args, file=config_file, given=parameters, shorthand=short)
+    return _run("robot", transport, ros_args, config_file, parameters, robot={"world": world})
 
 
 @loads("handsteer.cli.one_node", "handsteer.nodes.steering")
 def steering(
-    *ros_args: str,
-    transport: str,
+    *ros_args: RosArgument,
+    transport: Transport,
     page: PageOptions = PageOptions(),  # noqa: B008 - it is frozen
-    config_file: ConfigFile = None,
+    config_file: NodeFile = None,
     parameters: Parameters = None,
 ) -> int:
     """Serve the page, which shows the state of the graph and steers the robot on steering/cmd_vel.
@@ -138,27 +120,21 @@ def steering(
     For example:
       handsteer steering --transport auto
       handsteer steering --transport ros1 --port 9000
-
-    Parameters
-    ----------
-    ros_args
-        ROS arguments. ROS 1: topic:=other, __name:=name, __ns:=namespace, _parameter:=value.
-        ROS 2: --ros-args -r topic:=other -r __node:=name -r __ns:=/namespace -p parameter:=value --params-file file.
-    transport
-        ros2 (rclpy), dds or zenoh (ROS 2 without a ROS installation), auto (ros2 if installed, else dds), or ros1.
-    config_file
-        YAML file with parameters, each of which is an option too: `handsteer parameters`. ROS parameters override the
-        file, and options override both.
     """
-    short = {"dashboard": page.parameters()}
-    return _run("steering", transport, ros_args, file=config_file, given=parameters, shorthand=short)
+    return _run("steering", transport, ros_args, config_file, parameters, dashboard=page.parameters())
 
 
-def _run(verb: str, transport: str, words: tuple[str, ...], **settings: Any) -> int:
-    """Run the node of ``verb``; ``settings`` replace fields of its :class:`~handsteer.cli.one_node.Job`."""
-    from handsteer.cli.one_node import JOBS, run
+def _run(
+    verb: str,
+    transport: str,
+    words: tuple[str, ...],
+    file: Path | None,
+    given: dict[str, Any] | None,
+    **shorthand: dict[str, Any],
+) -> int:
+    from handsteer.cli.one_node import run
 
-    return run(replace(JOBS[verb], **settings), transport, words)
+    return run(verb, transport, words, lambda service: settings(file, given, shorthand, service=service))
 
 
 def zenoh_router(*, listen: str | None = None) -> int:

@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 from handsteer import making
@@ -24,10 +23,6 @@ from handsteer.transports.base import Session, Transport
 _LOOK_PERIOD_S = 0.5
 
 log = logging.getLogger(__name__)
-
-
-def _alone(_node: Any, _config: Config) -> AbstractContextManager[None]:
-    return nullcontext()
 
 
 @contextmanager
@@ -58,23 +53,13 @@ class Job:
         node: Default name of the node.
         section: Its own section of the configuration.
         make: Constructs the node.
-        file: YAML file with parameters.
-        given: Options with a full name, by section.
-        shorthand: Options with a short name.
         companion: Runs alongside the node.
     """
 
     node: str
     section: str
     make: Callable[[Config, Transport, Clock], Node]
-    file: Path | None = None
-    given: dict[str, Any] | None = None
-    shorthand: dict[str, Any] | None = None
-    companion: Callable[[Any, Config], AbstractContextManager[None]] = _alone
-
-    def settings(self, service: dict[str, Any] | None = None) -> Config:
-        """Return the parameters; ``service`` are those from the graph."""
-        return settings(self.file, self.given, self.shorthand, service=service)
+    companion: Callable[[Any, Config], AbstractContextManager[None]] = lambda *_: nullcontext()
 
 
 JOBS = {
@@ -86,26 +71,25 @@ JOBS = {
 }
 
 
-def load(verb: str) -> None:
-    """Import a node's module, before signals can interrupt the import."""
-    importlib.import_module(f"handsteer.nodes.{verb}")
-
-
 def run_ros1(verb: str, words: Sequence[str]) -> int:
     """Run a node with ROS 1 arguments only; return the exit code."""
     set_up_logging()
-    load(verb)
+    importlib.import_module(f"handsteer.nodes.{verb}")  # before signals can interrupt the import
     signals.interrupt_on_signals()
-    return exit_code(lambda: run(JOBS[verb], "ros1", tuple(words)))
+    return exit_code(lambda: run(verb, "ros1", tuple(words), lambda service: settings(None, None, service=service)))
 
 
-def run(job: Job, transport: str, words: tuple[str, ...]) -> int:
-    """Run a node until it ends or is interrupted; return the exit code."""
-    job.settings()  # report wrong input before joining the graph
+def run(verb: str, transport: str, words: tuple[str, ...], settle: Callable[[dict[str, Any]], Config]) -> int:
+    """Run a node until it ends or is interrupted; return the exit code.
+
+    ``settle`` returns the parameters, including those from the graph.
+    """
+    settle({})  # report wrong input before joining the graph
+    job = JOBS[verb]
     session: Session | None = None
     try:
         session = join(transport, job.node, words)
-        config = job.settings(from_parameters(session.parameters, job.section, session.name))
+        config = settle(from_parameters(session.parameters, job.section, session.name))
         node = job.make(config, session.transport, session.clock)
         session.serve(NodeParameters(config, job.section, _audited(node, config), node.check))
         session.offer(node.services)

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from handsteer.recognition.recognizer import Recognition, Recognizer
 
 
-@loads("handsteer.cameras.files", "handsteer.cli.models", "handsteer.recognition.recognizer")
+@loads("handsteer.cameras.files", "handsteer.recognition.recognizer", "tqdm")
 def recognize(
     source: Path, /, *, json: Flag = False, config_file: ConfigFile = None, parameters: Parameters = None
 ) -> int:
@@ -40,7 +40,7 @@ def recognize(
         YAML file with parameters, each of which is an option too: `handsteer parameters`. Options override the file.
     """
     from handsteer.cameras.files import PHOTO_SUFFIXES
-    from handsteer.cli.models import fetch_missing
+    from handsteer.cli.installation import fetch_missing
     from handsteer.recognition.recognizer import Recognizer
 
     config = settings(config_file, parameters)

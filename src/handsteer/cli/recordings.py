@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from cyclopts import Parameter
 
 from handsteer.cli import signals
-from handsteer.cli.app import ConfigFile, Flag, Parameters, loads
+from handsteer.cli.app import ConfigFile, Flag, Parameters, Transport, loads
 from handsteer.cli.running import printable, say, settings, signals_ignored
 from handsteer.errors import RecordingError
 
@@ -24,7 +24,7 @@ _MOST_PRINTED = 50
 def record(
     output: Path,
     *ros_args: str,
-    transport: str,
+    transport: Transport,
     config_file: ConfigFile = None,
     parameters: Parameters = None,
 ) -> int:
@@ -43,8 +43,6 @@ def record(
     ros_args
         ROS arguments. ROS 1: topic:=other, __name:=name, __ns:=namespace.
         ROS 2: --ros-args -r topic:=other -r __ns:=/namespace.
-    transport
-        ros2 (rclpy), dds or zenoh (ROS 2 without a ROS installation), auto (ros2 if installed, else dds), or ros1.
     config_file
         YAML file with parameters, of which cmd_vel_type and collision_monitor matter; options override it.
     """

@@ -79,7 +79,7 @@ class Mode:
             raise ConfigError(f"--duration: {self.duration:g} should be greater than 0 seconds")
 
 
-@loads("handsteer.cli.drive", "handsteer.cli.models")
+@loads("handsteer.cli.drive", "tqdm")
 def run(
     *ros_args: str,
     what: CameraAndRobot = CameraAndRobot(),
@@ -116,7 +116,7 @@ def run(
         Without it, handsteer.yaml of the working directory, if there is one; the page saves to it.
     """
     from handsteer.cli.drive import drive, linked, summary_text
-    from handsteer.cli.models import fetch_missing
+    from handsteer.cli.installation import fetch_missing
 
     config_file = config_file or default_file()
     shorthand = {**what.parameters(), "dashboard": page.parameters(), "foxglove": {"port": foxglove}}

@@ -1,4 +1,4 @@
-"""Shared by the verbs: logging, settings, messages and exit codes."""
+"""Shared by the verbs: logging, settings, messages, tables and exit codes."""
 
 import gc
 import logging
@@ -6,7 +6,7 @@ import os
 import signal
 import sys
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -93,6 +93,24 @@ def check_writable(option: str, path: Path, error: type[HandsteerError]) -> None
 def printable(line: str) -> str:
     """Return ``line`` without what controls a terminal, which names in files of others may contain."""
     return "".join(each if each.isprintable() else "?" for each in line)
+
+
+def table(head: Sequence[str], rows: Sequence[Sequence[str]], text_columns: int = 1) -> str:
+    """Return a table as text; columns after the first ``text_columns`` are aligned to the right."""
+    from rich.console import Console  # this module is loaded for help too
+    from rich.table import Table
+    from rich.text import Text
+
+    grid = Table(box=None, pad_edge=False)
+    for column, name in enumerate(head):
+        grid.add_column(Text(name), justify="left" if column < text_columns else "right", no_wrap=True)
+    for row in rows:
+        grid.add_row(*map(Text, row))
+    # Wide enough never to wrap: another program may read the lines.
+    console = Console(width=10_000, color_system=None, force_terminal=False)
+    with console.capture() as text:
+        console.print(grid)
+    return "\n".join(line.rstrip() for line in text.get().splitlines())
 
 
 def say(message: str) -> None:

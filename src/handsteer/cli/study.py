@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from handsteer.study.plan import Plan
 
 
-@loads("handsteer.cli.drive", "handsteer.cli.models", "handsteer.study.results")
+@loads("handsteer.cli.drive", "handsteer.study.results", "tqdm")
 def study(
     plan: Path,
     *,
@@ -44,7 +44,7 @@ def study(
         YAML file with parameters; options override it, and the plan overrides both.
     """
     from handsteer.cli.drive import drive
-    from handsteer.cli.models import fetch_missing
+    from handsteer.cli.installation import fetch_missing
     from handsteer.study.order import order_of
     from handsteer.study.plan import course_file, load_configs, load_courses, read_plan
     from handsteer.study.results import prepare

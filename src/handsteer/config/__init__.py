@@ -11,7 +11,7 @@ from typing import Any, Literal, TypeVar
 
 from pydantic import Field, ValidationError, model_validator
 
-from handsteer.config.driving import CollisionMonitorConfig, ControlConfig, RobotConfig, RobotKind, preset
+from handsteer.config.driving import PRESETS, CollisionMonitorConfig, ControlConfig, RobotConfig, RobotKind
 from handsteer.config.recognition import (
     CameraConfig,
     JoyConfig,
@@ -216,8 +216,8 @@ def cmd_vel_type(config: Config) -> CmdVelType:
     return robot if control == "auto" else control
 
 
-def validate(section: type[S], values: Any, where: str = "") -> S:
-    """Return ``section`` built from ``values``; ``where`` is added to the message of an error.
+def validate(section: type[S], values: Any) -> S:
+    """Return ``section`` built from ``values``.
 
     Raises:
         ConfigError: A field is unknown, of a wrong type or out of range.
@@ -225,7 +225,7 @@ def validate(section: type[S], values: Any, where: str = "") -> S:
     try:
         return section.model_validate(values)
     except ValidationError as error:
-        raise ConfigError(describe(error, section) + where) from None
+        raise ConfigError(describe(error, section)) from None
 
 
 def describe(error: ValidationError, section: type[Section] | None = None) -> str:
@@ -257,12 +257,12 @@ def _fields_beside(section: type[Section] | None, place: tuple[str | int, ...]) 
 
 
 def _preset(values: dict[str, Any]) -> dict[str, Any]:
-    """Return the preset of the robot that ``values`` name; it overrides only the defaults."""
+    """Return the preset of the robot that ``values`` name; it overrides only the defaults. Validation comes later."""
     robot = values["robot"] if isinstance(values.get("robot"), dict) else {}
     name, kind = robot.get("preset"), robot.get("kind", "sim")
     if name is None and kind != "sim":
         name = "generic"
-    return preset(name)
+    return PRESETS.get(name, {}) if isinstance(name, str) else {}
 
 
 def _read_yaml(path: Path) -> dict[str, Any]:

@@ -21,7 +21,6 @@ from handsteer.timeouts import ODOMETRY_S, ROBOT_S, STALE_S
 from handsteer.types import ALWAYS_STOP, BUILT_IN, Action, CmdVelType, find_sign
 
 Preset = Literal["generic", "turtlebot3_burger", "turtlebot3_waffle", "turtlebot4", "turtlesim"]
-PRESETS: tuple[Preset, ...] = get_args(Preset)
 
 _BRAKES = 0.7
 
@@ -45,22 +44,14 @@ def _preset(
     return {"control": speeds, "robot": {**speeds, **accelerations, **robot}, "collision_monitor": brakes}
 
 
-_KNOWN: dict[str, dict[str, Any]] = {
+PRESETS: dict[str, dict[str, Any]] = {
     "generic": _preset(0.5, 1.0, 0.5, 2.0),
     "turtlebot3_burger": _preset(0.22, 2.84, 2.5, 3.2),
     "turtlebot3_waffle": _preset(0.26, 1.82, 2.5, 3.2),
     "turtlebot4": _preset(0.306, 1.9, 0.9, 3.0),
     "turtlesim": _preset(2.0, 2.0, 2.0, 4.0, **_TURTLESIM),
 }
-
-
-def preset(name: object) -> dict[str, Any]:
-    """Return the preset of this name, nested as in :class:`~handsteer.config.Config`.
-
-    Args:
-        name: One of :data:`PRESETS`; for any other value the result is empty, and validation reports it later.
-    """
-    return _KNOWN.get(name, {}) if isinstance(name, str) else {}
+"""Nested as in :class:`~handsteer.config.Config`, by name."""
 
 
 class ControlConfig(Section):

@@ -4,11 +4,15 @@
 """
 
 import math
+from typing import Literal
 
 from handsteer.config import ControlConfig
+from handsteer.control.explain import Reason
 from handsteer.control.safety import Ramp, Safety
-from handsteer.control.twist_mux import TwistMux
+from handsteer.control.sign_control import CruiseControl, SignControl
 from handsteer.types import NONE, RELEASED, ZERO, Stick, Velocity, action_of
+
+Source = Literal["none", "signs", "joystick", "steering"]
 
 
 class Control:
@@ -106,3 +110,120 @@ class Control:
             return None
         since_s, self._since_command_s = self._since_command_s, 0.0
         return self._ramp.step(velocity, min(since_s, self._config.sign_timeout))
+
+
+class TwistMux:
+    """Merges the hand, as signs or as a joystick, and steering into one stream of velocities.
+
+    A steering command takes over at once and blocks the hand until ``steering_timeout`` has passed without another one.
+    Then one zero is commanded, and signs continue from zero. These are the priorities and timeouts of ROS's
+    ``twist_mux``, in one place, so that the robot has one source of commands.
+
+    Attributes:
+        source: The active input.
+        velocity: The last commanded velocity.
+    """
+
+    def __init__(self, config: ControlConfig) -> None:
+        self._config = config
+        self._signs = _signs_by_rule(config)
+        self._since_input_s = 0.0
+        self._is_held = False
+        self._last_sign: str | None = None
+        self.velocity = ZERO
+        self.source: Source = "none"
+
+    def step(
+        self, dt_s: float, *, sign: str | None = None, steering: Velocity | None = None, stick: Stick | None = None
+    ) -> Velocity | None:
+        """Process what :meth:`Control.step` admits.
+
+        Steering is clamped to the limits, and zero if not finite. Full deflection of the joystick is the highest speed.
+        """
+        if not (math.isfinite(dt_s) and dt_s >= 0):
+            return self.halt()
+        if steering is not None:
+            return self._follow("steering", steering)
+        if self.source == "steering":
+            return self._wait(dt_s, self._config.steering_timeout)
+        if stick is not None:
+            return self._follow_stick(stick)
+        if self.source == "joystick":
+            return self._wait(dt_s, self._config.sign_timeout)
+        velocity = self._signs.step(sign, dt_s)
+        if sign is not None:
+            self._last_sign = sign
+        self.source = "none" if self._signs.silent else "signs"
+        return self._take(velocity)
+
+    def reconfigure(self, config: ControlConfig) -> Velocity | None:
+        """Change limits, steps, times and actions; no change makes the robot faster.
+
+        Returns:
+            The velocity to command now if the last one exceeds the new limits; else None.
+        """
+        if config.rule == self._config.rule:
+            self._signs.reconfigure(config)
+        else:
+            self._signs = _signs_by_rule(config)
+        self._config = config
+        within = self.velocity.clamped(config.max_linear, config.max_angular)
+        return self._take(within if self.source != "none" and within != self.velocity else None)
+
+    def hold_back(self, velocity: Velocity) -> None:
+        """Continue from ``velocity``, a slower one that was commanded instead of the last."""
+        self.velocity = velocity
+        self._signs.hold_back(velocity)
+
+    def halt(self) -> Velocity | None:
+        """Stop the active input; return one zero, or None if there is none."""
+        was_driving = self.source != "none"
+        self._signs.halt()
+        self.source = "none"
+        return self._take(ZERO if was_driving else None)
+
+    @property
+    def reason(self) -> Reason:
+        """Why this velocity is commanded."""
+        if self.source == "steering":
+            return Reason("steered_at_zero" if self.velocity.is_zero else "steered")
+        if self._config.mode == "joystick":
+            is_held = self.source == "joystick" and self._is_held
+            return Reason("not_held" if not is_held else "held" if self.velocity.is_zero else "joystick")
+        return self._reason_of_signs
+
+    @property
+    def _reason_of_signs(self) -> Reason:
+        if self.source == "none":
+            return Reason("no_input", f"{self._config.sign_timeout:g}")
+        sign = self._last_sign or NONE
+        if not self.velocity.is_zero:
+            return Reason("sign", sign)
+        if sign == NONE:
+            return Reason("no_sign")
+        return Reason("stop_sign", sign) if action_of(sign, self._config.actions) == "stop" else Reason("not_started")
+
+    def _follow_stick(self, stick: Stick) -> Velocity | None:
+        config, self._is_held = self._config, stick.held
+        wanted = Velocity(stick.forward * config.max_linear, stick.left * config.max_angular)
+        return self._follow("joystick", wanted if stick.held else ZERO)
+
+    def _follow(self, source: Source, wanted: Velocity) -> Velocity | None:
+        config = self._config
+        self._signs.halt()
+        self.source = source
+        self._since_input_s = 0.0
+        return self._take(wanted.clamped(config.max_linear, config.max_angular) if wanted.is_finite else ZERO)
+
+    def _wait(self, dt_s: float, timeout_s: float) -> Velocity | None:
+        self._since_input_s += dt_s
+        return self.halt() if self._since_input_s >= timeout_s else None
+
+    def _take(self, velocity: Velocity | None) -> Velocity | None:
+        if velocity is not None:
+            self.velocity = velocity
+        return velocity
+
+
+def _signs_by_rule(config: ControlConfig) -> SignControl:
+    return CruiseControl(config) if config.rule == "cruise" else SignControl(config)

@@ -24,7 +24,7 @@ from handsteer.control.footprint import (
     reach_m,
     seen_from,
 )
-from handsteer.types import ZERO, Velocity
+from handsteer.types import ZERO, Velocity, changed_towards
 
 _PAD_M = 0.02
 """Minimum distance of obstacles from the robot, on all sides."""
@@ -118,13 +118,22 @@ def limit(
 
 def _within_reach(wanted: Velocity, points: Points, rule: CollisionMonitorConfig, moving: Velocity) -> Points:
     """Return those of ``points`` that the robot could reach, even if it is slowed."""
-    v = max(abs(moving.linear_mps), abs(wanted.linear_mps))
-    w = max(abs(moving.angular_radps), abs(wanted.angular_radps))
-    way_m = v * (rule.reaction_time + max(v / rule.deceleration, w / rule.angular_deceleration))
-    pad_m = _PAD_M + _PAD_S * fastest_mps(Velocity(v, w), rule) + _NOISE_M
+    highest = _highest(moving, wanted)
+    way_m = highest.linear_mps * (rule.reaction_time + _braking_s(highest, rule))
+    pad_m = _PAD_M + _PAD_S * fastest_mps(highest, rule) + _NOISE_M
     far_m = way_m + rule.margin + _CREEP_M + reach_m(rule) + pad_m
     x, y = points[:, 0], points[:, 1]
     return points[x * x + y * y <= far_m**2]
+
+
+def _highest(one: Velocity, other: Velocity) -> Velocity:
+    """Return the higher linear and angular speeds of the two."""
+    linear = max(abs(one.linear_mps), abs(other.linear_mps))
+    return Velocity(linear, max(abs(one.angular_radps), abs(other.angular_radps)))
+
+
+def _braking_s(velocity: Velocity, rule: CollisionMonitorConfig) -> float:
+    return max(abs(velocity.linear_mps) / rule.deceleration, abs(velocity.angular_radps) / rule.angular_deceleration)
 
 
 def _scaled(velocity: Velocity, linear: float, angular: float) -> Velocity:
@@ -143,9 +152,7 @@ def _share(velocity: Velocity, points: Points, rule: CollisionMonitorConfig) -> 
     fastest = fastest_mps(velocity, rule)
     if fastest < _NOTHING_MPS:
         return 1.0, None
-    braking_s = max(
-        abs(velocity.linear_mps) / rule.deceleration, abs(velocity.angular_radps) / rule.angular_deceleration
-    )
+    braking_s = _braking_s(velocity, rule)
     # The margin applies to driving only; a turn in place may end at the pad, so that a robot at a wall can turn away.
     margin_s = rule.margin * abs(velocity.linear_mps) / fastest**2
     needed_s = delay_s + braking_s / 2
@@ -174,21 +181,12 @@ def first_hit(velocity: Velocity, points: Points, rule: CollisionMonitorConfig, 
 
 def _met_while_braking(moving: Velocity, target: Velocity, points: Points, rule: CollisionMonitorConfig) -> Hit | None:
     """Return the first obstacle hit if ``target`` is commanded now and zero one reaction time later, or None."""
-    fastest = fastest_mps(
-        Velocity(
-            max(abs(moving.linear_mps), abs(target.linear_mps)),
-            max(abs(moving.angular_radps), abs(target.angular_radps)),
-        ),
-        rule,
-    )
+    highest = _highest(moving, target)
+    fastest = fastest_mps(highest, rule)
     if fastest < _NOTHING_MPS:
         return None
     # A robot that reverses its direction stops on the way, and has to stop again.
-    stop_s = max(
-        max(abs(moving.linear_mps), abs(target.linear_mps)) / rule.deceleration,
-        max(abs(moving.angular_radps), abs(target.angular_radps)) / rule.angular_deceleration,
-    )
-    times_s = _times(fastest, rule.reaction_time + stop_s)
+    times_s = _times(fastest, rule.reaction_time + _braking_s(highest, rule))
     poses = braking(moving, target, rule, rule.reaction_time, times_s)
     return _met(poses, times_s, points, rule, pad_m=_PAD_M + _PAD_S * fastest, fastest_mps=fastest)
 
@@ -293,13 +291,5 @@ class ObstacleLimiter:
         elapsed_s = max(0.0, now_s - max(self._moving_s, self._commanded_s))
         if not math.isfinite(elapsed_s):
             return ZERO
-        return Velocity(
-            _towards(self._moving.linear_mps, self._commanded.linear_mps, self.rule.deceleration * elapsed_s),
-            _towards(
-                self._moving.angular_radps, self._commanded.angular_radps, self.rule.angular_deceleration * elapsed_s
-            ),
-        )
-
-
-def _towards(now: float, wanted: float, most: float) -> float:
-    return min(max(wanted, now - most), now + most)
+        change = Velocity(self.rule.deceleration * elapsed_s, self.rule.angular_deceleration * elapsed_s)
+        return changed_towards(self._commanded, self._moving, change)

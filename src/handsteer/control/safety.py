@@ -1,9 +1,8 @@
 """Decides when the robot may move, and how fast it may accelerate: pure rules without a clock.
 
 A robot moves only while there is a current reason. :class:`Safety` decides whether inputs are followed, with the clutch
-:class:`Engagement`,
-:class:`Following` whether the robot does what is commanded, :class:`Allowance` limits the rate of signs, and
-:class:`Ramp` acceleration and jerk. The times are in :mod:`handsteer.timeouts`.
+:class:`Engagement`, :class:`Following` whether the robot does what is commanded, :class:`Allowance` limits the rate of
+signs, and :class:`Ramp` acceleration and jerk. The times are in :mod:`handsteer.timeouts`.
 """
 
 import math
@@ -35,24 +34,22 @@ class Engagement:
 
     Args:
         enabled: If not, the hand is always engaged.
+
+    Attributes:
+        engaged: Whether the hand drives.
     """
 
     def __init__(self, *, enabled: bool) -> None:
-        self.enabled = enabled
-        self._engaged = not enabled
+        self._enabled = enabled
+        self.engaged = not enabled
         self._palm_s = 0.0
         self._idle_s = 0.0
         self._gap_s = math.inf
 
     @property
-    def engaged(self) -> bool:
-        """Whether the hand drives."""
-        return self._engaged
-
-    @property
     def progress(self) -> float:
         """Progress of engaging, 0 to 1."""
-        return 1.0 if self._engaged else min(1.0, self._palm_s / ENGAGE_S)
+        return 1.0 if self.engaged else min(1.0, self._palm_s / ENGAGE_S)
 
     def step(self, dt_s: float) -> None:
         """Advance time by ``dt_s`` seconds, >= 0."""
@@ -72,12 +69,12 @@ class Engagement:
         self._palm_s = self._palm_s + self._gap_s if self._gap_s < FAULT_GAP_S else 0.0
         self._gap_s = 0.0
         if self._palm_s >= ENGAGE_S - _SLACK_S:
-            self._engaged = True
+            self.engaged = True
 
     def disengage(self) -> None:
         """Require the open palm again; without effect if not enabled."""
         self._palm_s, self._gap_s = 0.0, math.inf
-        self._engaged = not self.enabled
+        self.engaged = not self._enabled
 
 
 class Safety:
@@ -99,6 +96,9 @@ class Safety:
 
     Attributes:
         is_stopped: Whether a Stop is active, until :meth:`reset`.
+        signs_wait: Why signs have to show neutral first, as ``no sign came``; empty after a reset, None if they need
+            not.
+        steering_waits: Whether steering has to be released first.
         engagement: The clutch.
     """
 
@@ -113,24 +113,9 @@ class Safety:
         self._last_steering_was_zero = True
         self._neutral_s = 0.0
         self._was_fault = False
-        self._signs_wait: str | None = "has just started" if arming else None
-        self._steering_waits = arming
+        self.signs_wait: str | None = "has just started" if arming else None
+        self.steering_waits = arming
         self.is_stopped = False
-
-    @property
-    def signs_wait(self) -> str | None:
-        """Why signs have to show neutral first, as ``no sign came``; empty after a reset, None if they need not."""
-        return self._signs_wait
-
-    @property
-    def stick_waits(self) -> bool:
-        """Whether the hand as a joystick has to be released first."""
-        return self._stick_waits
-
-    @property
-    def steering_waits(self) -> bool:
-        """Whether steering has to be released first."""
-        return self._steering_waits
 
     def step(self, dt_s: float) -> None:
         """Advance time by ``dt_s`` seconds, >= 0; a timeout of signs is a fault."""
@@ -154,7 +139,7 @@ class Safety:
 
     def disarm(self, why: str = "") -> None:
         """Require neutral of signs and steering before either is followed again."""
-        self._signs_wait, self._steering_waits = why, True
+        self.signs_wait, self.steering_waits = why, True
         self._neutral_s = 0.0
         self._disengage()
 
@@ -163,8 +148,8 @@ class Safety:
         self._neutral_s = 0.0
         self._was_fault = True
         self._disengage()
-        if self._arming and not self._signs_wait:
-            self._signs_wait = why
+        if self._arming and not self.signs_wait:
+            self.signs_wait = why
 
     def robot_is_away(self, why: str) -> None:
         """Record that no robot follows the commands; with ``arming``, neutral is required when one does again."""
@@ -176,14 +161,14 @@ class Safety:
     def admits_sign(self, sign: str, *, stops: bool) -> bool:
         """Record a sign, and whether it ``stops``; return whether the robot may follow it."""
         self._note(sign, stops=stops)
-        return self._signs_wait is None and self.engagement.engaged and not self.is_stopped
+        return self.signs_wait is None and self.engagement.engaged and not self.is_stopped
 
     def admits_stick(self, *, held: bool) -> bool:
         """Record the state of the hand as a joystick; return whether the robot may follow it."""
         self._note("" if held else NONE, stops=not held)
         if not held:
             self._stick_waits = False
-        waits = self._stick_waits or self._signs_wait is not None
+        waits = self._stick_waits or self.signs_wait is not None
         return self.engagement.engaged and not (waits or self.is_stopped)
 
     def admits_steering(self, *, is_zero: bool) -> bool:
@@ -196,10 +181,10 @@ class Safety:
         is_lost = after_pause and self._arming and not self._last_steering_was_zero
         self._last_steering_was_zero = is_zero
         if is_lost:
-            self._steering_waits = True
+            self.steering_waits = True
         if is_zero or (after_pause and not is_lost):
-            self._steering_waits = False
-        return not (self._steering_waits or self.is_stopped)
+            self.steering_waits = False
+        return not (self.steering_waits or self.is_stopped)
 
     def reconfigure(self, config: ControlConfig) -> None:
         """Change the timeouts."""
@@ -214,7 +199,7 @@ class Safety:
         else:
             self._neutral_s = 0.0
         if self._neutral_s >= NEUTRAL_S - _SLACK_S and not (self._arming and self._age_s < ARMING_S):
-            self._signs_wait = None
+            self.signs_wait = None
 
     def _note_none(self, gap_s: float) -> None:
         if gap_s >= FAULT_GAP_S:

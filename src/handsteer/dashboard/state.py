@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import Literal, TypeVar
 
 from handsteer.config import ControlConfig
-from handsteer.control.twist_mux import Source
+from handsteer.control import Source
 from handsteer.nodes.status import ERROR, OK, CameraStatus, ControlStatus, RecognitionStatus, RobotStatus, Status
 from handsteer.timeouts import ODOMETRY_S, ROBOT_S
 from handsteer.types import NONE, SIGNS, ZERO, CourseState, Velocity

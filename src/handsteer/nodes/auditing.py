@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 from handsteer.audit import ERROR, INFO, WARN, AuditCode, AuditEvent, write_event
 from handsteer.clock import Clock
+from handsteer.control import Source
 from handsteer.control.explain import Reason
 from handsteer.control.safety import Safety
-from handsteer.control.twist_mux import Source
 from handsteer.messages import AUDIT
 from handsteer.nodes import status
 from handsteer.transports.base import Transport

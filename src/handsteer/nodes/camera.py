@@ -44,8 +44,7 @@ class CameraNode(Node):
         frame_id: Coordinate frame of the images.
         calibration: Calibration of the camera that ``camera`` is at first, for pictures of its size; None if there is
             none.
-        image: Topic of the frames.
-        compressed: Topic of the same as JPEG, on demand.
+        image, compressed: Topics of the frames, and on demand of the same as JPEG.
 
     Attributes:
         ended: Set when a file has ended and ends the run.

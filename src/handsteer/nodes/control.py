@@ -64,12 +64,8 @@ class HandSignControlNode(Node):
         engage: Whether the hand drives nothing before an open palm engaged it.
         others_keep_stop: Whether nodes of other processes may remember a Stop from before the start; nothing moves
             before one of them was heard, for at most :data:`~handsteer.timeouts.HEAR_STOP_S`.
-        sign: Topic of the signs.
-        joy: Topic of the hand as a joystick.
+        sign, joy, steering, odom, scan: Topics of what it subscribes to.
         camera_changed: Topic on which it is published that another camera was chosen; none where it cannot be.
-        steering: Topic of steering commands, which override signs.
-        odom: Topic of the robot's odometry.
-        scan: Topic of its laser scans.
 
     Attributes:
         latency: From the capture of a frame to the resulting Twist.
@@ -143,14 +139,11 @@ class HandSignControlNode(Node):
         """Return ``stop`` and ``reset``, which are equivalent to true and false on ``/stop``."""
         publisher = self.publisher(STOP)
 
-        def publish(is_stopped: bool, answer: str) -> str:
+        def publish(is_stopped: bool) -> str:
             publisher.publish(Bool(data=is_stopped))
-            return answer
+            return "stopped, until it is reset" if is_stopped else "reset"
 
-        return {
-            "stop": lambda: publish(True, "stopped, until it is reset"),
-            "reset": lambda: publish(False, "reset"),
-        }
+        return {"stop": lambda: publish(True), "reset": lambda: publish(False)}
 
     def on_stop(self) -> None:
         """Stop the robot, and those that were selected a moment ago."""
@@ -174,18 +167,9 @@ class HandSignControlNode(Node):
         return self.transport.topic_name(topic), ", ".join(publishers) or "no known node"
 
     def _on_sign(self, received: Received[String]) -> None:
-        if self._waits_for_others():
-            self._publish(ZERO, received.captured_s)
-            return
-        if self._is_stale(received):
-            self._obey_late(is_stop=action_of(received.message.data, self._config.actions) == "stop")
-            return
-        elapsed_s = self._elapsed()
-        sign = None if self._stall_guard.distrusts(self.clock.now()) else received.message.data
-        self._look_after_the_robot(elapsed_s)
-        self._select_by(sign)
-        self._publish(self._control.step(elapsed_s, sign=sign), received.captured_s)
-        self._calm_down()
+        sign = received.message.data
+        is_stop = action_of(sign, self._config.actions) == "stop"
+        self._take(received.captured_s, is_late=self._is_stale(received), is_stop=is_stop, sign=sign)
 
     def _on_other_camera(self, received: Received[String]) -> None:
         """Stop, and wait for neutral in a frame of the other camera."""
@@ -195,20 +179,11 @@ class HandSignControlNode(Node):
         self._look_for_changes(self.clock.now())
 
     def _on_stick(self, stick: Stick, received: Received[Joy]) -> None:
-        if self._waits_for_others():
-            self._publish(ZERO, received.captured_s)
-            return
-        if self._is_stale(received):
-            self._obey_late(is_stop=not stick.held)
-            return
-        elapsed_s = self._elapsed()
-        trusted = None if self._stall_guard.distrusts(self.clock.now()) else stick
-        self._look_after_the_robot(elapsed_s)
-        self._publish(self._control.step(elapsed_s, stick=trusted), received.captured_s)
-        self._calm_down()
+        self._take(received.captured_s, is_late=self._is_stale(received), is_stop=not stick.held, stick=stick)
 
     def _on_gamepad(self, stick: Stick, received: Received[Joy]) -> None:
-        self._steer(stick.forward * self._config.max_linear, stick.left * self._config.max_angular, received)
+        limits = self._config
+        self._steer(Velocity(stick.forward * limits.max_linear, stick.left * limits.max_angular), received)
 
     def _is_stale(self, received: Received[Any]) -> bool:
         """Return whether a message shows what is too old, or was seen by another camera; the watchdog keeps running."""
@@ -218,29 +193,37 @@ class HandSignControlNode(Node):
         return is_old or is_of_other or received.is_late
 
     def _on_steering(self, received: Received[Twist]) -> None:
-        self._steer(received.message.linear.x, received.message.angular.z, received)
+        self._steer(Velocity(received.message.linear.x, received.message.angular.z), received)
 
-    def _steer(self, linear_mps: float, angular_radps: float, received: Received[Any]) -> None:
+    def _steer(self, wanted: Velocity, received: Received[Any]) -> None:
+        self._take(None, is_late=received.is_late, is_stop=wanted.is_zero, steering=wanted)
+
+    def _take(
+        self,
+        captured_s: float | None,
+        *,
+        is_late: bool,
+        is_stop: bool,
+        sign: str | None = None,
+        stick: Stick | None = None,
+        steering: Velocity | None = None,
+    ) -> None:
+        """Follow an input; a late one can only stop: it does not show what is seen now, so it does not arm."""
         if self._waits_for_others():
-            self._publish(ZERO)
-            return
-        wanted = Velocity(linear_mps, angular_radps)
-        if received.is_late:
-            self._obey_late(is_stop=wanted.is_zero)
-            return
-        elapsed_s = self._elapsed()
-        steering = None if self._stall_guard.distrusts(self.clock.now()) else wanted
-        self._look_after_the_robot(elapsed_s)
-        self._publish(self._control.step(elapsed_s, steering=steering))
-        self._look_for_changes(self._last_step_s)
+            self._publish(ZERO, captured_s)
+        elif is_late:
+            self._publish(self._control.halt() if is_stop else None)
+        else:
+            elapsed_s = self._elapsed()
+            if self._stall_guard.distrusts(self.clock.now()):
+                sign = stick = steering = None
+            self._look_after_the_robot(elapsed_s)
+            self._select_by(sign)
+            self._publish(self._control.step(elapsed_s, sign=sign, stick=stick, steering=steering), captured_s)
+            self._calm_down()
 
     def _waits_for_others(self) -> bool:
         return self._stops is not None and self._stops.waits_for_others
-
-    def _obey_late(self, *, is_stop: bool) -> None:
-        """Stop for a late sign or command; it does not show what is seen now, so it does not arm."""
-        if is_stop:
-            self._publish(self._control.halt())
 
     def _on_odometry(self, received: Received[Odometry]) -> None:
         assert self._following is not None
@@ -329,7 +312,7 @@ class HandSignControlNode(Node):
             linear_mps=round(velocity.linear_mps, 3),
             angular_radps=round(velocity.angular_radps, 3),
             moving=self._is_moving,
-            robot=self._selection.fleet.selected if self._selection else None,
+            robot=self._selection.robot if self._selection else None,
             blind=bool(self._monitor.why_blind()),
             obstacle_m=self._monitor.obstacle_m,
             warning=self._rivals.warning or None,
@@ -357,7 +340,7 @@ class HandSignControlNode(Node):
 
     def _reason_by_input(self) -> Reason:
         safety, source, why = self._safety, self._mux.source, self._safety.signs_wait
-        robot = self._selection.fleet.selected if self._selection else ""
+        robot = self._selection.robot if self._selection else ""
         if source == "steering" and safety.steering_waits:
             return Reason("steering_disarmed", robot=robot)
         # Without any input, that is the reason after a reset, which needs no explanation.

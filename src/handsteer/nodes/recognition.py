@@ -32,9 +32,9 @@ from handsteer.nodes.base import Node
 from handsteer.nodes.status import RecognitionStatus
 from handsteer.nodes.supervision import StopKeeper
 from handsteer.nodes.timing import CALM_S, TOO_SLOW, FrameAge, LatencyLog, Recording, StallGuard, far_and_late
-from handsteer.recognition.hand import Classifier, Hand
+from handsteer.recognition.hand import Hand
 from handsteer.recognition.hand_joystick import HandJoystick
-from handsteer.recognition.recognizer import Recognition, Recognizer
+from handsteer.recognition.recognizer import Recognition, Recognizer, annotate, open_classifier
 from handsteer.transports.base import Received, Subscription, Transport
 from handsteer.types import NONE, RELEASED, Handedness
 
@@ -47,8 +47,6 @@ _CHOOSE_PERIOD_S = 0.5
 log = logging.getLogger(__name__)
 
 M = TypeVar("M", Image, CompressedImage)
-Annotate = Callable[[NDArray[np.uint8], Recognition], NDArray[np.uint8]]
-OpenClassifier = Callable[[SignsConfig], Classifier]
 
 
 class HandSignRecognitionNode(Node):
@@ -57,13 +55,9 @@ class HandSignRecognitionNode(Node):
     Args:
         recognizer: Recognises the signs.
         config: Maximum age of a frame, and which images to subscribe to.
-        annotate: Draws the result into a copy of the frame, if there are subscribers.
-        open_classifier: Opens the classifier of ``signs.model`` when it changes while the node runs.
         joystick: The hand as a joystick, with the default parameters when None.
-        image: Topic of the frames.
-        compressed: Topic of the same as JPEG.
-        sign: Topic of the signs.
-        joy: Topic of the hand as a joystick.
+        image, compressed: Topics of the frames, and of the same as JPEG.
+        sign, joy: Topics of the signs, and of the hand as a joystick.
         camera_changed: Topic on which it is published that another camera was chosen; none where it cannot be.
 
     Attributes:
@@ -79,9 +73,7 @@ class HandSignRecognitionNode(Node):
         clock: Clock,
         recognizer: Recognizer,
         config: SignsConfig,
-        annotate: Annotate,
         *,
-        open_classifier: OpenClassifier,
         joystick: HandJoystick | None = None,
         image: Topic[Image] = IMAGE_RAW,
         compressed: Topic[CompressedImage] = IMAGE_COMPRESSED,
@@ -96,8 +88,6 @@ class HandSignRecognitionNode(Node):
         self._recognizer = recognizer
         self._config = config
         self._joystick = joystick or HandJoystick()
-        self._annotate = annotate
-        self._open_classifier = open_classifier
         self._model = _version_of(config.model)
         self._last_captured_s: float | None = None
         self._unseen_s = 0.0
@@ -141,7 +131,7 @@ class HandSignRecognitionNode(Node):
         """Raise ConfigError if the file of ``signs.model`` has changed and cannot be used."""
         if self._has_other_model(config.signs):
             try:
-                self._open_classifier(config.signs)
+                open_classifier(config.signs)
             except ModelError as error:
                 raise ConfigError(f"signs.model: {error}") from None
 
@@ -149,7 +139,7 @@ class HandSignRecognitionNode(Node):
         """Apply the confidences and times of ``signs``, and its model if the file was replaced or rewritten."""
         if self._has_other_model(config.signs):
             version = _version_of(config.signs.model)
-            self._recognizer.use(self._open_classifier(config.signs))
+            self._recognizer.use(open_classifier(config.signs))
             self._joystick.reset()
             self._model = version
         self._config = config.signs
@@ -226,7 +216,7 @@ class HandSignRecognitionNode(Node):
         self.processing.add(self.clock.now() - began_s)
         if self._annotated.has_subscribers:
             header = received.message.header
-            picture = self._annotate(image, recognition)
+            picture = annotate(image, recognition)
             self._joystick.draw(picture)
             self._annotated.publish(image_message(picture, header), received.captured_s)
 

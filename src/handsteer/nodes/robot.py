@@ -46,11 +46,10 @@ from handsteer.nodes.supervision import Rivals, StopKeeper
 from handsteer.nodes.surroundings import Surroundings
 from handsteer.nodes.timing import StallGuard
 from handsteer.robots import RangeScan, Robot, RobotState
-from handsteer.robots.diff_drive import Velocity
 from handsteer.robots.editing import Change
 from handsteer.robots.world import World
 from handsteer.transports.base import Call, Received, Transport
-from handsteer.types import CourseState, Pose2D
+from handsteer.types import ZERO, CourseState, Pose2D, Velocity
 
 log = logging.getLogger(__name__)
 
@@ -74,8 +73,7 @@ class RobotNode(Node):
         robot: The robot to drive.
         config: Names of the coordinate frames, and whether to publish ``/clock``.
         cmd_vel: Topic of the commands, with Twist or TwistStamped.
-        odom: Topic of the odometry.
-        scan: Topic of the laser scans.
+        odom, scan: Topics of the odometry and the laser scans.
 
     Attributes:
         state: The robot's newest state.
@@ -99,7 +97,7 @@ class RobotNode(Node):
         self._config = config
         self._last_step_s = clock.now()
         self._stall_guard = StallGuard(config.cmd_vel_timeout, clock.now())
-        self._command = Velocity()
+        self._command = ZERO
         self._commanded_s = clock.now()
         self.state = robot.step(0.0)
         self.path_length_m = 0.0
@@ -175,7 +173,7 @@ class RobotNode(Node):
             self._stand()
 
     def _stand(self) -> None:
-        self._drive(Velocity())
+        self._drive(ZERO)
 
     def _start_again(self) -> None:
         self.state = self._robot.step(0.0)
@@ -215,7 +213,7 @@ class RobotNode(Node):
     def _report(self) -> RobotStatus:
         state = self.state
         silence_s = self.clock.now() - self._commanded_s
-        is_expired = silence_s > self._config.cmd_vel_timeout and self._command != Velocity()
+        is_expired = silence_s > self._config.cmd_vel_timeout and self._command != ZERO
         return RobotStatus(
             collisions=state.collisions,
             path_length_m=round(self.path_length_m, 2),

@@ -1,7 +1,7 @@
 """Sends velocity commands to the selected one of several robots, and zeros to the ones selected before."""
 
 import logging
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -14,59 +14,25 @@ log = logging.getLogger(__name__)
 
 _LAST_ZEROS = 10
 
-Advertise = Callable[[Topic[Any]], Commands]
-
 NEXT = "next"
-"""Accepted by :meth:`Fleet.select` instead of a name."""
-
-
-class Fleet:
-    """Several robots, one of which is driven at a time.
-
-    Args:
-        names: Names of the robots, at least one; the first is selected initially.
-
-    Attributes:
-        selected: Name of the robot that is driven.
-    """
-
-    def __init__(self, names: Sequence[str]) -> None:
-        self._names = tuple(names)
-        self.selected = self._names[0]
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of all robots, in order."""
-        return self._names
-
-    def select(self, name: str) -> bool:
-        """Select the robot ``name``, or the next one for :data:`NEXT`; return whether the selection changed.
-
-        An unknown name changes nothing.
-        """
-        if name == NEXT:
-            name = self._names[(self._names.index(self.selected) + 1) % len(self._names)]
-        if name == self.selected or name not in self._names:
-            return False
-        self.selected = name
-        return True
+"""Accepted by :meth:`Selection.select` instead of a name."""
 
 
 class Selection:
-    """The robots that one control drives, one at a time.
+    """The robots that one control drives, one at a time; the first is selected initially.
 
     A name on ``/select_robot`` selects a robot, ``next`` the following one; ``/selected_robot``, latched, has the
     selected one.
 
     Args:
         node: The control.
-        names: Namespaces of the robots, in order.
+        names: Namespaces of the robots, in order, at least one.
         cmd_vel: The topic of commands within each namespace.
         advertise: Returns the publisher of a topic of commands.
         on_change: Called when another robot was selected, before anything is sent to it.
 
     Attributes:
-        fleet: The robots, and which one is selected.
+        robot: Namespace of the robot that is driven.
         topics: The command topic of each robot.
     """
 
@@ -75,39 +41,46 @@ class Selection:
         node: Node,
         names: tuple[str, ...],
         cmd_vel: Topic[Any],
-        advertise: Advertise,
+        advertise: Callable[[Topic[Any]], Commands],
         on_change: Callable[[], None],
     ) -> None:
-        self.fleet = Fleet(names)
+        self.robot = names[0]
+        self._names = names
         topics = {name: replace(cmd_vel, name=f"/{name}{cmd_vel.name}") for name in names}
         self.topics = tuple(topics.values())
         self._commands = {name: advertise(topic) for name, topic in topics.items()}
         self._on_change = on_change
         self._left: dict[str, int] = {}
         self._selected = node.publisher(SELECTED_ROBOT)
-        self._selected.publish(String(data=self.fleet.selected))
+        self._selected.publish(String(data=self.robot))
         node.subscribe(SELECT_ROBOT, self._on_select)
 
     @property
     def commands(self) -> Commands:
         """The publisher of commands to the selected robot."""
-        return self._commands[self.fleet.selected]
+        return self._commands[self.robot]
 
     def follow(self) -> bool:
         """Use the message type that each robot subscribes to; return whether it has changed for the selected one."""
         changed = [name for name, commands in self._commands.items() if commands.follow()]
-        return self.fleet.selected in changed
+        return self.robot in changed
 
     def select(self, name: str) -> None:
-        """Select the robot ``name`` (or ``next``); the previous one gets a zero first, and more from :meth:`beat`."""
-        before = self.fleet.selected
-        if not self.fleet.select(name):
-            return
-        self._left[before] = _LAST_ZEROS
-        self._left.pop(self.fleet.selected, None)
-        self.beat()
-        self._on_change()
-        self._selected.publish(String(data=self.fleet.selected))
+        """Select the robot ``name``, or the following one for :data:`NEXT`; an unknown name changes nothing.
+
+        The previous one gets a zero first, and more from :meth:`beat`.
+        """
+        if name == NEXT:
+            name = self._names[(self._names.index(self.robot) + 1) % len(self._names)]
+        if name not in self._names:
+            log.warning("there is no robot %r to select; there are %s", name, ", ".join(self._names))
+        elif name != self.robot:
+            self._left[self.robot] = _LAST_ZEROS
+            self._left.pop(name, None)
+            self.robot = name
+            self.beat()
+            self._on_change()
+            self._selected.publish(String(data=name))
 
     def beat(self) -> None:
         """Send a zero to each robot that was selected a moment ago."""
@@ -118,7 +91,4 @@ class Selection:
                 del self._left[name]
 
     def _on_select(self, received: Received[String]) -> None:
-        name = received.message.data.strip()
-        self.select(name)
-        if name != self.fleet.selected and name not in (*self.fleet.names, NEXT):
-            log.warning("there is no robot %r to select; there are %s", name, ", ".join(self.fleet.names))
+        self.select(received.message.data.strip())

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from typing import ClassVar, Literal
 
 from handsteer.config import ControlConfig
+from handsteer.control import Source
 from handsteer.control.explain import Reason
-from handsteer.control.twist_mux import Source
 from handsteer.types import NONE, CourseState, Handedness, Pose2D, describe_seen
 
 OK, WARN, ERROR = 0, 1, 2

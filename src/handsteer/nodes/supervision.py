@@ -3,6 +3,7 @@
 import logging
 import math
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 from handsteer.messages import STOP, STOPPED, Bool, Topic
@@ -79,14 +80,13 @@ class Rivals:
     def __init__(self, node: Node, topics: Sequence[Topic[Any]], elsewhere: dict[str, Look] | None = None) -> None:
         self.warning = ""
         self._node = node
-        self._looks: dict[str, Look] = {node.transport.topic_name(topic): self._look_at(topic) for topic in topics}
+        self._looks: dict[str, Look] = {
+            node.transport.topic_name(topic): partial(node.transport.publishers_of, topic) for topic in topics
+        }
         self._looks |= elsewhere or {}
         self._seen: dict[str, int] = {}
         self._logged: set[str] = set()
         node.every(_PERIOD_S, self._look)
-
-    def _look_at(self, topic: Topic[Any]) -> Look:
-        return lambda: self._node.transport.publishers_of(topic)
 
     def _look(self) -> None:
         warnings = [warning for name, look in self._looks.items() if (warning := self._problem(name, look()))]

@@ -1,7 +1,6 @@
 """The world around a simulated robot: changes requested by the page, the course, and the markers."""
 
-import threading
-from collections import deque
+import queue
 from collections.abc import Callable
 from concurrent.futures import Future
 
@@ -9,9 +8,9 @@ from handsteer.errors import WorldError
 from handsteer.messages import WORLD_MARKERS, Header
 from handsteer.nodes.base import Node
 from handsteer.nodes.world_markers import Touches, gate_strips, world_markers
-from handsteer.robots import Robot, RobotState
+from handsteer.robots import InWorld, Robot, RobotState
 from handsteer.robots.course import Referee
-from handsteer.robots.editing import Change, InWorld
+from handsteer.robots.editing import Change
 from handsteer.robots.world import World
 from handsteer.transports.base import Call
 from handsteer.types import CourseState
@@ -19,41 +18,6 @@ from handsteer.types import CourseState
 _MARKERS_PERIOD_S = 0.05
 _REPEAT_S = 0.5
 _MOST_WAITING = 16
-
-
-class WorldChanges:
-    """Changes of a robot's world that wait for the robot's thread; :meth:`ask` may be called from any thread."""
-
-    def __init__(self) -> None:
-        self._lock = threading.Lock()
-        self._waiting: deque[tuple[Callable[[], None], Future[None]]] = deque()
-
-    def ask(self, change: Callable[[], None]) -> Future[None]:
-        """Queue ``change``; return a future that is done, or fails with the :class:`WorldError` that refuses it."""
-        future: Future[None] = Future()
-        with self._lock:
-            if len(self._waiting) >= _MOST_WAITING:
-                future.set_exception(WorldError("too many changes wait already: the robot is busy or has ended"))
-            else:
-                self._waiting.append((change, future))
-        return future
-
-    def make(self) -> bool:
-        """Make all queued changes in order, on this thread; return whether there were any."""
-        with self._lock:
-            waiting, self._waiting = self._waiting, deque()
-        for change, future in waiting:
-            if future.set_running_or_notify_cancel():
-                try:
-                    change()
-                except WorldError as error:
-                    future.set_exception(error)
-                except Exception as error:
-                    future.set_exception(error)
-                    raise
-                else:
-                    future.set_result(None)
-        return bool(waiting)
 
 
 class Surroundings:
@@ -84,7 +48,7 @@ class Surroundings:
         self._before_change = before_change
         self._after_restart = after_restart
         self._in_world = robot if isinstance(robot, InWorld) else None
-        self._changes = WorldChanges()
+        self._waiting: queue.Queue[tuple[Callable[[], None], Future[None]]] = queue.Queue(_MOST_WAITING)
         self._referee = Referee(self._in_world.world.gates if self._in_world else ())
         self._touches = Touches()
         self._most_markers = 0
@@ -112,15 +76,15 @@ class Surroundings:
         Returns:
             Done, or failed with the :class:`~handsteer.errors.WorldError` that explains why nothing has changed.
         """
-        return self._changes.ask(lambda: self._change(change))
+        return self._ask(lambda: self._change(change))
 
     def enter(self, world: World) -> Future[None]:
         """Move the robot to the start of another world; see :meth:`change`."""
-        return self._changes.ask(lambda: self._restart(lambda robot: robot.enter(world)))
+        return self._ask(lambda: self._restart(lambda robot: robot.enter(world)))
 
     def reset(self) -> Future[None]:
         """Reset the robot and all things to their initial places; see :meth:`change`."""
-        return self._changes.ask(lambda: self._restart(lambda robot: robot.reset()))
+        return self._ask(lambda: self._restart(lambda robot: robot.reset()))
 
     def services(self) -> dict[str, Call]:
         """Return ``reset_odometry``, which sets the odometry to 0 at the current place; none for a real robot."""
@@ -129,19 +93,39 @@ class Surroundings:
             return {}
 
         def reset() -> str:
-            self._changes.ask(robot.reset_odometry)
+            self._ask(robot.reset_odometry)
             return "the odometry counts from here"
 
         return {"reset_odometry": reset}
 
     def make_changes(self) -> None:
-        """Make the requested changes, on this thread."""
-        self._changes.make()
+        """Make the changes requested so far, in order, on this thread."""
+        for _ in range(self._waiting.qsize()):
+            change, future = self._waiting.get_nowait()
+            if future.set_running_or_notify_cancel():
+                try:
+                    change()
+                except WorldError as error:
+                    future.set_exception(error)
+                except Exception as error:
+                    future.set_exception(error)
+                    raise
+                else:
+                    future.set_result(None)
 
     def note(self, state: RobotState) -> None:
         """Count gates and remember touches of the robot in ``state``."""
         self._referee.step(state.truth, state.collisions or 0, state.time_s)
         self._touches.note(state.contacts, self._node.clock.now())
+
+    def _ask(self, change: Callable[[], None]) -> Future[None]:
+        """Queue ``change`` for the node's thread; may be called from any thread."""
+        future: Future[None] = Future()
+        try:
+            self._waiting.put_nowait((change, future))
+        except queue.Full:
+            future.set_exception(WorldError("too many changes wait already: the robot is busy or has ended"))
+        return future
 
     def _editable(self) -> InWorld:
         if self._in_world is None:

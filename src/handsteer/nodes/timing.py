@@ -205,14 +205,10 @@ def duration_in_words(seconds: float) -> str:
 
 
 class LatencyLog:
-    """Keeps the newest durations and computes their percentiles.
+    """Keeps the newest 10,000 durations and computes their percentiles."""
 
-    Args:
-        capacity: How many are kept.
-    """
-
-    def __init__(self, capacity: int = 10_000) -> None:
-        self._seconds: deque[float] = deque(maxlen=capacity)
+    def __init__(self) -> None:
+        self._seconds: deque[float] = deque(maxlen=10_000)
 
     def __len__(self) -> int:
         return len(self._seconds)

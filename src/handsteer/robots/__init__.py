@@ -1,12 +1,15 @@
 """Robots to drive, a simulated one or one behind a topic, and their interface."""
 
 from dataclasses import dataclass
-from typing import Literal, Protocol
+from typing import TYPE_CHECKING, Literal, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from handsteer.types import Pose2D
+
+if TYPE_CHECKING:
+    from handsteer.robots.world import World
 
 Shape = Literal["box", "cylinder", "sphere"]
 
@@ -115,10 +118,44 @@ class Robot(Protocol):
         """Return the nodes that command it in a graph of its own, this one included; empty without such a graph."""
         ...
 
-    def reset(self) -> None:
-        """Reset the robot and the obstacles to the start."""
-        ...
-
     def close(self) -> None:
         """Stop and release all resources; may be called twice."""
+        ...
+
+
+@runtime_checkable
+class InWorld(Robot, Protocol):
+    """A robot in a world that can be changed, such as a simulated one.
+
+    Attributes:
+        world: Its world, with all things in their initial places.
+    """
+
+    @property
+    def world(self) -> "World": ...  # noqa: D102
+
+    def enter(self, world: "World") -> None:
+        """Move the robot to the start of another world; odometry and collisions are reset to 0.
+
+        Raises:
+            WorldError: The world cannot be used; nothing has changed.
+        """
+        ...
+
+    def change(self, world: "World") -> None:
+        """Stop the robot where it is, and replace the world around it by ``world``.
+
+        Things that are the same in both worlds stay where they are, even if they were pushed.
+
+        Raises:
+            WorldError: Something new would overlap the robot or its start; nothing has changed.
+        """
+        ...
+
+    def reset(self) -> None:
+        """Reset the robot, the obstacles, odometry and collisions; the time continues."""
+        ...
+
+    def reset_odometry(self) -> None:
+        """Set the odometry to 0 without moving the robot."""
         ...

@@ -3,9 +3,7 @@
 import math
 
 from handsteer.config import RobotConfig
-from handsteer.robots.diff_drive import Velocity
-
-ZERO = Velocity()
+from handsteer.types import ZERO, Velocity
 
 _LAST_ZEROS = 10
 """How many zeros follow the last command: one may be lost, and a publisher keeps ten messages for its subscribers."""
@@ -49,8 +47,7 @@ class CommandLimiter:
 
     def command(self, wanted: Velocity) -> Velocity | None:
         """Take a command; return what to send now, or None. One that is not finite counts as zero."""
-        is_finite = math.isfinite(wanted.linear_mps) and math.isfinite(wanted.angular_radps)
-        self._wanted = wanted if is_finite else ZERO
+        self._wanted = wanted if wanted.is_finite else ZERO
         self._age_s = 0.0
         self._zeros_left = _LAST_ZEROS
         if self._linked and self._wanted == ZERO:

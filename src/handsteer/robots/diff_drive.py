@@ -8,15 +8,7 @@ import math
 from dataclasses import dataclass
 
 from handsteer.config import RobotConfig
-from handsteer.types import Pose2D
-
-
-@dataclass(frozen=True)
-class Velocity:
-    """A velocity on the floor: forward in m/s, and turning in rad/s, left positive (REP 103)."""
-
-    linear_mps: float = 0.0
-    angular_radps: float = 0.0
+from handsteer.types import ZERO, Pose2D, Velocity, changed_towards
 
 
 @dataclass(frozen=True)
@@ -29,9 +21,9 @@ class DriveState:
         velocity: The velocity commanded to the wheels now, within all limits.
     """
 
-    target: Velocity = Velocity()
+    target: Velocity = ZERO
     target_age_s: float = 0.0
-    velocity: Velocity = Velocity()
+    velocity: Velocity = ZERO
 
 
 def step(state: DriveState, command: Velocity | None, dt_s: float, config: RobotConfig) -> DriveState:
@@ -47,26 +39,18 @@ def step(state: DriveState, command: Velocity | None, dt_s: float, config: Robot
     if command is None:
         target, age_s = state.target, state.target_age_s + dt_s
     else:
-        target, age_s = (command if _is_finite(command) else Velocity()), 0.0
-    wanted = target if age_s < config.cmd_vel_timeout else Velocity()
-    velocity = Velocity(
-        _limit(wanted.linear_mps, state.velocity.linear_mps, config.max_linear, config.max_linear_acceleration * dt_s),
-        _limit(
-            wanted.angular_radps,
-            state.velocity.angular_radps,
-            config.max_angular,
-            config.max_angular_acceleration * dt_s,
-        ),
-    )
-    return DriveState(target, age_s, velocity)
+        target, age_s = (command if command.is_finite else ZERO), 0.0
+    wanted = target if age_s < config.cmd_vel_timeout else ZERO
+    limited = wanted.clamped(config.max_linear, config.max_angular)
+    change = Velocity(config.max_linear_acceleration * dt_s, config.max_angular_acceleration * dt_s)
+    return DriveState(target, age_s, changed_towards(limited, state.velocity, change))
 
 
 def wheel_speeds(velocity: Velocity, config: RobotConfig) -> tuple[float, float]:
     """Return the speeds of the left and right wheels in rad/s, forward positive: (v ∓ w L / 2) / r."""
     sideways = velocity.angular_radps * config.wheel_separation / 2
-    return (velocity.linear_mps - sideways) / config.wheel_radius, (
-        velocity.linear_mps + sideways
-    ) / config.wheel_radius
+    left, right = velocity.linear_mps - sideways, velocity.linear_mps + sideways
+    return left / config.wheel_radius, right / config.wheel_radius
 
 
 def velocity_of(left: float, right: float, config: RobotConfig) -> Velocity:
@@ -94,13 +78,3 @@ def integrate(pose: Pose2D, left: float, right: float, config: RobotConfig) -> P
         pose.y + chord * math.sin(pose.yaw + half_turn),
         math.remainder(pose.yaw + moved.angular_radps, math.tau),
     )
-
-
-def _is_finite(velocity: Velocity) -> bool:
-    return math.isfinite(velocity.linear_mps) and math.isfinite(velocity.angular_radps)
-
-
-def _limit(wanted: float, now: float, highest: float, largest_change: float) -> float:
-    """Return the value nearest to ``wanted`` within ``highest`` and within ``largest_change`` of ``now``."""
-    wanted = max(-highest, min(highest, wanted))
-    return max(now - largest_change, min(now + largest_change, wanted))

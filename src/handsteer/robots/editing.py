@@ -3,12 +3,12 @@
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Literal, Protocol, runtime_checkable
+from typing import Any, Literal
 
 from pydantic import ValidationError
 
 from handsteer.errors import WorldError
-from handsteer.robots import Robot, Shape
+from handsteer.robots import Shape
 from handsteer.robots.world import Box, Cylinder, Gate, Sphere, Thing, World, describe_problem
 from handsteer.types import Pose2D
 
@@ -34,51 +34,15 @@ _GAP_M = 0.1
 _RING_M = 0.5
 
 
-@runtime_checkable
-class InWorld(Robot, Protocol):
-    """A robot in a world that can be changed, such as a simulated one.
-
-    Attributes:
-        world: Its world, with all things in their initial places.
-    """
-
-    @property
-    def world(self) -> World: ...  # noqa: D102
-
-    def enter(self, world: World) -> None:
-        """Move the robot to the start of another world; odometry and collisions are reset to 0.
-
-        Raises:
-            WorldError: The world cannot be used; nothing has changed.
-        """
-        ...
-
-    def change(self, world: World) -> None:
-        """Stop the robot where it is, and replace the world around it by ``world``.
-
-        Things that are the same in both worlds stay where they are.
-
-        Raises:
-            WorldError: Something new would overlap the robot or its start; nothing has changed.
-        """
-        ...
-
-    def reset_odometry(self) -> None:
-        """Set the odometry to 0 without moving the robot."""
-        ...
-
-
 def add(world: World, shape: Shape, robot: Pose2D) -> World:
     """Return ``world`` with one more thing, uniquely named, at the first free place in front of ``robot``.
 
     Raises:
         WorldError: There are too many already.
     """
-    if len(world.obstacles) >= MOST_OBSTACLES:
-        raise WorldError(f"the world is full: {MOST_OBSTACLES} things are the most that can be put in by hand")
     fields = {"name": unique_name(world, shape), "shape": shape, "position": (0.0, 0.0), **_NEW[shape]}
     radius = footprint_m(_checked(world, [fields]).obstacles[-1])
-    return _checked(world, [*_dumped(world), {**fields, "position": free_place(world, robot, radius)}])
+    return _with_thing(world, {**fields, "position": free_place(world, robot, radius)})
 
 
 def add_wall(world: World, start: Place, end: Place) -> World:
@@ -87,13 +51,11 @@ def add_wall(world: World, start: Place, end: Place) -> World:
     Raises:
         WorldError: There are too many things already, or the wall is too short or too long.
     """
-    if len(world.obstacles) >= MOST_OBSTACLES:
-        raise WorldError(f"the world is full: {MOST_OBSTACLES} things are the most that can be put in by hand")
     (x, y), (to_x, to_y) = start, end
     size = (round(math.dist(start, end), 3), _WALL_WIDTH_M, _WALL_HEIGHT_M)
     fields: dict[str, Any] = {"name": unique_name(world, "wall"), "shape": "box", "size": size, "colour": "#9aa3b2"}
     fields |= {"position": _rounded(((x + to_x) / 2, (y + to_y) / 2)), "yaw": round(math.atan2(to_y - y, to_x - x), 4)}
-    return _checked(world, [*_dumped(world), fields])
+    return _with_thing(world, fields)
 
 
 def add_gate(world: World, left: Place, right: Place) -> World:
@@ -294,6 +256,12 @@ def _index(world: World, name: str, section: Section) -> int:
 
 def _dumped(world: World, section: Section = "obstacles") -> list[dict[str, Any]]:
     return [thing.model_dump() for thing in _things(world, section)]
+
+
+def _with_thing(world: World, fields: dict[str, Any]) -> World:
+    if len(world.obstacles) >= MOST_OBSTACLES:
+        raise WorldError(f"the world is full: {MOST_OBSTACLES} things are the most that can be put in by hand")
+    return _checked(world, [*_dumped(world), fields])
 
 
 def _checked(world: World, things: list[dict[str, Any]], section: Section = "obstacles") -> World:

@@ -10,12 +10,11 @@ from typing import Any
 from handsteer.config import RobotConfig
 from handsteer.messages import CMD_VEL, LaserScan, Odometry, Topic, TurtlePose, type_name, yaw_of
 from handsteer.robots import Obstacle, RangeScan, RobotState
-from handsteer.robots.command_limiter import ZERO, CommandLimiter
+from handsteer.robots.command_limiter import CommandLimiter
 from handsteer.robots.description import robot_description
-from handsteer.robots.diff_drive import Velocity
 from handsteer.transports.base import Received, Session
 from handsteer.transports.commands import Commands
-from handsteer.types import Pose2D
+from handsteer.types import ZERO, Pose2D, Velocity
 
 log = logging.getLogger(__name__)
 
@@ -135,10 +134,6 @@ class RemoteRobot:
         """Return the nodes that publish on its command topic."""
         return self._session.transport.publishers_of(self._topic)
 
-    def reset(self) -> None:
-        """Stop it where it is; a real robot cannot be moved back."""
-        self.command(0.0, 0.0)
-
     def close(self) -> None:
         """Send several zeros; may be called twice."""
         if self._closed:
@@ -158,14 +153,14 @@ class RemoteRobot:
 
     def _send(self, velocity: Velocity | None) -> None:
         if velocity is not None:
-            self._cmd_vel.send(*_numbers(velocity))
+            self._cmd_vel.send(velocity.linear_mps, velocity.angular_radps)
 
     def _on_odometry(self, received: Received[Any]) -> None:
         message = received.message
         read = _of_turtle if self._config.odom_type == "turtlesim_pose" else _of_odometry
         seen = read(message, self._session.clock.now())
         pose = seen.pose
-        self._senseless = not all(map(math.isfinite, (pose.x, pose.y, pose.yaw, *_numbers(seen.velocity))))
+        self._senseless = not (seen.velocity.is_finite and all(map(math.isfinite, (pose.x, pose.y, pose.yaw))))
         if not self._senseless:
             self._seen = seen
 
@@ -209,7 +204,3 @@ def _of_odometry(message: Odometry, at_s: float) -> _Seen:
 def _of_turtle(message: TurtlePose, at_s: float) -> _Seen:
     velocity = Velocity(message.linear_velocity, message.angular_velocity)
     return _Seen(Pose2D(message.x, message.y, message.theta), velocity, at_s)
-
-
-def _numbers(velocity: Velocity) -> tuple[float, float]:
-    return velocity.linear_mps, velocity.angular_radps

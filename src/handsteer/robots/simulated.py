@@ -10,10 +10,10 @@ from handsteer.config import RobotConfig
 from handsteer.errors import WorldError
 from handsteer.robots import Obstacle, RangeScan, RobotState, diff_drive
 from handsteer.robots.description import robot_description
-from handsteer.robots.diff_drive import DriveState, Velocity
+from handsteer.robots.diff_drive import DriveState
 from handsteer.robots.physics import ROBOT_JOINT, TIMESTEP_S, WHEEL_JOINTS, Lidar, compile_model, thing_name
 from handsteer.robots.world import World, load_world
-from handsteer.types import Pose2D
+from handsteer.types import Pose2D, Velocity
 
 _log = logging.getLogger(__name__)
 
@@ -107,11 +107,7 @@ class SimulatedRobot:
         return []
 
     def enter(self, world: World) -> None:
-        """Move the robot to the start of another world, as :meth:`reset`.
-
-        Raises:
-            WorldError: MuJoCo refuses it, or an obstacle in it overlaps the robot at the start; nothing has changed.
-        """
+        """Move the robot to the start of another world: see :class:`~handsteer.robots.InWorld`."""
         model = compile_model(self.description, world)
         if touched := _touched_at_start(model, world):
             raise WorldError(_at_start(touched[0]))
@@ -119,14 +115,7 @@ class SimulatedRobot:
         self.reset()
 
     def change(self, world: World) -> None:
-        """Stop the robot where it is, and replace the world around it by ``world``.
-
-        Odometry, wheel angles and collisions continue. Things that are the same in both worlds stay where they are,
-        even if they were pushed.
-
-        Raises:
-            WorldError: MuJoCo refuses it, or something new in it overlaps the robot or its start; nothing has changed.
-        """
+        """Replace the world around the robot; odometry, wheel angles and collisions continue."""
         model = compile_model(self.description, world)
         before = {thing.name: (index, thing) for index, thing in enumerate(self.world.obstacles)}
         same = {

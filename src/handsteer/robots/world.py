@@ -243,7 +243,7 @@ def _where(location: tuple[int | str, ...], values: Any) -> str:
             name = thing.get("name") if isinstance(thing, dict) else None
             shapes: tuple[Shape, ...] = ("box", "cylinder", "sphere")
             fields = [str(part) for part in rest if part not in shapes]
-            return " ".join([f"{section}[{index}]", *([repr(name)] if name else []), *(".".join(fields),)]).rstrip()
+            return " ".join([f"{section}[{index}]", *([repr(name)] if name else []), ".".join(fields)]).rstrip()
         case ():
             return "obstacles" if isinstance(values, dict) else "world"
         case _:

@@ -23,6 +23,6 @@ for verb, function in {
     "collect": "collect:collect",
     "import": "collect:import_keypoints",
     "train": "train:train",
-    "export": "export:export",
+    "export": "train:export",
 }.items():
     app.command(f"handsteer.cli.signs.{function}", name=verb, help_epilogue="")

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handsteer.cameras.choose import open_camera
-from handsteer.cli.models import fetch_missing
+from handsteer.cli.installation import fetch_missing
 from handsteer.cli.running import say
 from handsteer.cli.signs.tables import dataset_table
 from handsteer.cli.terminal import Keys, TerminalPicture

@@ -61,9 +61,9 @@ def evaluate(
     config_file
         YAML file with parameters, each of which is an option too: `handsteer parameters`. Options override the file.
     """
-    from handsteer.cli.signs.evaluation import Wanted, print_evaluation
+    from handsteer.cli.signs.evaluation import print_evaluation, views_of
 
+    config, views = settings(config_file, parameters), views_of(rotate, flip=flip, enlarge=not as_is)
     pictures = {"--png": png, "--reliability": reliability, "--sweep-png": sweep_png}
-    wanted = Wanted(sources, pictures, rotate=rotate, flip=flip, enlarge=not as_is, sweep=sweep, grace_s=grace)
-    print_evaluation(settings(config_file, parameters), wanted, json=json)
+    print_evaluation(config, sources, views, pictures, grace_s=grace, sweep=sweep, json=json)
     return 0

@@ -3,13 +3,12 @@
 import json as json_format
 import sys
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tqdm import tqdm
 
-from handsteer.cli.models import fetch_missing
+from handsteer.cli.installation import fetch_missing
 from handsteer.cli.signs.tables import evaluation_tables
 from handsteer.config import Config
 from handsteer.errors import EvaluationError, needing
@@ -32,55 +31,49 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-@dataclass(frozen=True)
-class Wanted:
-    """What to evaluate, and how.
+def print_evaluation(
+    config: Config,
+    sources: Iterable[Path],
+    views: Sequence[View],
+    pictures: Mapping[str, Path | None],
+    *,
+    grace_s: float,
+    sweep: bool,
+    json: bool,
+) -> None:
+    """Evaluate folders of photos, videos and datasets, write the plots, and print the result.
 
-    Attributes:
-        sources: Folders of photos, videos, and datasets.
+    Args:
+        config: Thresholds and models.
+        sources: What to evaluate.
+        views: How each is seen.
         pictures: Files of the plots, by the option that asks for each.
-        rotate: Angles in degrees, separated by commas.
-        flip: Whether to flip left to right.
-        enlarge: Whether to enlarge small photos.
-        sweep: Whether to print the results for other thresholds.
         grace_s: For how long a sign may still count in a video after it is no longer shown.
-    """
-
-    sources: tuple[Path, ...]
-    pictures: Mapping[str, Path | None]
-    rotate: str
-    flip: bool
-    enlarge: bool
-    sweep: bool
-    grace_s: float
-
-
-def print_evaluation(config: Config, wanted: Wanted, *, json: bool) -> None:
-    """Evaluate, write the plots, and print the result.
+        sweep: Whether to print the results for other thresholds.
+        json: Whether to print one JSON object instead of tables.
 
     Raises:
         HandsteerError: A source, an option or a file to write is wrong.
     """
-    _check(wanted.grace_s, wanted.pictures)
-    views = _views(wanted.rotate, flip=wanted.flip, enlarge=wanted.enlarge)
+    _check(grace_s, pictures)
     classifier = open_classifier(config.signs)
-    opened = _open(wanted.sources, classifier)
-    _check_figures(opened, {**wanted.pictures, "--sweep": wanted.sweep})
-    evaluation = _evaluate(opened, views, config, classifier, wanted.grace_s)
+    opened = _open(sources, classifier)
+    _check_figures(opened, {**pictures, "--sweep": sweep})
+    evaluation = _evaluate(opened, views, config, classifier, grace_s)
     runs = evaluation.stills or evaluation.videos
     names = ", ".join(dict.fromkeys(Path(run.source).resolve().name for run in runs))
-    for option, path in wanted.pictures.items():
+    for option, path in pictures.items():
         if path is not None:
             _write_plot(option, path, _plot(option, evaluation, names))
-    with_sweep = wanted.sweep or wanted.pictures["--sweep-png"] is not None
+    with_sweep = sweep or pictures["--sweep-png"] is not None
     if json:
         print(json_format.dumps(evaluation.as_dict(with_sweep=with_sweep)))
         return
-    with_reliability = wanted.pictures["--reliability"] is not None
+    with_reliability = pictures["--reliability"] is not None
     print(evaluation_tables(evaluation, with_reliability=with_reliability, with_sweep=with_sweep))
 
 
-def _views(rotate: str, *, flip: bool, enlarge: bool) -> list[View]:
+def views_of(rotate: str, *, flip: bool, enlarge: bool) -> list[View]:
     """Return the views: one for a single angle; for several, one for each, and with ``flip`` also each flipped."""
     try:
         angles = [float(angle) for angle in rotate.split(",") if angle.strip()]

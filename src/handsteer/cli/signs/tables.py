@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 
-from handsteer.cli.table import table
+from handsteer.cli.running import table
 from handsteer.training.custom.dataset import Dataset, summarise
 from handsteer.training.custom.report import TrainingReport, false_hands, how_it_was_tried, mistakes
 from handsteer.training.evaluation.intervals import Rate, Share

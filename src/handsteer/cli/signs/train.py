@@ -1,4 +1,4 @@
-"""``handsteer signs list`` and ``train``: the known signs, and learning further ones from datasets."""
+"""``handsteer signs list``, ``train`` and ``export``: the known signs, and learning further ones from datasets."""
 
 import json as json_format
 import sys
@@ -8,15 +8,15 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from handsteer.cli.app import ConfigFile, Flag, Parameters, loads
-from handsteer.cli.running import check_writable, say, settings
-from handsteer.errors import TrainingError
+from handsteer.cli.running import check_writable, say, settings, table
+from handsteer.errors import ModelError, TrainingError
 
 _LOW_RECALL = 0.8
 _DATASET = Path("signs.npz")  # as teach.dataset and teach.model of the configuration
 _MODEL = Path("my-signs.npz")
 
 
-@loads("handsteer.cli.table", "handsteer.control.explain", "handsteer.recognition.recognizer")
+@loads("handsteer.control.explain", "handsteer.recognition.recognizer", "rich.table")
 def list_signs(*, json: Flag = False, config_file: ConfigFile = None, parameters: Parameters = None) -> int:
     """Print the signs that the model knows, and what each makes the robot do.
 
@@ -32,7 +32,6 @@ def list_signs(*, json: Flag = False, config_file: ConfigFile = None, parameters
     config_file
         YAML file with parameters, each of which is an option too: `handsteer parameters`. Options override the file.
     """
-    from handsteer.cli.table import table
     from handsteer.control.explain import effect_of
     from handsteer.recognition.recognizer import open_classifier
     from handsteer.types import NONE, action_of, find_sign
@@ -115,4 +114,32 @@ def train(
         if sign.recall is not None and (sign.recall.rate or 0) < _LOW_RECALL:
             say(f"{sign.summary.label} is recognised poorly: collect more takes, in every way you will show it")
     say(f"the learnt signs are in {output}: drive with --signs.model {output}")
+    return 0
+
+
+@loads("handsteer.training.custom.onnx_file")
+def export(model: Path, output: Path, /) -> int:
+    """Write taught signs as an ONNX file, which computes their confidences from MediaPipe's landmarks.
+
+    For example:
+      handsteer signs export my-signs.npz my-signs.onnx
+
+    ONNX Runtime runs the file without handsteer; docs/teach.md says how.
+
+    Parameters
+    ----------
+    model
+        File written by `signs train`, or downloaded from the page.
+    output
+        File to write; it must not exist.
+    """
+    from handsteer.recognition.custom_signs import load_custom_model
+    from handsteer.training.custom.onnx_file import save_onnx
+
+    if output.exists():
+        raise ModelError(f"{output} exists already: give another name, nothing is overwritten")
+    check_writable("OUTPUT", output, ModelError)
+    learnt = load_custom_model(model)
+    save_onnx(learnt, output)
+    say(f"{', '.join(learnt.labels)}: as ONNX in {output}")
     return 0
