@@ -60,7 +60,7 @@ class Recording(Protocol):
 
     @property
     def about(self) -> Mapping[str, str]:
-        """The metadata that handsteer writes (:mod:`handsteer.recordings.about`); empty in those of others."""
+        """The metadata that handsteer writes (:func:`handsteer.recordings.describe`); empty in those of others."""
         ...
 
     @property
