@@ -13,7 +13,17 @@ from typing import Any
 from handsteer.clock import Clock
 from handsteer.config import Config, cmd_vel_type
 from handsteer.images import bgr_image, jpeg_message
-from handsteer.messages import IMAGE_COMPRESSED, IMAGE_RAW, RECORDED, CompressedImage, Image, String, Topic, cmd_vel
+from handsteer.messages import (
+    IMAGE_COMPRESSED,
+    IMAGE_RAW,
+    RECORDED,
+    SCAN,
+    CompressedImage,
+    Image,
+    String,
+    Topic,
+    cmd_vel,
+)
 from handsteer.recordings import describe
 from handsteer.recordings.mcap_writer import McapWriter
 from handsteer.transports.base import Received, Transport
@@ -185,7 +195,8 @@ class GraphRecorder(Recorder):
     """
 
     def __init__(self, path: Path, transport: Transport, clock: Clock, config: Config) -> None:
-        topics = (*RECORDED, cmd_vel(cmd_vel_type(config)))
+        scans = (SCAN,) if config.collision_monitor.enabled else ()
+        topics = (*RECORDED, cmd_vel(cmd_vel_type(config)), *scans)
         super().__init__(path, transport, clock, topics, describe(None, clock, ()))
         self._decides_s: float | None = time.monotonic() + _DECIDES_AFTER_S
 
