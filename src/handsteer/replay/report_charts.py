@@ -11,17 +11,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from handsteer.replay.drive_facts import DriveFacts
+from handsteer.replay.drive_facts import DriveFacts, Stand
 from handsteer.types import NONE, SIGNS
 
 Figure = dict[str, Any]
 
 _COLOURS = ("#e5484d", "#2f9e5b", "#8e5bd0", "#2b7fd9", "#e08a1e", "#1aa0a8")
 _MORE_COLOURS = ("#c2569f", "#7d8c2c", "#5b6ee1", "#b5793f")
-GREY, DRIVEN, STAND = "#8a94a6", "#2b7fd9", "#e5484d"
+GREY, DRIVEN = "#8a94a6", "#2b7fd9"
 """Colours that have the same meaning in all charts."""
 
-_COMMANDED = "#e08a1e"
+_COMMANDED, _STAND = "#e08a1e", "#e5484d"
 _BINS = 60
 
 
@@ -115,20 +115,10 @@ def _signs(facts: DriveFacts) -> _Panel:
     for row, name in enumerate(names):
         spans = [span for span in facts.spans if span.sign == name]
         times = [time_s for span in spans for time_s in (span.begin_s, span.end_s, np.nan)]
-        traces.append(
-            {
-                "type": "scatter",
-                "mode": "lines",
-                "name": escape(name),
-                "showlegend": False,
-                "x": typed(times),
-                "y": typed([row] * len(times)),
-                # Short signs would be left out of a long time.
-                "line": {"width": 12, "color": _colour(name, row), "simplify": False},
-                "text": escape(name),
-                "hovertemplate": "%{text}, %{x:.2f} s<extra></extra>",
-            }
-        )
+        # Short signs would be left out of a long time.
+        line = {"width": 12, "color": _colour(name, row), "simplify": False}
+        hover = {"text": escape(name), "hovertemplate": "%{text}, %{x:.2f} s<extra></extra>"}
+        traces.append(scatter("lines", escape(name), times, [row] * len(times), line=line, showlegend=False, **hover))
     labels = {
         "tickvals": [*range(len(names))],
         "ticktext": [escape(name) for name in names],
@@ -144,17 +134,16 @@ def _confidence(facts: DriveFacts) -> _Panel:
     if not len(table):
         return _Panel("", [])
     seen = [escape(name) for name in facts.seen]
-    trace = {
-        "type": "scatter",
-        "mode": "lines",
-        "name": "confidence",
-        "showlegend": False,
-        "x": typed(table[:, 0]),
-        "y": typed(table[:, 1]),
-        "text": [seen[int(index)] for index in table[:, 2]],
-        "hovertemplate": "%{text} with %{y:.2f}, %{x:.2f} s<extra></extra>",
-        "line": {"width": 1.2, "color": _MORE_COLOURS[2]},
-    }
+    trace = scatter(
+        "lines",
+        "confidence",
+        table[:, 0],
+        table[:, 1],
+        showlegend=False,
+        text=[seen[int(index)] for index in table[:, 2]],
+        hovertemplate="%{text} with %{y:.2f}, %{x:.2f} s<extra></extra>",
+        line={"width": 1.2, "color": _MORE_COLOURS[2]},
+    )
     return _Panel("confidence", [trace], 0.6, {"range": [-0.03, 1.03]})
 
 
@@ -164,11 +153,13 @@ def _velocities(facts: DriveFacts) -> list[_Panel]:
     for column, title in ((1, "m/s"), (2, "rad/s")):
         traces = []
         if len(commanded):
-            traces.append(_line(commanded, column, "commanded", _COMMANDED) | {"line": _hv(_COMMANDED)})
+            # It holds until the next one.
+            traces.append(_line(commanded, column, "commanded", {"color": _COMMANDED, "shape": "hv"}))
         if len(driven):
-            traces.append(_line(driven, column, "driven, by odometry", DRIVEN))
+            traces.append(_line(driven, column, "driven, by odometry", {"color": DRIVEN}))
         if column == 1 and facts.stands:
-            traces.append(_stand_marks(facts))
+            times = [stand.time_s for stand in facts.stands]
+            traces.append(stops([*enumerate(facts.stands, 1)], times, [0] * len(times), size=7))
         for trace in traces:
             trace["showlegend"] = column == 1
             trace["legendgroup"] = trace["name"]
@@ -176,34 +167,9 @@ def _velocities(facts: DriveFacts) -> list[_Panel]:
     return panels
 
 
-def _line(table: NDArray[np.float64], column: int, name: str, colour: str) -> dict[str, Any]:
-    return {
-        "type": "scatter",
-        "mode": "lines",
-        "name": name,
-        "x": typed(table[:, 0]),
-        "y": typed(table[:, column]),
-        "line": {"width": 1.5, "color": colour},
-        "hovertemplate": "%{y:.3f}, %{x:.2f} s<extra>" + name + "</extra>",
-    }
-
-
-def _hv(colour: str) -> dict[str, Any]:
-    """Return a line that keeps its value until the next point, as a command does."""
-    return {"width": 1.5, "color": colour, "shape": "hv"}
-
-
-def _stand_marks(facts: DriveFacts) -> dict[str, Any]:
-    return {
-        "type": "scatter",
-        "mode": "markers",
-        "name": "stopped",
-        "x": typed([stand.time_s for stand in facts.stands]),
-        "y": typed([0] * len(facts.stands)),
-        "hovertext": [escape(f"{number}. {stand.reason}") for number, stand in enumerate(facts.stands, 1)],
-        "hoverinfo": "text",
-        "marker": {"color": STAND, "size": 7, "symbol": "square"},
-    }
+def _line(table: NDArray[np.float64], column: int, name: str, line: dict[str, Any]) -> dict[str, Any]:
+    hover = "%{y:.3f}, %{x:.2f} s<extra>" + name + "</extra>"
+    return scatter("lines", name, table[:, 0], table[:, column], line={"width": 1.5, **line}, hovertemplate=hover)
 
 
 def _rank(sign: str) -> tuple[int, str]:
@@ -215,6 +181,20 @@ def _colour(sign: str, row: int) -> str:
     if sign == NONE:
         return GREY
     return _COLOURS[SIGNS.index(sign)] if sign in SIGNS else _MORE_COLOURS[row % len(_MORE_COLOURS)]
+
+
+def stops(
+    stands: list[tuple[int, Stand]], x: ArrayLike, y: ArrayLike, *, size: int, mode: str = "markers", **more: Any
+) -> dict[str, Any]:
+    """Return marks of numbered stops at ``x`` and ``y``, with their reasons."""
+    reasons = [escape(f"{number}. {stand.reason}") for number, stand in stands]
+    marker = {"color": _STAND, "size": size, "symbol": "square"}
+    return scatter(mode, "stopped", x, y, hovertext=reasons, hoverinfo="text", marker=marker, **more)
+
+
+def scatter(mode: str, name: str, x: ArrayLike, y: ArrayLike, **more: Any) -> dict[str, Any]:
+    """Return points or a line through them."""
+    return {"type": "scatter", "mode": mode, "name": name, "x": typed(x), "y": typed(y), **more}
 
 
 def escape(text: str) -> str:

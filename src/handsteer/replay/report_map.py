@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handsteer.replay.drive_facts import DriveFacts, Thing
-from handsteer.replay.report_charts import DRIVEN, GREY, STAND, Figure, escape, typed
+from handsteer.replay.report_charts import DRIVEN, GREY, Figure, scatter, stops, typed
 
 _BUMP = "#8e5bd0"
 _MOST_LABELS = 60
@@ -45,44 +45,28 @@ def _paths(facts: DriveFacts) -> list[dict[str, Any]]:
 
 
 def _stands(facts: DriveFacts) -> list[dict[str, Any]]:
-    places = [(number, stand) for number, stand in enumerate(facts.stands, 1) if stand.x is not None]
-    trace = {
-        "mode": "markers+text" if len(places) <= _MOST_LABELS else "markers",
-        "name": "stopped",
-        "x": [stand.x for _, stand in places],
-        "y": [stand.y for _, stand in places],
-        "text": [str(number) for number, _ in places],
-        "textposition": "top right",
-        "hovertext": [escape(f"{number}. {stand.reason}") for number, stand in places],
-        "hoverinfo": "text",
-        "marker": {"color": STAND, "size": 8, "symbol": "square"},
-    }
-    return [{"type": "scatter", **trace}] if places else []
+    stands = [(number, stand) for number, stand in enumerate(facts.stands, 1) if stand.place is not None]
+    x, y = _columns([stand.place for _, stand in stands])
+    mode = "markers+text" if len(stands) <= _MOST_LABELS else "markers"
+    labels = [str(number) for number, _ in stands]
+    return [stops(stands, x, y, size=8, mode=mode, text=labels, textposition="top right")] if stands else []
 
 
 def _bumps(facts: DriveFacts) -> list[dict[str, Any]]:
-    places = [(x, y) for _, x, y in facts.bumps if x is not None]
-    trace = {
-        "mode": "markers",
-        "name": "bumps",
-        "x": [x for x, _ in places],
-        "y": [y for _, y in places],
-        "marker": {"color": _BUMP, "size": 10, "symbol": "x"},
-    }
-    return [{"type": "scatter", **trace}] if places else []
+    x, y = _columns(facts.bumps)
+    return [scatter("markers", "bumps", x, y, marker={"color": _BUMP, "size": 10, "symbol": "x"})] if x else []
+
+
+def _columns(places: Iterable[tuple[float, float] | None]) -> tuple[list[float], list[float]]:
+    known = [place for place in places if place is not None]
+    return [x for x, _ in known], [y for _, y in known]
 
 
 def _path(table: NDArray[np.float64], name: str, colour: str, dash: str) -> dict[str, Any]:
-    return {
-        "type": "scatter",
-        "mode": "lines",
-        "name": name,
-        "x": typed(table[:, 1]),
-        "y": typed(table[:, 2]),
-        "customdata": typed(table[:, 0]),
-        "hovertemplate": "%{x:.2f}, %{y:.2f} m at %{customdata:.1f} s<extra>" + name + "</extra>",
-        "line": {"width": 2, "color": colour, "dash": dash},
-    }
+    hover = "%{x:.2f}, %{y:.2f} m at %{customdata:.1f} s<extra>" + name + "</extra>"
+    line = {"width": 2, "color": colour, "dash": dash}
+    times = typed(table[:, 0])
+    return scatter("lines", name, table[:, 1], table[:, 2], customdata=times, hovertemplate=hover, line=line)
 
 
 def _with_gaps(table: NDArray[np.float64], leaps_s: Iterable[float]) -> NDArray[np.float64]:
