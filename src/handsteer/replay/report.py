@@ -17,8 +17,7 @@ from handsteer.errors import RecordingError, needing
 from handsteer.recordings import open_recording
 from handsteer.replay.drive_facts import DriveFacts, Stand
 from handsteer.replay.drive_reader import read_drive
-from handsteer.replay.report_charts import latencies, timeline
-from handsteer.replay.report_map import drive_map
+from handsteer.replay.report_charts import drive_map, latencies, timeline
 from handsteer.replay.report_words import Total, heading, sign_totals, totals
 from handsteer.types import stopwatch
 
