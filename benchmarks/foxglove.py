@@ -14,10 +14,10 @@ import statistics
 import subprocess
 import sys
 import time
-from pathlib import Path
 
 import numpy as np
 import websockets
+from _measuring import cpu_s
 
 from handsteer.config import FoxgloveConfig, load
 from handsteer.graph import Graph
@@ -43,12 +43,6 @@ async def look(address: str, without: list[str]) -> None:
         print("receives", flush=True)
         async for _ in socket:
             pass
-
-
-def cpu_s(pid: int) -> float:
-    """Return the processor time of a process so far."""
-    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(") ")[2].split()
-    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
 def measure(name: str, address: str, live: int, latencies: list[float], duration_s: float) -> np.ndarray:

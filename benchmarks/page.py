@@ -30,6 +30,7 @@ from playwright.sync_api import Browser, Page
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # for the relay and the browser that the tests use
 
+from _measuring import resident_mb
 from scripts import chromium
 from tests.dashboard.network import Relay, client_of, cookies_of, deaf, deaf_page, drawn, join_query
 
@@ -227,10 +228,6 @@ def count_viewers(rounds: int, duration_s: float, camera: str) -> None:
             f"({ms / base_ms - 1:+.1%}; by round {' '.join(f'{ratio - 1:+.0%}' for ratio in ratios)})"
         )
     print(f"(limit for 4: {LIMIT_SLOWER:.0%} slower; {rounds} rounds of {duration_s:.0f} s each, {load_now()})")
-
-
-def resident_mb(process: str = "self") -> float:
-    return int(Path(f"/proc/{process}/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6
 
 
 def count_deaf(rounds: int, duration_s: float, camera: str) -> None:

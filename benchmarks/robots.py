@@ -17,28 +17,16 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # for the domains that the tests use
 
+from _measuring import cpu_s, resident_mb
 from tests.dds.graph import free_domain
 
 from handsteer.messages import CMD_VEL, ODOM, Twist, twist
 from handsteer.transports import join
 from handsteer.transports.base import Publisher
 
-_TICKS_PER_S = os.sysconf("SC_CLK_TCK")
 _ODOMETRY_HZ = 50
 _COMMAND_PERIOD_S = 1 / 30
 _START_TIMEOUT_S = 180.0
-
-
-def cpu_s(process: subprocess.Popen[bytes]) -> float:
-    """Return the CPU seconds of ``process`` so far."""
-    fields = Path(f"/proc/{process.pid}/stat").read_text().rpartition(") ")[2].split()
-    return (int(fields[11]) + int(fields[12])) / _TICKS_PER_S
-
-
-def memory_mb(process: subprocess.Popen[bytes]) -> float:
-    """Return the resident memory of ``process`` in MB, including shared libraries."""
-    pages = int(Path(f"/proc/{process.pid}/statm").read_text().split()[1])
-    return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
 
 
 def measure(count: int, seconds: float) -> tuple[float, float, float]:
@@ -60,11 +48,11 @@ def measure(count: int, seconds: float) -> tuple[float, float, float]:
     try:
         _wait_until(lambda: all(came.values()))
         _drive(commands, 2.0)
-        before, first = [cpu_s(robot) for robot in robots], dict(came)
+        before, first = [cpu_s(robot.pid) for robot in robots], dict(came)
         took_s = _drive(commands, seconds)
-        used = sum(cpu_s(robot) for robot in robots) - sum(before)
+        used = sum(cpu_s(robot.pid) for robot in robots) - sum(before)
         share = sum(came[name] - first[name] for name in names) / (count * took_s * _ODOMETRY_HZ)
-        return used / took_s / count, memory_mb(robots[0]), share
+        return used / took_s / count, resident_mb(robots[0].pid), share
     finally:
         for robot in robots:
             robot.terminate()

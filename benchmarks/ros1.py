@@ -7,7 +7,7 @@ a second run, without subscribers of that topic.
 """
 
 import argparse
-import os
+import itertools
 import sys
 import tempfile
 import time
@@ -17,7 +17,8 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # for the graph that the tests use
 
-from tests.processes import Peer, Process, eventually
+from _measuring import at_rate, cpu_s, resident_mb
+from tests.processes import Peer, eventually
 from tests.ros1.graph import Ros1Graph, ros1_graph
 
 from handsteer.cameras.virtual import VirtualHandCamera
@@ -54,20 +55,10 @@ def feed(path: str, rate: float) -> None:
     publisher = rospy.Publisher("/image_raw", Image, queue_size=1, tcp_nodelay=True)
     data = [frame.tobytes() for frame in np.load(path)]
     message = Image(height=HEIGHT, width=WIDTH, encoding="bgr8", step=3 * WIDTH)
-    due_s, number = time.monotonic(), 0
-    while not rospy.is_shutdown():
+    for number in itertools.takewhile(lambda _: not rospy.is_shutdown(), at_rate(rate, sys.maxsize)):
         message.data = data[number % len(data)]
         message.header.stamp = rospy.Time.from_sec(time.time())
         publisher.publish(message)
-        due_s, number = due_s + 1 / rate, number + 1
-        time.sleep(max(0.0, due_s - time.monotonic()))
-
-
-def used(process: Process) -> tuple[float, float]:
-    """Return the CPU seconds of a process so far, and its memory in MB."""
-    fields = Path(f"/proc/{process.popen.pid}/stat").read_text(encoding="ascii").rpartition(")")[2].split()
-    ticks, pages = int(fields[11]) + int(fields[12]), int(fields[21])
-    return ticks / os.sysconf("SC_CLK_TCK"), pages * os.sysconf("SC_PAGE_SIZE") / 1e6
 
 
 def latencies_ms(peer: Peer, wall_offset_s: float) -> np.ndarray:
@@ -95,9 +86,10 @@ def measure(graph: Ros1Graph, frames: Path, rate: float, duration_s: float) -> N
     feeder = graph.run(sys.executable, __file__, "--feed", str(frames), "--rate", str(rate))
     eventually(lambda: "/feeder" in graph.nodes())
     time.sleep(WARM_UP_S)
-    before = {verb: used(process) for verb, process in nodes.items()}
+    before = {verb: cpu_s(process.popen.pid) for verb, process in nodes.items()}
     time.sleep(duration_s)
-    after = {verb: used(process) for verb, process in nodes.items()}
+    spent_s = {verb: cpu_s(process.popen.pid) - before[verb] for verb, process in nodes.items()}
+    memory_mb = {verb: resident_mb(process.popen.pid) for verb, process in nodes.items()}
     peer = graph.peer()
     peer.ask("record_stamps", topic=ANNOTATED)
     peer.ask("record", topic=CMD_VEL, package="geometry_msgs", type="Twist", fields=["linear.x"])
@@ -112,8 +104,7 @@ def measure(graph: Ros1Graph, frames: Path, rate: float, duration_s: float) -> N
     print(f"  image to Twist                    {np.median(times):8.1f} {p99:8.1f} ms")
     print(f"  p99 is {p99 / frame_ms:.2f} x a frame's processing (limit 2), {p99 / slow_frame_ms:.2f} x a slow frame's")
     for verb in nodes:
-        cpu = 100 * (after[verb][0] - before[verb][0]) / duration_s
-        print(f"  {verb:12s} {cpu:6.1f} % of a core, {after[verb][1]:6.0f} MB")
+        print(f"  {verb:12s} {100 * spent_s[verb] / duration_s:6.1f} % of a core, {memory_mb[verb]:6.0f} MB")
     for process in (*nodes.values(), feeder, peer):
         process.kill()
 

@@ -26,6 +26,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # for the graph that the tests use
 
+from _measuring import at_rate, cpu_s
 from _original_nodes import OriginalNodes, original_nodes
 from tests.processes import Process
 from tests.ros1.graph import Ros1Graph, ros1_graph
@@ -39,7 +40,6 @@ _SETTLE_S = 0.3
 _FIRST_S = 60.0
 _START_RATE_HZ = 60.0
 _CMD_VEL = "/robot_diff_drive_controller/cmd_vel"
-_PROCESSOR_CLOCK = 2
 
 
 @dataclass
@@ -107,32 +107,18 @@ class Chain:
         self._words.publish(sign)
 
 
-def at_rate(rate_hz: float, seconds: float = _FIRST_S) -> Iterator[int]:
-    """Count, ``rate_hz`` times a second."""
-    due_s = time.monotonic()
-    for number in range(round(rate_hz * seconds)):
-        yield number
-        due_s += 1 / rate_hz
-        time.sleep(max(0.0, due_s - time.monotonic()))
-
-
-def processor_s(process: Process) -> float:
-    """Return the CPU time of all threads of a process so far, in seconds."""
-    return time.clock_gettime(~process.popen.pid << 3 | _PROCESSOR_CLOCK)
-
-
 def play(chain: Chain, nodes: dict[str, Process], film: list[np.ndarray], rate_hz: float, seconds: float) -> Figures:
     """Send the film for ``seconds``, after an uncounted second; return the measurements."""
     warm = round(rate_hz * _WARM_UP_S)
     before = {verb: 0.0 for verb in nodes}
-    for number in at_rate(rate_hz, _WARM_UP_S + seconds):
+    for number in at_rate(rate_hz, warm + round(rate_hz * seconds)):
         if number == warm:
-            before = {verb: processor_s(process) for verb, process in nodes.items()}
+            before = {verb: cpu_s(process.popen.pid) for verb, process in nodes.items()}
             for times in (chain.sent_s, chain.signs_s, chain.twists_s):
                 times.clear()
         chain.send(film[number % len(film)])
     time.sleep(_SETTLE_S)
-    spent = {verb: 1000 * (processor_s(process) - before[verb]) for verb, process in nodes.items()}
+    spent = {verb: 1000 * (cpu_s(process.popen.pid) - before[verb]) for verb, process in nodes.items()}
     signs, sent = len(chain.signs_s), len(chain.sent_s)
     return Figures(
         spent["recognition"] / sent,
@@ -228,10 +214,10 @@ def until_first(
     came: list[float], feed: Callable[[int], None], rate_hz: float, process: Process | None = None
 ) -> float:
     """Send input until there is output; return the CPU time of ``process`` so far, in seconds."""
-    for number in at_rate(rate_hz):
+    for number in at_rate(rate_hz, round(rate_hz * _FIRST_S)):
         feed(number)
         if came:
-            return processor_s(process) if process else 0.0
+            return cpu_s(process.popen.pid) if process else 0.0
     raise SystemExit(f"no message within {_FIRST_S:.0f} s" + (f":\n{process.text}" if process else ""))
 
 

@@ -15,6 +15,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # for the ROS 2 node that the tests use
 
+from _measuring import at_rate
 from tests.processes import eventually
 from tests.ros2.graph import ros2_graph
 
@@ -41,11 +42,8 @@ def message(topic: Topic[Any], picture: Any) -> Any:
 
 def send(publisher: Publisher[Any], topic: Topic[Any], count: int, rate: float) -> None:
     picture = VirtualHandCamera(VirtualHandConfig(), width=640, height=480, fps=30, clock=WallClock()).read().image
-    due_s = time.monotonic()
-    for _ in range(count):
+    for _ in at_rate(rate, count):
         publisher.publish(message(topic, picture))
-        due_s += 1 / rate
-        time.sleep(max(0.0, due_s - time.monotonic()))
 
 
 def measure(session: Session, peer: Any, topic: Topic[Any], count: int, rate: float) -> None:

@@ -21,7 +21,8 @@ from pathlib import Path
 from typing import Any
 
 import socketio
-from page import DRIVE, film, load_now, plain_viewers, resident_mb, served
+from _measuring import resident_mb
+from page import DRIVE, film, load_now, plain_viewers, served
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # for the chain and the visitors that the tests use
 

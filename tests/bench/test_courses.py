@@ -4,12 +4,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from handsteer.bench.courses import COURSES, open_course, place_at
+from handsteer.bench.courses import COURSES, open_course
 from handsteer.bench.laps import run_lap
 from handsteer.config import RobotConfig
 from handsteer.robots.course import crosses
 from handsteer.robots.simulated import SimulatedRobot
 from handsteer.robots.world import load_world, shipped_worlds
+from handsteer.types import Pose2D
 
 SHIPPED = [name for name in shipped_worlds() if load_world(name).gates]
 
@@ -17,7 +18,7 @@ SHIPPED = [name for name in shipped_worlds() if load_world(name).gates]
 @pytest.mark.parametrize("name", SHIPPED)
 def test_the_ideal_path_passes_all_gates_in_order_and_touches_nothing(name: str) -> None:
     course = open_course(name)
-    poses = [place_at(course.path, index) for index in range(len(course.path.s))]
+    poses = [Pose2D(x, y, 0.0) for x, y in course.path.points.tolist()]
     passed = [
         next(at for at, (before, now) in enumerate(pairwise(poses)) if crosses(gate, before, now))
         for gate in course.gates

@@ -20,8 +20,7 @@ from handsteer.recordings import open_recording
 from handsteer.recordings.mcap_reader import McapFile
 from handsteer.replay.by_time import rerun_by_time
 from handsteer.replay.drive_reader import read_drive
-from handsteer.replay.report_charts import latencies, timeline
-from handsteer.replay.report_map import drive_map
+from handsteer.replay.report_charts import drive_map, latencies, timeline
 from handsteer.replay.report_words import totals
 from handsteer.replay.rerun import has_journals, recorded_config, rerun
 from tests.fuzz.mutants import hold, mutants

@@ -13,7 +13,7 @@ from handsteer.clock import RealClock
 from handsteer.config import FoxgloveConfig, load
 from handsteer.dashboard.page_process import PageProcess
 from handsteer.graph import Graph
-from handsteer.live.driving import CONFIRM_S, Driving, OwnSeat, SharedSeat
+from handsteer.live.driving import CONFIRM_S, Driving, Seat, SharedSeat
 from handsteer.live.process import LiveProcess
 from handsteer.live.server import LiveServer
 from handsteer.messages import AUDIT, STEERING_CMD_VEL, Twist, Vector3
@@ -38,7 +38,7 @@ class Wheel:
         self.bench = Bench()
         node = SteeringNode(self.bench.transport, self.bench.clock)
         self.bench.nodes = [node]
-        self.seat = OwnSeat()
+        self.seat = Seat()
         self.driving = Driving(node, self.seat)
         self.heard = self.bench.record(STEERING_CMD_VEL)
 
@@ -129,7 +129,7 @@ def test_the_seat_of_the_page_is_asked_for_once_a_second() -> None:
 @contextmanager
 def served(graph: Graph) -> Iterator[str]:
     node = SteeringNode(graph.transport, graph.clock, name="foxglove")
-    server = LiveServer(graph.transport, graph.clock, graph.topics, FoxgloveConfig(port=0), Driving(node, OwnSeat()))
+    server = LiveServer(graph.transport, graph.clock, graph.topics, FoxgloveConfig(port=0), Driving(node, Seat()))
     node.start()
     try:
         yield server.start()
@@ -254,7 +254,7 @@ def watched() -> Iterator[tuple[str, list[Twist]]]:
     transport, heard = InProcessTransport(), list[Twist]()
     transport.subscribe("probe", STEERING_CMD_VEL, lambda received: heard.append(received.message))
     node = SteeringNode(transport, RealClock())
-    server = LiveServer(transport, RealClock(), (STEERING_CMD_VEL,), FoxgloveConfig(port=0), Driving(node, OwnSeat()))
+    server = LiveServer(transport, RealClock(), (STEERING_CMD_VEL,), FoxgloveConfig(port=0), Driving(node, Seat()))
     try:
         yield server.start(), heard
     finally:

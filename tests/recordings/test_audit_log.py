@@ -30,15 +30,9 @@ def test_a_line_has_time_code_who_and_sentence(tmp_path: Path) -> None:
 
 
 def test_it_rotates(tmp_path: Path) -> None:
-    transport = InProcessTransport()
-    audit = AuditLog(transport, tmp_path / "audit.log")
-    publisher = transport.advertise("dashboard", AUDIT)
     long = AuditEvent("stands", "hand_sign_control", "x" * 1000)
     for _ in range(9):
-        for _ in range(700):  # less than may wait for the disk
-            publisher.publish(write_event(long, Time(0, 0)))
-        audit.flush()
-    audit.close()
+        written(tmp_path / "audit.log", *[long] * 700)  # less than may wait for the disk
     sizes = {path.name: path.stat().st_size for path in tmp_path.iterdir()}
     assert set(sizes) == {"audit.log", *(f"audit.log.{number}" for number in range(1, 5))}
     assert max(sizes.values()) <= 1 << 20

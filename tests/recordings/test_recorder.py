@@ -4,18 +4,21 @@ import signal
 from collections import Counter
 from pathlib import Path
 
+import numpy as np
 import pytest
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
 
-from handsteer.clock import SteppedClock
-from handsteer.config import Config, VirtualHandConfig
+from handsteer.clock import RealClock, SteppedClock
+from handsteer.config import CollisionMonitorConfig, Config, VirtualHandConfig
 from handsteer.errors import RecordingError
 from handsteer.graph import Graph
-from handsteer.messages import HAND_SIGN
+from handsteer.messages import HAND_SIGN, SCAN, Header, LaserScan, Time
 from handsteer.recordings.mcap_reader import McapFile
 from handsteer.recordings.mcap_writer import McapWriter
+from handsteer.recordings.recorder import GraphRecorder
+from handsteer.transports.in_process import InProcessTransport
 
 EVERY_FRAME = ("/image_raw/compressed", "/camera_info", "/gesture/hand_sign", "/gesture/joy")
 OTHERS = (
@@ -70,6 +73,18 @@ def test_nothing_is_overwritten(recording: Path) -> None:
     with Graph(Config(), SteppedClock()) as graph, pytest.raises(RecordingError, match="exists already"):
         graph.record(recording)
     assert recording.read_bytes() == before
+
+
+@pytest.mark.parametrize("enabled", [False, True])
+def test_laser_scans_of_a_graph_are_recorded_where_they_are_used(tmp_path: Path, enabled: bool) -> None:
+    transport, path = InProcessTransport(), tmp_path / "graph.mcap"
+    config = Config(collision_monitor=CollisionMonitorConfig(enabled=enabled))
+    recorder = GraphRecorder(path, transport, RealClock(), config)
+    ones = np.ones(2, np.float32)
+    scan = LaserScan(Header(Time(0, 0), "laser"), 0.0, 1.0, 1.0, 0.0, 0.1, 0.1, 9.0, ones, ones)
+    transport.advertise("robot", SCAN).publish(scan)
+    recorder.close()
+    assert [recorded.topic for recorded in McapFile(path).messages()] == ["/scan"] * enabled
 
 
 def test_one_recording_at_a_time(tmp_path: Path) -> None:

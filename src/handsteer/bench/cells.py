@@ -8,6 +8,7 @@ from dataclasses import asdict, dataclass, field, replace
 from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from handsteer.bench.courses import open_course
 from handsteer.bench.laps import INTERFACES, Conditions, Lap, run_lap
@@ -37,18 +38,20 @@ class Estimate:
     def of(cls, values: Sequence[float], statistic: Callable[..., Any] = np.median) -> "Estimate":
         """Return the ``statistic`` of ``values``, which are at least one; the same values give the same interval."""
         array = np.asarray(values, float)
-        draws = np.random.default_rng(0).integers(len(array), size=(_RESAMPLES, len(array)))
-        low, high = np.quantile(statistic(array[draws], axis=1), [0.025, 0.975])
-        return cls(float(statistic(array)), float(low), float(high))
+        return cls._of(len(array), lambda drawn: statistic(array[drawn], axis=-1))
 
     @classmethod
     def of_ratio(cls, values: Sequence[float], others: Sequence[float]) -> "Estimate":
         """Return the ratio of the medians of two series by the same seeds, which are drawn together."""
         above, below = np.asarray(values, float), np.asarray(others, float)
-        draws = np.random.default_rng(0).integers(len(above), size=(_RESAMPLES, len(above)))
-        ratios = np.median(above[draws], axis=1) / np.median(below[draws], axis=1)
-        low, high = np.quantile(ratios, [0.025, 0.975])
-        return cls(float(np.median(above) / np.median(below)), float(low), float(high))
+        return cls._of(len(above), lambda drawn: np.median(above[drawn], axis=-1) / np.median(below[drawn], axis=-1))
+
+    @classmethod
+    def _of(cls, count: int, statistic: Callable[[NDArray[np.int64]], Any]) -> "Estimate":
+        """Return what ``statistic`` makes of (..., ``count``) indices, of all and of drawn ones."""
+        draws = np.random.default_rng(0).integers(count, size=(_RESAMPLES, count))
+        low, high = np.quantile(statistic(draws), [0.025, 0.975])
+        return cls(float(statistic(np.arange(count))), float(low), float(high))
 
 
 @dataclass(frozen=True)

@@ -22,6 +22,7 @@ HALF_WIDTH_M = 0.245
 _STEP_M = 0.02
 _RUN_OUT_M = 1.0
 _WIDEST_M = 1.0
+_BACK_M, _AHEAD_M = 0.6, 1.5
 
 
 @dataclass(frozen=True)
@@ -61,9 +62,9 @@ class Path:
         """Return the index of the point ``s_m`` along the curve."""
         return min(max(0, round(s_m / float(self.s[1]))), len(self.s) - 1)
 
-    def nearest(self, x: float, y: float, near_m: float, *, back_m: float = 0.6, ahead_m: float = 1.5) -> int:
-        """Return the index of the point nearest to x, y, at most ``back_m`` before and ``ahead_m`` after ``near_m``."""
-        low, high = self.index(near_m - back_m), self.index(near_m + ahead_m) + 1
+    def nearest(self, x: float, y: float, near_m: float) -> int:
+        """Return the index of the point nearest to x, y, among those 0.6 m before to 1.5 m after ``near_m``."""
+        low, high = self.index(near_m - _BACK_M), self.index(near_m + _AHEAD_M) + 1
         part = self.points[low:high]
         return low + int(np.argmin((part[:, 0] - x) ** 2 + (part[:, 1] - y) ** 2))
 
@@ -140,12 +141,6 @@ def open_course(name_or_path: str) -> Course:
     if len(world.gates) < 2:
         raise BenchError(f"world {name_or_path!r} is no course: it needs at least two gates, a start and a finish")
     return Course(name_or_path, world, Path.through(_corners(world)))
-
-
-def place_at(path: Path, index: int) -> Pose2D:
-    """Return the pose on ``path`` at ``index``."""
-    x, y = path.points[index].tolist()
-    return Pose2D(x, y, float(path.headings[index]))
 
 
 def off_stop(stop: Stop, pose: Pose2D) -> tuple[float, float]:

@@ -33,14 +33,12 @@ class LandmarkErrors:
         apart: Standard deviation of each landmark's x and y, in palm lengths.
         together: Likewise, of all of them together.
         depth: Likewise, of each landmark's z.
-        keep: Correlation of an error with that of the frame before, at 30 frames a second.
         missed: Probability that a hand in view is not found in a frame.
     """
 
     apart: float = 0.006
     together: float = 0.012
     depth: float = 0.03
-    keep: float = 0.0
     missed: float = 0.001
 
     def scaled(self, factor: float) -> "LandmarkErrors":
@@ -69,16 +67,11 @@ class HandLandmarker:
     def __init__(self, camera: Pinhole, errors: LandmarkErrors, random: np.random.Generator) -> None:
         self.pose = sign_pose(NONE)
         self._camera, self._errors, self._random = camera, errors, random
-        self._apart, self._together = np.zeros((21, 3)), np.zeros(2)
 
     def detect(self, image: Image, *, search: bool = True, dt_s: float = math.inf) -> list[Hand]:
         """Return the hand unless it is missed, or its palm is outside of the picture; ignores the arguments."""
-        keep = self._errors.keep
-        fresh = math.sqrt(1 - keep**2)
-        self._apart = keep * self._apart + fresh * self._random.standard_normal((21, 3))
-        self._together = keep * self._together + fresh * self._random.standard_normal(2)
-        is_missed = self._random.random() < self._errors.missed
         hand = self._hand()
+        is_missed = self._random.random() < self._errors.missed
         palm = hand.points[[0, 5, 17], :2].mean(axis=0)
         is_inside = bool(((palm > 0.0) & (palm < 1.0)).all())
         return [hand] if is_inside and not is_missed else []
@@ -96,8 +89,9 @@ class HandLandmarker:
         scale = self._camera.focal_px / joints[0, 2]
         palm_m = float(np.linalg.norm(skeleton.joints[0, 9]))
         errors = self._errors
-        moved = np.array([errors.apart, errors.apart, errors.depth]) * self._apart * palm_m
-        shift = errors.together * self._together * palm_m
+        apart, together = self._random.standard_normal((21, 3)), self._random.standard_normal(2)
+        moved = np.array([errors.apart, errors.apart, errors.depth]) * apart * palm_m
+        shift = errors.together * together * palm_m
         size = np.array([self._camera.width, self._camera.height])
         depth = (joints[:, 2] - joints[0, 2] + moved[:, 2]) * scale / self._camera.width
         points = np.column_stack([(pixels + (moved[:, :2] + shift) * scale) / size, depth])

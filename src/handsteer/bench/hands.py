@@ -5,8 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from handsteer.hand.kinematics import ANGLES, Array, clamp
-from handsteer.hand.poses import HandPose, View, sign_pose
+from handsteer.hand.kinematics import ANGLES, Array
+from handsteer.hand.poses import HandPose, sign_pose
+from handsteer.hand.script import Sway, ease, numbers_of, pose_of
 from handsteer.types import NONE
 
 SUBMOVEMENT_S = 0.1
@@ -19,11 +20,8 @@ _QUICKEST_S, _SLOWEST_S = 0.15, 0.30
 """Range of the time from one sign to the next."""
 
 # Physiological tremor of a raised arm: 4 to 5 times the 30 µm of a resting one (W. Growdon et al., Electromyogr. Clin.
-# Neurophysiol. 40, 2000), at 8 to 12 Hz. The sway is that of the virtual hand (hand.script).
+# Neurophysiol. 40, 2000), at 8 to 12 Hz.
 _TREMOR_M, _TREMOR_HZ = 0.00014, (8.0, 12.0)
-_SWAY_HZ = (0.23, 0.41, 0.67)
-_SWAY_JOINTS = 0.010
-_SWAY_VIEW = np.array([0.030, 0.022, 0.022, 0.003, 0.003, 0.004])
 
 _ARM_S = 0.25
 """Duration of a movement of the wrist by a few centimetres."""
@@ -119,17 +117,12 @@ class OperatorsHand:
         self.intended = NONE
         self.changes = 0
         self._wrist: Limb | None = None
-        self._from = self._to = _numbers(sign_pose(NONE))
+        self._from = self._to = numbers_of(sign_pose(NONE))
         self._share, self._change_s = 1.0, 1.0
         self._notice_s = math.inf
         self._time_s = 0.0
-        self._phases = random.uniform(0, math.tau, (len(_SWAY_HZ), len(self._to)))
+        self._sway = Sway(random)
         self._tremor = random.uniform(*_TREMOR_HZ, 3), random.uniform(0, math.tau, 3)
-
-    @property
-    def is_settled(self) -> bool:
-        """Whether the hand has reached the sign."""
-        return self._share >= 1.0
 
     def show(self, sign: str) -> None:
         """Begin to show ``sign``; nothing if it is shown already."""
@@ -139,13 +132,13 @@ class OperatorsHand:
         self.changes += 1
         slip = self._random.random()
         if slip < self._slips.wrong:
-            self._move_to(_numbers(sign_pose(str(self._random.choice(self._choices)))))
+            self._move_to(numbers_of(sign_pose(str(self._random.choice(self._choices)))))
         elif slip < self._slips.wrong + self._slips.unclear:
-            target, relaxed = _numbers(sign_pose(sign)), _numbers(sign_pose(NONE))
+            target, relaxed = numbers_of(sign_pose(sign)), numbers_of(sign_pose(NONE))
             target[: len(ANGLES)] += _UNCLEAR * (relaxed - target)[: len(ANGLES)]
             self._move_to(target)
         else:
-            self._move_to(_numbers(sign_pose(sign)))
+            self._move_to(numbers_of(sign_pose(sign)))
             return
         self._notice_s = self._slips.noticed_s
 
@@ -161,7 +154,7 @@ class OperatorsHand:
         self._notice_s -= dt_s
         if self._notice_s <= 0.0:
             self._notice_s = math.inf
-            self._move_to(_numbers(sign_pose(self.intended)))
+            self._move_to(numbers_of(sign_pose(self.intended)))
         if self._wrist is not None:
             self._wrist.step(dt_s)
 
@@ -171,19 +164,14 @@ class OperatorsHand:
         self._notice_s = math.inf
 
     def _now(self) -> Array:
-        share = self._share**3 * (self._share * (6.0 * self._share - 15.0) + 10.0)  # minimum jerk
+        share = ease(self._share)
         return np.asarray((1.0 - share) * self._from + share * self._to)
 
     def pose(self) -> HandPose:
         """Return the hand now."""
-        waves = np.sin(math.tau * self._time_s * np.array(_SWAY_HZ)[:, None] + self._phases).mean(axis=0)
-        numbers = self._now() + np.concatenate([np.full(len(ANGLES), _SWAY_JOINTS), _SWAY_VIEW]) * waves
+        numbers = self._now() + self._sway.at(self._time_s)
         hertz, phases = self._tremor
         numbers[-3:] += math.sqrt(2.0) * _TREMOR_M * np.sin(math.tau * self._time_s * hertz + phases)
         if self._wrist is not None:
             numbers[-3:-1] += self._wrist.place()
-        return HandPose(clamp(numbers[: len(ANGLES)]), View.from_array(numbers[len(ANGLES) :]))
-
-
-def _numbers(pose: HandPose) -> Array:
-    return np.concatenate([pose.angles, pose.view.to_array()])
+        return pose_of(numbers)

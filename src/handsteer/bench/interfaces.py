@@ -54,21 +54,16 @@ class Interface(Protocol):
 
 
 class _Page:
-    """Sends a velocity at the page's rate while in use, and lets the control process it."""
+    """Sends a velocity at the page's rate while in use, and lets the control process it; see :class:`Interface`."""
 
     period_s = _PAGE_PERIOD_S
 
     def __init__(self, config: ControlConfig) -> None:
-        self._changes = 0
+        self.changes = 0
         self.delay_s = PAGE_S
         self._control = Control(config, arming=False)
         self._next_s = 0.0
         self._is_held = False
-
-    @property
-    def changes(self) -> int:
-        """How often the operator has changed the act so far."""
-        return self._changes
 
     def step(self) -> Velocity | None:
         """Advance time by one tick; return the command, if there is a new one."""
@@ -113,7 +108,7 @@ class Pad(_Page):
             return
         if is_in_use == self._is_in_use and float(np.hypot(*(aim - self._aim))) < self._least:
             return
-        self._changes += 1
+        self.changes += 1
         self._since_s = 0.0
         self._aim, self._is_in_use = aim, is_in_use
         self._thumb.aim(aim)
@@ -167,7 +162,7 @@ class Keys(_Page):
                 self._press(axis, 0)
 
     def _press(self, axis: int, key: int) -> None:
-        self._changes += 1
+        self.changes += 1
         self._next[axis] = key
         self._due_s[axis] = self._PRESS_S * (1 + 0.2 * float(self._random.standard_normal()))
 
@@ -220,7 +215,7 @@ class Sliders(_Page):
             self._begin(int(np.argmax(gaps)), float(self._random.uniform(*self._REACH_S)))
 
     def _begin(self, slider: int, time_s: float) -> None:
-        self._changes += 1
+        self.changes += 1
         self._moves, self._due_s = (slider, 0.0), time_s
 
     def _move(self) -> Velocity | None:

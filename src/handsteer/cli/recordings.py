@@ -20,7 +20,7 @@ _LOOK_PERIOD_S = 0.2
 _MOST_PRINTED = 50
 
 
-@loads("handsteer.recordings.graph_recorder", "handsteer.transports")
+@loads("handsteer.recordings.recorder", "handsteer.transports")
 def record(
     output: Path,
     *ros_args: str,
@@ -46,13 +46,13 @@ def record(
     config_file
         YAML file with parameters, of which cmd_vel_type and collision_monitor matter; options override it.
     """
-    from handsteer.recordings.graph_recorder import GraphRecorder
+    from handsteer.recordings.recorder import GraphRecorder
     from handsteer.transports import join
 
     config = settings(config_file, parameters)
     session = join(transport, "recorder", ros_args)
     try:
-        recorder = GraphRecorder(output, session, config)
+        recorder = GraphRecorder(output, session.transport, session.clock, config)
         try:
             say(f"recording to {output}; Ctrl-C ends")
             while recorder.ended_by is None and not session.wait(_LOOK_PERIOD_S) and not signals.were_raised():
@@ -102,8 +102,7 @@ def replay(
     """
     from handsteer.clock import SteppedClock
     from handsteer.recognition.recognizer import model_files
-    from handsteer.recordings import open_recording
-    from handsteer.recordings.about import describe
+    from handsteer.recordings import describe, open_recording
     from handsteer.replay.by_time import rerun_by_time
     from handsteer.replay.compare import Comparison, compare, differing_software
     from handsteer.replay.rerun import has_journals, recorded_config, rerun

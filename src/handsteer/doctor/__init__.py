@@ -73,13 +73,16 @@ def _port(port: int) -> Finding:
 
 
 def _ros() -> list[Finding]:
-    ros1 = "rospy can be imported" if importlib.util.find_spec("rospy") else "no rospy (Debian, Ubuntu: make ros1)"
-    has_rclpy = importlib.util.find_spec("rclpy") is not None
-    ros2 = "rclpy can be imported" if has_rclpy else "no rclpy for this Python: is a ROS 2 sourced?"
     return [
-        Finding("ros 1", "ok" if importlib.util.find_spec("rospy") else "optional", f"{ros1}; not needed to run"),
-        Finding("ros 2", "ok" if has_rclpy else "optional", f"{ros2}; not needed to run"),
+        _importable("ros 1", "rospy", "no rospy (Debian, Ubuntu: make ros1)"),
+        _importable("ros 2", "rclpy", "no rclpy for this Python: is a ROS 2 sourced?"),
     ]
+
+
+def _importable(name: str, module: str, otherwise: str) -> Finding:
+    if importlib.util.find_spec(module):
+        return Finding(name, "ok", f"{module} can be imported; not needed to run")
+    return Finding(name, "optional", f"{otherwise}; not needed to run")
 
 
 def _gl() -> Finding:

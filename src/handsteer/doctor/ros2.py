@@ -247,10 +247,10 @@ def _not_joined(problem: str, here: Network, taken: set[int]) -> str:
     if here.reach == "CYCLONEDDS_URI":
         return f"CYCLONEDDS_URI cannot be used: {problem}; fix or unset it"
     if here.places and taken and not places_left(here.domain, taken, here.places):
-        first = 7410 + 250 * here.domain
+        ports = _places(here.domain, here.places)
         return (
-            f"all {here.places} places in domain {here.domain} on this machine are taken (UDP ports {first} to "
-            f"{first + 2 * here.places - 1}): end some nodes, or choose another ROS_DOMAIN_ID"
+            f"all {here.places} places in domain {here.domain} on this machine are taken (UDP ports {ports.start} to "
+            f"{ports.stop - 1}): end some nodes, or choose another ROS_DOMAIN_ID"
         )
     return f"{here.place} cannot be joined: {problem}"
 

@@ -16,7 +16,7 @@ _MAX_S = 3600.0
 _MAX_M = 0.5
 _PART = re.compile(r"([^:]*):(\S*)\s*")
 
-# The sway of a raised hand: sums of slow waves of these amplitudes, in radians and metres.
+# The sway of a raised hand, with amplitudes in radians and metres.
 _SWAY_HZ = (0.23, 0.41, 0.67)
 _SWAY_JOINTS = 0.010
 _SWAY_VIEW = np.array([0.030, 0.022, 0.022, 0.003, 0.003, 0.004])
@@ -122,9 +122,9 @@ class Motion:
 
     def __init__(self, script: str, handedness: Handedness = "Right", seed: int = 0) -> None:
         self._parts = parse_script(script)
-        self._poses = [_numbers(_placed(part, handedness)) for part in self._parts]
+        self._poses = [numbers_of(_placed(part, handedness)) for part in self._parts]
         self._ends = np.cumsum([part.duration_s for part in self._parts])
-        self._phases = np.random.default_rng(seed).uniform(0, 2 * np.pi, (len(_SWAY_HZ), len(self._poses[0])))
+        self._sway = Sway(np.random.default_rng(seed))
 
     @property
     def duration_s(self) -> float:
@@ -139,14 +139,26 @@ class Motion:
         part = self._parts[index]
         elapsed = within - (float(self._ends[index]) - part.duration_s)
         change = min(_CHANGE_S, part.duration_s)
-        share = _ease(elapsed / change)
+        share = ease(elapsed / change)
         numbers = (1.0 - share) * self._poses[index - 1] + share * self._poses[index]
-        return Moment(_pose(numbers + self._sway(time_s)), part.sign, elapsed >= change)
+        return Moment(pose_of(numbers + self._sway.at(time_s)), part.sign, elapsed >= change)
 
-    def _sway(self, time_s: float) -> Array:
-        waves = np.sin(2 * np.pi * time_s * np.array(_SWAY_HZ)[:, None] + self._phases).mean(axis=0)
-        sizes = np.concatenate([np.full(len(ANGLES), _SWAY_JOINTS), _SWAY_VIEW])
-        return np.asarray(sizes * waves)
+
+class Sway:
+    """The sway of a raised hand: sums of slow waves.
+
+    Args:
+        random: Source of their phases.
+    """
+
+    def __init__(self, random: np.random.Generator) -> None:
+        self._sizes = np.concatenate([np.full(len(ANGLES), _SWAY_JOINTS), _SWAY_VIEW])
+        self._phases = random.uniform(0, math.tau, (len(_SWAY_HZ), len(self._sizes)))
+
+    def at(self, time_s: float) -> Array:
+        """Return what it adds to :func:`numbers_of` a hand after ``time_s`` seconds."""
+        waves = np.sin(math.tau * time_s * np.array(_SWAY_HZ)[:, None] + self._phases).mean(axis=0)
+        return np.asarray(self._sizes * waves)
 
 
 def _placed(part: Part, handedness: Handedness) -> HandPose:
@@ -157,15 +169,17 @@ def _placed(part: Part, handedness: Handedness) -> HandPose:
     return replace(pose, view=replace(pose.view, position=(x + right_m, y + part.down_m, z)))
 
 
-def _numbers(pose: HandPose) -> Array:
+def numbers_of(pose: HandPose) -> Array:
+    """Return the angles and the view of ``pose`` as one array, so that hands can be mixed."""
     return np.concatenate([pose.angles, pose.view.to_array()])
 
 
-def _pose(numbers: Array) -> HandPose:
+def pose_of(numbers: Array) -> HandPose:
+    """Return the hand of such an array, its angles within their limits."""
     return HandPose(clamp(numbers[: len(ANGLES)]), View.from_array(numbers[len(ANGLES) :]))
 
 
-def _ease(share: float) -> float:
-    """Map 0 to 1 onto 0 to 1 with zero velocity at both ends (K. Perlin's smootherstep)."""
+def ease(share: float) -> float:
+    """Map 0 to 1 onto 0 to 1 with zero velocity at both ends: minimum jerk (K. Perlin's smootherstep)."""
     share = min(max(share, 0.0), 1.0)
     return share**3 * (share * (6.0 * share - 15.0) + 10.0)

@@ -3,7 +3,7 @@
 import math
 import threading
 from collections.abc import Callable
-from typing import Final, Protocol
+from typing import Final
 
 from handsteer.nodes.steering import SteeringNode
 from handsteer.timeouts import HOLD_TIMEOUT_S
@@ -16,43 +16,27 @@ _WATCH_PERIOD_S: Final = 0.05
 _ASK_PERIOD_S: Final = 1.0
 
 
-class Seat(Protocol):
-    """The right to drive, which one program or one viewer of the page has at a time."""
+class Seat:
+    """The right to drive, which one program has at a time: the first that asks.
 
-    def has(self, program: str) -> bool:
-        """Return whether ``program`` has the seat."""
-        ...
-
-    def ask(self, program: str) -> None:
-        """Ask for the seat for ``program``; it may get it later."""
-        ...
-
-    def leave(self, program: str) -> None:
-        """Give back the seat, or end the request for it; has no effect on others."""
-        ...
-
-
-class OwnSeat:
-    """A :class:`Seat` for a run without a page: the first program that asks has it."""
+    Attributes:
+        driver: Who has it; None if it is free.
+    """
 
     def __init__(self) -> None:
-        self._driver: str | None = None
-
-    def has(self, program: str) -> bool:
-        """Return whether ``program`` has the seat."""
-        return self._driver == program
+        self.driver: str | None = None
 
     def ask(self, program: str) -> None:
         """Take the seat for ``program`` if it is free."""
-        self._driver = self._driver or program
+        self.driver = self.driver or program
 
     def leave(self, program: str) -> None:
-        """Give back the seat."""
-        if self._driver == program:
-            self._driver = None
+        """Give back the seat of ``program``; has no effect on others."""
+        if self.driver == program:
+            self.driver = None
 
 
-class SharedSeat:
+class SharedSeat(Seat):
     """A :class:`Seat` that the page's viewers share: its driver is asked, and may hand it over.
 
     Args:
@@ -60,23 +44,19 @@ class SharedSeat:
     """
 
     def __init__(self, say: Callable[[str, str], None]) -> None:
+        super().__init__()
         self._say = say
-        self._driver: str | None = None
 
     def note(self, driver: str | None) -> None:
         """Note who has the seat now, a program or a viewer."""
-        self._driver = driver
-
-    def has(self, program: str) -> bool:
-        """Return whether ``program`` has the seat."""
-        return self._driver == program
+        self.driver = driver
 
     def ask(self, program: str) -> None:
-        """Ask for the seat."""
+        """Ask for the seat for ``program``; it may get it later."""
         self._say("ask", program)
 
     def leave(self, program: str) -> None:
-        """Give back the seat, or end the request for it."""
+        """Give back the seat of ``program``, or end its request."""
         self._say("leave", program)
 
 
@@ -112,10 +92,10 @@ class Driving:
             Whether it has the seat.
         """
         now = self._steering.clock.now()
-        if not self._seat.has(program) and now - self._asked_s >= _ASK_PERIOD_S:
+        if self._seat.driver != program and now - self._asked_s >= _ASK_PERIOD_S:
             self._asked_s = now
             self._seat.ask(program)
-        if not self._seat.has(program):
+        if self._seat.driver != program:
             return False
         with self._lock:
             if program != self._program or now - self._heard_s > HOLD_TIMEOUT_S or is_late:
@@ -138,7 +118,7 @@ class Driving:
             if self._program is None:
                 return
             is_silent = self._steering.clock.now() - self._heard_s > HOLD_TIMEOUT_S
-            if is_silent or not self._seat.has(self._program):
+            if is_silent or self._seat.driver != self._program:
                 self._release()
 
     def _release(self) -> None:

@@ -109,7 +109,7 @@ def _serve(pipe: Pipe) -> None:
         LiveError: They cannot be served.
     """
     # The graph's process, which imports this module too, needs no server.
-    from handsteer.live.driving import Driving, OwnSeat, SharedSeat  # noqa: PLC0415
+    from handsteer.live.driving import Driving, Seat, SharedSeat  # noqa: PLC0415
     from handsteer.live.server import LiveServer  # noqa: PLC0415
     from handsteer.nodes.steering import SteeringNode  # noqa: PLC0415
 
@@ -128,7 +128,7 @@ def _serve(pipe: Pipe) -> None:
             return
     clock, topics, config, is_shared = begun.result()
     steering = SteeringNode(transport, clock, name="foxglove") if config.drive else None
-    driving = Driving(steering, shared if is_shared else OwnSeat()) if steering is not None else None
+    driving = Driving(steering, shared if is_shared else Seat()) if steering is not None else None
     server = LiveServer(transport, clock, topics, config, driving)
     pipe.say("served", server.start())
     if steering is not None:

@@ -36,22 +36,14 @@ _WARNING: Final = 1
 
 @dataclass(frozen=True)
 class Subscribe:
-    """A client subscribes.
-
-    Attributes:
-        channels: Number of the channel by the number that the client gives its subscription.
-    """
+    """A client subscribes: numbers of channels by the numbers that it gives the subscriptions."""
 
     channels: Mapping[int, int]
 
 
 @dataclass(frozen=True)
 class Unsubscribe:
-    """A client ends subscriptions.
-
-    Attributes:
-        subscriptions: Their numbers.
-    """
+    """A client ends subscriptions, by their numbers."""
 
     subscriptions: Sequence[int]
 
@@ -79,22 +71,14 @@ class ClientChannel:
 
 @dataclass(frozen=True)
 class Advertise:
-    """A client will publish.
-
-    Attributes:
-        channels: By the number that the client gives each.
-    """
+    """A client will publish on these channels, by the numbers that it gives them."""
 
     channels: Mapping[int, ClientChannel]
 
 
 @dataclass(frozen=True)
 class Unadvertise:
-    """A client will not publish any more.
-
-    Attributes:
-        channels: Numbers of the channels.
-    """
+    """A client will not publish any more on the channels of these numbers."""
 
     channels: Sequence[int]
 
@@ -190,13 +174,12 @@ def read_command(content: bytes, encoding: str) -> Velocity:
         LiveError: It is no Twist, or a number of it is not finite.
     """
     try:
-        twist: Twist | None = decode(content, type_name(Twist)) if encoding == "cdr" else None
-        sent = json.loads(content) if twist is None else None
-        velocity = (
-            Velocity(twist.linear.x, twist.angular.z)
-            if twist is not None
-            else Velocity(_speed(sent, "linear", "x"), _speed(sent, "angular", "z"))
-        )
+        if encoding == "cdr":
+            twist: Twist = decode(content, type_name(Twist))
+            velocity = Velocity(twist.linear.x, twist.angular.z)
+        else:
+            sent = json.loads(content)
+            velocity = Velocity(_speed(sent, "linear", "x"), _speed(sent, "angular", "z"))
     except LiveError:
         raise
     except Exception:

@@ -22,8 +22,7 @@ from handsteer.config import FoxgloveConfig
 from handsteer.errors import LiveError
 from handsteer.live.access import Access
 from handsteer.live.driving import Driving
-from handsteer.live.feeds import Feeds
-from handsteer.live.outbox import Outbox
+from handsteer.live.feeds import Feeds, Outbox
 from handsteer.live.protocol import (
     LARGEST_REQUEST_BYTES,
     SUBPROTOCOLS,
@@ -279,7 +278,7 @@ async def _send(connection: ServerConnection, outbox: Outbox) -> None:
                 continue
             subscription, message = what
             try:
-                raw = message.raw()
+                raw = message.raw
             except Exception as error:
                 log.warning("a message cannot be sent to Foxglove: %s", error)
                 continue

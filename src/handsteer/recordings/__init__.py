@@ -1,14 +1,23 @@
 """Recordings of a graph's topics: MCAP files as ROS 2 writes them, and bags of ROS 1 and 2."""
 
+import datetime
+import hashlib
+import platform
+from collections.abc import Sequence
+from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from handsteer import __version__
+from handsteer.clock import Clock
+from handsteer.config import Config
 from handsteer.errors import RecordingError
 
 if TYPE_CHECKING:
     from handsteer.recordings.recorded import Recording
 
 _BAGS = frozenset({".bag", ".db3"})
+_PACKAGES = ("ai-edge-litert", "mujoco", "numpy", "opencv-python-headless")
 
 
 def is_recording(path: Path) -> bool:
@@ -33,3 +42,28 @@ def open_recording(path: Path) -> "Recording":
     from handsteer.recordings.mcap_reader import McapFile  # noqa: PLC0415
 
     return McapFile(path)
+
+
+def describe(config: Config | None, clock: Clock, models: Sequence[Path]) -> dict[str, str]:
+    """Return the metadata of a recording that begins now: parameters, versions, and hashes of the models.
+
+    Args:
+        config: The parameters of all nodes; None if they are not known.
+        clock: The graph's clock.
+        models: The model files of the recognition.
+    """
+    about = {
+        "handsteer": __version__,
+        "began": datetime.datetime.now(datetime.UTC).isoformat(timespec="milliseconds"),
+        "clock_offset_s": repr(clock.offset_s),
+        "python": platform.python_version(),
+        "system": f"{platform.system()} {platform.machine()}",
+    }
+    for package in _PACKAGES:
+        try:
+            about[package] = metadata.version(package)
+        except metadata.PackageNotFoundError:
+            continue
+    if config is not None:
+        about["config"] = config.model_dump_json()
+    return about | {f"model {path.name}": hashlib.sha256(path.read_bytes()).hexdigest() for path in models}

@@ -5,6 +5,7 @@ import logging
 import logging.handlers
 import queue
 import sys
+from contextlib import ExitStack
 from io import TextIOWrapper
 from pathlib import Path
 
@@ -43,23 +44,17 @@ class AuditLog:
 
     def __init__(self, transport: Transport, path: Path) -> None:
         self._waiting: queue.Queue[logging.LogRecord] = queue.Queue(_MOST_WAITING)
-        self._listener = logging.handlers.QueueListener(self._waiting, _File(path))
-        self._listener.start()
-        self._subscription = transport.subscribe("audit_log", AUDIT, self._take)
+        file = _File(path)
+        listener = logging.handlers.QueueListener(self._waiting, file)
+        listener.start()
+        self._end = ExitStack()
+        self._end.callback(file.close)
+        self._end.callback(listener.stop)
+        self._end.callback(transport.subscribe("audit_log", AUDIT, self._take).close)
 
     def close(self) -> None:
         """Write what waits, and close the file; may be called twice."""
-        self._subscription.close()
-        # Stopping it twice fails before Python 3.12.
-        listener, self._listener = self._listener, logging.handlers.QueueListener(self._waiting)
-        if listener.handlers:
-            listener.stop()
-            for handler in listener.handlers:
-                handler.close()
-
-    def flush(self) -> None:
-        """Wait until everything so far is written."""
-        self._waiting.join()
+        self._end.close()
 
     def _take(self, received: Received[Log]) -> None:
         record = logging.makeLogRecord({"msg": line_of(received.message)})
@@ -81,7 +76,7 @@ class _File(logging.handlers.RotatingFileHandler):
         self._has_failed = False
         super().__init__(path, maxBytes=_FILE_BYTES, backupCount=_OLD_FILES, encoding="utf-8", delay=True)
 
-    def _open(self) -> "TextIOWrapper":
+    def _open(self) -> TextIOWrapper:
         Path(self.baseFilename).parent.mkdir(parents=True, exist_ok=True)
         return super()._open()
 

@@ -8,33 +8,24 @@ from rosbags.rosbag1 import Reader as Ros1Reader
 from rosbags.rosbag2 import Reader as Ros2Reader
 
 from handsteer.errors import RecordingError
-from handsteer.recordings.recorded import Recorded
+from handsteer.recordings.recorded import Recorded, Recording
 from handsteer.transports.ros2.encoding import types
 
 
-class Bag:
+class Bag(Recording):
     """A bag: a file of ROS 1 (``.bag``), or a folder of ROS 2, or a file of one (``.db3``).
 
     Args:
         path: The file or folder.
-
-    Attributes:
-        path: The same.
-        about: Empty: bags do not contain what handsteer writes to its recordings.
-        began_s: The time of the first message, in seconds since 1970; 0 if there is none.
-        problem: Why it was not read to its end; None if it was, or was not read yet.
 
     Raises:
         RecordingError: It cannot be read.
     """
 
     def __init__(self, path: Path) -> None:
-        self.path = path
-        self.about: dict[str, str] = {}
-        self.problem: str | None = None
+        super().__init__(path)
         self._is_ros1 = path.suffix == ".bag"
-        self.began_s = next((recorded.time_s for recorded in self.messages()), 0.0)
-        if self.problem is not None:
+        if not self.began_s and self.problem is not None:
             raise RecordingError(f"cannot read the bag {path}: {self.problem}")
 
     def messages(self, topics: Collection[str] | None = None) -> Iterator[Recorded]:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from handsteer.errors import RecordingError, needing
-from handsteer.recordings.recorded import Recorded
+from handsteer.recordings.recorded import Recorded, Recording
 
 with needing("reading MCAP files", "record", "mcap"):
     import lz4.frame
@@ -26,26 +26,18 @@ _FAILURES = (McapError, struct.error, ValueError, IndexError, KeyError, MemoryEr
 _FAILURES_OF_CHUNKS = (*_FAILURES, zstandard.ZstdError, RuntimeError)
 
 
-class McapFile:
+class McapFile(Recording):
     """An MCAP file.
 
     Args:
         path: The file.
-
-    Attributes:
-        path: The file.
-        about: The metadata that handsteer writes at its start; empty in the files of others.
-        problem: Why it was not read to its end; None before it was read, and if it was whole.
 
     Raises:
         RecordingError: It cannot be read, or is no MCAP file.
     """
 
     def __init__(self, path: Path) -> None:
-        self.path = path
-        self.about: dict[str, str] = {}
-        self.problem: str | None = None
-        self._began_s: float | None = None
+        super().__init__(path)
         for opcode, body in self._records():
             if opcode == Opcode.METADATA:
                 metadata = self._parsed(Metadata, body)
@@ -53,13 +45,6 @@ class McapFile:
                     self.about = metadata.metadata
             elif opcode != Opcode.HEADER:
                 break
-
-    @property
-    def began_s(self) -> float:
-        """The time of the first message, in seconds since the epoch of its stamps; 0 if there is none."""
-        if self._began_s is None:
-            self._began_s = next((recorded.time_s for recorded in self.messages()), 0.0)
-        return self._began_s
 
     def messages(self, topics: Collection[str] | None = None) -> Iterator[Recorded]:
         """Yield the messages of ``topics``, of all by default, in the order in which they were written."""

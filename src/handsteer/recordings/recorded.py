@@ -1,9 +1,11 @@
-"""Recorded messages, and the interface of what contains them."""
+"""Recorded messages, and what contains them."""
 
-from collections.abc import Collection, Iterator, Mapping
+from abc import ABC, abstractmethod
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from handsteer.errors import RecordingError
 from handsteer.transports.ros2.encoding import decode, types
@@ -50,29 +52,28 @@ class Recorded:
             raise RecordingError(f"{self.topic}: a damaged message of {self.type}: {error}") from None
 
 
-class Recording(Protocol):
-    """A recording that can be read."""
+class Recording(ABC):
+    """A recording that can be read.
 
-    @property
-    def path(self) -> Path:
-        """The file or folder."""
-        ...
+    Args:
+        path: The file or folder.
 
-    @property
-    def about(self) -> Mapping[str, str]:
-        """The metadata that handsteer writes (:mod:`handsteer.recordings.about`); empty in those of others."""
-        ...
+    Attributes:
+        path: The same.
+        about: The metadata that handsteer writes (:func:`handsteer.recordings.describe`); empty in those of others.
+        problem: Why it was not read to its end; None if it was, or was not read yet.
+    """
 
-    @property
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.about: dict[str, str] = {}
+        self.problem: str | None = None
+
+    @cached_property
     def began_s(self) -> float:
         """The time of the first message, in seconds since the epoch of its stamps; 0 if there is none."""
-        ...
+        return next((recorded.time_s for recorded in self.messages()), 0.0)
 
-    @property
-    def problem(self) -> str | None:
-        """Why it was not read to its end; None if it was, or was not read yet."""
-        ...
-
+    @abstractmethod
     def messages(self, topics: Collection[str] | None = None) -> Iterator[Recorded]:
         """Yield the messages of ``topics``, of all by default, in the order in which they were written."""
-        ...

@@ -1,4 +1,4 @@
-"""Records the topics of a graph to a file while the graph runs."""
+"""Records the topics of a graph to a file while the graph runs: those of this process, or of several."""
 
 import itertools
 import logging
@@ -11,15 +11,20 @@ from pathlib import Path
 from typing import Any
 
 from handsteer.clock import Clock
+from handsteer.config import Config, cmd_vel_type
 from handsteer.images import bgr_image, jpeg_message
 from handsteer.messages import (
     IMAGE_COMPRESSED,
     IMAGE_RAW,
+    RECORDED,
+    SCAN,
     CompressedImage,
     Image,
     String,
     Topic,
+    cmd_vel,
 )
+from handsteer.recordings import describe
 from handsteer.recordings.mcap_writer import McapWriter
 from handsteer.transports.base import Received, Transport
 from handsteer.transports.ros2.encoding import encode
@@ -31,6 +36,8 @@ _CUT_PERIOD_S = 0.5
 # A disk may hang for seconds; a graph publishes some 250 messages a second, 30 of them pictures.
 _MOST_WAITING = 5000
 _MOST_PICTURES_WAITING = 150
+# Nodes of other processes appear late.
+_DECIDES_AFTER_S = 3.0
 
 log = logging.getLogger(__name__)
 
@@ -170,3 +177,40 @@ class Recorder:
                 log.warning("a message on %s cannot be recorded: %s", name, error)
                 continue
             self._file.write(topic, name, raw, time_ns, number)
+
+
+class GraphRecorder(Recorder):
+    """Records a graph of several processes that this one has joined.
+
+    Pictures are taken from ``/image_raw/compressed`` if a node publishes that, else from ``/image_raw``.
+
+    Args:
+        path: The file, which must not exist yet.
+        transport: Carries the messages.
+        clock: The graph's clock.
+        config: Names the type of the commands, and whether laser scans are used.
+
+    Raises:
+        RecordingError: The file exists or cannot be created.
+    """
+
+    def __init__(self, path: Path, transport: Transport, clock: Clock, config: Config) -> None:
+        scans = (SCAN,) if config.collision_monitor.enabled else ()
+        topics = (*RECORDED, cmd_vel(cmd_vel_type(config)), *scans)
+        super().__init__(path, transport, clock, topics, describe(None, clock, ()))
+        self._decides_s: float | None = time.monotonic() + _DECIDES_AFTER_S
+
+    def look(self) -> None:
+        """Decide which pictures to record, once it is known who publishes; call it several times a second."""
+        if self._decides_s is None:
+            return
+        publishers_of = self._transport.publishers_of
+        if publishers_of(IMAGE_COMPRESSED):
+            self.listen(IMAGE_COMPRESSED)
+        elif publishers_of(IMAGE_RAW) and time.monotonic() > self._decides_s:
+            name = self._transport.topic_name(IMAGE_RAW)
+            log.info("no node publishes compressed pictures: those of %s are recorded as JPEG", name)
+            self.listen(IMAGE_RAW)
+        else:
+            return
+        self._decides_s = None

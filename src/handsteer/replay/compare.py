@@ -74,7 +74,7 @@ def differing_software(about: Mapping[str, str], now: Mapping[str, str]) -> list
     """Return what of the software and the models is not as it was, as ``numpy: 2.3.0 was recorded, now 2.4.6``.
 
     Args:
-        about: Metadata of a recording (:mod:`handsteer.recordings.about`).
+        about: Metadata of a recording (:func:`handsteer.recordings.describe`).
         now: The same of this program.
     """
     names = [name for name in now if name in about and name not in ("config", "began", "clock_offset_s")]

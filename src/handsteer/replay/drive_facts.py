@@ -1,17 +1,60 @@
 """What a recording says about a drive: plain data, for a page or for JSON."""
 
+from array import array
 from collections import Counter
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from handsteer.replay.curves import Curve
 from handsteer.types import CourseState
 
-CONFIDENCE, COMMANDED, DRIVEN, TRUTH = 3, 3, 5, 3
-"""Columns of the curves of :class:`DriveFacts`."""
+# More points of a curve in a chart would only make the page larger and slower.
+_MOST_SHOWN = 20_000
+_MOST_KEPT = 400_000
+
+
+class Curve:
+    """Rows of numbers, of which the first is the time; beyond some 400,000 rows, only every second one is kept.
+
+    Args:
+        columns: Numbers per row, with the time.
+    """
+
+    def __init__(self, columns: int) -> None:
+        self._columns = columns
+        self._rows = array("d")
+        self._stride = self._skipped = 1
+
+    def __len__(self) -> int:
+        return len(self._rows) // self._columns
+
+    def add(self, *row: float) -> None:
+        """Add a row."""
+        if self._skipped < self._stride:
+            self._skipped += 1
+            return
+        self._skipped = 1
+        self._rows.extend(row)
+        if len(self) >= _MOST_KEPT:
+            kept = np.frombuffer(self._rows).reshape(-1, self._columns)[::2].tobytes()
+            self._rows = array("d", kept)
+            self._stride *= 2
+
+    def table(self, most: int = _MOST_SHOWN) -> NDArray[np.float64]:
+        """Return at most about ``most`` rows, (n, columns), with the smallest and largest value of each part."""
+        table = np.frombuffer(self._rows.tobytes()).reshape(-1, self._columns)
+        if len(table) <= most:
+            return table
+        # Each part gives two rows per column of values.
+        parts = np.array_split(np.arange(len(table)), max(1, most // (2 * (self._columns - 1))))
+        chosen = set[int]()
+        for part in parts:
+            values = table[part[0] : part[-1] + 1, 1:]
+            chosen.update((part[0] + values.argmin(axis=0)).tolist(), (part[0] + values.argmax(axis=0)).tolist())
+        return table[sorted(chosen)]
 
 
 @dataclass
@@ -48,8 +91,7 @@ class Stand:
         sign: The confirmed sign; empty if unknown.
         code: The control's reason code; empty if unknown.
         reason: The reason in words.
-        x: Place on the map, in metres; None if unknown.
-        y: Place on the map, in metres; None if unknown.
+        place: x and y on the map, in metres; None if unknown.
         picture: The frame that led to it, or the one of that moment, as a small JPEG; None if there is none.
         has_led: Whether the command is known to have followed from the picture.
     """
@@ -59,8 +101,7 @@ class Stand:
     sign: str = ""
     code: str = ""
     reason: str = ""
-    x: float | None = None
-    y: float | None = None
+    place: tuple[float, float] | None = None
     picture: bytes | None = None
     has_led: bool = False
 
@@ -146,7 +187,7 @@ class DriveFacts:
         stands: Each time that it was commanded to stand after it drove; only the first 10,000.
         stand_count: How often that was.
         stops: How often ``/stop`` was set.
-        bumps: When it began to touch obstacles, and where.
+        bumps: Where it began to touch an obstacle, each time; None if unknown.
         knows_bumps: Whether the robot reports what it touches.
         laps: On the world's course.
         events: What people and nodes did, from the audit; only the first 1,000.
@@ -170,10 +211,10 @@ class DriveFacts:
     signs: dict[str, SignTotal] = field(default_factory=dict)
     spans: list[SignSpan] = field(default_factory=list)
     seen: list[str] = field(default_factory=list)
-    confidence: Curve = field(default_factory=lambda: Curve(CONFIDENCE))
-    commanded: Curve = field(default_factory=lambda: Curve(COMMANDED))
-    driven: Curve = field(default_factory=lambda: Curve(DRIVEN))
-    truth: Curve = field(default_factory=lambda: Curve(TRUTH))
+    confidence: Curve = field(default_factory=lambda: Curve(3))
+    commanded: Curve = field(default_factory=lambda: Curve(3))
+    driven: Curve = field(default_factory=lambda: Curve(5))
+    truth: Curve = field(default_factory=lambda: Curve(3))
     leaps_s: list[float] = field(default_factory=list)
     sources: dict[str, float] = field(default_factory=dict)
     distance_m: float | None = None
@@ -181,7 +222,7 @@ class DriveFacts:
     stands: list[Stand] = field(default_factory=list)
     stand_count: int = 0
     stops: int = 0
-    bumps: list[tuple[float, float | None, float | None]] = field(default_factory=list)
+    bumps: list[tuple[float, float] | None] = field(default_factory=list)
     knows_bumps: bool = False
     laps: list[Lap] = field(default_factory=list)
     events: list[Event] = field(default_factory=list)
@@ -202,7 +243,6 @@ class DriveFacts:
 
     def totals(self) -> dict[str, Any]:
         """Return the totals as plain values, for JSON."""
-        has_course = bool(self.laps)
         return {
             "recording": str(self.path),
             "began": self.began or None,
@@ -224,7 +264,7 @@ class DriveFacts:
             "stands_by_reason": dict(Counter(stand.code or "unknown" for stand in self.stands).most_common()),
             "stops": self.stops,
             "bumps": len(self.bumps) if self.knows_bumps else None,
-            "gates": sum(lap.course.passed for lap in self.laps) if has_course else None,
+            "gates": sum(lap.course.passed for lap in self.laps) if self.laps else None,
             "laps": [{"began_s": round(lap.began_s, 3), **lap.course.as_dict()} for lap in self.laps],
             "latency_median_ms": _round(self.latency_ms(50)),
             "latency_p99_ms": _round(self.latency_ms(99)),

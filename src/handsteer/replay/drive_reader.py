@@ -23,12 +23,9 @@ from handsteer.nodes.diagnostics import read_status
 from handsteer.nodes.journal import journal_topic
 from handsteer.nodes.status import CameraStatus, ControlStatus, RecognitionStatus, RobotStatus
 from handsteer.recordings.recorded import Recorded, Recording
-from handsteer.replay.curves import Curve
-from handsteer.replay.drive_facts import DriveFacts, Event
+from handsteer.replay.drive_facts import Curve, DriveFacts, Event
+from handsteer.replay.drive_logs import MapThings, RobotLog, SignLog
 from handsteer.replay.journals import parse_spin
-from handsteer.replay.map_things import MapThings
-from handsteer.replay.robot_log import RobotLog
-from handsteer.replay.sign_log import SignLog
 from handsteer.replay.stand_log import StandLog
 from handsteer.types import NONE, Velocity
 
@@ -134,8 +131,7 @@ class _Reader:
             )
         self._stands.end(self._now_s)
         self._signs.end()
-        if self._markers is not None:
-            self._take_markers(self._markers)
+        self._take_markers()
         facts.things = self._map.all()
         facts.duration_s = self._now_s - self._began_s
         self._robot.end()
@@ -209,11 +205,12 @@ class _Reader:
         self._markers = recorded
         if recorded.time_s - self._markers_s >= _MARKERS_PERIOD_S:
             self._markers_s = recorded.time_s
-            self._take_markers(recorded)
+            self._take_markers()
 
-    def _take_markers(self, recorded: Recorded) -> None:
-        self._markers = None
-        self._map.note(recorded.message)
+    def _take_markers(self) -> None:
+        markers, self._markers = self._markers, None
+        if markers is not None:
+            self._map.note(markers.message)
 
     def _on_spin(self, recorded: Recorded, time_s: float) -> None:
         self._stands.note_spin(parse_spin(recorded))

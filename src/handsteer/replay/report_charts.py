@@ -1,28 +1,28 @@
-"""The charts over time of a report, as plotly's figures: plain data, whose colours the page adds.
+"""The charts and the map of a report, as plotly's figures: plain data, whose colours the page adds.
 
 Texts from a recording are escaped, because plotly reads HTML in texts.
 """
 
 import base64
 import html
+import math
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from handsteer.replay.drive_facts import DriveFacts
+from handsteer.replay.drive_facts import DriveFacts, Stand, Thing
 from handsteer.types import NONE, SIGNS
 
 Figure = dict[str, Any]
 
 _COLOURS = ("#e5484d", "#2f9e5b", "#8e5bd0", "#2b7fd9", "#e08a1e", "#1aa0a8")
 _MORE_COLOURS = ("#c2569f", "#7d8c2c", "#5b6ee1", "#b5793f")
-GREY, DRIVEN, STAND = "#8a94a6", "#2b7fd9", "#e5484d"
-"""Colours that have the same meaning in all charts."""
-
-_COMMANDED = "#e08a1e"
+_GREY, _DRIVEN, _COMMANDED, _STAND, _BUMP = "#8a94a6", "#2b7fd9", "#e08a1e", "#e5484d", "#8e5bd0"
 _BINS = 60
+_MOST_LABELS = 60
 
 
 @dataclass
@@ -90,12 +90,12 @@ def latencies(facts: DriveFacts) -> Figure | None:
         hover[-1] = f"{edges[-2]:.1f} ms and more, up to {values.max():.0f} ms: {counts[-1]} frames"
     bars = {
         "type": "bar",
-        "x": typed((edges[:-1] + edges[1:]) / 2),
-        "y": typed(counts),
+        "x": _typed((edges[:-1] + edges[1:]) / 2),
+        "y": _typed(counts),
         "width": float(edges[1] - edges[0]),
         "hovertext": hover,
         "hoverinfo": "text",
-        "marker": {"color": DRIVEN},
+        "marker": {"color": _DRIVEN},
         "name": "frames",
     }
     layout = {
@@ -108,6 +108,26 @@ def latencies(facts: DriveFacts) -> Figure | None:
     return {"data": [bars], "layout": layout}
 
 
+def drive_map(facts: DriveFacts) -> Figure | None:
+    """Return the driven path among obstacles and gates; None if nothing of them is known."""
+    traces = [*_paths(facts), *_stops_on_map(facts), *_bumps(facts)]
+    if not (traces or facts.things):
+        return None
+    equal = {"scaleanchor": "x", "scaleratio": 1}
+    axes = [
+        {"title": {"text": f"{name} in m"}, "zeroline": False, "constrain": "domain", **_bounds(facts, axis)}
+        for axis, name in enumerate("xy")
+    ]
+    layout = {
+        "height": 560,
+        "shapes": [_shape(thing) for thing in facts.things],
+        "xaxis": axes[0],
+        "yaxis": axes[1] | equal,
+        "hovermode": "closest",
+    }
+    return {"data": traces, "layout": layout}
+
+
 def _signs(facts: DriveFacts) -> _Panel:
     """Return a row per sign, with a thick line while it was the confirmed one."""
     names = sorted(facts.signs, key=_rank, reverse=True)
@@ -115,23 +135,13 @@ def _signs(facts: DriveFacts) -> _Panel:
     for row, name in enumerate(names):
         spans = [span for span in facts.spans if span.sign == name]
         times = [time_s for span in spans for time_s in (span.begin_s, span.end_s, np.nan)]
-        traces.append(
-            {
-                "type": "scatter",
-                "mode": "lines",
-                "name": escape(name),
-                "showlegend": False,
-                "x": typed(times),
-                "y": typed([row] * len(times)),
-                # Short signs would be left out of a long time.
-                "line": {"width": 12, "color": _colour(name, row), "simplify": False},
-                "text": escape(name),
-                "hovertemplate": "%{text}, %{x:.2f} s<extra></extra>",
-            }
-        )
+        # Short signs would be left out of a long time.
+        line = {"width": 12, "color": _colour(name, row), "simplify": False}
+        hover = {"text": _escape(name), "hovertemplate": "%{text}, %{x:.2f} s<extra></extra>"}
+        traces.append(_scatter("lines", _escape(name), times, [row] * len(times), line=line, showlegend=False, **hover))
     labels = {
         "tickvals": [*range(len(names))],
-        "ticktext": [escape(name) for name in names],
+        "ticktext": [_escape(name) for name in names],
         "range": [-0.6, len(names) - 0.4],
         "title": None,
         "zeroline": False,
@@ -143,18 +153,17 @@ def _confidence(facts: DriveFacts) -> _Panel:
     table = facts.confidence.table()
     if not len(table):
         return _Panel("", [])
-    seen = [escape(name) for name in facts.seen]
-    trace = {
-        "type": "scatter",
-        "mode": "lines",
-        "name": "confidence",
-        "showlegend": False,
-        "x": typed(table[:, 0]),
-        "y": typed(table[:, 1]),
-        "text": [seen[int(index)] for index in table[:, 2]],
-        "hovertemplate": "%{text} with %{y:.2f}, %{x:.2f} s<extra></extra>",
-        "line": {"width": 1.2, "color": _MORE_COLOURS[2]},
-    }
+    seen = [_escape(name) for name in facts.seen]
+    trace = _scatter(
+        "lines",
+        "confidence",
+        table[:, 0],
+        table[:, 1],
+        showlegend=False,
+        text=[seen[int(index)] for index in table[:, 2]],
+        hovertemplate="%{text} with %{y:.2f}, %{x:.2f} s<extra></extra>",
+        line={"width": 1.2, "color": _MORE_COLOURS[2]},
+    )
     return _Panel("confidence", [trace], 0.6, {"range": [-0.03, 1.03]})
 
 
@@ -164,11 +173,13 @@ def _velocities(facts: DriveFacts) -> list[_Panel]:
     for column, title in ((1, "m/s"), (2, "rad/s")):
         traces = []
         if len(commanded):
-            traces.append(_line(commanded, column, "commanded", _COMMANDED) | {"line": _hv(_COMMANDED)})
+            # It holds until the next one.
+            traces.append(_line(commanded, column, "commanded", {"color": _COMMANDED, "shape": "hv"}))
         if len(driven):
-            traces.append(_line(driven, column, "driven, by odometry", DRIVEN))
+            traces.append(_line(driven, column, "driven, by odometry", {"color": _DRIVEN}))
         if column == 1 and facts.stands:
-            traces.append(_stand_marks(facts))
+            times = [stand.time_s for stand in facts.stands]
+            traces.append(_stops([*enumerate(facts.stands, 1)], times, [0] * len(times), size=7))
         for trace in traces:
             trace["showlegend"] = column == 1
             trace["legendgroup"] = trace["name"]
@@ -176,34 +187,9 @@ def _velocities(facts: DriveFacts) -> list[_Panel]:
     return panels
 
 
-def _line(table: NDArray[np.float64], column: int, name: str, colour: str) -> dict[str, Any]:
-    return {
-        "type": "scatter",
-        "mode": "lines",
-        "name": name,
-        "x": typed(table[:, 0]),
-        "y": typed(table[:, column]),
-        "line": {"width": 1.5, "color": colour},
-        "hovertemplate": "%{y:.3f}, %{x:.2f} s<extra>" + name + "</extra>",
-    }
-
-
-def _hv(colour: str) -> dict[str, Any]:
-    """Return a line that keeps its value until the next point, as a command does."""
-    return {"width": 1.5, "color": colour, "shape": "hv"}
-
-
-def _stand_marks(facts: DriveFacts) -> dict[str, Any]:
-    return {
-        "type": "scatter",
-        "mode": "markers",
-        "name": "stopped",
-        "x": typed([stand.time_s for stand in facts.stands]),
-        "y": typed([0] * len(facts.stands)),
-        "hovertext": [escape(f"{number}. {stand.reason}") for number, stand in enumerate(facts.stands, 1)],
-        "hoverinfo": "text",
-        "marker": {"color": STAND, "size": 7, "symbol": "square"},
-    }
+def _line(table: NDArray[np.float64], column: int, name: str, line: dict[str, Any]) -> dict[str, Any]:
+    hover = "%{y:.3f}, %{x:.2f} s<extra>" + name + "</extra>"
+    return _scatter("lines", name, table[:, 0], table[:, column], line={"width": 1.5, **line}, hovertemplate=hover)
 
 
 def _rank(sign: str) -> tuple[int, str]:
@@ -213,15 +199,104 @@ def _rank(sign: str) -> tuple[int, str]:
 
 def _colour(sign: str, row: int) -> str:
     if sign == NONE:
-        return GREY
+        return _GREY
     return _COLOURS[SIGNS.index(sign)] if sign in SIGNS else _MORE_COLOURS[row % len(_MORE_COLOURS)]
 
 
-def escape(text: str) -> str:
+def _paths(facts: DriveFacts) -> list[dict[str, Any]]:
+    """Return the path in the world, and the one by odometry, which drifts; only the latter is known of a real robot."""
+    odometry = _with_gaps(facts.driven.table()[:, [0, 3, 4]], facts.leaps_s)
+    truth = _with_gaps(facts.truth.table(), facts.leaps_s)
+    if not len(truth):
+        return [_path(odometry, "driven path", _DRIVEN, "solid")] if len(odometry) else []
+    paths = [_path(truth, "driven path", _DRIVEN, "solid")]
+    return [_path(odometry, "by odometry", _GREY, "dot"), *paths] if len(odometry) else paths
+
+
+def _stops_on_map(facts: DriveFacts) -> list[dict[str, Any]]:
+    stands = [(number, stand) for number, stand in enumerate(facts.stands, 1) if stand.place is not None]
+    x, y = _columns([stand.place for _, stand in stands])
+    mode = "markers+text" if len(stands) <= _MOST_LABELS else "markers"
+    labels = [str(number) for number, _ in stands]
+    return [_stops(stands, x, y, size=8, mode=mode, text=labels, textposition="top right")] if stands else []
+
+
+def _bumps(facts: DriveFacts) -> list[dict[str, Any]]:
+    x, y = _columns(facts.bumps)
+    return [_scatter("markers", "bumps", x, y, marker={"color": _BUMP, "size": 10, "symbol": "x"})] if x else []
+
+
+def _columns(places: Iterable[tuple[float, float] | None]) -> tuple[list[float], list[float]]:
+    known = [place for place in places if place is not None]
+    return [x for x, _ in known], [y for _, y in known]
+
+
+def _path(table: NDArray[np.float64], name: str, colour: str, dash: str) -> dict[str, Any]:
+    hover = "%{x:.2f}, %{y:.2f} m at %{customdata:.1f} s<extra>" + name + "</extra>"
+    line = {"width": 2, "color": colour, "dash": dash}
+    times = _typed(table[:, 0])
+    return _scatter("lines", name, table[:, 1], table[:, 2], customdata=times, hovertemplate=hover, line=line)
+
+
+def _with_gaps(table: NDArray[np.float64], leaps_s: Iterable[float]) -> NDArray[np.float64]:
+    """Return a path with a gap at each of ``leaps_s``."""
+    if not len(table):
+        return table
+    at = np.searchsorted(table[:, 0], sorted(leaps_s))
+    return np.insert(table, at, np.nan, axis=0)
+
+
+def _bounds(facts: DriveFacts, axis: int) -> dict[str, Any]:
+    """Return the range of an axis of the map that shows everything: plotly does not look at shapes for it."""
+    values = [table[:, column + axis] for table, column in ((facts.driven.table(), 3), (facts.truth.table(), 1))]
+    values += [np.array(_corners(thing))[:, axis] for thing in facts.things]
+    joined = np.concatenate(values)
+    if not len(joined):
+        return {}
+    margin = 0.04 * float(np.ptp(joined)) + 0.2
+    return {"range": [float(joined.min()) - margin, float(joined.max()) + margin]}
+
+
+def _shape(thing: Thing) -> dict[str, Any]:
+    red, green, blue = thing.rgb
+    colour = f"rgb({red},{green},{blue})"
+    look = {"line": {"color": colour, "width": 3 if thing.kind == "gate" else 1}, "fillcolor": colour, "layer": "below"}
+    if thing.kind == "disc":
+        radius = thing.length / 2
+        box = {"x0": thing.x - radius, "x1": thing.x + radius, "y0": thing.y - radius, "y1": thing.y + radius}
+        return {"type": "circle", "opacity": 0.55, **box, **look}
+    path = "M" + "L".join(f"{x:.4f},{y:.4f}" for x, y in _corners(thing)) + "Z"
+    return {"type": "path", "opacity": 0.9 if thing.kind == "gate" else 0.55, "path": path, **look}
+
+
+def _corners(thing: Thing) -> list[tuple[float, float]]:
+    """Return the corners of the rectangle around a thing, in metres."""
+    half_x, half_y = thing.length / 2, thing.width / 2
+    cos, sin = math.cos(thing.yaw), math.sin(thing.yaw)
+    return [
+        (thing.x + cos * x - sin * y, thing.y + sin * x + cos * y)
+        for x, y in ((-half_x, -half_y), (half_x, -half_y), (half_x, half_y), (-half_x, half_y))
+    ]
+
+
+def _stops(
+    stands: list[tuple[int, Stand]], x: ArrayLike, y: ArrayLike, *, size: int, mode: str = "markers", **more: Any
+) -> dict[str, Any]:
+    """Return marks of numbered stops at ``x`` and ``y``, with their reasons."""
+    reasons = [_escape(f"{number}. {stand.reason}") for number, stand in stands]
+    marker = {"color": _STAND, "size": size, "symbol": "square"}
+    return _scatter(mode, "stopped", x, y, hovertext=reasons, hoverinfo="text", marker=marker, **more)
+
+
+def _scatter(mode: str, name: str, x: ArrayLike, y: ArrayLike, **more: Any) -> dict[str, Any]:
+    return {"type": "scatter", "mode": mode, "name": name, "x": _typed(x), "y": _typed(y), **more}
+
+
+def _escape(text: str) -> str:
     """Return a text of a recording for plotly."""
     return html.escape(text, quote=False)
 
 
-def typed(values: ArrayLike) -> dict[str, str]:
+def _typed(values: ArrayLike) -> dict[str, str]:
     """Return numbers as plotly's typed array, smaller than text."""
     return {"dtype": "f4", "bdata": base64.b64encode(np.asarray(values, "<f4").tobytes()).decode()}

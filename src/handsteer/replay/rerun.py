@@ -18,8 +18,7 @@ from handsteer.messages import CAMERA_CHANGED, CMD_VEL, GESTURE_JOY, HAND_SIGN, 
 from handsteer.nodes.base import Node
 from handsteer.nodes.journal import JOURNALS
 from handsteer.recordings.recorded import Recorded, Recording
-from handsteer.replay.journals import Got, Spin, read_spins
-from handsteer.replay.stage import ReplayClock, ReplayTransport
+from handsteer.replay.journals import Got, ReplayClock, ReplayTransport, Spin, read_spins
 from handsteer.transports.base import Received
 from handsteer.transports.ros2.encoding import encode
 

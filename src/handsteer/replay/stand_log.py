@@ -153,9 +153,7 @@ class StandLog:
     def _begin(self, time_s: float, sign: str, place: tuple[float, float] | None) -> Stand:
         self._settle()
         self._is_driving = False
-        stand = Stand(time_s - self._began_s, sign=sign)
-        if place is not None:
-            stand.x, stand.y = place
+        stand = Stand(time_s - self._began_s, sign=sign, place=place)
         self._facts.stand_count += 1
         if len(self._facts.stands) < _MOST_STANDS:
             self._facts.stands.append(stand)

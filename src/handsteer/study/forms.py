@@ -100,12 +100,20 @@ FORMS: Final[Mapping[FormName, Form]] = {
 }
 
 
-def check_answers(form: FormName, answers: Mapping[str, int]) -> None:
-    """Check that ``answers`` has a possible answer to each item of ``form``, and nothing else.
+def score(form: FormName, answers: Mapping[str, int]) -> float:
+    """Return the score of ``form``, 0 to 100: the raw TLX, where more is more load, or the SUS, where more is better.
 
     Raises:
         StudyError: An item is missing, unknown, or its answer is not one of the form's.
     """
+    _check(form, answers)
+    values = [answers[item.name] for item in FORMS[form].items]
+    if form == "tlx":
+        return sum(values) / len(values)
+    return 2.5 * sum(5 - value if index % 2 else value - 1 for index, value in enumerate(values))
+
+
+def _check(form: FormName, answers: Mapping[str, int]) -> None:
     names = [item.name for item in FORMS[form].items]
     possible = FORMS[form].answers
     for number, name in enumerate(names, 1):
@@ -115,16 +123,3 @@ def check_answers(form: FormName, answers: Mapping[str, int]) -> None:
             raise StudyError(f"question {number}: {answers[name]!r} is no answer: {possible[0]} to {possible[-1]} are")
     if unknown := answers.keys() - set(names):
         raise StudyError(f"{form} has no item {min(unknown)}")
-
-
-def score(form: FormName, answers: Mapping[str, int]) -> float:
-    """Return the score of ``form``, 0 to 100: the raw TLX, where more is more load, or the SUS, where more is better.
-
-    Raises:
-        StudyError: See :func:`check_answers`.
-    """
-    check_answers(form, answers)
-    values = [answers[item.name] for item in FORMS[form].items]
-    if form == "tlx":
-        return sum(values) / len(values)
-    return 2.5 * sum(5 - value if index % 2 else value - 1 for index, value in enumerate(values))

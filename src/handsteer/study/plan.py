@@ -16,10 +16,11 @@
 import hashlib
 import re
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Any, Final, Literal, TypeVar
 
-from pydantic import AfterValidator, Field, ValidationError, field_validator
+from pydantic import AfterValidator, BeforeValidator, Field, ValidationError
 
 from handsteer import config, plain_yaml
 from handsteer.config import Config, Section
@@ -38,6 +39,8 @@ Input = Literal["hand", "pad", "keys", "sliders", "gamepad", "tilt"]
 """What a participant drives with: the hand, or one of the page's inputs for manual steering."""
 
 FormName = Literal["tlx", "sus"]
+
+Name = TypeVar("Name", bound=str)
 
 _MOST_PARTICIPANTS = 1000
 _LONGEST_PATH = 200
@@ -69,13 +72,29 @@ def _is_printable(name: str) -> str:
     return name
 
 
-def _are_some(names: tuple[str, ...], most: int = 12) -> tuple[str, ...]:
+def _are_some(names: tuple[Name, ...], least: int = 1, most: int = 12) -> tuple[Name, ...]:
     twice = next((name for index, name in enumerate(names) if name in names[:index]), None)
     if twice is not None:
         raise ValueError(f"should have each value once; {twice!r} is there twice")
-    if not 1 <= len(names) <= most:
-        raise ValueError(f"should have 1 to {most} values, not {len(names)}")
+    if not least <= len(names) <= most:
+        raise ValueError(f"should have {least} to {most} values, not {len(names)}")
     return names
+
+
+def _have_names(conditions: "tuple[Condition, ...]") -> "tuple[Condition, ...]":
+    _are_some(tuple(each.name for each in conditions))
+    return conditions
+
+
+def _people(given: object) -> object:
+    """Return the ids of a number of participants; a list of ids as it is."""
+    if isinstance(given, bool) or not isinstance(given, int | list | tuple):
+        raise ValueError("should be a number of people, or a list of ids such as [P01, P02]")
+    if isinstance(given, int):
+        if not 1 <= given <= _MOST_PARTICIPANTS:
+            raise ValueError(f"{given} should be 1 to {_MOST_PARTICIPANTS} people")
+        return tuple(f"P{number:02d}" for number in range(1, given + 1))
+    return given
 
 
 Text = Annotated[str, Field(max_length=4000)]
@@ -101,47 +120,20 @@ class Plan(Section):
         description="Shown first; the participant agrees to it",
     )
     thanks: Text = Field("That was all. Thank you!", description="Shown at the end")
-    participants: tuple[Id, ...] = Field(description="Their number, or a list of ids, never of names")
-    conditions: tuple[Condition, ...] = Field(description="What is compared")
+    participants: Annotated[
+        tuple[Id, ...], BeforeValidator(_people), AfterValidator(partial(_are_some, most=_MOST_PARTICIPANTS))
+    ] = Field(description="Their number, or a list of ids, never of names")
+    conditions: Annotated[tuple[Condition, ...], AfterValidator(_have_names)] = Field(description="What is compared")
     courses: Annotated[tuple[Course, ...], AfterValidator(_are_some)] = Field(
         description="Shipped worlds with gates, or YAML files next to the plan"
     )
     practice_laps: int = Field(1, ge=0, le=50, description="On each course and under each condition, before the laps")
     laps: int = Field(3, ge=1, le=50, description="Measured laps on each course and under each condition")
     lap_limit: float = Field(120.0, ge=5, le=3600, description="A lap, and the wait for its start, ends after this [s]")
-    forms: tuple[FormName, ...] = Field(
+    forms: Annotated[tuple[FormName, ...], AfterValidator(partial(_are_some, least=0))] = Field(
         ("tlx", "sus"), description="Filled in after each condition: NASA-TLX, System Usability Scale"
     )
     config: dict[str, Any] = Field({}, description="Parameters of all conditions, by section")
-
-    @field_validator("participants", mode="before")
-    @classmethod
-    def _from_number(cls, given: object) -> object:
-        if isinstance(given, bool) or not isinstance(given, int | list | tuple):
-            raise ValueError("should be a number of people, or a list of ids such as [P01, P02]")
-        if isinstance(given, int):
-            if not 1 <= given <= _MOST_PARTICIPANTS:
-                raise ValueError(f"{given} should be 1 to {_MOST_PARTICIPANTS} people")
-            return tuple(f"P{number:02d}" for number in range(1, given + 1))
-        return given
-
-    @field_validator("participants")
-    @classmethod
-    def _are_different_people(cls, participants: tuple[str, ...]) -> tuple[str, ...]:
-        return _are_some(participants, _MOST_PARTICIPANTS)
-
-    @field_validator("conditions")
-    @classmethod
-    def _have_different_names(cls, conditions: tuple[Condition, ...]) -> tuple[Condition, ...]:
-        _are_some(tuple(each.name for each in conditions))
-        return conditions
-
-    @field_validator("forms")
-    @classmethod
-    def _are_different_forms(cls, forms: tuple[FormName, ...]) -> tuple[FormName, ...]:
-        if forms:
-            _are_some(forms)
-        return forms
 
     def condition(self, name: str) -> Condition:
         """Return the condition of this name."""

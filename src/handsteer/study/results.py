@@ -9,7 +9,7 @@ import errno
 import io
 import logging
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, Final
 
@@ -99,7 +99,7 @@ class Results:
             StudyError: Some are of another plan.
         """
         steps = set()
-        for table, step_of in ((self._laps, _lap_of), (self._forms, _form_of)):
+        for table in (self._laps, self._forms):
             for line, row in table.rows:
                 if row["participant"] != participant:
                     continue
@@ -109,7 +109,7 @@ class Results:
                         "use those, or other --results"
                     )
                 if row.get("outcome") != REPEATED:
-                    steps.add(_read(step_of, row, table.path, line))
+                    steps.add(_step_of(row, f"{table.path}, line {line}"))
         return steps
 
     def add_lap(self, row: Row) -> None:
@@ -148,8 +148,7 @@ class _Table:
         self.path = path
         self._columns = columns
         try:
-            data = self._repaired(self._content())
-            self.rows = list(self._parsed(data))
+            self.rows = self._parsed(self._repaired(self._content()))
         except OSError as error:
             raise StudyError(f"cannot use {path}: {error.strerror}") from None
 
@@ -184,7 +183,7 @@ class _Table:
             os.fsync(file.fileno())
         return whole
 
-    def _parsed(self, data: bytes) -> "list[tuple[int, dict[str, str]]]":
+    def _parsed(self, data: bytes) -> list[tuple[int, dict[str, str]]]:
         try:
             reader = csv.reader(io.StringIO(data.decode("utf-8-sig"), newline=""), strict=True)
             lines = [(reader.line_num, values) for values in reader]
@@ -221,27 +220,20 @@ class _Table:
                 os.close(folder)
 
 
-def _line(values: "list[Any] | tuple[str, ...]") -> bytes:
+def _line(values: Iterable[Any]) -> bytes:
     text = io.StringIO(newline="")
     csv.writer(text).writerow(values)
     return text.getvalue().encode()
 
 
-def _lap_of(row: Mapping[str, str]) -> Step:
-    practice = {"0": False, "1": True}[row["practice"]]
-    return Step("lap", int(row["order"]), row["condition"], row["course"], practice, int(row["lap"]))
-
-
-def _form_of(row: Mapping[str, str]) -> Step:
-    if row["form"] == "consent":
-        return Step("consent")
-    form = next(name for name in FORMS if name == row["form"])
-    return Step("form", int(row["order"]), row["condition"], form=form)
-
-
-def _read(step_of: Any, row: Mapping[str, str], path: Path, line: int) -> Step:
+def _step_of(row: Mapping[str, str], where: str) -> Step:
     try:
-        step: Step = step_of(row)
+        if "form" not in row:
+            practice = {"0": False, "1": True}[row["practice"]]
+            return Step("lap", int(row["order"]), row["condition"], row["course"], practice, int(row["lap"]))
+        if row["form"] == "consent":
+            return Step("consent")
+        form = next(name for name in FORMS if name == row["form"])
+        return Step("form", int(row["order"]), row["condition"], form=form)
     except (KeyError, ValueError, StopIteration):
-        raise StudyError(f"{path}, line {line}: is no row that handsteer has written") from None
-    return step
+        raise StudyError(f"{where}: is no row that handsteer has written") from None

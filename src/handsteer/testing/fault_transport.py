@@ -75,6 +75,7 @@ class FaultTransport:
 
     Attributes:
         wire: Delivers delayed messages.
+        clock: The graph's clock.
     """
 
     def __init__(
@@ -89,7 +90,7 @@ class FaultTransport:
         self.crosses_network = inner.crosses_network
         self.is_one_machine = inner.is_one_machine
         self._inner = inner
-        self._clock = clock
+        self.clock = clock
         self._guards = guards
         self._carries_capture_times = carries_capture_times
         self._random = random.Random(seed)
@@ -154,18 +155,14 @@ class FaultTransport:
             if fault.frozen or self._random.random() < fault.reorder:
                 self.wire.hold(link, math.inf, deliver)
             else:
-                due_s = self._clock.now() + fault.delay_s + self._random.uniform(0.0, fault.jitter_s)
+                due_s = self.clock.now() + fault.delay_s + self._random.uniform(0.0, fault.jitter_s)
                 due_s = self._due_s[link] = max(due_s, self._due_s.get(link, due_s))
                 self.wire.hold(link, due_s, deliver)
                 self.wire.follow(link, due_s)
 
     def captured(self, message: object, captured_s: float | None) -> float | None:
         """Return the capture time received with a ``message`` that was sent with ``captured_s``."""
-        return captured_s if self._carries_capture_times else capture_time(message, self._clock)
-
-    def now(self) -> float:
-        """Return the time of the graph's clock, in seconds."""
-        return self._clock.now()
+        return captured_s if self._carries_capture_times else capture_time(message, self.clock)
 
 
 class FaultPublisher(Generic[M]):
@@ -193,11 +190,11 @@ class FaultPublisher(Generic[M]):
     def publish(self, message: M, captured_s: float | None = None) -> None:
         """Send ``message`` as the current fault has it."""
         check_type(self._topic, message)
-        deliver = partial(self._arrive, message, captured_s, self._transport.now())
+        deliver = partial(self._arrive, message, captured_s, self._transport.clock.now())
         self._transport.send(self._node, self._topic, deliver)
 
     def _arrive(self, message: M, captured_s: float | None, sent_s: float) -> None:
-        late = self._lateness is not None and self._lateness.is_late(b"", sent_s, self._transport.now())
+        late = self._lateness is not None and self._lateness.is_late(b"", sent_s, self._transport.clock.now())
         if not late:
             self._inner.publish(message, self._transport.captured(message, captured_s))
 

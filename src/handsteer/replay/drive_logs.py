@@ -1,13 +1,22 @@
-"""Follows the robot of a recording: its path, bumps and laps."""
+"""Follows the signs, the robot and the things around it through a recording; times are in seconds since it began."""
 
 import math
+from itertools import islice
 from typing import Any
 
 from handsteer.errors import RecordingError
-from handsteer.messages import yaw_of
+from handsteer.messages import MarkerArray, yaw_of
 from handsteer.nodes.status import RobotStatus
-from handsteer.replay.drive_facts import DriveFacts, Lap
+from handsteer.nodes.world_markers import GATES
+from handsteer.replay.drive_facts import DriveFacts, Lap, SignSpan, SignTotal, Thing
 from handsteer.types import CourseState, Velocity
+
+_MOST_SPANS = 20_000
+_MOST_NAMES = 100
+_LONGEST_NAME = 60
+_OTHERS = "other signs"
+# As the control, for which there is no sign when none has come for 0.35 s.
+_SIGN_HOLDS_S = 0.35
 
 _LARGEST = 1e6
 _MOST_LAPS, _MOST_BUMPS, _MOST_LEAPS = 1000, 1000, 1000
@@ -16,9 +25,64 @@ _LEAP_M = 0.5
 _STANDS_MPS, _STANDS_RADPS = 0.01, 0.02
 _LONGEST_STEP_S = 0.5
 
+_MOST_THINGS = 2000
+_BOX, _SPHERE, _CYLINDER = 1, 2, 3
+_ADD, _DELETE, _DELETE_ALL = 0, 2, 3
+_FARTHEST_M = 1e5
+
+
+class SignLog:
+    """Follows when each sign was the confirmed one, and what single frames showed.
+
+    Args:
+        facts: Gets spans, totals and confidences.
+
+    Attributes:
+        sign: The newest confirmed sign; empty before the first.
+    """
+
+    def __init__(self, facts: DriveFacts) -> None:
+        self.sign = ""
+        self._facts = facts
+        self._span: SignSpan | None = None
+        self._index: dict[str, int] = {}
+
+    def note(self, sign: str, time_s: float) -> None:
+        """Note the confirmed sign of a frame."""
+        self.sign = sign[:_LONGEST_NAME]
+        name = _known(self.sign, self._facts.signs)
+        total = self._facts.signs.setdefault(name, SignTotal())
+        total.frames += 1
+        if self._span is not None:
+            self._span.end_s = min(time_s, self._span.end_s + _SIGN_HOLDS_S)
+        if self._span is None or self._span.sign != name or self._span.end_s < time_s:
+            self.end()
+            total.times += 1
+            self._span = SignSpan(name, time_s, time_s)
+            if len(self._facts.spans) < _MOST_SPANS:
+                self._facts.spans.append(self._span)
+
+    def note_confidence(self, time_s: float, seen: str, confidence: float) -> None:
+        """Note what the newest frame alone shows."""
+        name = _known(seen[:_LONGEST_NAME], self._index)
+        index = self._index.setdefault(name, len(self._index))
+        if index == len(self._facts.seen):
+            self._facts.seen.append(name)
+        self._facts.confidence.add(time_s, max(0.0, min(confidence, 1.0)), index)
+
+    def end(self) -> None:
+        """Close the last span."""
+        if self._span is not None:
+            self._facts.signs[self._span.sign].seconds += self._span.end_s - self._span.begin_s
+
+
+def _known(name: str, names: dict[str, SignTotal] | dict[str, int]) -> str:
+    """Return ``name``, or a common one if there are too many."""
+    return name if name in names or len(names) < _MOST_NAMES else _OTHERS
+
 
 class RobotLog:
-    """Follows the robot of a recording; times are in seconds since it began.
+    """Follows the robot: its path, bumps and laps.
 
     Args:
         facts: Gets the path, the distance, the time of driving, bumps and laps.
@@ -83,7 +147,7 @@ class RobotLog:
                     gained_m if gained_m >= 0 else status.path_length_m
                 )
             self._path_m = status.path_length_m
-        self._note_bumps(time_s, status.collisions)
+        self._note_bumps(status.collisions)
         if status.course is not None:
             self._note_course(time_s, status.course)
 
@@ -96,14 +160,13 @@ class RobotLog:
         elif facts.commands:
             facts.driving_s = self._commanded_s
 
-    def _note_bumps(self, time_s: float, collisions: int | None) -> None:
+    def _note_bumps(self, collisions: int | None) -> None:
         if collisions is None:
             return
         self._facts.knows_bumps = True
         before, self._collisions = self._collisions, collisions
         new = 0 if before is None else collisions - before if collisions >= before else collisions
-        for _ in range(min(new, _MOST_BUMPS - len(self._facts.bumps))):
-            self._facts.bumps.append((time_s, *(self.place or (None, None))))
+        self._facts.bumps += [self.place] * min(new, _MOST_BUMPS - len(self._facts.bumps))
 
     def _note_course(self, time_s: float, course: CourseState) -> None:
         before, self._course = self._course, course
@@ -119,3 +182,39 @@ class RobotLog:
 
 def _step_s(before_s: float, now_s: float) -> float:
     return max(0.0, min(now_s - before_s, _LONGEST_STEP_S))
+
+
+class MapThings:
+    """The things that the markers so far have left on the map; those of other shapes than boxes and discs are not."""
+
+    def __init__(self) -> None:
+        self._things: dict[tuple[str, int], Thing] = {}
+
+    def note(self, message: MarkerArray) -> None:
+        """Add, change or remove things."""
+        for marker in islice(message.markers, _MOST_THINGS):
+            key = (marker.ns, marker.id)
+            thing = _thing(marker) if marker.action == _ADD else None
+            if marker.action == _DELETE_ALL:
+                self._things.clear()
+            elif thing is not None and (key in self._things or len(self._things) < _MOST_THINGS):
+                self._things[key] = thing
+            elif marker.action == _DELETE:
+                self._things.pop(key, None)
+
+    def all(self) -> list[Thing]:
+        """Return all things, obstacles before gates."""
+        return sorted(self._things.values(), key=lambda thing: thing.kind == "gate")
+
+
+def _thing(marker: Any) -> Thing | None:
+    position, scale, colour = marker.pose.position, marker.scale, marker.color
+    yaw = yaw_of(marker.pose.orientation)
+    numbers = (position.x, position.y, yaw, scale.x, scale.y, colour.r, colour.g, colour.b)
+    if not all(math.isfinite(number) and abs(number) < _FARTHEST_M for number in numbers):
+        return None
+    if marker.type not in (_BOX, _SPHERE, _CYLINDER):
+        return None
+    kind = "gate" if marker.ns == GATES else "box" if marker.type == _BOX else "disc"
+    red, green, blue = (round(255 * max(0.0, min(part, 1.0))) for part in (colour.r, colour.g, colour.b))
+    return Thing(kind, position.x, position.y, yaw, scale.x, scale.y, (red, green, blue))

@@ -1,6 +1,6 @@
 import numpy as np
 
-from handsteer.replay.curves import Curve
+from handsteer.replay.drive_facts import Curve
 
 
 def curve(count: int) -> Curve:
