@@ -4,12 +4,13 @@ import pytest
 
 from handsteer.config import Config, SignsConfig
 from handsteer.errors import RecordingError
-from handsteer.messages import HAND_SIGN
+from handsteer.messages import CMD_VEL, HAND_SIGN, Header, Time, Topic, TwistStamped
 from handsteer.recordings import open_recording
 from handsteer.recordings.mcap_writer import McapWriter
 from handsteer.replay.by_time import rerun_by_time
 from handsteer.replay.compare import Comparison, Moment, compare
 from handsteer.replay.rerun import Source
+from handsteer.transports.ros2.encoding import encode
 from tests.recordings.test_bags import as_ros1
 
 
@@ -57,3 +58,19 @@ def test_without_pictures_only_signs_can_be_replayed(tmp_path: Path) -> None:
         list(rerun_by_time(open_recording(tmp_path / "empty.mcap"), Config()))
     with pytest.raises(RecordingError, match="contains nothing"):
         list(rerun_by_time(open_recording(tmp_path / "empty.mcap"), Config(), "signs"))
+
+
+@pytest.mark.slow
+def test_commands_with_a_time_stamp_are_compared_without_it(recording: Path, tmp_path: Path) -> None:
+    path, stamped = tmp_path / "stamped.mcap", Topic(CMD_VEL.name, TwistStamped)
+    writer = McapWriter(path)
+    for recorded in open_recording(recording).messages({HAND_SIGN.name, CMD_VEL.name}):
+        if recorded.topic == CMD_VEL.name:
+            message = TwistStamped(Header(Time(0, recorded.number), "base_link"), recorded.message)
+            writer.write(stamped, stamped.name, encode(message), recorded.time_ns, recorded.number)
+        else:
+            writer.write(HAND_SIGN, HAND_SIGN.name, recorded.raw, recorded.time_ns, recorded.number)
+    writer.close()
+    comparison, moments = replayed(path, Config(), "signs")
+    assert moments == []
+    assert comparison.commands > 200

@@ -24,6 +24,7 @@ from handsteer.messages import (
     STEERING_CMD_VEL,
     STOP,
     Topic,
+    twist_in,
     type_name,
 )
 from handsteer.nodes.base import Node
@@ -80,16 +81,25 @@ def rerun_by_time(recording: Recording, config: Config, source: Source = "frames
             yield Result(RECOGNITION, recorded.time_s, {}, {}, {}, recorded)
             continue
         replayed = traces[recorded.topic].around(recorded.time_s)
-        nearest = [recorded.raw] if recorded.raw in replayed else replayed[-1:]
         is_sign = recorded.topic == HAND_SIGN.name
+        raw = recorded.raw if is_sign else _twist_of(recorded)
+        nearest = [raw] if raw in replayed else replayed[-1:]
         yield Result(
             RECOGNITION if is_sign else CONTROL,
             recorded.time_s,
-            {recorded.topic: [recorded.raw]},
+            {recorded.topic: [raw]},
             {recorded.topic: nearest},
             {},
             frame if is_sign else None,
         )
+
+
+def _twist_of(recorded: Recorded) -> bytes:
+    """Return a recorded command without the time stamp that some robots want, as the replayed one is."""
+    try:
+        return encode(twist_in(recorded.message))
+    except RecordingError:
+        return recorded.raw
 
 
 def _picture_topic(recording: Recording) -> str:
