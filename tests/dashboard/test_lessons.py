@@ -10,10 +10,10 @@ import pytest
 
 from handsteer.clock import RealClock
 from handsteer.config import Config, TeachConfig
-from handsteer.dashboard.hand_drawing import taught_drawings
 from handsteer.dashboard.lesson_node import LessonNode
 from handsteer.dashboard.lesson_state import SignClass
 from handsteer.dashboard.lessons import KEPT, KEPT_TAKES, Lessons, with_signs
+from handsteer.dashboard.sign_pictures import taught_drawings
 from handsteer.errors import ConfigError, DatasetError, ModelCorrupt
 from handsteer.images import image_message
 from handsteer.messages import IMAGE_RAW, Header

@@ -22,10 +22,10 @@ from handsteer.clock import Clock
 from handsteer.dashboard.camera_choices import CameraChoices
 from handsteer.dashboard.elements import box, sentence, switch, text
 from handsteer.dashboard.first_visit import CameraOffer, Coach
-from handsteer.dashboard.legend import DRAWN
 from handsteer.dashboard.page import PICTURE_PATH, Page
 from handsteer.dashboard.remote_graph import RemoteGraph
 from handsteer.dashboard.settings import Settings
+from handsteer.dashboard.sign_pictures import DRAWN
 from handsteer.dashboard.socket_events import is_page_of
 from handsteer.dashboard.state import PageState
 from handsteer.dashboard.viewers import OnDemandNode

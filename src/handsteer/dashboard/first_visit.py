@@ -12,9 +12,9 @@ from handsteer.audit import without_passwords
 from handsteer.cameras import VIRTUAL_HAND
 from handsteer.cameras.choice import BROWSER, OWN
 from handsteer.dashboard.elements import box, button, read_words, sentence, switch, tag, text
-from handsteer.dashboard.legend import DRAWN
 from handsteer.dashboard.page import Page
 from handsteer.dashboard.remote_graph import RemoteGraph
+from handsteer.dashboard.sign_pictures import DRAWN
 from handsteer.dashboard.state import PageState
 from handsteer.errors import HandsteerError
 from handsteer.types import FORWARD, STOP

@@ -12,58 +12,15 @@ from nicegui import ui
 from handsteer.config import ControlConfig, SignsConfig
 from handsteer.control.explain import effect_words, figures_of
 from handsteer.dashboard.elements import box, button, switch, tag, text
-from handsteer.dashboard.hand_drawing import taught_drawings
 from handsteer.dashboard.page import Page
 from handsteer.dashboard.settings import Settings
 from handsteer.dashboard.settings_fields import FIELDS
-from handsteer.dashboard.sign_pictures import SIGN_PATH
+from handsteer.dashboard.sign_pictures import DRAWN, MOVED_FIST, SIGN_PATH, TAUGHT, taught_drawings
 from handsteer.dashboard.state import PageState
 from handsteer.errors import ConfigError
-from handsteer.types import (
-    BACKWARD,
-    FORWARD,
-    GO,
-    SIGNS,
-    STOP,
-    TURN_LEFT,
-    TURN_RIGHT,
-    action_of,
-)
-
-# The user's right hand in a mirror, in a box of 64 x 64: the palm, then the fingers as thick lines. The thumb is on the
-# left, where a mirror shows the thumb of a right hand with its palm turned to it.
-_PALM = '<rect x="20" y="30" width="26" height="26" rx="10" class="palm"/>'
-_FINGER = '<path d="M{x} 34V{top}" class="finger"/>'
-_FIST = _PALM + "".join(_FINGER.format(x=x, top=29) for x in (23, 30, 37, 43))
-_TUCKED_THUMB = '<path d="M20 44L33 47" class="finger thumb"/>'
-_THUMB_LEFT = _FIST + '<path d="M24 40L6 36" class="finger"/>'
-_FINGERS = "".join(_FINGER.format(x=x, top=top) for x, top in ((23, 13), (30, 8), (37, 10), (43, 17)))
-_OPEN_PALM = f'{_PALM}{_FINGERS}<path d="M22 46L9 34" class="finger"/>'
-_INDEX_UP = _FIST + _FINGER.format(x=23, top=9) + _TUCKED_THUMB
-
-
-def _svg(shapes: str, transform: str = "", classes: str = "") -> str:
-    return (
-        f'<svg viewBox="0 0 64 64" aria-hidden="true" class="{classes}"><g transform="{transform}">{shapes}</g></svg>'
-    )
-
-
-DRAWN: Mapping[str, tuple[str, str]] = {
-    FORWARD: ("index finger up", _svg(_INDEX_UP)),
-    BACKWARD: ("index finger down", _svg(_INDEX_UP, "rotate(180 32 32)")),
-    STOP: ("open palm", _svg(_OPEN_PALM)),
-    TURN_LEFT: ("thumb to your left", _svg(_THUMB_LEFT)),
-    TURN_RIGHT: ("thumb to your right", _svg(_THUMB_LEFT, "matrix(-1 0 0 1 64 0)")),
-    GO: ("closed fist", _svg(_FIST + _TUCKED_THUMB)),
-}
-"""How to hold the hand for each shipped sign, in words and as SVG."""
+from handsteer.types import GO, SIGNS, STOP, action_of
 
 _MOVE = "Move it"
-_ARROWS = "".join(
-    f'<path d="M-6 -21L0 -29L6 -21" transform="translate(32 32) rotate({turn})"/>' for turn in (0, 90, 180, 270)
-)
-_MOVED = _svg(f'<g transform="translate(10.5 5) scale(0.65)">{_FIST}{_TUCKED_THUMB}</g><g class="arrows">{_ARROWS}</g>')
-_TAUGHT = _svg(_OPEN_PALM, classes="taught")  # where no drawing of its takes is known
 
 
 @dataclass(frozen=True)
@@ -100,7 +57,7 @@ def legend(
         action = action_of(sign, rule.actions if rule else {})
         # The semicolon precedes what does not change, which is left out for brevity.
         effect = effect_words(action, rule).partition(";")[0]
-        drawn = DRAWN.get(sign) or ("taught", taught.get(sign, _TAUGHT))
+        drawn = DRAWN.get(sign) or ("taught", taught.get(sign, TAUGHT))
         return LegendEntry(sign, *drawn, effect, figures_of(action, rule) if rule else "")
 
     order = [*(sign for sign in DRAWN if sign in signs), *(sign for sign in signs if sign not in DRAWN)]
@@ -113,7 +70,7 @@ def joystick_legend(rule: ControlConfig) -> tuple[LegendEntry, ...]:
     return (
         LegendEntry("Open the hand", *DRAWN[STOP], "ready; when held, stops at once", ""),
         LegendEntry("Close the fist", *DRAWN[GO], "holds the joystick: here is its middle", ""),
-        LegendEntry(_MOVE, "closed fist", _MOVED, "up is forward, down backward, sideways turns", limits),
+        LegendEntry(_MOVE, "closed fist", MOVED_FIST, "up is forward, down backward, sideways turns", limits),
     )
 
 

@@ -8,8 +8,6 @@ from typing import Final, TypeVar
 from nicegui import ui
 
 from handsteer.dashboard.elements import box, button, switch, tag, text
-from handsteer.dashboard.hand_drawing import taught_drawings
-from handsteer.dashboard.legend import DRAWN
 from handsteer.dashboard.lesson import Lesson
 from handsteer.dashboard.lesson_files import CAN_EXPORT, LESSON_PATH
 from handsteer.dashboard.lesson_node import LessonNode
@@ -18,6 +16,7 @@ from handsteer.dashboard.lessons import Lessons
 from handsteer.dashboard.page import Page
 from handsteer.dashboard.settings import Settings
 from handsteer.dashboard.settings_fields import FIELDS
+from handsteer.dashboard.sign_pictures import DRAWN, taught_drawings
 from handsteer.errors import HandsteerError
 from handsteer.recognition.custom_signs import load_custom_model
 from handsteer.types import Action, find_sign

@@ -7,9 +7,9 @@ from typing import Final
 from nicegui import ui
 
 from handsteer.dashboard.elements import box, button, switch, tag, text
-from handsteer.dashboard.hand_drawing import draw_hand
 from handsteer.dashboard.lesson_panels import ViewerLesson
 from handsteer.dashboard.lesson_state import LessonState, SignClass
+from handsteer.dashboard.sign_pictures import draw_hand
 from handsteer.training.custom.report import (
     CustomSignFigures,
     Mistake,
