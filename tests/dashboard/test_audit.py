@@ -6,11 +6,10 @@ from pathlib import Path
 from handsteer.audit import AuditEvent, read_event
 from handsteer.clock import SteppedClock
 from handsteer.config import Config
-from handsteer.dashboard.audit import PageAudit
 from handsteer.dashboard.node import DashboardNode
 from handsteer.dashboard.settings import Settings, SettingsFile
 from handsteer.dashboard.settings_fields import FIELDS
-from handsteer.dashboard.viewers import ANSWER_S, ControlLease
+from handsteer.dashboard.viewers import ANSWER_S, ControlLease, PageAudit
 from handsteer.graph import Graph
 from handsteer.messages import AUDIT, Log
 from handsteer.nodes.steering import SteeringNode

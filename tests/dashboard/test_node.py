@@ -7,9 +7,8 @@ import pytest
 from handsteer.clock import SteppedClock
 from handsteer.config import ControlConfig
 from handsteer.control.explain import Reason
-from handsteer.dashboard.audit import PageAudit
 from handsteer.dashboard.node import DashboardNode
-from handsteer.dashboard.viewers import OnDemandNode
+from handsteer.dashboard.viewers import OnDemandNode, PageAudit
 from handsteer.errors import TransportError
 from handsteer.messages import (
     CMD_VEL,

@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 from handsteer.config import ControlConfig
 from handsteer.control.explain import Reason
 from handsteer.control.twist_mux import Source
-from handsteer.dashboard.mux_row import mux_inputs
 from handsteer.dashboard.state import (
     STALE_S,
     Observed,
@@ -21,6 +20,7 @@ from handsteer.dashboard.state import (
     frame_rate,
 )
 from handsteer.dashboard.status_bar import spoken
+from handsteer.dashboard.steer_panel import mux_inputs
 from handsteer.dashboard.steering_input import read_deflection, read_number
 from handsteer.nodes.status import CameraStatus, ControlStatus, RecognitionStatus, RobotStatus, Status
 from handsteer.types import SIGNS, ZERO, Velocity

@@ -8,7 +8,6 @@ from typing import Any, cast
 
 from handsteer.audit import WARN
 from handsteer.clock import Clock, to_seconds
-from handsteer.dashboard.audit import PageAudit
 from handsteer.dashboard.state import (
     COMMAND_HOLDS_S,
     Observed,
@@ -18,7 +17,7 @@ from handsteer.dashboard.state import (
     Viewers,
     compose,
 )
-from handsteer.dashboard.viewers import ControlLease
+from handsteer.dashboard.viewers import ControlLease, PageAudit
 from handsteer.dashboard.world_state import (
     PERIOD_S,
     Sample,

@@ -8,9 +8,7 @@ from dataclasses import dataclass
 from nicegui import ui
 
 from handsteer.dashboard.access import SESSION
-from handsteer.dashboard.audit import PageAudit
-from handsteer.dashboard.elements import switch, tag, text
-from handsteer.dashboard.languages import ENGLISH, preferred_language
+from handsteer.dashboard.elements import STATIC, switch, tag, text
 from handsteer.dashboard.lessons import Lessons
 from handsteer.dashboard.node import DashboardNode
 from handsteer.dashboard.recordings import Recordings, duration_text
@@ -18,7 +16,7 @@ from handsteer.dashboard.remote_graph import RemoteGraph
 from handsteer.dashboard.settings import Settings
 from handsteer.dashboard.state import PageState
 from handsteer.dashboard.status_bar import Banner, LeasePanel, TimingLine
-from handsteer.dashboard.viewers import LeaseStatus, OnDemandNode
+from handsteer.dashboard.viewers import LeaseStatus, OnDemandNode, PageAudit
 from handsteer.study.session import Session
 
 PICTURE_PATH = "/camera.mjpg"
@@ -63,6 +61,13 @@ _ASSET = {"css": '<link rel="stylesheet" href="{}">', "js": '<script src="{}" de
 _TRANSLATED = '<script src="{0}/languages/{1}.js"></script><script src="{0}/translate.js"></script>'
 # What the browser draws while it still loads the scripts that draw everything else.
 _LOADING = f'<div class="loading" aria-hidden="true" translate="no">{ICON}<b>handsteer</b></div>'
+# The server writes English everywhere. For a browser that prefers another language of static/languages, the script
+# static/translate.js replaces the words where they are shown, by that catalogue.
+ENGLISH = "en"
+LANGUAGES = frozenset({ENGLISH, *(file.stem for file in (STATIC / "languages").glob("*.js"))})
+"""Two-letter codes (ISO 639-1)."""
+
+_LONGEST_HEADER = 500
 _LINKS = (("/", "Drive"), ("/world", "World"), ("/teach", "Teach"), ("/settings", "Settings"))
 _PERIOD_S = 0.1
 _ACK_PATIENCE_S = 5.0
@@ -219,3 +224,29 @@ class Page:
         if node.is_watched_by(self.client.id) and (joined := node.join(self.client.id)):
             joined.leave(self.client.id)
         node.leave(self.client.id)
+
+
+def preferred_language(accept: str) -> str:
+    """Return the language of the page that a browser wants most; English if it wants none of them.
+
+    Args:
+        accept: Its ``Accept-Language`` header (RFC 9110, section 12.5.4), for example ``de-CH, de;q=0.9, en;q=0.8``.
+    """
+    wanted: dict[str, float] = {}
+    for item in accept[:_LONGEST_HEADER].split(","):
+        name, _, weight = item.partition(";")
+        language = name.strip().partition("-")[0].lower()
+        if language in LANGUAGES:
+            wanted[language] = max(_weight(weight), wanted.get(language, 0.0))
+    best = max(wanted, key=wanted.__getitem__, default=ENGLISH)  # the first of equals
+    return best if wanted.get(best, 0.0) > 0.0 else ENGLISH
+
+
+def _weight(parameter: str) -> float:
+    name, _, value = parameter.strip().partition("=")
+    if name.strip().lower() != "q":
+        return 1.0
+    try:
+        return float(value)
+    except ValueError:
+        return 0.0

@@ -19,7 +19,7 @@ from handsteer.cameras.browser import check_frame
 from handsteer.cameras.choice import BROWSER, OWN, CameraChoice, Size
 from handsteer.clock import Clock
 from handsteer.config import Config
-from handsteer.dashboard.audit import PageAudit
+from handsteer.dashboard.viewers import PageAudit
 from handsteer.errors import ConfigError, FrameError, HandsteerError, TransportError
 from handsteer.graph import Graph
 from handsteer.making import make_steering

@@ -19,7 +19,6 @@ from handsteer.cameras.browser import LARGEST_BYTES
 from handsteer.clock import Clock
 from handsteer.config import DEFAULT_FILE, DashboardConfig
 from handsteer.dashboard.access import HEADERS, Access, AccessMiddleware
-from handsteer.dashboard.audit import PageAudit
 from handsteer.dashboard.camera import FrameSocket, PictureNode, PictureResponse
 from handsteer.dashboard.drive_page import DrivePage
 from handsteer.dashboard.elements import STATIC
@@ -45,7 +44,7 @@ from handsteer.dashboard.settings_page import SettingsPage
 from handsteer.dashboard.sign_pictures import serve_sign_pictures
 from handsteer.dashboard.socket_events import SocketEvents
 from handsteer.dashboard.study_page import StudyPage
-from handsteer.dashboard.viewers import OnDemandNode
+from handsteer.dashboard.viewers import OnDemandNode, PageAudit
 from handsteer.dashboard.world_page import WorldPage
 from handsteer.dashboard.world_state import VelocityHistory
 from handsteer.errors import DashboardError

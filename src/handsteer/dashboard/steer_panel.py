@@ -2,11 +2,11 @@
 
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 
 from nicegui import ui
 
 from handsteer.dashboard.elements import box, button, card, read_words, switch, text
-from handsteer.dashboard.mux_row import MuxRow
 from handsteer.dashboard.page import Page
 from handsteer.dashboard.state import PageState
 from handsteer.dashboard.steering_input import SteeringInput, read_deflection, read_number
@@ -26,6 +26,49 @@ _HINTS = {
 _LATE = "Your command came too late and was ignored: is the network slow? If not, reload the page."
 
 
+@dataclass(frozen=True)
+class MuxInput:
+    """One input of the twist mux.
+
+    Attributes:
+        name: Its display name.
+        is_active: Whether it drives the robot, or stops it.
+        viewer: The viewer whose input it is, while active; empty if unknown.
+    """
+
+    name: str
+    is_active: bool
+    viewer: str = ""
+
+
+def mux_inputs(state: PageState) -> tuple[MuxInput, ...]:
+    """Return the inputs in order of priority; at most one is active."""
+    directly = bool(state.viewers.topic and state.viewers.steers)
+    by_hand = not state.stopped and (directly or state.driver == "steering")
+    by_air = not state.stopped and not by_hand and state.driver in ("signs", "joystick")
+    return (
+        MuxInput("Stop", state.stopped, state.viewers.stopped),
+        MuxInput("By hand", by_hand, state.viewers.steered or "another node"),
+        MuxInput("Joystick" if state.is_joystick else "Signs", by_air),
+    )
+
+
+class _MuxRow:
+    """The inputs in a row, with the active one highlighted."""
+
+    def __init__(self) -> None:
+        with box("mux").props('role="group" aria-label="The active input; the first one overrides the others"'):
+            text("name", "Active input")
+            self._chips = [text("source chip", name) for name in ("Stop", "By hand", "Signs")]
+
+    def update(self, state: PageState) -> None:
+        """Show ``state``."""
+        for chip, each in zip(self._chips, mux_inputs(state), strict=True):
+            chip.set_text(f"{each.name}: {each.viewer}" if each.is_active and each.viewer else each.name)
+            chip.props('aria-current="true"' if each.is_active else "", remove="" if each.is_active else "aria-current")
+            switch(chip, "holds", on=each.is_active)
+
+
 class SteerPanel:
     """A pad that drives while it is held, and sliders that drive while the page is in front.
 
@@ -39,7 +82,7 @@ class SteerPanel:
         self._page = page
         self._input = SteeringInput()
         with card("Steer by hand", "panel steer") as self._card:
-            self._mux = MuxRow()
+            self._mux = _MuxRow()
             button("Hold to drive by tilt", label="Hold to drive by tilting this device").classes("tilt")
             with box("row"):
                 with box("pad-side"):
