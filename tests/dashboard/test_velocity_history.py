@@ -1,4 +1,4 @@
-from handsteer.dashboard.velocity_panel import rows_of
+from handsteer.dashboard.drive_page import rows_of
 from handsteer.dashboard.world_state import PERIOD_S, SPAN_S, Sample, VelocityHistory
 from handsteer.types import Velocity
 

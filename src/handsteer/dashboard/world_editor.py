@@ -10,8 +10,7 @@ from nicegui import ui
 
 from handsteer.dashboard.elements import box, button, switch, text
 from handsteer.dashboard.world_desk import WorldDesk
-from handsteer.dashboard.world_form import ThingForm
-from handsteer.dashboard.world_plan import Tool, WorldPlan, read_tool
+from handsteer.dashboard.world_plan import ThingForm, Tool, WorldPlan, read_tool
 from handsteer.errors import WorldError
 from handsteer.robots import Shape
 from handsteer.robots.editing import (
