@@ -11,7 +11,7 @@ from nicegui import ui
 from handsteer.audit import without_passwords
 from handsteer.cameras import VIRTUAL_HAND
 from handsteer.cameras.choice import BROWSER, OWN
-from handsteer.dashboard.elements import box, button, read_words, sentence, switch, tag, text
+from handsteer.dashboard.elements import box, button, read_words, sentence, set_property, switch, tag, text
 from handsteer.dashboard.page import Page
 from handsteer.dashboard.remote_graph import RemoteGraph
 from handsteer.dashboard.sign_pictures import DRAWN
@@ -155,5 +155,4 @@ class Coach:
     def _mark(self) -> None:
         for number, step in enumerate(self._steps):
             switch(step, "done", on=number < self._done)
-            is_next = number == max(0, self._done)
-            step.props('aria-current="step"' if is_next else "", remove="" if is_next else "aria-current")
+            set_property(step, "aria-current", "step" if number == max(0, self._done) else None)

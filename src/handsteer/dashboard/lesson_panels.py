@@ -7,7 +7,7 @@ from typing import Final, TypeVar
 
 from nicegui import ui
 
-from handsteer.dashboard.elements import box, button, switch, tag, text
+from handsteer.dashboard.elements import box, button, set_property, switch, tag, text
 from handsteer.dashboard.lesson import Lesson
 from handsteer.dashboard.lesson_files import CAN_EXPORT, LESSON_PATH
 from handsteer.dashboard.lesson_node import LessonNode
@@ -267,8 +267,8 @@ class LessonPanel:
         self._sign.set_text(sign)
         self._effect.set_text(effect)
         is_idle = state.recorded is None and not state.is_training
-        _enable(self._train, on=state.can_train)
-        _enable(self._keep, on=is_idle)
+        set_property(self._train, "disabled", not state.can_train)
+        set_property(self._keep, "disabled", not is_idle)
         to_keep = state.is_fresh and state.is_changed
         switch(self._train, "primary", on=not to_keep)
         switch(self._keep, "primary", on=to_keep)
@@ -305,10 +305,6 @@ def set_words(element: ui.element, words: str) -> None:
     label = element.default_slot.children[0]
     if isinstance(label, ui.label):
         label.set_text(words)
-
-
-def _enable(element: ui.element, *, on: bool) -> None:
-    element.props(remove="disabled") if on else element.props("disabled")
 
 
 def _download(words: str, address: str, label: str) -> ui.element:

@@ -18,8 +18,6 @@ from handsteer.hand.script import parse_script
 from handsteer.parameters import plain
 from handsteer.robots.world import load_world
 
-"""Default file for settings, in the working directory."""
-
 _COMMENT = re.compile(r"(^|\s)#", re.MULTILINE)
 
 # These select the defaults of other fields.

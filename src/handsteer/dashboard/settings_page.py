@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator
 
 from nicegui import ui
 
-from handsteer.dashboard.elements import box, button, identifier, switch, tag, text
+from handsteer.dashboard.elements import box, button, identifier, set_property, switch, tag, text
 from handsteer.dashboard.node import DashboardNode
 from handsteer.dashboard.page import Page, PageContext
 from handsteer.dashboard.settings import Settings
@@ -192,7 +192,6 @@ class _Group:
             self.body = box("rows")
         with link:
             self._count = tag("span", "count", "")
-        self._unfold(on=self._is_open)
 
     def update(self, settings: Settings, *, searched: bool) -> None:
         """Show how many values differ from the default; while ``searched``, unfold it if it has a row to show."""
@@ -202,10 +201,4 @@ class _Group:
         is_found = any(row.is_found for row in self.rows)
         switch(self._card, "hidden", on=not is_found)
         switch(self._link, "hidden", on=not is_found)
-        self._unfold(on=is_found if searched else self._is_open)
-
-    def _unfold(self, *, on: bool) -> None:
-        if on:
-            self._card.props("open")
-        else:
-            self._card.props(remove="open")
+        set_property(self._card, "open", is_found if searched else self._is_open)

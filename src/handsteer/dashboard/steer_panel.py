@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from nicegui import ui
 
-from handsteer.dashboard.elements import box, button, card, read_words, switch, text
+from handsteer.dashboard.elements import box, button, card, read_words, set_property, switch, text
 from handsteer.dashboard.page import Page
 from handsteer.dashboard.state import PageState
 from handsteer.dashboard.steering_input import SteeringInput, read_deflection, read_number
@@ -65,7 +65,7 @@ class _MuxRow:
         """Show ``state``."""
         for chip, each in zip(self._chips, mux_inputs(state), strict=True):
             chip.set_text(f"{each.name}: {each.viewer}" if each.is_active and each.viewer else each.name)
-            chip.props('aria-current="true"' if each.is_active else "", remove="" if each.is_active else "aria-current")
+            set_property(chip, "aria-current", "true" if each.is_active else None)
             switch(chip, "holds", on=each.is_active)
 
 
@@ -220,7 +220,7 @@ class _Slider:
         if self._slider.enabled != on:
             self._slider.set_enabled(on)
             for each in self._buttons:
-                each.props("" if on else "disabled", remove="disabled" if on else "")
+                set_property(each, "disabled", not on)
 
     def _limit(self, label: str, name: str, value: float) -> ui.number:
         number = ui.number(name, value=value, step=_SLIDER_STEP, format="%.2f", on_change=self._read_limits)

@@ -35,19 +35,8 @@ class LeaseStatus:
     left_s: float = 0.0
 
 
-@dataclass(frozen=True)
-class SeatChange:
-    """The lease has got another holder.
-
-    Attributes:
-        before: The driver before; None if there was none.
-        after: The driver now; None if there is none.
-        how: Why it has changed.
-    """
-
-    before: str | None
-    after: str | None
-    how: SeatChangeReason
+OnSeat = Callable[[str | None, str | None, SeatChangeReason], None]
+"""Called with the driver before and after a change of the lease, None if there is none, and why it has changed."""
 
 
 class ControlLease:
@@ -60,7 +49,7 @@ class ControlLease:
         on_change: Called with each change of the driver; must return at once, and not use the lease.
     """
 
-    def __init__(self, on_change: Callable[[SeatChange], None] = lambda _: None) -> None:
+    def __init__(self, on_change: OnSeat = lambda *_: None) -> None:
         self._on_change = on_change
         self._lock = threading.Lock()
         self._driver: str | None = None
@@ -92,32 +81,27 @@ class ControlLease:
             elif self._driver != viewer and self._request is None:
                 self._request = (viewer, now_s + ANSWER_S)
 
-    def answer(self, viewer: str, *, hand_over: bool) -> bool:
-        """Grant or refuse the request, if ``viewer`` is the driver; return whether the driver has changed."""
+    def answer(self, viewer: str, *, hand_over: bool) -> None:
+        """Grant or refuse the request, if ``viewer`` is the driver."""
         with self._lock:
-            if self._driver != viewer or self._request is None:
-                return False
-            asker, self._request = self._request[0], None
-            if hand_over:
-                self._change(asker, "handed_over")
-            return hand_over
+            if self._driver == viewer and self._request is not None:
+                asker, self._request = self._request[0], None
+                if hand_over:
+                    self._change(asker, "handed_over")
 
-    def leave(self, viewer: str) -> bool:
-        """Release the lease or withdraw a request; return whether ``viewer`` was the driver."""
+    def leave(self, viewer: str) -> None:
+        """Release the lease, which grants a pending request, or withdraw a request."""
         with self._lock:
             if self._request is not None and self._request[0] == viewer:
                 self._request = None
-            if self._driver != viewer:
-                return False
-            # A pending request is granted.
-            self._change(self._request[0] if self._request else None, "left")
-            self._request = None
-            return True
+            if self._driver == viewer:
+                self._change(self._request[0] if self._request else None, "left")
+                self._request = None
 
-    def tick(self, now_s: float) -> bool:
-        """Grant a request that has not been answered in time; return whether the driver has changed."""
+    def tick(self, now_s: float) -> None:
+        """Grant a request that has not been answered in time."""
         with self._lock:
-            return self._hand_over_if_due(now_s)
+            self._hand_over_if_due(now_s)
 
     def status_of(self, viewer: str, now_s: float) -> LeaseStatus:
         """Return the lease as ``viewer`` sees it."""
@@ -130,16 +114,14 @@ class ControlLease:
                 return LeaseStatus("driver", asker is not None, left_s)
             return LeaseStatus("watcher", asker == viewer, left_s)
 
-    def _hand_over_if_due(self, now_s: float) -> bool:
-        if self._request is None or now_s < self._request[1]:
-            return False
-        self._change(self._request[0], "unanswered")
-        self._request = None
-        return True
+    def _hand_over_if_due(self, now_s: float) -> None:
+        if self._request is not None and now_s >= self._request[1]:
+            self._change(self._request[0], "unanswered")
+            self._request = None
 
     def _change(self, driver: str | None, how: SeatChangeReason) -> None:
         before, self._driver = self._driver, driver
-        self._on_change(SeatChange(before, driver, how))
+        self._on_change(before, driver, how)
 
 
 N = TypeVar("N", bound=Node)
@@ -258,20 +240,20 @@ class PageAudit:
         with self._lock:
             self._auditor.say(AuditEvent(code, self.driver, sentence, about), self._clock.now())
 
-    def on_seat(self, change: SeatChange) -> None:
+    def on_seat(self, before: str | None, after: str | None, how: SeatChangeReason) -> None:
         """Publish who has left the seat and who has taken it."""
-        self.on_driver(change.after)
-        before, after = (viewer and self.name_of(viewer) for viewer in (change.before, change.after))
-        if change.before is not None:
-            left = {"handed_over": f"handed the seat over to {after}", "unanswered": "lost the seat: gave no answer"}
-            code: AuditCode = "seat_lost" if change.how == "unanswered" else "seat_left"
-            self.say(code, change.before, left.get(change.how, "left the seat"))
-        if change.after is not None:
-            self.driver = str(after)
+        self.on_driver(after)
+        leaver, taker = (viewer and self.name_of(viewer) for viewer in (before, after))
+        if before is not None:
+            left = {"handed_over": f"handed the seat over to {taker}", "unanswered": "lost the seat: gave no answer"}
+            code: AuditCode = "seat_lost" if how == "unanswered" else "seat_left"
+            self.say(code, before, left.get(how, "left the seat"))
+        if after is not None:
+            self.driver = str(taker)
             taken = {
                 "free": "took the seat, which was free",
-                "handed_over": f"took the seat, which {before} handed over",
-                "unanswered": f"took the seat from {before}, who gave no answer",
-                "left": f"took the seat, which {before} left",
+                "handed_over": f"took the seat, which {leaver} handed over",
+                "unanswered": f"took the seat from {leaver}, who gave no answer",
+                "left": f"took the seat, which {leaver} left",
             }
-            self.say("seat_taken", change.after, taken[change.how])
+            self.say("seat_taken", after, taken[how])
