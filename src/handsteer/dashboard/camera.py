@@ -263,17 +263,17 @@ class CameraPanel:
     def update(self, state: PageState) -> None:
         """Show ``state``."""
         # A confirmed sign stays active for a moment when it is not seen.
-        shown = state.sign if state.seen == NONE else state.seen
+        shown = state.recognition.sign if state.seen == NONE else state.seen
         self._sign.set_text("No sign" if shown == NONE else shown)
-        switch(self._sign, "pending", on=shown != state.sign)
+        switch(self._sign, "pending", on=shown != state.recognition.sign)
         confirmed = round(100 * state.confirmed)
         self._ring.style(f"--confirmed: {confirmed}%").props(f"aria-valuenow={confirmed}")
         switch(self._ring, "whole", on=confirmed == 100)
         switch(self._engage, "hidden", on=state.engaging is None)
         engaged = round(100 * (state.engaging or 0.0))
         self._engaging.style(f"--engaged: {engaged}%").props(f"aria-valuenow={engaged}")
-        self._hand.set_text(f"{state.handedness} hand" if state.handedness else "No hand")
-        percent = round(100 * state.confidence) if state.seen != NONE else 0
+        self._hand.set_text(f"{state.recognition.handedness} hand" if state.recognition.handedness else "No hand")
+        percent = round(100 * state.recognition.confidence) if state.seen != NONE else 0
         self._percent.set_text(f"{percent} %" if percent else "")
         self._confidence.style(f"width: {percent}%")
         self._no_picture.set_text(sentence(state.no_picture))

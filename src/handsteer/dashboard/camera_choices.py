@@ -65,8 +65,8 @@ class CameraChoices:
     def update(self, state: PageState) -> None:
         """Show ``state``."""
         self._machine.update()
-        if state.min_confidence is not None and state.min_confidence != self._shown:
-            self._shown = state.min_confidence
+        if state.recognition.min_confidence is not None and state.recognition.min_confidence != self._shown:
+            self._shown = state.recognition.min_confidence
             self._slider.set_value(self._shown)
             self._tell()
         if (swapped := _SWAP_SIDES.value_in(self._settings.running)) != self._is_swapped:

@@ -113,8 +113,8 @@ def steps_done(done: int, state: PageState) -> int:
     happens = (
         state.seen != FORWARD and state.mood != "driving",
         state.seen == FORWARD,
-        state.driver == "signs" and state.mood == "driving" and not state.measured.is_rest,
-        state.sign == STOP and state.measured.is_rest,
+        state.control.source == "signs" and state.mood == "driving" and not state.measured.is_rest,
+        state.recognition.sign == STOP and state.measured.is_rest,
     )
     return done + 1 if done < len(_STEPS) and happens[done + 1] else done
 

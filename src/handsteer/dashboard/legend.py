@@ -85,10 +85,10 @@ _STEPS = {STOP: "Open the hand", GO: "Close the fist"}
 def active_entry(state: PageState) -> str:
     """Return the name of the entry to highlight; empty, or of no entry, if there is none."""
     if not state.is_joystick:
-        return state.sign
-    if state.driver == "joystick" and not state.commanded.is_zero:
+        return state.recognition.sign
+    if state.control.source == "joystick" and not state.commanded.is_zero:
         return _MOVE
-    return _STEPS.get(state.sign, "")
+    return _STEPS.get(state.recognition.sign, "")
 
 
 _MODE = FIELDS["control.mode"]
@@ -198,9 +198,10 @@ Bars = tuple[tuple[int, ...], int]
 
 def bars_of(state: PageState) -> Bars:
     """Return the bars of ``state``: how confidently each of its signs is recognised."""
-    confidences = state.confidences or (0.0,) * len(state.signs)
+    recognition = state.recognition
+    confidences = recognition.confidences or (0.0,) * len(state.signs)
     shares = tuple(_STEP * round(100 * max(0.0, min(share, 1.0)) / _STEP) for share in confidences)
-    least = _DEFAULTS.min_confidence if state.min_confidence is None else state.min_confidence
+    least = _DEFAULTS.min_confidence if recognition.min_confidence is None else recognition.min_confidence
     return shares[: len(state.signs)], round(100 * least)
 
 

@@ -69,7 +69,9 @@ class TimingLine:
         if time.monotonic() < self._due_s:
             return
         self._due_s = time.monotonic() + 1.0
-        typical, slowest = (_rounded(value) for value in (state.latency_median_ms, state.latency_p99_ms))
+        typical, slowest = (
+            _rounded(value) for value in (state.control.latency_median_ms, state.control.latency_p99_ms)
+        )
         self._times.set_text(f"{typical} / {slowest} ms")
         self._rate.set_text(f"{_rounded(state.fps)} frames/s")
 

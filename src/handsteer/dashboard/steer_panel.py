@@ -44,8 +44,8 @@ class MuxInput:
 def mux_inputs(state: PageState) -> tuple[MuxInput, ...]:
     """Return the inputs in order of priority; at most one is active."""
     directly = bool(state.viewers.topic and state.viewers.steers)
-    by_hand = not state.stopped and (directly or state.driver == "steering")
-    by_air = not state.stopped and not by_hand and state.driver in ("signs", "joystick")
+    by_hand = not state.stopped and (directly or state.control.source == "steering")
+    by_air = not state.stopped and not by_hand and state.control.source in ("signs", "joystick")
     return (
         MuxInput("Stop", state.stopped, state.viewers.stopped),
         MuxInput("By hand", by_hand, state.viewers.steered or "another node"),
@@ -119,10 +119,11 @@ class SteerPanel:
         if not can_steer:
             self._input.sliders = ZERO
         self._show_sliders()
-        limits = (state.max_linear_mps, state.max_angular_radps)
+        rule = state.control.rule
+        limits = (rule.max_linear, rule.max_angular) if rule else (0.0, 0.0)
         for slider, limit in zip((self._linear, self._angular), limits, strict=True):
             slider.enable(on=can_steer)
-            if all(limits) and limit:
+            if all(limits):
                 slider.restrict(limit)
         self._hint.set_text(_LATE if self._input.is_late else _HINTS[lease.role])
         switch(self._hint, "late", on=self._input.is_late)

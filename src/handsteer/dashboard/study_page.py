@@ -126,7 +126,7 @@ class StudyPage(Page):
             self.end("repeated")
             self._card.message = self._card.message or _LOST
             return
-        self.lead(lambda: session.note(state.course, state.path_length_m, node.clock.now()))
+        self.lead(lambda: session.note(state.robot.course, state.robot.path_length_m, node.clock.now()))
         if session.lap is None:
             self._halt()
         elif lap.course is None and session.lap.course is not None:

@@ -57,11 +57,11 @@ class WorldPanel:
     def update(self, state: PageState, world: WorldState) -> None:
         """Show ``state`` and ``world``."""
         self._view.update(world)
-        self._driver.set_text(_DRIVERS.get(state.driver, state.driver))
-        self._path.set_text(UNKNOWN if state.path_length_m is None else f"{state.path_length_m:.1f} m")
-        self._bumps.set_text(UNKNOWN if state.collisions is None else str(state.collisions))
-        self._course.update(state.course)
-        self._flash(state.collisions)
+        self._driver.set_text(_DRIVERS.get(state.control.source, state.control.source))
+        self._path.set_text(UNKNOWN if state.robot.path_length_m is None else f"{state.robot.path_length_m:.1f} m")
+        self._bumps.set_text(UNKNOWN if state.robot.collisions is None else str(state.robot.collisions))
+        self._course.update(state.robot.course)
+        self._flash(state.robot.collisions)
 
     def _look(self, view: View) -> None:
         """Move the camera to the start of ``view``."""
