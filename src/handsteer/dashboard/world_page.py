@@ -63,7 +63,7 @@ class WorldPage(Page):
             self._name.set_text(graph.world_name)
             self._saved.set_text("no unsaved changes" if is_saved else "unsaved changes")
             switch(self._saved, "unsaved", on=not is_saved)
-        for element, target in ((self._undo, history.before()), (self._redo, history.after())):
+        for element, target in ((self._undo, history.to(-1)), (self._redo, history.to(1))):
             set_property(element, "disabled", target is None)
 
     def _fit(self) -> None:
