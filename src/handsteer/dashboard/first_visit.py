@@ -10,7 +10,7 @@ from nicegui import ui
 
 from handsteer.audit import without_passwords
 from handsteer.cameras import VIRTUAL_HAND
-from handsteer.cameras.choice import BROWSER, OWN
+from handsteer.cameras.choice import BROWSER, OWN, Size
 from handsteer.dashboard.elements import box, button, read_words, sentence, set_property, switch, tag, text
 from handsteer.dashboard.page import Page
 from handsteer.dashboard.remote_graph import RemoteGraph
@@ -50,9 +50,15 @@ def refusal(sent: object) -> str:
     return read_words(sent)
 
 
-def why_not(error: HandsteerError) -> str:
-    """Return a sentence for viewers on a camera that cannot be used."""
-    return f"{sentence(without_passwords(str(error)))}."
+async def choose_camera(page: Page, graph: RemoteGraph, source: str, size: Size | None = None) -> str:
+    """Choose a camera of ``graph``, if the viewer of ``page`` drives; return why not, in a sentence, or nothing."""
+    if not page.drives():
+        return NOT_THE_DRIVER
+    try:
+        await asyncio.wrap_future(graph.choose_camera(source, size))
+    except HandsteerError as error:
+        return f"{sentence(without_passwords(str(error)))}."
+    return ""
 
 
 class CameraOffer:
@@ -86,14 +92,7 @@ class CameraOffer:
         switch(self._own, "hidden", on=source == OWN or not has_own)
 
     async def _use_own(self) -> None:
-        trouble = NOT_THE_DRIVER
-        if self._page.drives():
-            trouble = ""
-            try:
-                await asyncio.wrap_future(self._graph.choose_camera(OWN))
-            except HandsteerError as error:
-                trouble = why_not(error)
-        self._refusal.set_text(trouble)
+        self._refusal.set_text(await choose_camera(self._page, self._graph, OWN))
 
 
 _STEPS: Final = (

@@ -17,7 +17,6 @@ from handsteer.dashboard.settings import Settings
 from handsteer.dashboard.settings_fields import FIELDS
 from handsteer.dashboard.sign_pictures import DRAWN, MOVED_FIST, SIGN_PATH, TAUGHT, taught_drawings
 from handsteer.dashboard.state import PageState
-from handsteer.errors import ConfigError
 from handsteer.types import GO, SIGNS, STOP, action_of
 
 _MOVE = "Move it"
@@ -92,6 +91,7 @@ def active_entry(state: PageState) -> str:
 
 
 _MODE = FIELDS["control.mode"]
+_REFUSAL = "only the driver can change it: ask to drive first"
 _MODES = {"signs": "Signs", "joystick": "Joystick"}
 _TITLES = {"signs": "The signs", "joystick": "The hand as a joystick"}
 
@@ -152,17 +152,8 @@ class LegendPanel:
 
     def _choose(self, mode: str) -> None:
         """Change the mode, if this viewer drives; it is not saved to the file."""
-        if self._settings is None:
-            return
-        trouble = ""
-        if not self._page.drives():
-            trouble = "only the driver can change it: ask to drive first"
-        else:
-            try:
-                self._settings.set(_MODE, mode)
-            except ConfigError as error:
-                trouble = str(error)
-        self._trouble.set_text(trouble)
+        if (settings := self._settings) is not None:
+            self._trouble.set_text(self._page.change(lambda: settings.set(_MODE, mode), _REFUSAL))
 
     def _show_bars(self, state: PageState) -> None:
         """Show how confidently each sign is recognised; one message for all bars, because it changes at each update."""

@@ -17,6 +17,7 @@ from handsteer.dashboard.settings import Settings
 from handsteer.dashboard.state import PageState
 from handsteer.dashboard.status_bar import Banner, LeasePanel, TimingLine
 from handsteer.dashboard.viewers import LeaseStatus, OnDemandNode, PageAudit
+from handsteer.errors import HandsteerError
 from handsteer.study.session import Session
 
 PICTURE_PATH = "/camera.mjpg"
@@ -85,20 +86,20 @@ class PageContext:
 
     Attributes:
         node: Joined while a browser shows a page.
+        audit: Publishes what viewers do.
         graph: The graph, for what pages do in addition to its topics; None if its nodes run elsewhere.
         settings: The graph's parameters, likewise.
         lessons: Teaches the graph signs, likewise.
         study: Leads a participant through a study; None without one.
-        audit: Publishes what viewers do; None if they need no names.
         recordings: Serves recordings; None if none can be made.
     """
 
     node: OnDemandNode[DashboardNode]
+    audit: PageAudit
     graph: RemoteGraph | None = None
     settings: Settings | None = None
     lessons: Lessons | None = None
     study: Session | None = None
-    audit: PageAudit | None = None
     recordings: Recordings | None = None
 
 
@@ -114,10 +115,10 @@ class Page:
     def __init__(self, context: PageContext, path: str, *assets: str) -> None:
         self.client = ui.context.client
         self._context = context
-        self._introduce(context.audit)
+        self._introduce()
         self.client.on_disconnect(self._leave)
         self.client.on_delete(self._leave)
-        self.client.on_delete(self._forget)
+        self.client.on_delete(lambda: context.audit.forget(self.client.id))
         ui.add_head_html(_INSTALLABLE)
         ui.add_body_html(_LOADING)
         self._speak(preferred_language(self.client.request.headers.get("accept-language", "")))
@@ -155,15 +156,24 @@ class Page:
         node = self.node
         return node is not None and node.lease.take(self.client.id, node.clock.now())
 
+    def change(self, action: Callable[[], object], refusal: str) -> str:
+        """Call ``action`` if this viewer drives; return an error message, or ``refusal``; empty if it succeeded."""
+        if not self.drives():
+            return refusal
+        try:
+            action()
+        except HandsteerError as error:
+            return str(error)
+        return ""
+
     def lease(self, node: DashboardNode) -> LeaseStatus:
         """Return the control lease as this viewer sees it."""
         return node.lease.status_of(self.client.id, node.clock.now())
 
-    def _introduce(self, audit: PageAudit | None) -> None:
+    def _introduce(self) -> None:
         request = self.client.request
-        if audit is not None:
-            session = request.scope.get("state", {}).get(SESSION, "")
-            audit.introduce(self.client.id, session, request.client.host if request.client else "")
+        session = request.scope.get("state", {}).get(SESSION, "")
+        self._context.audit.introduce(self.client.id, session, request.client.host if request.client else "")
 
     def _speak(self, language: str) -> None:
         if language != ENGLISH:
@@ -171,10 +181,6 @@ class Page:
             self.client.page = copy.copy(self.client.page)
             self.client.page.language = language  # type: ignore[assignment]
             ui.add_head_html(_TRANSLATED.format(ASSETS_PATH, language))
-
-    def _forget(self) -> None:
-        if self._context.audit is not None:
-            self._context.audit.forget(self.client.id)
 
     def _top(self, path: str) -> None:
         with ui.element("header").classes("top"):

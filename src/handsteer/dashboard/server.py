@@ -108,7 +108,7 @@ class Dashboard:
         audit = PageAudit(transport, clock) if graph is None else graph.audit
         self.node = OnDemandNode(lambda: DashboardNode(transport, clock, steering, cmd_vel, history, audit=audit))
         self.pictures = OnDemandNode(lambda: PictureNode(transport, clock))
-        self.context = PageContext(self.node, audit=audit)
+        self.context = PageContext(self.node, audit)
         if graph is not None:
             settings_file = SettingsFile(file or DEFAULT_FILE, is_read=file is not None)
             settings = Settings(
@@ -119,7 +119,7 @@ class Dashboard:
             )
             study = Session(graph.study) if graph.study is not None else None
             recordings = Recordings(graph.config.recording.folder, lambda: graph.state.recording)
-            self.context = PageContext(self.node, graph, settings, Lessons.of(graph), study, audit, recordings)
+            self.context = PageContext(self.node, audit, graph, settings, Lessons(graph), study, recordings)
         self.webcam = FrameSocket(graph, self._drives)
         self._config = config
         self._server: uvicorn.Server | None = None
