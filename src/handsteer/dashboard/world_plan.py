@@ -136,7 +136,7 @@ class ThingForm:
             if not isinstance(thing, Gate):
                 self._movable.set_value(thing.movable)
         if not isinstance(thing, Gate):
-            switch(self._numbers[-1], "off", on=not thing.movable)  # a fixed thing's mass has no effect
+            switch(self._numbers[-1], "hidden", on=not thing.movable)  # a fixed thing's mass has no effect
 
     def _build(self, thing: Thing | Gate) -> None:
         self._box.clear()
