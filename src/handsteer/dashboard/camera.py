@@ -221,16 +221,9 @@ def _resolve(future: "asyncio.Future[bytes | None]", jpeg: bytes | None) -> None
 
 
 class CameraPanel:
-    """The mirrored picture, the recognised sign, and the choice of camera.
+    """The mirrored picture in its ``stage``, the recognised sign, and the choice of camera if there is a ``graph``.
 
-    Args:
-        page: Shows the panel.
-        graph: The graph whose camera can be chosen; None if there is no choice.
-        settings: Those of the graph, to be changed next to the picture; None if they cannot.
-        coaches: Whether a new driver is shown how to drive.
-
-    Attributes:
-        stage: Holds the picture and its overlays.
+    With ``settings``, these can be changed next to the picture; it ``coaches`` a new driver.
     """
 
     def __init__(

@@ -30,13 +30,7 @@ _EMIT_INDEX: Final = "(event) => emit(Number(event.target.value))"
 
 
 class CameraChoices:
-    """A folded panel of choices.
-
-    Args:
-        page: Shows the panel.
-        graph: The graph whose camera is chosen.
-        settings: Those of the graph.
-    """
+    """A folded panel of choices."""
 
     def __init__(self, page: Page, graph: RemoteGraph, settings: Settings) -> None:
         self._page, self._settings = page, settings

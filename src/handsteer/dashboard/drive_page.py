@@ -161,13 +161,7 @@ _NOTHING = "Keeps all topics in a file, for a replay and a report."
 
 
 class RecordPanel:
-    """Starts and ends recordings for the driver; everybody sees them.
-
-    Args:
-        page: Shows the panel.
-        graph: What is recorded.
-        recordings: Serves files and reports.
-    """
+    """Starts and ends recordings for the driver; everybody sees them."""
 
     def __init__(self, page: Page, graph: RemoteGraph, recordings: Recordings) -> None:
         self._page, self._graph, self._recordings = page, graph, recordings

@@ -62,12 +62,7 @@ async def choose_camera(page: Page, graph: RemoteGraph, source: str, size: Size 
 
 
 class CameraOffer:
-    """Chooses between the graph's camera and the browser's, and says first that a demo hand is shown.
-
-    Args:
-        page: Shows the offer.
-        graph: The graph whose camera is chosen.
-    """
+    """Chooses between the graph's camera and the browser's, and says first that a demo hand is shown."""
 
     def __init__(self, page: Page, graph: RemoteGraph) -> None:
         self._page, self._graph = page, graph

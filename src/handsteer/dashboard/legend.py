@@ -97,11 +97,9 @@ _TITLES = {"signs": "The signs", "joystick": "The hand as a joystick"}
 
 
 class LegendPanel:
-    """What the hand does, as reported by the nodes, with the active sign or step highlighted; and a switch of the mode.
+    """What the hand does, as reported by the nodes, with the active sign or step highlighted.
 
-    Args:
-        page: Shows the panel.
-        settings: Those of the graph; None if the mode cannot be changed here.
+    With ``settings``, the mode can be changed.
     """
 
     def __init__(self, page: Page, settings: Settings | None) -> None:
@@ -197,13 +195,7 @@ def bars_of(state: PageState) -> Bars:
 
 
 class _Tile:
-    """One sign; opened, it shows how to hold the hand.
-
-    Args:
-        entry: What it shows.
-        number: The number of its bar; None without one.
-        on_click: Called with the sign.
-    """
+    """One sign; opened, it shows how to hold the hand. ``number`` is that of its bar; None without one."""
 
     def __init__(self, entry: LegendEntry, number: int | None, on_click: Callable[[str], None]) -> None:
         self.is_open = False

@@ -117,12 +117,7 @@ class _Example:
 
 
 class _ClassCard:
-    """A class of the lesson, which can be changed.
-
-    Attributes:
-        element: The card.
-        label: The sign, or ``NONE``.
-    """
+    """A class of the lesson, which can be changed; its ``label`` is the sign, or ``NONE``."""
 
     def __init__(self, lesson: ViewerLesson, one: SignClass) -> None:
         self._lesson = lesson

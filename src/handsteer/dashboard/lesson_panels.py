@@ -32,10 +32,7 @@ _LONGEST: Final = 200
 class ViewerLesson:
     """The lesson of a page's viewer.
 
-    Attributes:
-        lessons: Run it.
-        viewer: The viewer.
-        message: An error, or what has happened, while there is no lesson; empty if nothing.
+    While there is none, ``message`` is an error, or what has happened; empty if nothing.
     """
 
     def __init__(self, page: Page, lessons: Lessons) -> None:
@@ -115,12 +112,7 @@ class ViewerLesson:
 
 
 class StartPanel:
-    """Begins a lesson; shows the signs that have been taught.
-
-    Args:
-        lesson: The viewer's lesson.
-        settings: Those of the graph.
-    """
+    """Begins a lesson; shows the signs that have been taught."""
 
     def __init__(self, lesson: ViewerLesson, settings: Settings | None) -> None:
         self._lesson = lesson
@@ -226,9 +218,7 @@ def _full(path: Path) -> Path:
 class LessonPanel:
     """What the hand is recognised as, and the tools: train, keep, undo, files, the end.
 
-    Args:
-        lesson: The viewer's lesson.
-        actions: Returns the action that is selected for each sign.
+    ``actions`` returns the action that is selected for each sign.
     """
 
     def __init__(self, lesson: ViewerLesson, actions: Callable[[], Mapping[str, str]]) -> None:

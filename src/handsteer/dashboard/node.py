@@ -69,8 +69,6 @@ class DashboardNode(Node):
     """Keeps the newest message of each topic for the page.
 
     Args:
-        transport: Carries the messages.
-        clock: The graph's clock.
         steering: Drives when a viewer steers on the page.
         cmd_vel: The topic of the displayed commands. If its type is open and the transport reports types, the commands
             that the control reports are shown instead.
@@ -79,7 +77,6 @@ class DashboardNode(Node):
 
     Attributes:
         world: The contents of the 3D view.
-        lease: The control lease.
         history: The velocities of the last 30 s.
     """
 

@@ -62,7 +62,6 @@ class GraphServer:
 
     Args:
         pipe: Not started yet; connected to a :class:`RemoteGraph`.
-        graph: The graph.
         file: The YAML file that its parameters were read from, which settings are saved to.
         study: What the page leads a participant through, if anything.
     """
@@ -143,8 +142,6 @@ class RemoteGraph:
         pipe: Not started yet; connected to a :class:`GraphServer`.
 
     Attributes:
-        transport: Carries the graph's messages.
-        clock: The graph's clock.
         state: What the graph has reported last.
         steering: Runs in this process; not started.
         study: What the page leads a participant through, if anything.

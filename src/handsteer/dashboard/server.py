@@ -73,8 +73,6 @@ class Dashboard:
     NiceGUI keeps its state per process, so a process serves one page at a time.
 
     Args:
-        transport: Carries the graph's messages.
-        clock: The graph's clock.
         steering: Drives when a viewer steers on the page.
         config: Address and options of the page.
         cmd_vel: The topic of the displayed commands.

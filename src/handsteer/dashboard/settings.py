@@ -39,7 +39,6 @@ class Settings:
         on_save: Called with what was done, once the settings are saved.
 
     Attributes:
-        file: The file that settings are saved to.
         wanted: The parameters in the form: those of the next start, once saved.
         revision: Counts changes and saves.
     """

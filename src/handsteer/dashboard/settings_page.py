@@ -155,13 +155,6 @@ class _Group:
 
     Args:
         name: The section's name in the file, or ``common``; the anchor that the link leads to.
-        title: Its title.
-        meaning: A line on it.
-        link: Its link.
-
-    Attributes:
-        body: Contains the rows.
-        rows: Its rows.
     """
 
     def __init__(self, name: str, title: str, meaning: str, link: ui.link) -> None:

@@ -17,13 +17,9 @@ class Row:
     """One parameter: its meaning, its value, and a reset to its default.
 
     Attributes:
-        field: The parameter.
-        element: The row.
         is_found: Whether the search finds it.
 
     Args:
-        field: The parameter.
-        settings: The parameters.
         change: Makes a change if this viewer may; returns an error message, or an empty text.
     """
 

@@ -23,12 +23,7 @@ COMMAND_HOLDS_S = ROBOT_S
 
 @dataclass(frozen=True)
 class Report:
-    """The last report of a node on ``/diagnostics``.
-
-    Attributes:
-        status: What it reports.
-        came_s: Time of arrival in seconds of the graph's clock.
-    """
+    """The last report of a node on ``/diagnostics``, and its time of arrival in seconds of the graph's clock."""
 
     status: Status
     came_s: float
@@ -232,11 +227,6 @@ def explain(reporting: Reporting, viewers: Viewers = NO_VIEWERS, *, is_moving: b
 
     The control reports whether the robot is commanded to move. If it is not, because no sign is confirmed, the reason
     lies upstream: the camera gives no picture, no hand is in view, or the hand shows no sign.
-
-    Args:
-        reporting: The status of each node that is not silent.
-        viewers: The viewers' activity, which the control does not know.
-        is_moving: Whether the robot is measured to move.
     """
     if viewers.topic and viewers.steers:
         return "driving", "Driving", f"steered by hand, straight on {viewers.topic}"

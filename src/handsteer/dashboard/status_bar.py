@@ -17,12 +17,7 @@ UNKNOWN = "--"
 
 
 class LeasePanel:
-    """Whether this viewer drives, and buttons to request or hand over the control lease.
-
-    Args:
-        ask: Called to request the lease.
-        answer: Called with True to hand it over, with False to keep it.
-    """
+    """Whether this viewer drives, and buttons to request the lease, or to hand it over (``answer(True)``)."""
 
     _WORDS: ClassVar[dict[Role, str]] = {
         "driver": "you drive",

@@ -73,9 +73,6 @@ class SteerPanel:
     """A pad that drives while it is held, and sliders that drive while the page is in front.
 
     In the browser, a gamepad and the tilt of a phone move the pad.
-
-    Args:
-        page: Shows the panel.
     """
 
     def __init__(self, page: Page) -> None:
@@ -248,13 +245,7 @@ class _Slider:
 
 
 class TopicPanel:
-    """The name of the steering topic, and its consequences.
-
-    Args:
-        page: Shows the panel.
-        steering: Is released before the topic changes.
-        has_choice: Whether the viewer may choose another topic.
-    """
+    """The name of the steering topic, which the viewer may change if it ``has_choice``, and its consequences."""
 
     def __init__(self, page: Page, steering: SteerPanel, *, has_choice: bool) -> None:
         self._page, self._steering = page, steering

@@ -158,11 +158,7 @@ class StudyPage(Page):
 
 
 class _StudyCard:
-    """The current step.
-
-    Attributes:
-        message: What went wrong, or empty.
-    """
+    """The current step, and in ``message`` what went wrong, or nothing."""
 
     def __init__(self, session: Session, page: StudyPage) -> None:
         self._session, self._page = session, page

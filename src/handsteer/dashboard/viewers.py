@@ -184,10 +184,6 @@ _UNKNOWN = "a viewer"
 class PageAudit:
     """Publishes what viewers do; may be called on any thread.
 
-    Args:
-        transport: Carries the messages.
-        clock: The graph's clock.
-
     Attributes:
         driver: Name of the driver, or of the last one.
         on_driver: Called with the viewer that has got the seat, or None if it is free; must return at once.

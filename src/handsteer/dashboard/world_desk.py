@@ -55,16 +55,7 @@ class History:
 
 
 class WorldDesk:
-    """Changes the world of a simulated robot, if this viewer drives.
-
-    Args:
-        page: The viewer's page.
-        graph: The robot's graph; None if it cannot be accessed.
-        show: Shows a message.
-
-    Attributes:
-        history: The changes that can be undone.
-    """
+    """Changes the world of a simulated robot, if this viewer drives; calls ``show`` with messages."""
 
     def __init__(self, page: Page, graph: RemoteGraph | None, show: Callable[[str], object]) -> None:
         self._page, self.graph, self._show = page, graph, show

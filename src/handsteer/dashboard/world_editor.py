@@ -54,16 +54,7 @@ _READ_FILE = f"""async (event) => {{
 
 
 class WorldEditor:
-    """Edits the world of a simulated robot, for the driver.
-
-    Args:
-        desk: Changes the world.
-        plan: Shows it.
-        show: Shows a message.
-
-    Attributes:
-        robot: Pose of the robot; new things are placed near it.
-    """
+    """Edits the world of a simulated robot, for the driver; new things are placed near the pose ``robot``."""
 
     def __init__(self, desk: WorldDesk, plan: WorldPlan, show: Callable[[str], object]) -> None:
         self._desk, self._plan, self._show = desk, plan, show

@@ -24,12 +24,7 @@ _VIEWS: tuple[tuple[View, str, str], ...] = (
 
 
 class WorldPanel:
-    """The robot in its world.
-
-    Args:
-        page: Shows the panel.
-        graph: The graph whose world can be changed; None if it cannot be accessed.
-    """
+    """The robot in its world."""
 
     def __init__(self, page: Page, graph: RemoteGraph | None) -> None:
         self._collisions: int | None = None
