@@ -116,8 +116,7 @@ class ReportPanel:
     def __init__(self, lesson: ViewerLesson) -> None:
         self._lesson = lesson
         self._shown: tuple[TrainingReport | None, tuple[SignClass, ...]] = (None, ())
-        with ui.element("section").classes("card panel report hidden") as self.element:
-            tag("h2", "", "How well it was learnt")
+        with card("How well it was learnt", "panel report hidden") as self.element:
             self._content = box("figures")
 
     def update(self, state: LessonState) -> None:

@@ -7,7 +7,7 @@ from typing import Final, TypeVar
 
 from nicegui import ui
 
-from handsteer.dashboard.elements import box, button, set_property, switch, tag, text
+from handsteer.dashboard.elements import box, button, card, set_property, switch, text
 from handsteer.dashboard.lesson import Lesson
 from handsteer.dashboard.lesson_files import CAN_EXPORT, LESSON_PATH
 from handsteer.dashboard.lesson_node import LessonNode
@@ -117,8 +117,7 @@ class StartPanel:
     def __init__(self, lesson: ViewerLesson, settings: Settings | None) -> None:
         self._lesson = lesson
         self._shown: object = None
-        with ui.element("section").classes("card panel start") as self.element:
-            tag("h2", "", "Teach your own signs")
+        with card("Teach your own signs", "panel start") as self.element:
             text(
                 "lead", "Show a sign to the camera a few times, train for some seconds, and choose what the robot does."
             )

@@ -191,7 +191,10 @@ class Page:
                     ui.link(name, target).props('aria-current="page"' if target == path else "")
             self._timing = TimingLine()
             with ui.element("div").classes("right"):
-                self._driving = LeasePanel(self._ask, self._answer)
+                self._driving = LeasePanel(
+                    lambda: self.do(DashboardNode.ask_to_drive),
+                    lambda hand_over: self.do(lambda node, viewer: node.lease.answer(viewer, hand_over=hand_over)),
+                )
                 self._recorded = text("recorded hidden", "").props('title="A recording is being made"')
                 self._source = ui.label("").classes("source chip")
                 with ui.element("button").classes("icon-button theme").props('aria-label="Light or dark"'):
@@ -214,16 +217,10 @@ class Page:
         return oldest is None or now_s - self._unread[1] < _ACK_PATIENCE_S
 
     def _halt(self) -> None:
-        self.do(lambda node, viewer: node.halt(viewer))
+        self.do(DashboardNode.halt)
 
     def _reset(self) -> None:
-        self.do(lambda node, viewer: node.reset(viewer))
-
-    def _ask(self) -> None:
-        self.do(lambda node, viewer: node.ask_to_drive(viewer))
-
-    def _answer(self, hand_over: bool) -> None:
-        self.do(lambda node, viewer: node.lease.answer(viewer, hand_over=hand_over))
+        self.do(DashboardNode.reset)
 
     def _leave(self) -> None:
         node = self._context.node

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from nicegui import ui
 
 from handsteer.dashboard.elements import box, button, card, read_words, set_property, switch, text
+from handsteer.dashboard.node import DashboardNode
 from handsteer.dashboard.page import Page
 from handsteer.dashboard.state import PageState
 from handsteer.dashboard.steering_input import SteeringInput, read_deflection, read_number
@@ -130,7 +131,7 @@ class SteerPanel:
         """Stop steering from this page and set the sliders to zero."""
         self._input.sliders = ZERO
         self._show_sliders()
-        self._page.do(lambda node, viewer: node.release(viewer))
+        self._page.do(DashboardNode.release)
 
     def _hold_pad(self, sent: object) -> None:
         x, y = read_deflection(sent)
