@@ -97,10 +97,7 @@ class Lessons:
     def begin(self, viewer: str, person: str = "", *, restore: bool = False) -> None:
         """Begin a lesson on the takes of earlier ones; a lesson abandoned by another viewer ends.
 
-        Args:
-            viewer: The viewer who teaches.
-            person: The person who shows the signs; ``me`` by default.
-            restore: Whether to continue the last lesson, if it was not kept.
+        ``person`` shows the signs; ``me`` by default. With ``restore``, the last lesson goes on, if it was not kept.
 
         Raises:
             DatasetError: It is not a valid name, or the file of takes is damaged.
@@ -132,11 +129,7 @@ class Lessons:
     def save(self, viewer: str, actions: Mapping[str, str]) -> None:
         """Save the takes, and the model if it was learnt from them, which the graph uses from then on.
 
-        The robot obeys the signs as soon as it may move again.
-
-        Args:
-            viewer: The viewer who teaches.
-            actions: The action of each sign.
+        The robot obeys the signs as soon as it may move again, each by its action of ``actions``.
 
         Raises:
             ConfigError: An action does not exist, or the running nodes reject a sign.

@@ -104,12 +104,9 @@ class PageContext:
 
 
 class Page:
-    """One browser's view; its timers run while the browser is connected.
+    """One browser's view at a URL ``path``, with its own stylesheets and scripts (``assets``).
 
-    Args:
-        context: What all pages share.
-        path: The page's URL path, which its link in the head shows.
-        assets: Its stylesheets and scripts.
+    Its timers run while the browser is connected.
     """
 
     def __init__(self, context: PageContext, path: str, *assets: str) -> None:
@@ -232,8 +229,7 @@ class Page:
 def preferred_language(accept: str) -> str:
     """Return the language of the page that a browser wants most; English if it wants none of them.
 
-    Args:
-        accept: Its ``Accept-Language`` header (RFC 9110, section 12.5.4), for example ``de-CH, de;q=0.9, en;q=0.8``.
+    ``accept`` is its ``Accept-Language`` header (RFC 9110, section 12.5.4), for example ``de-CH, de;q=0.9, en;q=0.8``.
     """
     wanted: dict[str, float] = {}
     for item in accept[:_LONGEST_HEADER].split(","):
