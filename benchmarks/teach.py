@@ -64,7 +64,7 @@ def main() -> None:
         with Graph(load(None, base, {"teach": {**files, "take_time": 1.5, "countdown": 0.0}})) as graph:
             graph.start()
             time.sleep(2.0)
-            lessons = Lessons.of(graph)
+            lessons = Lessons(graph)
             before = alone(graph)
             lessons.begin("me")
             lesson = lessons.node("me")

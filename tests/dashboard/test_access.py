@@ -115,6 +115,12 @@ def test_the_printed_address_lets_a_browser_in_and_hides_its_token(open_site: Si
     assert status_of_websocket(open_site, Cookie=pair, Origin="https://evil.example") == 403
 
 
+@pytest.mark.parametrize("others", ['settings={"a": 1}', "list[0]=1", 'name="a "b', ";=;"])
+def test_cookies_of_other_programs_of_the_machine_do_not_hide_ours(open_site: Site, others: str) -> None:
+    pair = open_site.get(f"/?token={token_of(open_site)}").headers["Set-Cookie"].partition(";")[0]
+    assert open_site.get("/", Cookie=f"{others}; {pair}").status == 200
+
+
 def test_what_follows_the_token_is_a_status_of_this_server(open_site: Site) -> None:
     for path in ("//evil.example/", "///evil.example/", "/%2Fevil.example/", "/\\evil.example"):
         response = open_site.get(f"{path}?token={token_of(open_site)}&a=b")

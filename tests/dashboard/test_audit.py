@@ -6,11 +6,10 @@ from pathlib import Path
 from handsteer.audit import AuditEvent, read_event
 from handsteer.clock import SteppedClock
 from handsteer.config import Config
-from handsteer.dashboard.audit import PageAudit
 from handsteer.dashboard.node import DashboardNode
 from handsteer.dashboard.settings import Settings, SettingsFile
 from handsteer.dashboard.settings_fields import FIELDS
-from handsteer.dashboard.viewers import ANSWER_S, ControlLease
+from handsteer.dashboard.viewers import ANSWER_S, ControlLease, PageAudit
 from handsteer.graph import Graph
 from handsteer.messages import AUDIT, Log
 from handsteer.nodes.steering import SteeringNode
@@ -63,7 +62,7 @@ def test_each_change_of_the_seat_is_told() -> None:
     lease.take("page a", 0.1)
     assert bench.take() == [("seat_taken", "viewer 1", "took the seat, which was free")]
     lease.ask("page b", 1.0)
-    assert lease.answer("page a", hand_over=True)
+    lease.answer("page a", hand_over=True)
     assert [(code, who) for code, who, _ in bench.take()] == [("seat_left", "viewer 1"), ("seat_taken", "viewer 2")]
     bench.clock.advance_to(2.0)
     lease.ask("page a", 2.0)

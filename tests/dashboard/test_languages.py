@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from handsteer.dashboard.elements import STATIC
-from handsteer.dashboard.languages import LANGUAGES, preferred_language
+from handsteer.dashboard.page import LANGUAGES, preferred_language
 from handsteer.dashboard.settings_fields import FIELDS, SECTION_TITLES
 from handsteer.types import EFFECTS, SIGNS
 

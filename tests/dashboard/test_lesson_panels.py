@@ -4,7 +4,7 @@ import pytest
 
 from handsteer.config import TeachConfig
 from handsteer.dashboard.lesson import Lesson
-from handsteer.dashboard.lesson_report import mistake_words
+from handsteer.dashboard.lesson_page import mistake_words
 from handsteer.dashboard.lesson_state import LessonState, Seen, SignClass, counted, instruction, outcome
 from handsteer.training.custom.collect import Facts, Status
 from handsteer.training.custom.dataset import Dataset

@@ -4,17 +4,19 @@ import itertools
 import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 import pytest
 
 from handsteer.clock import RealClock
 from handsteer.config import Config, TeachConfig
-from handsteer.dashboard.hand_drawing import taught_drawings
 from handsteer.dashboard.lesson_node import LessonNode
 from handsteer.dashboard.lesson_state import SignClass
 from handsteer.dashboard.lessons import KEPT, KEPT_TAKES, Lessons, with_signs
+from handsteer.dashboard.sign_pictures import taught_drawings
 from handsteer.errors import ConfigError, DatasetError, ModelCorrupt
+from handsteer.graph import Graph
 from handsteer.images import image_message
 from handsteer.messages import IMAGE_RAW, Header
 from handsteer.recognition.custom_signs import load_custom_model, save_custom_model
@@ -43,18 +45,15 @@ class School:
         )
         self.config = self.initial = Config(teach=plan)
         self.lessons = Lessons(
-            self.transport,
-            self.clock,
+            cast(Graph, self),
             lambda: (RecordedLandmarker([[hand] for hand in hands] * 1000), open_classifier(Config().signs)),
-            config=lambda: self.config,
-            reconfigure=self._take,
         )
         self.refuses = False
         self._ended = threading.Event()
         self._camera = threading.Thread(target=self._publish)
         self._camera.start()
 
-    def _take(self, config: Config) -> None:
+    def reconfigure(self, config: Config) -> None:
         if self.refuses:
             raise ConfigError("signs.model: refused")
         self.config = config

@@ -7,9 +7,8 @@ import pytest
 from handsteer.clock import SteppedClock
 from handsteer.config import ControlConfig
 from handsteer.control.explain import Reason
-from handsteer.dashboard.audit import PageAudit
 from handsteer.dashboard.node import DashboardNode
-from handsteer.dashboard.viewers import OnDemandNode
+from handsteer.dashboard.viewers import OnDemandNode, PageAudit
 from handsteer.errors import TransportError
 from handsteer.messages import (
     CMD_VEL,
@@ -100,7 +99,11 @@ def test_keeps_the_newest_report_of_every_node_that_reports(bench: Bench) -> Non
     bench.report(RecognitionStatus("Stop", seen="Stop", confidence=0.8, handedness="Left"))
     bench.report(ControlStatus(Reason("stop_sign", "Stop"), "signs"))
     state = bench.node.state()
-    assert (state.sign, state.confidence, state.reason) == ("Stop", 0.8, "the Stop sign is shown")
+    assert (state.recognition.sign, state.recognition.confidence, state.reason) == (
+        "Stop",
+        0.8,
+        "the Stop sign is shown",
+    )
 
 
 def test_tells_the_cameras_frames_a_second(bench: Bench) -> None:
@@ -172,10 +175,10 @@ def test_keeps_the_way_until_the_robot_is_put_back(bench: Bench) -> None:
 
 def test_knows_how_far_the_robot_is_on_its_course(bench: Bench) -> None:
     bench.report(RobotStatus())
-    assert bench.node.state().course is None
+    assert bench.node.state().robot.course is None
     course = CourseState(8, 2, frozenset({1}), 3, 12.5, "running")
     bench.report(RobotStatus(course=course))
-    assert bench.node.state().course == course
+    assert bench.node.state().robot.course == course
 
 
 def test_a_truth_that_is_none_is_not_taken(bench: Bench) -> None:
@@ -256,7 +259,7 @@ def test_understands_what_control_really_says(bench: Bench) -> None:
         bench.clock.advance(0.1)
         node.spin_once()
     state = bench.node.state()
-    assert (state.headline, state.reason, state.driver) == ("Driving", "steered by hand", "steering")
+    assert (state.headline, state.reason, state.control.source) == ("Driving", "steered by hand", "steering")
 
 
 def test_a_node_runs_only_while_somebody_watches() -> None:
@@ -389,5 +392,5 @@ def test_a_report_of_anything_does_not_break_the_page(bench: Bench) -> None:
     for node in ("my_camera", "hand_sign_recognition", "hand_sign_control", "robot", "somebody", ""):
         bench.publish(DIAGNOSTICS, DiagnosticArray(header, [DiagnosticStatus(7, node, "", "", values)]))
     state = bench.node.state()
-    assert (state.headline, state.camera, state.course) == ("Standing", "", None)
+    assert (state.headline, state.camera, state.robot.course) == ("Standing", "", None)
     assert bench.node.callback_errors == 0

@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 from handsteer.config import ControlConfig
 from handsteer.control import Source
 from handsteer.control.explain import Reason
-from handsteer.dashboard.mux_row import mux_inputs
 from handsteer.dashboard.state import (
     STALE_S,
     Observed,
@@ -21,6 +20,7 @@ from handsteer.dashboard.state import (
     frame_rate,
 )
 from handsteer.dashboard.status_bar import spoken
+from handsteer.dashboard.steer_panel import mux_inputs
 from handsteer.dashboard.steering_input import read_deflection, read_number
 from handsteer.nodes.status import CameraStatus, ControlStatus, RecognitionStatus, RobotStatus, Status
 from handsteer.types import SIGNS, ZERO, Velocity
@@ -157,17 +157,32 @@ def test_composes_the_figures() -> None:
         ),
         now_s=0.1,
     )
-    assert (state.sign, state.seen, state.confidence, state.handedness) == ("Forward", "Forward", 0.93, "Left")
+    assert (state.recognition.sign, state.seen, state.recognition.confidence, state.recognition.handedness) == (
+        "Forward",
+        "Forward",
+        0.93,
+        "Left",
+    )
     assert (state.commanded, state.measured) == (Velocity(0.25, 0.0), Velocity(0.24, 0.01))
-    assert (state.latency_median_ms, state.latency_p99_ms, state.fps) == (11.5, 20.0, 30.0)
-    assert (state.path_length_m, state.collisions) == (1.25, 2)
-    assert (state.camera, state.driver, state.no_picture) == ("video0", "signs", "")
+    assert (state.control.latency_median_ms, state.control.latency_p99_ms, state.fps) == (11.5, 20.0, 30.0)
+    assert (state.robot.path_length_m, state.robot.collisions) == (1.25, 2)
+    assert (state.camera, state.control.source, state.no_picture) == ("video0", "signs", "")
 
 
 def test_knows_nothing_before_anything_has_come() -> None:
     state = compose(Observed(), now_s=100.0)
-    assert (state.mood, state.sign, state.commanded, state.no_picture) == ("waiting", "NONE", ZERO, "no report yet")
-    assert (state.latency_median_ms, state.fps, state.path_length_m, state.collisions) == (None, None, None, None)
+    assert (state.mood, state.recognition.sign, state.commanded, state.no_picture) == (
+        "waiting",
+        "NONE",
+        ZERO,
+        "no report yet",
+    )
+    assert (state.control.latency_median_ms, state.fps, state.robot.path_length_m, state.robot.collisions) == (
+        None,
+        None,
+        None,
+        None,
+    )
 
 
 def test_says_why_there_is_no_picture() -> None:
@@ -320,11 +335,6 @@ def test_tells_how_far_a_sign_is_confirmed(sign: str, seen: str | None, progress
     assert compose(observed(RecognitionStatus(sign, seen=seen, progress=progress)), 0.1).confirmed == confirmed
 
 
-def test_knows_the_limits_of_the_control() -> None:
-    state = compose(observed(ControlStatus(rule=ControlConfig(max_linear=0.3, max_angular=1.5))), 0.1)
-    assert (state.max_linear_mps, state.max_angular_radps) == (0.3, 1.5)
-
-
 @given(
     sent=st.one_of(st.none(), st.booleans(), st.text(), st.floats(), st.integers()),
     low=st.floats(-5, 0),
@@ -339,7 +349,7 @@ def test_the_legend_is_of_what_was_last_known() -> None:
     before = compose(observed(), 100.0)
     assert (before.signs, before.rule) == (SIGNS, None)
     after = compose(observed(RecognitionStatus(signs=signs), ControlStatus(rule=rule)), 100.0)
-    assert (after.signs, after.rule, after.max_linear_mps) == (signs, rule, None)
+    assert (after.signs, after.rule, after.control.rule) == (signs, rule, None)
 
 
 def test_a_warning_of_two_nodes_is_shown_once() -> None:

@@ -20,8 +20,9 @@ def test_the_first_who_comes_drives_and_the_others_watch(lease: ControlLease) ->
 
 
 def test_a_driver_who_leaves_frees_the_seat(lease: ControlLease) -> None:
-    assert not lease.leave("ben")
-    assert lease.leave("anna")
+    lease.leave("ben")
+    assert lease.drives("anna")
+    lease.leave("anna")
     assert lease.status_of("ben", 1.0) == LeaseStatus("free")
     assert lease.take("ben", 1.0)
 
@@ -30,27 +31,30 @@ def test_the_driver_may_hand_over(lease: ControlLease) -> None:
     lease.ask("ben", 1.0)
     assert lease.status_of("anna", 4.0) == LeaseStatus("driver", asked=True, left_s=ANSWER_S - 3)
     assert lease.status_of("ben", 4.0) == LeaseStatus("watcher", asked=True, left_s=ANSWER_S - 3)
-    assert not lease.answer("ben", hand_over=True)  # nobody grants his own request
-    assert lease.answer("anna", hand_over=True)
+    lease.answer("ben", hand_over=True)
+    assert lease.drives("anna"), "nobody grants his own request"
+    lease.answer("anna", hand_over=True)
     assert lease.drives("ben")
     assert not lease.drives("anna")
 
 
 def test_the_driver_may_refuse_and_the_other_ask_again(lease: ControlLease) -> None:
     lease.ask("ben", 1.0)
-    assert not lease.answer("anna", hand_over=False)
+    lease.answer("anna", hand_over=False)
     assert lease.status_of("ben", 1.0) == LeaseStatus("watcher")
-    assert not lease.tick(1.0 + 2 * ANSWER_S)
+    lease.tick(1.0 + 2 * ANSWER_S)
+    assert lease.drives("anna")
     lease.ask("ben", 30.0)
     assert lease.status_of("ben", 30.0).asked
 
 
 def test_a_driver_who_does_not_answer_hands_over(lease: ControlLease) -> None:
     lease.ask("ben", 1.0)
-    assert not lease.tick(0.9 + ANSWER_S)
-    assert lease.tick(1.0 + ANSWER_S)
-    assert not lease.take("anna", 2.0 + ANSWER_S)
+    lease.tick(0.9 + ANSWER_S)
+    assert lease.drives("anna")
+    lease.tick(1.0 + ANSWER_S)
     assert lease.drives("ben")
+    assert not lease.take("anna", 2.0 + ANSWER_S)
 
 
 def test_the_seat_goes_to_who_has_asked_when_the_driver_leaves(lease: ControlLease) -> None:

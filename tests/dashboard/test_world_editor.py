@@ -46,14 +46,14 @@ def test_undo_and_redo_go_through_the_worlds_and_forget_what_others_have_changed
     history = History()
     history.note(empty, one)
     history.note(one, two)
-    assert (history.before(), history.after()) == (one, None)
-    history.go_back()
-    history.go_back()
-    assert (history.before(), history.after()) == (None, one)
-    history.go_on()
-    assert (history.before(), history.after()) == (empty, two)
+    assert (history.to(-1), history.to(1)) == (one, None)
+    history.go(-1)
+    history.go(-1)
+    assert (history.to(-1), history.to(1)) == (None, one)
+    history.go(1)
+    assert (history.to(-1), history.to(1)) == (empty, two)
     history.follow((add(one[0], "sphere", START), "empty"))
-    assert (history.before(), history.after()) == (None, None)
+    assert (history.to(-1), history.to(1)) == (None, None)
 
 
 def test_only_the_last_changes_can_be_undone() -> None:
@@ -63,8 +63,8 @@ def test_only_the_last_changes_can_be_undone() -> None:
         history.note(world, after)
         world = after
     steps = 0
-    while history.before():
-        history.go_back()
+    while history.to(-1):
+        history.go(-1)
         steps += 1
     assert steps == MOST_STEPS
 

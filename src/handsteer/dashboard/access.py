@@ -9,11 +9,11 @@ import hashlib
 import hmac
 import secrets
 from dataclasses import dataclass, field
-from http.cookies import CookieError, SimpleCookie
 from typing import Final, Literal
 from urllib.parse import SplitResult, parse_qsl, urlencode, urlsplit
 
 from starlette.datastructures import Headers, MutableHeaders, State
+from starlette.requests import cookie_parser
 from starlette.responses import PlainTextResponse, RedirectResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
@@ -102,11 +102,9 @@ class Access:
 
     @classmethod
     def to(cls, host: str, token: Literal["auto", "always"] = "auto") -> "Access":
-        """Return the rules for a page served on ``host``.
+        """Return the rules for a page served on ``host``, a name or an address.
 
-        Args:
-            host: A name or an address.
-            token: ``auto`` creates a token unless only this machine can reach the page, ``always`` in any case.
+        They have a token unless only this machine can reach the page; with ``always``, in any case.
         """
         is_local = is_loopback(host)
         is_free = is_local and token == "auto"
@@ -120,11 +118,8 @@ class Access:
 class AccessMiddleware:
     """Rejects requests without access: 400 and 403 for pages of other sites, 401 without the token.
 
-    A request without a session is given a new one.
-
-    Args:
-        app: Handles all other requests.
-        state: Has the current :class:`Access` as ``access``, and the :class:`Connections` as ``connections``.
+    A request without a session is given a new one. ``state`` has the current :class:`Access` as ``access``, and the
+    :class:`Connections` as ``connections``.
     """
 
     def __init__(self, app: ASGIApp, state: State) -> None:
@@ -246,11 +241,7 @@ def _parts(address: str) -> SplitResult:
 
 
 def _cookie(headers: Headers, name: str) -> str | None:
-    try:
-        found = SimpleCookie(headers.get("cookie", "")[:_LONGEST_COOKIES]).get(name)
-    except CookieError:
-        return None
-    return found.value if found else None
+    return cookie_parser(headers.get("cookie", "")[:_LONGEST_COOKIES]).get(name)
 
 
 def _bearer(headers: Headers) -> str | None:

@@ -22,10 +22,10 @@ from handsteer.clock import Clock
 from handsteer.dashboard.camera_choices import CameraChoices
 from handsteer.dashboard.elements import box, sentence, switch, text
 from handsteer.dashboard.first_visit import CameraOffer, Coach
-from handsteer.dashboard.legend import DRAWN
 from handsteer.dashboard.page import PICTURE_PATH, Page
 from handsteer.dashboard.remote_graph import RemoteGraph
 from handsteer.dashboard.settings import Settings
+from handsteer.dashboard.sign_pictures import DRAWN
 from handsteer.dashboard.socket_events import is_page_of
 from handsteer.dashboard.state import PageState
 from handsteer.dashboard.viewers import OnDemandNode
@@ -221,16 +221,9 @@ def _resolve(future: "asyncio.Future[bytes | None]", jpeg: bytes | None) -> None
 
 
 class CameraPanel:
-    """The mirrored picture, the recognised sign, and the choice of camera.
+    """The mirrored picture in its ``stage``, the recognised sign, and the choice of camera if there is a ``graph``.
 
-    Args:
-        page: Shows the panel.
-        graph: The graph whose camera can be chosen; None if there is no choice.
-        settings: Those of the graph, to be changed next to the picture; None if they cannot.
-        coaches: Whether a new driver is shown how to drive.
-
-    Attributes:
-        stage: Holds the picture and its overlays.
+    With ``settings``, these can be changed next to the picture; it ``coaches`` a new driver.
     """
 
     def __init__(
@@ -263,17 +256,17 @@ class CameraPanel:
     def update(self, state: PageState) -> None:
         """Show ``state``."""
         # A confirmed sign stays active for a moment when it is not seen.
-        shown = state.sign if state.seen == NONE else state.seen
+        shown = state.recognition.sign if state.seen == NONE else state.seen
         self._sign.set_text("No sign" if shown == NONE else shown)
-        switch(self._sign, "pending", on=shown != state.sign)
+        switch(self._sign, "pending", on=shown != state.recognition.sign)
         confirmed = round(100 * state.confirmed)
         self._ring.style(f"--confirmed: {confirmed}%").props(f"aria-valuenow={confirmed}")
         switch(self._ring, "whole", on=confirmed == 100)
         switch(self._engage, "hidden", on=state.engaging is None)
         engaged = round(100 * (state.engaging or 0.0))
         self._engaging.style(f"--engaged: {engaged}%").props(f"aria-valuenow={engaged}")
-        self._hand.set_text(f"{state.handedness} hand" if state.handedness else "No hand")
-        percent = round(100 * state.confidence) if state.seen != NONE else 0
+        self._hand.set_text(f"{state.recognition.handedness} hand" if state.recognition.handedness else "No hand")
+        percent = round(100 * state.recognition.confidence) if state.seen != NONE else 0
         self._percent.set_text(f"{percent} %" if percent else "")
         self._confidence.style(f"width: {percent}%")
         self._no_picture.set_text(sentence(state.no_picture))

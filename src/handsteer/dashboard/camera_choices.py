@@ -1,6 +1,5 @@
 """Choices next to the picture: the camera, its resolution and view, and from which confidence on a sign counts."""
 
-import asyncio
 from typing import Any, Final
 
 from nicegui import ui
@@ -8,13 +7,12 @@ from nicegui import ui
 from handsteer.cameras import VIRTUAL_HAND
 from handsteer.cameras.choice import BROWSER, CameraChoice, Size
 from handsteer.dashboard.elements import box, sentence, tag, text
-from handsteer.dashboard.first_visit import NOT_THE_DRIVER, why_not
+from handsteer.dashboard.first_visit import NOT_THE_DRIVER, choose_camera
 from handsteer.dashboard.page import Page
 from handsteer.dashboard.remote_graph import RemoteGraph
 from handsteer.dashboard.settings import Settings
 from handsteer.dashboard.settings_fields import FIELDS, Field
 from handsteer.dashboard.state import PageState
-from handsteer.errors import ConfigError, HandsteerError
 
 _THRESHOLD: Final = FIELDS["signs.min_confidence"]
 _SWAP_SIDES: Final = FIELDS["signs.swap_sides"]
@@ -32,13 +30,7 @@ _EMIT_INDEX: Final = "(event) => emit(Number(event.target.value))"
 
 
 class CameraChoices:
-    """A folded panel of choices.
-
-    Args:
-        page: Shows the panel.
-        graph: The graph whose camera is chosen.
-        settings: Those of the graph.
-    """
+    """A folded panel of choices."""
 
     def __init__(self, page: Page, graph: RemoteGraph, settings: Settings) -> None:
         self._page, self._settings = page, settings
@@ -65,8 +57,8 @@ class CameraChoices:
     def update(self, state: PageState) -> None:
         """Show ``state``."""
         self._machine.update()
-        if state.min_confidence is not None and state.min_confidence != self._shown:
-            self._shown = state.min_confidence
+        if state.recognition.min_confidence is not None and state.recognition.min_confidence != self._shown:
+            self._shown = state.recognition.min_confidence
             self._slider.set_value(self._shown)
             self._tell()
         if (swapped := _SWAP_SIDES.value_in(self._settings.running)) != self._is_swapped:
@@ -100,12 +92,7 @@ class CameraChoices:
 
     def _set(self, field: Field, value: str) -> bool:
         """Set a parameter, or say why not; return whether it is set."""
-        trouble = "" if self._page.drives() else NOT_THE_DRIVER
-        if not trouble:
-            try:
-                self._settings.set(field, value)
-            except ConfigError as error:
-                trouble = str(error)
+        trouble = self._page.change(lambda: self._settings.set(field, value), NOT_THE_DRIVER)
         self._trouble.set_text(trouble)
         return not trouble
 
@@ -178,17 +165,10 @@ class _MachineCameras:
             await self._use(self._graph.state.camera_source, self._sizes[number])
 
     async def _use(self, source: str, size: Size) -> None:
-        trouble = NOT_THE_DRIVER
-        if self._page.drives():
-            self._trouble.set_text("")
-            self._progress.set_text(f"Opening {self._graph.camera_name(source)} …")
-            try:
-                await asyncio.wrap_future(self._graph.choose_camera(source, size))
-            except HandsteerError as error:
-                trouble = why_not(error)
-            else:
-                trouble = ""
-            self._progress.set_text("")
+        self._trouble.set_text("")
+        self._progress.set_text(f"Opening {self._graph.camera_name(source)} …")
+        trouble = await choose_camera(self._page, self._graph, source, size)
+        self._progress.set_text("")
         self._trouble.set_text(trouble)
         if trouble:
             self._fill()  # the browser shows what was selected

@@ -10,11 +10,11 @@ from nicegui import ui
 
 from handsteer.audit import without_passwords
 from handsteer.cameras import VIRTUAL_HAND
-from handsteer.cameras.choice import BROWSER, OWN
-from handsteer.dashboard.elements import box, button, read_words, sentence, switch, tag, text
-from handsteer.dashboard.legend import DRAWN
+from handsteer.cameras.choice import BROWSER, OWN, Size
+from handsteer.dashboard.elements import box, button, read_words, sentence, set_property, switch, tag, text
 from handsteer.dashboard.page import Page
 from handsteer.dashboard.remote_graph import RemoteGraph
+from handsteer.dashboard.sign_pictures import DRAWN
 from handsteer.dashboard.state import PageState
 from handsteer.errors import HandsteerError
 from handsteer.types import FORWARD, STOP
@@ -50,18 +50,19 @@ def refusal(sent: object) -> str:
     return read_words(sent)
 
 
-def why_not(error: HandsteerError) -> str:
-    """Return a sentence for viewers on a camera that cannot be used."""
-    return f"{sentence(without_passwords(str(error)))}."
+async def choose_camera(page: Page, graph: RemoteGraph, source: str, size: Size | None = None) -> str:
+    """Choose a camera of ``graph``, if the viewer of ``page`` drives; return why not, in a sentence, or nothing."""
+    if not page.drives():
+        return NOT_THE_DRIVER
+    try:
+        await asyncio.wrap_future(graph.choose_camera(source, size))
+    except HandsteerError as error:
+        return f"{sentence(without_passwords(str(error)))}."
+    return ""
 
 
 class CameraOffer:
-    """Chooses between the graph's camera and the browser's, and says first that a demo hand is shown.
-
-    Args:
-        page: Shows the offer.
-        graph: The graph whose camera is chosen.
-    """
+    """Chooses between the graph's camera and the browser's, and says first that a demo hand is shown."""
 
     def __init__(self, page: Page, graph: RemoteGraph) -> None:
         self._page, self._graph = page, graph
@@ -86,14 +87,7 @@ class CameraOffer:
         switch(self._own, "hidden", on=source == OWN or not has_own)
 
     async def _use_own(self) -> None:
-        trouble = NOT_THE_DRIVER
-        if self._page.drives():
-            trouble = ""
-            try:
-                await asyncio.wrap_future(self._graph.choose_camera(OWN))
-            except HandsteerError as error:
-                trouble = why_not(error)
-        self._refusal.set_text(trouble)
+        self._refusal.set_text(await choose_camera(self._page, self._graph, OWN))
 
 
 _STEPS: Final = (
@@ -113,8 +107,8 @@ def steps_done(done: int, state: PageState) -> int:
     happens = (
         state.seen != FORWARD and state.mood != "driving",
         state.seen == FORWARD,
-        state.driver == "signs" and state.mood == "driving" and not state.measured.is_rest,
-        state.sign == STOP and state.measured.is_rest,
+        state.control.source == "signs" and state.mood == "driving" and not state.measured.is_rest,
+        state.recognition.sign == STOP and state.measured.is_rest,
     )
     return done + 1 if done < len(_STEPS) and happens[done + 1] else done
 
@@ -155,5 +149,4 @@ class Coach:
     def _mark(self) -> None:
         for number, step in enumerate(self._steps):
             switch(step, "done", on=number < self._done)
-            is_next = number == max(0, self._done)
-            step.props('aria-current="step"' if is_next else "", remove="" if is_next else "aria-current")
+            set_property(step, "aria-current", "step" if number == max(0, self._done) else None)

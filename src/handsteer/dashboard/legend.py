@@ -12,58 +12,14 @@ from nicegui import ui
 from handsteer.config import ControlConfig, SignsConfig
 from handsteer.control.explain import effect_words, figures_of
 from handsteer.dashboard.elements import box, button, switch, tag, text
-from handsteer.dashboard.hand_drawing import taught_drawings
 from handsteer.dashboard.page import Page
 from handsteer.dashboard.settings import Settings
 from handsteer.dashboard.settings_fields import FIELDS
-from handsteer.dashboard.sign_pictures import SIGN_PATH
+from handsteer.dashboard.sign_pictures import DRAWN, MOVED_FIST, SIGN_PATH, TAUGHT, taught_drawings
 from handsteer.dashboard.state import PageState
-from handsteer.errors import ConfigError
-from handsteer.types import (
-    BACKWARD,
-    FORWARD,
-    GO,
-    SIGNS,
-    STOP,
-    TURN_LEFT,
-    TURN_RIGHT,
-    action_of,
-)
-
-# The user's right hand in a mirror, in a box of 64 x 64: the palm, then the fingers as thick lines. The thumb is on the
-# left, where a mirror shows the thumb of a right hand with its palm turned to it.
-_PALM = '<rect x="20" y="30" width="26" height="26" rx="10" class="palm"/>'
-_FINGER = '<path d="M{x} 34V{top}" class="finger"/>'
-_FIST = _PALM + "".join(_FINGER.format(x=x, top=29) for x in (23, 30, 37, 43))
-_TUCKED_THUMB = '<path d="M20 44L33 47" class="finger thumb"/>'
-_THUMB_LEFT = _FIST + '<path d="M24 40L6 36" class="finger"/>'
-_FINGERS = "".join(_FINGER.format(x=x, top=top) for x, top in ((23, 13), (30, 8), (37, 10), (43, 17)))
-_OPEN_PALM = f'{_PALM}{_FINGERS}<path d="M22 46L9 34" class="finger"/>'
-_INDEX_UP = _FIST + _FINGER.format(x=23, top=9) + _TUCKED_THUMB
-
-
-def _svg(shapes: str, transform: str = "", classes: str = "") -> str:
-    return (
-        f'<svg viewBox="0 0 64 64" aria-hidden="true" class="{classes}"><g transform="{transform}">{shapes}</g></svg>'
-    )
-
-
-DRAWN: Mapping[str, tuple[str, str]] = {
-    FORWARD: ("index finger up", _svg(_INDEX_UP)),
-    BACKWARD: ("index finger down", _svg(_INDEX_UP, "rotate(180 32 32)")),
-    STOP: ("open palm", _svg(_OPEN_PALM)),
-    TURN_LEFT: ("thumb to your left", _svg(_THUMB_LEFT)),
-    TURN_RIGHT: ("thumb to your right", _svg(_THUMB_LEFT, "matrix(-1 0 0 1 64 0)")),
-    GO: ("closed fist", _svg(_FIST + _TUCKED_THUMB)),
-}
-"""How to hold the hand for each shipped sign, in words and as SVG."""
+from handsteer.types import GO, SIGNS, STOP, action_of
 
 _MOVE = "Move it"
-_ARROWS = "".join(
-    f'<path d="M-6 -21L0 -29L6 -21" transform="translate(32 32) rotate({turn})"/>' for turn in (0, 90, 180, 270)
-)
-_MOVED = _svg(f'<g transform="translate(10.5 5) scale(0.65)">{_FIST}{_TUCKED_THUMB}</g><g class="arrows">{_ARROWS}</g>')
-_TAUGHT = _svg(_OPEN_PALM, classes="taught")  # where no drawing of its takes is known
 
 
 @dataclass(frozen=True)
@@ -100,7 +56,7 @@ def legend(
         action = action_of(sign, rule.actions if rule else {})
         # The semicolon precedes what does not change, which is left out for brevity.
         effect = effect_words(action, rule).partition(";")[0]
-        drawn = DRAWN.get(sign) or ("taught", taught.get(sign, _TAUGHT))
+        drawn = DRAWN.get(sign) or ("taught", taught.get(sign, TAUGHT))
         return LegendEntry(sign, *drawn, effect, figures_of(action, rule) if rule else "")
 
     order = [*(sign for sign in DRAWN if sign in signs), *(sign for sign in signs if sign not in DRAWN)]
@@ -113,7 +69,7 @@ def joystick_legend(rule: ControlConfig) -> tuple[LegendEntry, ...]:
     return (
         LegendEntry("Open the hand", *DRAWN[STOP], "ready; when held, stops at once", ""),
         LegendEntry("Close the fist", *DRAWN[GO], "holds the joystick: here is its middle", ""),
-        LegendEntry(_MOVE, "closed fist", _MOVED, "up is forward, down backward, sideways turns", limits),
+        LegendEntry(_MOVE, "closed fist", MOVED_FIST, "up is forward, down backward, sideways turns", limits),
     )
 
 
@@ -128,23 +84,22 @@ _STEPS = {STOP: "Open the hand", GO: "Close the fist"}
 def active_entry(state: PageState) -> str:
     """Return the name of the entry to highlight; empty, or of no entry, if there is none."""
     if not state.is_joystick:
-        return state.sign
-    if state.driver == "joystick" and not state.commanded.is_zero:
+        return state.recognition.sign
+    if state.control.source == "joystick" and not state.commanded.is_zero:
         return _MOVE
-    return _STEPS.get(state.sign, "")
+    return _STEPS.get(state.recognition.sign, "")
 
 
 _MODE = FIELDS["control.mode"]
+_REFUSAL = "only the driver can change it: ask to drive first"
 _MODES = {"signs": "Signs", "joystick": "Joystick"}
 _TITLES = {"signs": "The signs", "joystick": "The hand as a joystick"}
 
 
 class LegendPanel:
-    """What the hand does, as reported by the nodes, with the active sign or step highlighted; and a switch of the mode.
+    """What the hand does, as reported by the nodes, with the active sign or step highlighted.
 
-    Args:
-        page: Shows the panel.
-        settings: Those of the graph; None if the mode cannot be changed here.
+    With ``settings``, the mode can be changed.
     """
 
     def __init__(self, page: Page, settings: Settings | None) -> None:
@@ -195,17 +150,8 @@ class LegendPanel:
 
     def _choose(self, mode: str) -> None:
         """Change the mode, if this viewer drives; it is not saved to the file."""
-        if self._settings is None:
-            return
-        trouble = ""
-        if not self._page.drives():
-            trouble = "only the driver can change it: ask to drive first"
-        else:
-            try:
-                self._settings.set(_MODE, mode)
-            except ConfigError as error:
-                trouble = str(error)
-        self._trouble.set_text(trouble)
+        if (settings := self._settings) is not None:
+            self._trouble.set_text(self._page.change(lambda: settings.set(_MODE, mode), _REFUSAL))
 
     def _show_bars(self, state: PageState) -> None:
         """Show how confidently each sign is recognised; one message for all bars, because it changes at each update."""
@@ -241,20 +187,15 @@ Bars = tuple[tuple[int, ...], int]
 
 def bars_of(state: PageState) -> Bars:
     """Return the bars of ``state``: how confidently each of its signs is recognised."""
-    confidences = state.confidences or (0.0,) * len(state.signs)
+    recognition = state.recognition
+    confidences = recognition.confidences or (0.0,) * len(state.signs)
     shares = tuple(_STEP * round(100 * max(0.0, min(share, 1.0)) / _STEP) for share in confidences)
-    least = _DEFAULTS.min_confidence if state.min_confidence is None else state.min_confidence
+    least = _DEFAULTS.min_confidence if recognition.min_confidence is None else recognition.min_confidence
     return shares[: len(state.signs)], round(100 * least)
 
 
 class _Tile:
-    """One sign; opened, it shows how to hold the hand.
-
-    Args:
-        entry: What it shows.
-        number: The number of its bar; None without one.
-        on_click: Called with the sign.
-    """
+    """One sign; opened, it shows how to hold the hand. ``number`` is that of its bar; None without one."""
 
     def __init__(self, entry: LegendEntry, number: int | None, on_click: Callable[[str], None]) -> None:
         self.is_open = False

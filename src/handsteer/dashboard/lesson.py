@@ -149,14 +149,7 @@ class Lesson:
         self._set(recorded=None, status=READY)
 
     def see(self, hand: Hand | None, guess: SignGuess, confidences: Mapping[str, float], dt_s: float) -> None:
-        """Process the next frame.
-
-        Args:
-            hand: The hand in it, if any.
-            guess: What the model recognises it as.
-            confidences: The confidence of each sign.
-            dt_s: Seconds since the last frame.
-        """
+        """Process the next frame, ``dt_s`` seconds after the last: its hand, the model's guess, and each confidence."""
         none = {NONE: 1.0 - max(confidences.values(), default=0.0)} if hand is not None else {}
         self._set(seen=Seen(hand is not None, guess.sign, guess.confidence, {**confidences, **none}))
         if self._collector is not None:

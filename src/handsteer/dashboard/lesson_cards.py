@@ -7,11 +7,10 @@ from typing import Final
 from nicegui import ui
 
 from handsteer.dashboard.elements import box, button, switch, tag, text
-from handsteer.dashboard.hand_drawing import draw_hand
-from handsteer.dashboard.legend import DRAWN
 from handsteer.dashboard.lesson import MOST_TAKES, Lesson
 from handsteer.dashboard.lesson_panels import ViewerLesson, set_words
 from handsteer.dashboard.lesson_state import Collected, LessonState, Seen, SignClass, counted
+from handsteer.dashboard.sign_pictures import DRAWN, draw_hand
 from handsteer.training.custom.dataset import typical_hand
 from handsteer.types import EFFECTS, NONE
 
@@ -118,12 +117,7 @@ class _Example:
 
 
 class _ClassCard:
-    """A class of the lesson, which can be changed.
-
-    Attributes:
-        element: The card.
-        label: The sign, or ``NONE``.
-    """
+    """A class of the lesson, which can be changed; its ``label`` is the sign, or ``NONE``."""
 
     def __init__(self, lesson: ViewerLesson, one: SignClass) -> None:
         self._lesson = lesson

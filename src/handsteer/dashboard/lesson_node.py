@@ -37,8 +37,6 @@ class LessonNode(Node):
     Hands are detected a second time, in addition to the recognition, only during a lesson.
 
     Args:
-        transport: Carries the messages.
-        clock: The graph's clock.
         lesson: Used only by this node from here on.
         open_models: Opens the landmarker and the classifier of the shipped signs; called on this node's thread.
     """

@@ -7,9 +7,7 @@ from typing import Final, TypeVar
 
 from nicegui import ui
 
-from handsteer.dashboard.elements import box, button, switch, tag, text
-from handsteer.dashboard.hand_drawing import taught_drawings
-from handsteer.dashboard.legend import DRAWN
+from handsteer.dashboard.elements import box, button, card, set_property, switch, text
 from handsteer.dashboard.lesson import Lesson
 from handsteer.dashboard.lesson_files import CAN_EXPORT, LESSON_PATH
 from handsteer.dashboard.lesson_node import LessonNode
@@ -18,6 +16,7 @@ from handsteer.dashboard.lessons import Lessons
 from handsteer.dashboard.page import Page
 from handsteer.dashboard.settings import Settings
 from handsteer.dashboard.settings_fields import FIELDS
+from handsteer.dashboard.sign_pictures import DRAWN, taught_drawings
 from handsteer.errors import HandsteerError
 from handsteer.recognition.custom_signs import load_custom_model
 from handsteer.types import Action, find_sign
@@ -33,10 +32,7 @@ _LONGEST: Final = 200
 class ViewerLesson:
     """The lesson of a page's viewer.
 
-    Attributes:
-        lessons: Run it.
-        viewer: The viewer.
-        message: An error, or what has happened, while there is no lesson; empty if nothing.
+    While there is none, ``message`` is an error, or what has happened; empty if nothing.
     """
 
     def __init__(self, page: Page, lessons: Lessons) -> None:
@@ -116,18 +112,12 @@ class ViewerLesson:
 
 
 class StartPanel:
-    """Begins a lesson; shows the signs that have been taught.
-
-    Args:
-        lesson: The viewer's lesson.
-        settings: Those of the graph.
-    """
+    """Begins a lesson; shows the signs that have been taught."""
 
     def __init__(self, lesson: ViewerLesson, settings: Settings | None) -> None:
         self._lesson = lesson
         self._shown: object = None
-        with ui.element("section").classes("card panel start") as self.element:
-            tag("h2", "", "Teach your own signs")
+        with card("Teach your own signs", "panel start") as self.element:
             text(
                 "lead", "Show a sign to the camera a few times, train for some seconds, and choose what the robot does."
             )
@@ -227,9 +217,7 @@ def _full(path: Path) -> Path:
 class LessonPanel:
     """What the hand is recognised as, and the tools: train, keep, undo, files, the end.
 
-    Args:
-        lesson: The viewer's lesson.
-        actions: Returns the action that is selected for each sign.
+    ``actions`` returns the action that is selected for each sign.
     """
 
     def __init__(self, lesson: ViewerLesson, actions: Callable[[], Mapping[str, str]]) -> None:
@@ -268,8 +256,8 @@ class LessonPanel:
         self._sign.set_text(sign)
         self._effect.set_text(effect)
         is_idle = state.recorded is None and not state.is_training
-        _enable(self._train, on=state.can_train)
-        _enable(self._keep, on=is_idle)
+        set_property(self._train, "disabled", not state.can_train)
+        set_property(self._keep, "disabled", not is_idle)
         to_keep = state.is_fresh and state.is_changed
         switch(self._train, "primary", on=not to_keep)
         switch(self._keep, "primary", on=to_keep)
@@ -306,10 +294,6 @@ def set_words(element: ui.element, words: str) -> None:
     label = element.default_slot.children[0]
     if isinstance(label, ui.label):
         label.set_text(words)
-
-
-def _enable(element: ui.element, *, on: bool) -> None:
-    element.props(remove="disabled") if on else element.props("disabled")
 
 
 def _download(words: str, address: str, label: str) -> ui.element:

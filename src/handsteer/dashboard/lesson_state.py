@@ -29,10 +29,7 @@ STILL: Final = "Move the hand a little: nearer, farther, tilted."
 def hint(hand: Hand | None, guess: SignGuess, hands: Sequence[Hand]) -> str:
     """Return one sentence on what to improve; empty if nothing.
 
-    Args:
-        hand: The hand in the newest frame.
-        guess: What it is recognised as.
-        hands: The hands of the current take, oldest first.
+    ``hand`` is that in the newest frame, ``hands`` are those of the current take, oldest first.
     """
     if hand is None:
         return NO_HAND
@@ -206,13 +203,7 @@ def instruction(state: LessonState) -> tuple[str, str]:
 
 
 def outcome(seen: Seen | None, least: float, action_of: Callable[[str], Action]) -> tuple[str, str]:
-    """Return in words how the hand is recognised, and what the robot would do.
-
-    Args:
-        seen: The newest frame; None without one.
-        least: The confidence from which on a sign counts.
-        action_of: Returns the action of a sign, current or intended.
-    """
+    """Return in words how the hand is recognised, and what the robot would do; a sign counts from ``least`` on."""
     if seen is None:
         return "No picture", "no picture comes from the camera"
     if not seen.hand:

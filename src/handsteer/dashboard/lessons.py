@@ -2,12 +2,12 @@
 
 import datetime
 import threading
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Final
 
-from handsteer.clock import Clock
 from handsteer.config import Config, ControlConfig, SignsConfig, validate
 from handsteer.dashboard.lesson import Lesson
 from handsteer.dashboard.lesson_node import LessonNode, OpenModels
@@ -21,7 +21,6 @@ from handsteer.recognition.recognizer import open_classifier, open_landmarker
 from handsteer.training.custom.collect import Facts
 from handsteer.training.custom.dataset import Dataset, load_dataset, save_dataset
 from handsteer.training.custom.shared import load_shared, save_shared
-from handsteer.transports.base import Transport
 from handsteer.types import ACTIONS, NONE, Action, action_of, find_sign
 
 KEPT: Final = "Kept, and in use. End the lesson, then press Reset to drive."
@@ -47,40 +46,19 @@ class Lessons:
     :meth:`begin`, :meth:`save`, :meth:`share` and :meth:`take_file` read and write files.
 
     Args:
-        transport: Carries the graph's messages.
-        clock: The graph's clock.
-        open_models: Opens the landmarker and the classifier of the shipped signs, for a lesson.
-        config: Returns the configuration of the running graph.
-        reconfigure: Applies another one to the running graph; raises ConfigError if it is rejected.
+        graph: Uses what is taught.
+        open_models: Opens the landmarker and the classifier of the shipped signs for a lesson; those of the graph's
+            configuration by default.
     """
 
-    def __init__(
-        self,
-        transport: Transport,
-        clock: Clock,
-        open_models: OpenModels,
-        config: Callable[[], Config],
-        reconfigure: Callable[[Config], None],
-    ) -> None:
-        self._transport, self._clock = transport, clock
-        self._plan = config().teach
-        self._open_models = open_models
-        self._config = config
-        self._reconfigure = reconfigure
+    def __init__(self, graph: Graph | RemoteGraph, open_models: OpenModels | None = None) -> None:
+        self._graph = graph
+        self._plan = graph.config.teach
+        self._open_models = open_models or partial(_open_models, graph.config)
         self._lock = threading.RLock()
         self._current: _Current | None = None
         self._draft: LessonState | None = None
         self._closed = False
-
-    @classmethod
-    def of(cls, graph: Graph | RemoteGraph) -> "Lessons":
-        """Return the lessons of a graph."""
-        config = graph.config
-
-        def open_models() -> tuple[Landmarker, Classifier]:
-            return open_landmarker(config), open_classifier(config.signs.model_copy(update={"model": None}))
-
-        return cls(graph.transport, graph.clock, open_models, lambda: graph.config, graph.reconfigure)
 
     @property
     def is_running(self) -> bool:
@@ -95,12 +73,12 @@ class Lessons:
     @property
     def signs(self) -> SignsConfig:
         """The running parameters of recognition."""
-        return self._config().signs
+        return self._graph.config.signs
 
     @property
     def model_path(self) -> Path:
         """The file that the taught model is written to."""
-        return self._config().signs.model or self._plan.model
+        return self._graph.config.signs.model or self._plan.model
 
     @property
     def takes_wanted(self) -> int:
@@ -109,20 +87,17 @@ class Lessons:
 
     def actions(self) -> tuple[Action, ...]:
         """Return the available actions."""
-        several = bool(self._config().control.robots)
+        several = bool(self._graph.config.control.robots)
         return tuple(action for action in ACTIONS if several or action != "next_robot")
 
     def action_of(self, label: str) -> Action:
         """Return the current or default action of the sign ``label``."""
-        return action_of(label, self._config().control.actions)
+        return action_of(label, self._graph.config.control.actions)
 
     def begin(self, viewer: str, person: str = "", *, restore: bool = False) -> None:
         """Begin a lesson on the takes of earlier ones; a lesson abandoned by another viewer ends.
 
-        Args:
-            viewer: The viewer who teaches.
-            person: The person who shows the signs; ``me`` by default.
-            restore: Whether to continue the last lesson, if it was not kept.
+        ``person`` shows the signs; ``me`` by default. With ``restore``, the last lesson goes on, if it was not kept.
 
         Raises:
             DatasetError: It is not a valid name, or the file of takes is damaged.
@@ -142,7 +117,7 @@ class Lessons:
             if restore and self._draft is not None:
                 lesson.restore(self._draft)
             self._draft = None
-            node = LessonNode(self._transport, self._clock, lesson, self._open_models)
+            node = LessonNode(self._graph.transport, self._graph.clock, lesson, self._open_models)
             self._current = _Current(viewer, node, read)
             node.start()
 
@@ -154,11 +129,7 @@ class Lessons:
     def save(self, viewer: str, actions: Mapping[str, str]) -> None:
         """Save the takes, and the model if it was learnt from them, which the graph uses from then on.
 
-        The robot obeys the signs as soon as it may move again.
-
-        Args:
-            viewer: The viewer who teaches.
-            actions: The action of each sign.
+        The robot obeys the signs as soon as it may move again, each by its action of ``actions``.
 
         Raises:
             ConfigError: An action does not exist, or the running nodes reject a sign.
@@ -180,7 +151,7 @@ class Lessons:
                 if state.is_fresh:
                     save_custom_model(state.model, self.model_path.expanduser())
                 removed = [one.label for one in state.kept if one.label not in labels]
-                self._reconfigure(with_signs(self._config(), self.model_path, effects, removed))
+                self._graph.reconfigure(with_signs(self._graph.config, self.model_path, effects, removed))
                 message = KEPT
             save_dataset(dataset, path)
             current.read = _version(path)
@@ -236,6 +207,10 @@ class Lessons:
         if found is None:
             raise ConfigError(f"{name!r} is no action: choose one of {', '.join(self.actions())}")
         return found
+
+
+def _open_models(config: Config) -> tuple[Landmarker, Classifier]:
+    return open_landmarker(config), open_classifier(config.signs.model_copy(update={"model": None}))
 
 
 def with_signs(config: Config, model: Path, actions: Mapping[str, Action], removed: Iterable[str] = ()) -> Config:

@@ -55,11 +55,7 @@ class Connection:
 
 
 class Connections:
-    """Accepts and limits connections; runs on the server's thread only.
-
-    Args:
-        certificate: For secure connections; None for plain ones.
-    """
+    """Accepts and limits connections, secure ones with a ``certificate``; runs on the server's thread only."""
 
     def __init__(self, certificate: ssl.SSLContext | None = None) -> None:
         self._certificate = certificate

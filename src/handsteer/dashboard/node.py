@@ -8,7 +8,6 @@ from typing import Any, cast
 
 from handsteer.audit import WARN
 from handsteer.clock import Clock, to_seconds
-from handsteer.dashboard.audit import PageAudit
 from handsteer.dashboard.state import (
     COMMAND_HOLDS_S,
     Observed,
@@ -18,7 +17,7 @@ from handsteer.dashboard.state import (
     Viewers,
     compose,
 )
-from handsteer.dashboard.viewers import ControlLease
+from handsteer.dashboard.viewers import ControlLease, PageAudit
 from handsteer.dashboard.world_state import (
     PERIOD_S,
     Sample,
@@ -70,8 +69,6 @@ class DashboardNode(Node):
     """Keeps the newest message of each topic for the page.
 
     Args:
-        transport: Carries the messages.
-        clock: The graph's clock.
         steering: Drives when a viewer steers on the page.
         cmd_vel: The topic of the displayed commands. If its type is open and the transport reports types, the commands
             that the control reports are shown instead.
@@ -80,7 +77,6 @@ class DashboardNode(Node):
 
     Attributes:
         world: The contents of the 3D view.
-        lease: The control lease.
         history: The velocities of the last 30 s.
     """
 

@@ -8,9 +8,7 @@ from dataclasses import dataclass
 from nicegui import ui
 
 from handsteer.dashboard.access import SESSION
-from handsteer.dashboard.audit import PageAudit
-from handsteer.dashboard.elements import switch, tag, text
-from handsteer.dashboard.languages import ENGLISH, preferred_language
+from handsteer.dashboard.elements import STATIC, switch, tag, text
 from handsteer.dashboard.lessons import Lessons
 from handsteer.dashboard.node import DashboardNode
 from handsteer.dashboard.recordings import Recordings, duration_text
@@ -18,7 +16,8 @@ from handsteer.dashboard.remote_graph import RemoteGraph
 from handsteer.dashboard.settings import Settings
 from handsteer.dashboard.state import PageState
 from handsteer.dashboard.status_bar import Banner, LeasePanel, TimingLine
-from handsteer.dashboard.viewers import LeaseStatus, OnDemandNode
+from handsteer.dashboard.viewers import LeaseStatus, OnDemandNode, PageAudit
+from handsteer.errors import HandsteerError
 from handsteer.study.session import Session
 
 PICTURE_PATH = "/camera.mjpg"
@@ -63,6 +62,13 @@ _ASSET = {"css": '<link rel="stylesheet" href="{}">', "js": '<script src="{}" de
 _TRANSLATED = '<script src="{0}/languages/{1}.js"></script><script src="{0}/translate.js"></script>'
 # What the browser draws while it still loads the scripts that draw everything else.
 _LOADING = f'<div class="loading" aria-hidden="true" translate="no">{ICON}<b>handsteer</b></div>'
+# The server writes English everywhere. For a browser that prefers another language of static/languages, the script
+# static/translate.js replaces the words where they are shown, by that catalogue.
+ENGLISH = "en"
+LANGUAGES = frozenset({ENGLISH, *(file.stem for file in (STATIC / "languages").glob("*.js"))})
+"""Two-letter codes (ISO 639-1)."""
+
+_LONGEST_HEADER = 500
 _LINKS = (("/", "Drive"), ("/world", "World"), ("/teach", "Teach"), ("/settings", "Settings"))
 _PERIOD_S = 0.1
 _ACK_PATIENCE_S = 5.0
@@ -80,39 +86,36 @@ class PageContext:
 
     Attributes:
         node: Joined while a browser shows a page.
+        audit: Publishes what viewers do.
         graph: The graph, for what pages do in addition to its topics; None if its nodes run elsewhere.
         settings: The graph's parameters, likewise.
         lessons: Teaches the graph signs, likewise.
         study: Leads a participant through a study; None without one.
-        audit: Publishes what viewers do; None if they need no names.
         recordings: Serves recordings; None if none can be made.
     """
 
     node: OnDemandNode[DashboardNode]
+    audit: PageAudit
     graph: RemoteGraph | None = None
     settings: Settings | None = None
     lessons: Lessons | None = None
     study: Session | None = None
-    audit: PageAudit | None = None
     recordings: Recordings | None = None
 
 
 class Page:
-    """One browser's view; its timers run while the browser is connected.
+    """One browser's view at a URL ``path``, with its own stylesheets and scripts (``assets``).
 
-    Args:
-        context: What all pages share.
-        path: The page's URL path, which its link in the head shows.
-        assets: Its stylesheets and scripts.
+    Its timers run while the browser is connected.
     """
 
     def __init__(self, context: PageContext, path: str, *assets: str) -> None:
         self.client = ui.context.client
         self._context = context
-        self._introduce(context.audit)
+        self._introduce()
         self.client.on_disconnect(self._leave)
         self.client.on_delete(self._leave)
-        self.client.on_delete(self._forget)
+        self.client.on_delete(lambda: context.audit.forget(self.client.id))
         ui.add_head_html(_INSTALLABLE)
         ui.add_body_html(_LOADING)
         self._speak(preferred_language(self.client.request.headers.get("accept-language", "")))
@@ -150,15 +153,24 @@ class Page:
         node = self.node
         return node is not None and node.lease.take(self.client.id, node.clock.now())
 
+    def change(self, action: Callable[[], object], refusal: str) -> str:
+        """Call ``action`` if this viewer drives; return an error message, or ``refusal``; empty if it succeeded."""
+        if not self.drives():
+            return refusal
+        try:
+            action()
+        except HandsteerError as error:
+            return str(error)
+        return ""
+
     def lease(self, node: DashboardNode) -> LeaseStatus:
         """Return the control lease as this viewer sees it."""
         return node.lease.status_of(self.client.id, node.clock.now())
 
-    def _introduce(self, audit: PageAudit | None) -> None:
+    def _introduce(self) -> None:
         request = self.client.request
-        if audit is not None:
-            session = request.scope.get("state", {}).get(SESSION, "")
-            audit.introduce(self.client.id, session, request.client.host if request.client else "")
+        session = request.scope.get("state", {}).get(SESSION, "")
+        self._context.audit.introduce(self.client.id, session, request.client.host if request.client else "")
 
     def _speak(self, language: str) -> None:
         if language != ENGLISH:
@@ -166,10 +178,6 @@ class Page:
             self.client.page = copy.copy(self.client.page)
             self.client.page.language = language  # type: ignore[assignment]
             ui.add_head_html(_TRANSLATED.format(ASSETS_PATH, language))
-
-    def _forget(self) -> None:
-        if self._context.audit is not None:
-            self._context.audit.forget(self.client.id)
 
     def _top(self, path: str) -> None:
         with ui.element("header").classes("top"):
@@ -180,7 +188,10 @@ class Page:
                     ui.link(name, target).props('aria-current="page"' if target == path else "")
             self._timing = TimingLine()
             with ui.element("div").classes("right"):
-                self._driving = LeasePanel(self._ask, self._answer)
+                self._driving = LeasePanel(
+                    lambda: self.do(DashboardNode.ask_to_drive),
+                    lambda hand_over: self.do(lambda node, viewer: node.lease.answer(viewer, hand_over=hand_over)),
+                )
                 self._recorded = text("recorded hidden", "").props('title="A recording is being made"')
                 self._source = ui.label("").classes("source chip")
                 with ui.element("button").classes("icon-button theme").props('aria-label="Light or dark"'):
@@ -203,19 +214,38 @@ class Page:
         return oldest is None or now_s - self._unread[1] < _ACK_PATIENCE_S
 
     def _halt(self) -> None:
-        self.do(lambda node, viewer: node.halt(viewer))
+        self.do(DashboardNode.halt)
 
     def _reset(self) -> None:
-        self.do(lambda node, viewer: node.reset(viewer))
-
-    def _ask(self) -> None:
-        self.do(lambda node, viewer: node.ask_to_drive(viewer))
-
-    def _answer(self, hand_over: bool) -> None:
-        self.do(lambda node, viewer: node.lease.answer(viewer, hand_over=hand_over))
+        self.do(DashboardNode.reset)
 
     def _leave(self) -> None:
         node = self._context.node
         if node.is_watched_by(self.client.id) and (joined := node.join(self.client.id)):
             joined.leave(self.client.id)
         node.leave(self.client.id)
+
+
+def preferred_language(accept: str) -> str:
+    """Return the language of the page that a browser wants most; English if it wants none of them.
+
+    ``accept`` is its ``Accept-Language`` header (RFC 9110, section 12.5.4), for example ``de-CH, de;q=0.9, en;q=0.8``.
+    """
+    wanted: dict[str, float] = {}
+    for item in accept[:_LONGEST_HEADER].split(","):
+        name, _, weight = item.partition(";")
+        language = name.strip().partition("-")[0].lower()
+        if language in LANGUAGES:
+            wanted[language] = max(_weight(weight), wanted.get(language, 0.0))
+    best = max(wanted, key=wanted.__getitem__, default=ENGLISH)  # the first of equals
+    return best if wanted.get(best, 0.0) > 0.0 else ENGLISH
+
+
+def _weight(parameter: str) -> float:
+    name, _, value = parameter.strip().partition("=")
+    if name.strip().lower() != "q":
+        return 1.0
+    try:
+        return float(value)
+    except ValueError:
+        return 0.0

@@ -10,8 +10,8 @@ from concurrent.futures import Future, InvalidStateError
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from handsteer.dashboard.audit import PageAudit
 from handsteer.dashboard.remote_graph import GraphServer, RemoteGraph
+from handsteer.dashboard.viewers import PageAudit
 from handsteer.errors import DashboardError, needing
 from handsteer.graph import Graph
 from handsteer.study.session import Task

@@ -19,7 +19,7 @@ from handsteer.cameras.browser import check_frame
 from handsteer.cameras.choice import BROWSER, OWN, CameraChoice, Size
 from handsteer.clock import Clock
 from handsteer.config import Config
-from handsteer.dashboard.audit import PageAudit
+from handsteer.dashboard.viewers import PageAudit
 from handsteer.errors import ConfigError, FrameError, HandsteerError, TransportError
 from handsteer.graph import Graph
 from handsteer.making import make_steering
@@ -62,7 +62,6 @@ class GraphServer:
 
     Args:
         pipe: Not started yet; connected to a :class:`RemoteGraph`.
-        graph: The graph.
         file: The YAML file that its parameters were read from, which settings are saved to.
         study: What the page leads a participant through, if anything.
     """
@@ -143,8 +142,6 @@ class RemoteGraph:
         pipe: Not started yet; connected to a :class:`GraphServer`.
 
     Attributes:
-        transport: Carries the graph's messages.
-        clock: The graph's clock.
         state: What the graph has reported last.
         steering: Runs in this process; not started.
         study: What the page leads a participant through, if anything.

@@ -9,6 +9,7 @@ from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Literal
 
+import cv2
 import numpy as np
 from nicegui import ui
 from nicegui.elements.scene.scene_object3d import Object3D
@@ -203,14 +204,9 @@ Rotation = NDArray[np.float64]
 
 
 def about_axis(axis: Vector, angle: float) -> Rotation:
-    """Return the rotation by ``angle`` in rad about ``axis`` of any length (Rodrigues' formula); none for axis 0."""
-    length = math.hypot(*axis)
-    if not length:
-        return np.eye(3)
-    x, y, z = (part / length for part in axis)
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    turn: Rotation = np.eye(3) + math.sin(angle) * cross + (1 - math.cos(angle)) * cross @ cross
-    return turn
+    """Return the rotation by ``angle`` in rad about ``axis`` of any length; none for axis 0."""
+    length = math.hypot(*axis) or 1.0
+    return np.asarray(cv2.Rodrigues(np.array([angle * part / length for part in axis]))[0], np.float64)
 
 
 def from_rpy(rpy: Vector) -> Rotation:

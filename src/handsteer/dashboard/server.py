@@ -19,7 +19,6 @@ from handsteer.cameras.browser import LARGEST_BYTES
 from handsteer.clock import Clock
 from handsteer.config import DEFAULT_FILE, DashboardConfig
 from handsteer.dashboard.access import HEADERS, Access, AccessMiddleware
-from handsteer.dashboard.audit import PageAudit
 from handsteer.dashboard.camera import FrameSocket, PictureNode, PictureResponse
 from handsteer.dashboard.drive_page import DrivePage
 from handsteer.dashboard.elements import STATIC
@@ -45,7 +44,7 @@ from handsteer.dashboard.settings_page import SettingsPage
 from handsteer.dashboard.sign_pictures import serve_sign_pictures
 from handsteer.dashboard.socket_events import SocketEvents
 from handsteer.dashboard.study_page import StudyPage
-from handsteer.dashboard.viewers import OnDemandNode
+from handsteer.dashboard.viewers import OnDemandNode, PageAudit
 from handsteer.dashboard.world_page import WorldPage
 from handsteer.dashboard.world_state import VelocityHistory
 from handsteer.errors import DashboardError
@@ -74,8 +73,6 @@ class Dashboard:
     NiceGUI keeps its state per process, so a process serves one page at a time.
 
     Args:
-        transport: Carries the graph's messages.
-        clock: The graph's clock.
         steering: Drives when a viewer steers on the page.
         config: Address and options of the page.
         cmd_vel: The topic of the displayed commands.
@@ -109,7 +106,7 @@ class Dashboard:
         audit = PageAudit(transport, clock) if graph is None else graph.audit
         self.node = OnDemandNode(lambda: DashboardNode(transport, clock, steering, cmd_vel, history, audit=audit))
         self.pictures = OnDemandNode(lambda: PictureNode(transport, clock))
-        self.context = PageContext(self.node, audit=audit)
+        self.context = PageContext(self.node, audit)
         if graph is not None:
             settings_file = SettingsFile(file or DEFAULT_FILE, is_read=file is not None)
             settings = Settings(
@@ -120,7 +117,7 @@ class Dashboard:
             )
             study = Session(graph.study) if graph.study is not None else None
             recordings = Recordings(graph.config.recording.folder, lambda: graph.state.recording)
-            self.context = PageContext(self.node, graph, settings, Lessons.of(graph), study, audit, recordings)
+            self.context = PageContext(self.node, audit, graph, settings, Lessons(graph), study, recordings)
         self.webcam = FrameSocket(graph, self._drives)
         self._config = config
         self._server: uvicorn.Server | None = None

@@ -18,8 +18,6 @@ from handsteer.hand.script import parse_script
 from handsteer.parameters import plain
 from handsteer.robots.world import load_world
 
-"""Default file for settings, in the working directory."""
-
 _COMMENT = re.compile(r"(^|\s)#", re.MULTILINE)
 
 # These select the defaults of other fields.
@@ -41,7 +39,6 @@ class Settings:
         on_save: Called with what was done, once the settings are saved.
 
     Attributes:
-        file: The file that settings are saved to.
         wanted: The parameters in the form: those of the next start, once saved.
         revision: Counts changes and saves.
     """

@@ -130,9 +130,7 @@ class Field:
     def parse(self, text: str, current: Any = None) -> Any:
         """Return the value of ``text``, validated like a value in a YAML file.
 
-        Args:
-            text: From :meth:`show`, or entered by a viewer.
-            current: The current value, which contains the masked passwords.
+        Passwords that :meth:`show` has masked are those of the ``current`` value.
 
         Raises:
             ConfigError: It is not valid YAML or not an allowed value; the message is that for a file.

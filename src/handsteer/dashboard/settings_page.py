@@ -4,14 +4,13 @@ from collections.abc import Callable, Iterator
 
 from nicegui import ui
 
-from handsteer.dashboard.elements import box, button, identifier, switch, tag, text
+from handsteer.dashboard.elements import box, button, identifier, set_property, switch, tag, text
 from handsteer.dashboard.node import DashboardNode
 from handsteer.dashboard.page import Page, PageContext
 from handsteer.dashboard.settings import Settings
 from handsteer.dashboard.settings_fields import COMMON, FIELDS, FORM, SECTION_TITLES, Field
 from handsteer.dashboard.settings_row import Row
 from handsteer.dashboard.state import PageState
-from handsteer.errors import HandsteerError
 from handsteer.parameters import section_model
 
 _LONGEST_SEARCH = 100
@@ -33,7 +32,7 @@ class SettingsPage(Page):
             with ui.element("section").classes("card panel"):
                 text("elsewhere", _ELSEWHERE)
         else:
-            self._panel = SettingsPanel(context.settings, self.drives)
+            self._panel = SettingsPanel(context.settings, self)
 
     def show(self, node: DashboardNode, state: PageState) -> None:
         """Show changes."""
@@ -44,16 +43,10 @@ class SettingsPage(Page):
 
 
 class SettingsPanel:
-    """All parameters, with a search, and buttons to load and save the file.
+    """All parameters, with a search, and buttons to load and save the file."""
 
-    Args:
-        settings: The parameters.
-        drives: Returns whether this viewer may change anything, after giving it the lease if that is free.
-    """
-
-    def __init__(self, settings: Settings, drives: Callable[[], bool]) -> None:
-        self._settings = settings
-        self._drives = drives
+    def __init__(self, settings: Settings, page: Page) -> None:
+        self._settings, self._page = settings, page
         self._shown: tuple[object, ...] = ()
         self._groups: list[_Group] = []
         self._toolbar()
@@ -112,23 +105,16 @@ class SettingsPanel:
             self._place = text("place", "")
             self._message = text("said", "").props('role="status"')
 
-    def _change(self, change: Callable[[], object], done: str = "") -> str | None:
-        """Make a change if this viewer may, and show ``done`` or the error message; return the latter, if any."""
-        error = None
-        if not self._drives():
-            error = "only the driver can change settings: ask to drive first"
-        else:
-            try:
-                change()
-            except HandsteerError as problem:
-                error = str(problem)
+    def _change(self, change: Callable[[], object], done: str = "") -> str:
+        """Make a change if this viewer may, and show ``done`` or the error message; return the latter."""
+        error = self._page.change(change, "only the driver can change settings: ask to drive first")
         self._message.set_text(error or done)
-        switch(self._message, "wrong", on=error is not None)
+        switch(self._message, "wrong", on=bool(error))
         return error
 
     def _save_file(self) -> None:
         done: list[str] = []
-        if self._change(lambda: done.append(self._settings.save())) is None:
+        if not self._change(lambda: done.append(self._settings.save())):
             self._message.set_text(done[0])
 
     def _load_file(self) -> None:
@@ -169,13 +155,6 @@ class _Group:
 
     Args:
         name: The section's name in the file, or ``common``; the anchor that the link leads to.
-        title: Its title.
-        meaning: A line on it.
-        link: Its link.
-
-    Attributes:
-        body: Contains the rows.
-        rows: Its rows.
     """
 
     def __init__(self, name: str, title: str, meaning: str, link: ui.link) -> None:
@@ -192,7 +171,6 @@ class _Group:
             self.body = box("rows")
         with link:
             self._count = tag("span", "count", "")
-        self._unfold(on=self._is_open)
 
     def update(self, settings: Settings, *, searched: bool) -> None:
         """Show how many values differ from the default; while ``searched``, unfold it if it has a row to show."""
@@ -202,10 +180,4 @@ class _Group:
         is_found = any(row.is_found for row in self.rows)
         switch(self._card, "hidden", on=not is_found)
         switch(self._link, "hidden", on=not is_found)
-        self._unfold(on=is_found if searched else self._is_open)
-
-    def _unfold(self, *, on: bool) -> None:
-        if on:
-            self._card.props("open")
-        else:
-            self._card.props(remove="open")
+        set_property(self._card, "open", is_found if searched else self._is_open)

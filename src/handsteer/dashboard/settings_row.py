@@ -17,17 +17,13 @@ class Row:
     """One parameter: its meaning, its value, and a reset to its default.
 
     Attributes:
-        field: The parameter.
-        element: The row.
         is_found: Whether the search finds it.
 
     Args:
-        field: The parameter.
-        settings: The parameters.
-        change: Makes a change if this viewer may; returns an error message, or None.
+        change: Makes a change if this viewer may; returns an error message, or an empty text.
     """
 
-    def __init__(self, field: Field, settings: Settings, change: Callable[[Callable[[], object]], str | None]) -> None:
+    def __init__(self, field: Field, settings: Settings, change: Callable[[Callable[[], object]], str]) -> None:
         self.field = field
         self.is_found = True
         self._settings = settings
@@ -127,17 +123,17 @@ class Row:
         error = self._change(lambda: self._settings.set(self.field, entered))
         self._give_up(error)
         # Invalid text stays to be corrected; an invalid choice returns to the value that is set.
-        self._is_edited = error is not None and isinstance(self._input, ui.input)
+        self._is_edited = bool(error) and isinstance(self._input, ui.input)
 
     def _to_default(self) -> None:
         self._give_up(self._change(lambda: self._settings.reset(self.field)))
 
-    def _give_up(self, error: str | None = None) -> None:
+    def _give_up(self, error: str = "") -> None:
         """End the edit, show ``error``, and then the value that is set."""
         self._is_edited = False
         self._shown = ()
         if not isinstance(self._input, ui.switch):
-            self._input.error = error and self._without_name(error)
+            self._input.error = self._without_name(error) if error else None
 
     def _without_name(self, error: str) -> str:
         return error.removeprefix(self.field.path).removeprefix(": ")

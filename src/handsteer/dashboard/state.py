@@ -6,10 +6,9 @@ from dataclasses import dataclass, field
 from typing import Literal, TypeVar
 
 from handsteer.config import ControlConfig
-from handsteer.control import Source
 from handsteer.nodes.status import ERROR, OK, CameraStatus, ControlStatus, RecognitionStatus, RobotStatus, Status
 from handsteer.timeouts import ODOMETRY_S, ROBOT_S
-from handsteer.types import NONE, SIGNS, ZERO, CourseState, Velocity
+from handsteer.types import NONE, SIGNS, ZERO, Velocity
 
 S = TypeVar("S", bound=Status)
 
@@ -24,12 +23,7 @@ COMMAND_HOLDS_S = ROBOT_S
 
 @dataclass(frozen=True)
 class Report:
-    """The last report of a node on ``/diagnostics``.
-
-    Attributes:
-        status: What it reports.
-        came_s: Time of arrival in seconds of the graph's clock.
-    """
+    """The last report of a node on ``/diagnostics``, and its time of arrival in seconds of the graph's clock."""
 
     status: Status
     came_s: float
@@ -124,30 +118,20 @@ class PageState:
         mood: Selects the colour of the banner.
         headline: What the robot does, in one or two words.
         reason: Why it does so.
-        sign: The confirmed sign.
+        recognition: The recognition's status, its defaults while it is silent.
+        control: The control's status, likewise.
+        robot: The robot's status, likewise.
         seen: The sign in the newest frame alone.
-        confidence: Of ``seen``, 0 to 1.
-        confidences: Of each of ``signs`` in the newest frame, 0 to 1, in the same order; empty if unknown.
-        min_confidence: The smallest confidence that counts; None if unknown.
-        handedness: ``Left``, ``Right`` or empty.
         signs: The signs that can be recognised, as last reported.
         rule: Configures the signs' actions, as last reported by the control; None if unknown.
         no_picture: Why there are no pictures; empty if there are.
         camera: Short name of the camera.
-        driver: The active input.
         stopped: Whether the robot is stopped until reset.
         commanded: The commanded velocity, zero without a command.
         measured: The velocity from odometry.
-        latency_median_ms: Latency from capture to command; None if unknown.
-        latency_p99_ms: 99th percentile of the same.
         fps: Frame rate of the camera in Hz; None if unknown.
-        path_length_m: Distance driven; None if not reported.
-        collisions: Number of collisions with obstacles; None if not reported.
         confirmed: Progress of confirming ``seen``, 0 to 1 (confirmed).
         viewers: The viewers' activity.
-        max_linear_mps: Speed limit of the control, either way; None if not reported.
-        max_angular_radps: Likewise, for turning.
-        course: Progress on the world's course; None without one.
         engaging: Progress of engaging the hand, 0 to 1; None if it is engaged, or cannot be.
         sides_swapped: Whether the picture is as the camera sees it, because recognition swaps left and right.
         warnings: Problems that do not stop operation, such as two nodes that command one robot; a sentence each.
@@ -156,33 +140,23 @@ class PageState:
     mood: Mood
     headline: str
     reason: str
-    sign: str
+    recognition: RecognitionStatus
+    control: ControlStatus
+    robot: RobotStatus
     seen: str
-    confidence: float
-    handedness: str
     signs: tuple[str, ...]
     rule: ControlConfig | None
     no_picture: str
     camera: str
-    driver: Source
     stopped: bool
     commanded: Velocity
     measured: Velocity
-    latency_median_ms: float | None
-    latency_p99_ms: float | None
     fps: float | None
-    path_length_m: float | None
-    collisions: int | None
     confirmed: float
     viewers: Viewers
-    max_linear_mps: float | None
-    max_angular_radps: float | None
-    course: CourseState | None = None
-    engaging: float | None = None
-    warnings: tuple[str, ...] = ()
-    confidences: tuple[float, ...] = ()
-    min_confidence: float | None = None
-    sides_swapped: bool = False
+    engaging: float | None
+    warnings: tuple[str, ...]
+    sides_swapped: bool
 
     @property
     def is_joystick(self) -> bool:
@@ -193,7 +167,7 @@ class PageState:
 def compose(observed: Observed, now_s: float, viewers: Viewers = NO_VIEWERS) -> PageState:
     """Return the page's state at ``now_s``, in seconds of the graph's clock, as one of its ``viewers`` sees it."""
     reporting = Reporting.at(now_s, observed)
-    seen, control = reporting.recognition or RecognitionStatus(), reporting.control or ControlStatus()
+    recognition, control = reporting.recognition or RecognitionStatus(), reporting.control or ControlStatus()
     robot = reporting.robot or RobotStatus()
     mood, headline, reason = explain(reporting, viewers, is_moving=observed.is_moving(now_s))
     # What was last known of a node that has fallen silent.
@@ -203,31 +177,21 @@ def compose(observed: Observed, now_s: float, viewers: Viewers = NO_VIEWERS) -> 
         mood=mood,
         headline=headline,
         reason=reason,
-        sign=seen.sign,
-        seen=seen.seen or NONE,
-        confidence=seen.confidence,
-        handedness=seen.handedness,
+        recognition=recognition,
+        control=control,
+        robot=robot,
+        seen=recognition.seen or NONE,
         signs=(last_seen and last_seen.signs) or SIGNS,
         rule=last_control.rule if last_control else None,
         no_picture=why_no_picture(reporting),
         camera=reporting.camera.short_name if reporting.camera else "",
-        driver=control.source,
         stopped=stopped,
         commanded=observed.command if now_s - observed.command_came_s < COMMAND_HOLDS_S else ZERO,
         measured=observed.measured,
-        latency_median_ms=control.latency_median_ms,
-        latency_p99_ms=control.latency_p99_ms,
         fps=frame_rate(observed.frame_counts, now_s),
-        path_length_m=robot.path_length_m,
-        collisions=robot.collisions,
-        confirmed=confirmed(seen),
+        confirmed=confirmed(recognition),
         viewers=viewers,
-        max_linear_mps=control.rule.max_linear if control.rule else None,
-        max_angular_radps=control.rule.max_angular if control.rule else None,
-        course=robot.course,
         engaging=None if control.engaged or stopped else max(0.0, min(control.engage_progress, 1.0)),
-        confidences=seen.confidences,
-        min_confidence=seen.min_confidence,
         sides_swapped=last_seen is not None and last_seen.sides_swapped,
         warnings=tuple(dict.fromkeys(warning for warning in (control.warning, robot.warning) if warning)),
     )
@@ -263,11 +227,6 @@ def explain(reporting: Reporting, viewers: Viewers = NO_VIEWERS, *, is_moving: b
 
     The control reports whether the robot is commanded to move. If it is not, because no sign is confirmed, the reason
     lies upstream: the camera gives no picture, no hand is in view, or the hand shows no sign.
-
-    Args:
-        reporting: The status of each node that is not silent.
-        viewers: The viewers' activity, which the control does not know.
-        is_moving: Whether the robot is measured to move.
     """
     if viewers.topic and viewers.steers:
         return "driving", "Driving", f"steered by hand, straight on {viewers.topic}"

@@ -17,12 +17,7 @@ UNKNOWN = "--"
 
 
 class LeasePanel:
-    """Whether this viewer drives, and buttons to request or hand over the control lease.
-
-    Args:
-        ask: Called to request the lease.
-        answer: Called with True to hand it over, with False to keep it.
-    """
+    """Whether this viewer drives, and buttons to request the lease, or to hand it over (``answer(True)``)."""
 
     _WORDS: ClassVar[dict[Role, str]] = {
         "driver": "you drive",
@@ -69,7 +64,9 @@ class TimingLine:
         if time.monotonic() < self._due_s:
             return
         self._due_s = time.monotonic() + 1.0
-        typical, slowest = (_rounded(value) for value in (state.latency_median_ms, state.latency_p99_ms))
+        typical, slowest = (
+            _rounded(value) for value in (state.control.latency_median_ms, state.control.latency_p99_ms)
+        )
         self._times.set_text(f"{typical} / {slowest} ms")
         self._rate.set_text(f"{_rounded(state.fps)} frames/s")
 

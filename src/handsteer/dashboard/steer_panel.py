@@ -2,11 +2,12 @@
 
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 
 from nicegui import ui
 
-from handsteer.dashboard.elements import box, button, card, read_words, switch, text
-from handsteer.dashboard.mux_row import MuxRow
+from handsteer.dashboard.elements import box, button, card, read_words, set_property, switch, text
+from handsteer.dashboard.node import DashboardNode
 from handsteer.dashboard.page import Page
 from handsteer.dashboard.state import PageState
 from handsteer.dashboard.steering_input import SteeringInput, read_deflection, read_number
@@ -26,20 +27,60 @@ _HINTS = {
 _LATE = "Your command came too late and was ignored: is the network slow? If not, reload the page."
 
 
+@dataclass(frozen=True)
+class MuxInput:
+    """One input of the twist mux.
+
+    Attributes:
+        name: Its display name.
+        is_active: Whether it drives the robot, or stops it.
+        viewer: The viewer whose input it is, while active; empty if unknown.
+    """
+
+    name: str
+    is_active: bool
+    viewer: str = ""
+
+
+def mux_inputs(state: PageState) -> tuple[MuxInput, ...]:
+    """Return the inputs in order of priority; at most one is active."""
+    directly = bool(state.viewers.topic and state.viewers.steers)
+    by_hand = not state.stopped and (directly or state.control.source == "steering")
+    by_air = not state.stopped and not by_hand and state.control.source in ("signs", "joystick")
+    return (
+        MuxInput("Stop", state.stopped, state.viewers.stopped),
+        MuxInput("By hand", by_hand, state.viewers.steered or "another node"),
+        MuxInput("Joystick" if state.is_joystick else "Signs", by_air),
+    )
+
+
+class _MuxRow:
+    """The inputs in a row, with the active one highlighted."""
+
+    def __init__(self) -> None:
+        with box("mux").props('role="group" aria-label="The active input; the first one overrides the others"'):
+            text("name", "Active input")
+            self._chips = [text("source chip", name) for name in ("Stop", "By hand", "Signs")]
+
+    def update(self, state: PageState) -> None:
+        """Show ``state``."""
+        for chip, each in zip(self._chips, mux_inputs(state), strict=True):
+            chip.set_text(f"{each.name}: {each.viewer}" if each.is_active and each.viewer else each.name)
+            set_property(chip, "aria-current", "true" if each.is_active else None)
+            switch(chip, "holds", on=each.is_active)
+
+
 class SteerPanel:
     """A pad that drives while it is held, and sliders that drive while the page is in front.
 
     In the browser, a gamepad and the tilt of a phone move the pad.
-
-    Args:
-        page: Shows the panel.
     """
 
     def __init__(self, page: Page) -> None:
         self._page = page
         self._input = SteeringInput()
         with card("Steer by hand", "panel steer") as self._card:
-            self._mux = MuxRow()
+            self._mux = _MuxRow()
             button("Hold to drive by tilt", label="Hold to drive by tilting this device").classes("tilt")
             with box("row"):
                 with box("pad-side"):
@@ -76,10 +117,11 @@ class SteerPanel:
         if not can_steer:
             self._input.sliders = ZERO
         self._show_sliders()
-        limits = (state.max_linear_mps, state.max_angular_radps)
+        rule = state.control.rule
+        limits = (rule.max_linear, rule.max_angular) if rule else (0.0, 0.0)
         for slider, limit in zip((self._linear, self._angular), limits, strict=True):
             slider.enable(on=can_steer)
-            if all(limits) and limit:
+            if all(limits):
                 slider.restrict(limit)
         self._hint.set_text(_LATE if self._input.is_late else _HINTS[lease.role])
         switch(self._hint, "late", on=self._input.is_late)
@@ -89,7 +131,7 @@ class SteerPanel:
         """Stop steering from this page and set the sliders to zero."""
         self._input.sliders = ZERO
         self._show_sliders()
-        self._page.do(lambda node, viewer: node.release(viewer))
+        self._page.do(DashboardNode.release)
 
     def _hold_pad(self, sent: object) -> None:
         x, y = read_deflection(sent)
@@ -177,7 +219,7 @@ class _Slider:
         if self._slider.enabled != on:
             self._slider.set_enabled(on)
             for each in self._buttons:
-                each.props("" if on else "disabled", remove="disabled" if on else "")
+                set_property(each, "disabled", not on)
 
     def _limit(self, label: str, name: str, value: float) -> ui.number:
         number = ui.number(name, value=value, step=_SLIDER_STEP, format="%.2f", on_change=self._read_limits)
@@ -204,13 +246,7 @@ class _Slider:
 
 
 class TopicPanel:
-    """The name of the steering topic, and its consequences.
-
-    Args:
-        page: Shows the panel.
-        steering: Is released before the topic changes.
-        has_choice: Whether the viewer may choose another topic.
-    """
+    """The name of the steering topic, which the viewer may change if it ``has_choice``, and its consequences."""
 
     def __init__(self, page: Page, steering: SteerPanel, *, has_choice: bool) -> None:
         self._page, self._steering = page, steering

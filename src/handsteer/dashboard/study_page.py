@@ -126,7 +126,7 @@ class StudyPage(Page):
             self.end("repeated")
             self._card.message = self._card.message or _LOST
             return
-        self.lead(lambda: session.note(state.course, state.path_length_m, node.clock.now()))
+        self.lead(lambda: session.note(state.robot.course, state.robot.path_length_m, node.clock.now()))
         if session.lap is None:
             self._halt()
         elif lap.course is None and session.lap.course is not None:
@@ -158,11 +158,7 @@ class StudyPage(Page):
 
 
 class _StudyCard:
-    """The current step.
-
-    Attributes:
-        message: What went wrong, or empty.
-    """
+    """The current step, and in ``message`` what went wrong, or nothing."""
 
     def __init__(self, session: Session, page: StudyPage) -> None:
         self._session, self._page = session, page

@@ -1,11 +1,17 @@
-"""The control lease: one viewer at a time drives, the others watch and may request it."""
+"""The viewers of the page: the control lease, the nodes that run for them, and what the audit says of them."""
 
+import itertools
 import threading
+from collections import OrderedDict
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass
 from typing import Generic, Literal, TypeVar
 
+from handsteer.audit import INFO, AuditCode, AuditEvent
+from handsteer.clock import Clock
+from handsteer.nodes.auditing import Auditor
 from handsteer.nodes.base import Node
+from handsteer.transports.base import Transport
 
 ANSWER_S = 10.0
 """A request that the driver does not answer within this time is granted."""
@@ -29,19 +35,8 @@ class LeaseStatus:
     left_s: float = 0.0
 
 
-@dataclass(frozen=True)
-class SeatChange:
-    """The lease has got another holder.
-
-    Attributes:
-        before: The driver before; None if there was none.
-        after: The driver now; None if there is none.
-        how: Why it has changed.
-    """
-
-    before: str | None
-    after: str | None
-    how: SeatChangeReason
+OnSeat = Callable[[str | None, str | None, SeatChangeReason], None]
+"""Called with the driver before and after a change of the lease, None if there is none, and why it has changed."""
 
 
 class ControlLease:
@@ -54,7 +49,7 @@ class ControlLease:
         on_change: Called with each change of the driver; must return at once, and not use the lease.
     """
 
-    def __init__(self, on_change: Callable[[SeatChange], None] = lambda _: None) -> None:
+    def __init__(self, on_change: OnSeat = lambda *_: None) -> None:
         self._on_change = on_change
         self._lock = threading.Lock()
         self._driver: str | None = None
@@ -86,32 +81,27 @@ class ControlLease:
             elif self._driver != viewer and self._request is None:
                 self._request = (viewer, now_s + ANSWER_S)
 
-    def answer(self, viewer: str, *, hand_over: bool) -> bool:
-        """Grant or refuse the request, if ``viewer`` is the driver; return whether the driver has changed."""
+    def answer(self, viewer: str, *, hand_over: bool) -> None:
+        """Grant or refuse the request, if ``viewer`` is the driver."""
         with self._lock:
-            if self._driver != viewer or self._request is None:
-                return False
-            asker, self._request = self._request[0], None
-            if hand_over:
-                self._change(asker, "handed_over")
-            return hand_over
+            if self._driver == viewer and self._request is not None:
+                asker, self._request = self._request[0], None
+                if hand_over:
+                    self._change(asker, "handed_over")
 
-    def leave(self, viewer: str) -> bool:
-        """Release the lease or withdraw a request; return whether ``viewer`` was the driver."""
+    def leave(self, viewer: str) -> None:
+        """Release the lease, which grants a pending request, or withdraw a request."""
         with self._lock:
             if self._request is not None and self._request[0] == viewer:
                 self._request = None
-            if self._driver != viewer:
-                return False
-            # A pending request is granted.
-            self._change(self._request[0] if self._request else None, "left")
-            self._request = None
-            return True
+            if self._driver == viewer:
+                self._change(self._request[0] if self._request else None, "left")
+                self._request = None
 
-    def tick(self, now_s: float) -> bool:
-        """Grant a request that has not been answered in time; return whether the driver has changed."""
+    def tick(self, now_s: float) -> None:
+        """Grant a request that has not been answered in time."""
         with self._lock:
-            return self._hand_over_if_due(now_s)
+            self._hand_over_if_due(now_s)
 
     def status_of(self, viewer: str, now_s: float) -> LeaseStatus:
         """Return the lease as ``viewer`` sees it."""
@@ -124,16 +114,14 @@ class ControlLease:
                 return LeaseStatus("driver", asker is not None, left_s)
             return LeaseStatus("watcher", asker == viewer, left_s)
 
-    def _hand_over_if_due(self, now_s: float) -> bool:
-        if self._request is None or now_s < self._request[1]:
-            return False
-        self._change(self._request[0], "unanswered")
-        self._request = None
-        return True
+    def _hand_over_if_due(self, now_s: float) -> None:
+        if self._request is not None and now_s >= self._request[1]:
+            self._change(self._request[0], "unanswered")
+            self._request = None
 
     def _change(self, driver: str | None, how: SeatChangeReason) -> None:
         before, self._driver = self._driver, driver
-        self._on_change(SeatChange(before, driver, how))
+        self._on_change(before, driver, how)
 
 
 N = TypeVar("N", bound=Node)
@@ -187,3 +175,81 @@ class OnDemandNode(Generic[N]):
         if self._node is not None:
             self._node.stop()
             self._node = None
+
+
+_MOST_SESSIONS = 1000
+_UNKNOWN = "a viewer"
+
+
+class PageAudit:
+    """Publishes what viewers do; may be called on any thread.
+
+    Attributes:
+        driver: Name of the driver, or of the last one.
+        on_driver: Called with the viewer that has got the seat, or None if it is free; must return at once.
+    """
+
+    def __init__(self, transport: Transport, clock: Clock) -> None:
+        self.driver = "dashboard"
+        self.on_driver: Callable[[str | None], None] = lambda _: None
+        self._auditor = Auditor(transport, "dashboard", clock)
+        self._clock = clock
+        self._lock = threading.RLock()
+        self._numbers = itertools.count(1)
+        self._sessions: OrderedDict[str, int] = OrderedDict()
+        self._names: dict[str, str] = {}
+
+    def introduce(self, viewer: str, session: str, address: str) -> None:
+        """Name ``viewer``; pages of one session have one number."""
+        with self._lock:
+            number = self._sessions.pop(session, None) or next(self._numbers)
+            self._sessions[session or viewer] = number
+            if len(self._sessions) > _MOST_SESSIONS:
+                self._sessions.popitem(last=False)
+            self._names[viewer] = f"viewer {number} ({address})" if address else f"viewer {number}"
+
+    def introduce_program(self, viewer: str) -> None:
+        """Name a viewer that is no page but a program by its own name."""
+        with self._lock:
+            self._names[viewer] = viewer
+
+    def forget(self, viewer: str) -> None:
+        """Forget the name of a viewer who has left."""
+        with self._lock:
+            self._names.pop(viewer, None)
+
+    def name_of(self, viewer: str) -> str:
+        """Return the name of ``viewer``, such as ``viewer 1 (127.0.0.1)``."""
+        return self._names.get(viewer, _UNKNOWN)
+
+    def person_of(self, viewer: str) -> str:
+        """Return what is the same for all pages of one browser, even of those that it has left."""
+        return self._names.get(viewer, viewer)
+
+    def say(self, code: AuditCode, viewer: str, sentence: str, about: str = "", level: int = INFO) -> None:
+        """Publish what ``viewer`` does."""
+        with self._lock:
+            self._auditor.say(AuditEvent(code, self.name_of(viewer), sentence, about, level), self._clock.now())
+
+    def say_of_driver(self, code: AuditCode, sentence: str, about: str = "") -> None:
+        """Publish what the driver does."""
+        with self._lock:
+            self._auditor.say(AuditEvent(code, self.driver, sentence, about), self._clock.now())
+
+    def on_seat(self, before: str | None, after: str | None, how: SeatChangeReason) -> None:
+        """Publish who has left the seat and who has taken it."""
+        self.on_driver(after)
+        leaver, taker = (viewer and self.name_of(viewer) for viewer in (before, after))
+        if before is not None:
+            left = {"handed_over": f"handed the seat over to {taker}", "unanswered": "lost the seat: gave no answer"}
+            code: AuditCode = "seat_lost" if how == "unanswered" else "seat_left"
+            self.say(code, before, left.get(how, "left the seat"))
+        if after is not None:
+            self.driver = str(taker)
+            taken = {
+                "free": "took the seat, which was free",
+                "handed_over": f"took the seat, which {leaver} handed over",
+                "unanswered": f"took the seat from {leaver}, who gave no answer",
+                "left": f"took the seat, which {leaver} left",
+            }
+            self.say("seat_taken", after, taken[how])

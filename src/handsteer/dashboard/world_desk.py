@@ -1,10 +1,10 @@
 """Changes of the robot's world by one viewer, with undo and redo."""
 
 import asyncio
-from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future
 from functools import partial
+from typing import Literal
 
 from handsteer.dashboard.page import Page
 from handsteer.dashboard.remote_graph import RemoteGraph
@@ -21,62 +21,41 @@ _ANSWER_TIMEOUT_S = 5.0
 Named = tuple[World, str]
 """A world, and the name that it was loaded by."""
 
+Step = Literal[-1, 1]
+"""Undo, or redo."""
+
 
 class History:
-    """Worlds before and after the present one; forgotten when the world was changed by others."""
+    """The present world between those before and after it; forgotten when the world was changed by others."""
 
     def __init__(self) -> None:
-        self._past: deque[Named] = deque(maxlen=MOST_STEPS)
-        self._future: list[Named] = []
-        self._now: Named | None = None
+        self._worlds: list[Named] = []  # oldest first
+        self._at = 0  # the present one
 
     def note(self, before: Named, now: Named) -> None:
         """Remember the change from ``before`` to ``now``."""
         self.follow(before)
         if now != before:
-            self._past.append(before)
-            self._future.clear()
-            self._now = now
+            self._worlds = [*self._worlds[: self._at + 1][-MOST_STEPS:], now]
+            self._at = len(self._worlds) - 1
 
     def follow(self, now: Named) -> None:
         """Forget everything if ``now`` is not the result of the last change."""
-        if now != self._now:
-            self._past.clear()
-            self._future.clear()
-        self._now = now
+        if not self._worlds or now != self._worlds[self._at]:
+            self._worlds, self._at = [now], 0
 
-    def before(self) -> Named | None:
-        """Return the world that undo leads to."""
-        return self._past[-1] if self._past else None
+    def to(self, step: Step) -> Named | None:
+        """Return the world that undo (-1) or redo (1) leads to."""
+        at = self._at + step
+        return self._worlds[at] if 0 <= at < len(self._worlds) else None
 
-    def after(self) -> Named | None:
-        """Return the world that redo leads to."""
-        return self._future[-1] if self._future else None
-
-    def go_back(self) -> None:
-        """Note that the last change was undone."""
-        if self._now is not None:
-            self._future.append(self._now)
-        self._now = self._past.pop()
-
-    def go_on(self) -> None:
-        """Note that it was made again."""
-        if self._now is not None:
-            self._past.append(self._now)
-        self._now = self._future.pop()
+    def go(self, step: Step) -> None:
+        """Note that the last change was undone (-1), or made again (1)."""
+        self._at += step
 
 
 class WorldDesk:
-    """Changes the world of a simulated robot, if this viewer drives.
-
-    Args:
-        page: The viewer's page.
-        graph: The robot's graph; None if it cannot be accessed.
-        show: Shows a message.
-
-    Attributes:
-        history: The changes that can be undone.
-    """
+    """Changes the world of a simulated robot, if this viewer drives; calls ``show`` with messages."""
 
     def __init__(self, page: Page, graph: RemoteGraph | None, show: Callable[[str], object]) -> None:
         self._page, self.graph, self._show = page, graph, show
@@ -129,11 +108,11 @@ class WorldDesk:
 
     async def undo(self) -> None:
         """Undo the last change that this page has made."""
-        await self._go(self.history.before, self.history.go_back, "Undone.", "There is nothing to undo.")
+        await self._go(-1, "Undone.", "There is nothing to undo.")
 
     async def redo(self) -> None:
         """Make again the last change that was undone."""
-        await self._go(self.history.after, self.history.go_on, "Made again.", "There is nothing to make again.")
+        await self._go(1, "Made again.", "There is nothing to make again.")
 
     async def _do(self, request: Callable[[], Future[None]], done: str, name: str | None = None) -> bool:
         async with self._changing:
@@ -147,20 +126,20 @@ class WorldDesk:
                     self.history.note(before, now)
             return succeeded
 
-    async def _go(self, to: Callable[[], Named | None], note: Callable[[], None], done: str, none: str) -> None:
+    async def _go(self, step: Step, done: str, none: str) -> None:
         graph = self.changeable()
         if graph is None:
             return
         self.follow()
         async with self._changing:
-            target = to()
+            target = self.history.to(step)
             if target is None:
                 self._show(none)
                 return
             self.stop()
             if await self._wait_for(graph.change_world(partial(replace, by=target[0])), done):
                 graph.world_name = target[1]
-                note()
+                self.history.go(step)
 
     def _named(self) -> Named | None:
         return (self.world, self.graph.world_name) if self.graph is not None and self.world is not None else None

@@ -2,7 +2,7 @@
 
 import asyncio
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any, get_args
 
@@ -10,8 +10,7 @@ from nicegui import ui
 
 from handsteer.dashboard.elements import box, button, switch, text
 from handsteer.dashboard.world_desk import WorldDesk
-from handsteer.dashboard.world_form import ThingForm
-from handsteer.dashboard.world_plan import Tool, WorldPlan, read_tool
+from handsteer.dashboard.world_plan import ThingForm, Tool, WorldPlan, read_tool
 from handsteer.errors import WorldError
 from handsteer.robots import Shape
 from handsteer.robots.editing import (
@@ -42,6 +41,9 @@ _TOOLS: dict[Tool, tuple[str, str]] = {
     "wall": ("Wall", "Press where the wall begins, drag to where it ends, and release."),
     "gate": ("Gate", "Press at the gate's left post, drag to its right post, and release: it is passed forward."),
 }
+Key = tuple[Section, str]
+"""A thing or gate, by its section and name."""
+
 _NOTHING = "Choose a thing on the plan or in this list to change its size, place or colour."
 
 _READ_FILE = f"""async (event) => {{
@@ -52,20 +54,10 @@ _READ_FILE = f"""async (event) => {{
 
 
 class WorldEditor:
-    """Edits the world of a simulated robot, for the driver.
-
-    Args:
-        desk: Changes the world.
-        plan: Shows it.
-        show: Shows a message.
-
-    Attributes:
-        robot: Pose of the robot; new things are placed near it.
-    """
+    """Edits the world of a simulated robot, for the driver; new things are placed near the pose ``robot``."""
 
     def __init__(self, desk: WorldDesk, plan: WorldPlan, show: Callable[[str], object]) -> None:
         self._desk, self._plan, self._show = desk, plan, show
-        self._chosen: tuple[Section, str] | None = None
         self._world: World | None = None
         self.robot = Pose2D(0.0, 0.0, 0.0)
         plan.on("pick", lambda event: self.pick(event.args))
@@ -87,7 +79,7 @@ class WorldEditor:
 
     def properties(self) -> None:
         """Make the inputs of the chosen thing."""
-        self._things = ui.select({}, on_change=self._on_choice)
+        self._things = ui.select({}, on_change=self._show_choice)
         self._things.props(f'{_SELECT} aria-label="Which thing to change"')
         self._nothing = text("hint", _NOTHING)
         self._form = ThingForm(self._edit)
@@ -120,14 +112,14 @@ class WorldEditor:
     def pick(self, sent: object) -> None:
         """Select the thing or gate that a browser names."""
         if found := self._named(sent):
-            self._things.set_value(_key(*found))
+            self._things.set_value(found)
 
     async def drop(self, sent: object) -> None:
         """Move the thing or gate that a browser names, unless it is already there."""
         found, to = self._named(sent), _read_place(sent, "x", "y")
-        thing = self._thing(found)
-        if found is None or thing is None or to is None:
+        if found is None or to is None:
             return
+        _, thing = self._all[found]
         if math.dist(place(thing), to) > _LEAST_MOVE_M:
             await self._edit(found[1], put(thing, to), found[0])
         self._plan.update()  # a refused thing returns
@@ -155,26 +147,24 @@ class WorldEditor:
         for each, element in self._tools.items():
             element.props(f'aria-pressed="{"true" if each == tool else "false"}"')
 
-    def _named(self, sent: object) -> tuple[Section, str] | None:
-        """Return section and name of what a browser names by its index, which may be anything."""
+    @property
+    def _all(self) -> dict[Key, tuple[int, Thing | Gate]]:
+        """All things and gates, with their index in the section."""
+        world = self._desk.world or World()
+        sections: dict[Section, Sequence[Thing | Gate]] = {"obstacles": world.obstacles, "gates": world.gates}
+        return {(section, of[at].name): (at, of[at]) for section, of in sections.items() for at in range(len(of))}
+
+    @property
+    def _chosen(self) -> Key | None:
+        """The chosen thing or gate, which may be gone."""
+        chosen: Key | None = self._things.value
+        return chosen
+
+    def _named(self, sent: object) -> Key | None:
+        """Return what a browser names by its section and index, which may be anything."""
         values = sent if isinstance(sent, dict) else {}
-        index, section = values.get("index"), values.get("section")
-        for each in _sections(self._desk.world):
-            things = each[1]
-            if each[0] == section and isinstance(index, int) and 0 <= index < len(things):
-                return each[0], things[index].name
-        return None
-
-    def _thing(self, key: tuple[Section, str] | None) -> Thing | Gate | None:
-        found = self._place_of(key)
-        return None if found is None else dict(_sections(self._desk.world))[found[0]][found[1]]
-
-    def _place_of(self, key: tuple[Section, str] | None) -> tuple[Section, int] | None:
-        for section, things in _sections(self._desk.world):
-            for index, thing in enumerate(things):
-                if (section, thing.name) == key:
-                    return section, index
-        return None
+        named = (values.get("section"), values.get("index"))
+        return next((key for key, (index, _) in self._all.items() if (key[0], index) == named), None)
 
     async def _add(self, shape: Shape) -> None:
         await self._add_last(partial(add, shape=shape, robot=self.robot), "obstacles")
@@ -182,9 +172,9 @@ class WorldEditor:
     async def _add_last(self, change: Change, section: Section) -> None:
         if await self._desk.change(change):
             self.update()
-            if things := dict(_sections(self._desk.world))[section]:
-                self._things.set_value(_key(section, things[-1].name))
-                self._show(f"Added {things[-1].name}.")
+            if keys := [key for key in self._all if key[0] == section]:
+                self._things.set_value(keys[-1])
+                self._show(f"Added {keys[-1][1]}.")
 
     async def _edit(self, name: str, fields: dict[str, Any], section: Section | None = None) -> None:
         section = section or (self._chosen[0] if self._chosen else "obstacles")
@@ -231,38 +221,20 @@ class WorldEditor:
             graph.saved_world = world
 
     def _refresh(self) -> None:
-        names = {_key(section, thing.name): thing.name for section, of in _sections(self._desk.world) for thing in of}
-        value = _key(*self._chosen) if self._place_of(self._chosen) and self._chosen else None
-        if names != self._things.options or value != self._things.value:
-            self._things.set_options(names, value=value)
-        self._show_choice()
-
-    def _on_choice(self) -> None:
-        found = (
-            (section, thing.name)
-            for section, things in _sections(self._desk.world)
-            for thing in things
-            if _key(section, thing.name) == self._things.value
-        )
-        self._chosen = next(found, None)
+        names = {key: key[1] for key in self._all}
+        if names != self._things.options:
+            self._things.set_options(names)
         self._show_choice()
 
     def _show_choice(self) -> None:
-        thing = self._thing(self._chosen)
+        chosen = self._chosen
+        index, thing = self._all.get(chosen, (0, None)) if chosen else (0, None)
         self._form.show(thing)
-        self._plan.choose(self._place_of(self._chosen))
+        self._plan.choose((chosen[0], index) if chosen and thing else None)
         switch(self._nothing, "hidden", on=thing is not None)
         switch(self._delete, "hidden", on=thing is None)
         for each in (self._earlier, self._later):
             switch(each, "hidden", on=not isinstance(thing, Gate))
-
-
-def _sections(world: World | None) -> tuple[tuple[Section, tuple[Thing | Gate, ...]], ...]:
-    return () if world is None else (("obstacles", world.obstacles), ("gates", world.gates))
-
-
-def _key(section: Section, name: str) -> str:
-    return f"{section} {name}"
 
 
 def _read_place(sent: Any, x: str | int, y: str | int) -> Place | None:

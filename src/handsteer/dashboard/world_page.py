@@ -2,7 +2,7 @@
 
 from nicegui import ui
 
-from handsteer.dashboard.elements import box, button, set_property, switch, tag, text
+from handsteer.dashboard.elements import box, button, card, set_property, switch, tag, text
 from handsteer.dashboard.node import DashboardNode
 from handsteer.dashboard.page import Page, PageContext
 from handsteer.dashboard.state import PageState
@@ -38,13 +38,11 @@ class WorldPage(Page):
                     button("-", lambda: plan.run_method("zoom", 1.25), "Zoom out")
             self._editor = WorldEditor(desk, plan, self._message.set_text)
             with box("side"):
-                with ui.element("section").classes("card panel"):
-                    tag("h2", "", "Add and move")
+                with card("Add and move", "panel"):
                     self._editor.tools()
                     snap = ui.switch("snap to 0.1 m and 15°", value=True)
                     snap.on_value_change(lambda event: plan.snap(on=bool(event.value)))
-                with ui.element("section").classes("card panel"):
-                    tag("h2", "", "Chosen thing")
+                with card("Chosen thing", "panel"):
                     self._editor.properties()
             with files:
                 self._editor.files()
@@ -63,7 +61,7 @@ class WorldPage(Page):
             self._name.set_text(graph.world_name)
             self._saved.set_text("no unsaved changes" if is_saved else "unsaved changes")
             switch(self._saved, "unsaved", on=not is_saved)
-        for element, target in ((self._undo, history.before()), (self._redo, history.after())):
+        for element, target in ((self._undo, history.to(-1)), (self._redo, history.to(1))):
             set_property(element, "disabled", target is None)
 
     def _fit(self) -> None:

@@ -24,12 +24,7 @@ _VIEWS: tuple[tuple[View, str, str], ...] = (
 
 
 class WorldPanel:
-    """The robot in its world.
-
-    Args:
-        page: Shows the panel.
-        graph: The graph whose world can be changed; None if it cannot be accessed.
-    """
+    """The robot in its world."""
 
     def __init__(self, page: Page, graph: RemoteGraph | None) -> None:
         self._collisions: int | None = None
@@ -57,11 +52,11 @@ class WorldPanel:
     def update(self, state: PageState, world: WorldState) -> None:
         """Show ``state`` and ``world``."""
         self._view.update(world)
-        self._driver.set_text(_DRIVERS.get(state.driver, state.driver))
-        self._path.set_text(UNKNOWN if state.path_length_m is None else f"{state.path_length_m:.1f} m")
-        self._bumps.set_text(UNKNOWN if state.collisions is None else str(state.collisions))
-        self._course.update(state.course)
-        self._flash(state.collisions)
+        self._driver.set_text(_DRIVERS.get(state.control.source, state.control.source))
+        self._path.set_text(UNKNOWN if state.robot.path_length_m is None else f"{state.robot.path_length_m:.1f} m")
+        self._bumps.set_text(UNKNOWN if state.robot.collisions is None else str(state.robot.collisions))
+        self._course.update(state.robot.course)
+        self._flash(state.robot.collisions)
 
     def _look(self, view: View) -> None:
         """Move the camera to the start of ``view``."""
