@@ -28,6 +28,7 @@ from handsteer.transports.base import UNNAMED
 from handsteer.transports.dds.discovery import Endpoint, Matching, RosGraph
 from handsteer.transports.dds.network import Network
 from handsteer.transports.dds.topics import dds_type, opaque_type, reader_qos, service_dds_type, service_qos, writer_qos
+from handsteer.transports.ros2.base_transport import Other
 from handsteer.transports.ros2.encoding import NodeName, dds_type_name, reply_type, request_type, ros_type_name
 
 _USER_DATA = b"enclave=/;"
@@ -107,18 +108,17 @@ class Participant:
         """Return the nodes of other processes, and their publishers and subscribers with the node of each, if known."""
         return self._graph.nodes(), [(end, self._graph.node_of(key)) for key, end in self._matching.others().items()]
 
-    def publishers_of(self, name: str) -> list[str]:
-        """Return the node of each publisher of the topic of this full name in other processes.
+    def others_of(self, name: str) -> list[Other]:
+        """Return the publishers and subscribers of the topic of this full name in other processes.
 
         Names of nodes come up to three seconds late.
         """
-        ends = self._matching.others().items()
-        return [self._graph.node_of(key) or UNNAMED for key, end in ends if end.publishes and end.topic == f"rt{name}"]
-
-    def subscribed_types(self, name: str) -> set[str]:
-        """Return the types of the subscribers of the topic of this full name in other processes."""
-        others = self._matching.others().values()
-        return {ros_type_name(end.type) for end in others if not end.publishes and end.topic == f"rt{name}"}
+        _, ends = self.others()
+        return [
+            Other(node or UNNAMED, ros_type_name(end.type), end.publishes)
+            for end, node in ends
+            if end.topic == f"rt{name}"
+        ]
 
     def release(self, endpoint: DataWriter[Any] | DataReader[Any]) -> None:
         """Release a writer or reader; it is deleted when the caller drops its reference too."""

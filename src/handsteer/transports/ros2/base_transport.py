@@ -11,7 +11,7 @@ import time
 from abc import abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, ClassVar, Generic, Protocol, TypeVar
+from typing import Any, ClassVar, Generic, NamedTuple, Protocol, TypeVar
 
 from handsteer.clock import Clock
 from handsteer.errors import TransportError
@@ -190,6 +190,14 @@ class Ros2Transport(BaseTransport):
         """Return the types of the subscribers of ``topic`` in other processes."""
 
 
+class Other(NamedTuple):
+    """A publisher or subscriber in another process: the full name of its node, and the type of its messages."""
+
+    node: str
+    type: str
+    publishes: bool
+
+
 class WireTransport(Ros2Transport):
     """Carries messages without ROS 2's own library, and services too.
 
@@ -205,7 +213,8 @@ class WireTransport(Ros2Transport):
 
     def publishers_of(self, topic: Topic[Any]) -> list[str]:
         """Return the full names of the ROS 2 nodes that publish ``topic``, in this process and others."""
-        return sorted([*super().publishers_of(topic), *self._other_publishers(self.topic_name(topic))])
+        others = [other.node for other in self._others(self.topic_name(topic)) if other.publishes]
+        return sorted([*super().publishers_of(topic), *others])
 
     def topic_name(self, topic: Topic[Any]) -> str:
         """Return the topic's full name in the graph, remapped."""
@@ -232,8 +241,11 @@ class WireTransport(Ros2Transport):
         """Offer a service, as in :meth:`serve`; return a function that ends it, and is called once."""
 
     @abstractmethod
-    def _other_publishers(self, name: str) -> list[str]:
-        """Return the node of each publisher of the topic of this full name in other processes."""
+    def _others(self, name: str) -> list[Other]:
+        """Return the publishers and subscribers of the topic of this full name in other processes."""
+
+    def _subscribed_types(self, topic: Topic[Any]) -> set[str]:
+        return {other.type for other in self._others(self.topic_name(topic)) if not other.publishes}
 
 
 Take = Callable[[bytes, bytes, float | None], None]
