@@ -2,11 +2,12 @@
 
 import itertools
 import time
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import Any, Protocol
+from typing import Any
 
 from tests.contracts.node_contract import CMD_VEL, FORWARD, ODOM, Driver, Running, Twists, twists
-from tests.processes import Peer, Process, eventually
+from tests.processes import Peer, Process, Processes, as_tests_drive, eventually
 
 NODE = "hand_sign_control"
 SCRIPT = ("-p", "virtual_hand.script:=Forward:60")
@@ -16,14 +17,42 @@ SETTLE_S = 0.3
 _numbers = itertools.count()
 
 
-class PeerGraph(Protocol):
-    """Processes with a plain program among them that looks on, as :class:`tests.dds.graph.DdsGraph` has them."""
+class PeerGraph(Processes, ABC):
+    """The processes of a test in a graph of ROS 2, with one plain program among them that looks on.
 
+    Attributes:
+        env: Environment of the processes.
+        peer: The plain program.
+        transport: What joins our nodes.
+    """
+
+    env: dict[str, str]
     peer: Peer
+    transport: str
 
-    def node(self, verb: str, *arguments: str, name: str, ros: tuple[str, ...] = ()) -> Process: ...
+    @abstractmethod
+    def start_peer(self) -> Peer:
+        """Start a plain program; wait until it is ready."""
 
-    def publishes(self, node: str, topic: str) -> bool: ...
+    @abstractmethod
+    def handsteer(self, *arguments: str) -> Process:
+        """Start ``handsteer`` with ``arguments`` in this graph."""
+
+    @abstractmethod
+    def publishes(self, node: str, topic: str) -> bool:
+        """Return whether the plain program knows that the node of this full name publishes ``topic``."""
+
+    def node(self, verb: str, *arguments: str, name: str, ros: tuple[str, ...] = ()) -> Process:
+        """Start one of handsteer's nodes and wait until it is in the graph under ``name``."""
+        words = ("--ros-args", *ros) if ros else ()
+        process = self.handsteer(verb, "--transport", self.transport, *as_tests_drive(verb, arguments), *words)
+        eventually(lambda: name in self.nodes() or not process.running, what=f"{name} to start")
+        assert process.running, process.text
+        return process
+
+    def nodes(self) -> dict[str, Any]:
+        """Return the nodes as the plain program knows them: what they publish and subscribe to."""
+        return dict(self.peer.ask("graph"))
 
 
 class DdsDriver(Driver):

@@ -3,14 +3,13 @@
 import json
 import subprocess
 import sys
-from pathlib import Path
 from typing import Any
 
 import pytest
 
 pytest.importorskip("cyclonedds")
 
-from tests.dds.graph import DdsGraph, dds_graph
+from tests.dds.graph import DdsGraph
 from tests.processes import eventually
 
 DRIVEN = "robot_diff_drive_controller/cmd_vel:=/robot_diff_drive_controller/cmd_vel"
@@ -24,17 +23,16 @@ def look(domain: DdsGraph) -> dict[str, Any]:
 
 
 @pytest.mark.slow
-def test_nodes_topics_and_what_is_amiss(tmp_path: Path) -> None:
-    with dds_graph(tmp_path) as domain:
-        domain.node("control", name="/hand_sign_control")
-        domain.node("control", name="/r1/other", ros=("-r", "__ns:=/r1", "-r", "__node:=other", "-r", DRIVEN))
-        domain.peer.ask("advertise", topic="/eye", type="Image", reliable=False)
-        domain.peer.ask("introduce", name="talker")
-        viewer = domain.start_peer()
-        viewer.ask("record", topic="/eye", type="Image", fields=["height"], reliable=True)
-        viewer.ask("introduce", name="viewer")
-        seen = eventually(lambda: found if len((found := look(domain))["nodes"]) == 4 else None, what="all nodes")
-    assert seen["place"] == f"domain {domain.domain}, this machine"
+def test_nodes_topics_and_what_is_amiss(fresh: DdsGraph) -> None:
+    fresh.node("control", name="/hand_sign_control")
+    fresh.node("control", name="/r1/other", ros=("-r", "__ns:=/r1", "-r", "__node:=other", "-r", DRIVEN))
+    fresh.peer.ask("advertise", topic="/eye", type="Image", reliable=False)
+    fresh.peer.ask("introduce", name="talker")
+    viewer = fresh.start_peer()
+    viewer.ask("record", topic="/eye", type="Image", fields=["height"], reliable=True)
+    viewer.ask("introduce", name="viewer")
+    seen = eventually(lambda: found if len((found := look(fresh))["nodes"]) == 4 else None, what="all nodes")
+    assert seen["place"] == f"domain {fresh.domain}, this machine"
     assert seen["nodes"] == ["/hand_sign_control", "/r1/other", "/talker", "/viewer"]
     topics = {topic["name"]: topic for topic in seen["topics"]}
     assert topics["/gesture/hand_sign"]["types"] == ["std_msgs/msg/String"]

@@ -109,6 +109,12 @@ def publish(order: dict[str, Any]) -> bool:
     return True
 
 
+def publish_raw(order: dict[str, Any]) -> bool:
+    """Send bytes that are no message."""
+    publishers[order["topic"]].publish(bytes.fromhex(order["hex"]))
+    return True
+
+
 def run_clock(order: dict[str, Any]) -> bool:
     """Publish simulated time at 50 Hz, beside other orders."""
     publisher = publishers["/clock"]
@@ -251,6 +257,7 @@ ORDERS = {
         advertise,
         listeners,
         publish,
+        publish_raw,
         run_clock,
         shift,
         graph,

@@ -2,16 +2,12 @@
 
 import subprocess
 
-import pytest
+from tests.ros2.graph import NEEDS_ROS2, PYTHON
 
-from tests.ros2.graph import PYTHON
-
+pytestmark = NEEDS_ROS2
 TIMEOUT_S = 600.0
 
 
-@pytest.mark.ros2
-@pytest.mark.slow
-@pytest.mark.skipif(not PYTHON.exists(), reason="no ROS 2 here: make ros2 installs one for the tests")
 def test_the_transport_keeps_its_contract_where_rclpy_is() -> None:
     tests = "tests/transports/rclpy/in_ros2.py"
     command = [str(PYTHON), "-m", "pytest", "-q", "-p", "no:cacheprovider", "-p", "no:xdist", tests]
