@@ -299,13 +299,14 @@ class TransportContract:
         assert split_reporter(transport.full_name("my_camera"))[1] == "my_camera"
 
 
-class Ros2Contract(TransportContract):
-    """Inherit, and provide ``session``: this process as the node ``/r1/tests``."""
+class SessionContract(TransportContract):
+    """Inherit, and provide ``session``: this process as a node whose name is ``full_name``."""
 
     settle_s = 0.3
+    full_name = "/r1/tests"
 
     def name_of(self, node: str) -> str:
-        return "/r1/tests"
+        return self.full_name
 
     @pytest.fixture
     def session(self) -> Iterator[Session]:
@@ -321,5 +322,5 @@ class Ros2Contract(TransportContract):
         return session.clock
 
     def test_the_process_has_its_full_name(self, session: Session) -> None:
-        assert session.name == "/r1/tests"
-        assert session.transport.full_name("my_camera") == "r1/tests: my_camera"
+        assert session.name == self.full_name
+        assert session.transport.full_name("my_camera") == f"{self.full_name[1:]}: my_camera"

@@ -293,11 +293,6 @@ def graph(_order: dict[str, Any]) -> dict[str, Any]:
     return nodes
 
 
-def routers(_order: dict[str, Any]) -> int:
-    """Return how many routers this program is connected to."""
-    return len(session.info.routers_zid())
-
-
 ORDERS = {
     order.__name__: order
     for order in (
@@ -312,7 +307,6 @@ ORDERS = {
         run_clock,
         introduce,
         graph,
-        routers,
     )
 }
 

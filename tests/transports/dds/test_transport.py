@@ -6,13 +6,13 @@ import pytest
 
 from handsteer.transports import join
 from handsteer.transports.base import Session
-from tests.contracts.transport_contract import Ros2Contract
+from tests.contracts.transport_contract import SessionContract
 from tests.dds.graph import free_domain
 
 pytest.importorskip("cyclonedds")
 
 
-class TestDds(Ros2Contract):
+class TestDds(SessionContract):
     @pytest.fixture
     def session(self, monkeypatch: pytest.MonkeyPatch) -> Iterator[Session]:
         monkeypatch.setenv("ROS_DOMAIN_ID", str(free_domain()))

@@ -29,7 +29,7 @@ from handsteer.messages import (
 from handsteer.transports import join
 from handsteer.transports.base import Session
 from handsteer.transports.rclpy.topics import publisher_qos, subscription_qos
-from tests.contracts.transport_contract import Ros2Contract, eventually, heard
+from tests.contracts.transport_contract import SessionContract, eventually, heard
 from tests.dds.graph import free_domain
 
 Join = Callable[..., Session]
@@ -56,7 +56,7 @@ def joined() -> Iterator[Join]:
         session.close()
 
 
-class TestRclpy(Ros2Contract):
+class TestRclpy(SessionContract):
     @pytest.fixture
     def session(self, joined: Join, caplog: pytest.LogCaptureFixture) -> Session:
         session = joined("-r", "__ns:=/r1")

@@ -6,13 +6,13 @@ import pytest
 
 from handsteer.transports import join
 from handsteer.transports.base import Session
-from tests.contracts.transport_contract import Ros2Contract
+from tests.contracts.transport_contract import SessionContract
 from tests.processes import free_port
 
 pytest.importorskip("zenoh")
 
 
-class TestZenoh(Ros2Contract):
+class TestZenoh(SessionContract):
     @pytest.fixture
     def session(self, monkeypatch: pytest.MonkeyPatch) -> Iterator[Session]:
         # No router, and nobody else: this process talks to itself.

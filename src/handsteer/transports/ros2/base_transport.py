@@ -84,7 +84,7 @@ class Writer(Protocol):
         ...
 
 
-class Ros2Publisher(BasePublisher[M]):
+class _Publisher(BasePublisher[M]):
     """Publisher of a topic by ``writer``, which raises one of ``errors`` if it cannot send.
 
     Without a writer, there are never subscribers.
@@ -100,18 +100,15 @@ class Ros2Publisher(BasePublisher[M]):
 
     @property
     def has_subscribers(self) -> bool:
-        """Whether there are subscribers, in this process or another."""
         with self._lock:
             return self._writer is not None and self._writer.has_readers
 
     def flush(self, timeout_s: float) -> None:
-        """Wait until all reliable subscribers have what was published, for at most ``timeout_s`` seconds."""
         writer = self._writer
         if writer is not None and not writer.flush(timeout_s):
             log.info("%s: not every subscriber has confirmed the last message", self.name)
 
     def close(self) -> None:
-        """Stop publishing; may be called twice."""
         with self._lock:
             writer, self._writer = self._writer, None
         if writer is not None:
@@ -169,9 +166,9 @@ class Ros2Transport(BaseTransport):
         for publisher in publishers:
             publisher.flush(max(0.0, deadline_s - time.monotonic()))
 
-    def _open_publisher(self, node: str, name: str, topic: Topic[M]) -> Ros2Publisher[M]:
+    def _open_publisher(self, node: str, name: str, topic: Topic[M]) -> BasePublisher[M]:
         compile_type(type_name(topic.type))
-        return Ros2Publisher(self._node_name, name, topic, self._open_writer(name, topic), self.errors)
+        return _Publisher(self._node_name, name, topic, self._open_writer(name, topic), self.errors)
 
     def _reception(self, node: str, name: str, topic: Topic[M]) -> Receive[M]:
         compile_type(type_name(topic.type))
