@@ -9,7 +9,7 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
-from tests.dds.driver import PeerGraph
+from tests.contracts.ros2_node_contract import PeerGraph
 from tests.processes import NODES, Peer, Process
 
 PEER = Path(__file__).with_name("peer.py")

@@ -270,16 +270,9 @@ def text(of: Qos) -> str:
     return of[Policy.Userdata].data.decode() if Policy.Userdata in of else ""
 
 
-ORDERS = {
-    order.__name__: order
-    for order in (
-        *(record, get, advertise, listeners, publish, repeat, publish_raw, run_clock),
-        *(introduce, graph, user_data, call),
-    )
-}
-
 threading.Thread(target=collect, daemon=True).start()
 print("ready", flush=True)
 for line in sys.stdin:
     order = json.loads(line)
-    print(json.dumps(ORDERS[order["order"]](order)), flush=True)
+    answer = globals()[order["order"]](order)  # the function of that name
+    print(json.dumps(answer), flush=True)

@@ -18,8 +18,7 @@ from tests.contracts.node_contract import (
     Running,
     twists,
 )
-from tests.contracts.ros2_node_contract import Ros2NodeContract
-from tests.dds.driver import NODE, SETTLE_S, DdsDriver, driving_chain, record_twists
+from tests.contracts.ros2_node_contract import NODE, SETTLE_S, DdsDriver, Ros2NodeContract, driving_chain, record_twists
 from tests.dds.graph import DdsGraph
 from tests.processes import eventually
 

@@ -8,7 +8,7 @@ import pytest
 
 from tests.about import about
 from tests.contracts.node_contract import CMD_VEL
-from tests.dds.driver import NODE, DdsDriver, record_twists
+from tests.contracts.ros2_node_contract import NODE, DdsDriver, record_twists
 from tests.dds.graph import DdsGraph
 from tests.processes import eventually
 

@@ -4,7 +4,7 @@ import os
 import sys
 from pathlib import Path
 
-from tests.dds.driver import PeerGraph
+from tests.contracts.ros2_node_contract import PeerGraph
 from tests.processes import NODES, Peer, Process, eventually, free_port
 
 PEER = Path(__file__).with_name("peer.py")

@@ -20,8 +20,7 @@ from tests.contracts.node_contract import (
     Running,
     expect_a_run_to_drive,
 )
-from tests.contracts.ros2_node_contract import Ros2NodeContract
-from tests.dds.driver import NODE, DdsDriver, PeerGraph, driving_chain
+from tests.contracts.ros2_node_contract import NODE, DdsDriver, PeerGraph, Ros2NodeContract, driving_chain
 from tests.processes import eventually
 from tests.rmw_zenoh.graph import DOMAIN, ZenohGraph
 

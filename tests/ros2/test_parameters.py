@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from tests.contracts.node_contract import FORWARD
-from tests.dds.driver import NODE, DdsDriver
+from tests.contracts.ros2_node_contract import NODE, DdsDriver
 from tests.processes import eventually
 from tests.ros2.graph import NEEDS_ROS2, Ros2Graph
 

@@ -2,14 +2,15 @@
 
 import os
 import signal
+import subprocess
 from pathlib import Path
 
 import pytest
 
 from tests.contracts.node_contract import CMD_VEL, FORWARD, ODOM, RUN, expect_a_run_to_drive
-from tests.dds.driver import NODE, DdsDriver
+from tests.contracts.ros2_node_contract import NODE, DdsDriver
 from tests.processes import eventually
-from tests.ros2.graph import NEEDS_ROS2, Ros2Graph
+from tests.ros2.graph import NEEDS_ROS2, PYTHON, Ros2Graph
 
 pytestmark = NEEDS_ROS2
 
@@ -114,3 +115,10 @@ def test_a_node_that_is_ended_leaves_at_once(ros2: Ros2Graph) -> None:
     assert camera.code() == 0, camera.text
     assert "Traceback" not in camera.text
     eventually(lambda: "/brief/my_camera" not in ros2.nodes(), 3.0, what="the node to be gone for others")
+
+
+def test_the_transport_keeps_its_contract_where_rclpy_is() -> None:
+    tests = "tests/transports/rclpy/in_ros2.py"
+    command = [str(PYTHON), "-m", "pytest", "-q", "-p", "no:cacheprovider", "-p", "no:xdist", tests]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=600.0, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr

@@ -18,8 +18,7 @@ from tests.contracts.node_contract import (
     ChainContract,
     Running,
 )
-from tests.contracts.ros2_node_contract import Ros2NodeContract
-from tests.dds.driver import NODE, SCRIPT, driving_chain
+from tests.contracts.ros2_node_contract import NODE, SCRIPT, Ros2NodeContract, driving_chain
 from tests.processes import eventually
 from tests.ros2.graph import NEEDS_ROS2, TRANSPORTS, Ros2Graph, needs_tf2_msgs
 

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from tests.contracts.node_contract import FORWARD
-from tests.dds.driver import NODE
+from tests.contracts.ros2_node_contract import NODE
 from tests.dds.graph import ROS_VARIABLES
 from tests.distributed.network import NoNamespacesError, two_machines
 from tests.processes import Peer, Process, eventually

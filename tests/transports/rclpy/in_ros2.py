@@ -1,4 +1,4 @@
-"""The transport by rclpy, where rclpy is: ``test_in_ros2.py`` runs this by the Python of ``make ros2``."""
+"""The transport by rclpy, where rclpy is: ``tests/ros2/test_rclpy.py`` runs this by the Python of ``make ros2``."""
 
 import logging
 import sys
