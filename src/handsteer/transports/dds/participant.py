@@ -47,7 +47,6 @@ class Participant:
     """A participant of a DDS domain, known to ROS 2 as one node.
 
     Attributes:
-        name: The node's name.
         is_local: Whether all others are certainly on this machine.
         dispatcher: The thread that serves readers, until they are released.
 
@@ -59,7 +58,6 @@ class Participant:
     """
 
     def __init__(self, network: Network, name: NodeName, *, is_observer: bool = False) -> None:
-        self.name = name
         self.is_local = network.is_local
         try:
             self._domain: Any = None if network.config is None else Domain(network.domain, network.config)
@@ -81,13 +79,13 @@ class Participant:
             self.dispatcher.add(reader, serve)
         self.dispatcher.start()
 
-    def writer(self, topic: Topic[Any]) -> DataWriter[Any]:
-        """Return a new writer of ``topic``; its messages are instances of its ``data_type``."""
-        return self._open(DataWriter, topic, writer_qos(topic), publishes=True)
+    def writer(self, name: str, topic: Topic[Any]) -> DataWriter[Any]:
+        """Return a new writer of ``topic``, whose full name is ``name``; its messages have its ``data_type``."""
+        return self._open(DataWriter, name, topic, writer_qos(topic), publishes=True)
 
-    def reader(self, topic: Topic[Any]) -> DataReader[Any]:
-        """Return a new reader of ``topic``."""
-        return self._open(DataReader, topic, reader_qos(topic), publishes=False)
+    def reader(self, name: str, topic: Topic[Any]) -> DataReader[Any]:
+        """Return a new reader of ``topic``, whose full name is ``name``."""
+        return self._open(DataReader, name, topic, reader_qos(topic), publishes=False)
 
     def service(self, name: str, kind: str) -> tuple[DataReader[Any], DataWriter[Any]]:
         """Return a reader of the requests and a writer of the replies of the service of this full name and type."""
@@ -134,8 +132,8 @@ class Participant:
         self._topics.clear()
         self._participant = self._domain = None
 
-    def _open(self, kind: Callable[..., E], topic: Topic[Any], qos: Qos, *, publishes: bool) -> E:
-        name, message = f"rt{self.name.topic(topic)}", type_name(topic.type)
+    def _open(self, kind: Callable[..., E], full_name: str, topic: Topic[Any], qos: Qos, *, publishes: bool) -> E:
+        name, message = f"rt{full_name}", type_name(topic.type)
         with self._lock:
             if (name, message) not in self._topics:
                 self._topics[name, message] = DdsTopic(self._participant, name, dds_type(message))

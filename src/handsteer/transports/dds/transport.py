@@ -52,7 +52,7 @@ class DdsTransport(WireTransport):
         return _Writer(self._participant, name, topic)
 
     def _open_reader(self, name: str, topic: Topic[Any], take: Take) -> Callable[[], None]:
-        reader = self._participant.reader(topic)
+        reader = self._participant.reader(name, topic)
 
         def serve() -> None:
             for sample in reader.take(topic.depth):
@@ -77,7 +77,7 @@ class _Writer:
     def __init__(self, participant: Participant, name: str, topic: Topic[Any]) -> None:
         self._participant = participant
         self._name = name
-        self._writer: Any = participant.writer(topic)
+        self._writer: Any = participant.writer(name, topic)
         self._is_slow = False
 
     @property
