@@ -17,7 +17,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # for the ROS 2 no
 
 from _measuring import at_rate
 from tests.processes import eventually
-from tests.ros2.graph import ros2_graph
+from tests.ros2.graph import Ros2Graph
 
 from handsteer.cameras.virtual import VirtualHandCamera
 from handsteer.clock import WallClock
@@ -65,7 +65,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="Measure the messages received by a real ROS 2.")
     parser.add_argument("--images", type=int, default=300, help="pictures of each kind to send, 30 per second")
     options = parser.parse_args()
-    with tempfile.TemporaryDirectory() as home, ros2_graph(Path(home)) as graph:
+    with tempfile.TemporaryDirectory() as home, Ros2Graph(Path(home)) as graph:
         os.environ.update({name: value for name, value in graph.env.items() if name.startswith("ROS_")})
         session = join("dds", "talker", [])
         print(f"from handsteer to rclpy on Fast DDS; load before: {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores")

@@ -151,6 +151,12 @@ class Processes:
         self._home = home
         self._processes: list[Process] = []
 
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.stop()
+
     def adopt(self, process: P) -> P:
         """End ``process`` with the others."""
         self._processes.append(process)

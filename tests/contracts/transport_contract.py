@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from handsteer.audit import WARN, AuditEvent, write_event
-from handsteer.clock import Clock, RealClock
+from handsteer.clock import Clock, RealClock, WallClock
 from handsteer.errors import TransportError
 from handsteer.images import bgr_image, image_message
 from handsteer.messages import (
@@ -31,7 +31,7 @@ from handsteer.messages import (
 )
 from handsteer.nodes.base import Node
 from handsteer.nodes.diagnostics import split_reporter
-from handsteer.transports.base import Publisher, Received, Transport
+from handsteer.transports.base import Publisher, Received, Session, Transport
 
 M = TypeVar("M")
 WAIT_S = 10.0
@@ -297,3 +297,30 @@ class TransportContract:
 
     def test_a_node_is_known_by_its_own_name(self, transport: Transport) -> None:
         assert split_reporter(transport.full_name("my_camera"))[1] == "my_camera"
+
+
+class SessionContract(TransportContract):
+    """Inherit, and provide ``session``: this process as a node whose name is ``full_name``."""
+
+    settle_s = 0.3
+    full_name = "/r1/tests"
+
+    def name_of(self, node: str) -> str:
+        return self.full_name
+
+    @pytest.fixture
+    def session(self) -> Iterator[Session]:
+        raise NotImplementedError
+
+    @pytest.fixture
+    def transport(self, session: Session) -> Transport:
+        return session.transport
+
+    @pytest.fixture
+    def clock(self, session: Session) -> Clock:
+        assert isinstance(session.clock, WallClock)
+        return session.clock
+
+    def test_the_process_has_its_full_name(self, session: Session) -> None:
+        assert session.name == self.full_name
+        assert session.transport.full_name("my_camera") == f"{self.full_name[1:]}: my_camera"

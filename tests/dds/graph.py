@@ -6,11 +6,11 @@ import os
 import random
 import sys
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
-from tests.processes import NODES, Peer, Process, Processes, as_tests_drive, eventually
+from tests.contracts.ros2_node_contract import PeerGraph
+from tests.processes import NODES, Peer, Process
 
 PEER = Path(__file__).with_name("peer.py")
 MODULES = {"dds": "handsteer.transports.dds.transport", "ros2": "handsteer.transports.rclpy.session"}
@@ -44,14 +44,11 @@ def free_domain() -> int:
     raise AssertionError("all DDS domains are taken by other tests")
 
 
-class DdsGraph(Processes):
-    """The processes of a test in a domain, with one plain DDS program among them that looks on.
+class DdsGraph(PeerGraph):
+    """A domain, with a plain DDS program in it.
 
     Attributes:
-        env: Environment of the processes.
-        peer: The plain program.
-        transport: What joins our nodes.
-        python: What runs them.
+        python: What runs our nodes.
 
     Args:
         home: Folder for logs.
@@ -81,37 +78,8 @@ class DdsGraph(Processes):
         return self.adopt(Peer(command, self.env, self.log("peer"), ("cyclonedds.domain", "rclpy")))
 
     def handsteer(self, *arguments: str) -> Process:
-        """Start ``handsteer`` with ``arguments`` in this domain."""
         command = [self.python, "-m", "handsteer", *arguments]
         return self.adopt(Process(command, self.env, self.log(), (*NODES, MODULES[self.transport])))
 
-    def node(self, verb: str, *arguments: str, name: str, ros: tuple[str, ...] = ()) -> Process:
-        """Start one of handsteer's nodes and wait until it is in the graph under ``name``."""
-        process = self.handsteer(
-            verb,
-            "--transport",
-            self.transport,
-            *as_tests_drive(verb, arguments),
-            *(("--ros-args", *ros) if ros else ()),
-        )
-        eventually(lambda: name in self.nodes() or not process.running, what=f"{name} to start")
-        assert process.running, process.text
-        return process
-
-    def nodes(self) -> dict[str, Any]:
-        """Return the nodes as the plain program knows them: what they publish and subscribe to."""
-        return dict(self.peer.ask("graph"))
-
     def publishes(self, node: str, topic: str) -> bool:
-        """Return whether the plain program knows that the node of this full name publishes ``topic``."""
         return f"rt{topic}" in self.nodes()[node]["writers"]
-
-
-@contextlib.contextmanager
-def dds_graph(home: Path) -> Iterator[DdsGraph]:
-    """A domain with a plain program in it, for as long as the block lasts."""
-    graph = DdsGraph(home)
-    try:
-        yield graph
-    finally:
-        graph.stop()

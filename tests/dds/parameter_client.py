@@ -14,19 +14,14 @@ from typing import Any
 from cyclonedds.core import Policy, Qos
 from cyclonedds.domain import DomainParticipant
 from cyclonedds.idl import IdlStruct, make_idl_struct
-from cyclonedds.idl.types import byte, float64, int32, int64, sequence, uint8, uint32, uint64
+from cyclonedds.idl.types import byte, float64, int64, sequence, uint8, uint32, uint64
 from cyclonedds.internal import InvalidSample
 from cyclonedds.pub import DataWriter
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
+from ros_types import CDR, RELIABLE, Time
 
 MSG, SRV = "rcl_interfaces::msg::dds_::", "rcl_interfaces::srv::dds_::"
-
-
-@dataclass
-class Time(IdlStruct, typename="builtin_interfaces::msg::dds_::Time_"):
-    sec: int32 = 0
-    nanosec: uint32 = 0
 
 
 @dataclass
@@ -107,98 +102,21 @@ class SetParametersResult(IdlStruct, typename=f"{MSG}SetParametersResult_"):
     reason: str
 
 
-@dataclass
-class ListRequest(IdlStruct, typename=f"{SRV}ListParameters_Request_"):
-    client: uint64
-    number: int64
-    prefixes: sequence[str]
-    depth: uint64
+def _exchanged(name: str, **members: Any) -> Any:
+    """Return the type of a request or a reply, which begins with the client and the number of the request."""
+    return make_idl_struct(name, f"{SRV}{name}_", {"client": uint64, "number": int64, **members})
 
 
-@dataclass
-class ListReply(IdlStruct, typename=f"{SRV}ListParameters_Response_"):
-    client: uint64
-    number: int64
-    result: ListParametersResult
-
-
-@dataclass
-class GetRequest(IdlStruct, typename=f"{SRV}GetParameters_Request_"):
-    client: uint64
-    number: int64
-    names: sequence[str]
-
-
-@dataclass
-class GetReply(IdlStruct, typename=f"{SRV}GetParameters_Response_"):
-    client: uint64
-    number: int64
-    values: sequence[ParameterValue]
-
-
-@dataclass
-class TypesRequest(IdlStruct, typename=f"{SRV}GetParameterTypes_Request_"):
-    client: uint64
-    number: int64
-    names: sequence[str]
-
-
-@dataclass
-class TypesReply(IdlStruct, typename=f"{SRV}GetParameterTypes_Response_"):
-    client: uint64
-    number: int64
-    types: sequence[uint8]
-
-
-@dataclass
-class DescribeRequest(IdlStruct, typename=f"{SRV}DescribeParameters_Request_"):
-    client: uint64
-    number: int64
-    names: sequence[str]
-
-
-@dataclass
-class DescribeReply(IdlStruct, typename=f"{SRV}DescribeParameters_Response_"):
-    client: uint64
-    number: int64
-    descriptors: sequence[ParameterDescriptor]
-
-
-@dataclass
-class SetRequest(IdlStruct, typename=f"{SRV}SetParameters_Request_"):
-    client: uint64
-    number: int64
-    parameters: sequence[Parameter]
-
-
-@dataclass
-class SetReply(IdlStruct, typename=f"{SRV}SetParameters_Response_"):
-    client: uint64
-    number: int64
-    results: sequence[SetParametersResult]
-
-
-@dataclass
-class AtomicRequest(IdlStruct, typename=f"{SRV}SetParametersAtomically_Request_"):
-    client: uint64
-    number: int64
-    parameters: sequence[Parameter]
-
-
-@dataclass
-class AtomicReply(IdlStruct, typename=f"{SRV}SetParametersAtomically_Response_"):
-    client: uint64
-    number: int64
-    result: SetParametersResult
-
-
-SERVICES: dict[str, tuple[Any, Any]] = {
-    "ListParameters": (ListRequest, ListReply),
-    "GetParameters": (GetRequest, GetReply),
-    "GetParameterTypes": (TypesRequest, TypesReply),
-    "DescribeParameters": (DescribeRequest, DescribeReply),
-    "SetParameters": (SetRequest, SetReply),
-    "SetParametersAtomically": (AtomicRequest, AtomicReply),
+SERVICES = {
+    service: (_exchanged(f"{service}_Request", **request), _exchanged(f"{service}_Response", **reply))
+    for service, request, reply in (
+        ("ListParameters", {"prefixes": sequence[str], "depth": uint64}, {"result": ListParametersResult}),
+        ("GetParameters", {"names": sequence[str]}, {"values": sequence[ParameterValue]}),
+        ("GetParameterTypes", {"names": sequence[str]}, {"types": sequence[uint8]}),
+        ("DescribeParameters", {"names": sequence[str]}, {"descriptors": sequence[ParameterDescriptor]}),
+        ("SetParameters", {"parameters": sequence[Parameter]}, {"results": sequence[SetParametersResult]}),
+        ("SetParametersAtomically", {"parameters": sequence[Parameter]}, {"result": SetParametersResult}),
+    )
 }
 _numbers = itertools.count(1)
 
@@ -211,10 +129,10 @@ class Client:
         number = next(_numbers).to_bytes(4, "big")
         identity = ".".join(f"{byte:x}" for byte in participant.guid.bytes[:12] + number)
         qos = Qos(
-            Policy.Reliability.Reliable(1_000_000_000),
+            RELIABLE,
             Policy.Durability.Volatile,
             Policy.History.KeepLast(1000),
-            Policy.DataRepresentation(use_cdrv0_representation=True),
+            CDR,
             Policy.Userdata(f"clientid={identity};".encode() if identified else b""),
         )
         self.request_type = request

@@ -1,6 +1,6 @@
 """A plain DDS program that knows nothing of handsteer: what others' nodes see of ours.
 
-Its types are written by hand, from ROS 2's definitions, and cyclonedds itself encodes them. It reads orders as lines of
+cyclonedds itself encodes the types of ``ros_types.py``. It reads orders as lines of
 JSON from its input and answers each by one line of JSON. ``record`` (topic, type, fields, reliable) starts to note
 messages, ``get`` (topic, since_s) returns what was noted as ``[time_s, [values]]``. ``advertise`` (topic, type,
 reliable) comes before ``listeners`` (topic), which returns how many listen, ``publish`` (topic, values, count,
@@ -17,7 +17,6 @@ import json
 import sys
 import threading
 import time
-from dataclasses import dataclass, field
 from functools import reduce
 from typing import Any
 
@@ -29,165 +28,29 @@ from cyclonedds.builtin import (
 )
 from cyclonedds.core import Policy, Qos
 from cyclonedds.domain import Domain, DomainParticipant
-from cyclonedds.idl import IdlStruct
-from cyclonedds.idl.types import array, bounded_str, byte, float32, float64, int32, sequence, uint8, uint32
 from cyclonedds.internal import InvalidSample
 from cyclonedds.pub import DataWriter
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
 from parameter_client import Client, Log, ParameterEvent
-
-LOOPBACK = """<CycloneDDS><Domain><General>
-<Interfaces><NetworkInterface address="127.0.0.1"/></Interfaces><AllowMulticast>false</AllowMulticast>
-</General><Discovery><ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>32</MaxAutoParticipantIndex>
-<Peers><Peer address="127.0.0.1"/></Peers></Discovery></Domain></CycloneDDS>"""
-
-
-@dataclass
-class String(IdlStruct, typename="std_msgs::msg::dds_::String_"):
-    data: str = ""
-
-
-@dataclass
-class Bool(IdlStruct, typename="std_msgs::msg::dds_::Bool_"):
-    data: bool = False
-
-
-@dataclass
-class Time(IdlStruct, typename="builtin_interfaces::msg::dds_::Time_"):
-    sec: int32 = 0
-    nanosec: uint32 = 0
-
-
-@dataclass
-class Header(IdlStruct, typename="std_msgs::msg::dds_::Header_"):
-    stamp: Time = field(default_factory=Time)
-    frame_id: str = ""
-
-
-@dataclass
-class Image(IdlStruct, typename="sensor_msgs::msg::dds_::Image_"):
-    header: Header = field(default_factory=Header)
-    height: uint32 = 0
-    width: uint32 = 0
-    encoding: str = ""
-    is_bigendian: uint8 = 0
-    step: uint32 = 0
-    data: sequence[uint8] = field(default_factory=list)
-
-
-@dataclass
-class Vector3(IdlStruct, typename="geometry_msgs::msg::dds_::Vector3_"):
-    x: float64 = 0.0
-    y: float64 = 0.0
-    z: float64 = 0.0
-
-
-@dataclass
-class Twist(IdlStruct, typename="geometry_msgs::msg::dds_::Twist_"):
-    linear: Vector3 = field(default_factory=Vector3)
-    angular: Vector3 = field(default_factory=Vector3)
-
-
-@dataclass
-class Point(IdlStruct, typename="geometry_msgs::msg::dds_::Point_"):
-    x: float64 = 0.0
-    y: float64 = 0.0
-    z: float64 = 0.0
-
-
-@dataclass
-class Quaternion(IdlStruct, typename="geometry_msgs::msg::dds_::Quaternion_"):
-    x: float64 = 0.0
-    y: float64 = 0.0
-    z: float64 = 0.0
-    w: float64 = 1.0
-
-
-@dataclass
-class Pose(IdlStruct, typename="geometry_msgs::msg::dds_::Pose_"):
-    position: Point = field(default_factory=Point)
-    orientation: Quaternion = field(default_factory=Quaternion)
-
-
-@dataclass
-class PoseWithCovariance(IdlStruct, typename="geometry_msgs::msg::dds_::PoseWithCovariance_"):
-    pose: Pose = field(default_factory=Pose)
-    covariance: array[float64, 36] = field(default_factory=lambda: [0.0] * 36)
-
-
-@dataclass
-class TwistWithCovariance(IdlStruct, typename="geometry_msgs::msg::dds_::TwistWithCovariance_"):
-    twist: Twist = field(default_factory=Twist)
-    covariance: array[float64, 36] = field(default_factory=lambda: [0.0] * 36)
-
-
-@dataclass
-class Joy(IdlStruct, typename="sensor_msgs::msg::dds_::Joy_"):
-    header: Header = field(default_factory=Header)
-    axes: sequence[float32] = field(default_factory=list)
-    buttons: sequence[int32] = field(default_factory=list)
-
-
-@dataclass
-class Odometry(IdlStruct, typename="nav_msgs::msg::dds_::Odometry_"):
-    header: Header = field(default_factory=Header)
-    child_frame_id: str = ""
-    pose: PoseWithCovariance = field(default_factory=PoseWithCovariance)
-    twist: TwistWithCovariance = field(default_factory=TwistWithCovariance)
-
-
-@dataclass
-class KeyValue(IdlStruct, typename="diagnostic_msgs::msg::dds_::KeyValue_"):
-    key: str = ""
-    value: str = ""
-
-
-@dataclass
-class DiagnosticStatus(IdlStruct, typename="diagnostic_msgs::msg::dds_::DiagnosticStatus_"):
-    level: byte = 0
-    name: str = ""
-    message: str = ""
-    hardware_id: str = ""
-    values: sequence[KeyValue] = field(default_factory=list)
-
-
-@dataclass
-class DiagnosticArray(IdlStruct, typename="diagnostic_msgs::msg::dds_::DiagnosticArray_"):
-    header: Header = field(default_factory=Header)
-    status: sequence[DiagnosticStatus] = field(default_factory=list)
-
-
-@dataclass
-class CompressedImage(IdlStruct, typename="sensor_msgs::msg::dds_::CompressedImage_"):
-    header: Header = field(default_factory=Header)
-    format: str = ""
-    data: sequence[uint8] = field(default_factory=list)
-
-
-@dataclass
-class Clock(IdlStruct, typename="rosgraph_msgs::msg::dds_::Clock_"):
-    clock: Time = field(default_factory=Time)
-
-
-@dataclass
-class Gid(IdlStruct, typename="rmw_dds_common::msg::dds_::Gid_"):
-    data: array[uint8, 16]
-
-
-@dataclass
-class NodeEntitiesInfo(IdlStruct, typename="rmw_dds_common::msg::dds_::NodeEntitiesInfo_"):
-    node_namespace: bounded_str[256]
-    node_name: bounded_str[256]
-    reader_gid_seq: sequence[Gid]
-    writer_gid_seq: sequence[Gid]
-
-
-@dataclass
-class ParticipantEntitiesInfo(IdlStruct, typename="rmw_dds_common::msg::dds_::ParticipantEntitiesInfo_"):
-    gid: Gid
-    node_entities_info_seq: sequence[NodeEntitiesInfo]
-
+from ros_types import (
+    CDR,
+    LOOPBACK,
+    RELIABLE,
+    Bool,
+    Clock,
+    CompressedImage,
+    DiagnosticArray,
+    Gid,
+    Image,
+    Joy,
+    NodeEntitiesInfo,
+    Odometry,
+    ParticipantEntitiesInfo,
+    String,
+    Time,
+    Twist,
+)
 
 TYPES = {
     kind.__name__: kind
@@ -205,8 +68,6 @@ TYPES = {
         ParameterEvent,
     )
 }
-RELIABLE, BEST_EFFORT = Policy.Reliability.Reliable(1_000_000_000), Policy.Reliability.BestEffort
-CDR = Policy.DataRepresentation(use_cdrv0_representation=True)
 
 number, config, hostname = (*sys.argv[1:], "", "")[:3]
 domain = Domain(int(number), config or LOOPBACK)
@@ -234,7 +95,7 @@ infos: dict[bytes, Any] = {}
 
 
 def qos(order: dict[str, Any]) -> Qos:
-    reliability = RELIABLE if order.get("reliable", True) else BEST_EFFORT
+    reliability = RELIABLE if order.get("reliable", True) else Policy.Reliability.BestEffort
     durability = Policy.Durability.TransientLocal if order.get("latched") else Policy.Durability.Volatile
     return Qos(reliability, durability, Policy.History.KeepLast(order.get("depth", 100)), CDR)
 
@@ -409,16 +270,9 @@ def text(of: Qos) -> str:
     return of[Policy.Userdata].data.decode() if Policy.Userdata in of else ""
 
 
-ORDERS = {
-    order.__name__: order
-    for order in (
-        *(record, get, advertise, listeners, publish, repeat, publish_raw, run_clock),
-        *(introduce, graph, user_data, call),
-    )
-}
-
 threading.Thread(target=collect, daemon=True).start()
 print("ready", flush=True)
 for line in sys.stdin:
     order = json.loads(line)
-    print(json.dumps(ORDERS[order["order"]](order)), flush=True)
+    answer = globals()[order["order"]](order)  # the function of that name
+    print(json.dumps(answer), flush=True)

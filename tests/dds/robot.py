@@ -1,6 +1,6 @@
 """Robots as plain DDS programs that know nothing of handsteer: they follow commands, and say where they are.
 
-Types are written by hand, from ROS 2's definitions, and cyclonedds itself encodes them. It reads orders as lines of
+cyclonedds itself encodes the types of ``ros_types.py``. It reads orders as lines of
 JSON and answers each by one. ``add`` (name, cmd_vel, stamped, odom, turtle) makes a robot, which stops by itself when
 it has heard nothing for half a second. ``state`` (name) returns ``[x, y, yaw, linear, angular]``, ``commands``
 (name) what it was told as ``[time_s, linear, angular, stamp_s, frame]``. ``odometry`` (name, mode) sets what it says of
@@ -12,112 +12,36 @@ import math
 import sys
 import threading
 import time
-from dataclasses import dataclass, field
 from typing import Any
 
 from cyclonedds.core import Policy, Qos
 from cyclonedds.domain import Domain, DomainParticipant
-from cyclonedds.idl import IdlStruct
-from cyclonedds.idl.types import array, float32, float64, int32, uint32
 from cyclonedds.internal import InvalidSample
 from cyclonedds.pub import DataWriter
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
+from ros_types import (
+    CDR,
+    LOOPBACK,
+    RELIABLE,
+    Header,
+    Odometry,
+    Point,
+    Pose,
+    PoseWithCovariance,
+    Quaternion,
+    TurtlePose,
+    Twist,
+    TwistStamped,
+    TwistWithCovariance,
+    Vector3,
+)
 
-LOOPBACK = """<CycloneDDS><Domain><General>
-<Interfaces><NetworkInterface address="127.0.0.1"/></Interfaces><AllowMulticast>false</AllowMulticast>
-</General><Discovery><ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>32</MaxAutoParticipantIndex>
-<Peers><Peer address="127.0.0.1"/></Peers></Discovery></Domain></CycloneDDS>"""
 PERIOD_S = 0.02
 TIMEOUT_S = 0.5
 
 
-@dataclass
-class Time(IdlStruct, typename="builtin_interfaces::msg::dds_::Time_"):
-    sec: int32 = 0
-    nanosec: uint32 = 0
-
-
-@dataclass
-class Header(IdlStruct, typename="std_msgs::msg::dds_::Header_"):
-    stamp: Time = field(default_factory=Time)
-    frame_id: str = ""
-
-
-@dataclass
-class Vector3(IdlStruct, typename="geometry_msgs::msg::dds_::Vector3_"):
-    x: float64 = 0.0
-    y: float64 = 0.0
-    z: float64 = 0.0
-
-
-@dataclass
-class Twist(IdlStruct, typename="geometry_msgs::msg::dds_::Twist_"):
-    linear: Vector3 = field(default_factory=Vector3)
-    angular: Vector3 = field(default_factory=Vector3)
-
-
-@dataclass
-class TwistStamped(IdlStruct, typename="geometry_msgs::msg::dds_::TwistStamped_"):
-    header: Header = field(default_factory=Header)
-    twist: Twist = field(default_factory=Twist)
-
-
-@dataclass
-class Point(IdlStruct, typename="geometry_msgs::msg::dds_::Point_"):
-    x: float64 = 0.0
-    y: float64 = 0.0
-    z: float64 = 0.0
-
-
-@dataclass
-class Quaternion(IdlStruct, typename="geometry_msgs::msg::dds_::Quaternion_"):
-    x: float64 = 0.0
-    y: float64 = 0.0
-    z: float64 = 0.0
-    w: float64 = 1.0
-
-
-@dataclass
-class Pose(IdlStruct, typename="geometry_msgs::msg::dds_::Pose_"):
-    position: Point = field(default_factory=Point)
-    orientation: Quaternion = field(default_factory=Quaternion)
-
-
-@dataclass
-class PoseWithCovariance(IdlStruct, typename="geometry_msgs::msg::dds_::PoseWithCovariance_"):
-    pose: Pose = field(default_factory=Pose)
-    covariance: array[float64, 36] = field(default_factory=lambda: [0.0] * 36)
-
-
-@dataclass
-class TwistWithCovariance(IdlStruct, typename="geometry_msgs::msg::dds_::TwistWithCovariance_"):
-    twist: Twist = field(default_factory=Twist)
-    covariance: array[float64, 36] = field(default_factory=lambda: [0.0] * 36)
-
-
-@dataclass
-class Odometry(IdlStruct, typename="nav_msgs::msg::dds_::Odometry_"):
-    header: Header = field(default_factory=Header)
-    child_frame_id: str = ""
-    pose: PoseWithCovariance = field(default_factory=PoseWithCovariance)
-    twist: TwistWithCovariance = field(default_factory=TwistWithCovariance)
-
-
-@dataclass
-class TurtlePose(IdlStruct, typename="turtlesim::msg::dds_::Pose_"):
-    x: float32 = 0.0
-    y: float32 = 0.0
-    theta: float32 = 0.0
-    linear_velocity: float32 = 0.0
-    angular_velocity: float32 = 0.0
-
-
-QOS = Qos(
-    Policy.Reliability.Reliable(1_000_000_000),
-    Policy.History.KeepLast(10),
-    Policy.DataRepresentation(use_cdrv0_representation=True),
-)
+QOS = Qos(RELIABLE, Policy.History.KeepLast(10), CDR)
 
 
 class Robot:
@@ -194,9 +118,9 @@ def run() -> None:
         time.sleep(PERIOD_S)
 
 
-ORDERS = {order.__name__: order for order in (add, state, commands, odometry)}
 threading.Thread(target=run, daemon=True).start()
 print("ready", flush=True)
 for line in sys.stdin:
     order = json.loads(line)
-    print(json.dumps(ORDERS[order["order"]](order)), flush=True)
+    answer = globals()[order["order"]](order)  # the function of that name
+    print(json.dumps(answer), flush=True)

@@ -2,13 +2,12 @@
 
 import signal
 import sys
-from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 
 import pytest
 
-from tests.dds.graph import DdsGraph, dds_graph
+from tests.dds.graph import DdsGraph
 from tests.processes import Peer, eventually
 
 pytest.importorskip("cyclonedds")
@@ -18,12 +17,6 @@ ROBOT = Path(__file__).with_name("robot.py")
 NAMES = ("r1", "r2", "r3")
 CMD_VEL = "robot_diff_drive_controller/cmd_vel"
 SIGNS, SELECT = "/gesture/hand_sign", "/select_robot"
-
-
-@pytest.fixture
-def graph(tmp_path: Path) -> Iterator[DdsGraph]:
-    with dds_graph(tmp_path) as graph:
-        yield graph
 
 
 def show(graph: DdsGraph, sign: str, count: int = 20) -> None:
@@ -76,49 +69,49 @@ def moved_by(graph: DdsGraph, robots: Peer, sign: str) -> list[str]:
     return [name for name in NAMES if any(linear for _, linear, *_ in told[name])]
 
 
-def test_only_the_selected_robot_moves_and_only_after_stop(graph: DdsGraph, tmp_path: Path) -> None:
-    robots = start(graph, tmp_path)
+def test_only_the_selected_robot_moves_and_only_after_stop(fresh: DdsGraph, tmp_path: Path) -> None:
+    robots = start(fresh, tmp_path)
     for name in ("r1", "r2", "r3"):
-        show(graph, "Stop", count=2)
-        assert moved_by(graph, robots, "Forward") == [name]
-        select(graph, "next")
+        show(fresh, "Stop", count=2)
+        assert moved_by(fresh, robots, "Forward") == [name]
+        select(fresh, "next")
         eventually(partial(_is_told_zero, robots, name), what=f"{name} to be told zero")
-        assert moved_by(graph, robots, "Forward") == []
+        assert moved_by(fresh, robots, "Forward") == []
         assert [linear for _, linear, *_ in robots.ask("commands", name=name)[-3:]] == [0.0, 0.0, 0.0]
-    names = [name for _, (name,) in graph.peer.ask("get", topic="/selected_robot")]
+    names = [name for _, (name,) in fresh.peer.ask("get", topic="/selected_robot")]
     assert names == ["r1", "r2", "r3", "r1", "r2", "r3", "r1"]
 
 
-def test_a_sign_selects_the_next_robot(graph: DdsGraph, tmp_path: Path) -> None:
+def test_a_sign_selects_the_next_robot(fresh: DdsGraph, tmp_path: Path) -> None:
     robots = start(
-        graph, tmp_path, "-p", "actions.Peace:=next_robot", "-p", "cmd_vel_type:=twist_stamped", stamped=True
+        fresh, tmp_path, "-p", "actions.Peace:=next_robot", "-p", "cmd_vel_type:=twist_stamped", stamped=True
     )
-    show(graph, "Stop", count=1)
-    assert moved_by(graph, robots, "Forward") == ["r1"]
-    show(graph, "Peace")
-    eventually(lambda: graph.peer.ask("get", topic="/selected_robot")[-1][1] == ["r2"])
+    show(fresh, "Stop", count=1)
+    assert moved_by(fresh, robots, "Forward") == ["r1"]
+    show(fresh, "Peace")
+    eventually(lambda: fresh.peer.ask("get", topic="/selected_robot")[-1][1] == ["r2"])
     eventually(lambda: robots.ask("commands", name="r1")[-1][1] == 0.0)
-    assert moved_by(graph, robots, "Forward") == []
-    show(graph, "Stop", count=1)
-    assert moved_by(graph, robots, "Forward") == ["r2"]
+    assert moved_by(fresh, robots, "Forward") == []
+    show(fresh, "Stop", count=1)
+    assert moved_by(fresh, robots, "Forward") == ["r2"]
 
 
-def test_robots_that_are_no_names_are_refused(graph: DdsGraph) -> None:
-    process = graph.handsteer("control", "--transport", "dds", "--ros-args", "-p", "robots:=[r1, r1]")
+def test_robots_that_are_no_names_are_refused(fresh: DdsGraph) -> None:
+    process = fresh.handsteer("control", "--transport", "dds", "--ros-args", "-p", "robots:=[r1, r1]")
     assert process.code() == 2
     assert "ROS parameter /hand_sign_control/robots: " in process.text
     assert "should name each robot once" in process.text
 
 
-def test_several_robots_are_simulated_each_in_its_namespace(graph: DdsGraph) -> None:
-    robots = graph.handsteer("robots", "3", "--transport", "dds", "--world", "empty")
-    eventually(lambda: {"/r1/robot", "/r2/robot", "/r3/robot"} <= set(graph.nodes()) or not robots.running)
+def test_several_robots_are_simulated_each_in_its_namespace(fresh: DdsGraph) -> None:
+    robots = fresh.handsteer("robots", "3", "--transport", "dds", "--world", "empty")
+    eventually(lambda: {"/r1/robot", "/r2/robot", "/r3/robot"} <= set(fresh.nodes()) or not robots.running)
     assert robots.running, robots.text
-    graph.peer.ask("record", topic=f"/r2/{CMD_VEL[:-7]}odom", type="Odometry", fields=["twist.twist.linear.x"])
-    graph.peer.ask("advertise", topic=f"/r2/{CMD_VEL}", type="Twist")
-    eventually(lambda: graph.peer.ask("listeners", topic=f"/r2/{CMD_VEL}"))
-    graph.peer.ask("publish", topic=f"/r2/{CMD_VEL}", values={"linear.x": 0.3}, count=30, period_s=0.05)
-    speeds = [speed for _, (speed,) in graph.peer.ask("get", topic=f"/r2/{CMD_VEL[:-7]}odom")]
+    fresh.peer.ask("record", topic=f"/r2/{CMD_VEL[:-7]}odom", type="Odometry", fields=["twist.twist.linear.x"])
+    fresh.peer.ask("advertise", topic=f"/r2/{CMD_VEL}", type="Twist")
+    eventually(lambda: fresh.peer.ask("listeners", topic=f"/r2/{CMD_VEL}"))
+    fresh.peer.ask("publish", topic=f"/r2/{CMD_VEL}", values={"linear.x": 0.3}, count=30, period_s=0.05)
+    speeds = [speed for _, (speed,) in fresh.peer.ask("get", topic=f"/r2/{CMD_VEL[:-7]}odom")]
     assert max(speeds) == pytest.approx(0.3, abs=0.05)
     robots.signal(signal.SIGTERM)
     assert robots.code() == 0

@@ -4,7 +4,6 @@ import re
 import signal
 import time
 from collections.abc import Iterator
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -16,35 +15,21 @@ from tests.contracts.node_contract import (
     ODOM,
     PATIENT,
     ChainContract,
-    ControlContract,
-    MakeDriver,
     Running,
     twists,
 )
-from tests.dds.driver import NODE, SETTLE_S, DdsDriver, driving_chain, record_twists
-from tests.dds.graph import DdsGraph, dds_graph
+from tests.contracts.ros2_node_contract import NODE, SETTLE_S, DdsDriver, Ros2NodeContract, driving_chain, record_twists
+from tests.dds.graph import DdsGraph
 from tests.processes import eventually
 
 pytest.importorskip("cyclonedds")
 pytestmark = pytest.mark.slow
 
 
-@pytest.fixture(scope="module")
-def dds_domain(tmp_path_factory: pytest.TempPathFactory) -> Iterator[DdsGraph]:
-    with dds_graph(tmp_path_factory.mktemp("dds")) as graph:
-        yield graph
-
-
-@pytest.fixture
-def dds(dds_domain: DdsGraph) -> Iterator[DdsGraph]:
-    with dds_domain.test():
-        yield dds_domain
-
-
-class TestControl(ControlContract):
+class TestNodes(Ros2NodeContract):
     @pytest.fixture
-    def drive(self, dds: DdsGraph) -> MakeDriver:
-        return partial(DdsDriver, dds)
+    def graph(self, dds: DdsGraph) -> DdsGraph:
+        return dds
 
 
 def test_parameters_come_from_files_too(dds: DdsGraph, tmp_path: Path) -> None:
@@ -60,15 +45,6 @@ def test_parameters_come_from_files_too(dds: DdsGraph, tmp_path: Path) -> None:
     for sign in ("Forward", "Turn Left"):
         dds.peer.ask("publish", topic=signs, values={"data": sign}, count=1, period_s=0.0)
     eventually(lambda: [twist for _, twist in twists(dds.peer, cmd_vel)][:2] == [(0.03, 0.0), (0.03, 0.4)], 10.0)
-
-
-def test_what_is_no_text_does_not_end_the_node(dds: DdsGraph) -> None:
-    driver = DdsDriver(dds)
-    driver.show_raw(b"\x00\x01\x00\x00\x03\x00\x00\x00\xff\xfe\x00\x00")
-    driver.show("Turn Left")
-    driver.expect((0.0, 0.1))
-    assert "a message of 12 bytes cannot be read" in driver.process.text
-    assert "Traceback" not in driver.process.text
 
 
 def test_ros2_sees_the_node_by_its_names_types_and_hashes(dds: DdsGraph) -> None:
@@ -116,11 +92,10 @@ def test_what_a_node_logs_is_on_rosout_for_who_comes_later_too(dds: DdsGraph, tm
     assert logged[0][1].endswith(".hand_sign_control")
 
 
-def test_the_discovery_itself_carries_the_hash_of_ros2(tmp_path: Path) -> None:
-    with dds_graph(tmp_path) as graph:
-        graph.node("control", name=f"/{NODE}")
-        digest = "typehash=RIHS01_91a0593bacdcc50ea9bdcf849a938b128412cc1ea821245c663bcd26f83c295e;"
-        assert graph.peer.ask("user_data", topic="ros_discovery_info") == {"writers": [digest], "readers": [digest]}
+def test_the_discovery_itself_carries_the_hash_of_ros2(fresh: DdsGraph) -> None:
+    fresh.node("control", name=f"/{NODE}")
+    digest = "typehash=RIHS01_91a0593bacdcc50ea9bdcf849a938b128412cc1ea821245c663bcd26f83c295e;"
+    assert fresh.peer.ask("user_data", topic="ros_discovery_info") == {"writers": [digest], "readers": [digest]}
 
 
 @pytest.mark.parametrize(
@@ -153,130 +128,97 @@ def test_a_file_of_parameters_may_be_shared_with_other_nodes(dds: DdsGraph, tmp_
     assert "did you mean linear_step?" in text
 
 
-def test_what_does_not_fit_is_said_in_words(tmp_path: Path) -> None:
-    with dds_graph(tmp_path) as graph:
-        peer = graph.peer
-        peer.ask("record", topic="/image_raw", type="Image", fields=["width"], depth=5, latched=True)
-        peer.ask("advertise", topic="/gesture/hand_sign", type="Twist")
-        peer.ask("introduce", name="viewer")
-        camera = graph.node("camera", *FORWARD, name="/my_camera")
-        control = graph.node("control", name=f"/{NODE}")
-        profile = "the publisher is volatile, the subscriber wants transient local"
-        line = f"/image_raw: nothing passes between our publisher and the subscriber of /viewer: {profile}"
-        eventually(lambda: line in camera.text, 10.0, what=line)
-        assert "(ours: reliable, volatile, keep last 3; theirs: reliable, transient local" in camera.text
-        types = "ours has the type std_msgs/msg/String, theirs geometry_msgs/msg/Twist"
-        eventually(lambda: types in control.text, 10.0, what=types)
-        assert peer.ask("get", topic="/image_raw") == []
+def test_what_does_not_fit_is_said_in_words(fresh: DdsGraph) -> None:
+    peer = fresh.peer
+    peer.ask("record", topic="/image_raw", type="Image", fields=["width"], depth=5, latched=True)
+    peer.ask("advertise", topic="/gesture/hand_sign", type="Twist")
+    peer.ask("introduce", name="viewer")
+    camera = fresh.node("camera", *FORWARD, name="/my_camera")
+    control = fresh.node("control", name=f"/{NODE}")
+    profile = "the publisher is volatile, the subscriber wants transient local"
+    line = f"/image_raw: nothing passes between our publisher and the subscriber of /viewer: {profile}"
+    eventually(lambda: line in camera.text, 10.0, what=line)
+    assert "(ours: reliable, volatile, keep last 3; theirs: reliable, transient local" in camera.text
+    types = "ours has the type std_msgs/msg/String, theirs geometry_msgs/msg/Twist"
+    eventually(lambda: types in control.text, 10.0, what=types)
+    assert peer.ask("get", topic="/image_raw") == []
 
 
-def test_images_reach_who_wants_them_reliable_and_one_that_hangs_holds_up_nobody(tmp_path: Path) -> None:
+def test_images_reach_who_wants_them_reliable_and_one_that_hangs_holds_up_nobody(fresh: DdsGraph) -> None:
     """As the subscribers of all tutorials do, which have a depth of 10 and no more."""
-    with dds_graph(tmp_path) as graph:
-        hangs, goes_on = graph.peer, graph.start_peer()
-        topics = {"/image_raw": "Image", "/image_raw/compressed": "CompressedImage"}
-        for topic, kind in topics.items():
-            hangs.ask("record", topic=topic, type=kind, fields=["header.stamp"], depth=10)
-            goes_on.ask("record", topic=topic, type=kind, fields=["header.stamp"], depth=10)
-        camera = graph.node("camera", "--camera", "virtual", name="/my_camera")
-        for peer in (hangs, goes_on):
-            eventually(lambda: all(len(peer.ask("get", topic=topic)) > 5 for topic in topics))  # noqa: B023
-        hangs.freeze()
-        frozen_s = time.monotonic()
-        for topic in topics:
-            eventually(lambda: len(goes_on.ask("get", topic=topic, since_s=frozen_s)) > 40, what=topic)  # noqa: B023
-            stamps = [stamp for _, (stamp,) in goes_on.ask("get", topic=topic, since_s=frozen_s)]
-            assert stamps == sorted(set(stamps))
-        assert "dropped" not in camera.text
+    hangs, goes_on = fresh.peer, fresh.start_peer()
+    topics = {"/image_raw": "Image", "/image_raw/compressed": "CompressedImage"}
+    for topic, kind in topics.items():
+        hangs.ask("record", topic=topic, type=kind, fields=["header.stamp"], depth=10)
+        goes_on.ask("record", topic=topic, type=kind, fields=["header.stamp"], depth=10)
+    camera = fresh.node("camera", "--camera", "virtual", name="/my_camera")
+    for peer in (hangs, goes_on):
+        eventually(lambda: all(len(peer.ask("get", topic=topic)) > 5 for topic in topics))  # noqa: B023
+    hangs.freeze()
+    frozen_s = time.monotonic()
+    for topic in topics:
+        eventually(lambda: len(goes_on.ask("get", topic=topic, since_s=frozen_s)) > 40, what=topic)  # noqa: B023
+        stamps = [stamp for _, (stamp,) in goes_on.ask("get", topic=topic, since_s=frozen_s)]
+        assert stamps == sorted(set(stamps))
+    assert "dropped" not in camera.text
 
 
-def test_several_robots_share_one_tree_of_transforms(tmp_path: Path) -> None:
-    with dds_graph(tmp_path) as graph:
-        for name, words in (("r1", ()), ("r2", ()), ("alone", ("-r", "/tf:=tf"))):
-            topic = f"/{name}{ODOM}"
-            graph.peer.ask("record", topic=topic, type="Odometry", fields=["header.frame_id", "child_frame_id"])
-            graph.node("robot", name=f"/{name}/robot", ros=("-r", f"__ns:=/{name}", *words))
-            seen = eventually(lambda: graph.peer.ask("get", topic=topic))  # noqa: B023
-            prefix = "" if words else f"{name}/"
-            assert seen[0][1] == [f"{prefix}odom", f"{prefix}base_link"]
+def test_several_robots_share_one_tree_of_transforms(fresh: DdsGraph) -> None:
+    for name, words in (("r1", ()), ("r2", ()), ("alone", ("-r", "/tf:=tf"))):
+        topic = f"/{name}{ODOM}"
+        fresh.peer.ask("record", topic=topic, type="Odometry", fields=["header.frame_id", "child_frame_id"])
+        fresh.node("robot", name=f"/{name}/robot", ros=("-r", f"__ns:=/{name}", *words))
+        seen = eventually(lambda: fresh.peer.ask("get", topic=topic))  # noqa: B023
+        prefix = "" if words else f"{name}/"
+        assert seen[0][1] == [f"{prefix}odom", f"{prefix}base_link"]
 
 
-def test_a_node_says_once_that_it_is_ready_and_names_its_topics_as_others_know_them(tmp_path: Path) -> None:
-    with dds_graph(tmp_path) as graph:
-        words = ("-r", "__ns:=/r1", "-r", "image_raw:=/front/image")
-        camera = graph.node("camera", *FORWARD, name="/r1/my_camera", ros=words)
-        line = (
-            "/r1/my_camera is ready: publishes /diagnostics, /front/camera_info, /front/image, "
-            "/front/image/compressed, /r1/audit, /r1/stopped; listens to /r1/stop"
-        )
-        eventually(lambda: line in camera.text, 10.0, what=line)
-        assert camera.text.count("is ready") == 1
+def test_a_node_says_once_that_it_is_ready_and_names_its_topics_as_others_know_them(fresh: DdsGraph) -> None:
+    words = ("-r", "__ns:=/r1", "-r", "image_raw:=/front/image")
+    camera = fresh.node("camera", *FORWARD, name="/r1/my_camera", ros=words)
+    line = (
+        "/r1/my_camera is ready: publishes /diagnostics, /front/camera_info, /front/image, "
+        "/front/image/compressed, /r1/audit, /r1/stopped; listens to /r1/stop"
+    )
+    eventually(lambda: line in camera.text, 10.0, what=line)
+    assert camera.text.count("is ready") == 1
 
 
-def test_raw_images_for_another_machine_are_warned_of_once(tmp_path: Path) -> None:
-    with dds_graph(tmp_path) as graph:
-        near, far, farther = graph.peer, graph.start_peer("far"), graph.start_peer("farther")
-        camera = graph.node("camera", *FORWARD, name="/my_camera")
-        images = {"topic": "/image_raw", "type": "Image", "fields": ["width"], "reliable": False}
-        near.ask("record", **images)
-        near.ask("introduce", name="near")
-        eventually(lambda: near.ask("get", topic="/image_raw"))
-        assert "takes raw images" not in camera.text
-        for peer, name in ((far, "viewer"), (farther, "another")):
-            peer.ask("record", **images)
-            peer.ask("introduce", name=name)
-            eventually(lambda: "/image_raw: /viewer takes raw images" in camera.text)
-        eventually(lambda: farther.ask("get", topic="/image_raw"))
-        assert "let it take /image_raw/compressed" in camera.text
-        assert camera.text.count("takes raw images") == 1
+def test_raw_images_for_another_machine_are_warned_of_once(fresh: DdsGraph) -> None:
+    near, far, farther = fresh.peer, fresh.start_peer("far"), fresh.start_peer("farther")
+    camera = fresh.node("camera", *FORWARD, name="/my_camera")
+    images = {"topic": "/image_raw", "type": "Image", "fields": ["width"], "reliable": False}
+    near.ask("record", **images)
+    near.ask("introduce", name="near")
+    eventually(lambda: near.ask("get", topic="/image_raw"))
+    assert "takes raw images" not in camera.text
+    for peer, name in ((far, "viewer"), (farther, "another")):
+        peer.ask("record", **images)
+        peer.ask("introduce", name=name)
+        eventually(lambda: "/image_raw: /viewer takes raw images" in camera.text)
+    eventually(lambda: farther.ask("get", topic="/image_raw"))
+    assert "let it take /image_raw/compressed" in camera.text
+    assert camera.text.count("takes raw images") == 1
 
 
-def test_recognition_takes_compressed_images_beyond_this_machine(tmp_path: Path) -> None:
-    with dds_graph(tmp_path) as graph:
-        images = {"rt/image_raw", "rt/image_raw/compressed"}
-        graph.node("recognition", name="/near/hand_sign_recognition", ros=("-r", "__ns:=/near"))
-        # Wherever the peers of the user's configuration may be, those of this test are here.
-        loopback = "<General><Interfaces><NetworkInterface address='127.0.0.1'/></Interfaces></General>"
-        graph.env["CYCLONEDDS_URI"] = (
-            f"<CycloneDDS><Domain>{loopback}<Discovery><ParticipantIndex>auto</ParticipantIndex>"
-            "<Peers><Peer address='127.0.0.1'/></Peers></Discovery></Domain></CycloneDDS>"
-        )
-        graph.node("recognition", name="/hand_sign_recognition")
-        eventually(lambda: images & set(graph.nodes()["/hand_sign_recognition"]["readers"]))
-        assert images & set(graph.nodes()["/hand_sign_recognition"]["readers"]) == {"rt/image_raw/compressed"}
-        assert "rt/near/image_raw" in graph.nodes()["/near/hand_sign_recognition"]["readers"]
-
-
-def test_simulated_time_is_followed(tmp_path: Path) -> None:
-    with dds_graph(tmp_path) as graph:
-        graph.peer.ask("advertise", topic="/clock", type="Clock", reliable=False, depth=1)
-        graph.peer.ask("record", topic="/image_raw", type="Image", fields=["header.stamp"], reliable=False)
-        camera = graph.node("camera", *FORWARD, name="/my_camera", ros=("-p", "use_sim_time:=true"))
-        eventually(lambda: graph.peer.ask("listeners", topic="/clock") > 0)
-        graph.peer.ask("run_clock", from_s=1000.0, seconds=30.0)
-        eventually(lambda: [v for _, (v,) in graph.peer.ask("get", topic="/image_raw") if 1000.0 < v < 1040.0], 15.0)
-        assert camera.running
+def test_recognition_takes_compressed_images_beyond_this_machine(fresh: DdsGraph) -> None:
+    images = {"rt/image_raw", "rt/image_raw/compressed"}
+    fresh.node("recognition", name="/near/hand_sign_recognition", ros=("-r", "__ns:=/near"))
+    # Wherever the peers of the user's configuration may be, those of this test are here.
+    loopback = "<General><Interfaces><NetworkInterface address='127.0.0.1'/></Interfaces></General>"
+    fresh.env["CYCLONEDDS_URI"] = (
+        f"<CycloneDDS><Domain>{loopback}<Discovery><ParticipantIndex>auto</ParticipantIndex>"
+        "<Peers><Peer address='127.0.0.1'/></Peers></Discovery></Domain></CycloneDDS>"
+    )
+    fresh.node("recognition", name="/hand_sign_recognition")
+    eventually(lambda: images & set(fresh.nodes()["/hand_sign_recognition"]["readers"]))
+    assert images & set(fresh.nodes()["/hand_sign_recognition"]["readers"]) == {"rt/image_raw/compressed"}
+    assert "rt/near/image_raw" in fresh.nodes()["/near/hand_sign_recognition"]["readers"]
 
 
 class TestChain(ChainContract):
     @pytest.fixture(scope="class")
     @classmethod
     def chain(cls, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Running]:
-        with dds_graph(tmp_path_factory.mktemp("chain")) as graph:
+        with DdsGraph(tmp_path_factory.mktemp("chain")) as graph:
             yield driving_chain(graph)
-
-
-def test_a_robot_follows_another_programs_twists(dds: DdsGraph) -> None:
-    peer: Any = dds.peer
-    dds.node("robot", name="/lone/robot", ros=("-r", "__ns:=/lone", "-r", f"{CMD_VEL[1:]}:=/lone/cmd_vel"))
-    peer.ask(
-        "record", topic=f"/lone{ODOM}", type="Odometry", fields=["twist.twist.angular.z", "pose.pose.orientation.z"]
-    )
-    peer.ask("advertise", topic="/lone/cmd_vel", type="Twist")
-    eventually(lambda: peer.ask("listeners", topic="/lone/cmd_vel") > 0)
-    eventually(lambda: peer.ask("get", topic=f"/lone{ODOM}"))
-    peer.ask("publish", topic="/lone/cmd_vel", values={"angular.z": 0.5}, count=20, period_s=0.05)
-    turned = peer.ask("get", topic=f"/lone{ODOM}")
-    assert max(speed for _, (speed, _) in turned) == pytest.approx(0.5, abs=0.05)
-    assert turned[-1][1][1] > 0.1  # to the left
-    eventually(lambda: abs(peer.ask("get", topic=f"/lone{ODOM}")[-1][1][0]) < 0.01, 5.0, what="the robot to stand")

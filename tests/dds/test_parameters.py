@@ -1,7 +1,6 @@
 """The parameters of our nodes, as a client of rmw_cyclonedds_cpp sees and sets them."""
 
 import time
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -9,26 +8,14 @@ import pytest
 
 from tests.about import about
 from tests.contracts.node_contract import CMD_VEL
-from tests.dds.driver import NODE, DdsDriver, record_twists
-from tests.dds.graph import DdsGraph, dds_graph
+from tests.contracts.ros2_node_contract import NODE, DdsDriver, record_twists
+from tests.dds.graph import DdsGraph
 from tests.processes import eventually
 
 pytest.importorskip("cyclonedds")
 pytestmark = pytest.mark.slow
 
 DOUBLE, STRING = 3, 4
-
-
-@pytest.fixture(scope="module")
-def dds_domain(tmp_path_factory: pytest.TempPathFactory) -> Iterator[DdsGraph]:
-    with dds_graph(tmp_path_factory.mktemp("dds")) as graph:
-        yield graph
-
-
-@pytest.fixture
-def dds(dds_domain: DdsGraph) -> Iterator[DdsGraph]:
-    with dds_domain.test():
-        yield dds_domain
 
 
 def ask(dds: DdsGraph, node: str, service: str, kind: str, **fields: Any) -> Any:
@@ -102,7 +89,7 @@ def test_a_client_that_says_in_no_way_who_it_is_gets_no_answer_and_harms_nobody(
 
 
 def test_requests_do_not_hold_up_signs(tmp_path: Path) -> None:
-    with dds_graph(tmp_path) as dds:
+    with DdsGraph(tmp_path) as dds:
         other = dds.start_peer()
         driver = DdsDriver(dds, parameters={"linear_step": 0.01})
         node = next(name for name in dds.nodes() if name.endswith(NODE))

@@ -5,14 +5,13 @@ import math
 import signal
 import sys
 import time
-from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from tests.dds.graph import DdsGraph, dds_graph
+from tests.dds.graph import DdsGraph
 from tests.processes import Peer, Process, eventually
 
 pytest.importorskip("cyclonedds")
@@ -63,9 +62,8 @@ class Robots:
 
 
 @pytest.fixture
-def robots(tmp_path: Path) -> Iterator[Robots]:
-    with dds_graph(tmp_path) as graph:
-        yield Robots(graph, tmp_path)
+def robots(fresh: DdsGraph, tmp_path: Path) -> Robots:
+    return Robots(fresh, tmp_path)
 
 
 def summary_of(process: Process) -> dict[str, Any]:

@@ -32,12 +32,11 @@ from handsteer.nodes.control import HandSignControlNode
 from handsteer.nodes.recognition import HandSignRecognitionNode
 from handsteer.nodes.robot import RobotNode
 from handsteer.nodes.steering import SteeringNode
-from handsteer.parameters import NodeParameters
 from handsteer.robots import Robot
 from handsteer.robots.remote import RemoteRobot
 from handsteer.testing.fault_transport import FaultTransport
 from handsteer.testing.faulty_camera import SpoiltCamera
-from handsteer.transports.base import Call, Received
+from handsteer.transports.base import Received, Session
 from handsteer.types import NONE
 from tests.faults.base import Base
 from tests.faults.domain import Domain
@@ -212,17 +211,11 @@ class RemoteChain(Chain):
 
 
 @dataclass(frozen=True)
-class _Session:
+class _Session(Session):
     transport: FaultTransport
     clock: SteppedClock
     name: str = "/robot"
     parameters: Mapping[str, Any] = field(default_factory=dict)
-
-    def offer(self, services: Callable[[], Mapping[str, Call]]) -> None:
-        pass
-
-    def serve(self, parameters: NodeParameters) -> None:
-        pass
 
     def wait(self, timeout_s: float) -> bool:
         return False

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from tests.contracts.node_contract import CMD_VEL, FORWARD, ODOM
-from tests.dds.graph import DdsGraph, dds_graph
+from tests.dds.graph import DdsGraph
 from tests.faults.stepped import Outcome
 from tests.processes import Process, eventually
 
@@ -283,7 +283,7 @@ def _disk() -> Iterator[Row]:
 @contextmanager
 def rig(by: str) -> Iterator[Rig]:
     """Let our nodes run as processes for as long as the block lasts."""
-    with tempfile.TemporaryDirectory() as home, dds_graph(Path(home)) as graph:
+    with tempfile.TemporaryDirectory() as home, DdsGraph(Path(home)) as graph:
         made = Rig(graph, by)
         made.open()
         yield made

@@ -1,13 +1,11 @@
 """A Zenoh network of its own for a test, with its router, and processes in it."""
 
-import contextlib
 import os
 import sys
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
-from tests.processes import NODES, Peer, Process, Processes, as_tests_drive, eventually, free_port
+from tests.contracts.ros2_node_contract import PeerGraph
+from tests.processes import NODES, Peer, Process, eventually, free_port
 
 PEER = Path(__file__).with_name("peer.py")
 MODULES = (*NODES, "handsteer.transports.zenoh.transport")
@@ -21,18 +19,18 @@ _VARIABLES = (
 )
 
 
-class ZenohGraph(Processes):
-    """The processes of a test around a router, with one plain Zenoh program among them that looks on.
+class ZenohGraph(PeerGraph):
+    """A network around a router, with a plain Zenoh program in it.
 
     Args:
         home: Folder for what the processes say.
         mode: ``peer``, in which processes connect directly, or ``client``, in which all goes by the router.
 
     Attributes:
-        env: Environment of the processes.
         router: ``handsteer zenoh-router``.
-        peer: The plain program.
     """
+
+    transport = "zenoh"
 
     def __init__(self, home: Path, mode: str = "peer") -> None:
         super().__init__(home)
@@ -53,42 +51,16 @@ class ZenohGraph(Processes):
         return router
 
     def start_peer(self) -> Peer:
-        """Start a plain program; wait until it is ready."""
         command = [sys.executable, str(PEER), self.endpoint, str(DOMAIN)]
         return self.adopt(
             Peer(command, {**self.env, "PEER_CONFIG": f'mode="{self._mode}"'}, self.log("peer"), ("zenoh",))
         )
 
     def handsteer(self, *arguments: str, **env: str) -> Process:
-        """Start ``handsteer`` with ``arguments`` in this network."""
         return self._start(list(arguments), {**self.env, **env})
 
-    def node(self, verb: str, *arguments: str, name: str, ros: tuple[str, ...] = ()) -> Process:
-        """Start one of handsteer's nodes and wait until it is in the graph under ``name``."""
-        process = self.handsteer(
-            verb, "--transport", "zenoh", *as_tests_drive(verb, arguments), *(("--ros-args", *ros) if ros else ())
-        )
-        eventually(lambda: name in self.nodes() or not process.running, what=f"{name} to start")
-        assert process.running, process.text
-        return process
-
-    def nodes(self) -> dict[str, Any]:
-        """Return the nodes as the plain program knows them: what they publish and subscribe to."""
-        return dict(self.peer.ask("graph"))
-
     def publishes(self, node: str, topic: str) -> bool:
-        """Return whether the node publishes on the topic."""
         return topic in self.nodes()[node]["MP"]
 
     def _start(self, arguments: list[str], env: dict[str, str]) -> Process:
         return self.adopt(Process([sys.executable, "-m", "handsteer", *arguments], env, self.log(), MODULES))
-
-
-@contextlib.contextmanager
-def zenoh_graph(home: Path, mode: str = "peer") -> Iterator[ZenohGraph]:
-    """A network with a router and a plain program in it, for as long as the block lasts."""
-    graph = ZenohGraph(home, mode)
-    try:
-        yield graph
-    finally:
-        graph.stop()

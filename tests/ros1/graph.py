@@ -92,11 +92,19 @@ class Ros1Graph(Processes):
             return set()
         return {node for kind in state for _, nodes in kind for node in nodes}
 
+    def topics(self) -> dict[str, tuple[set[str], set[str]]]:
+        """Return who publishes and who subscribes to each topic."""
+        _, _, (publishers, subscribers, _) = self.master.getSystemState("/test")
+        sending, listening = dict(publishers), dict(subscribers)
+        return {name: (set(sending.get(name, ())), set(listening.get(name, ()))) for name in {*sending, *listening}}
+
     def listeners(self, topic: str) -> list[str]:
         """Return the full names of the nodes that subscribe to ``topic``."""
-        _, _, state = self.master.getSystemState("/test")
-        listeners: dict[str, list[str]] = dict(state[1])
-        return listeners.get(topic, [])
+        return sorted(self.topics().get(topic, (set(), set()))[1])
+
+    def talkers(self, topic: str) -> list[str]:
+        """Return the full names of the nodes that publish ``topic``."""
+        return sorted(self.topics().get(topic, (set(), set()))[0])
 
     def connected(self, node: str, topic: str) -> list[str]:
         """Return the full names of the nodes to which ``node`` sends ``topic``: the master knows no connections."""
@@ -104,12 +112,6 @@ class Ros1Graph(Processes):
         interface: Any = xmlrpc.client.ServerProxy(uri)
         _, _, info = interface.getBusInfo("/test")
         return [other for _, other, direction, _, name, *_ in info if (direction, name) == ("o", topic)]
-
-    def talkers(self, topic: str) -> list[str]:
-        """Return the full names of the nodes that publish ``topic``."""
-        _, _, state = self.master.getSystemState("/test")
-        talkers: dict[str, list[str]] = dict(state[0])
-        return talkers.get(topic, [])
 
     @property
     def master(self) -> Any:

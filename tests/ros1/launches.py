@@ -108,12 +108,6 @@ class LaunchGraph(Ros1Graph):
         """Note what comes on ``topics``, given as type by name."""
         return Recorder(self.peer(), topics)
 
-    def topics(self) -> dict[str, tuple[set[str], set[str]]]:
-        """Return who publishes and who subscribes to each topic."""
-        _, _, (publishers, subscribers, _) = self.master.getSystemState("/test")
-        sending, listening = dict(publishers), dict(subscribers)
-        return {name: (set(sending.get(name, ())), set(listening.get(name, ()))) for name in {*sending, *listening}}
-
     def pid(self, node: str) -> int | None:
         """Return the process that ``node`` runs in, or None while it does not answer."""
         code, _, uri = self.master.lookupNode("/test", node)

@@ -256,11 +256,13 @@ def test_time_may_come_from_the_clock_topic(ros: LaunchGraph) -> None:
     show(ros, "Forward:600")
     ros.set_parameter("/use_sim_time", True)
     record = ros.record(TOPICS)
-    clock = ros.run(sys.executable, str(Path(__file__).with_name("publish_clock.py")), "1000")
+    clock = ros.peer()
+    clock.ask("advertise", topic="/clock", package="rosgraph_msgs", type="Clock")
+    clock.ask("run_clock", from_s=1000.0, rate=1.0)
     ros.launch(*SIGN_CONTROL, VIRTUAL)
     ros.launch(*DRIVE_ROBOT, "world:=empty")
     assert 1000 < eventually(lambda: drives(record), what="it drives on simulated time")["stamp_s"] < 1200
-    clock.kill()
+    clock.ask("stop_clock")
     # With time standing still no odometry comes; what the robot is told last counts.
     eventually(lambda: record.of(CMD_VEL)[-1]["linear"] == 0.0, what="a clock that stops leaves it standing")
 

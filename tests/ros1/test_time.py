@@ -100,5 +100,4 @@ def test_a_robot_may_tell_the_time_and_does_not_follow_itself(simulated: Ros1Gra
 
 def test_without_being_asked_the_robot_does_not_tell_the_time(ros1: Ros1Graph) -> None:
     ros1.node("robot", name="/robot")
-    _, _, (publishers, _, _) = ros1.master.getSystemState("/test")
-    assert "/clock" not in dict(publishers)
+    assert ros1.talkers("/clock") == []

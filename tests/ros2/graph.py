@@ -1,10 +1,8 @@
 """A domain of a real ROS 2 for a test: its rclpy, with Fast DDS, looks at our nodes."""
 
-import contextlib
 import shutil
 import sys
 import sysconfig
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -14,6 +12,14 @@ from tests.dds.graph import DdsGraph
 PEER = Path(__file__).with_name("peer.py")
 PYTHON = Path(sys.prefix) / "ros2" / "bin" / "python"
 """Made by ``make ros2``."""
+TRANSPORTS = ("ros2", "dds")
+"""What joins our nodes."""
+NEEDS_ROS2 = [
+    pytest.mark.ros2,
+    pytest.mark.slow,
+    pytest.mark.skipif(not PYTHON.exists(), reason="no ROS 2 here: make ros2 installs one for the tests"),
+]
+"""Marks of the tests that need it."""
 needs_tf2_msgs = pytest.mark.skipif(
     not (shutil.which("g++") and Path(sysconfig.get_path("include"), "Python.h").exists()),
     reason="make ros2 needs g++ and Python's headers for tf2_msgs",
@@ -21,7 +27,7 @@ needs_tf2_msgs = pytest.mark.skipif(
 
 
 class Ros2Graph(DdsGraph):
-    """The processes of a test in a domain, with a node of a real ROS 2 among them that looks on.
+    """A domain, with a node of a real ROS 2 in it.
 
     Args:
         home: Folder for logs.
@@ -34,15 +40,4 @@ class Ros2Graph(DdsGraph):
         super().__init__(home, (str(PYTHON), str(PEER)))
 
     def publishes(self, node: str, topic: str) -> bool:
-        """Return whether ROS 2 knows that the node of this full name publishes ``topic``."""
         return topic in self.nodes()[node]["publishes"]
-
-
-@contextlib.contextmanager
-def ros2_graph(home: Path, transport: str = "dds") -> Iterator[Ros2Graph]:
-    """A domain with a ROS 2 node in it, for as long as the block lasts."""
-    graph = Ros2Graph(home, transport)
-    try:
-        yield graph
-    finally:
-        graph.stop()

@@ -1,22 +1,17 @@
 """The parameters of our nodes by rclpy, as ``ros2 param`` sees and sets them: by rclpy's own client."""
 
 import signal
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from tests.contracts.node_contract import FORWARD
-from tests.dds.driver import NODE, DdsDriver
+from tests.contracts.ros2_node_contract import NODE, DdsDriver
 from tests.processes import eventually
-from tests.ros2.graph import PYTHON, Ros2Graph, ros2_graph
+from tests.ros2.graph import NEEDS_ROS2, Ros2Graph
 
-pytestmark = [
-    pytest.mark.ros2,
-    pytest.mark.slow,
-    pytest.mark.skipif(not PYTHON.exists(), reason="no ROS 2 here: make ros2 installs one for the tests"),
-]
+pytestmark = NEEDS_ROS2
 
 DOUBLE, STRING = 3, 4
 SERVICES = {
@@ -27,18 +22,6 @@ SERVICES = {
     "set_parameters": "rcl_interfaces/srv/SetParameters",
     "set_parameters_atomically": "rcl_interfaces/srv/SetParametersAtomically",
 }
-
-
-@pytest.fixture(scope="module")
-def ros2_domain(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Ros2Graph]:
-    with ros2_graph(tmp_path_factory.mktemp("ros2"), "ros2") as graph:
-        yield graph
-
-
-@pytest.fixture
-def ros2(ros2_domain: Ros2Graph) -> Iterator[Ros2Graph]:
-    with ros2_domain.test():
-        yield ros2_domain
 
 
 def ask(ros2: Ros2Graph, node: str, call: str, *arguments: Any) -> Any:
@@ -183,7 +166,7 @@ def test_two_nodes_answer_each_for_itself(ros2: Ros2Graph) -> None:
 
 
 def test_beyond_this_machine_the_network_card_is_used(tmp_path: Path) -> None:
-    with ros2_graph(tmp_path, "ros2") as graph:
+    with Ros2Graph(tmp_path, "ros2") as graph:
         graph.peer.kill()
         graph.env["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "SUBNET"
         graph.peer = graph.start_peer()

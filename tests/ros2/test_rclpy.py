@@ -2,33 +2,17 @@
 
 import os
 import signal
-from collections.abc import Iterator
+import subprocess
 from pathlib import Path
 
 import pytest
 
 from tests.contracts.node_contract import CMD_VEL, FORWARD, ODOM, RUN, expect_a_run_to_drive
-from tests.dds.driver import NODE, DdsDriver
+from tests.contracts.ros2_node_contract import NODE, DdsDriver
 from tests.processes import eventually
-from tests.ros2.graph import PYTHON, Ros2Graph, ros2_graph
+from tests.ros2.graph import NEEDS_ROS2, PYTHON, Ros2Graph
 
-pytestmark = [
-    pytest.mark.ros2,
-    pytest.mark.slow,
-    pytest.mark.skipif(not PYTHON.exists(), reason="no ROS 2 here: make ros2 installs one for the tests"),
-]
-
-
-@pytest.fixture(scope="module")
-def ros2_domain(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Ros2Graph]:
-    with ros2_graph(tmp_path_factory.mktemp("ros2"), "ros2") as graph:
-        yield graph
-
-
-@pytest.fixture
-def ros2(ros2_domain: Ros2Graph) -> Iterator[Ros2Graph]:
-    with ros2_domain.test():
-        yield ros2_domain
+pytestmark = NEEDS_ROS2
 
 
 @pytest.fixture
@@ -116,7 +100,7 @@ def test_what_is_wrong_ends_a_node_with_one_line(ros2: Ros2Graph, words: tuple[s
 
 
 def test_a_run_drives_a_robot_by_rclpy(tmp_path: Path) -> None:
-    with ros2_graph(tmp_path, "ros2") as graph:
+    with Ros2Graph(tmp_path, "ros2") as graph:
         peer = graph.peer
         graph.node("robot", name="/robot", ros=("-r", f"{CMD_VEL[1:]}:=/cmd_vel", "-r", f"{ODOM[1:]}:=/odom"))
         fields = ["twist.twist.linear.x", "pose.pose.position.x"]
@@ -131,3 +115,10 @@ def test_a_node_that_is_ended_leaves_at_once(ros2: Ros2Graph) -> None:
     assert camera.code() == 0, camera.text
     assert "Traceback" not in camera.text
     eventually(lambda: "/brief/my_camera" not in ros2.nodes(), 3.0, what="the node to be gone for others")
+
+
+def test_the_transport_keeps_its_contract_where_rclpy_is() -> None:
+    tests = "tests/transports/rclpy/in_ros2.py"
+    command = [str(PYTHON), "-m", "pytest", "-q", "-p", "no:cacheprovider", "-p", "no:xdist", tests]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=600.0, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr

@@ -1,41 +1,31 @@
-"""``handsteer run --robot …`` drives a node of a real ROS 2 that stands for the robot, whichever commands it takes."""
+"""``handsteer run --robot …`` and ``handsteer record`` among nodes of a real ROS 2."""
 
 import json
 import signal
 import time
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
+from handsteer.recordings.mcap_reader import McapFile
 from tests.processes import eventually
-from tests.ros2.graph import PYTHON, Ros2Graph, ros2_graph
+from tests.ros2.graph import NEEDS_ROS2, Ros2Graph
 
 pytest.importorskip("cyclonedds")
-pytestmark = [
-    pytest.mark.ros2,
-    pytest.mark.slow,
-    pytest.mark.skipif(not PYTHON.exists(), reason="no ROS 2 here: make ros2 installs one for the tests"),
-]
+pytestmark = NEEDS_ROS2
 
 CAMERA = ("--headless", "--json", "--camera", "virtual", "--camera.width", "320", "--camera.height", "240")
 FIELDS = {"TwistStamped": ["twist.linear.x", "header.stamp", "header.frame_id"], "Twist": ["linear.x"]}
 
 
-@pytest.fixture(params=("ros2", "dds"))
-def ros2(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Ros2Graph]:
-    with ros2_graph(tmp_path, request.param) as graph:
-        yield graph
-
-
 @pytest.mark.parametrize("kind", list(FIELDS))
-def test_a_robot_of_a_real_ros2_is_driven_as_it_takes_commands(ros2: Ros2Graph, kind: str) -> None:
-    peer = ros2.peer
+def test_a_robot_of_a_real_ros2_is_driven_as_it_takes_commands(fresh: Ros2Graph, kind: str) -> None:
+    peer = fresh.peer
     peer.ask("record", topic="/cmd_vel", type=kind, fields=FIELDS[kind])
     peer.ask("advertise", topic="/odom", type="Odometry", depth=5)
     # It stands still, which a control notices that tells it to go faster than this.
     words = ("--virtual-hand.script", "Stop:6 Forward:60", "--control.max-linear", "0.09", "--robot.odom-timeout", "10")
-    process = ros2.handsteer("run", *CAMERA, "--robot", ros2.transport, *words)
+    process = fresh.handsteer("run", *CAMERA, "--robot", fresh.transport, *words)
     eventually(lambda: peer.ask("listeners", topic="/odom") or not process.running)
     assert process.running, process.text
     # Both ends have found each other only when each has seen the other, which takes Fast DDS up to three seconds.
@@ -51,3 +41,27 @@ def test_a_robot_of_a_real_ros2_is_driven_as_it_takes_commands(ros2: Ros2Graph, 
     summary = json.loads(next(line for line in process.text.splitlines() if line.startswith("{")))
     assert summary["final_pose"] == {"x": 1.5, "y": 0.0, "yaw": 0.0}
     eventually(lambda: [speed for _, (speed, *_) in peer.ask("get", topic="/cmd_vel")][-3:] == [0.0] * 3, 5.0)
+
+
+def test_a_recording_is_played_into_rclpy_and_recorded_from_it(
+    fresh: Ros2Graph, recording: Path, tmp_path: Path
+) -> None:
+    copy = tmp_path / "copy.mcap"
+    fresh.peer.ask("record", topic="/image_raw", type="Image", fields=["width", "height", "encoding"])
+    fresh.peer.ask("advertise", topic="/gesture/hand_sign", type="String")
+    recorder = fresh.handsteer("record", str(copy), "--transport", fresh.transport)
+    eventually(lambda: fresh.peer.ask("listeners", topic="/gesture/hand_sign") > 0, what="the recorder to listen")
+    fresh.node("camera", "--camera", str(recording), name="/my_camera")
+    eventually(lambda: len(fresh.peer.ask("get", topic="/image_raw")) > 30, what="pictures in rclpy")
+    assert {tuple(seen) for _, seen in fresh.peer.ask("get", topic="/image_raw")} == {(640, 480, "bgr8")}
+    fresh.peer.ask("publish", topic="/gesture/hand_sign", values={"data": "Forward"}, count=20, period_s=0.1)
+    eventually(lambda: copy.stat().st_size > 500_000 or not recorder.running, what="pictures in the recording")
+    recorder.signal(signal.SIGINT)
+    assert recorder.code() == 0, recorder.text
+    file = McapFile(copy)
+    kinds = {(recorded.topic, recorded.type) for recorded in file.messages()}
+    assert file.problem is None
+    assert ("/image_raw/compressed", "sensor_msgs/msg/CompressedImage") in kinds
+    signs = [recorded.message.data for recorded in file.messages({"/gesture/hand_sign"})]
+    assert set(signs) == {"Forward"}
+    assert len(signs) >= 10

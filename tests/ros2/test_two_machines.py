@@ -9,18 +9,13 @@ from typing import Any
 import pytest
 
 from tests.contracts.node_contract import FORWARD
-from tests.dds.driver import NODE
+from tests.contracts.ros2_node_contract import NODE
 from tests.dds.graph import ROS_VARIABLES
 from tests.distributed.network import NoNamespacesError, two_machines
 from tests.processes import Peer, Process, eventually
-from tests.ros2.graph import PEER, PYTHON
+from tests.ros2.graph import NEEDS_ROS2, PEER, PYTHON
 
-pytestmark = [
-    pytest.mark.netns,
-    pytest.mark.ros2,
-    pytest.mark.slow,
-    pytest.mark.skipif(not PYTHON.exists(), reason="no ROS 2 here: make ros2 installs one for the tests"),
-]
+pytestmark = [pytest.mark.netns, *NEEDS_ROS2]
 
 
 def test_parameters_are_listed_and_set_from_another_machine(tmp_path: Path) -> None:

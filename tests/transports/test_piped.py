@@ -104,6 +104,19 @@ def test_the_graph_counts_publishers_of_the_other_process_until_they_are_gone(bo
     assert eventually(lambda: both.graph.publishers_of(CMD_VEL) == [])
 
 
+def test_the_late_end_of_a_subscription_does_not_end_the_next_one(both: Both) -> None:
+    both.start()
+    both.far.say("subscribe", 1, "page", HAND_SIGN)
+    both.far.say("subscribe", 2, "page", HAND_SIGN)
+    both.far.say("unsubscribe", HAND_SIGN.name, 1)
+    both.far.say("subscribe", 3, "page", CMD_VEL)
+    assert eventually(lambda: both.graph.advertise("control", CMD_VEL).has_subscribers)
+    publisher = both.graph.advertise("recognition", HAND_SIGN)
+    assert publisher.has_subscribers
+    both.far.say("unsubscribe", HAND_SIGN.name, 2)
+    assert eventually(lambda: not publisher.has_subscribers)
+
+
 def test_a_process_that_stands_still_gets_the_newest_only_and_holds_up_nobody(both: Both) -> None:
     signs: list[str] = []
     pictures: list[Received[Any]] = []

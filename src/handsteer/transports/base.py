@@ -1,5 +1,6 @@
 """The interfaces of transports, which publish and subscribe to topics, and of sessions, which join a graph."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Generic, Protocol, TypeVar, runtime_checkable
@@ -143,49 +144,39 @@ class KnowsTypes(Protocol):
         ...
 
 
-class Session(Protocol):
-    """A process's membership in a graph of several processes."""
+class Session(ABC):
+    """A process's membership in a graph of several processes.
 
-    @property
-    def name(self) -> str:
-        """Full name of the process in the graph, with namespace, such as ``/r1/my_camera``."""
-        ...
+    Attributes:
+        name: Full name of the process in the graph, with namespace, such as ``/r1/my_camera``.
+        parameters: Parameters of this process from the graph's own parameter service, as of the start.
+        clock: The graph's time.
+        transport: Carries the graph's messages.
+    """
 
-    @property
-    def parameters(self) -> Mapping[str, Any]:
-        """Parameters of this process from the graph's own parameter service, as of the start."""
-        ...
+    name: str
+    parameters: Mapping[str, Any]
+    clock: Clock
+    transport: Transport
 
-    @property
-    def clock(self) -> Clock:
-        """The graph's time."""
-        ...
-
-    @property
-    def transport(self) -> Transport:
-        """Carries the graph's messages."""
-        ...
-
-    def serve(self, parameters: NodeParameters) -> None:
+    def serve(self, parameters: NodeParameters) -> None:  # noqa: B027 - ROS 1 does not
         """Let others get and set the parameters of this process's node, if the graph supports it."""
-        ...
 
-    def offer(self, services: Callable[[], Mapping[str, Call]]) -> None:
+    def offer(self, services: Callable[[], Mapping[str, Call]]) -> None:  # noqa: B027 - only rclpy does
         """Offer the services ``~/name`` of this process's node, if the graph supports it.
 
         Args:
             services: Returns the services by name; not called if the graph does not support services.
         """
-        ...
 
+    @abstractmethod
     def wait(self, timeout_s: float) -> bool:
         """Wait for at most ``timeout_s`` seconds; return whether the graph has asked this process to end.
 
         Raises:
             TransportError: The graph is gone.
         """
-        ...
 
+    @abstractmethod
     def close(self) -> None:
         """Deliver what was published, then leave; may be called twice."""
-        ...

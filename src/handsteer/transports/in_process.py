@@ -97,11 +97,10 @@ class Fanout(Generic[M]):
 
     def remove(self, deliver: Deliver[M]) -> None:
         """Stop calling ``deliver``; does nothing if it was removed already."""
-        with self._lock:
+        with ExitStack() as unlocked, self._lock:
             self._subscribers = tuple(known for known in self._subscribers if known is not deliver)
-            is_last = not self._subscribers and self._receive is not None
-        if is_last:
-            self.close()
+            if not self._subscribers and self._receive is not None:
+                self._close(unlocked)
 
     def send(self, received: Received[M]) -> None:
         """Deliver ``received`` to all subscribers, on this thread."""
@@ -114,12 +113,14 @@ class Fanout(Generic[M]):
 
     def close(self) -> None:
         """Remove all subscribers and stop receiving; may be called twice."""
-        with self._lock:
-            end, self._end = self._end, None
-            self._subscribers, self._last = (), None
-        # Outside the lock, because a message that is being delivered may wait for it.
-        if end is not None:
-            end()
+        with ExitStack() as unlocked, self._lock:
+            self._close(unlocked)
+
+    def _close(self, unlocked: ExitStack) -> None:
+        # Receiving ends outside the lock, because a message that is being delivered may wait for it.
+        if self._end is not None:
+            unlocked.callback(self._end)
+        self._subscribers, self._end, self._last = (), None, None
 
 
 class BasePublisher(ABC, Generic[M]):

@@ -153,8 +153,9 @@ class PipedTransport(BaseTransport):
 
     def _reception(self, node: str, name: str, topic: Topic[M]) -> Receive[M]:
         def receive(_send: Deliver[M]) -> Callable[[], None]:
-            self._pipe.say("subscribe", node, topic)
-            return lambda: self._pipe.say("unsubscribe", name)
+            number = next(self._numbers)
+            self._pipe.say("subscribe", number, node, topic)
+            return lambda: self._pipe.say("unsubscribe", name, number)
 
         return receive
 
@@ -196,7 +197,7 @@ class Gateway:
         self._pipe = pipe
         self._transport = transport
         self._publishers: dict[int, tuple[Publisher[Any], Topic[Any]]] = {}
-        self._subscriptions: dict[str, Subscription] = {}
+        self._subscriptions: dict[str, tuple[int, Subscription]] = {}
         for handler in (self._advertise, self._unadvertise, self._publish, self._subscribe, self._unsubscribe):
             pipe.on(handler.__name__.removeprefix("_"), handler)
 
@@ -204,7 +205,8 @@ class Gateway:
         """End all publishing and receiving; may be called twice."""
         self._publishers.clear()
         while self._subscriptions:
-            self._subscriptions.popitem()[1].close()
+            _, (_, subscription) = self._subscriptions.popitem()
+            subscription.close()
 
     def _advertise(self, number: int, node: str, topic: Topic[Any]) -> None:
         self._publishers[number] = (self._transport.advertise(node, topic), topic)
@@ -219,17 +221,18 @@ class Gateway:
         if topic.lifespan_s is None or time.monotonic() - sent_s <= topic.lifespan_s:
             publisher.publish(received.message, received.captured_s)
 
-    def _subscribe(self, node: str, topic: Topic[Any]) -> None:
+    def _subscribe(self, number: int, node: str, topic: Topic[Any]) -> None:
         def deliver(received: Received[Any]) -> None:
             self._pipe.say("message", topic.name, received, key=topic.name, keep=kept(topic))
 
-        self._unsubscribe(topic.name)
-        self._subscriptions[topic.name] = self._transport.subscribe(node, topic, deliver)
+        if topic.name in self._subscriptions:
+            self._subscriptions.pop(topic.name)[1].close()
+        self._subscriptions[topic.name] = (number, self._transport.subscribe(node, topic, deliver))
 
-    def _unsubscribe(self, name: str) -> None:
-        subscription = self._subscriptions.pop(name, None)
-        if subscription is not None:
-            subscription.close()
+    def _unsubscribe(self, name: str, number: int) -> None:
+        # The end of a subscription may come after the beginning of the next one, which has replaced it.
+        if self._subscriptions.get(name, (None,))[0] == number:
+            self._subscriptions.pop(name)[1].close()
 
 
 def kept(topic: Topic[Any]) -> int:

@@ -1,4 +1,4 @@
-"""The transport by rclpy, where rclpy is: ``test_in_ros2.py`` runs this by the Python of ``make ros2``."""
+"""The transport by rclpy, where rclpy is: ``tests/ros2/test_rclpy.py`` runs this by the Python of ``make ros2``."""
 
 import logging
 import sys
@@ -12,7 +12,7 @@ import rclpy
 from rclpy.qos import QoSProfile
 from std_msgs.msg import String as TheirString
 
-from handsteer.clock import Clock, SimulatedClock, WallClock
+from handsteer.clock import SimulatedClock
 from handsteer.errors import TransportError
 from handsteer.messages import (
     CAMERA_INFO,
@@ -27,9 +27,9 @@ from handsteer.messages import (
     Topic,
 )
 from handsteer.transports import join
-from handsteer.transports.base import Session, Transport
+from handsteer.transports.base import Session
 from handsteer.transports.rclpy.topics import publisher_qos, subscription_qos
-from tests.contracts.transport_contract import TransportContract, eventually, heard
+from tests.contracts.transport_contract import SessionContract, eventually, heard
 from tests.dds.graph import free_domain
 
 Join = Callable[..., Session]
@@ -56,31 +56,13 @@ def joined() -> Iterator[Join]:
         session.close()
 
 
-class TestRclpy(TransportContract):
-    settle_s = 0.3
-
-    def name_of(self, node: str) -> str:
-        return "/r1/tests"
-
+class TestRclpy(SessionContract):
     @pytest.fixture
     def session(self, joined: Join, caplog: pytest.LogCaptureFixture) -> Session:
         session = joined("-r", "__ns:=/r1")
         # What handsteer logs goes to rclpy alone, and the contract looks for it here.
         logging.getLogger("handsteer").addHandler(caplog.handler)
         return session
-
-    @pytest.fixture
-    def transport(self, session: Session) -> Transport:
-        return session.transport
-
-    @pytest.fixture
-    def clock(self, session: Session) -> Clock:
-        assert isinstance(session.clock, WallClock)
-        return session.clock
-
-    def test_the_process_has_its_full_name(self, session: Session) -> None:
-        assert session.name == "/r1/tests"
-        assert session.transport.full_name("my_camera") == "r1/tests: my_camera"
 
 
 def test_a_type_that_this_ros2_lacks_is_said_once_and_left_out(

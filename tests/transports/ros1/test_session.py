@@ -5,13 +5,12 @@ from collections.abc import Callable, Iterator
 import numpy as np
 import pytest
 
-from handsteer.clock import WallClock
 from handsteer.errors import TransportError
 from handsteer.messages import Image, Topic
 from handsteer.nodes.base import Node
 from handsteer.transports import join
 from handsteer.transports.base import Received, Session, Transport
-from tests.contracts.transport_contract import TransportContract, eventually
+from tests.contracts.transport_contract import SessionContract, eventually
 from tests.ros1.graph import Ros1Graph, ros1_graph
 
 pytestmark = pytest.mark.ros1
@@ -26,17 +25,13 @@ def graph(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Ros1Graph]:
         yield graph
 
 
-@pytest.fixture(scope="session")
-def session(graph: Ros1Graph) -> Session:
-    """This process as a ROS node; it leaves the graph when the process ends."""
-    return join("ros1", "tests", [])
+class TestRos1(SessionContract):
+    full_name = "/tests"
 
-
-class TestRos1(TransportContract):
-    settle_s = 0.3
-
-    def name_of(self, node: str) -> str:
-        return "/tests"
+    @pytest.fixture(scope="session")
+    def session(self, graph: Ros1Graph) -> Session:
+        """This process as a ROS node; it leaves the graph when the process ends."""
+        return join("ros1", "tests", [])
 
     @pytest.fixture
     def transport(self, session: Session) -> Iterator[Transport]:
@@ -45,11 +40,6 @@ class TestRos1(TransportContract):
         transport = Ros1Transport(session.clock)
         yield transport
         transport.close()
-
-    @pytest.fixture
-    def clock(self, session: Session) -> WallClock:
-        assert isinstance(session.clock, WallClock)
-        return session.clock
 
     @pytest.mark.slow
     @pytest.mark.parametrize("through_a_node", [True, False], ids=["node", "callback"])
@@ -84,7 +74,6 @@ class TestRos1(TransportContract):
         assert float(np.median(ages_s)) < 0.7, ages_s
 
     def test_a_process_has_one_name(self, session: Session) -> None:
-        assert session.name == "/tests"
         with pytest.raises(TransportError, match=r"is the ROS node /tests already.*one a process.*process of its own"):
             join("ros1", "another", [])
 

@@ -4,21 +4,15 @@ from collections.abc import Iterator
 
 import pytest
 
-from handsteer.clock import Clock, WallClock
 from handsteer.transports import join
-from handsteer.transports.base import Session, Transport
-from tests.contracts.transport_contract import TransportContract
+from handsteer.transports.base import Session
+from tests.contracts.transport_contract import SessionContract
 from tests.processes import free_port
 
 pytest.importorskip("zenoh")
 
 
-class TestZenoh(TransportContract):
-    settle_s = 0.3
-
-    def name_of(self, node: str) -> str:
-        return "/r1/tests"
-
+class TestZenoh(SessionContract):
     @pytest.fixture
     def session(self, monkeypatch: pytest.MonkeyPatch) -> Iterator[Session]:
         # No router, and nobody else: this process talks to itself.
@@ -27,19 +21,6 @@ class TestZenoh(TransportContract):
         session = join("zenoh", "tests", ["--ros-args", "-r", "__ns:=/r1"])
         yield session
         session.close()
-
-    @pytest.fixture
-    def transport(self, session: Session) -> Transport:
-        return session.transport
-
-    @pytest.fixture
-    def clock(self, session: Session) -> Clock:
-        assert isinstance(session.clock, WallClock)
-        return session.clock
-
-    def test_the_process_has_its_full_name(self, session: Session) -> None:
-        assert session.name == "/r1/tests"
-        assert session.transport.full_name("my_camera") == "r1/tests: my_camera"
 
 
 @pytest.mark.slow

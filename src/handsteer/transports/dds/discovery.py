@@ -27,6 +27,7 @@ from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
 
 from handsteer.messages import Image, type_name
+from handsteer.transports.base import UNNAMED
 from handsteer.transports.dds.topics import dds_type, describe, discovery_qos, host, misfits
 from handsteer.transports.ros2.encoding import NodeName, dds_type_name, ros_type_name, types
 
@@ -258,7 +259,7 @@ class Matching:
         self._advised = True
         name = ours.topic.removeprefix("rt")
         return (
-            f"{name}: {node or 'a node without a name'} takes raw images, many of which are lost on the way to another "
+            f"{name}: {node or UNNAMED} takes raw images, many of which are lost on the way to another "
             f"machine or to Fast DDS: let it take {name}{_COMPRESSED}"
         )
 
@@ -293,7 +294,7 @@ def reasons(ours: Endpoint, theirs: Endpoint) -> list[str]:
 
 def explain(ours: Endpoint, theirs: Endpoint, node: str | None) -> str:
     """Return one line with the two endpoints that are not connected, the reasons, and both profiles."""
-    who = node or "a node without a name"
+    who = node or UNNAMED
     return (
         f"{ours.topic.removeprefix('rt')}: nothing passes between our {ours.kind} and the {theirs.kind} of {who}: "
         f"{'; '.join(reasons(ours, theirs))} (ours: {describe(ours.qos)}; theirs: {describe(theirs.qos)})"

@@ -28,6 +28,7 @@ from handsteer.transports.base import UNNAMED
 from handsteer.transports.dds.discovery import Endpoint, Matching, RosGraph
 from handsteer.transports.dds.network import Network
 from handsteer.transports.dds.topics import dds_type, opaque_type, reader_qos, service_dds_type, service_qos, writer_qos
+from handsteer.transports.ros2.base_transport import Other
 from handsteer.transports.ros2.encoding import NodeName, dds_type_name, reply_type, request_type, ros_type_name
 
 _USER_DATA = b"enclave=/;"
@@ -46,7 +47,6 @@ class Participant:
     """A participant of a DDS domain, known to ROS 2 as one node.
 
     Attributes:
-        name: The node's name.
         is_local: Whether all others are certainly on this machine.
         dispatcher: The thread that serves readers, until they are released.
 
@@ -58,7 +58,6 @@ class Participant:
     """
 
     def __init__(self, network: Network, name: NodeName, *, is_observer: bool = False) -> None:
-        self.name = name
         self.is_local = network.is_local
         try:
             self._domain: Any = None if network.config is None else Domain(network.domain, network.config)
@@ -80,13 +79,13 @@ class Participant:
             self.dispatcher.add(reader, serve)
         self.dispatcher.start()
 
-    def writer(self, topic: Topic[Any]) -> DataWriter[Any]:
-        """Return a new writer of ``topic``; its messages are instances of its ``data_type``."""
-        return self._open(DataWriter, topic, writer_qos(topic), publishes=True)
+    def writer(self, name: str, topic: Topic[Any]) -> DataWriter[Any]:
+        """Return a new writer of ``topic``, whose full name is ``name``; its messages have its ``data_type``."""
+        return self._open(DataWriter, name, topic, writer_qos(topic), publishes=True)
 
-    def reader(self, topic: Topic[Any]) -> DataReader[Any]:
-        """Return a new reader of ``topic``."""
-        return self._open(DataReader, topic, reader_qos(topic), publishes=False)
+    def reader(self, name: str, topic: Topic[Any]) -> DataReader[Any]:
+        """Return a new reader of ``topic``, whose full name is ``name``."""
+        return self._open(DataReader, name, topic, reader_qos(topic), publishes=False)
 
     def service(self, name: str, kind: str) -> tuple[DataReader[Any], DataWriter[Any]]:
         """Return a reader of the requests and a writer of the replies of the service of this full name and type."""
@@ -107,18 +106,17 @@ class Participant:
         """Return the nodes of other processes, and their publishers and subscribers with the node of each, if known."""
         return self._graph.nodes(), [(end, self._graph.node_of(key)) for key, end in self._matching.others().items()]
 
-    def publishers_of(self, name: str) -> list[str]:
-        """Return the node of each publisher of the topic of this full name in other processes.
+    def others_of(self, name: str) -> list[Other]:
+        """Return the publishers and subscribers of the topic of this full name in other processes.
 
         Names of nodes come up to three seconds late.
         """
-        ends = self._matching.others().items()
-        return [self._graph.node_of(key) or UNNAMED for key, end in ends if end.publishes and end.topic == f"rt{name}"]
-
-    def subscribed_types(self, name: str) -> set[str]:
-        """Return the types of the subscribers of the topic of this full name in other processes."""
-        others = self._matching.others().values()
-        return {ros_type_name(end.type) for end in others if not end.publishes and end.topic == f"rt{name}"}
+        _, ends = self.others()
+        return [
+            Other(node or UNNAMED, ros_type_name(end.type), end.publishes)
+            for end, node in ends
+            if end.topic == f"rt{name}"
+        ]
 
     def release(self, endpoint: DataWriter[Any] | DataReader[Any]) -> None:
         """Release a writer or reader; it is deleted when the caller drops its reference too."""
@@ -134,8 +132,8 @@ class Participant:
         self._topics.clear()
         self._participant = self._domain = None
 
-    def _open(self, kind: Callable[..., E], topic: Topic[Any], qos: Qos, *, publishes: bool) -> E:
-        name, message = f"rt{self.name.topic(topic)}", type_name(topic.type)
+    def _open(self, kind: Callable[..., E], full_name: str, topic: Topic[Any], qos: Qos, *, publishes: bool) -> E:
+        name, message = f"rt{full_name}", type_name(topic.type)
         with self._lock:
             if (name, message) not in self._topics:
                 self._topics[name, message] = DdsTopic(self._participant, name, dds_type(message))

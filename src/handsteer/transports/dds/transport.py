@@ -22,7 +22,7 @@ from handsteer.messages import Topic
 from handsteer.transports.dds.network import network
 from handsteer.transports.dds.participant import Participant
 from handsteer.transports.dds.topics import user_data
-from handsteer.transports.ros2.base_transport import Take, WireTransport
+from handsteer.transports.ros2.base_transport import Other, Take, WireTransport
 from handsteer.transports.ros2.encoding import NodeName
 
 _REQUESTS_AT_ONCE = 100
@@ -52,7 +52,7 @@ class DdsTransport(WireTransport):
         return _Writer(self._participant, name, topic)
 
     def _open_reader(self, name: str, topic: Topic[Any], take: Take) -> Callable[[], None]:
-        reader = self._participant.reader(topic)
+        reader = self._participant.reader(name, topic)
 
         def serve() -> None:
             for sample in reader.take(topic.depth):
@@ -69,18 +69,15 @@ class DdsTransport(WireTransport):
     def _open_service(self, name: str, kind: str, respond: Callable[[bytes], bytes]) -> Callable[[], None]:
         return _Service(self._participant, name, kind, respond).close
 
-    def _other_publishers(self, name: str) -> list[str]:
-        return self._participant.publishers_of(name)
-
-    def _subscribed_types(self, topic: Topic[Any]) -> set[str]:
-        return self._participant.subscribed_types(self.topic_name(topic))
+    def _others(self, name: str) -> list[Other]:
+        return self._participant.others_of(name)
 
 
 class _Writer:
     def __init__(self, participant: Participant, name: str, topic: Topic[Any]) -> None:
         self._participant = participant
         self._name = name
-        self._writer: Any = participant.writer(topic)
+        self._writer: Any = participant.writer(name, topic)
         self._is_slow = False
 
     @property

@@ -23,7 +23,7 @@ from rclpy.utilities import remove_ros_args
 from handsteer.clock import Clock, SimulatedClock, WallClock
 from handsteer.errors import ConfigError, HandsteerError, TransportError
 from handsteer.parameters import Description, NodeParameters, Value
-from handsteer.transports.base import Call
+from handsteer.transports.base import Call, Session
 from handsteer.transports.rclpy.topics import RclpyTransport, ros_class
 from handsteer.transports.ros2.arguments import nested
 from handsteer.transports.ros2.encoding import encode
@@ -82,8 +82,8 @@ def _logging_by(logger: Any) -> Iterator[None]:
         ours.setLevel(level)
 
 
-class RclpySession:
-    """A :class:`~handsteer.transports.base.Session` of ROS 2, by a node of rclpy.
+class RclpySession(Session):
+    """A session of ROS 2, by a node of rclpy.
 
     rclpy itself provides ROS 2's common features of nodes: arguments and remapping, parameters and ``qos_overrides``,
     ``use_sim_time``, the log, ``get_type_description``.
@@ -108,7 +108,7 @@ class RclpySession:
             self.parameters: dict[str, Any] = take_given(self._node)
             self.clock = self._make_clock()
             self._clock_monitor = ClockMonitor(self.clock)
-            self.transport = RclpyTransport(self._node, self.clock)
+            self.transport: RclpyTransport = RclpyTransport(self._node, self.clock)
             self._executor = SingleThreadedExecutor(context=self._context)
             self._executor.add_node(self._node)
             self._thread = threading.Thread(target=self._spin, name="rclpy", daemon=True)

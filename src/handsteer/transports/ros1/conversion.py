@@ -109,7 +109,7 @@ def _from_ros1_log(theirs: Any) -> Log:
 def _written_types() -> Typestore:
     """Return our types without the fields that ROS 1 does not have; rosbags adds ``seq`` to headers."""
     store = message_types()
-    there = {field for field, _ in get_typestore(Stores.ROS1_NOETIC).fielddefs[_MARKER][1]}
+    there = {field for field, _ in _ros1_types().fielddefs[_MARKER][1]}
     constants, fields = store.fielddefs[_MARKER]
     store.fielddefs[_MARKER] = (constants, [(field, kind) for field, kind in fields if field in there])
     return store
@@ -120,7 +120,7 @@ def _read_types() -> Typestore:
     """Return types with the fields of ROS 1, whose messages are instances of our classes."""
     store = message_types()
     store.fielddefs[_MARKER] = _written_types().fielddefs[_MARKER]
-    store.fielddefs[_HEADER] = get_typestore(Stores.ROS1_NOETIC).fielddefs[_HEADER]
+    store.fielddefs[_HEADER] = _ros1_types().fielddefs[_HEADER]
     makers: dict[str, Any] = {_MARKER: _make_marker, _HEADER: lambda _seq, stamp, frame_id: Header(stamp, frame_id)}
     store.types |= makers
     return store

@@ -5,13 +5,12 @@ import math
 import sys
 import threading
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 from handsteer.clock import Clock, SimulatedClock, WallClock
 from handsteer.errors import TransportError
-from handsteer.parameters import NodeParameters
-from handsteer.transports.base import Call
+from handsteer.transports.base import Session
 
 try:
     import rosgraph
@@ -39,8 +38,8 @@ _DELIVER_S = 0.1
 _LEAVE_TIMEOUT_S = 2.0
 
 
-class Ros1Session:
-    """A :class:`~handsteer.transports.base.Session` of ROS 1. rospy allows one name per process.
+class Ros1Session(Session):
+    """A session of ROS 1, where nodes read their parameters at the start. rospy allows one name per process.
 
     Args:
         node: Name of the node, unless ``arguments`` rename it.
@@ -73,12 +72,6 @@ class Ros1Session:
         self.transport = Ros1Transport(self.clock, translated.topics)
         self._watcher = threading.Thread(target=self._watch, name="ros1_session", daemon=True)
         self._watcher.start()
-
-    def serve(self, parameters: NodeParameters) -> None:
-        """Do nothing: in ROS 1 the master has the parameters, and nodes read them at the start."""
-
-    def offer(self, services: Callable[[], Mapping[str, Call]]) -> None:
-        """Do nothing: the nodes of the course have no services."""
 
     def wait(self, timeout_s: float) -> bool:
         """Wait for at most ``timeout_s`` seconds; return whether ROS has asked this process to end (`rosnode kill`).

@@ -3,7 +3,7 @@
 import logging
 import threading
 from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
@@ -11,7 +11,7 @@ from handsteer.clock import Clock, SimulatedClock, WallClock, to_seconds
 from handsteer.errors import HandsteerError, TransportError
 from handsteer.messages import CLOCK, Log, Time, Topic
 from handsteer.parameters import NodeParameters
-from handsteer.transports.base import Call, Publisher
+from handsteer.transports.base import Publisher, Session
 from handsteer.transports.ros2.arguments import parse_arguments
 from handsteer.transports.ros2.base_transport import WireTransport
 from handsteer.transports.ros2.encoding import NodeName, decode, encode, identify, request_type
@@ -78,8 +78,8 @@ class RosoutHandler(logging.Handler):
 Connect = Callable[[NodeName, Clock], WireTransport]
 
 
-class Ros2Session:
-    """A :class:`~handsteer.transports.base.Session` of ROS 2, on any middleware but rclpy.
+class Ros2Session(Session):
+    """A session of ROS 2, on any middleware but rclpy; only that has services of any type.
 
     Args:
         node: Name of the node, unless ``arguments`` rename it.
@@ -105,7 +105,7 @@ class Ros2Session:
         self._logs: Publisher[Log] | None = None
         self._clock_monitor = ClockMonitor(self.clock)
         self._left = threading.Event()
-        self.transport = connect(name, self.clock)
+        self.transport: WireTransport = connect(name, self.clock)
         try:
             self._logs = self._publish_logs() if given.rosout else None
             if isinstance(self.clock, SimulatedClock):
@@ -124,9 +124,6 @@ class Ros2Session:
         events = self.transport.advertise(self.name, PARAMETER_EVENTS)
         for name, kind, answer in ParameterServices(self.name, parameters, self._stamp, events.publish).services:
             self.transport.serve(name, kind, partial(_respond, kind, answer))
-
-    def offer(self, services: Callable[[], Mapping[str, Call]]) -> None:
-        """Do nothing: only rclpy has services of any type."""
 
     def wait(self, timeout_s: float) -> bool:
         """Wait for at most ``timeout_s`` seconds; return whether this session has been closed.

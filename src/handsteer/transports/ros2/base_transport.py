@@ -11,7 +11,7 @@ import time
 from abc import abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, ClassVar, Generic, Protocol, TypeVar
+from typing import Any, ClassVar, Generic, NamedTuple, Protocol, TypeVar
 
 from handsteer.clock import Clock
 from handsteer.errors import TransportError
@@ -84,7 +84,7 @@ class Writer(Protocol):
         ...
 
 
-class Ros2Publisher(BasePublisher[M]):
+class _Publisher(BasePublisher[M]):
     """Publisher of a topic by ``writer``, which raises one of ``errors`` if it cannot send.
 
     Without a writer, there are never subscribers.
@@ -100,18 +100,15 @@ class Ros2Publisher(BasePublisher[M]):
 
     @property
     def has_subscribers(self) -> bool:
-        """Whether there are subscribers, in this process or another."""
         with self._lock:
             return self._writer is not None and self._writer.has_readers
 
     def flush(self, timeout_s: float) -> None:
-        """Wait until all reliable subscribers have what was published, for at most ``timeout_s`` seconds."""
         writer = self._writer
         if writer is not None and not writer.flush(timeout_s):
             log.info("%s: not every subscriber has confirmed the last message", self.name)
 
     def close(self) -> None:
-        """Stop publishing; may be called twice."""
         with self._lock:
             writer, self._writer = self._writer, None
         if writer is not None:
@@ -169,9 +166,9 @@ class Ros2Transport(BaseTransport):
         for publisher in publishers:
             publisher.flush(max(0.0, deadline_s - time.monotonic()))
 
-    def _open_publisher(self, node: str, name: str, topic: Topic[M]) -> Ros2Publisher[M]:
+    def _open_publisher(self, node: str, name: str, topic: Topic[M]) -> BasePublisher[M]:
         compile_type(type_name(topic.type))
-        return Ros2Publisher(self._node_name, name, topic, self._open_writer(name, topic), self.errors)
+        return _Publisher(self._node_name, name, topic, self._open_writer(name, topic), self.errors)
 
     def _reception(self, node: str, name: str, topic: Topic[M]) -> Receive[M]:
         compile_type(type_name(topic.type))
@@ -190,6 +187,14 @@ class Ros2Transport(BaseTransport):
         """Return the types of the subscribers of ``topic`` in other processes."""
 
 
+class Other(NamedTuple):
+    """A publisher or subscriber in another process: the full name of its node, and the type of its messages."""
+
+    node: str
+    type: str
+    publishes: bool
+
+
 class WireTransport(Ros2Transport):
     """Carries messages without ROS 2's own library, and services too.
 
@@ -205,7 +210,8 @@ class WireTransport(Ros2Transport):
 
     def publishers_of(self, topic: Topic[Any]) -> list[str]:
         """Return the full names of the ROS 2 nodes that publish ``topic``, in this process and others."""
-        return sorted([*super().publishers_of(topic), *self._other_publishers(self.topic_name(topic))])
+        others = [other.node for other in self._others(self.topic_name(topic)) if other.publishes]
+        return sorted([*super().publishers_of(topic), *others])
 
     def topic_name(self, topic: Topic[Any]) -> str:
         """Return the topic's full name in the graph, remapped."""
@@ -232,8 +238,11 @@ class WireTransport(Ros2Transport):
         """Offer a service, as in :meth:`serve`; return a function that ends it, and is called once."""
 
     @abstractmethod
-    def _other_publishers(self, name: str) -> list[str]:
-        """Return the node of each publisher of the topic of this full name in other processes."""
+    def _others(self, name: str) -> list[Other]:
+        """Return the publishers and subscribers of the topic of this full name in other processes."""
+
+    def _subscribed_types(self, topic: Topic[Any]) -> set[str]:
+        return {other.type for other in self._others(self.topic_name(topic)) if not other.publishes}
 
 
 Take = Callable[[bytes, bytes, float | None], None]

@@ -171,16 +171,13 @@ class Router:
     def __init__(self, environment: Mapping[str, str], endpoint: str | None = None) -> None:
         zenoh.try_init_log_from_env()
         config = router_config(environment, endpoint)
-        endpoints = json.loads(config.get_json("listen/endpoints"))
-        if isinstance(endpoints, dict):
-            endpoints = endpoints.get("router", [])
-        self.endpoints: list[str] = endpoints
+        self.endpoints = _endpoints(config, "listen")
         """Addresses it listens on."""
         try:
             self._session = zenoh.open(config)
         except zenoh.ZError as error:
             raise TransportError(
-                f"no Zenoh router can be started at {' and '.join(endpoints)}: is there one already, or another "
+                f"no Zenoh router can be started at {' and '.join(self.endpoints)}: is there one already, or another "
                 f"program on that port? ({reason(error)})"
             ) from None
 

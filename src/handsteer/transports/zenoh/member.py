@@ -8,7 +8,7 @@ import time
 import zenoh
 
 from handsteer.errors import TransportError
-from handsteer.transports.ros2.base_transport import Profile
+from handsteer.transports.ros2.base_transport import Other, Profile
 from handsteer.transports.ros2.encoding import NodeName, type_hash
 from handsteer.transports.zenoh.configuration import Network, reason, routers
 from handsteer.transports.zenoh.keys import (
@@ -32,7 +32,6 @@ class Member:
     """A session of a Zenoh network, known to ROS 2 as one node.
 
     Attributes:
-        name: The node's name.
         is_local: Whether this process connects to this machine only, as far as is known.
         neighbours: The other nodes.
 
@@ -41,7 +40,6 @@ class Member:
     """
 
     def __init__(self, network: Network, name: NodeName) -> None:
-        self.name = name
         self.is_local = network.is_local
         self._network = network
         zenoh.try_init_log_from_env()
@@ -149,22 +147,19 @@ class Neighbours:
         for entity in theirs:
             self._compare(entity)
 
-    def publishers_of(self, topic: str) -> list[str]:
-        """Return the node of each publisher of the topic of this full name in other processes."""
-        return [node for node, _ in self._others("publisher", topic)]
-
-    def subscribed_types(self, topic: str) -> set[str]:
-        """Return the types of the subscribers of the topic of this full name in other processes."""
-        return {end.type for _, end in self._others("subscriber", topic)}
+    def of(self, topic: str) -> list[Other]:
+        """Return the publishers and subscribers of the topic of this full name in other processes."""
+        with self._lock:
+            theirs = [(entity.node, entity.endpoint) for entity in self._theirs.values()]
+        return [
+            Other(node, end.type, end.kind == "publisher")
+            for node, end in theirs
+            if end.topic == topic and end.kind in _OPPOSITE
+        ]
 
     def close(self) -> None:
         """Stop comparing."""
         self._watch.undeclare()
-
-    def _others(self, kind: str, topic: str) -> list[tuple[str, Endpoint]]:
-        with self._lock:
-            theirs = [(entity.node, entity.endpoint) for entity in self._theirs.values()]
-        return [(node, end) for node, end in theirs if (end.kind, end.topic) == (kind, topic)]
 
     def _note(self, sample: zenoh.Sample) -> None:
         token = str(sample.key_expr)

@@ -17,7 +17,7 @@ import zenoh.ext
 
 from handsteer.clock import Clock
 from handsteer.messages import Topic, type_name
-from handsteer.transports.ros2.base_transport import IMAGES, Profile, Take, WireTransport, offered, requested
+from handsteer.transports.ros2.base_transport import IMAGES, Other, Profile, Take, WireTransport, offered, requested
 from handsteer.transports.ros2.encoding import NodeName
 from handsteer.transports.zenoh.configuration import network
 from handsteer.transports.zenoh.keys import attachment, gid, read_attachment
@@ -82,11 +82,8 @@ class ZenohTransport(WireTransport):
 
         return close
 
-    def _other_publishers(self, name: str) -> list[str]:
-        return self._member.neighbours.publishers_of(name)
-
-    def _subscribed_types(self, topic: Topic[Any]) -> set[str]:
-        return self._member.neighbours.subscribed_types(self.topic_name(topic))
+    def _others(self, name: str) -> list[Other]:
+        return self._member.neighbours.of(name)
 
 
 class _Writer:
