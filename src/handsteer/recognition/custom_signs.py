@@ -205,11 +205,7 @@ def load_custom_model(path: Path) -> CustomModel:
         ModelMissing: It cannot be read.
         ModelCorrupt: It is not a model of taught signs, is damaged, or has another format.
     """
-    arrays = _FILE.read(path)
-    try:
-        return model_from(arrays)
-    except (KeyError, ValueError, TypeError, AttributeError, ArithmeticError, RecursionError, DatasetError) as error:
-        raise _FILE.damaged(path, error) from None
+    return _FILE.read(path, model_from)
 
 
 def model_from(arrays: Arrays) -> CustomModel:

@@ -130,11 +130,7 @@ def load_model(path: Path = DEFAULT_MODEL) -> SignModel:
         ModelMissing: It cannot be read.
         ModelCorrupt: It is not a sign model, is damaged, or has another format.
     """
-    arrays = _FILE.read(path)
-    try:
-        return _built(arrays)
-    except (KeyError, ValueError, TypeError, AttributeError, ArithmeticError, RecursionError) as error:
-        raise _FILE.damaged(path, error) from None
+    return _FILE.read(path, _built)
 
 
 def _built(arrays: Arrays) -> SignModel:

@@ -112,11 +112,7 @@ def load_dataset(path: Path) -> Dataset:
     Raises:
         DatasetError: It cannot be read, is damaged, or has another version.
     """
-    arrays = _FILE.read(path)
-    try:
-        return dataset_from(arrays)
-    except (KeyError, ValueError, TypeError, IndexError, ArithmeticError, RecursionError, DatasetError) as error:
-        raise _FILE.damaged(path, error) from None
+    return _FILE.read(path, dataset_from)
 
 
 def save_dataset(dataset: Dataset, path: Path) -> None:

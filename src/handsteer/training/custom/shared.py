@@ -12,7 +12,7 @@ from typing import Final
 from handsteer.errors import DatasetError
 from handsteer.recognition.custom_signs import CustomModel, model_arrays, model_from
 from handsteer.recognition.hand import Hand
-from handsteer.recognition.npz import NpzFormat
+from handsteer.recognition.npz import Arrays, NpzFormat
 from handsteer.training.custom.dataset import Dataset, dataset_arrays, dataset_from
 
 LARGEST_SHARED_BYTES: Final = 24_000_000
@@ -48,14 +48,14 @@ def load_shared(path: Path) -> tuple[Dataset, CustomModel | None]:
     Raises:
         DatasetError: It cannot be read, is too large, is damaged, or contains neither.
     """
-    arrays = _FILE.read(path, LARGEST_SHARED_BYTES)
-    try:
-        dataset = dataset_from(arrays) if "takes" in arrays else Dataset()
-        model = model_from(arrays) if "taught" in arrays else None
-    except Exception as error:  # damaged arrays raise errors of many types
-        raise _FILE.damaged(path, error) from None
+    return _FILE.read(path, _built, LARGEST_SHARED_BYTES)
+
+
+def _built(arrays: Arrays) -> tuple[Dataset, CustomModel | None]:
+    dataset = dataset_from(arrays) if "takes" in arrays else Dataset()
+    model = model_from(arrays) if "taught" in arrays else None
     if not dataset.takes and model is None:
-        raise _FILE.damaged(path, "there is neither a take nor a model in it")
+        raise ValueError("there is neither a take nor a model in it")
     return dataset, model
 
 

@@ -167,11 +167,7 @@ def load_people(path: Path = FILE) -> tuple[Distribution, ...]:
         ModelMissing: It cannot be read.
         ModelCorrupt: It is not such a file, or is damaged.
     """
-    arrays = _NPZ.read(path)
-    try:
-        return _built(arrays)
-    except (KeyError, ValueError, TypeError) as error:
-        raise _NPZ.damaged(path, error) from None
+    return _NPZ.read(path, _built)
 
 
 def _built(arrays: Arrays) -> tuple[Distribution, ...]:
