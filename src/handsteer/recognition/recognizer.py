@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 
 from handsteer.config import Config, SignsConfig
 from handsteer.recognition.custom_signs import CustomClassifier, load_custom_model
-from handsteer.recognition.debouncer import Debouncer, Evidence
 from handsteer.recognition.features import PALM, directions
+from handsteer.recognition.filters import Debouncer, Evidence, HandPosition, HandSelector
 from handsteer.recognition.hand import CONNECTIONS, Classifier, Hand, Landmarker, SignGuess
-from handsteer.recognition.hand_selector import HandPosition, HandSelector
 from handsteer.recognition.landmark_models import find_pair
 from handsteer.recognition.landmarker import MediaPipeLandmarker
 from handsteer.recognition.shipped_signs import DEFAULT_MODEL, ShippedClassifier, load_model
