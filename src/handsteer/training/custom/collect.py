@@ -3,7 +3,7 @@
 import math
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final, Literal
 
@@ -23,7 +23,6 @@ Phase = Literal["ready", "countdown", "recording", "done"]
 
 _FEWEST: Final = 5
 """Minimum number of hands in a take."""
-
 
 _RUN_UP_S: Final = 0.5
 
@@ -259,7 +258,7 @@ def _photo_takes(
         if hand is None:
             without_hand(path)
         else:
-            yield Facts(facts.label, facts.person, session, facts.source).take([hand], [0.0])
+            yield replace(facts, session=session).take([hand], [0.0])
 
 
 def _video_takes(source: Path, landmarker: Landmarker, facts: Facts, take_s: float) -> Iterator[Take]:

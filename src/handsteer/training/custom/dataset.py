@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Final
@@ -239,10 +239,6 @@ class LabelSummary:
     rows: int
     persons: int
     sessions: int
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the counts as plain values, for JSON."""
-        return asdict(self)
 
 
 def summarise(dataset: Dataset) -> list[LabelSummary]:
