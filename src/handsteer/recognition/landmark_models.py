@@ -116,7 +116,7 @@ def fetch_models(progress: Progress) -> list[Path]:
         ModelError: The folder is not writable.
     """
     folder = models_dir()
-    missing = [name for name in MODELS if not _is_there(name, folder)]
+    missing = [name for name in MODELS if not _is_there(name)]
     if missing:
         try:
             folder.mkdir(parents=True, exist_ok=True)
@@ -128,9 +128,9 @@ def fetch_models(progress: Progress) -> list[Path]:
     return [folder / name for name in MODELS]
 
 
-def _is_there(name: str, folder: Path) -> bool:
+def _is_there(name: str) -> bool:
     try:
-        find_model(name, folder)
+        find_model(name)
     except ModelError:
         return False
     return True
