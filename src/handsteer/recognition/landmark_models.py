@@ -91,10 +91,7 @@ def find_model(name: str, directory: Path | None = None) -> Path:
 
 
 def find_pair(model: str) -> tuple[Path, Path]:
-    """Return the paths of the palm model and the hand landmark model of a configuration.
-
-    Args:
-        model: ``fast``, ``full`` or ``lite``, as ``landmarks.model`` of the configuration.
+    """Return the paths of the palm model and the hand landmark model of ``landmarks.model``: fast, full or lite.
 
     Raises:
         ModelMissing: One does not exist, or cannot be read.

@@ -149,9 +149,6 @@ class ShippedClassifier:
     fist; the direction in the image determines the sign. A sign's likelihood is the product of those of its shape, of
     its direction and of the hand's :func:`legibility`. The confidence increases with it from 0 through 0.8 at the
     sign's threshold to 1. Motions have higher thresholds than ``Go`` and ``Stop``.
-
-    Args:
-        model: As from :func:`~handsteer.recognition.shipped_signs.load_model`.
     """
 
     def __init__(self, model: SignModel) -> None:
