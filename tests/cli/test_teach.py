@@ -18,7 +18,7 @@ from handsteer.training.custom.onnx_file import as_onnx
 from tests.cli.test_cli import fails, prints
 from tests.recognition.models import model
 from tests.training.custom.takes import takes
-from tests.training.custom.test_keypoint_csv import row, written
+from tests.training.custom.test_exchange import row, written
 
 VIRTUAL = [
     "--camera",
@@ -185,8 +185,7 @@ def test_without_the_package_onnx_it_is_named(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "onnx", None)
-    for name in ("onnx_file", "onnx_graph"):
-        monkeypatch.delitem(sys.modules, f"handsteer.training.custom.{name}", raising=False)
+    monkeypatch.delitem(sys.modules, "handsteer.training.custom.onnx_file", raising=False)
     said = fails(capsys, "signs", "export", "mine.npz", "mine.onnx")
     assert said == "the export as ONNX needs the package onnx: run pip install 'handsteer[onnx]'"
 

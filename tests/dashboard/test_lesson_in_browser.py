@@ -14,8 +14,8 @@ from handsteer.cameras.files import video_frames
 from handsteer.config import load
 from handsteer.recognition.custom_signs import load_custom_model
 from handsteer.training.custom.dataset import load_dataset
+from handsteer.training.custom.exchange import LARGEST_SHARED_BYTES
 from handsteer.training.custom.onnx_file import as_onnx
-from handsteer.training.custom.shared import LARGEST_SHARED_BYTES
 from tests.dashboard.test_accessibility import faults
 from tests.dashboard.visits import NEEDS_A_BROWSER, PATIENCE_MS, Visit, visiting
 

@@ -20,12 +20,13 @@ from handsteer.graph import Graph
 from handsteer.images import image_message
 from handsteer.messages import IMAGE_RAW, Header
 from handsteer.recognition.custom_signs import load_custom_model, save_custom_model
-from handsteer.recognition.hand import Hand, RecordedLandmarker
+from handsteer.recognition.hand import Hand
 from handsteer.recognition.recognizer import open_classifier
 from handsteer.training.custom.dataset import Dataset, load_dataset, save_dataset
-from handsteer.training.custom.shared import load_shared, save_shared
+from handsteer.training.custom.exchange import load_shared, save_shared
 from handsteer.transports.in_process import InProcessTransport
 from handsteer.types import NONE
+from tests.recognition.hands import RecordedLandmarker
 from tests.recognition.models import model
 from tests.training.custom.takes import shaken, takes
 

@@ -48,7 +48,7 @@ from handsteer.robots.world import load_world, parse_world
 from handsteer.study.plan import read_plan
 from handsteer.study.session import Session
 from handsteer.training.custom.dataset import load_dataset
-from handsteer.training.custom.keypoint_csv import read_class_names, read_keypoints
+from handsteer.training.custom.exchange import read_class_names, read_keypoints
 from handsteer.training.evaluation.labels import read_photo_labels
 from handsteer.transports.ros2.arguments import parse_arguments
 from handsteer.transports.ros2.encoding import decode, encode

@@ -27,12 +27,12 @@ from handsteer.nodes.recognition import HandSignRecognitionNode
 from handsteer.nodes.status import RecognitionStatus
 from handsteer.parameters import NodeParameters
 from handsteer.recognition.custom_signs import save_custom_model
-from handsteer.recognition.hand import Hand, RecordedLandmarker
+from handsteer.recognition.hand import Hand
 from handsteer.recognition.recognizer import Recognition, Recognizer
 from handsteer.recognition.shipped_signs import ShippedClassifier, load_model
 from handsteer.types import FORWARD
 from tests.nodes.stepping import Bench
-from tests.recognition.hands import show_fingers, show_sign
+from tests.recognition.hands import RecordedLandmarker, show_fingers, show_sign
 from tests.recognition.models import model
 
 HEADER = Header(stamp=Time(0, 0), frame_id="camera")

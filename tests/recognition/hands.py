@@ -1,5 +1,8 @@
 """Hands with a known shape, as a landmark model would see them if it made no errors."""
 
+from collections.abc import Iterable
+from math import inf
+
 import numpy as np
 
 from handsteer.hand.kinematics import angles_of, pose_joints, turn_z
@@ -63,3 +66,23 @@ def moved(hand: Hand, x_px: float, scale: float = 1.0) -> Hand:
     """Return ``hand`` moved to the right by ``x_px`` pixels, after it was scaled about the image's middle."""
     pixels = (hand.pixels[:, :2] - np.array(SIZE) / 2) * scale + np.array(SIZE) / 2 + (x_px, 0.0)
     return hand_of(pixels, hand.world, hand.handedness)
+
+
+class RecordedLandmarker:
+    """A landmarker that returns the recorded hands of ``frames``, one list per frame, and then none."""
+
+    def __init__(self, frames: Iterable[list[Hand]]) -> None:
+        self._frames = [list(hands) for hands in frames]
+        self._next = 0
+
+    def detect(self, image: np.ndarray, *, search: bool = True, dt_s: float = inf) -> list[Hand]:
+        """Return the hands of the next frame, an empty list after the last one; ignores the arguments."""
+        hands = self._frames[self._next] if self._next < len(self._frames) else []
+        self._next += 1
+        return list(hands)
+
+    def follow_only(self, hand: Hand) -> None:
+        """Do nothing: a recording continues with all its hands."""
+
+    def reset(self) -> None:
+        """Do nothing: a recording tracks no hands, and continues where it is."""

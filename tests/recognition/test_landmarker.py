@@ -276,9 +276,10 @@ def test_noise_of_any_size_gives_sound_hands_or_none(
         assert hand.image_size == (width, height)
 
 
-def test_models_that_are_not_there_are_named(tmp_path: Path) -> None:
+def test_models_that_are_not_there_are_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("HANDSTEER_MODELS", str(tmp_path))
     with pytest.raises(ModelMissing, match=r"palm_detection_full\.tflite.*handsteer models"):
-        MediaPipeLandmarker(LandmarksConfig(), tmp_path)
+        MediaPipeLandmarker(LandmarksConfig())
 
 
 @pytest.mark.slow

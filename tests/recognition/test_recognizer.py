@@ -3,11 +3,11 @@ import pytest
 
 from handsteer.config import Config, SignsConfig
 from handsteer.errors import FrameError
-from handsteer.recognition.hand import Hand, RecordedLandmarker
+from handsteer.recognition.hand import Hand
 from handsteer.recognition.recognizer import Recognizer
 from handsteer.recognition.shipped_signs import ShippedClassifier, load_model
 from handsteer.types import FORWARD, GO, NONE, SIGNS, STOP
-from tests.recognition.hands import moved, show_fingers, show_sign
+from tests.recognition.hands import RecordedLandmarker, moved, show_fingers, show_sign
 
 IMAGE = np.zeros((480, 640, 3), np.uint8)
 HAND = show_sign(FORWARD)

@@ -1,7 +1,7 @@
 """Where hands are looked for, with palms that are where a test says."""
 
 from collections.abc import Iterator
-from itertools import islice
+from itertools import islice, pairwise
 
 import numpy as np
 import pytest
@@ -12,8 +12,8 @@ from handsteer.hand.poses import THUMB, Pinhole, View
 from handsteer.hand.renderer import Look, make_background, render
 from handsteer.recognition.landmarker import MediaPipeLandmarker
 from handsteer.recognition.regions import Palm, PalmDetector, Roi
-from handsteer.recognition.search import Places, Search
-from tests.recognition.drawn_hand import draw, open_right_hand
+from handsteer.recognition.search import Pace, Places, Search, Stillness, cells_of_frame, cells_of_hands
+from tests.recognition.drawn_hand import draw, open_left_hand, open_right_hand
 
 FRAME = np.zeros((480, 640, 3), np.uint8)
 
@@ -136,3 +136,132 @@ def test_a_thumb_up_in_the_middle_is_not_read_as_an_index_finger() -> None:
 def test_nothing_is_found_without_any_palm_in_an_empty_frame() -> None:
     no_palms = MediaPipeLandmarker(LandmarksConfig(min_detection_confidence=1))
     assert [no_palms.detect(draw()) for _ in range(13)] == [[]] * 13
+
+
+DT = 1 / 30
+PACE = Pace(change=6, settle_s=0.12, period_s=0.2)
+EMPTY = draw()
+
+
+def looks(pictures: list[np.ndarray], pace: Pace = PACE, dt_s: float = DT) -> list[int]:
+    """Return at which of the pictures it is looked."""
+    stillness, looked = Stillness(), []
+    for number, picture in enumerate(pictures):
+        stillness.wait(dt_s)
+        if not stillness.is_too_early(pace) and stillness.wants_look(cells := cells_of_frame(picture), pace):
+            stillness.look(cells)
+            looked.append(number)
+    return looked
+
+
+def noisy(picture: np.ndarray, seed: int, levels: int = 8) -> np.ndarray:
+    noise = np.random.default_rng(seed).integers(-levels, levels + 1, picture.shape)
+    return np.clip(picture + noise, 0, 255).astype(np.uint8)
+
+
+def test_a_still_picture_is_looked_at_until_it_has_settled_and_then_now_and_then() -> None:
+    looked = looks([noisy(EMPTY, seed) for seed in range(64)])
+    assert looked[:4] == [0, 1, 2, 3]
+    assert {after - before for before, after in pairwise(looked[3:])} <= {6, 7}
+
+
+@pytest.mark.parametrize("fps", [5, 4, 1])
+def test_at_low_frame_rates_each_frame_is_looked_at(fps: int) -> None:
+    assert looks([EMPTY] * 10, dt_s=1 / fps) == list(range(10))
+
+
+def test_a_small_hand_is_a_change_in_its_first_frame() -> None:
+    hand = draw(open_right_hand(500, 300, size=20))
+    assert 20 in looks([EMPTY] * 20 + [hand] * 5)
+
+
+def test_what_comes_slowly_is_a_change_too() -> None:
+    """Each frame is nearly the one before; the picture is compared with the one that was looked at."""
+    seldom = Pace(change=6, settle_s=0.0, period_s=60.0)
+    slowly = [np.full((48, 64, 3), 100 + number, np.uint8) for number in range(40)]
+    assert looks(slowly, seldom) == list(range(0, 40, 6))
+
+
+def test_a_change_wakes_only_where_frames_were_left_out_before() -> None:
+    bright = np.full_like(EMPTY, 255)
+    for frames, woken in ((2, False), (20, True)):
+        stillness = Stillness()
+        for picture in [*[EMPTY] * frames, bright]:
+            stillness.wait(DT)
+            if stillness.wants_look(cells := cells_of_frame(picture), PACE):
+                stillness.look(cells)
+        assert stillness.woken is woken
+        stillness.wait(DT)
+        assert stillness.wants_look(cells_of_frame(EMPTY), PACE)
+        assert not stillness.woken
+
+
+def test_no_look_follows_another_too_early() -> None:
+    pace = Pace(change=6, settle_s=0.4, period_s=1.0, least_s=0.19)
+    flicker = [np.full((48, 64, 3), 200 * (number % 2), np.uint8) for number in range(30)]
+    assert all(after - before >= 6 for before, after in pairwise(looks(flicker, pace)))
+    assert looks([EMPTY] * 30, pace) == [0, 6, 12]
+
+
+@pytest.mark.parametrize("region", [Roi(100, 100, 80), Roi(-50, 900, 30), Roi(0, 0, 5000), Roi(639, 479, 0.1)])
+@pytest.mark.parametrize("shape", [(480, 640, 3), (1, 1, 3), (3, 700, 3)])
+def test_hands_anywhere_have_their_cells(region: Roi, shape: tuple[int, int, int]) -> None:
+    picture = np.full(shape, 77, np.uint8)
+    cells = cells_of_hands(picture, [region, region])
+    assert cells.shape == (24, 12, 3)
+    assert (cells == 77).all()
+
+
+def test_a_hand_that_comes_into_a_still_picture_is_found_in_the_same_frame() -> None:
+    landmarker = MediaPipeLandmarker(LandmarksConfig())
+    for _ in range(2):
+        for _ in range(20):
+            assert landmarker.detect(EMPTY, dt_s=DT) == []
+        assert any(landmarker.detect(draw(open_right_hand(300, 250)), dt_s=DT) for _ in range(2))
+
+
+def test_a_still_hand_is_given_again_without_a_look_but_for_a_moment_only() -> None:
+    landmarker = MediaPipeLandmarker(LandmarksConfig())
+    frame = draw(open_right_hand(300, 250))
+    hands = [landmarker.detect(frame, search=False, dt_s=DT)[0] for _ in range(30)]
+    same = [after is before for before, after in pairwise(hands)]
+    assert not any(same[:2]), "what has just changed is looked at in each frame"
+    assert 10 <= sum(same) <= 24
+    assert all(any(not each for each in same[begin : begin + 4]) for begin in range(26))
+
+
+def test_a_hand_that_moves_is_looked_at_in_each_frame() -> None:
+    landmarker = MediaPipeLandmarker(LandmarksConfig())
+    for _ in range(20):
+        landmarker.detect(draw(open_right_hand(300, 250)), search=False, dt_s=DT)
+    before = None
+    for x in range(302, 320, 2):
+        points = open_right_hand(x, 250)
+        (hand,) = landmarker.detect(draw(points), search=False, dt_s=DT)
+        assert hand is not before
+        assert np.median(hand.pixels[:, 0] - points[:, 0]) == pytest.approx(0, abs=10)
+        before = hand
+
+
+def test_a_hand_that_jumps_is_seen_in_the_same_frame_however_still_it_was() -> None:
+    landmarker = MediaPipeLandmarker(LandmarksConfig())
+    for _ in range(20):
+        landmarker.detect(draw(open_right_hand(150, 250)), search=False, dt_s=DT)
+    (hand,) = landmarker.detect(draw(open_right_hand(500, 250)), search=False, dt_s=DT)
+    assert hand.pixels[:, 0].mean() > 320
+
+
+def test_a_second_hand_is_found_within_a_quarter_of_a_second() -> None:
+    landmarker = MediaPipeLandmarker(LandmarksConfig(max_hands=2))
+    right = open_right_hand(150, 250)
+    for _ in range(45):
+        assert len(landmarker.detect(draw(right), dt_s=DT)) == 1
+    both = draw(right, open_left_hand(480, 250))
+    assert any(len(landmarker.detect(both, dt_s=DT)) == 2 for _ in range(8))
+
+
+def test_without_a_time_each_frame_is_looked_at() -> None:
+    landmarker = MediaPipeLandmarker(LandmarksConfig())
+    frame = draw(open_right_hand(300, 250))
+    hands = [landmarker.detect(frame, search=False)[0] for _ in range(10)]
+    assert all(after is not before for before, after in pairwise(hands))

@@ -142,12 +142,7 @@ class ChoiceOfCameras:
         return wanted.done
 
     def read(self) -> Frame | None:
-        """Return the newest frame of the selected camera, or None if there is none now.
-
-        Raises:
-            CameraLost: A camera of this machine stopped delivering frames.
-            EndOfStream: Its file has ended and ends the run.
-        """
+        """Return the newest frame of the selected camera, or None if there is none now."""
         with self._lock:
             wanted, self._wanted = self._wanted, None
         if wanted is not None:

@@ -82,17 +82,13 @@ def _file(path: Path, config: CameraConfig, clock: Clock) -> Camera:
 
 
 class MachineCameras:
-    """The cameras of this machine that can be chosen while nodes run: the own one, the virtual hand, and the webcams.
+    """A :class:`~handsteer.cameras.choice.Machine`: the own camera, the virtual hand, and the webcams.
 
     Args:
         config: Names the own camera, and the resolution and rate that webcams are asked for.
         virtual_hand: The virtual hand.
         clock: Stamps the frames.
         own: The camera that ``config`` names, opened.
-
-    Attributes:
-        own: The own camera; None if ``config`` names that of a browser.
-        size: The configured resolution.
     """
 
     def __init__(self, config: CameraConfig, virtual_hand: VirtualHandConfig, clock: Clock, own: Camera) -> None:
@@ -111,11 +107,7 @@ class MachineCameras:
         return (*own, *virtual, *(CameraChoice(source, name_of(source), has_sizes=True) for source in others))
 
     def open(self, source: str, size: Size) -> Camera:
-        """Open the camera of a choice.
-
-        Raises:
-            HandsteerError: It cannot be used.
-        """
+        """Open the camera of a choice."""
         source = self._source if source == OWN else source
         width, height = size if is_device(source) else self.size
         of = {"source": source, "width": width, "height": height}

@@ -69,11 +69,7 @@ class VideoFile:
             raise CameraUnreadable(f"{path} is not a video that can be decoded: try an mp4, avi or webm file")
 
     def read(self) -> Frame | None:
-        """Return the next frame; None after the last one if the end holds.
-
-        Raises:
-            EndOfStream: After the last frame, if it ends the run.
-        """
+        """Return the next frame; None after the last one if the end holds."""
         if self._next is None:
             if self._at_end == "end":
                 raise EndOfStream
@@ -128,7 +124,6 @@ class PhotoFolder:
         """Return the next frame; None after the last one if the end holds.
 
         Raises:
-            EndOfStream: After the last frame, if it ends the run.
             CameraUnreadable: The next photo cannot be decoded; reading again continues with the one after it.
         """
         index, repeat = divmod(self._shown, self._repeats)

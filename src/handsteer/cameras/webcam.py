@@ -51,10 +51,6 @@ class Webcam:
         fps: Requested frames per second.
         open_capture: Opens the device; tests inject faults here.
 
-    Attributes:
-        name: Name for people.
-        source: As above.
-
     Raises:
         CameraNotFound: There is no such device, or the address does not respond.
         CameraInUse: Another program uses the device.

@@ -19,7 +19,7 @@ from handsteer.dashboard.lessons import Lessons
 from handsteer.dashboard.socket_events import is_page_of
 from handsteer.recognition.custom_signs import CustomModel
 from handsteer.training.custom.dataset import Dataset
-from handsteer.training.custom.shared import LARGEST_SHARED_BYTES, takes_as_csv
+from handsteer.training.custom.exchange import LARGEST_SHARED_BYTES, takes_as_csv
 
 LESSON_PATH: Final = "/lesson"
 CAN_EXPORT: Final = importlib.util.find_spec("onnx") is not None

@@ -20,7 +20,7 @@ from handsteer.recognition.hand import Classifier, Landmarker
 from handsteer.recognition.recognizer import open_classifier, open_landmarker
 from handsteer.training.custom.collect import Facts
 from handsteer.training.custom.dataset import Dataset, load_dataset, save_dataset
-from handsteer.training.custom.shared import load_shared, save_shared
+from handsteer.training.custom.exchange import load_shared, save_shared
 from handsteer.types import ACTIONS, NONE, Action, action_of, find_sign
 
 KEPT: Final = "Kept, and in use. End the lesson, then press Reset to drive."

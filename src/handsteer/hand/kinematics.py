@@ -15,8 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
 
-DIGITS = ("thumb", "index", "middle", "ring", "little")
-FINGERS = DIGITS[1:]
+FINGERS = ("index", "middle", "ring", "little")
 
 ANGLES: tuple[str, ...] = (
     "wrist_flexion",

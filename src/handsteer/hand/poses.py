@@ -56,10 +56,6 @@ class Placement:
         """Transform (..., 3) points from the hand frame to the camera frame, in metres."""
         return (np.asarray(points) - PALM_CENTRE_M) @ self.matrix.T + self.position
 
-    def turn(self, directions: ArrayLike) -> Array:
-        """Transform (..., 3) directions from the hand frame to the camera frame."""
-        return np.asarray(directions) @ self.matrix.T
-
     def mirrored(self) -> "Placement":
         """Return the placement of the other hand whose picture is the mirror image of this one's."""
         return Placement(_MIRROR @ self.matrix, _MIRROR @ self.position)
@@ -155,11 +151,10 @@ class HandPose:
     view: View
 
 
-def _shape(*, thumb: tuple[float, ...], wrist: tuple[float, float] = (0.0, 0.0), **fingers: tuple[float, ...]) -> Array:
+def _shape(*, thumb: tuple[float, ...], **fingers: tuple[float, ...]) -> Array:
     """Return angles from degrees: thumb and fingers in the order of ``ANGLES``; omitted fingers are closed."""
-    degrees = {"wrist_flexion": wrist[0], "wrist_deviation": wrist[1]}
     names = ("spread", "opposition", "mcp", "ip", "rotation")
-    degrees |= {f"thumb_{name}": value for name, value in zip(names, thumb, strict=True)}
+    degrees = {f"thumb_{name}": value for name, value in zip(names, thumb, strict=True)}
     for finger in FINGERS:
         values = fingers.get(finger, _CLOSED[finger])
         degrees |= {f"{finger}_{joint}": value for joint, value in zip(_JOINTS, values, strict=True)}

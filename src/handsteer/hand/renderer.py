@@ -26,6 +26,7 @@ _GAMMA = 0.8
 _SPECULAR, _SHININESS = 0.24, 14.0
 _AMBIENT, _DIFFUSE = 0.46, 0.62
 _OCCLUSION = 0.22
+_SLEEVE = (0.42, 0.30, 0.20)  # blue, green, red
 
 
 @dataclass(frozen=True)
@@ -35,14 +36,12 @@ class Look:
     Attributes:
         skin: A key of :data:`SKINS`.
         sleeve: Whether the arm has a sleeve.
-        sleeve_colour: Blue, green, red, 0 to 1.
         light: (3,) direction to the light in the camera frame, of any length.
         brightness: Factor on all light.
     """
 
     skin: str = "medium"
     sleeve: bool = True
-    sleeve_colour: tuple[float, float, float] = (0.42, 0.30, 0.20)
     light: tuple[float, float, float] = (-0.45, -0.75, -0.75)
     brightness: float = 1.0
 
@@ -85,7 +84,7 @@ def _shade(hits: Hits, look: Look) -> Float:
     # Skin is translucent: its shadows begin later than those of an opaque surface.
     diffuse = np.clip((light @ hits.normals + 0.35) / 1.35, 0.0, 1.0)
     lit = (_AMBIENT + _DIFFUSE * diffuse) * (1.0 - _OCCLUSION * (1.0 - hits.sky))
-    palette = np.array([*SKINS[look.skin], look.sleeve_colour], np.float32)
+    palette = np.array([*SKINS[look.skin], _SLEEVE], np.float32)
     cloth = hits.materials[:, Material.SLEEVE]
     colours = palette.T @ hits.materials * lit[:, None] + (_SPECULAR * shine * (1.0 - cloth))[:, None]
     shaded: Float = np.clip(look.brightness * colours, 0.0, 1.0) ** np.float32(_GAMMA)

@@ -4,6 +4,7 @@ A round cone is swept by a ball whose radius changes along a line. The smooth un
 log(sum(exp(-d_i / k)))`` (I. Quilez, *Smooth minimum*), which also gives the weight of each.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from enum import IntEnum
 
@@ -106,84 +107,65 @@ _PALM = (
 _SLEEVE_FROM_M, _ARM_LENGTH_M = 0.075, 0.8
 
 
-class _Builder:
-    def __init__(self) -> None:
-        self.rows: list[tuple[Array, Array, float, float, int]] = []
-
-    def add(self, start: Array, end: Array, radii: tuple[float, float], material: Material = Material.SKIN) -> None:
-        self.rows.append((start, end, *radii, int(material)))
-
-    def ball(self, centre: Array, radius: float, material: Material = Material.SKIN) -> None:
-        self.add(centre, centre, (radius, radius), material)
-
-    def build(self) -> Cones:
-        start, end, start_radius, end_radius, material = (np.array(column) for column in zip(*self.rows, strict=True))
-        return Cones(start, end, start_radius, end_radius, material)
+_Cone = tuple[Array, Array, float, float, Material]
+"""Centres of the first and the last ball, their radii, and the material."""
 
 
 def hand_cones(skeleton: Skeleton, *, sleeve: bool = True) -> Cones:
     """Return the cones of the first hand of ``skeleton``, in the hand frame."""
     joints, axes = skeleton.joints[0], skeleton.axes[0]
-    builder = _Builder()
-    _add_palm(builder, joints)
+    rows = [*_palm(joints)]
     for digit in range(5):
-        _add_digit(builder, joints[1 + 4 * digit : 5 + 4 * digit], axes[digit], _RADII_M[digit], digit)
-    _add_arm(builder, skeleton.forearm[0], sleeve)
-    return builder.build()
+        rows += _digit(joints[1 + 4 * digit : 5 + 4 * digit], axes[digit], _RADII_M[digit], digit)
+    rows += _arm(skeleton.forearm[0], sleeve)
+    return Cones(*(np.array(column) for column in zip(*rows, strict=True)))
 
 
-def _add_palm(builder: _Builder, joints: Array) -> None:
+def _palm(joints: Array) -> Iterator[_Cone]:
     scale = float(np.linalg.norm(joints[9])) / float(BONE_LENGTHS_M[8])
     for start, end, start_radius, end_radius in _PALM:
-        builder.add(np.array(start) * scale, np.array(end) * scale, (start_radius * scale, end_radius * scale))
-    thumb_base, thumb_knuckle, index = joints[1], joints[2], joints[5]
+        yield np.array(start) * scale, np.array(end) * scale, start_radius * scale, end_radius * scale, Material.SKIN
+    base, knuckle, index = joints[1], joints[2], joints[5]
     # The ball of the thumb, and the skin between thumb and index finger.
-    builder.add(thumb_base * 0.85, thumb_base + 0.75 * (thumb_knuckle - thumb_base), (0.0165, 0.0135))
-    builder.add(0.5 * index + 0.2 * thumb_base, 0.45 * thumb_base + 0.55 * thumb_knuckle, (0.0100, 0.0085))
+    yield base * 0.85, base + 0.75 * (knuckle - base), 0.0165, 0.0135, Material.SKIN
+    yield 0.5 * index + 0.2 * base, 0.45 * base + 0.55 * knuckle, 0.0100, 0.0085, Material.SKIN
 
 
-def _add_digit(builder: _Builder, joints: Array, axes: Array, radii: tuple[float, ...], digit: int) -> None:
-    tip = joints[3] - axes[2][:, 1] * radii[3]
+def _digit(joints: Array, axes: Array, radii: tuple[float, ...], digit: int) -> Iterator[_Cone]:
+    along, back, tip_radius = axes[2][:, 1], -axes[2][:, 2], radii[3]
+    tip = joints[3] - along * tip_radius
     ends = (joints[0], joints[1], joints[2], tip)
     for bone in range(3):
         material = Material.FLUSHED if bone == 2 else Material.SKIN
         # Cones end before the joints, to compensate for what the union adds there.
         inset = 0.14 * (ends[bone + 1] - ends[bone])
-        builder.add(ends[bone] + inset, ends[bone + 1] - inset * (bone < 2), (radii[bone], radii[bone + 1]), material)
-    _add_knuckles(builder, ends, axes, radii, digit)
-    back = -axes[2][:, 2]
-    builder.add(
-        tip + axes[2][:, 1] * (0.2 * radii[3]) + back * 0.38 * radii[3],
-        tip - axes[2][:, 1] * (0.75 * radii[3]) + back * 0.46 * radii[3],
-        (0.70 * radii[3], 0.74 * radii[3]),
-        Material.NAIL,
-    )
+        yield ends[bone] + inset, ends[bone + 1] - inset * (bone < 2), radii[bone], radii[bone + 1], material
+    yield from _knuckles(ends, axes, radii, digit)
+    nail_from = tip + along * (0.2 * tip_radius) + back * 0.38 * tip_radius
+    nail_to = tip - along * (0.75 * tip_radius) + back * 0.46 * tip_radius
+    yield nail_from, nail_to, 0.70 * tip_radius, 0.74 * tip_radius, Material.NAIL
 
 
-def _add_knuckles(
-    builder: _Builder, ends: tuple[Array, ...], axes: Array, radii: tuple[float, ...], digit: int
-) -> None:
-    """Add bumps on the back of the joints, which protrude more the more a joint is bent."""
+def _knuckles(ends: tuple[Array, ...], axes: Array, radii: tuple[float, ...], digit: int) -> Iterator[_Cone]:
+    """Yield bumps on the back of the joints, which protrude more the more a joint is bent."""
     before = np.array([0.0, 0.0, 1.0]) if digit else axes[0][:, 2]
     for joint in range(2):
         after = axes[joint][:, 2]
         bent = float(np.clip(1.0 - before @ after, 0.0, 1.0))
         back = -(before + after) / max(float(np.linalg.norm(before + after)), 1e-6)
-        builder.ball(ends[joint] + back * (0.0042 * bent), (0.62 + 0.34 * bent) * radii[joint], Material.FLUSHED)
+        centre, radius = ends[joint] + back * (0.0042 * bent), (0.62 + 0.34 * bent) * radii[joint]
+        yield centre, centre, radius, radius, Material.FLUSHED
         before = after
 
 
-def _add_arm(builder: _Builder, forearm: Array, sleeve: bool) -> None:
+def _arm(forearm: Array, sleeve: bool) -> Iterator[_Cone]:
     across = np.cross(forearm, [0.0, 0.0, 1.0])
     across /= np.linalg.norm(across)
     for side in (-1, 0, 1):
-        wrist = across * 0.010 * side
-        builder.add(wrist, across * 0.014 * side + forearm * 0.26, (0.0160, 0.0290))
-    if sleeve:
-        for side in (-1, 1):
-            offset = across * 0.010 * side
-            builder.add(
-                offset + forearm * _SLEEVE_FROM_M, offset + forearm * _ARM_LENGTH_M, (0.031, 0.060), Material.SLEEVE
-            )
-    else:
-        builder.add(forearm * 0.26, forearm * _ARM_LENGTH_M, (0.036, 0.050))
+        yield across * 0.010 * side, across * 0.014 * side + forearm * 0.26, 0.0160, 0.0290, Material.SKIN
+    if not sleeve:
+        yield forearm * 0.26, forearm * _ARM_LENGTH_M, 0.036, 0.050, Material.SKIN
+        return
+    for side in (-1, 1):
+        offset = across * 0.010 * side
+        yield offset + forearm * _SLEEVE_FROM_M, offset + forearm * _ARM_LENGTH_M, 0.031, 0.060, Material.SLEEVE

@@ -5,7 +5,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Final, Literal
+from typing import Any, Final, Literal, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,7 @@ from handsteer.recognition.features import (
     directions,
     pair_distances,
     shape_features,
+    unit,
 )
 from handsteer.recognition.hand import Classifier, Hand, SignGuess
 from handsteer.recognition.network import Network, Novelty, from_arrays, to_arrays
@@ -52,8 +53,6 @@ _FILE: Final = NpzFormat(
     remedy="give one that `handsteer signs train` has written, or train it again",
 )
 
-_DEPTHS: Final[dict[str, Depth]] = {"full": "full", "flat": "flat"}
-
 
 def custom_features(pixels: Array, world: Array, depth: Depth) -> Array:
     """Return the (n, features) of n hands.
@@ -66,17 +65,12 @@ def custom_features(pixels: Array, world: Array, depth: Depth) -> Array:
         world: (n, 21, 3) landmarks in metres, with the image's axes; ignored if ``flat``.
         depth: Kind of the landmarks.
     """
-    pointing = [_unit(vectors) for vectors in directions(pixels)]
+    pointing = [unit(vectors) for vectors in directions(pixels)]
     if depth == "full":
-        return np.concatenate([shape_features(pixels, world), *pointing], axis=1)
+        return np.concatenate([shape_features(pixels, world), *pointing], axis=1, dtype=np.float64)
     palm = np.linalg.norm(pixels[:, KNUCKLES] - pixels[:, [WRIST]], axis=2).mean(axis=1, keepdims=True)
     lengths = np.clip(pair_distances(pixels) / np.maximum(palm, 1e-6), 0.0, 5.0)
     return np.concatenate([bone_bends(pixels), lengths, *pointing], axis=1, dtype=np.float64)
-
-
-def _unit(vectors: NDArray[np.floating]) -> Array:
-    lengths = np.linalg.norm(vectors, axis=1, keepdims=True)
-    return np.asarray(vectors / np.maximum(lengths, 1e-9), np.float64)
 
 
 @dataclass(frozen=True)
@@ -205,17 +199,13 @@ def load_custom_model(path: Path) -> CustomModel:
         ModelMissing: It cannot be read.
         ModelCorrupt: It is not a model of taught signs, is damaged, or has another format.
     """
-    arrays = _FILE.read(path)
-    try:
-        return model_from(arrays)
-    except (KeyError, ValueError, TypeError, AttributeError, ArithmeticError, RecursionError, DatasetError) as error:
-        raise _FILE.damaged(path, error) from None
+    return _FILE.read(path, model_from)
 
 
 def model_from(arrays: Arrays) -> CustomModel:
     """Return the model of the arrays of an untrusted file; errors of many types are raised for damaged ones."""
-    depth = _DEPTHS[str(arrays["depth"])]
-    network, novelty = from_arrays(arrays, FEATURE_COUNTS[depth])
+    depth = cast(Depth, str(arrays["depth"]))
+    network, novelty = from_arrays(arrays, FEATURE_COUNTS[depth])  # KeyError for another depth
     labels = tuple(str(label) for label in arrays["taught"])
     thresholds = arrays["thresholds"].astype(np.float64)
     count = len(labels)

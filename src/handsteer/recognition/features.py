@@ -75,11 +75,12 @@ def directions(pixels: Array) -> tuple[Array, Array, Array]:
     """
     knuckles = pixels[:, KNUCKLES].mean(axis=1)
     index = pixels[:, INDEX_TIP] - pixels[:, INDEX_BASE]
-    thumb = _unit(pixels[:, THUMB_TIP] - knuckles) + _unit(pixels[:, INDEX_BASE] - pixels[:, LITTLE_BASE])
+    thumb = unit(pixels[:, THUMB_TIP] - knuckles) + unit(pixels[:, INDEX_BASE] - pixels[:, LITTLE_BASE])
     return index, thumb, knuckles - pixels[:, WRIST]
 
 
-def _unit(vectors: Array) -> Array:
+def unit(vectors: Array) -> Array:
+    """Return (n, axes) ``vectors`` with the length 1, or 0."""
     lengths: Array = np.linalg.norm(vectors, axis=1, keepdims=True)
     return vectors / np.maximum(lengths, 1e-9)
 

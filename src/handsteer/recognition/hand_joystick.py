@@ -121,7 +121,7 @@ class HandJoystick:
         if self.grip is not None and dt_s > _PAUSE_S:
             self.reset()
         seen = _Seen.of(hand)
-        if self._last is not None and not seen.is_same_hand(self._last, self._palm_px):
+        if self._last is not None and not seen.is_same_hand(self._last, self.grip):
             self.reset()
         self._last, self._unseen_s = seen, 0.0
         is_open = recognition.seen == STOP or recognition.likelihoods.get(STOP, 0.0) >= _LIKELY
@@ -150,10 +150,6 @@ class HandJoystick:
         cv2.line(picture, neutral, now, _STICK, 3 * thickness, cv2.LINE_AA)
         cv2.circle(picture, now, 6 * thickness, _STICK, -1, cv2.LINE_AA)
 
-    @property
-    def _palm_px(self) -> float | None:
-        return None if self.grip is None else self.grip.palm_px
-
     def _miss(self, dt_s: float) -> None:
         self._unseen_s += dt_s
         if self._unseen_s > (_UNSEEN_S if self.grip else _BLURRED_S):
@@ -172,7 +168,8 @@ class HandJoystick:
         if self._closed_s < _CLOSED_S - 1e-9:
             return
         x, y, palm_px = (
-            sum(each) / len(self._closing) for each in zip(*map(_Seen.numbers, self._closing), strict=True)
+            sum(each) / len(self._closing)
+            for each in zip(*((hand.x, hand.y, hand.palm_px) for hand in self._closing), strict=True)
         )
         self.grip = Grip(seen.handedness, (x, y), palm_px, (x, y))
         self.stick = Stick(True)
@@ -231,13 +228,10 @@ class _Seen:
         is_cut_off = bool((shares < _EDGE).any() or (shares > 1.0 - _EDGE).any())
         return cls(x, y, max(1.0, float(scale) * palm_m), hand.handedness, is_cut_off)
 
-    def numbers(self) -> tuple[float, float, float]:
-        return self.x, self.y, self.palm_px
-
-    def is_same_hand(self, last: "_Seen", palm_px: float | None) -> bool:
-        """Return whether this can be the hand of the ``last`` frame, whose palm was ``palm_px`` long when closed."""
+    def is_same_hand(self, last: "_Seen", grip: Grip | None) -> bool:
+        """Return whether this can be the hand of the ``last`` frame, held by ``grip`` if it was."""
         is_near = math.hypot(self.x - last.x, self.y - last.y) <= _JUMP * max(self.palm_px, last.palm_px)
-        ratio = self.palm_px / (palm_px or last.palm_px)
+        ratio = self.palm_px / (grip or last).palm_px
         return is_near and 1 / _RESIZE <= ratio <= _RESIZE
 
 

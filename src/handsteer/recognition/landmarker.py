@@ -9,7 +9,6 @@ further ways than by palms in the frame, see ``search``.
 
 from dataclasses import dataclass
 from math import inf
-from pathlib import Path
 from typing import Final
 
 import cv2
@@ -58,79 +57,52 @@ class Estimate:
     presence: float
 
 
-class HandLandmarkModel:
-    """A hand landmark model.
-
-    Args:
-        path: The model file.
-        threads: CPU threads to run it on.
-
-    Raises:
-        ModelCorrupt: The file is not a model that can be run.
-    """
-
-    def __init__(self, path: Path, threads: int) -> None:
-        self._model = PictureModel(path, threads)
-
-    def estimate(self, image: NDArray[np.uint8], roi: Roi) -> Estimate:
-        """Return the output for the region ``roi`` of ``image``, (height, width, 3) uint8 BGR."""
-        side = self._model.side
-        outputs = self._model.run(roi.crop(image, side, cv2.BORDER_REPLICATE))
-        picture, presence, rightness, metric = outputs
-        points = picture.reshape(21, 3) / side
-        world = metric.reshape(21, 3)
-        return Estimate(
-            pixels=np.column_stack([roi.to_frame(points[:, :2]), points[:, 2] * (roi.side / _DEPTH_SCALE)]),
-            world=np.column_stack([world[:, :2] @ roi.axes, world[:, 2]]),
-            # MediaPipe calls this "Left", because it assumes mirrored pictures.
-            rightness=float(rightness[0]),
-            presence=float(presence[0]),
-        )
+def _estimate(model: PictureModel, image: NDArray[np.uint8], roi: Roi) -> Estimate:
+    """Return the output of a hand landmark model for the region ``roi`` of ``image``."""
+    picture, presence, rightness, metric = model.run(roi.crop(image, model.side, cv2.BORDER_REPLICATE))
+    points = picture.reshape(21, 3) / model.side
+    world = metric.reshape(21, 3)
+    return Estimate(
+        pixels=np.column_stack([roi.to_frame(points[:, :2]), points[:, 2] * (roi.side / _DEPTH_SCALE)]),
+        world=np.column_stack([world[:, :2] @ roi.axes, world[:, 2]]),
+        # MediaPipe calls this "Left", because it assumes mirrored pictures.
+        rightness=float(rightness[0]),
+        presence=float(presence[0]),
+    )
 
 
 class MediaPipeLandmarker:
     """Detects and tracks hands in frames; not thread-safe.
 
-    Tracked hands come first, in the order of the previous frame, then new ones by descending score, so hands never swap
-    places between frames.
+    Hands never swap places between frames.
 
     Args:
         config: Model, number of hands, thresholds, threads.
-        models: Folder of the model files; that of :func:`handsteer.recognition.landmark_models.models_dir` by default.
 
     Raises:
         ModelMissing: A model file is missing.
         ModelCorrupt: A model file has unexpected content.
     """
 
-    def __init__(self, config: LandmarksConfig, models: Path | None = None) -> None:
+    def __init__(self, config: LandmarksConfig) -> None:
         self._config = config
-        palm, landmark = find_pair(config.model, models)
+        palm, landmark = find_pair(config.model)
         palms = PalmDetector(palm, config.threads, config.min_detection_confidence)
         self._search = Search(palms, config.max_hands, wide=config.wide_search)
         self._searched = Stillness()
         self._searched_beside = Stillness()
         self._still = Stillness()
-        self._landmarks = HandLandmarkModel(landmark, config.threads)
+        self._landmarks = PictureModel(landmark, config.threads)
         self._followed: list[Roi] = []
         self._looked_at: list[Roi] = []
         self._hands: list[Hand] = []
         self._image_size = (0, 0)
 
     def detect(self, image: NDArray[np.uint8], *, search: bool = True, dt_s: float = inf) -> list[Hand]:
-        """Return the hands in ``image``; may be empty.
+        """Return the hands in ``image``, 1 to 32766 pixels a side, as :class:`Landmarker` describes.
 
         A frame of another size starts a new stream: no hand is tracked into it. A rejected frame changes nothing.
-
-        Args:
-            image: (height, width, 3) uint8, BGR, not mirrored; 1 to 32766 pixels a side, of any memory layout. Grey and
-                BGRA pictures are rejected.
-            search: Whether to search for further hands while one is tracked.
-            dt_s: Seconds since the last frame, >= 0, used to process fewer frames while the picture does not change;
-                without it, every frame is processed.
-
-        Raises:
-            FrameError: The image has another shape or type.
+        Without ``dt_s``, every frame is processed.
         """
         _check(image)
         height, width = image.shape[:2]
@@ -208,10 +180,11 @@ class MediaPipeLandmarker:
         """Return the estimates of the regions that show a hand; for a new hand, those of the second pass."""
         present = []
         for region in regions:
-            estimate = self._landmarks.estimate(image, region)
+            estimate = _estimate(self._landmarks, image, region)
             is_new = all(region is not followed for followed in self._followed)
             if is_new and self._config.refine_new_hands and self._is_present(estimate):
-                estimate = self._landmarks.estimate(image, from_landmarks(estimate.pixels[:, :2]).grown(_SECOND_LOOK))
+                second = from_landmarks(estimate.pixels[:, :2]).grown(_SECOND_LOOK)
+                estimate = _estimate(self._landmarks, image, second)
             if self._is_present(estimate) and estimate.presence >= min_presence:
                 present.append(estimate)
         return present

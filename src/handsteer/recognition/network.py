@@ -29,13 +29,9 @@ class Network:
     weights: tuple[Array, ...]
     biases: tuple[Array, ...]
 
-    def logits(self, features: Array) -> Array:
-        """Return the (n, classes) scores (logits) of (n, features)."""
-        return self.layers(features)[-1]
-
     def probabilities(self, features: Array) -> Array:
         """Return the (n, classes) probabilities of (n, features)."""
-        return softmax(self.logits(features))
+        return softmax(self.layers(features)[-1])
 
     def layers(self, features: Array) -> list[Array]:
         """Return the input of each layer, beginning with the scaled features, and the scores."""

@@ -4,9 +4,10 @@ import math
 import os
 import tempfile
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 from handsteer.errors import HandsteerError
 
 Arrays = dict[str, NDArray[Any]]
+Content = TypeVar("Content")
 
 LARGEST_BYTES: Final = 256_000_000
 """Maximum size of all arrays of a file together; half a million hands take as much."""
@@ -26,10 +28,11 @@ _SURROGATES: Final = 0xD800 >> 11
 _KINDS: Final = frozenset("biufU")
 
 
+@dataclass(frozen=True)
 class NpzFormat:
     """A kind of .npz file: its name, version and errors.
 
-    Args:
+    Attributes:
         what: Its name in messages, such as ``sign model``.
         version: The supported version, stored in the array ``format``.
         missing: Raised if a file cannot be read.
@@ -37,41 +40,47 @@ class NpzFormat:
         remedy: What users can do then, as the end of a sentence.
     """
 
-    def __init__(
-        self, what: str, version: int, *, missing: type[HandsteerError], corrupt: type[HandsteerError], remedy: str
-    ) -> None:
-        self.what = what
-        self.version = version
-        self.remedy = remedy
-        self._missing = missing
-        self._corrupt = corrupt
+    what: str
+    version: int
+    missing: type[HandsteerError]
+    corrupt: type[HandsteerError]
+    remedy: str
 
-    def read(self, path: Path, most_bytes: int = LARGEST_BYTES) -> Arrays:
-        """Return the arrays of the file ``path``, of this kind and version, with at most ``most_bytes`` together.
+    def read(self, path: Path, build: Callable[[Arrays], Content], most_bytes: int = LARGEST_BYTES) -> Content:
+        """Return the content of the file ``path``, of this kind and version.
+
+        Args:
+            path: The file.
+            build: Makes the content from the arrays; an error of any type means that the file is damaged.
+            most_bytes: Maximum size of all arrays together.
 
         Raises:
             HandsteerError: It cannot be read, or is not such a file; ``missing`` or ``corrupt``.
         """
+        arrays = self._arrays(path, most_bytes)
+        try:
+            return build(arrays)
+        except Exception as error:
+            reason = str(error)[:_LONGEST_REASON]
+            raise self.corrupt(f"{path}: a damaged {self.what} ({reason}); {self.remedy}") from None
+
+    def _arrays(self, path: Path, most_bytes: int) -> Arrays:
         try:
             with zipfile.ZipFile(path) as file:
                 _check_sizes(file, most_bytes)
                 arrays = {entry.filename.removesuffix(".npy"): _array(file, entry) for entry in file.infolist()}
         except OSError as error:
             reason = error.strerror or error
-            raise self._missing(f"cannot read the {self.what} {path} ({reason}): {self.remedy}") from None
+            raise self.missing(f"cannot read the {self.what} {path} ({reason}): {self.remedy}") from None
         except _RefusedError as problem:
-            raise self._corrupt(f"{path}: not a {self.what}: {problem}; {self.remedy}") from None
+            raise self.corrupt(f"{path}: not a {self.what}: {problem}; {self.remedy}") from None
         except Exception:  # the readers of headers and of compressed data raise errors of any type
-            raise self._corrupt(f"{path}: not a {self.what}, or damaged; {self.remedy}") from None
+            raise self.corrupt(f"{path}: not a {self.what}, or damaged; {self.remedy}") from None
         version = arrays.pop("format", None)
         if version is None or version.shape != () or version != self.version:
             known = f"is not known, expected {self.version}"
-            raise self._corrupt(f"{path}: a {self.what} of format {_in_words(version)} {known}; {self.remedy}")
+            raise self.corrupt(f"{path}: a {self.what} of format {_in_words(version)} {known}; {self.remedy}")
         return arrays
-
-    def damaged(self, path: Path, reason: object) -> HandsteerError:
-        """Return the error for a damaged file ``path``."""
-        return self._corrupt(f"{path}: a damaged {self.what} ({str(reason)[:_LONGEST_REASON]}); {self.remedy}")
 
     def write(self, path: Path, arrays: Mapping[str, Any]) -> None:
         """Write ``arrays`` to ``path``, atomically and deterministically.

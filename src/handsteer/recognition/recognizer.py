@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 
 from handsteer.config import Config, SignsConfig
 from handsteer.recognition.custom_signs import CustomClassifier, load_custom_model
-from handsteer.recognition.debouncer import Debouncer, Evidence
 from handsteer.recognition.features import PALM, directions
+from handsteer.recognition.filters import Debouncer, Evidence, HandPosition, HandSelector
 from handsteer.recognition.hand import CONNECTIONS, Classifier, Hand, Landmarker, SignGuess
-from handsteer.recognition.hand_selector import HandPosition, HandSelector
 from handsteer.recognition.landmark_models import find_pair
 from handsteer.recognition.landmarker import MediaPipeLandmarker
 from handsteer.recognition.shipped_signs import DEFAULT_MODEL, ShippedClassifier, load_model
@@ -216,7 +215,12 @@ def draw_hand(image: NDArray[np.uint8], hand: Hand | None) -> NDArray[np.uint8]:
     """Return a mirrored copy of ``image``, (height, width, 3) uint8, BGR, with the skeleton of ``hand``."""
     picture = np.asarray(cv2.flip(image, 1), np.uint8)
     if hand is not None:
-        _draw_skeleton(picture, hand.pixels[:, :2])
+        points = _mirrored(picture, hand.pixels[:, :2])
+        thickness = max(1, picture.shape[0] // 240)
+        for begin, end in CONNECTIONS:
+            cv2.line(picture, points[begin], points[end], _BONE, thickness, cv2.LINE_AA)
+        for point in points:
+            cv2.circle(picture, point, 2 * thickness, _JOINT, -1, cv2.LINE_AA)
     return picture
 
 
@@ -242,16 +246,6 @@ def _draw_palm(picture: NDArray[np.uint8], hand: Hand, recognition: Recognition)
         share = 1.0 if recognition.sign == recognition.seen else recognition.progress
         cv2.circle(picture, centre, radius, (60, 60, 60), thickness, cv2.LINE_AA)
         cv2.ellipse(picture, centre, (radius, radius), -90, 0, 360 * share, colour, 2 * thickness, cv2.LINE_AA)
-
-
-def _draw_skeleton(picture: NDArray[np.uint8], pixels: NDArray[np.float32]) -> None:
-    points = _mirrored(picture, pixels)
-    height = picture.shape[0]
-    thickness = max(1, height // 240)
-    for begin, end in CONNECTIONS:
-        cv2.line(picture, points[begin], points[end], _BONE, thickness, cv2.LINE_AA)
-    for point in points:
-        cv2.circle(picture, point, 2 * thickness, _JOINT, -1, cv2.LINE_AA)
 
 
 def _draw_label(picture: NDArray[np.uint8], recognition: Recognition) -> None:

@@ -130,11 +130,7 @@ def load_model(path: Path = DEFAULT_MODEL) -> SignModel:
         ModelMissing: It cannot be read.
         ModelCorrupt: It is not a sign model, is damaged, or has another format.
     """
-    arrays = _FILE.read(path)
-    try:
-        return _built(arrays)
-    except (KeyError, ValueError, TypeError, AttributeError, ArithmeticError, RecursionError) as error:
-        raise _FILE.damaged(path, error) from None
+    return _FILE.read(path, _built)
 
 
 def _built(arrays: Arrays) -> SignModel:
@@ -153,9 +149,6 @@ class ShippedClassifier:
     fist; the direction in the image determines the sign. A sign's likelihood is the product of those of its shape, of
     its direction and of the hand's :func:`legibility`. The confidence increases with it from 0 through 0.8 at the
     sign's threshold to 1. Motions have higher thresholds than ``Go`` and ``Stop``.
-
-    Args:
-        model: As from :func:`~handsteer.recognition.shipped_signs.load_model`.
     """
 
     def __init__(self, model: SignModel) -> None:

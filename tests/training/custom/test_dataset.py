@@ -1,3 +1,4 @@
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -40,7 +41,7 @@ def test_an_empty_dataset_is_one_too(tmp_path: Path) -> None:
 def test_takes_are_added_and_undone_and_counted() -> None:
     assert SOME.labels == ("Hi", "NONE")
     assert [each.label for each in SOME.without_last().takes] == ["Hi", "NONE"]
-    assert [each.as_dict() for each in summarise(SOME)] == [
+    assert [asdict(each) for each in summarise(SOME)] == [
         {"label": "Hi", "takes": 2, "rows": 7, "persons": 1, "sessions": 1},
         {"label": "NONE", "takes": 1, "rows": 2, "persons": 1, "sessions": 1},
     ]

@@ -26,7 +26,7 @@ from handsteer.recognition.custom_signs import (
     save_custom_model,
 )
 from handsteer.recognition.hand import Hand
-from handsteer.training.custom.keypoint_csv import read_keypoints
+from handsteer.training.custom.exchange import read_keypoints
 from handsteer.training.custom.onnx_file import as_onnx, save_onnx
 from handsteer.training.network import learn_novelty, train
 from tests.recognition.models import model as constant_model

@@ -127,7 +127,7 @@ def collect(
     return 0
 
 
-@loads("handsteer.cli.signs.collecting", "handsteer.training.custom.keypoint_csv")
+@loads("handsteer.cli.signs.collecting", "handsteer.training.custom.exchange")
 def import_keypoints(
     source: Path,
     /,
@@ -163,7 +163,7 @@ def import_keypoints(
     from handsteer.cli.signs.tables import dataset_table
     from handsteer.recognition.custom_signs import label_for
     from handsteer.training.custom.dataset import Dataset, load_dataset, save_dataset
-    from handsteer.training.custom.keypoint_csv import read_keypoints
+    from handsteer.training.custom.exchange import read_keypoints
 
     check_writable("--dataset", dataset, DatasetError)
     known = load_dataset(dataset) if dataset.exists() else Dataset()
@@ -177,7 +177,7 @@ def import_keypoints(
 
 def _names(labels: list[str]) -> dict[str, str]:
     if len(labels) == 1 and "=" not in labels[0]:
-        from handsteer.training.custom.keypoint_csv import read_class_names
+        from handsteer.training.custom.exchange import read_class_names
 
         return read_class_names(Path(labels[0]))
     names: dict[str, str] = {}

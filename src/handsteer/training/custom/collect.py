@@ -2,15 +2,15 @@
 
 import math
 import time
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from handsteer.cameras import Camera
+from handsteer.cameras import Camera, Frame
 from handsteer.cameras.files import PHOTO_SUFFIXES, find_photos, read_photo, video_frames
 from handsteer.clock import Clock
 from handsteer.errors import DatasetError
@@ -24,11 +24,13 @@ Phase = Literal["ready", "countdown", "recording", "done"]
 _FEWEST: Final = 5
 """Minimum number of hands in a take."""
 
-
 _RUN_UP_S: Final = 0.5
 
 _HELD_S: Final = 0.7
 """Terminals report a held key by repeating it; the first repetition comes after up to 0.66 s."""
+
+_Found = tuple[float, Hand]
+"""A hand, and its time in seconds."""
 
 
 @dataclass(frozen=True)
@@ -40,11 +42,11 @@ class Facts:
     session: str
     source: str
 
-    def take(self, hands: Sequence[Hand], times_s: Sequence[float]) -> Take:
-        """Return a take of ``hands``."""
-        begin_s = times_s[0]
-        times = tuple(round(time_s - begin_s, 4) for time_s in times_s)
-        return Take(self.label, self.person, self.session, self.source, tuple(hands), times)
+    def take(self, found: Sequence[_Found]) -> Take:
+        """Return a take of at least one hand."""
+        hands = tuple(hand for _, hand in found)
+        times = tuple(round(time_s - found[0][0], 4) for time_s, _ in found)
+        return Take(self.label, self.person, self.session, self.source, hands, times)
 
 
 @dataclass(frozen=True)
@@ -85,8 +87,7 @@ class Collector:
         self._take_s = take_s
         self._countdown_s = countdown_s
         self._hold = hold
-        self._hands: list[Hand] = []
-        self._times_s: list[float] = []
+        self._found: list[_Found] = []
         self._elapsed_s = 0.0
         self._recording = False
 
@@ -129,15 +130,14 @@ class Collector:
 
     def _record(self, hand: Hand | None) -> Status:
         if hand is not None:
-            self._hands.append(hand)
-            self._times_s.append(self._elapsed_s)
-        return Status("recording", 0.0 if self._hold else self._take_s - self._elapsed_s, len(self._hands))
+            self._found.append((self._elapsed_s, hand))
+        return Status("recording", 0.0 if self._hold else self._take_s - self._elapsed_s, len(self._found))
 
     def _end(self, end_s: float) -> Status:
-        count = sum(time_s <= end_s for time_s in self._times_s)
-        enough = count >= _FEWEST
-        take = self._facts.take(self._hands[:count], self._times_s[:count]) if enough else None
-        self._hands, self._times_s, self._elapsed_s, self._recording = [], [], 0.0, False
+        found = [each for each in self._found if each[0] <= end_s]
+        enough = len(found) >= _FEWEST
+        take = self._facts.take(found) if enough else None
+        self._found, self._elapsed_s, self._recording = [], 0.0, False
         self._left -= enough
         waiting = Status("done", 0.0, 0) if self.done else self._waiting()
         return Status(waiting.phase, waiting.left_s, 0, take, failed=not enough)
@@ -229,18 +229,12 @@ def collect_moment(recording: Path, landmarker: Landmarker, facts: Facts, begin_
         CameraUnreadable: The recording cannot be read, or contains no pictures.
         DatasetError: There is no hand in that part.
     """
-    landmarker.reset()
-    hands: list[Hand] = []
-    times_s: list[float] = []
     # The landmarker follows a hand from picture to picture, so it begins a little earlier.
-    for frame in recorded_frames(recording, begin_s - _RUN_UP_S, end_s):
-        hand = largest(landmarker.detect(frame.image))
-        if hand is not None and frame.captured_s >= begin_s:
-            hands.append(hand)
-            times_s.append(frame.captured_s)
-    if not hands:
+    seen = _seen(recorded_frames(recording, begin_s - _RUN_UP_S, end_s), landmarker)
+    found = [(time_s, hand) for time_s, hand in seen if hand is not None and time_s >= begin_s]
+    if not found:
         raise DatasetError(f"{recording}: there is no hand from {begin_s:g} to {end_s:g} s")
-    return facts.take(hands, times_s)
+    return facts.take(found)
 
 
 def largest(hands: Sequence[Hand]) -> Hand | None:
@@ -259,23 +253,26 @@ def _photo_takes(
         if hand is None:
             without_hand(path)
         else:
-            yield Facts(facts.label, facts.person, session, facts.source).take([hand], [0.0])
+            yield replace(facts, session=session).take([(0.0, hand)])
 
 
 def _video_takes(source: Path, landmarker: Landmarker, facts: Facts, take_s: float) -> Iterator[Take]:
-    landmarker.reset()
-    hands: list[Hand] = []
-    times_s: list[float] = []
+    found: list[_Found] = []
     end_s = take_s
-    for frame in recorded_frames(source) if is_recording(source) else video_frames(source):
-        if frame.captured_s >= end_s:
+    for time_s, hand in _seen(recorded_frames(source) if is_recording(source) else video_frames(source), landmarker):
+        if time_s >= end_s:
             end_s += take_s
-            if len(hands) >= _FEWEST:
-                yield facts.take(hands, times_s)
-            hands, times_s = [], []
-        hand = largest(landmarker.detect(frame.image))
+            if len(found) >= _FEWEST:
+                yield facts.take(found)
+            found = []
         if hand is not None:
-            hands.append(hand)
-            times_s.append(frame.captured_s)
-    if len(hands) >= _FEWEST:
-        yield facts.take(hands, times_s)
+            found.append((time_s, hand))
+    if len(found) >= _FEWEST:
+        yield facts.take(found)
+
+
+def _seen(frames: Iterable[Frame], landmarker: Landmarker) -> Iterator[tuple[float, Hand | None]]:
+    """Yield the time of each frame in seconds, and its largest hand."""
+    landmarker.reset()
+    for frame in frames:
+        yield frame.captured_s, largest(landmarker.detect(frame.image))

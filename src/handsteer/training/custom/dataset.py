@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Final
@@ -112,11 +112,7 @@ def load_dataset(path: Path) -> Dataset:
     Raises:
         DatasetError: It cannot be read, is damaged, or has another version.
     """
-    arrays = _FILE.read(path)
-    try:
-        return dataset_from(arrays)
-    except (KeyError, ValueError, TypeError, IndexError, ArithmeticError, RecursionError, DatasetError) as error:
-        raise _FILE.damaged(path, error) from None
+    return _FILE.read(path, dataset_from)
 
 
 def save_dataset(dataset: Dataset, path: Path) -> None:
@@ -243,10 +239,6 @@ class LabelSummary:
     rows: int
     persons: int
     sessions: int
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the counts as plain values, for JSON."""
-        return asdict(self)
 
 
 def summarise(dataset: Dataset) -> list[LabelSummary]:

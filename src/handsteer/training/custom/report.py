@@ -1,7 +1,7 @@
 """Checks a dataset before a training, and reports how well its signs are distinguished afterwards."""
 
 from collections.abc import Hashable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any, Final
 
 from handsteer.errors import TrainingError
@@ -183,7 +183,7 @@ class CustomSignFigures:
     def as_dict(self) -> dict[str, Any]:
         """Return the figures as plain values, for JSON."""
         recall = self.recall.as_dict() if self.recall else None
-        return {**self.summary.as_dict(), "sided": self.sided, "threshold": round(self.threshold, 4), "recall": recall}
+        return {**asdict(self.summary), "sided": self.sided, "threshold": round(self.threshold, 4), "recall": recall}
 
 
 @dataclass(frozen=True)
@@ -232,7 +232,7 @@ class TrainingReport:
         return {
             "signs": [sign.as_dict() for sign in self.signs],
             "held_out": self.held_out,
-            "confusion": self.confusion.as_dict(),
+            "confusion": asdict(self.confusion),
             "made_hands": self.made.as_dict(),
             "known": [{"sign": each.label, "told": each.sign, **each.hands.as_dict()} for each in self.known],
             "left_out": {each.label: each.why for each in self.left_out},

@@ -1,8 +1,9 @@
 """Trains a model of taught signs, and measures how well it distinguishes them from all other hands."""
 
+import itertools
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence, Set
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any, Final
 
 import numpy as np
@@ -64,15 +65,6 @@ class _Tried:
     hands: NDArray[np.int64]
 
 
-@dataclass(frozen=True)
-class _Rows:
-    """Hands with their classes."""
-
-    pixels: Array
-    world: Array
-    classes: NDArray[np.int64]
-
-
 def train_signs(
     dataset: Dataset,
     shipped: Classifier,
@@ -108,7 +100,7 @@ def train_signs(
         depth: Depth = "flat" if any(take.is_flat for take in dataset.takes) else "full"
         teacher = _Trainer(frozenset(sided) | _pointing_sideways(dataset, labels), depth)
         held_out, folds = split(dataset, labels)
-        steps = _Steps(progress, of=_EPOCHS * (len(folds) + 1))
+        steps = _counting(progress, of=_EPOCHS * (len(folds) + 1))
         tried = teacher.try_all(folds, labels, steps)
         confused = most_confused(_confusion(tried, np.zeros(len(labels)), labels))
         if confused is None:
@@ -149,17 +141,10 @@ def _without(dataset: Dataset, labels: Set[str]) -> Dataset:
     return Dataset(tuple(take for take in dataset.takes if take.label not in labels))
 
 
-class _Steps:
-    """Counts epochs over several trainings."""
-
-    def __init__(self, progress: Callable[[int, int], object], of: int) -> None:
-        self._progress = progress
-        self._of = of
-        self._done = 0
-
-    def __call__(self, _epoch: int) -> None:
-        self._done += 1
-        self._progress(self._done, self._of)
+def _counting(progress: Callable[[int, int], object], of: int) -> Callable[[int], object]:
+    """Return what counts epochs over several trainings."""
+    done = itertools.count(1)
+    return lambda _epoch: progress(next(done), of)
 
 
 class _Trainer:
@@ -184,16 +169,12 @@ class _Trainer:
         """Return a model of ``labels``, each of which occurs in ``takes``; other takes are examples of other hands."""
         random = np.random.default_rng(SEED)
         other = len(labels)
-        rows = [
-            self._varied([take for take in takes if take.label == label], number, random)
-            for number, label in enumerate(labels)
-        ]
-        others = [take for take in takes if take.label not in labels]
-        if others:
-            rows.append(self._varied(others, other, random))
-        rows.append(_Rows(self._made.pixels, self._made.world, np.full(len(self._made.shapes), other)))
-        features = np.concatenate([custom_features(each.pixels, each.world, self._depth) for each in rows])
-        classes = np.concatenate([each.classes for each in rows])
+        groups = [[take for take in takes if take.label == label] for label in labels]
+        groups.append([take for take in takes if take.label not in labels])
+        hands = [self._varied(group, random) for group in groups if group]
+        hands.append((self._made.pixels, self._made.world))
+        features = np.concatenate([custom_features(*each, self._depth) for each in hands])
+        classes = np.repeat(np.minimum(np.arange(len(hands)), other), [len(pixels) for pixels, _ in hands])
         network = train(features, classes, hidden=_HIDDEN, epochs=_EPOCHS, seed=SEED, progress=progress)
         mine = classes < other
         novelty = learn_novelty(features[mine], classes[mine], network.mean, network.scale, margin=_LIMIT_MARGIN)
@@ -227,12 +208,11 @@ class _Trainer:
         chances[:, columns] = np.concatenate([model.confidences(pixels, world) for pixels, world in looks])
         return chances
 
-    def _varied(self, takes: Sequence[Take], number: int, random: np.random.Generator) -> _Rows:
+    def _varied(self, takes: Sequence[Take], random: np.random.Generator) -> tuple[Array, Array]:
         pixels = np.concatenate([take.pixels for take in takes])
         world = np.concatenate([take.world for take in takes])
         both_hands = not any(take.label in self.sided for take in takes)
-        pixels, world = vary(pixels, world, _OF_EACH, random, both_hands=both_hands)
-        return _Rows(pixels, world, np.full(len(pixels), number))
+        return vary(pixels, world, _OF_EACH, random, both_hands=both_hands)
 
     def _facts(self, takes: Sequence[Take]) -> Mapping[str, Any]:
         dataset = Dataset(tuple(takes))
@@ -241,7 +221,7 @@ class _Trainer:
             "handsteer": __version__,
             "sources": sorted({take.source for take in takes}),
             "persons": len({take.person for take in takes}),
-            "signs": [summary.as_dict() for summary in summarise(dataset)],
+            "signs": [asdict(summary) for summary in summarise(dataset)],
             "sided": sorted(self.sided),
             "hands": {label: _outline(dataset, label, sided=label in self.sided) for label in dataset.labels},
             "made_hands": len(self._made.shapes),

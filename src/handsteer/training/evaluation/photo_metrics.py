@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from handsteer.training.evaluation.intervals import Share
@@ -87,10 +87,6 @@ class Confusion:
             counts[labels.index(truth)][labels.index(seen)] += 1
         return cls(labels, tuple(tuple(row) for row in counts))
 
-    def as_dict(self) -> dict[str, Any]:
-        """Return the matrix as plain values, for JSON."""
-        return {"labels": self.labels, "counts": self.counts}
-
 
 @dataclass(frozen=True)
 class Tally:
@@ -166,7 +162,7 @@ class PhotoReport(Tally):
             "recall_by_size": {sign: _plain(sizes) for sign, sizes in self.recall_by_size.items()},
             "false_commands": {**self.false_commands.as_dict(), "kinds": _plain(self.false_commands_by_kind)},
             "by_person_set": {name: tally.as_dict() for name, tally in self.by_person_set.items()},
-            "confusion": self.confusion.as_dict(),
+            "confusion": asdict(self.confusion),
         }
 
 

@@ -79,41 +79,6 @@ def evaluate_frames(
         raise LabelError(f"there is a label for frame {max(truths)}, but the last frame of the video is {number}")
 
 
-def evaluate_takes(
-    dataset: Dataset, classifier: Classifier, min_confidence: float, view: View
-) -> Iterator[PhotoResult]:
-    """Yield the recognition of each hand of a dataset, independently of the others.
-
-    The person becomes the result's kind and person set. Hands that cannot be scored in this ``view``, or lack the
-    required depth (:func:`lacks_depth`), are left out.
-
-    Args:
-        dataset: Contains only signs of the classifier, and ``NONE``.
-        classifier: The classifier to evaluate.
-        min_confidence: Minimum confidence of a sign, 0 to 1.
-        view: How the hands are transformed.
-    """
-    for number, take in enumerate(dataset.takes, start=1):
-        truth, _ = view.truth(take.label)
-        if truth is None:
-            continue
-        for row, hand in enumerate(take.hands, start=1):
-            if lacks_depth(hand, take.label, classifier):
-                continue
-            guess = classifier.classify(view.hand(hand))
-            yield PhotoResult(
-                path=f"take {number}, hand {row}",
-                kind=take.person,
-                truth=truth,
-                seen=guess.sign if guess.confidence >= min_confidence else NONE,
-                confidence=guess.confidence,
-                hand_px=hand.longer_side_px,
-                presence=hand.presence,
-                person_set=take.person,
-                likelihoods=guess.likelihoods,
-            )
-
-
 def lacks_depth(hand: Hand, label: str, classifier: Classifier) -> bool:
     """Return whether ``hand`` has no depth, but recognising ``label`` requires it, so that it cannot be scored.
 
@@ -181,9 +146,29 @@ class LabelledHands:
         """Return the results of ``classifier`` on the hands, transformed by ``view``."""
         hands = [(take.label, hand) for take in self.dataset.takes for hand in take.hands]
         without_depth = sum(lacks_depth(hand, label, classifier) for label, hand in hands)
-        results = tuple(watch(evaluate_takes(self.dataset, classifier, min_confidence, view), "hands"))
+        results = tuple(watch(self._results(classifier, min_confidence, view), "hands"))
         unscored = len(hands) - len(results) - without_depth
         return PhotoRun(str(self.path), view, results, unscored, without_depth)
+
+    def _results(self, classifier: Classifier, min_confidence: float, view: View) -> Iterator[PhotoResult]:
+        """Yield the recognition of each hand that can be scored; the person is its kind and person set."""
+        for number, take in enumerate(self.dataset.takes, start=1):
+            truth, _ = view.truth(take.label)
+            for row, hand in enumerate(take.hands, start=1):
+                if truth is None or lacks_depth(hand, take.label, classifier):
+                    continue
+                guess = classifier.classify(view.hand(hand))
+                yield PhotoResult(
+                    path=f"take {number}, hand {row}",
+                    kind=take.person,
+                    truth=truth,
+                    seen=guess.sign if guess.confidence >= min_confidence else NONE,
+                    confidence=guess.confidence,
+                    hand_px=hand.longer_side_px,
+                    presence=hand.presence,
+                    person_set=take.person,
+                    likelihoods=guess.likelihoods,
+                )
 
 
 @dataclass(frozen=True)

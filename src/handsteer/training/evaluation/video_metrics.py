@@ -157,7 +157,7 @@ class LabelledFigures:
             "false_commands": [asdict(event) for event in self.false_commands],
             **self.false_rate.as_dict("false_commands"),
             "engaged_false_commands": [asdict(event) for event in self.engaged_false],
-            "confusion": self.confusion.as_dict(),
+            "confusion": asdict(self.confusion),
         }
 
 

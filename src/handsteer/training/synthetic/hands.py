@@ -52,10 +52,9 @@ def name_shapes(angles: Array, joints: Array, elevations: Array, facing: Array) 
         elevations: (n, 2) angles of the index finger and of the thumb's tip to the image plane, radians, 0 to pi / 2.
         facing: (n,) 0 to 1, how directly the palm or the back of the hand faces the camera.
     """
-    reach = thumb_reach(joints)
+    reach, apart, tilt = _thumbs(joints)
     straight, open_enough = _straight(angles)
     closed, closed_enough = _closed(angles)
-    apart, tilt = thumb_gap(joints), np.degrees(thumb_angle(joints))
     curled, curled_enough = _closed(angles, ease=10.0)
     elevation = np.degrees(elevations)
     sure = {
@@ -77,30 +76,23 @@ def name_shapes(angles: Array, joints: Array, elevations: Array, facing: Array) 
     return named
 
 
-def thumb_reach(joints: Array) -> Array:
-    """Return (n,) distances of the thumb's tip from the little finger's base, in palm lengths."""
-    palm = np.linalg.norm(joints[:, [5, 9, 13, 17]] - joints[:, :1], axis=2).mean(axis=1)
-    reach: Array = np.linalg.norm(joints[:, 4] - joints[:, 17], axis=1) / palm
-    return reach
-
-
-def thumb_gap(joints: Array) -> Array:
-    """Return (n,) distances of the thumb's tip from the nearer of the index and middle fingertips, in palm lengths."""
-    palm = np.linalg.norm(joints[:, [5, 9, 13, 17]] - joints[:, :1], axis=2).mean(axis=1)
-    gaps: Array = np.linalg.norm(joints[:, [8, 12]] - joints[:, 4:5], axis=2).min(axis=1) / palm
-    return gaps
-
-
-def thumb_angle(joints: Array) -> Array:
-    """Return (n,) angles between the thumb, from its knuckle to its tip, and the palm, radians.
+def _thumbs(joints: Array) -> tuple[Array, Array, Array]:
+    """Return how the thumbs are held.
 
     A thumb along the index finger belongs to a fist, as the landmark model reports most plain fists.
+
+    Returns:
+        (n,) distances of the thumb's tip from the little finger's base, and from the nearer of the index and middle
+        fingertips, both in palm lengths; and (n,) angles between the thumb, from its knuckle to its tip, and the palm,
+        in degrees.
     """
-    thumb = joints[:, 4] - joints[:, 2]
-    palm = joints[:, [5, 9, 13, 17]].mean(axis=1) - joints[:, 0]
-    cosines = (thumb * palm).sum(axis=1) / np.linalg.norm(thumb, axis=1) / np.linalg.norm(palm, axis=1)
-    angles: Array = np.arccos(np.clip(cosines, -1.0, 1.0))
-    return angles
+    tip, knuckles = joints[:, 4], joints[:, [5, 9, 13, 17]]
+    palm = np.linalg.norm(knuckles - joints[:, :1], axis=2).mean(axis=1)
+    reach = np.linalg.norm(tip - joints[:, 17], axis=1) / palm
+    apart = np.linalg.norm(joints[:, [8, 12]] - tip[:, None], axis=2).min(axis=1) / palm
+    thumb, up = tip - joints[:, 2], knuckles.mean(axis=1) - joints[:, 0]
+    cosines = (thumb * up).sum(axis=1) / np.linalg.norm(thumb, axis=1) / np.linalg.norm(up, axis=1)
+    return reach, apart, np.degrees(np.arccos(np.clip(cosines, -1.0, 1.0)))
 
 
 def _straight(angles: Array) -> tuple[Flags, Flags]:

@@ -77,18 +77,12 @@ def draw_people(count: int, random: Random, people: tuple[Distribution, ...]) ->
     """
     kinds = sorted({each.kind for each in people})
     totals = {kind: sum(each.hands for each in people if each.kind == kind) for kind in kinds}
-    hands: dict[str, list[Array]] = {kind: [] for kind in kinds}
-    shapes: dict[str, list[NDArray[np.int64]]] = {kind: [] for kind in kinds}
-    for each in people:
-        part = each.draw(round(count / len(kinds) * each.hands / totals[each.kind]), random)
-        hands[each.kind].append(part)
-        shapes[each.kind].append(np.full(len(part), each.shape))
-    drawn = [np.concatenate(hands[kind]) for kind in kinds]
-    named = [np.concatenate(shapes[kind]) for kind in kinds]
-    by_kind = dict(zip(kinds, drawn, strict=True))
-    drawn.append(_closed_like(by_kind[THUMB][::2], np.concatenate([by_kind[FIST], by_kind[REST]]), random))
-    named.append(np.full(len(drawn[-1]), SHAPES.index(FIST)))
-    image, space = _seen_from_elsewhere(*from_canonical(np.concatenate(drawn)), random)
+    drawn = [(each, each.draw(round(count / len(kinds) * each.hands / totals[each.kind]), random)) for each in people]
+    drawn.sort(key=lambda pair: pair[0].kind)
+    by_kind = {kind: np.concatenate([hands for each, hands in drawn if each.kind == kind]) for kind in kinds}
+    closed = _closed_like(by_kind[THUMB][::2], np.concatenate([by_kind[FIST], by_kind[REST]]), random)
+    image, space = _seen_from_elsewhere(*from_canonical(np.concatenate([*by_kind.values(), closed])), random)
+    named = [np.full(len(hands), each.shape) for each, hands in drawn] + [np.full(len(closed), SHAPES.index(FIST))]
     return image, space, np.concatenate(named)
 
 
@@ -167,11 +161,7 @@ def load_people(path: Path = FILE) -> tuple[Distribution, ...]:
         ModelMissing: It cannot be read.
         ModelCorrupt: It is not such a file, or is damaged.
     """
-    arrays = _NPZ.read(path)
-    try:
-        return _built(arrays)
-    except (KeyError, ValueError, TypeError) as error:
-        raise _NPZ.damaged(path, error) from None
+    return _NPZ.read(path, _built)
 
 
 def _built(arrays: Arrays) -> tuple[Distribution, ...]:

@@ -16,7 +16,6 @@ Random = np.random.Generator
 States = NDArray[np.int64]
 
 _THUMB: Final = slice(2, 7)
-_JOINTS: Final = 4
 _FIRST_FINGER: Final = ANGLES.index("index_spread")
 
 # Spread, mcp, pip and dip in degrees (mean, standard deviation) for one finger that is ...
@@ -74,7 +73,7 @@ def open_hand(count: int, random: Random) -> Array:
     angles = _posed(np.full((count, 4), STRAIGHT), _choice([OUT, ALONGSIDE], [0.7, 0.3], count, random), random)
     _bend_together(angles, random, mcp=10, pip=6)
     apart = random.uniform(-0.2, 1.3, (count, 1))
-    angles[:, _spreads()] += np.radians([6.0, 0.0, -7.0, -15.0]) * apart
+    angles[:, _joints(0)] += np.radians([6.0, 0.0, -7.0, -15.0]) * apart
     return angles
 
 
@@ -214,8 +213,4 @@ def _choice(states: list[int], shares: list[float], count: int, random: Random) 
 
 
 def _joints(joint: int) -> list[int]:
-    return [_FIRST_FINGER + _JOINTS * finger + joint for finger in range(4)]
-
-
-def _spreads() -> list[int]:
-    return _joints(0)
+    return [_FIRST_FINGER + 4 * finger + joint for finger in range(4)]
