@@ -42,9 +42,6 @@ RUN_AGAIN = (
 time, which a machine that is busy with other things may upset. What is wrong fails each time; the last line of a run
 counts what was run again."""
 
-BROWSERS = 2
-"""How many processes run the tests with browsers."""
-
 LONG_VALUE = 100
 """Longer texts, in characters, are not part of a test's name."""
 
@@ -97,16 +94,14 @@ def pytest_configure() -> None:
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Mark what is in :data:`RUN_AGAIN`, what makes networks by the fixtures that make them, and what runs together.
 
-    With ``--dist loadgroup``, one process runs the tests of a file, and :data:`BROWSERS` those that need a browser, of
-    which each would draw pages without a graphics card. What takes longest comes first, so that no process is left
-    with it at the end: groups with browsers, then those with other slow tests.
+    With ``--dist loadgroup``, one process runs the tests of a file, and one all that need a browser: without a graphics
+    card, two that draw pages wait for each other. What takes longest comes first, so that no process is left with it
+    at the end: the group with browsers, then those with other slow tests.
     """
-    pages = sorted({item.path for item in items if item.get_closest_marker("browser")})
     ranks: dict[str, int] = {}
     for item in items:
         if not item.get_closest_marker("xdist_group"):
-            browser = item.get_closest_marker("browser")
-            group = f"browser {pages.index(item.path) % BROWSERS}" if browser else item.nodeid.partition("::")[0]
+            group = "browser" if item.get_closest_marker("browser") else item.nodeid.partition("::")[0]
             item.add_marker(pytest.mark.xdist_group(group))
         if set(getattr(item, "fixturenames", ())) & _NETWORKS:
             item.add_marker(pytest.mark.netns)

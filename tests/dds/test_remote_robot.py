@@ -139,7 +139,7 @@ def test_it_stands_when_who_drives_it_is_gone(robots: Robots, end: signal.Signal
 
 def test_it_is_told_to_stand_when_the_hand_is_gone(robots: Robots) -> None:
     robots.add()
-    robots.run("--robot", "dds", "--control.max-linear", "0.1", script="Stop:2 Forward:3 NONE:60")
+    robots.run("--robot", "dds", "--control.max-linear", "0.1", script="Stop:2 Forward:3 NONE:9")
     robots.expect_speed(0.1)
     robots.expect_speed(0.0)
     since = len(robots.told)
