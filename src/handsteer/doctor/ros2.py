@@ -118,7 +118,7 @@ class Sight:
     """What was observed in a domain.
 
     Attributes:
-        graph: As returned by :meth:`~handsteer.transports.dds.look.ObservedGraph.as_dict`; None if it cannot be joined.
+        graph: What :mod:`handsteer.transports.dds.look` prints, from JSON; None if it cannot be joined.
         problem: Why it cannot be joined: the engine's message, or else ours.
     """
 
