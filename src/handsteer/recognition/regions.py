@@ -6,6 +6,7 @@ they give a score, a box and seven keypoints. Anchors, decoding and suppression 
 ``palm_detection_detection_to_roi`` and ``hand_landmark_landmarks_to_roi``.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import atan2, cos, inf, log, pi, sin
 from pathlib import Path
@@ -23,8 +24,7 @@ _BASES_OF_INDEX_MIDDLE_RING: Final = (5, 9, 13)
 # Wrist, thumb without its tip, and the two lower joints of each finger: these move least when a finger bends.
 _STEADY_LANDMARKS: Final = (0, 1, 2, 3, 5, 6, 9, 10, 13, 14, 17, 18)
 
-_ANCHOR_GRIDS: Final = ((8, 2), (16, 6))
-"""Side of a grid's cells in pixels of the model's input, and number of anchors at each cell's centre."""
+_PALM_GRIDS: Final = ((8, 2), (16, 6))
 
 _WRIST: Final = 0
 _MIDDLE_BASE: Final = 2
@@ -154,6 +154,40 @@ class Palm:
         return from_palm(self.corners, self.keypoints[_WRIST], self.keypoints[_MIDDLE_BASE])
 
 
+class Detector:
+    """A single-shot detection model of MediaPipe: boxes with keypoints, and their scores.
+
+    Args:
+        model: Gives the candidates' values and the logits of their scores, in this order.
+        grids: Side of each grid's cells in pixels of the model's input, and number of anchors at a cell's centre.
+        min_score: Minimum score, 0 to 1.
+    """
+
+    def __init__(self, model: PictureModel, grids: Sequence[tuple[int, int]], min_score: float) -> None:
+        self._model = model
+        self._min_logit = _logit(min_score)
+        self._anchors = _anchors(model.side, grids)
+
+    def find(self, image: NDArray[np.uint8], limit: int, *, widened: float = 1.0) -> list[tuple[Array, float]]:
+        """Return at most ``limit`` detections in ``image``, (height, width, 3) uint8 BGR, by descending score.
+
+        ``widened`` enlarges the frame by this factor with a black border, so that what is in it appears smaller.
+
+        Returns:
+            Pairs of (n, 2) points in pixels of the frame, the top left and the bottom right of the box, then the
+            keypoints, and a score, 0 to 1.
+        """
+        height, width = image.shape[:2]
+        square = whole_frame(width, height, widened)
+        values, logits = self._model.run(square.crop(image, self._model.side, cv2.BORDER_CONSTANT))
+        logits = logits[:, 0]
+        found = np.flatnonzero(logits >= self._min_logit)
+        found = found[np.argsort(-logits[found], kind="stable")]
+        points = _decoded(values[found] / self._model.side, self._anchors[found])
+        merged = _merged(points, _sigmoid(logits[found]), limit)
+        return [(square.to_frame(each), score) for each, score in merged]
+
+
 class PalmDetector:
     """A palm detection model.
 
@@ -167,48 +201,35 @@ class PalmDetector:
     """
 
     def __init__(self, path: Path, threads: int, min_score: float) -> None:
-        self._model = PictureModel(path, threads)
-        self._min_logit = _logit(min_score)
-        self._anchors = _anchors(self._model.side)
+        self._detector = Detector(PictureModel(path, threads), _PALM_GRIDS, min_score)
 
     def detect(self, image: NDArray[np.uint8], limit: int, *, widened: float = 1.0) -> list[Palm]:
-        """Return at most ``limit`` palms in ``image``, (height, width, 3) uint8 BGR, by descending score.
-
-        ``widened`` enlarges the frame by this factor with a black border, so that hands appear smaller.
-        """
-        height, width = image.shape[:2]
-        square = whole_frame(width, height, widened)
-        values, logits = self._model.run(square.crop(image, self._model.side, cv2.BORDER_CONSTANT))
-        logits = logits[:, 0]
-        found = np.flatnonzero(logits >= self._min_logit)
-        found = found[np.argsort(-logits[found], kind="stable")]
-        points = _decoded(values[found] / self._model.side, self._anchors[found])
-        merged = _merged(points, _sigmoid(logits[found]), limit)
-        return [Palm(square.to_frame(each[:2]), square.to_frame(each[2:]), score) for each, score in merged]
+        """Return at most ``limit`` palms, as :meth:`Detector.find` describes."""
+        return [Palm(each[:2], each[2:], score) for each, score in self._detector.find(image, limit, widened=widened)]
 
 
-def _anchors(side: int) -> Array:
+def _anchors(side: int, grids: Sequence[tuple[int, int]]) -> Array:
     """Return the (n, 2) centres of the anchors, x and y from 0 to 1 across the picture, row by row in each grid."""
-    grids = []
-    for cell, per_cell in _ANCHOR_GRIDS:
+    anchors = []
+    for cell, per_cell in grids:
         along = (np.arange(side // cell, dtype=np.float32) + 0.5) * (cell / side)
         x, y = np.meshgrid(along, along)
         centers = np.stack([x.ravel(), y.ravel()], axis=1)
-        grids.append(np.repeat(centers, per_cell, axis=0))
-    return np.concatenate(grids)
+        anchors.append(np.repeat(centers, per_cell, axis=0))
+    return np.concatenate(anchors)
 
 
 def _decoded(values: Array, anchors: Array) -> Array:
     """Return the boxes and keypoints of n candidates, 0 to 1 across the picture.
 
     Args:
-        values: (n, 18) relative to the anchor: x and y of the box's centre, its width and height, 7 keypoints.
+        values: (n, 4 + 2 k) relative to the anchor: x and y of the box's centre, its width and height, k keypoints.
         anchors: (n, 2).
 
     Returns:
-        (n, 9, 2): top left and bottom right of the box, then the keypoints.
+        (n, 2 + k, 2): top left and bottom right of the box, then the keypoints.
     """
-    points = values.reshape(-1, 9, 2)
+    points = values.reshape(len(anchors), values.shape[1] // 2, 2)
     center, half_size = points[:, 0], points[:, 1] / 2
     corners = np.stack([center - half_size, center + half_size], axis=1)
     return np.concatenate([corners, points[:, 2:]], axis=1) + anchors[:, None]
@@ -220,12 +241,12 @@ def _merged(points: Array, scores: Array, limit: int) -> list[tuple[Array, float
     This is MediaPipe's weighted non-maximum suppression. A candidate without an area overlaps nothing and is dropped.
 
     Args:
-        points: (n, 9, 2) boxes and keypoints, by descending score.
+        points: (n, 2 + k, 2) boxes and keypoints, by descending score.
         scores: (n,).
         limit: Maximum number of results.
 
     Returns:
-        At most ``limit`` pairs of (9, 2) points and the best score of the group.
+        At most ``limit`` pairs of (2 + k, 2) points and the best score of the group.
     """
     merged: list[tuple[Array, float]] = []
     while len(scores) and len(merged) < limit:
