@@ -48,7 +48,9 @@ def make_wheel(index: Path, models: dict[str, bytes]) -> None:
     info = "mediapipe-0.10.21.dist-info"
     with zipfile.ZipFile(index / WHEEL, "w") as wheel:
         for name, content in models.items():
-            module = "palm_detection" if name.startswith("palm") else "hand_landmark"
+            module = next(
+                each for each in ("palm_detection", "hand_landmark", "pose_detection") if name.startswith(each)
+            )
             wheel.writestr(f"mediapipe/modules/{module}/{name}", content)
         wheel.writestr(f"{info}/LICENSE", LICENCE_TEXT)
         wheel.writestr(f"{info}/METADATA", "Metadata-Version: 2.1\nName: mediapipe\nVersion: 0.10.21\n")

@@ -14,6 +14,7 @@ from handsteer.cli.running import say
 from handsteer.errors import ModelMissing
 
 if TYPE_CHECKING:
+    from handsteer.config import Config
     from handsteer.doctor import Finding
     from handsteer.parameters import Description
 
@@ -86,16 +87,17 @@ def _fetch() -> Path:
             bar.close()
 
 
-def fetch_missing(model: str) -> None:
-    """Fetch the models if those of ``landmarks.model`` are missing, unless HANDSTEER_MODELS names their folder.
+def fetch_missing(config: "Config") -> None:
+    """Fetch the models if those that ``config`` needs are missing, unless HANDSTEER_MODELS names their folder.
 
     Raises:
         ModelError: They cannot be fetched or stored, or one is damaged.
     """
-    from handsteer.recognition.landmark_models import are_elsewhere, find_pair
+    from handsteer.recognition.landmark_models import are_elsewhere
+    from handsteer.recognition.recognizer import model_files
 
     try:
-        find_pair(model)
+        model_files(config)
     except ModelMissing:
         if are_elsewhere():
             raise

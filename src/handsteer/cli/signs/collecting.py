@@ -74,7 +74,7 @@ def collect_takes(config: Config, plan: Plan, recording: Path | None, moments: S
     parts = [_part(word) for word in moments]
     if plan.hold and not is_file and not Keys.possible():
         raise DatasetError("--hold needs a terminal to read keys from; without it, a countdown starts each take")
-    fetch_missing(config.landmarks.model)
+    fetch_missing(config)
     if recording is not None:
         landmarker = open_landmarker(config)
         known = known.with_takes([collect_moment(recording, landmarker, facts, *part) for part in parts])

@@ -107,7 +107,7 @@ def _evaluate(
     _check_scored(hands)
     # Datasets contain landmarks, so the landmark models are not needed for them.
     if folders or videos:
-        fetch_missing(config.landmarks.model)
+        fetch_missing(config)
     recognizer = Recognizer(config) if folders or videos else None
     photos = [folder.run(recognizer, view, _with_progress) for folder in folders for view in views if recognizer]
     _check_scored(photos)
