@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from handsteer.config import SignsConfig
 from handsteer.recognition.filters import Debouncer, Evidence, HandPosition, HandSelector
 from handsteer.recognition.hand import Hand, SignGuess
-from handsteer.types import FORWARD, GO, NONE, SIGNS, STOP, TURN_LEFT
+from handsteer.types import BACKWARD, FORWARD, GO, NONE, SIGNS, STOP, TURN_LEFT
 from tests.recognition.hands import moved, show_sign
 
 HAND = show_sign(STOP)
@@ -35,6 +35,13 @@ def test_the_hand_that_shows_a_sign_is_chosen_not_the_resting_one() -> None:
 
 def test_of_two_that_show_signs_the_larger_is_chosen() -> None:
     assert look(HandSelector(CONFIG), (SMALL, FORWARD), (LEFT, GO)) is LEFT
+
+
+def test_a_fist_leaves_another_sign_of_a_hand_of_its_size_alone() -> None:
+    # The other hand holds something: a fist, and more surely one than the pointing hand points.
+    fist, pointing = SignGuess(GO, 0.99), SignGuess(BACKWARD, 0.82)
+    for hands, guesses in (((LEFT, RIGHT), (fist, pointing)), ((RIGHT, LEFT), (pointing, fist))):
+        assert HandSelector(CONFIG).choose(hands, guesses, 0.1) == guesses.index(pointing)
 
 
 def test_without_a_sign_the_largest_hand_is_shown_but_not_kept() -> None:

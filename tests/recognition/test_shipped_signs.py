@@ -117,18 +117,33 @@ def test_the_mirror_image_is_as_sure_and_turns_the_other_way(sign: str) -> None:
     assert other.confidence == pytest.approx(one.confidence, abs=1e-4)
 
 
-def pointing_down(closed: float, pitch_deg: float) -> Hand:
-    """Return a hand whose index finger points down, the others ``closed`` from 0 to 1, tipped away from the camera."""
-    degrees = {"thumb_spread": 9.0, "thumb_opposition": 50.0, "thumb_mcp": 35.0, "thumb_ip": 60.0}
-    degrees |= {"index_mcp": 3.0, "index_pip": 5.0, "index_dip": 3.0}
+def pointing_down(bend_deg: float, thumb: dict[str, float], *, back: bool, pitch_deg: float = 0.0) -> Hand:
+    """Return a hand whose index finger points down, bent at its knuckle, and shows its palm or its back."""
+    degrees = {f"thumb_{joint}": angle for joint, angle in thumb.items()}
+    degrees |= {"index_mcp": bend_deg, "index_pip": 6.0, "index_dip": 4.0}
     for finger in ("middle", "ring", "little"):
-        degrees |= {f"{finger}_mcp": 70.0 * closed, f"{finger}_pip": 92.0 * closed, f"{finger}_dip": 50.0 * closed}
-    return show_pose(HandPose(angles_of(**degrees), View(yaw=0.15, pitch=math.radians(pitch_deg), roll=math.pi)))
+        degrees |= {f"{finger}_mcp": 78.0, f"{finger}_pip": 92.0, f"{finger}_dip": 50.0}
+    # Bent, the finger points to the palm's side, so the hand is tipped to let it point down.
+    tipped = math.radians(pitch_deg - 0.7 * bend_deg if back else pitch_deg + 0.7 * bend_deg)
+    yaw = math.pi if back else 0.0
+    return show_pose(HandPose(angles_of(**degrees), View(yaw=yaw + 0.1, pitch=tipped, roll=math.pi)))
 
 
-@pytest.mark.parametrize(("closed", "pitch_deg", "sign"), [(1.0, -20, BACKWARD), (1.0, 20, BACKWARD), (0.7, 20, NONE)])
-def test_a_half_open_hand_that_points_down_and_away_is_at_rest(closed: float, pitch_deg: float, sign: str) -> None:
-    assert sure_sign(pointing_down(closed, pitch_deg)) == sign
+@pytest.mark.parametrize("back", [False, True])
+@pytest.mark.parametrize("pitch_deg", [-20, 0, 20])
+@pytest.mark.parametrize("thumb", [THUMB_ACROSS, THUMB_OUT])
+def test_backward_from_the_palm_and_the_back_with_the_thumb_in_or_out(
+    back: bool, pitch_deg: float, thumb: dict[str, float]
+) -> None:
+    assert sure_sign(pointing_down(5.0, thumb, back=back, pitch_deg=pitch_deg)) == BACKWARD
+
+
+@pytest.mark.parametrize("thumb", [THUMB_ACROSS, THUMB_OUT])
+@pytest.mark.parametrize("bend_deg", [25, 45, 60])
+def test_an_index_finger_bent_at_its_knuckle_points_down_from_the_back(
+    thumb: dict[str, float], bend_deg: float
+) -> None:
+    assert sure_sign(pointing_down(bend_deg, thumb, back=True)) == BACKWARD
 
 
 def test_a_hand_that_is_hardly_there_is_no_sign() -> None:
@@ -185,7 +200,7 @@ def changed(path: Path, **arrays: np.ndarray | None) -> Path:
 def test_the_shipped_model_is_small_and_says_what_it_was_trained_on() -> None:
     model = load_model()
     assert len(CONTENT) < 300_000
-    assert model.shapes == ("open", "index", "thumb", "fist", "other")
+    assert model.shapes == ("open", "index", "index_down", "thumb", "fist", "other")
     assert "handsteer.training.synthetic" in model.trained_on["source"]
     assert sum(model.trained_on["hands"].values()) > 100_000
 

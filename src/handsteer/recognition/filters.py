@@ -11,7 +11,7 @@ import numpy as np
 from handsteer.config import SignsConfig
 from handsteer.recognition.features import PALM
 from handsteer.recognition.hand import Hand, SignGuess
-from handsteer.types import NONE, STOP
+from handsteer.types import GO, NONE, STOP
 
 _JUMP: Final = 1.0
 """Largest movement of a hand between two frames, in hand sizes."""
@@ -54,7 +54,8 @@ class HandPosition:
 class HandSelector:
     """Selects the active hand, which gives the signs, and follows it.
 
-    - Without an active hand, it selects one that shows a sign, by confidence and size.
+    - Without an active hand, it selects one that shows a sign, by confidence and size; a fist only if no other hand of
+      about its size or larger shows another sign.
     - Once a sign of the active hand is confirmed, it stays active while in view, until it has had no confirmed sign for
       ``switch_time`` and another hand, not much smaller, shows one: a resting hand or a bystander does not take over.
     - A hand that is out of view for ``dropout_hold`` is no longer active; until then, any hand may show ``Stop``.
@@ -100,7 +101,8 @@ class HandSelector:
         elif followed is not None:
             showing = []
         if showing:
-            followed = max(showing, key=lambda index: guesses[index].confidence * places[index].size ** 0.5)
+            some = _purposeful(showing, guesses, places)
+            followed = max(some, key=lambda index: guesses[index].confidence * places[index].size ** 0.5)
             self._idle_s = math.inf
         if followed is None:
             return max(range(len(places)), key=lambda index: places[index].size, default=None)
@@ -124,6 +126,16 @@ class HandSelector:
         if self._unseen_s > self._config.dropout_hold:
             self.reset()
         return None
+
+
+def _purposeful(showing: list[int], guesses: Sequence[SignGuess], places: Sequence[HandPosition]) -> list[int]:
+    """Return the hands of ``showing`` without the fists beside a hand that shows another sign.
+
+    A hand that holds something or rests looks like a fist too. A much smaller hand belongs to another person.
+    """
+    others = [places[index].size for index in showing if guesses[index].sign != GO]
+    largest = max(others, default=0.0)
+    return [index for index in showing if guesses[index].sign != GO or largest < _MUCH_SMALLER * places[index].size]
 
 
 @dataclass(frozen=True)

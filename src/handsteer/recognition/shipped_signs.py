@@ -13,12 +13,6 @@ from numpy.typing import NDArray
 from handsteer.errors import ModelCorrupt, ModelMissing
 from handsteer.recognition.features import (
     COUNT,
-    INDEX_BASE,
-    INDEX_TIP,
-    KNUCKLES,
-    MIDDLE_BASE,
-    MIDDLE_TIP,
-    WRIST,
     directions,
     shape_features,
 )
@@ -48,8 +42,12 @@ _POINTING: Final = 52.0
 
 People tilt their hands by up to 30 degrees, and their fingers relative to the hand.
 """
-_SIDEWAYS: Final = 49.0
-"""Largest angle of a thumb to the horizontal, in degrees: about half-way to a thumb up or down."""
+_SIDEWAYS: Final = 40.0
+"""Largest angle of a thumb to the horizontal, in degrees.
+
+Thumbs that turn are within 23 degrees of it, thumbs up and down that are tilted by 30 degrees mostly beyond 40. Other
+measures of the hand's tilt, such as the direction of its palm, do not separate them better.
+"""
 _UPRIGHT: Final = 55.0
 """Largest angle of an open hand to upwards: beyond it, hands hang or rest."""
 _RAISED: Final = 120.0
@@ -58,15 +56,11 @@ _HANGING: Final = 145.0
 """Smallest angle of a hanging hand's palm to upwards: 156 to 178 degrees for people at rest."""
 _HANGING_TRUST: Final = 0.82
 """Factor on the thumb's likelihood for a hanging hand: next to the fingers, it may seem to point sideways."""
-_AWAY: Final = 0.06
-_AWAY_DOUBT: Final = 0.01
-"""Depth of a resting index finger's tip beyond its base, in palm lengths, and the width of that limit.
+_BENT_UP: Final = 0.5
+"""Share of the likelihood of an index finger that is bent at its knuckle, or has the thumb out, that counts upwards.
 
-0.08 to 0.18 for people at rest; of people who point, 99 of 100 point towards the camera.
+So such a finger is ``Backward`` if it points down, and no sign if it points up, unless it may as well be straight.
 """
-_HALF_OPEN: Final = 0.56
-_HALF_OPEN_DOUBT: Final = 0.012
-"""Likewise, the distance of the middle finger's tip from its base: 0.55 to 0.68 at rest; 0.45 in a pointing hand."""
 
 _PRESENT: Final = 0.7
 _PRESENT_DOUBT: Final = 0.05
@@ -82,7 +76,7 @@ _SMALL_DOUBT_PX: Final = 4.0
 At 35 pixels they lose a hundredth; a fist 3 m from a webcam of 640x480 has some 17.
 """
 
-_THRESHOLDS: Final = {STOP: 0.5, GO: 0.6, FORWARD: 0.7, BACKWARD: 0.9, TURN_LEFT: 0.65, TURN_RIGHT: 0.65}
+_THRESHOLDS: Final = {STOP: 0.5, GO: 0.6, FORWARD: 0.7, BACKWARD: 0.75, TURN_LEFT: 0.65, TURN_RIGHT: 0.65}
 """Likelihood thresholds of the signs; docs/signs.md has the false rates that they were chosen for."""
 SURE: Final = 0.8
 """The confidence of a sign whose likelihood equals its threshold."""
@@ -169,7 +163,7 @@ class ShippedClassifier:
         pixels = hand.pixels[None, :, :2].astype(np.float64)
         shapes = self._model.probabilities(shape_features(pixels, hand.world[None])[0])
         legible = legibility(hand)
-        likelihoods = {sign: likelihood * legible for sign, likelihood in _signs(shapes, pixels, hand.world).items()}
+        likelihoods = {sign: likelihood * legible for sign, likelihood in _signs(shapes, pixels).items()}
         best = max(likelihoods, key=likelihoods.__getitem__)
         none = max(0.0, 1.0 - sum(likelihoods.values()))
         if none >= likelihoods[best]:
@@ -193,31 +187,21 @@ def legibility(hand: Hand) -> float:
     return present * large * float(inside)
 
 
-def _signs(shapes: dict[str, float], pixels: NDArray[np.float64], world: NDArray[np.floating]) -> dict[str, float]:
-    """Return the likelihood of each sign from those of the shapes, (1, 21, 2) pixels and (21, 3) world landmarks."""
+def _signs(shapes: dict[str, float], pixels: NDArray[np.float64]) -> dict[str, float]:
+    """Return the likelihood of each sign from those of the shapes and (1, 21, 2) landmarks in pixels."""
     index, thumb, palm = (vectors[0] for vectors in directions(pixels))
     hangs = 1.0 - _within(_HANGING, _from_up(palm))
+    straight, bent = shapes.get("index", 0.0), shapes.get("index_down", 0.0)
     sideways = shapes.get("thumb", 0.0) * (1.0 - (1.0 - _HANGING_TRUST) * hangs)
     return {
         STOP: shapes.get("open", 0.0) * _within(_UPRIGHT, _from_up(palm)),
         GO: shapes.get("fist", 0.0) * _within(_RAISED, _from_up(palm)),
-        FORWARD: shapes.get("index", 0.0) * _within(_POINTING, _from_up(index)),
-        BACKWARD: shapes.get("index", 0.0) * _within(_POINTING, 180.0 - _from_up(index)) * (1.0 - _at_rest(world)),
+        FORWARD: (straight + _BENT_UP * bent) * _within(_POINTING, _from_up(index)),
+        BACKWARD: (straight + bent) * _within(_POINTING, 180.0 - _from_up(index)),
         # The frame is not mirrored: the user's right is the left of the image.
         TURN_LEFT: sideways * _within(_SIDEWAYS, _from_right(thumb)),
         TURN_RIGHT: sideways * _within(_SIDEWAYS, 180.0 - _from_right(thumb)),
     }
-
-
-def _at_rest(world: NDArray[np.floating]) -> float:
-    """Return the likelihood, 0 to 1, that a hand with its index finger down, (21, 3), is at rest.
-
-    At rest, the finger points away from the camera, and the others are half open.
-    """
-    palm = max(float(np.linalg.norm(world[list(KNUCKLES)] - world[WRIST], axis=1).mean()), 1e-6)
-    away = float(world[INDEX_TIP, 2] - world[INDEX_BASE, 2]) / palm
-    reach = float(np.linalg.norm(world[MIDDLE_TIP] - world[MIDDLE_BASE])) / palm
-    return (1.0 - _within(_AWAY, away, _AWAY_DOUBT)) * (1.0 - _within(_HALF_OPEN, reach, _HALF_OPEN_DOUBT))
 
 
 def _from_up(vector: NDArray[np.float64]) -> float:

@@ -26,7 +26,7 @@ from handsteer.recognition.hand import Hand
 from handsteer.recognition.landmarker import MediaPipeLandmarker
 from handsteer.training.evaluation.labels import read_photo_labels
 from handsteer.training.evaluation.views import View
-from handsteer.training.synthetic.hands import FIST, OPEN, OTHER, SHAPES, THUMB
+from handsteer.training.synthetic.hands import FIST, INDEX_DOWN, OPEN, OTHER, SHAPES, THUMB
 from handsteer.training.synthetic.hands import INDEX as POINTING
 from handsteer.training.synthetic.people import (
     COORDINATES,
@@ -56,15 +56,35 @@ _SIZE: Final = (640, 480)
 _SIDES: Final = 8
 _DRAWN: Final = 45
 _END_ON: Final = 0.85
+_THUMB_ANGLES: Final = np.isin(np.arange(len(ANGLES)), range(2, 7))
+
+
+def _with_thumb(thumb: Array, fingers: Array) -> Array:
+    """Return the (23,) angles of ``fingers`` with those of the thumb from ``thumb``."""
+    return np.where(_THUMB_ANGLES, thumb, fingers)
+
+
 _ALONG: Final = angles_of(thumb_spread=20.0, thumb_opposition=14.0, thumb_mcp=6.0, thumb_ip=10.0)
+
+
+def _bent(degrees: float) -> Array:
+    """Return the (23,) angles of an index finger that is bent at its knuckle, as one that points down."""
+    others = degrees / 4
+    return poses.INDEX + angles_of(index_mcp=degrees, middle_mcp=others, ring_mcp=others, little_mcp=others)
+
+
 _POSES: Final = (
-    (OPEN, poses.OPEN),
-    (POINTING, poses.INDEX),
-    (THUMB, poses.THUMB),
-    (FIST, poses.FIST),
-    (FIST, np.where(np.isin(np.arange(len(ANGLES)), range(2, 7)), _ALONG, poses.FIST)),
+    ("drawn", OPEN, poses.OPEN),
+    ("drawn", POINTING, poses.INDEX),
+    ("drawn", THUMB, poses.THUMB),
+    ("drawn", FIST, poses.FIST),
+    ("drawn", FIST, _with_thumb(_ALONG, poses.FIST)),
+    ("drawn down", POINTING, _bent(45.0)),
+    ("drawn down", INDEX_DOWN, _bent(75.0)),
+    *(("drawn down", INDEX_DOWN, _with_thumb(poses.THUMB, _bent(bend))) for bend in (0.0, 30.0, 60.0)),
 )
-"""Shapes of the virtual hand: a fist with its thumb over the fingers, and one with it along them."""
+"""Kinds, shapes and angles of the virtual hand: among them a fist with its thumb over the fingers, and one with it
+along them. Photos hardly show the backs of hands that point down, so their statistics are of drawn ones only."""
 _CLUSTERS: Final = {REST: 8, THUMB: 6, "digits": 4}
 _DIRECTIONS: Final = 12
 _RAISED: Final = 0.6
@@ -93,8 +113,8 @@ def main() -> None:
         for kind, coordinates in seen_hands(folder):
             hands[kind].append(coordinates)
     fitted = [each for kind in sorted(hands) for each in fit(kind, np.array(hands[kind]))]
-    for shape, drawn in drawn_hands():
-        fitted += [_normal("drawn", SHAPES.index(shape), drawn)]
+    for kind, shape, drawn in drawn_hands():
+        fitted += [_normal(kind, SHAPES.index(shape), drawn)]
     save_people(tuple(fitted), FILE)
 
 
@@ -115,17 +135,18 @@ def seen_hands(folder: Path, part: Part = "tune") -> Iterator[tuple[str, Array]]
             yield kind, _coordinates(_raised(hands))
 
 
-def drawn_hands() -> Iterator[tuple[str, Array]]:
-    """Yield shape and (n, 105) canonical coordinates of rendered hands, viewed from several sides.
+def drawn_hands() -> Iterator[tuple[str, str, Array]]:
+    """Yield kind, shape and (n, 105) canonical coordinates of rendered hands, viewed from several sides.
 
     Photos do not show all sides of a fist; rendered hands show what the landmark model reports for them.
     """
-    random = np.random.default_rng(0)
+    # One each, so that poses of a new kind change no others.
+    randoms = {kind: np.random.default_rng(0) for kind, _, _ in _POSES}
     landmarker = MediaPipeLandmarker(LandmarksConfig())
     camera = Pinhole.webcam(*_SIZE)
     backgrounds = [make_background(kind, *_SIZE, seed) for seed, kind in enumerate(("plain", "cluttered"))]
-    for (shape, angles), side in tqdm(list(itertools.product(_POSES, range(_SIDES))), desc="drawn", disable=None):
-        seen = []
+    for (kind, shape, angles), side in tqdm(list(itertools.product(_POSES, range(_SIDES))), desc="drawn", disable=None):
+        seen, random = [], randoms[kind]
         for number in range(_DRAWN):
             yaw = (side + random.uniform(-0.5, 0.5)) * 2 * np.pi / _SIDES
             turn = orientation(yaw=yaw, pitch=random.normal(0, 0.45), roll=random.normal(0, 0.3))
@@ -138,12 +159,12 @@ def drawn_hands() -> Iterator[tuple[str, Array]]:
             if hands and (shape == FIST or _is_tilted(pointing, shape)):
                 seen.append(_coordinates(_raised(hands)))
         if len(seen) >= LEAST_HANDS:
-            yield shape, np.array(seen)
+            yield kind, shape, np.array(seen)
 
 
 def _is_tilted(joints: Array, shape: str) -> bool:
     """Return whether the pointing part of (21, 3) joints of a shape is seen from the side, not end on."""
-    start, end = {THUMB: (2, 4), POINTING: (5, 8), OPEN: (9, 12)}[shape]
+    start, end = {THUMB: (2, 4), POINTING: (5, 8), INDEX_DOWN: (5, 8), OPEN: (9, 12)}[shape]
     pointing = joints[end] - joints[start]
     return bool(abs(pointing[2]) <= _END_ON * np.linalg.norm(pointing))
 

@@ -9,9 +9,13 @@ from numpy.typing import NDArray
 from handsteer.hand.kinematics import ANGLES, FINGERS, Array, pose_joints, turn_x, turn_y, turn_z
 from handsteer.training.synthetic.shapes import Random, random_shapes
 
-OPEN, INDEX, THUMB, FIST, OTHER = "open", "index", "thumb", "fist", "other"
-SHAPES: Final = (OPEN, INDEX, THUMB, FIST, OTHER)
-"""The classes of the network."""
+OPEN, INDEX, INDEX_DOWN, THUMB, FIST, OTHER = "open", "index", "index_down", "thumb", "fist", "other"
+SHAPES: Final = (OPEN, INDEX, INDEX_DOWN, THUMB, FIST, OTHER)
+"""The classes of the network.
+
+``index_down`` is an index finger as people hold it to point down and no other: bent at its knuckle, because an arm that
+is raised cannot show it straight, or with the thumb extended.
+"""
 
 Flags = NDArray[np.bool_]
 
@@ -53,6 +57,7 @@ def name_shapes(angles: Array, joints: Array, elevations: Array, facing: Array) 
         facing: (n,) 0 to 1, how directly the palm or the back of the hand faces the camera.
     """
     reach, apart, tilt = _thumbs(joints)
+    pip, fold = _index(angles)
     straight, open_enough = _straight(angles)
     closed, closed_enough = _closed(angles)
     curled, curled_enough = _closed(angles, ease=10.0)
@@ -60,12 +65,14 @@ def name_shapes(angles: Array, joints: Array, elevations: Array, facing: Array) 
     sure = {
         OPEN: straight.all(axis=1) & (reach >= 0.92) & (facing >= 0.4),
         INDEX: straight[:, 0] & curled[:, 1:].all(axis=1) & (reach <= 1.0) & (elevation[:, 0] <= 55),
+        INDEX_DOWN: (pip <= 42) & curled[:, 1:].all(axis=1) & ((fold > 100) | (reach > 1.2)) & (elevation[:, 0] <= 55),
         THUMB: closed.all(axis=1) & (reach >= 1.05) & (apart >= 0.5) & (tilt >= 38) & (elevation[:, 1] <= 55),
         FIST: closed.all(axis=1) & ((reach <= 0.82) | (tilt <= 28) & (reach <= 1.1)),
     }
     possible = {
         OPEN: open_enough.all(axis=1) & (reach >= 0.82),
         INDEX: open_enough[:, 0] & curled_enough[:, 1:].all(axis=1) & (reach <= 1.2) & (elevation[:, 0] <= 68),
+        INDEX_DOWN: (pip <= 52) & curled_enough[:, 1:].all(axis=1) & (elevation[:, 0] <= 68),
         THUMB: closed_enough.all(axis=1) & (reach >= 0.9) & (apart >= 0.35) & (tilt >= 28) & (elevation[:, 1] <= 68),
         FIST: closed_enough.all(axis=1) & ((reach <= 0.98) | (tilt <= 36) & (reach <= 1.25)),
     }
@@ -93,6 +100,12 @@ def _thumbs(joints: Array) -> tuple[Array, Array, Array]:
     thumb, up = tip - joints[:, 2], knuckles.mean(axis=1) - joints[:, 0]
     cosines = (thumb * up).sum(axis=1) / np.linalg.norm(thumb, axis=1) / np.linalg.norm(up, axis=1)
     return reach, apart, np.degrees(np.arccos(np.clip(cosines, -1.0, 1.0)))
+
+
+def _index(angles: Array) -> tuple[Array, Array]:
+    """Return (n,) bends of the index fingers beyond the knuckle and in all, as in :func:`_straight`, in degrees."""
+    mcp, pip, dip = (bends[:, 0] for bends in _degrees(angles))
+    return pip, mcp + pip + 0.5 * dip
 
 
 def _straight(angles: Array) -> tuple[Flags, Flags]:

@@ -87,6 +87,17 @@ def index_up(count: int, random: Random) -> Array:
     return angles
 
 
+def index_down(count: int, random: Random) -> Array:
+    """Return (count, 23) angles of an index finger as it points down: bent at its knuckle, the others more so."""
+    angles = index_up(count, random)
+    angles[:, _THUMB] = _drawn(_THUMB_STATES[_choice([OUT, *range(1, 5)], [0.4, *[0.15] * 4], count, random)], random)
+    bent = np.radians(random.uniform(0, 75, (count, 1)))
+    angles[:, [_FIRST_FINGER + 1]] += bent
+    angles[:, _joints(1)[1:]] += 0.35 * bent
+    angles[:, _FIRST_FINGER + 2] += np.radians(random.uniform(0, 28, count))
+    return angles
+
+
 def thumb_out(count: int, random: Random) -> Array:
     """Return (count, 23) angles of a fist with the thumb extended, tightly or loosely closed."""
     states = np.repeat(_choice([CURLED, LOOSE, HOOKED], [0.7, 0.2, 0.1], count, random)[:, None], 4, axis=1)
@@ -163,13 +174,14 @@ def anything(count: int, random: Random) -> Array:
 
 
 MAKERS: Final[tuple[tuple[Callable[[int, Random], Array], float], ...]] = (
-    (open_hand, 0.11),
-    (index_up, 0.16),
-    (thumb_out, 0.15),
-    (fist, 0.12),
-    (any_fingers, 0.10),
-    (known_others, 0.11),
-    (relaxed, 0.11),
+    (open_hand, 0.10),
+    (index_up, 0.15),
+    (index_down, 0.09),
+    (thumb_out, 0.14),
+    (fist, 0.11),
+    (any_fingers, 0.08),
+    (known_others, 0.10),
+    (relaxed, 0.10),
     (holding, 0.08),
     (touching, 0.05),
     (anything, 0.03),

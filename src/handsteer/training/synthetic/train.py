@@ -20,7 +20,7 @@ from handsteer.training.synthetic.people import draw_people, load_people
 
 SEED: Final = 7
 _CHUNKS, _CHUNK, _PEOPLE = 10, 50_000, 20_000
-HIDDEN: Final = (64, 32)
+HIDDEN: Final = (96, 48)
 EPOCHS: Final = 30
 
 
