@@ -19,7 +19,7 @@ from pathlib import Path
 import cv2
 from _sign_photos import FOLDERS, Eyes, Look, Seen, digest, photo_looks, read_photos
 from _sign_renders import rendered_looks
-from _sign_table import LEAST, LEAST_OF_SAMPLE, Change, Counts, Row, Table, compare, failures, news, read_table
+from _sign_table import LEAST, LEAST_OF_SAMPLE, TABLE, Change, Counts, Row, Table, compare, failures, news, read_table
 from tqdm import tqdm
 
 from handsteer.training.evaluation.intervals import Share
@@ -48,6 +48,8 @@ def main(arguments: Sequence[str] | None = None, eyes: Eyes | None = None) -> No
     ]
     if options.sample:
         looks = sample_of(looks)
+    if not looks:
+        raise SystemExit(f"no row's name contains {options.only!r}; benchmarks/{TABLE.name} has the names")
     seen = measure(looks, jobs=options.jobs, eyes=eyes)
     if options.mistakes:
         print("\n".join(each.line for each in seen if not each.right))

@@ -38,6 +38,24 @@ def options(data_dir: Path) -> list[str]:
     return ["--sample", "--jobs", "1", "--data", str(data_dir)]
 
 
+def test_other_photos_than_those_of_the_table_are_refused(options: list[str], data_dir: Path, tmp_path: Path) -> None:
+    for name in FOLDERS:
+        (tmp_path / name).mkdir()
+        for entry in (data_dir / name).iterdir():
+            (tmp_path / name / entry.name).symlink_to(entry)
+    index = tmp_path / "hagrid-dev" / "index.csv"
+    lines = index.read_text().splitlines()
+    index.unlink()
+    index.write_text("\n".join(lines[:-1]))
+    with pytest.raises(SystemExit, match="are not those of the table"):
+        signs.main([*options, "--data", str(tmp_path), "--only", "sara / Turn Right / - / raw"])
+
+
+def test_rows_that_do_not_exist_are_refused(options: list[str]) -> None:
+    with pytest.raises(SystemExit, match="no row's name contains 'Sideways'"):
+        signs.main([*options, "--only", "Sideways"])
+
+
 def test_no_sign_is_lost_on_the_sample(options: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     signs.main(options)
     assert capsys.readouterr().out.endswith("no row is worse than the committed table\n")
