@@ -31,7 +31,7 @@ help:
 	@echo "make test-ros2    the tests with nodes of ROS 2"
 	@echo "make bench        print the speed and accuracy tables"
 	@echo "make bench-drive  update the tables and plots of docs/driving.md: laps of a simulated operator"
-	@echo "make bench-signs  print how well signs are recognised on photos of people"
+	@echo "make bench-signs  measure the signs on photos of people; fails if one is worse than in the committed table"
 	@echo "make signs-model  train the shipped sign model again, from synthetic hands; reproduces the file"
 	@echo "make landmark-model  build the 8-bit hand landmark model again from MediaPipe's; reproduces the file"
 	@echo "make faults       update the tables of docs/safety.md: the effect of every fault"
@@ -61,6 +61,7 @@ lint: $(BIN)/.dev
 	@$(BIN)/mypy
 	@$(BIN)/lint-imports --no-logo --cache-dir .mypy_cache/imports > $(BIN)/.imports || { cat $(BIN)/.imports; exit 1; }
 	@$(BIN)/python scripts/configuration_table.py --check
+	@$(BIN)/python -m scripts.signs_table --check
 
 fuzz: $(BIN)/.dev models
 	@HANDSTEER_FUZZ_CASES=$(CASES) $(BIN)/pytest -n auto tests/fuzz $(ARGS)
@@ -88,10 +89,11 @@ bench: $(BIN)/.dev models
 	@for table in benchmarks/[!_]*.py; do echo "== $$table"; $(BIN)/python $$table || exit 1; done
 
 bench-drive: $(BIN)/.dev models
-	@$(BIN)/python scripts/driving_table.py $(ARGS)
+	@$(BIN)/python -m scripts.driving_table $(ARGS)
 
 bench-signs: $(BIN)/.dev models
 	@$(BIN)/python benchmarks/signs.py $(ARGS)
+	@$(BIN)/python -m scripts.signs_table
 
 signs-model: | $(BIN)/.run
 	@$(BIN)/python -m handsteer.training.synthetic.train

@@ -1,114 +1,166 @@
-"""Recognition of signs on photos of people, by source, with 95 % intervals.
+"""Recognition of signs on photos of people who show them, compared with the committed table.
 
-Run ``python benchmarks/signs.py`` (``make bench-signs``). The photos are not part of the repository; docs/signs.md
-describes their folders. By default the report part is used, on which nothing was tuned; use the other part (``--part
-tune``) during development. Each photo is evaluated raw and flipped, with ``--tilt`` also rotated; forward photos
-rotated by 180 degrees give Backward, thumbs up and down rotated by 90 degrees give turns. Misses count as wrong.
+``make bench-signs`` measures every row again and prints it as it was and as it is; it exits with 1 and names each row
+that became worse (``_sign_table.py`` has the rule), or that cannot be compared. ``make bench-signs ARGS=--update``
+writes ``signs_table.json``, and the tables of docs/signs.md from it. ``--sample`` measures a fixed sample only, as the
+tests do. The photos are not part of the repository; docs/signs.md describes them.
 """
 
 import argparse
-import itertools
+import json
+import multiprocessing
+import os
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from functools import cache
 from pathlib import Path
 
 import cv2
+from _sign_photos import FOLDERS, Eyes, Look, Seen, digest, photo_looks, read_photos
+from _sign_renders import rendered_looks
+from _sign_table import LEAST, LEAST_OF_SAMPLE, TABLE, Change, Counts, Row, Table, compare, failures, news, read_table
+from tqdm import tqdm
 
-from handsteer.recognition.recognizer import Recognizer
 from handsteer.training.evaluation.intervals import Share
-from handsteer.training.evaluation.labels import LabelledPhoto, read_photo_labels
-from handsteer.training.evaluation.photo_metrics import PhotoResult
-from handsteer.training.evaluation.sources import evaluate_photos
-from handsteer.training.evaluation.views import View
-from handsteer.training.synthetic.fit import part_of
-from handsteer.types import FORWARD, MOTION_SIGNS, NONE, SIGNS, TURN_LEFT, TURN_RIGHT
 
 DATA = Path(__file__).parents[2] / "shared" / "data"
-FOLDERS = ("hagrid-dev", "photos")
-THUMBS = ("thumb_up", "thumb_down", "like", "dislike")
-TURNS = (TURN_LEFT, TURN_RIGHT)
+_CHUNK = 16
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description="Measure the signs on photos of people.")
-    parser.add_argument(
-        "--data", type=Path, default=DATA, help="folder that contains the folders hagrid-dev and photos"
-    )
-    parser.add_argument("--part", choices=("report", "tune"), default="report", help="part of the photos")
-    parser.add_argument(
-        "--tilt", type=float, nargs="+", default=[0.0], help="degrees to rotate them by, one after the other"
-    )
-    parser.add_argument("--mistakes", action="store_true", help="also list each wrongly recognised photo")
-    options = parser.parse_args()
-    photos = [photo for folder in FOLDERS for photo in read_photos(options.data / folder, options.part)]
-    if not photos:
-        raise SystemExit(f"{options.data} contains none of the folders {', '.join(FOLDERS)}; set another with --data")
-    cv2.setNumThreads(1)
-    results = list(look_at(photos, options.tilt))
-    print(f"the part to {options.part}, {len(photos)} photos, {len(results)} views")
-    print(f"{'':36}{'right, %':>24}{'of the hands found':>26}{'moved by mistake':>26}")
-    groups = defaultdict(list)
-    for group, result in results:
-        groups[result.person_set, group].append(result)
-        if result.truth == NONE:
-            groups["all", "no sign"].append(result)
-    for (source, group), members in sorted(groups.items()):
-        print_row(f"{source:8} {group}", members)
+def main(arguments: Sequence[str] | None = None, eyes: Eyes | None = None) -> None:
+    """Run the command.
+
+    Args:
+        arguments: Those of the command line if None.
+        eyes: The recognition to measure, with ``--jobs 1`` only; the default one if None.
+
+    Raises:
+        SystemExit: A row is worse than the table, or cannot be compared; with a line for each.
+    """
+    options = _options(arguments)
+    missing = [folder for folder in FOLDERS if not (options.data / folder).is_dir()]
+    if missing:
+        raise SystemExit(f"{options.data} lacks {', '.join(missing)}; set another folder with --data")
+    photos, wanted = read_photos(options.data), options.only.casefold()
+    looks: list[Look] = [
+        look for look in (*photo_looks(photos), *rendered_looks()) if wanted in look.row.name.casefold()
+    ]
+    if options.sample:
+        looks = sample_of(looks)
+    if not looks:
+        raise SystemExit(f"no row's name contains {options.only!r}; benchmarks/{TABLE.name} has the names")
+    seen = measure(looks, jobs=options.jobs, eyes=eyes)
     if options.mistakes:
-        for group, result in results:
-            if result.seen != result.truth:
-                print(f"{result.path} {group}: {result.truth} seen as {result.seen} {result.confidence:.2f}")
+        print("\n".join(each.line for each in seen if not each.right))
+    table = read_table()
+    known = table.sample if options.sample else table.rows
+    before = {row: counts for row, counts in known.items() if wanted in row.name.casefold()}
+    now = count(looks, seen)
+    changes = compare(before, now, least=LEAST_OF_SAMPLE if options.sample else LEAST)
+    print("\n".join(lines_of(changes)))
+    if options.json:
+        options.json.write_text(json.dumps([_plain(change) for change in changes], indent=1), encoding="utf-8")
+    if options.update:
+        sampled = [each for look, each in zip(looks, seen, strict=True) if look.in_sample]
+        Table(digest(photos), now, count(sample_of(looks), sampled)).write()
+        return
+    found = list(failures(changes))
+    if table.photos != digest(photos):
+        found.append(f"the photos in {options.data} are not those of the table")
+    _end(changes, found)
 
 
-def read_photos(folder: Path, part: str) -> list[LabelledPhoto]:
-    """Return the photos of one part of a folder; none if it does not exist."""
-    if not folder.is_dir():
-        return []
-    return [photo for photo in read_photo_labels(folder, SIGNS) if part_of(photo.path, photo.person_set) == part]
+def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description="Measure the signs on photos of people.")
+    parser.add_argument("--data", type=Path, default=DATA, help=f"folder that contains {', '.join(FOLDERS)}")
+    parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="number of processes")
+    parser.add_argument("--only", default="", metavar="TEXT", help="only rows whose names contain this")
+    parser.add_argument("--sample", action="store_true", help="only the fixed sample, in about a minute")
+    parser.add_argument("--update", action="store_true", help="write the table instead of comparing with it")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="also write all rows, before and now, to a file")
+    parser.add_argument("--mistakes", action="store_true", help="also list each wrongly recognised picture")
+    options = parser.parse_args(arguments)
+    if options.update and (options.only or options.sample):
+        parser.error("--update needs all rows: leave out --only and --sample")
+    return options
 
 
-def look_at(photos: list[LabelledPhoto], tilts: list[float]) -> Iterator[tuple[str, PhotoResult]]:
-    """Yield the row of the table and the result of each photo in each view."""
-    recognizer = Recognizer()
-    forward = [photo for photo in photos if photo.truth == FORWARD]
-    thumbs = [photo for photo in photos if photo.kind in THUMBS]
-    turned = [(photos, 0.0), (forward, 180.0), (thumbs, 90.0), (thumbs, -90.0)]
-    for (some, turn), tilt, flip in itertools.product(turned, tilts, (False, True)):
-        for result in evaluate_photos(some, recognizer, View(flip=flip, rotate_deg=turn + tilt)):
-            yield group_of(result, turn), result
+def measure(looks: Sequence[Look], *, jobs: int = 1, eyes: Eyes | None = None) -> list[Seen]:
+    """Return what is recognised in each of ``looks``.
+
+    Args:
+        looks: The pictures.
+        jobs: Number of processes; the results do not depend on it.
+        eyes: The recognition, for one process only; the default one if None.
+    """
+    if jobs == 1:
+        eyes = eyes or _eyes()
+        return [look.take(eyes) for look in tqdm(looks, unit="picture", disable=None)]
+    # Not forked: the landmark models' threads would be missing in the children.
+    with ProcessPoolExecutor(jobs, multiprocessing.get_context("spawn")) as pool:
+        results = pool.map(_take, looks, chunksize=_CHUNK)
+        return list(tqdm(results, total=len(looks), unit="picture", disable=None))
 
 
-def group_of(result: PhotoResult, turn: float) -> str:
-    """Return the row of a result in a view that is rotated by ``turn`` degrees."""
-    if result.truth == NONE:
-        return f"no sign: {result.kind}"
-    if result.truth in TURNS:
-        return "Turn, thumbs rotated by 90" if turn else "Turn"
-    return result.truth
+@cache
+def _eyes() -> Eyes:
+    cv2.setNumThreads(1)
+    return Eyes.open()
 
 
-def print_row(name: str, results: list[PhotoResult]) -> None:
-    """Print how many were right, of all and of those with a hand, and how many moved the robot wrongly."""
-    found = [result for result in results if result.hand_px is not None]
-    shares = (right(results), right(found), moved(results))
-    print(f"{name:36}{cell(shares[0]):>24}{cell(shares[1]):>26}{cell(shares[2]):>26}")
+def _take(look: Look) -> Seen:
+    return look.take(_eyes())
 
 
-def right(results: list[PhotoResult]) -> Share:
-    return Share(sum(result.seen == result.truth for result in results), len(results))
+def sample_of(looks: Sequence[Look]) -> list[Look]:
+    """Return those of the sample."""
+    return [look for look in looks if look.in_sample]
 
 
-def moved(results: list[PhotoResult]) -> Share:
-    moving = [result for result in results if result.seen != result.truth and result.seen in MOTION_SIGNS]
-    return Share(len(moving), len(results))
+def count(looks: Sequence[Look], seen: Sequence[Seen]) -> dict[Row, Counts]:
+    """Return the counts of each row."""
+    rows: dict[Row, Counts] = defaultdict(Counts)
+    for look, each in zip(looks, seen, strict=True):
+        rows[look.row] = rows[look.row].plus(Counts(int(each.right), 1, int(each.moved)))
+    return dict(rows)
 
 
-def cell(share: Share) -> str:
-    """Return a share in percent with its 95 % interval (Wilson) and its number."""
-    if share.rate is None or share.interval is None:
+def lines_of(changes: Sequence[Change]) -> Iterator[str]:
+    """Yield the table: each row before and now."""
+    width = max((len(change.row.name) for change in changes), default=0)
+    yield f"{'':{width}}  {'right, %: before':>16} | {'now':22}  moved by mistake: before | now"
+    for change in changes:
+        before, now = change.before or Counts(), change.now or Counts()
+        cells = f"{_percent(before):>16} | {_with_interval(now):22}  {before.moved:24} | {now.moved:3}"
+        verdict = "" if change.verdict == "same" else f"  {change.verdict}"
+        yield f"{change.row.name:{width}}  {cells}{verdict}"
+
+
+def _percent(counts: Counts) -> str:
+    return f"{100 * counts.right / counts.of:.1f}" if counts.of else "-"
+
+
+def _with_interval(counts: Counts) -> str:
+    interval = Share(counts.right, counts.of).interval
+    if interval is None:
         return "-"
-    low, high = share.interval
-    return f"{100 * share.rate:.1f} ({100 * low:.1f}-{100 * high:.1f}) of {share.of}"
+    return f"{_percent(counts)} ({100 * interval[0]:.1f}-{100 * interval[1]:.1f}) of {counts.of}"
+
+
+def _plain(change: Change) -> dict[str, object]:
+    sides = {name: counts and counts._asdict() for name, counts in (("before", change.before), ("now", change.now))}
+    return {**change.row._asdict(), **sides, "verdict": change.verdict}
+
+
+def _end(changes: list[Change], found: Sequence[str]) -> None:
+    """Print the rows that are better or new; exit with 1 and a line for each that must not be accepted."""
+    better = list(news(changes))
+    if better:
+        print("\n".join([*better, "update the table: make bench-signs ARGS=--update"]))
+    if found:
+        raise SystemExit("\n".join(found))
+    print("no row is worse than the committed table")
 
 
 if __name__ == "__main__":

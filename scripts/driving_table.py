@@ -2,12 +2,12 @@
 
 import argparse
 import os
-import re
 import sys
 import time
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
+from scripts.doc_tables import replaced, table
 from tqdm import tqdm
 
 from handsteer.bench.cells import Cell, CellResult, Estimate, run_cells, with_factor
@@ -57,7 +57,7 @@ def main() -> None:
             _pictures(seen, results),
         ]
     )
-    _write(text)
+    PAGE.write_text(replaced(PAGE.read_text(encoding="utf-8"), "driving", text), encoding="utf-8")
     PICTURES.mkdir(parents=True, exist_ok=True)
     for course in COURSES:
         write_plots([results[cell] for cell in usual if cell.course == course], (), PICTURES)
@@ -72,7 +72,7 @@ def _courses() -> str:
         course = open_course(name)
         stop = "stops" if course.world.stop else "drives through the finish"
         rows.append([f"`{name}`", f"{course.length_m:.1f} m", str(len(course.gates)), f"{course.difficulty:.1f}", stop])
-    return _table(["course", "ideal path", "gates", "index of difficulty", "at the end"], rows)
+    return table(["course", "ideal path", "gates", "index of difficulty", "at the end"], rows)
 
 
 def _course(name: str, results: Sequence[CellResult]) -> str:
@@ -87,7 +87,7 @@ def _course(name: str, results: Sequence[CellResult]) -> str:
         row += [_text(each.median("overshoot_m"), 1, 100)] if over else []
         rows.append([*row, _text(each.median("commands_per_min"), 0), _text(each.median("standing"), 0, 100)])
     pictures = [f"![{text} on {name}](pictures/driving/{name}-{what}.png)" for what, text in PLOTS.items()]
-    return "\n\n".join([f"### {name}", *pictures]) + "\n\n" + _table([*head, "acts a minute", "stands, %"], rows)
+    return "\n\n".join([f"### {name}", *pictures]) + "\n\n" + table([*head, "acts a minute", "stands, %"], rows)
 
 
 def _goals(results: dict[Cell, CellResult]) -> str:
@@ -113,7 +113,7 @@ def _goals(results: dict[Cell, CellResult]) -> str:
             "1.25 times",
         ]
     )
-    return "### The goals\n\n" + _table(["measure", "median and 95 % interval", "at most"], rows)
+    return "### The goals\n\n" + table(["measure", "median and 95 % interval", "at most"], rows)
 
 
 def _sweep(factor: str, results: Sequence[CellResult]) -> str:
@@ -134,7 +134,7 @@ def _sweep(factor: str, results: Sequence[CellResult]) -> str:
     ]
     head = ["time on the slalom, s", *(f"{value:g}" for value in values), *(f"bumps at {value:g}" for value in values)]
     plot = f"![{titles[factor]}](pictures/driving/slalom-{factor}.png)"
-    return f"### {titles[factor]}\n\n{plot}\n\n" + _table(head, rows)
+    return f"### {titles[factor]}\n\n{plot}\n\n" + table(head, rows)
 
 
 def _pictures(seen: Iterable[CellResult], results: dict[Cell, CellResult]) -> str:
@@ -153,7 +153,7 @@ def _pictures(seen: Iterable[CellResult], results: dict[Cell, CellResult]) -> st
             ]
         )
     head = ["slalom", "laps", "through pictures, s", "through landmarks, same seeds, s", "ratio"]
-    return "### Through pictures and through landmarks\n\n" + _table(head, rows)
+    return "### Through pictures and through landmarks\n\n" + table(head, rows)
 
 
 def _ratio(values: Sequence[float], others: Sequence[float]) -> str:
@@ -165,17 +165,6 @@ def _text(found: Estimate | None, digits: int, factor: float = 1.0) -> str:
         return ""
     value, low, high = (f"{factor * each:.{digits}f}" for each in (found.value, found.low, found.high))
     return value if low == high else f"{value} ({low} to {high})"
-
-
-def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    lines = [head, ["---"] * len(head), *rows]
-    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
-
-
-def _write(text: str) -> None:
-    page = PAGE.read_text(encoding="utf-8")
-    marked = re.compile(r"(<!-- driving -->\n).*?(<!-- end of driving -->)", re.DOTALL)
-    PAGE.write_text(marked.sub(lambda found: f"{found[1]}\n{text}\n\n{found[2]}", page), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -90,3 +90,4 @@ def test_a_photo_is_in_one_part_wherever_it_is_kept() -> None:
     assert 0.28 < parts.count("report") / len(parts) < 0.38
     assert {part_of(name, "emre") for name in names} == {"tune"}
     assert {part_of(name, "sld") for name in names} == {"report"}
+    assert {part_of(name, person) for name in names for person in ("arjav", "sara")} == {"choose"}

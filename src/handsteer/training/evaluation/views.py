@@ -85,9 +85,10 @@ class View:
         """Return the sign and the kind of a picture of ``sign`` and ``kind`` after the transformation.
 
         A flip swaps ``Turn Left`` and ``Turn Right``. Half a turn swaps ``Forward`` and ``Backward``, and the turns
-        too. A quarter turn makes a turn of a thumb up or down, and the reverse; an index finger that points sideways is
-        ``NONE``. A direction further than 30 degrees from all of these is not scored (None). ``Stop``, ``Go``, taught
-        signs and all other kinds stay the same.
+        too; few arms can hold such a hand, so these do not replace photos of people who show that sign. A quarter turn
+        makes a turn of a thumb up or down, and the reverse; an index finger that points sideways is ``NONE``.
+        A direction further than 30 degrees from all of these is not scored (None). ``Stop``, ``Go``, taught signs and
+        all other kinds stay the same.
         """
         name = kind.lower().replace(" ", "_").replace("-", "_") if sign == NONE else ""
         pose = _DIRECTIONS.get((sign or "", name))

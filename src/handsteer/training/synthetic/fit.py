@@ -39,10 +39,13 @@ from handsteer.training.synthetic.people import (
 )
 from handsteer.types import NONE, SIGNS
 
-Part = Literal["tune", "report"]
+Part = Literal["tune", "report", "choose"]
 
-_WHOLE_SETS: Final[dict[str, Part]] = {"emre": "tune", "sld": "report"}
-"""Sets of few people, or of people who cannot be distinguished: each is in one part as a whole."""
+_WHOLE_SETS: Final[dict[str, Part]] = {"emre": "tune", "sld": "report", "arjav": "choose", "sara": "choose"}
+"""Sets of few people, or of people who cannot be distinguished: each is in one part as a whole.
+
+Photos of the part ``choose`` are measured, and limits are chosen by them, but no statistics are fitted to them.
+"""
 
 _SHAPES: Final = {"Stop": OPEN, "Forward": POINTING, "Go": FIST, "Turn Right": THUMB, "Turn Left": THUMB}
 _KINDS: Final = {
