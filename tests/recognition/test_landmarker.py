@@ -14,6 +14,7 @@ from handsteer.cameras.files import read_photo
 from handsteer.config import LandmarksConfig
 from handsteer.errors import FrameError, ModelMissing
 from handsteer.recognition.hand import Hand
+from handsteer.recognition.landmark_models import PictureModel
 from handsteer.recognition.landmarker import MediaPipeLandmarker
 from handsteer.training.evaluation.views import View
 from handsteer.types import Handedness
@@ -165,6 +166,94 @@ def test_a_hand_that_jumps_is_seen_in_the_same_frame() -> None:
         landmarker.follow_only(hand)
     (hand,) = landmarker.detect(draw(open_right_hand(150, 250)), search=False)
     assert hand.pixels[:, 0].mean() < 320
+
+
+DT = 1 / 30
+PALMS, LANDMARKS = 192, 224
+"""Sides of the models' inputs."""
+
+
+@pytest.fixture
+def runs(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """The side of the input of each run of a model since it was last cleared."""
+    sides: list[int] = []
+    run = PictureModel.run
+
+    def counted(model: PictureModel, picture: np.ndarray) -> list[np.ndarray]:
+        sides.append(model.side)
+        return list(run(model, picture))
+
+    monkeypatch.setattr(PictureModel, "run", counted)
+    return sides
+
+
+def each_run_of(
+    stream: list[np.ndarray], landmarker: MediaPipeLandmarker, runs: list[int], dt_s: float = DT
+) -> list[tuple[int, int, int]]:
+    """Return the number of hands in each frame of a stream, and of runs of the palm and of the landmark model."""
+    found = []
+    for frame in stream:
+        runs.clear()
+        hands = landmarker.detect(frame, dt_s=dt_s)
+        found.append((len(hands), runs.count(PALMS), runs.count(LANDMARKS)))
+    return found
+
+
+def test_no_frame_of_a_stream_takes_many_runs_of_the_models_whatever_it_shows(
+    two_hand_landmarker: MediaPipeLandmarker, runs: list[int]
+) -> None:
+    middle = draw(open_right_hand(320, 220, size=110))
+    hands = [draw(open_right_hand(150, y), open_left_hand(480, 400 - y)) for y in (120, 300)]
+    shown = [EMPTY, *hands, *hands, EMPTY, middle, np.ascontiguousarray(np.rot90(middle, 2))]
+    one = draw(open_right_hand(500, 120))
+    shown += [hands[0], one, hands[1], one]
+    for frames_each in (1, 2, 5):
+        stream = [frame for frame in shown for _ in range(frames_each)]
+        for _, palms, landmarks in each_run_of([EMPTY, *stream], two_hand_landmarker, runs)[1:]:
+            assert palms <= 1
+            assert landmarks <= (3 if palms else 5)
+        two_hand_landmarker.reset()
+
+
+def test_a_hand_that_jumps_takes_two_runs_in_the_frame_that_finds_it_and_the_next_one_refines_it(
+    landmarker: MediaPipeLandmarker, runs: list[int]
+) -> None:
+    places = [open_right_hand(150, 250), open_right_hand(500, 250)] * 2
+    landmarker.detect(draw(places[1]), dt_s=DT)
+    for points in places:
+        found = each_run_of([draw(points)] * 2, landmarker, runs)
+        assert found == [(1, 1, 2), (1, 0, 1)]
+        fresh = MediaPipeLandmarker(LandmarksConfig())
+        (expected,), (hand,) = fresh.detect(draw(points)), landmarker.detect(draw(points), dt_s=DT)
+        assert distance(hand, expected.pixels[:, :2]) < 0.02 * expected.longer_side_px
+
+
+def test_of_two_hands_that_come_as_another_is_lost_the_upright_one_is_found_in_that_frame_both_in_the_next(
+    two_hand_landmarker: MediaPipeLandmarker, runs: list[int]
+) -> None:
+    centre, turn = np.array([150, 300]), np.radians(60)
+    axes = np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
+    both = draw((open_right_hand(150, 300) - centre) @ axes + centre, open_right_hand(480, 300))
+    two_hand_landmarker.detect(draw(open_right_hand(320, 100, size=60)), dt_s=DT)
+    runs.clear()
+    (upright,) = two_hand_landmarker.detect(both, search=False, dt_s=DT)
+    assert (runs.count(PALMS), runs.count(LANDMARKS)) == (1, 2)
+    assert upright.pixels[:, 0].mean() > 320, "the palm of the other one has a higher score"
+    assert each_run_of([both], two_hand_landmarker, runs) == [(2, 0, 3)]
+
+
+@pytest.mark.parametrize(("turned", "frames"), [(0, 3), (1, 20), (2, 6), (3, 20)])
+def test_a_hand_in_the_middle_without_a_palm_is_found_in_a_stream_too(
+    turned: int, frames: int, runs: list[int]
+) -> None:
+    frame = np.ascontiguousarray(np.rot90(draw(open_right_hand(320, 220, size=110)), turned))
+    no_palms = MediaPipeLandmarker(LandmarksConfig(min_detection_confidence=1))
+    no_palms.detect(draw(width=frame.shape[1], height=frame.shape[0]), dt_s=DT)
+    found = each_run_of([frame] * frames, no_palms, runs, dt_s=0.2)
+    assert found[-1][0] == 1
+    (hand,) = no_palms.detect(frame, dt_s=DT)
+    (as_with_a_palm,) = MediaPipeLandmarker(LandmarksConfig()).detect(frame)
+    assert np.abs(hand.pixels - as_with_a_palm.pixels)[:, :2].max() < 0.1 * hand.longer_side_px
 
 
 def test_no_hand_counts_below_the_asked_presence() -> None:

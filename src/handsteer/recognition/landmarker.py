@@ -5,9 +5,13 @@ enough hands are tracked, only the landmark model runs, on the region from the l
 detected in the whole frame first. In addition, unless configured otherwise, a new hand is processed twice, the second
 time in the region from its own landmarks, because a palm locates a hand less precisely; and hands are searched for in
 further ways than by palms in the frame, see ``search``.
+
+The first frame of a stream, and each frame without a time, is processed completely. In any other one the number of runs
+of the models is limited, and the next frame does what is left: its second run on a new hand, or its first on a region.
 """
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from math import inf
 from typing import Final
 
@@ -20,7 +24,7 @@ from handsteer.errors import FrameError
 from handsteer.recognition.hand import Hand
 from handsteer.recognition.landmark_models import PictureModel, find_pair
 from handsteer.recognition.regions import PalmDetector, Roi, from_landmarks
-from handsteer.recognition.search import Pace, Search, Stillness, cells_of_frame, cells_of_hands
+from handsteer.recognition.search import Pace, Places, Search, Stillness, cells_of_frame, cells_of_hands
 
 _DEPTH_SCALE: Final = 0.4
 """Factor of the model's depth relative to its x and y."""
@@ -31,6 +35,10 @@ _SAME_HAND_OVERLAP: Final = 0.5
 _PART: Final = 0.7
 _SECOND_LOOK: Final = 1.15
 """Factor on MediaPipe's region in the second pass: of 57 misread hands of people, it corrects 12 more."""
+_RUNS: Final = 5
+"""Maximum runs of the landmark model in a frame without palm detection: four rotations, one of them twice."""
+_RUNS_WITH_PALMS: Final = 2
+"""Likewise in a frame with palm detection; a lost hand's count too. MediaPipe's ``full`` models take longer for one."""
 _SEARCH: Final = Pace(change=6, settle_s=0.12, period_s=0.2)
 """How often to search without a hand: when settled, each of the four main ways has had its frame at 30 Hz."""
 _SEARCH_BESIDE_A_HAND: Final = Pace(change=6, settle_s=0.2, period_s=1.0, least_s=0.2)
@@ -49,12 +57,20 @@ class Estimate:
         world: (21, 3) in metres relative to the hand's centre, with the axes of ``pixels``.
         rightness: Likelihood, 0 to 1, of a person's right hand, rather than the left, in an unmirrored frame.
         presence: Likelihood that there is a hand, 0 to 1.
+        is_rough: Whether it is the first of a new hand, whose second is due in the next frame.
     """
 
     pixels: Array
     world: Array
     rightness: float
     presence: float
+    is_rough: bool = False
+
+    @property
+    def region(self) -> Roi:
+        """The region of the hand for the next run."""
+        region = from_landmarks(self.pixels[:, :2])
+        return region.grown(_SECOND_LOOK) if self.is_rough else region
 
 
 def _estimate(model: PictureModel, image: NDArray[np.uint8], roi: Roi) -> Estimate:
@@ -93,10 +109,18 @@ class MediaPipeLandmarker:
         self._searched_beside = Stillness()
         self._still = Stillness()
         self._landmarks = PictureModel(landmark, config.threads)
-        self._followed: list[Roi] = []
         self._looked_at: list[Roi] = []
-        self._hands: list[Hand] = []
         self._image_size = (0, 0)
+        self._start_stream()
+
+    def _start_stream(self) -> None:
+        self._followed: list[Roi] = []
+        self._hands: list[Hand] = []
+        self._has_rough = False
+        self._has_tracked = False
+        self._waiting: Places | None = None
+        self._runs_left = inf
+        self._is_first = True
 
     def detect(self, image: NDArray[np.uint8], *, search: bool = True, dt_s: float = inf) -> list[Hand]:
         """Return the hands in ``image``, 1 to 32766 pixels a side, as :class:`Landmarker` describes.
@@ -111,7 +135,12 @@ class MediaPipeLandmarker:
             self._image_size = (width, height)
         for stillness in (self._searched, self._searched_beside, self._still):
             stillness.wait(dt_s)
-        if self._wants_search(image, search):
+        self._runs_left = inf if self._is_first or dt_s == inf else _RUNS
+        self._is_first = False
+        if self._has_rough or self._waiting:
+            self._still.reset()
+            estimates = self._followed_on(image)
+        elif self._wants_search(image, search):
             self._still.reset()
             estimates = self._new_and_followed(image, self._followed)
         elif self._followed and self._still.wants_look(cells_of_hands(image, self._looked_at), _FOLLOW):
@@ -121,6 +150,8 @@ class MediaPipeLandmarker:
         if self._followed and not estimates:
             self._searched.reset()
         present, self._followed = _of_different_hands(estimates)
+        self._has_rough = any(estimate.is_rough for estimate in present)
+        self._has_tracked = not all(estimate.is_rough for estimate in present)
         if self._followed:
             self._looked_at = self._followed
             self._still.look(cells_of_hands(image, self._looked_at))
@@ -135,8 +166,7 @@ class MediaPipeLandmarker:
 
     def reset(self) -> None:
         """Stop tracking all hands."""
-        self._followed = []
-        self._hands = []
+        self._start_stream()
         self._search.reset()
         for stillness in (self._searched, self._searched_beside, self._still):
             stillness.reset()
@@ -156,38 +186,75 @@ class MediaPipeLandmarker:
         return True
 
     def _followed_on(self, image: NDArray[np.uint8]) -> list[Estimate]:
-        """Return the tracked hands that are still visible; if none is, newly found ones."""
-        present = self._present(image, self._followed)
-        if present or not self._config.wide_search:
+        """Return the hands that are still visible and those of waiting regions; if there is none, newly found ones."""
+        waiting, self._waiting = self._waiting, None
+        present = self._present(image, waiting or Places([]), self._followed)
+        # A hand that its second run has rejected was none: searching for it as for a lost one would find it again.
+        if present or not (self._has_tracked and self._config.wide_search):
             return present
-        # Search immediately for a hand that has jumped: it may show Stop.
         self._search.begin_again()
-        return self._new_and_followed(image, [])
+        # Search immediately for a hand that has jumped: it may show Stop.
+        return [] if waiting else self._new_and_followed(image, [])
 
     def _new_and_followed(self, image: NDArray[np.uint8], followed: list[Roi]) -> list[Estimate]:
         """Return the tracked hands that are still visible, and newly found ones."""
         if not followed:
             # One of two hands may be found only in the next frame, which is searched in another way.
             self._searched_beside.reset()
+        self._runs_left = max(1, self._runs_left - _RUNS + _RUNS_WITH_PALMS)
         for places in self._search.places(image, beside_a_hand=bool(followed)):
-            regions = _distinct([*followed, *places.regions])[: self._config.max_hands]
-            if present := self._present(image, regions, places.min_presence):
-                rivals = [each for roi in places.rivals for each in self._present(image, [roi], places.min_presence)]
-                return [max(present + rivals, key=lambda each: each.presence)] if rivals else present
+            present = self._present(image, places, followed)
+            if present or self._waiting:
+                return present
         return []
 
-    def _present(self, image: NDArray[np.uint8], regions: list[Roi], min_presence: float = 0.0) -> list[Estimate]:
-        """Return the estimates of the regions that show a hand; for a new hand, those of the second pass."""
-        present = []
-        for region in regions:
-            estimate = _estimate(self._landmarks, image, region)
-            is_new = all(region is not followed for followed in self._followed)
-            if is_new and self._config.refine_new_hands and self._is_present(estimate):
-                second = from_landmarks(estimate.pixels[:, :2]).grown(_SECOND_LOOK)
-                estimate = _estimate(self._landmarks, image, second)
-            if self._is_present(estimate) and estimate.presence >= min_presence:
+    def _present(self, image: NDArray[np.uint8], places: Places, followed: list[Roi]) -> list[Estimate]:
+        """Return the estimates of the regions ``followed`` and of ``places`` that show a hand.
+
+        What lacks a run of the model waits for the next frame.
+        """
+        if places.rivals and self._runs_left < _RUNS:
+            if self._runs_left < 1 or self._is_present(self._run(image, places.regions[0])):
+                self._waiting = places
+            return []
+        regions = _distinct([*followed, *places.regions])[: self._config.max_hands]
+        if len(regions) > self._runs_left:
+            # The hand that points upwards may show Stop.
+            regions.sort(key=lambda region: abs(region.rotation))
+        present, left = self._of_regions(image, regions, places.min_presence)
+        if left:
+            self._waiting = Places(left, places.min_presence)
+        if not present or not places.rivals:
+            return present
+        rivals, _ = self._of_regions(image, places.rivals, places.min_presence)
+        return [max(present + rivals, key=lambda each: each.presence)]
+
+    def _of_regions(
+        self, image: NDArray[np.uint8], regions: Sequence[Roi], min_presence: float
+    ) -> tuple[list[Estimate], list[Roi]]:
+        """Return the estimates of the regions that show a hand, and the regions that lack a run of the model."""
+        firsts = [self._run(image, region) for region in regions if self._runs_left >= 1]
+        present, left = [], list(regions[len(firsts) :])
+        for region, first in zip(regions, firsts, strict=False):
+            estimate, least = first, 0.0
+            if all(region is not followed for followed in self._followed):
+                estimate, least = self._refined(image, first), min_presence
+            if estimate.is_rough and estimate.presence < least:
+                left.append(region)
+            elif self._is_present(estimate) and estimate.presence >= least:
                 present.append(estimate)
-        return present
+        return present, left
+
+    def _refined(self, image: NDArray[np.uint8], first: Estimate) -> Estimate:
+        """Return the estimate of the second run on a new hand; ``first``, as a rough one, if no run is left."""
+        if not self._config.refine_new_hands or not self._is_present(first):
+            return first
+        rough = replace(first, is_rough=True)
+        return self._run(image, rough.region) if self._runs_left >= 1 else rough
+
+    def _run(self, image: NDArray[np.uint8], region: Roi) -> Estimate:
+        self._runs_left -= 1
+        return _estimate(self._landmarks, image, region)
 
     def _is_present(self, estimate: Estimate) -> bool:
         return estimate.presence > self._config.min_presence
@@ -211,7 +278,7 @@ def _of_different_hands(estimates: list[Estimate]) -> tuple[list[Estimate], list
     Two regions may lead to the same hand, and some fingers of a hand to a smaller hand within it.
     """
     whole = [estimate for estimate in estimates if not any(_is_part(estimate, other) for other in estimates)]
-    regions = [from_landmarks(estimate.pixels[:, :2]) for estimate in whole]
+    regions = [estimate.region for estimate in whole]
     kept = _distinct(regions)
     return [each for each, region in zip(whole, regions, strict=True) if any(region is one for one in kept)], kept
 
