@@ -240,6 +240,11 @@ class Debouncer:
             self.sign = NONE
         return self.sign
 
+    def is_due(self, seen: str, dt_s: float) -> bool:
+        """Return whether ``seen``, ``dt_s`` seconds after the last frame, is confirmed now if the hand is still."""
+        shown_s = self.candidate_s + dt_s if seen == self.candidate else 0.0
+        return seen in (self.sign, STOP) or shown_s >= self._config.confirm_time - _SLACK_S
+
     def reconfigure(self, config: SignsConfig) -> None:
         """Change the times; the confirmed sign stays."""
         self._config = config

@@ -137,7 +137,7 @@ class Recognizer:
             FrameError: The image has another shape or type.
         """
         self.reset()
-        recognition = self.step(image, 0.0)
+        recognition = self._step(image, 0.0, alone=True)
         self.reset()
         return replace(recognition, sign=recognition.seen)
 
@@ -151,17 +151,27 @@ class Recognizer:
         Raises:
             FrameError: The image has another shape or type.
         """
+        return self._step(image, dt_s)
+
+    def _step(self, image: NDArray[np.uint8], dt_s: float, *, alone: bool = False) -> Recognition:
+        """Process a frame, ``alone`` or as the next of a stream."""
         # A hand whose sign is being confirmed is effectively selected.
         search = self._selector.wants_search() and self._filter.candidate == NONE
         hands = self._landmarker.detect(image, search=search, dt_s=dt_s)
         classified = [self._classifier.classify(hand) for hand in hands]
-        guesses = self._raised(image, hands, [self._seen(guess) for guess in classified], dt_s)
+        guesses = [self._seen(guess) for guess in classified]
+        if self._resting is not None:
+            self._resting.next_frame(dt_s)
+            guesses = self._raised(self._resting, image, hands, guesses, alone=alone, dt_s=dt_s)
         chosen = self._selector.choose(hands, guesses, dt_s)
         hand, guess = (hands[chosen], guesses[chosen]) if chosen is not None else (None, _NOTHING)
         likelihoods = {} if chosen is None or guess is _AT_REST else classified[chosen].likelihoods
-        self._evidence.add(HandPosition.of_palm(hand) if hand else None, likelihoods, dt_s)
         since_s = self._filter.candidate_s + dt_s
-        guess = self._bridged(guess, since_s)
+        if guess is _AT_REST:
+            self._evidence.reset()
+        else:
+            self._evidence.add(HandPosition.of_palm(hand) if hand else None, likelihoods, dt_s)
+            guess = self._bridged(guess, since_s)
         still = self._evidence.is_still(min(since_s, self._config.confirm_time))
         sign = self._filter.step(guess.sign, dt_s, still=still)
         if hand is not None and guess.sign == sign != NONE:
@@ -190,21 +200,26 @@ class Recognizer:
             self._resting.reset()
 
     def _raised(
-        self, image: NDArray[np.uint8], hands: Sequence[Hand], guesses: list[SignGuess], dt_s: float
+        self,
+        resting: RestingHands,
+        image: NDArray[np.uint8],
+        hands: Sequence[Hand],
+        guesses: Sequence[SignGuess],
+        *,
+        alone: bool,
+        dt_s: float,
     ) -> list[SignGuess]:
-        """Return ``guesses`` without the signs of hands at rest.
+        """Return ``guesses`` without the signs of hands at rest; people are searched for when a sign is about to count.
 
         A ``Stop`` does not wait for that, and counts at rest too, unless another hand shows a sign.
         """
-        if self._resting is None:
-            return guesses
-        self._resting.next_frame(dt_s)
         several = sum(guess.sign != NONE for guess in guesses) > 1
         raised = []
         for hand, guess in zip(hands, guesses, strict=True):
+            search = alone or several or self._filter.is_due(guess.sign, dt_s)
             asked = guess.sign != NONE and (several or guess.sign != STOP)
             drives = guess.sign == self._filter.sign
-            is_resting = asked and self._resting.is_resting(image, hand, drives=drives)
+            is_resting = asked and resting.is_resting(image, hand, search=search, drives=drives)
             raised.append(_AT_REST if is_resting else guess)
         return raised
 

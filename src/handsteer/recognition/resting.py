@@ -137,20 +137,23 @@ class RestingHands:
         self._verdicts = []
         self._people = None
 
-    def is_resting(self, image: NDArray[np.uint8], hand: Hand, *, drives: bool = False) -> bool:
+    def is_resting(self, image: NDArray[np.uint8], hand: Hand, *, search: bool = True, drives: bool = False) -> bool:
         """Return whether ``hand`` is at rest.
 
         Args:
             image: The frame, (height, width, 3) uint8, BGR; the same until :meth:`next_frame`.
             hand: A hand in it.
+            search: Whether to search for people; otherwise only what was found before is known.
             drives: Whether its sign counts already; then people are searched for again only when it has moved.
         """
         place = HandPosition.of_palm(hand)
         if place.y < _ABOVE * place.size:
             return False
         near = next((each for each in self._verdicts if place.distance(each.place) <= _MOVED), None)
-        if near is not None and (drives or near.age_s <= _AGAIN_S):
+        if near is not None and (drives or not search or near.age_s <= _AGAIN_S):
             return near.resting
+        if not search:
+            return False
         self._verdicts = [each for each in self._verdicts if each is not near and each.age_s <= _AGAIN_S]
         self._verdicts.append(_Verdict(place, self._has_at_rest(image, hand)))
         return self._verdicts[-1].resting

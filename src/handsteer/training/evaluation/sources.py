@@ -36,8 +36,7 @@ def evaluate_photos(photos: Iterable[LabelledPhoto], recognizer: Recognizer, vie
         truth, kind = view.truth(photo.truth, photo.kind)
         if truth is None:
             continue
-        recognizer.reset()
-        recognition = recognizer.step(view.picture(read_photo(photo.path)), 0.0)
+        recognition = recognizer.recognize(view.picture(read_photo(photo.path)))
         hand = recognition.hand
         yield PhotoResult(
             path=str(photo.path),
