@@ -25,9 +25,10 @@ from handsteer.hand.poses import HandPose, Pinhole, sign_pose
 from handsteer.hand.poses import View as Look
 from handsteer.hand.renderer import Look as Skin
 from handsteer.hand.renderer import make_background, render
+from handsteer.recognition.features import shape_features
 from handsteer.recognition.hand import Classifier, Hand
 from handsteer.recognition.landmarker import MediaPipeLandmarker
-from handsteer.recognition.profile import ProfiledClassifier
+from handsteer.recognition.profile import FLOOR, SHAPE_OF, ProfiledClassifier
 from handsteer.recognition.shipped_signs import SURE, ShippedClassifier, load_model
 from handsteer.training.calibration import calibrate, shown_hand
 from handsteer.training.evaluation.labels import read_photo_labels
@@ -38,7 +39,7 @@ DATA = Path(__file__).parents[2] / "shared" / "data"
 SETS = {"index-down": "arjav", "thumbs-clip": "sara", "photos": "emre"}
 NAMES = {"arjav": "one man, index fingers", "sara": "one person, thumbs", "emre": "three people together"}
 OTHERS = ("photos", "hagrid-dev")
-SHOWN, MADE_UP, VIEWS = 5, 8, 14
+SHOWN, MADE_UP, VIEWS = 5, 6, 12
 VIEWED = (View(), View(flip=True))
 
 
@@ -65,6 +66,7 @@ def print_table(people: Sequence[Person], others: list[tuple[str, str, Hand]], d
     """Print a row for each person; ``others`` are (person, sign, hand)."""
     shipped = ShippedClassifier(load_model())
     motions = {id(hand): moves(shipped, hand) for _, _, hand in others}
+    others = [each for each in others if motions[id(each[2])] or could_move(shipped, each[2])]
     print(f"{'person':26}{'judged':>7}{'no hand':>8}{'errors before':>15}{'after':>7}{'ratio':>7}", end="")
     print(f"{'others move: no sign':>22}{'after':>7}{'new':>6}{'other sign':>12}{'after':>7}")
     totals = np.zeros(9)
@@ -122,6 +124,12 @@ def moves(classifier: Classifier, hand: Hand) -> str:
     """Return the sign with which ``hand`` moves the robot; empty if it does not."""
     guess = classifier.classify(hand)
     return guess.sign if guess.sign in MOTION_SIGNS and guess.confidence >= SURE else ""
+
+
+def could_move(shipped: ShippedClassifier, hand: Hand) -> bool:
+    """Return whether a profile could let ``hand`` move the robot: all others need not be read again."""
+    shapes = shipped.model.probabilities(shape_features(hand.pixels[None, :, :2], hand.world[None])[0])
+    return any(shapes[SHAPE_OF[sign]] >= FLOOR for sign in MOTION_SIGNS)
 
 
 def read_people(data: Path, landmarker: MediaPipeLandmarker) -> Iterator[Person]:

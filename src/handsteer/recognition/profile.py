@@ -47,7 +47,7 @@ FLOOR: Final = 0.005
 
 _GAIN: Final = 10.0
 """Log-odds that a view adds for a hand that equals it; at its reach it adds none."""
-_LOSS: Final = 1.5
+_LOSS: Final = 1.0
 """Log-odds that a sign loses at most for a hand that is far from all its views."""
 _LONGEST_NAME: Final = 40
 _LARGEST_BYTES: Final = 1_000_000
