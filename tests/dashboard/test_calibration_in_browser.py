@@ -21,7 +21,7 @@ def profiles(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_a_sign_is_shown_saved_used_and_given_up_again() -> None:
-    with visiting("Forward:6000", "/teach", locale="de-DE") as visit:
+    with visiting("Forward:3600", "/teach", locale="de-DE") as visit:
         card = visit.page.locator(".calibration")
         card.get_by_label("Name des Profils").fill("Ann")
         card.get_by_label("linke Hand").click()

@@ -35,10 +35,11 @@ def test_five_views_of_each_sign_halve_the_errors_of_an_odd_hand(odd: Calibratio
 def test_the_result_says_what_is_read(odd: Calibration) -> None:
     results = {each.sign: each for each in odd.results}
     assert tuple(results) == SIGNS
-    assert results[STOP].before.count < 3
-    assert results[STOP].read_as == "NONE"
-    assert results[STOP].after is not None
-    assert results[STOP].after.count > results[STOP].before.count
+    stop = results[STOP]
+    assert stop.before.count < 3
+    assert stop.read_as == "NONE"
+    assert stop.after is not None
+    assert stop.after.count > stop.before.count
     assert (results[FORWARD].before.count, results[FORWARD].read_as, results[FORWARD].why_not) == (5, "", "")
     assert odd.profile.made["signs"][STOP]["before"] == {"count": results[STOP].before.count, "of": 5}
 

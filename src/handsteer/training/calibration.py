@@ -52,7 +52,7 @@ _LEAST_USABLE: Final = 0.3
 _MOST_HANDS: Final = 300
 _SPREADS: Final = 1.6
 """Reach in distances between neighbouring views of a person."""
-_EVERYBODYS_REACH: Final = 0.45
+_EVERYBODYS_REACH: Final = 0.52
 _EVERYBODYS_WEIGHT: Final = 8
 """Weight of everybody's reach, in views."""
 _SHORTER: Final = 0.9
