@@ -31,7 +31,7 @@ from handsteer.recognition.recognizer import open_classifier
 from handsteer.recognition.shipped_signs import SURE, ShippedClassifier, load_model
 from handsteer.training.synthetic.hands import make_hands
 from handsteer.types import FORWARD, NONE, SIGNS, STOP
-from tests.recognition.hands import hand_of, show_sign
+from tests.recognition.hands import hand_of, show_fingers, show_sign
 from tests.recognition.odd_person import errors, odd_hands
 
 SHIPPED = ShippedClassifier(load_model())
@@ -49,6 +49,7 @@ def widest(**changes: Any) -> Profile:
 
 
 OWN = ProfiledClassifier(SHIPPED, widest())
+VIEWS = widest().views[FORWARD]
 
 
 def any_hands(count: int) -> list[Hand]:
@@ -86,10 +87,37 @@ def test_nothing_moves_the_robot_but_what_did_before_or_is_near_the_persons_view
 
 def test_likelihoods_never_grow_without_a_view_either() -> None:
     # The recognizer bridges a lost frame by the mean likelihood of a sign, not by the sign of each frame.
-    only_stop = ProfiledClassifier(SHIPPED, widest(views={STOP: widest().views[STOP]}, reach={STOP: REACH[1]}))
-    for hand in any_hands(1_000):
-        known, guess = SHIPPED.classify(hand), only_stop.classify(hand)
-        assert all(guess.likelihoods[sign] <= known.likelihoods[sign] + 1e-12 for sign in SIGNS if sign != STOP)
+    only_forward = ProfiledClassifier(SHIPPED, widest(views={FORWARD: VIEWS}, reach={FORWARD: REACH[0]}))
+    for hand in any_hands(2_000):
+        known, guess = SHIPPED.classify(hand), only_forward.classify(hand)
+        others = set(SIGNS) - {STOP, FORWARD}
+        assert all(guess.likelihoods[sign] <= known.likelihoods[sign] + 1e-12 for sign in others)
+
+
+def always(**chances: float) -> ShippedClassifier:
+    """A classifier whose network gives every hand these probabilities of the shapes."""
+    model = SHIPPED.model
+    biases = np.log([chances[shape] for shape in model.shapes])
+    zeros = np.zeros((COUNT, len(model.shapes)))
+    return ShippedClassifier(replace(model, network=replace(model.network, weights=(zeros,), biases=(biases,))))
+
+
+@pytest.mark.parametrize(("chance", "sign"), [(FLOOR * 1.1, FORWARD), (FLOOR * 0.9, NONE)])
+def test_a_hand_of_another_shape_does_not_move_the_robot_even_if_it_equals_a_view(chance: float, sign: str) -> None:
+    hand = show_sign(FORWARD)
+    shipped = always(open=0.001, index=chance, thumb=0.001, fist=0.001, other=0.997 - chance)
+    own = ProfiledClassifier(shipped, widest(views={FORWARD: features([hand])}, reach={FORWARD: REACH[1]}))
+    assert shipped.classify(hand).sign == NONE
+    assert own.classify(hand).sign == sign
+
+
+def test_a_sign_that_loses_gives_way_to_none_but_to_no_other_sign() -> None:
+    # A shape between two: the index finger points up, and the thumb sideways.
+    hand = show_fingers("index", thumb={"spread": 56.0, "opposition": 12.0})
+    shipped = always(open=0.001, index=0.52, thumb=0.46, fist=0.001, other=0.018)
+    stranger = ProfiledClassifier(shipped, widest(views={FORWARD: -VIEWS}, reach={FORWARD: REACH[0]}))
+    assert shipped.classify(hand).sign == FORWARD
+    assert stranger.classify(hand).sign == NONE
 
 
 def test_hands_of_others_move_the_robot_less() -> None:
@@ -133,9 +161,6 @@ def test_a_profile_is_saved_and_loaded(tmp_path: Path) -> None:
     assert all((loaded.views[sign] == views).all() for sign, views in widest().views.items())
     hand = odd_hands(1, seed=9)[STOP][0]
     assert open_classifier(SignsConfig(profile=path)).classify(hand) == OWN.classify(hand)
-
-
-VIEWS = widest().views[FORWARD]
 
 
 @pytest.mark.parametrize(

@@ -133,7 +133,7 @@ class ProfiledClassifier:
             added = float(log_odds(distances(row, views), self._reach[sign])[0])
             if added > 0.0 and shapes[SHAPE_OF[sign]] < FLOOR:
                 added = 0.0
-            found[sign] = max(0.0, added) if sign == STOP else added
+            found[sign] = added
         return found
 
     def _adapted(
