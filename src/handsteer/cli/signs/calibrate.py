@@ -68,7 +68,7 @@ def calibrate(
     It asks for each sign with each hand, prints what it reads before and after,
     and how to hold a sign that it cannot adapt. Move the hand a little meanwhile:
     nearer, farther, tilted. The result is a profile, a small file without
-    pictures. Other people's hands do not move the robot more often by it.
+    pictures, and its limits bound which hands of others it can let move the robot.
 
     Parameters
     ----------
