@@ -39,8 +39,7 @@ MOST_VIEWS: Final = 16
 REACH: Final = (0.3, 0.55)
 """Smallest and largest distance of a hand from a view at which the view speaks for it.
 
-Distances are root mean squares of features whitened by the spread of everybody's hands of one shape. Of hands without a
-sign, 999 of 1000 are farther than the largest from any view of a person.
+Distances are root mean squares of features whitened by the spread of everybody's hands of one shape.
 """
 FLOOR: Final = 0.005
 """Least probability, in the shipped model, of the shape of a sign that views speak for."""
