@@ -53,6 +53,10 @@ class ModelCorrupt(ModelError):  # noqa: N818
     """A model file is damaged, or not the expected one."""
 
 
+class ProfileError(ModelError):
+    """A person's profile of the signs cannot be made or used."""
+
+
 class EvaluationError(HandsteerError):
     """Signs cannot be evaluated: there are no such photos or video, or the report cannot be written."""
 

@@ -104,6 +104,11 @@ class SignsConfig(Section):
         None,
         description="File of taught signs, written by `handsteer signs train`; none for the shipped signs only",
     )
+    profile: OptionalPath = live(
+        None,
+        description="How the driver shows the six signs, written by `handsteer signs calibrate`: a name, or a file; "
+        "none reads them as everybody shows them",
+    )
     min_confidence: float = live(0.8, ge=0, le=1, description="Minimum confidence to recognise a sign")
     release_confidence: float = live(
         0.5, ge=0, le=1, description="Minimum confidence to keep the sign that already counts"

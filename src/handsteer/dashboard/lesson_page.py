@@ -6,6 +6,7 @@ from typing import Final
 
 from nicegui import ui
 
+from handsteer.dashboard.calibration_panel import CalibrationPanel
 from handsteer.dashboard.camera import CameraPanel
 from handsteer.dashboard.elements import box, button, card, switch, tag, text
 from handsteer.dashboard.lesson import Lesson
@@ -32,6 +33,7 @@ _ELSEWHERE: Final = (
 )
 _STANDS: Final = "The robot stands until the lesson is over: end it, then press Reset."
 _LOST: Final = "Another viewer drives now: the lesson has ended. You can continue it when you drive again."
+_LOST_CALIBRATION: Final = "Another viewer drives now: the calibration has ended."
 
 
 class LessonPage(Page):
@@ -40,6 +42,7 @@ class LessonPage(Page):
     def __init__(self, context: PageContext) -> None:
         super().__init__(context, "/teach", "drive.css", "teach.css", "webcam.js", "teach.js")
         self._lesson: ViewerLesson | None = None
+        self._calibration: CalibrationPanel | None = None
         if context.lessons is None:
             with card("Teach", "lesson panel"):
                 ui.label(_ELSEWHERE)
@@ -50,6 +53,7 @@ class LessonPage(Page):
         self._countdown = _Countdown(self._camera.stage)
         with box("lesson"):
             self._start = StartPanel(lesson, context.settings)
+            self._calibration = CalibrationPanel(self, context.calibrations) if context.calibrations else None
             with box("hidden workspace") as self._workspace:
                 self._cards = ClassCards(lesson)
                 self._panel = LessonPanel(lesson, self._cards.actions)
@@ -59,6 +63,8 @@ class LessonPage(Page):
         ui.on("record", lambda event: lesson.hold(event.args))
         self.client.on_disconnect(lambda: lesson.do(Lesson.pause))
         self.client.on_delete(lesson.leave)
+        if self._calibration is not None:
+            self.client.on_delete(self._calibration.leave)
 
     def show(self, node: DashboardNode, state: PageState) -> None:
         """Show changes; ends the lesson if its viewer no longer drives."""
@@ -71,7 +77,8 @@ class LessonPage(Page):
             lesson.end(_LOST)
         taught = lesson.node
         switch(self._workspace, "hidden", on=taught is None)
-        switch(self._start.element, "hidden", on=taught is not None)
+        is_calibrating = self._calibrate(is_teaching=taught is not None)
+        switch(self._start.element, "hidden", on=taught is not None or is_calibrating)
         self._countdown.update(taught.state if taught is not None else None)
         if taught is None:
             self._start.update()
@@ -80,9 +87,22 @@ class LessonPage(Page):
         for panel in (self._panel, self._cards, self._report):
             panel.update(taught.state)
 
+    def _calibrate(self, *, is_teaching: bool) -> bool:
+        """Show the calibration, unless a sign is taught; return whether one is running. It ends with the lease."""
+        panel = self._calibration
+        if panel is None:
+            return False
+        if panel.node is not None and not self.drives():
+            panel.end(_LOST_CALIBRATION)
+        switch(panel.element, "hidden", on=is_teaching)
+        panel.update()
+        return panel.node is not None
+
     def _reset(self) -> None:
         if self._lesson is not None and self._lesson.node is not None:
             self._lesson.do(lambda lesson: lesson.say(_STANDS))
+        elif self._calibration is not None and self._calibration.node is not None:
+            self._calibration.node.say(_STANDS)
         else:
             super()._reset()
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from nicegui import ui
 
 from handsteer.dashboard.access import SESSION
+from handsteer.dashboard.calibration import Calibrations
 from handsteer.dashboard.elements import STATIC, switch, tag, text
 from handsteer.dashboard.lessons import Lessons
 from handsteer.dashboard.node import DashboardNode
@@ -92,6 +93,7 @@ class PageContext:
         lessons: Teaches the graph signs, likewise.
         study: Leads a participant through a study; None without one.
         recordings: Serves recordings; None if none can be made.
+        calibrations: Adapts the signs to a person; None if the graph's nodes run elsewhere.
     """
 
     node: OnDemandNode[DashboardNode]
@@ -101,6 +103,7 @@ class PageContext:
     lessons: Lessons | None = None
     study: Session | None = None
     recordings: Recordings | None = None
+    calibrations: Calibrations | None = None
 
 
 class Page:

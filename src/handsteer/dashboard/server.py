@@ -19,6 +19,7 @@ from handsteer.cameras.browser import LARGEST_BYTES
 from handsteer.clock import Clock
 from handsteer.config import DEFAULT_FILE, DashboardConfig
 from handsteer.dashboard.access import HEADERS, Access, AccessMiddleware
+from handsteer.dashboard.calibration import Calibrations
 from handsteer.dashboard.camera import FrameSocket, PictureNode, PictureResponse
 from handsteer.dashboard.drive_page import DrivePage
 from handsteer.dashboard.elements import STATIC
@@ -117,7 +118,8 @@ class Dashboard:
             )
             study = Session(graph.study) if graph.study is not None else None
             recordings = Recordings(graph.config.recording.folder, lambda: graph.state.recording)
-            self.context = PageContext(self.node, audit, graph, settings, Lessons(graph), study, recordings)
+            lessons, calibrations = Lessons(graph), Calibrations(graph)
+            self.context = PageContext(self.node, audit, graph, settings, lessons, study, recordings, calibrations)
         self.webcam = FrameSocket(graph, self._drives)
         self._config = config
         self._server: uvicorn.Server | None = None
@@ -171,6 +173,8 @@ class Dashboard:
         self.pictures.close()
         if self.context.lessons is not None:
             self.context.lessons.close()
+        if self.context.calibrations is not None:
+            self.context.calibrations.close()
         if self.context.recordings is not None:
             self.context.recordings.close()
         if self._server is not None and self._thread is not None:

@@ -8,6 +8,7 @@ from handsteer.dashboard.elements import box, button, identifier, switch, tag, t
 from handsteer.dashboard.settings import Settings
 from handsteer.dashboard.settings_fields import Field
 from handsteer.errors import ConfigError
+from handsteer.recognition.profile import profile_names
 
 _NONE = "none"
 _STYLE = "outlined dense hide-bottom-space no-error-icon"
@@ -89,7 +90,10 @@ class Row:
             select = ui.select(options, value=value, on_change=self._take).without_auto_validation()
             return select.props(f"{_STYLE} options-dense popup-content-class=identifiers {label}")
         keyboard = 'inputmode="decimal"' if field.kind == "number" else ""
-        line = ui.input(value=value, validation=self._check).props(f"{_STYLE} {keyboard} {unit} {label}")
+        known = profile_names() if field.path == "signs.profile" else None
+        line = ui.input(value=value, validation=self._check, autocomplete=known).props(
+            f"{_STYLE} {keyboard} {unit} {label}"
+        )
         line.on("blur", self._take).on("keydown.enter", self._take).on("keydown.escape", self._give_up)
         return line
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from handsteer.cameras.freshness import Freshness
 from handsteer.clock import Clock
 from handsteer.config import Config, SignsConfig
-from handsteer.errors import ConfigError, ModelError
+from handsteer.errors import ConfigError, ModelError, ProfileError
 from handsteer.images import bgr_image, image_message, jpeg_picture, mirrored
 from handsteer.messages import (
     GESTURE_JOY,
@@ -34,6 +34,7 @@ from handsteer.nodes.supervision import StopKeeper
 from handsteer.nodes.timing import CALM_S, TOO_SLOW, FrameAge, LatencyLog, Recording, StallGuard, far_and_late
 from handsteer.recognition.hand import Hand
 from handsteer.recognition.hand_joystick import HandJoystick
+from handsteer.recognition.profile import profile_path
 from handsteer.recognition.recognizer import Recognition, Recognizer, annotate, open_classifier
 from handsteer.transports.base import Received, Subscription, Transport
 from handsteer.types import NONE, RELEASED, Handedness
@@ -88,7 +89,7 @@ class HandSignRecognitionNode(Node):
         self._recognizer = recognizer
         self._config = config
         self._joystick = joystick or HandJoystick()
-        self._model = _version_of(config.model)
+        self._models = _versions_of(config)
         self._last_captured_s: float | None = None
         self._unseen_s = 0.0
         self._last_frame_s = clock.now()
@@ -128,31 +129,34 @@ class HandSignRecognitionNode(Node):
             self._change_images()
 
     def check(self, config: Config) -> None:
-        """Raise ConfigError if the file of ``signs.model`` has changed and cannot be used."""
-        if self._has_other_model(config.signs):
+        """Raise ConfigError if the file of ``signs.model`` or ``signs.profile`` has changed and cannot be used."""
+        if self._has_other_models(config.signs):
             try:
                 open_classifier(config.signs)
+            except ProfileError as error:
+                raise ConfigError(f"signs.profile: {error}") from None
             except ModelError as error:
                 raise ConfigError(f"signs.model: {error}") from None
 
     def on_reconfigure(self, config: Config) -> None:
-        """Apply the confidences and times of ``signs``, and its model if the file was replaced or rewritten."""
-        if self._has_other_model(config.signs):
-            version = _version_of(config.signs.model)
+        """Apply the confidences and times of ``signs``; its model and profile if a file was replaced or rewritten."""
+        if self._has_other_models(config.signs):
+            versions = _versions_of(config.signs)
             self._recognizer.use(open_classifier(config.signs))
             self._joystick.reset()
-            self._model = version
+            self._models = versions
         self._config = config.signs
         limit_s = config.signs.max_frame_age
         self._age.limit_s = self._freshness.limit_s = self._recording.limit_s = self._stall_guard.limit_s = limit_s
         self._recognizer.reconfigure(config.signs)
         self._joystick.reconfigure(config.joystick)
 
-    def _has_other_model(self, config: SignsConfig) -> bool:
-        version, mine = _version_of(config.model), self._model
-        if version is not None and mine is not None and version == (mine[0], *_GONE):
-            return False  # the model stays loaded after its file is deleted
-        return version != mine
+    def _has_other_models(self, config: SignsConfig) -> bool:
+        return any(
+            # A file stays loaded after it is deleted.
+            version != mine and not (version is not None and mine is not None and version == (mine[0], *_GONE))
+            for version, mine in zip(_versions_of(config), self._models, strict=True)
+        )
 
     def _on_other_camera(self, received: Received[String]) -> None:
         """Forget the hand, and what it showed to the camera before."""
@@ -308,6 +312,11 @@ class HandSignRecognitionNode(Node):
 
 
 _GONE = (-1, -1)
+
+
+def _versions_of(config: SignsConfig) -> list[tuple[Path, int, int] | None]:
+    """Return the versions of the files of ``signs.model`` and ``signs.profile``."""
+    return [_version_of(config.model), _version_of(config.profile and profile_path(config.profile))]
 
 
 def _version_of(model: Path | None) -> tuple[Path, int, int] | None:

@@ -5,5 +5,6 @@
 ``landmarker`` finds hands with MediaPipe's models: ``search`` decides where and when to look for new ones, ``regions``
 detects palms in the whole frame, and computes the region of a hand from its palm or its last landmarks.
 ``landmark_models`` locates, downloads and runs the model files. ``shipped_signs`` and ``custom_signs`` classify a hand
-by its ``features`` with a ``network``. ``filters`` select the active hand, and confirm its sign.
+by its ``features`` with a ``network``; ``profile`` adapts the shipped signs to one person. ``filters`` select the
+active hand, and confirm its sign.
 """

@@ -15,6 +15,7 @@ from handsteer.recognition.filters import Debouncer, Evidence, HandPosition, Han
 from handsteer.recognition.hand import CONNECTIONS, Classifier, Hand, Landmarker, SignGuess
 from handsteer.recognition.landmark_models import find_model, find_pair
 from handsteer.recognition.landmarker import MediaPipeLandmarker
+from handsteer.recognition.profile import ProfiledClassifier, load_profile, profile_path
 from handsteer.recognition.resting import MODEL as PEOPLE_MODEL
 from handsteer.recognition.resting import RestingHands
 from handsteer.recognition.shipped_signs import DEFAULT_MODEL, ShippedClassifier, load_model
@@ -39,24 +40,28 @@ def open_landmarker(config: Config) -> Landmarker:
 
 
 def open_classifier(config: SignsConfig) -> Classifier:
-    """Return the classifier of the shipped and taught signs of ``config``.
+    """Return the classifier of the shipped signs, as the person of the profile shows them, and of the taught signs.
 
     Raises:
-        ModelError: A sign model is missing or broken.
+        ModelError: A sign model or the profile is missing or broken.
     """
     shipped = ShippedClassifier(load_model())
-    return CustomClassifier(shipped, load_custom_model(config.model.expanduser())) if config.model else shipped
+    known: Classifier = shipped
+    if config.profile:
+        known = ProfiledClassifier(shipped, load_profile(profile_path(config.profile)))
+    return CustomClassifier(known, load_custom_model(config.model.expanduser())) if config.model else known
 
 
 def model_files(config: Config) -> tuple[Path, ...]:
-    """Return the files of the models that ``config`` names: of palms, landmarks, people, shipped and taught signs.
+    """Return the files that ``config`` names: of palms, landmarks, people, shipped and taught signs, and the profile.
 
     Raises:
         ModelError: A landmark model is missing or broken.
     """
     taught = () if config.signs.model is None else (config.signs.model.expanduser(),)
+    own = () if config.signs.profile is None else (profile_path(config.signs.profile),)
     people = (find_model(PEOPLE_MODEL),) if config.landmarks.reject_resting else ()
-    return (*find_pair(config.landmarks.model), *people, DEFAULT_MODEL, *taught)
+    return (*find_pair(config.landmarks.model), *people, DEFAULT_MODEL, *taught, *own)
 
 
 @dataclass(frozen=True)

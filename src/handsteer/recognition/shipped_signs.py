@@ -143,10 +143,13 @@ class ShippedClassifier:
     fist; the direction in the image determines the sign. A sign's likelihood is the product of those of its shape, of
     its direction and of the hand's :func:`legibility`. The confidence increases with it from 0 through 0.8 at the
     sign's threshold to 1. Motions have higher thresholds than ``Go`` and ``Stop``.
+
+    Attributes:
+        model: Its model.
     """
 
     def __init__(self, model: SignModel) -> None:
-        self._model = model
+        self.model = model
 
     @property
     def signs(self) -> tuple[str, ...]:
@@ -161,14 +164,21 @@ class ShippedClassifier:
         if not (np.isfinite(hand.points[:, :2]).all() and np.isfinite(hand.world).all()):
             return SignGuess(NONE, 0.0, dict.fromkeys(SIGNS, 0.0))
         pixels = hand.pixels[None, :, :2].astype(np.float64)
-        shapes = self._model.probabilities(shape_features(pixels, hand.world[None])[0])
-        legible = legibility(hand)
-        likelihoods = {sign: likelihood * legible for sign, likelihood in _signs(shapes, pixels).items()}
+        shapes = self.model.probabilities(shape_features(pixels, hand.world[None])[0])
+        likelihoods = self.likelihoods(shapes, hand)
         best = max(likelihoods, key=likelihoods.__getitem__)
         none = max(0.0, 1.0 - sum(likelihoods.values()))
         if none >= likelihoods[best]:
             return SignGuess(NONE, none, likelihoods)
         return SignGuess(best, self.confidence(best, likelihoods[best]), likelihoods)
+
+    def likelihoods(self, shapes: dict[str, float], hand: Hand) -> dict[str, float]:
+        """Return the likelihood of each sign, 0 to 1, if the shape of ``hand`` has the probabilities ``shapes``.
+
+        The landmarks of ``hand`` are finite.
+        """
+        legible, pixels = legibility(hand), hand.pixels[None, :, :2].astype(np.float64)
+        return {sign: likelihood * legible for sign, likelihood in _signs(shapes, pixels).items()}
 
     def confidence(self, sign: str, likelihood: float) -> float:
         """Return the confidence, 0 to 1, of ``sign`` with this ``likelihood``."""

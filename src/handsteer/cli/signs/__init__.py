@@ -4,6 +4,7 @@ from cyclopts import App
 
 _EXAMPLES = """Examples:
   handsteer signs list                 the signs, and what each does
+  handsteer signs calibrate            adapt the six signs to you
   handsteer signs collect --label Hi   show a new sign to the camera
   handsteer signs train                learn it
   handsteer signs evaluate photos/     how well signs are recognised
@@ -11,7 +12,7 @@ _EXAMPLES = """Examples:
 
 app = App(
     name="signs",
-    help="List, evaluate and teach signs.",
+    help="List, evaluate, calibrate and teach signs.",
     help_epilogue=_EXAMPLES,
     help_format="plaintext",
     result_action="return_value",
@@ -20,6 +21,7 @@ app = App(
 for verb, function in {
     "list": "train:list_signs",
     "evaluate": "evaluate:evaluate",
+    "calibrate": "calibrate:calibrate",
     "collect": "collect:collect",
     "import": "collect:import_keypoints",
     "train": "train:train",
