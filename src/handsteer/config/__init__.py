@@ -128,11 +128,13 @@ class FoxgloveConfig(Section):
     )
     token: Literal["auto", "always"] = Field(
         "auto",
-        description="When a program needs the token: auto if other machines can reach the address, or always, for "
-        "machines with several users and for viewers on other web sites",
+        description="When a program needs the token: auto if other machines can reach the address or programs may "
+        "drive, or always, for machines with several users and for viewers on other web sites",
     )
     drive: bool = Field(
-        False, description="Whether these programs may drive, one at a time, by Twist on /cmd_vel; else they only look"
+        False,
+        description="Whether these programs may drive, one at a time, by Twist on /cmd_vel, which needs the token; "
+        "else they only look",
     )
 
 
