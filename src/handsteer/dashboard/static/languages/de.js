@@ -52,6 +52,7 @@ const WORDS = {
   "Reset": "Zurücksetzen",
   "Reset: let the robot be driven again": "Zurücksetzen: den Roboter wieder fahren lassen",
   "Stop": "Stopp",
+  "Sent": "Gesendet",
   "Stop the robot (space key)": "Den Roboter anhalten (Leertaste)",
   "Driving": "Fahrt",
   "Standing": "Stillstand",
