@@ -135,6 +135,12 @@ def quoted(value: object, most: int = LONGEST_QUOTE) -> str:
     return words if len(words) <= most else f"{words[: most - 3]}..."
 
 
+def as_name(value: object) -> str:
+    """Return a name from outside, such as a field's, for a message: quoted unless it is short and printable."""
+    text = str(value)
+    return text if len(text) <= LONGEST_QUOTE and text.isprintable() else quoted(text)
+
+
 def reason_of(error: Exception) -> str:
     """Return why something failed, for a message: of a system error its words without the number."""
     return (error.strerror if isinstance(error, OSError) else None) or str(error)
