@@ -1,6 +1,7 @@
 """Subscribes the control to joysticks: the hand on ``/gesture/joy``, and a gamepad on ``/joy``."""
 
 from collections.abc import Callable
+from typing import Protocol
 
 from handsteer.config import JoyConfig
 from handsteer.messages import JOY, Joy, Topic, stick_in
@@ -11,6 +12,14 @@ from handsteer.types import Stick
 OnStick = Callable[[Stick, Received[Joy]], None]
 
 
+class OnGamepad(Protocol):
+    """Receives the states of a gamepad."""
+
+    def __call__(self, stick: Stick, received: Received[Joy], *, is_at_rest: bool) -> None:
+        """Process one; ``is_at_rest`` is whether its button is not held, and was not before."""
+        ...
+
+
 class Joysticks:
     """Passes on the states of both joysticks while they are wanted.
 
@@ -19,11 +28,10 @@ class Joysticks:
         hand: Topic of the hand as a joystick.
         on_hand: Receives each of its states.
         rule: How the gamepad's messages are read.
-        on_gamepad: Receives the gamepad's states while its button is held, and the first one after its release: one at
-            rest leaves the robot to others.
+        on_gamepad: Receives each state of the gamepad.
     """
 
-    def __init__(self, node: Node, hand: Topic[Joy], on_hand: OnStick, rule: JoyConfig, on_gamepad: OnStick) -> None:
+    def __init__(self, node: Node, hand: Topic[Joy], on_hand: OnStick, rule: JoyConfig, on_gamepad: OnGamepad) -> None:
         self._node, self._hand = node, hand
         self._on_hand, self._on_gamepad = on_hand, on_gamepad
         self._rule = rule.model_dump()
@@ -49,5 +57,4 @@ class Joysticks:
     def _take(self, received: Received[Joy]) -> None:
         stick = stick_in(received.message, **self._rule)
         was_held, self._is_gamepad_held = self._is_gamepad_held, stick.held
-        if stick.held or was_held:
-            self._on_gamepad(stick, received)
+        self._on_gamepad(stick, received, is_at_rest=not (stick.held or was_held))
