@@ -813,6 +813,44 @@ def test_a_gamepad_goes_before_the_hand_while_its_button_is_held() -> None:
     assert bench.last() == (0.5, 0), "a gamepad at rest leaves the robot to the hand"
 
 
+@pytest.mark.parametrize("age_s", [0.6, 3600.0, -3600.0], ids=["a moment ago", "an hour ago", "in an hour"])
+def test_a_gamepad_with_a_stamp_of_another_time_is_not_followed(age_s: float, caplog: pytest.LogCaptureFixture) -> None:
+    bench = ControlBench(JOYSTICK)
+    bench.clock.advance(7200.0)
+    bench.run(0.5)
+    bench.hold(RELEASED, *[AHEAD] * 10, age_s=age_s, on=bench.gamepad)
+    assert set(bench.commands) <= {(0, 0)}
+    assert caplog.text.count("/joy is stamped") == 1
+    bench.hold(*[AHEAD] * 10, on=bench.gamepad)
+    assert set(bench.commands) <= {(0, 0)}, "its release was of another time too"
+    bench.hold(RELEASED, AHEAD, on=bench.gamepad)
+    assert bench.last() == (0.5, 0)
+
+
+def test_a_gamepad_whose_stamp_stands_is_one_message() -> None:
+    bench = ControlBench(JOYSTICK)
+    bench.hold(RELEASED, AHEAD, on=bench.gamepad)
+    stamped_s = bench.clock.now()
+    for _ in range(60):
+        bench.gamepad.publish(joy_of(AHEAD, HEADER), stamped_s)
+        bench.run(1 / 30)
+    assert bench.last() == (0, 0)
+    bench.hold(*[AHEAD] * 3, on=bench.gamepad)
+    assert bench.last() == (0, 0), "it may have been held since long"
+    bench.hold(RELEASED, AHEAD, on=bench.gamepad)
+    assert bench.last() == (0.5, 0)
+
+
+def test_a_gamepad_without_stamps_counts_on_arrival() -> None:
+    bench = ControlBench(JOYSTICK)
+    for stick in (RELEASED, *[AHEAD] * 60):
+        bench.gamepad.publish(joy_of(stick, HEADER))
+        bench.run(1 / 30)
+    assert bench.last() == (0.5, 0)
+    bench.run(0.5)
+    assert bench.last() == (0, 0)
+
+
 def test_button_and_axes_of_the_gamepad_are_those_of_the_configuration() -> None:
     bench = ControlBench(JOYSTICK)
     rule = JoyConfig(enable_button=5, axis_linear=3, axis_angular=2)

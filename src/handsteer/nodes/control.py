@@ -182,11 +182,11 @@ class HandSignControlNode(Node):
 
     def _on_gamepad(self, stick: Stick, received: Received[Joy], *, is_at_rest: bool) -> None:
         """Follow a gamepad; one that stays at rest leaves the robot to others, and was seen released."""
-        limits = self._config
+        limits, is_late = self._config, self._is_stale(received)
         if not is_at_rest:
             wanted = Velocity(stick.forward * limits.max_linear, stick.left * limits.max_angular)
-            self._steer(wanted, received, by="gamepad")
-        elif not (self._waits_for_others() or received.is_late or self._stall_guard.distrusts(self.clock.now())):
+            self._steer(wanted, is_late=is_late, by="gamepad")
+        elif not (is_late or self._waits_for_others() or self._stall_guard.distrusts(self.clock.now())):
             self._safety.note_rest("gamepad")
 
     def _is_stale(self, received: Received[Any]) -> bool:
@@ -197,10 +197,11 @@ class HandSignControlNode(Node):
         return is_old or is_of_other or received.is_late
 
     def _on_steering(self, received: Received[Twist]) -> None:
-        self._steer(Velocity(received.message.linear.x, received.message.angular.z), received)
+        wanted = Velocity(received.message.linear.x, received.message.angular.z)
+        self._steer(wanted, is_late=received.is_late, by="steering")
 
-    def _steer(self, wanted: Velocity, received: Received[Any], by: SteeredBy = "steering") -> None:
-        self._take(None, is_late=received.is_late, is_stop=wanted.is_zero, steering=wanted, by=by)
+    def _steer(self, wanted: Velocity, *, is_late: bool, by: SteeredBy) -> None:
+        self._take(None, is_late=is_late, is_stop=wanted.is_zero, steering=wanted, by=by)
 
     def _take(
         self,
