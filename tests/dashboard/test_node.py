@@ -268,6 +268,16 @@ def test_who_watches_cannot_steer_until_the_driver_has_left(bench: Bench) -> Non
     assert bench.steered[-1] == (-0.4, 0.0)
 
 
+def test_who_watches_cannot_reset(bench: Bench) -> None:
+    """The guard: the control lease in ``reset``."""
+    press(bench, "driver", 0.3)
+    bench.node.halt("watcher")
+    bench.node.reset("watcher")
+    assert bench.steering.is_stopped
+    bench.node.reset("driver")
+    assert not bench.steering.is_stopped
+
+
 def test_the_robot_stops_when_another_takes_over(bench: Bench) -> None:
     press(bench, "driver", 0.3)
     bench.node.lease.ask("watcher", bench.clock.now())

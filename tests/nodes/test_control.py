@@ -38,7 +38,7 @@ from handsteer.messages import (
 )
 from handsteer.nodes.control import HandSignControlNode
 from handsteer.nodes.steering import SteeringNode
-from handsteer.transports.base import Publisher
+from handsteer.transports.base import Publisher, Received
 from handsteer.types import RELEASED, Stick
 from tests.nodes.stepping import Bench
 
@@ -111,6 +111,30 @@ def test_a_stop_from_a_stale_frame_stops(bench: ControlBench) -> None:
     bench.show("Forward")
     bench.show("Stop", "Forward", age_s=0.6)
     assert bench.commands == [(0.01, 0), (0, 0)]
+
+
+def test_a_sign_that_the_transport_delivers_late_moves_and_arms_nothing() -> None:
+    """The guard: ``is_late`` in ``_is_stale``, for signs, which have no stamp over ROS."""
+    bench = ControlBench(arming=True)
+    bench.run(2.0)
+    for sign in ("Stop", *["Forward"] * 10):
+        bench.control._on_sign(Received(String(data=sign), is_late=True))
+        bench.run(1 / 30)
+    assert set(bench.commands) <= {(0, 0)}
+    bench.show(*["Forward"] * 10)
+    assert set(bench.commands) <= {(0, 0)}, "the late Stop was no neutral"
+    bench.show("Stop", "Forward")
+    assert bench.last() == (0.01, 0)
+
+
+def test_a_late_zero_is_not_a_release(bench: ControlBench) -> None:
+    """The guard: a late input only stops in ``_take``."""
+    bench.control._on_steering(Received(twist(0.0, 0.0), is_late=True))
+    bench.control._on_steering(Received(twist(0.3, 0.0)))
+    assert bench.last() == (0, 0)
+    bench.control._on_steering(Received(twist(0.0, 0.0)))
+    bench.control._on_steering(Received(twist(0.3, 0.0)))
+    assert bench.last() == (0.3, 0)
 
 
 def test_one_zero_at_the_end(bench: ControlBench) -> None:
