@@ -211,7 +211,7 @@ def test_no_frame_of_a_stream_takes_many_runs_of_the_models_whatever_it_shows(
         stream = [frame for frame in shown for _ in range(frames_each)]
         for _, palms, landmarks in each_run_of([EMPTY, *stream], two_hand_landmarker, runs)[1:]:
             assert palms <= 1
-            assert landmarks <= (3 if palms else 5)
+            assert landmarks <= (2 if palms else 5)
         two_hand_landmarker.reset()
 
 
@@ -242,6 +242,16 @@ def test_of_two_hands_that_come_as_another_is_lost_the_upright_one_is_found_in_t
     assert each_run_of([both], two_hand_landmarker, runs) == [(2, 0, 3)]
 
 
+def test_no_region_waits_once_a_single_hand_is_followed(
+    two_hand_landmarker: MediaPipeLandmarker, runs: list[int]
+) -> None:
+    both = draw(open_right_hand(150, 300), open_right_hand(480, 300))
+    two_hand_landmarker.detect(draw(open_right_hand(320, 100, size=60)), dt_s=DT)
+    (hand,) = two_hand_landmarker.detect(both, search=False, dt_s=DT)
+    two_hand_landmarker.follow_only(hand)
+    assert each_run_of([both], two_hand_landmarker, runs) == [(1, 0, 1)]
+
+
 @pytest.mark.parametrize(("turned", "frames"), [(0, 3), (1, 20), (2, 6), (3, 20)])
 def test_a_hand_in_the_middle_without_a_palm_is_found_in_a_stream_too(
     turned: int, frames: int, runs: list[int]
@@ -251,6 +261,7 @@ def test_a_hand_in_the_middle_without_a_palm_is_found_in_a_stream_too(
     no_palms.detect(draw(width=frame.shape[1], height=frame.shape[0]), dt_s=DT)
     found = each_run_of([frame] * frames, no_palms, runs, dt_s=0.2)
     assert found[-1][0] == 1
+    assert all(landmarks <= (2 if palms else 5) for _, palms, landmarks in found)
     (hand,) = no_palms.detect(frame, dt_s=DT)
     (as_with_a_palm,) = MediaPipeLandmarker(LandmarksConfig()).detect(frame)
     assert np.abs(hand.pixels - as_with_a_palm.pixels)[:, :2].max() < 0.1 * hand.longer_side_px

@@ -163,6 +163,7 @@ class MediaPipeLandmarker:
         kept = [index for index, each in enumerate(self._hands) if each is hand]
         self._hands = [self._hands[index] for index in kept]
         self._followed = [self._followed[index] for index in kept]
+        self._waiting = None
 
     def reset(self) -> None:
         """Stop tracking all hands."""
@@ -201,7 +202,7 @@ class MediaPipeLandmarker:
         if not followed:
             # One of two hands may be found only in the next frame, which is searched in another way.
             self._searched_beside.reset()
-        self._runs_left = max(1, self._runs_left - _RUNS + _RUNS_WITH_PALMS)
+        self._runs_left -= _RUNS - _RUNS_WITH_PALMS
         for places in self._search.places(image, beside_a_hand=bool(followed)):
             present = self._present(image, places, followed)
             if present or self._waiting:
