@@ -27,7 +27,7 @@ EPOCHS: Final = 30
 def made_hands(chunks: int, seed: int) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Return (n, features) of n synthetic hands, and their (n,) shapes as indices into ``SHAPES``; deterministic.
 
-    A chunk gives about 58 000 hands.
+    A chunk gives about 56 000 hands.
     """
     people = load_people()
     features, shapes = [], []
