@@ -15,7 +15,15 @@ from tests.cli.test_cli import fails, prints
 VERBS = [
     *("run", "recognize", "study", "parameters", "completion", "models", "doctor", "ros", "record", "replay"),
     *("report", "bench", "camera", "recognition", "control", "robot", "steering", "zenoh-router", "robots"),
-    *("signs list", "signs evaluate", "signs collect", "signs import", "signs train", "signs export"),
+    *(
+        "signs list",
+        "signs evaluate",
+        "signs collect",
+        "signs import",
+        "signs train",
+        "signs export",
+        "signs calibrate",
+    ),
 ]
 HEAVY = {"cv2", "mujoco", "nicegui", "numpy", "plotly", "pydantic", "rosbags", "tqdm", "yaml"}
 LOADS = """

@@ -88,8 +88,7 @@ class LandmarksConfig(Section):
     )
     reject_resting: bool = Field(
         True,
-        description="Ignore signs, other than Stop, of hands that hang beside the body or lie in the lap; finds the "
-        "person for that",
+        description="Ignore signs, other than Stop, of hands that hang or lie in the lap; finds the person for that",
     )
     min_presence: float = Field(0.5, ge=0, le=1, description="Minimum score to keep tracking a hand")
     threads: int = Field(1, ge=1, le=64, description="CPU threads of the landmark model")

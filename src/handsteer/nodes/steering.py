@@ -229,6 +229,8 @@ class SteeringNode(Node):
             if self._target.commands.follow():
                 self._stand()
             if self._wanted is not None:
+                if not self._wanted.is_zero:  # what is repeated here does not pause; a zero would count as a release
+                    self._wanted = self._admitted(self._wanted)
                 self._publish(self._wanted)
             elif self.is_direct and self.is_stopped:
                 self._publish(ZERO)

@@ -129,7 +129,7 @@ class HandSelector:
 
 
 def _purposeful(showing: list[int], guesses: Sequence[SignGuess], places: Sequence[HandPosition]) -> list[int]:
-    """Return the hands of ``showing`` without the fists beside a hand that shows another sign.
+    """Return the hands of ``showing`` without the fists where another hand shows another sign.
 
     A hand that holds something or rests looks like a fist too. A much smaller hand belongs to another person.
     """

@@ -1,4 +1,4 @@
-"""Recognises hands at rest by where they are on the person: low beside the body, in the lap, clasped in front of it.
+"""Recognises hands at rest by where they are on the person: low at the body, in the lap, clasped in front of it.
 
 The shape of a hand cannot tell rest from a sign: loosely closed fingers look like a fist, and a hanging hand points
 down. So MediaPipe's model of people finds the shoulders and hips; a hand that hangs is at the height of the hips, and
@@ -35,11 +35,11 @@ _LOW: Final = 0.65
 
 Of three people, hands that hang are at 0.9 to 1.3, those that are shown at -0.5 to 0.5.
 """
-_BESIDE: Final = 1.0
+_ASIDE: Final = 1.0
 """Largest distance of a resting hand from the line from shoulders to hips, in lengths of that line; 0.2 to 0.6 seen."""
 _LARGE: Final = 0.55
 """Longer side of a hand from which it is nearer to the camera than the body, in lengths of that line; 0.2 to 0.4 seen
-for hands beside the body."""
+for hands that hang."""
 _ABOVE: Final = _LOW / _LARGE
 """Smallest distance of a resting hand from the upper edge of the frame in longer sides of the hand: its person's
 shoulders are in the frame."""
@@ -64,8 +64,8 @@ class Person:
 
     def has_at_rest(self, hand: Hand) -> bool:
         """Return whether ``hand`` is at rest, if it is this person's."""
-        down, beside = self.place(hand)
-        return down > _LOW and beside < _BESIDE and hand.longer_side_px < _LARGE * self.length
+        down, aside = self.place(hand)
+        return down > _LOW and aside < _ASIDE and hand.longer_side_px < _LARGE * self.length
 
     @property
     def length(self) -> float:
@@ -73,7 +73,7 @@ class Person:
         return max(1.0, float(np.hypot(*(self.hips - self.shoulders))))
 
     def place(self, hand: Hand) -> tuple[float, float]:
-        """Return how far down the middle of the palm is, and how far beside the line from shoulders to hips.
+        """Return how far down the middle of the palm is, and how far from the line from shoulders to hips.
 
         Both in lengths of that line: (0, 0) is at the shoulders, (1, 0) at the hips.
         """

@@ -1044,6 +1044,8 @@ const WORDS = {
   "Run the landmark model twice on a new hand, for better landmarks.": "Das Landmarken-Modell bei einer neuen Hand zweimal anwenden, für bessere Landmarken.",
   "Wide search": "Weite Suche",
   "Also search a widened frame, where hands are smaller, and its middle; finds more close hands.": "Auch ein erweitertes Bild durchsuchen, in dem Hände kleiner sind, und seine Mitte; findet mehr nahe Hände.",
+  "Reject resting": "Ruhende ablehnen",
+  "Ignore signs, other than Stop, of hands that hang or lie in the lap; finds the person for that.": "Zeichen außer Stop von Händen übergehen, die hängen oder im Schoß liegen; sucht dazu die Person.",
   "Minimum presence": "Mindestpräsenz",
   "Minimum score to keep tracking a hand.": "Mindestwert, um eine Hand weiter zu verfolgen.",
   "Threads": "Threads",
