@@ -49,6 +49,10 @@ def test_a_hand_rests_that_is_low_beside_the_body_and_not_in_front_of_it(
     assert PERSON.has_at_rest(hand_at(down, beside, size)) is rests
 
 
+def test_a_hand_that_drives_may_be_moved_lower() -> None:
+    assert [PERSON.has_at_rest(hand_at(down, 0.3, 0.3), drives=True) for down in (0.75, 1.0)] == [False, True]
+
+
 def test_a_person_who_leans_is_measured_along_the_body() -> None:
     leaning = Person(np.array([220.0, 150.0]), np.array([320.0, 323.0]))  # by 30 degrees
     down, beside = leaning.place(hand_at(0.87, 0.0, 0.3))

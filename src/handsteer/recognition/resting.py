@@ -35,6 +35,8 @@ _LOW: Final = 0.65
 
 Of three people, hands that hang are at 0.9 to 1.3, those that are shown at -0.5 to 0.5.
 """
+_LOW_DRIVING: Final = 0.85
+"""Likewise for a hand whose sign counts already: a fist that is a joystick is moved down on purpose."""
 _ASIDE: Final = 1.0
 """Largest distance of a resting hand from the line from shoulders to hips, in lengths of that line; 0.2 to 0.6 seen."""
 _LARGE: Final = 0.55
@@ -62,10 +64,12 @@ class Person:
     shoulders: Array
     hips: Array
 
-    def has_at_rest(self, hand: Hand) -> bool:
-        """Return whether ``hand`` is at rest, if it is this person's."""
+    def has_at_rest(self, hand: Hand, *, drives: bool = False) -> bool:
+        """Return whether ``hand``, whose sign counts already if it ``drives``, is at rest, if it is this person's."""
         down, aside = self.place(hand)
-        return down > _LOW and aside < _ASIDE and hand.longer_side_px < _LARGE * self.length
+        return (
+            down > (_LOW_DRIVING if drives else _LOW) and aside < _ASIDE and hand.longer_side_px < _LARGE * self.length
+        )
 
     @property
     def length(self) -> float:
@@ -144,7 +148,7 @@ class RestingHands:
             image: The frame, (height, width, 3) uint8, BGR; the same until :meth:`next_frame`.
             hand: A hand in it.
             search: Whether to search for people; otherwise only what was found before is known.
-            drives: Whether its sign counts already; then people are searched for again only when it has moved.
+            drives: Whether its sign counts already; then it may be lower, and people are searched for only when it moves.
         """
         place = HandPosition.of_palm(hand)
         if place.y < _ABOVE * place.size:
@@ -155,13 +159,13 @@ class RestingHands:
         if not search:
             return False
         self._verdicts = [each for each in self._verdicts if each is not near and each.age_s <= _AGAIN_S]
-        self._verdicts.append(_Verdict(place, self._has_at_rest(image, hand)))
+        self._verdicts.append(_Verdict(place, self._has_at_rest(image, hand, drives=drives)))
         return self._verdicts[-1].resting
 
-    def _has_at_rest(self, image: NDArray[np.uint8], hand: Hand) -> bool:
+    def _has_at_rest(self, image: NDArray[np.uint8], hand: Hand, *, drives: bool) -> bool:
         if self._people is None:
             if self._detector is None:
                 self._detector = PersonDetector(self._path, self._threads)
             self._people = self._detector.detect(image)
         nearest = min(self._people, key=lambda person: person.place(hand)[1], default=None)
-        return nearest is not None and nearest.has_at_rest(hand)
+        return nearest is not None and nearest.has_at_rest(hand, drives=drives)
