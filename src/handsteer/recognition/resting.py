@@ -148,7 +148,7 @@ class RestingHands:
             image: The frame, (height, width, 3) uint8, BGR; the same until :meth:`next_frame`.
             hand: A hand in it.
             search: Whether to search for people; otherwise only what was found before is known.
-            drives: Whether its sign counts already; then it may be lower, and people are searched for only when it moves.
+            drives: Whether its sign counts already: it may be lower, and people are searched for only when it moves.
         """
         place = HandPosition.of_palm(hand)
         if place.y < _ABOVE * place.size:
