@@ -2,7 +2,7 @@
 
 // Stop goes two ways: by the websocket, which the caller uses, and by requests that the server answers even while it
 // builds pages. These are repeated until one is answered. data-stop on the root shows how far it is.
-const REPEAT_MS = 200, PATIENCE_MS = 4000, SHOWN_MS = 2000, MOST_AT_ONCE = 4;
+const STOP_REPEAT_MS = 200, PATIENCE_MS = 4000, SHOWN_MS = 2000, MOST_AT_ONCE = 4;
 let press = 0, confirmed = 0, shownUntil = 0;
 function pressStop() {
   const number = ++press;
@@ -17,7 +17,7 @@ async function repeatStop(number) {
       open++;
       sendStop(number).finally(() => open--);
     }
-    await new Promise((resolve) => setTimeout(resolve, REPEAT_MS));
+    await new Promise((resolve) => setTimeout(resolve, STOP_REPEAT_MS));
   }
 }
 async function sendStop(number) {
