@@ -6,8 +6,10 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from handsteer.recognition.regions import Roi, from_landmarks, from_palm, whole_frame
+from handsteer.recognition.landmark_models import find_pair
+from handsteer.recognition.regions import Detector, PalmDetector, Roi, from_landmarks, from_palm, whole_frame
 from tests.about import about
+from tests.recognition.drawn_hand import draw, open_right_hand
 
 coordinates = st.floats(-2000, 2000)
 angles = st.floats(-3.1, 3.1)
@@ -89,3 +91,45 @@ def test_a_whole_frame_is_letterboxed(border: int, outside: int) -> None:
     assert crop.shape == (192, 192, 3)
     assert crop[96, 96, 0] == crop[96, 0, 0] == crop[25, 96, 0] == 200
     assert crop[5, 96, 0] == crop[187, 96, 0] == outside
+
+
+@pytest.fixture(scope="module")
+def palms() -> PalmDetector:
+    return PalmDetector(find_pair("fast")[0], 1, 0.3)
+
+
+def test_a_palm_in_a_grainy_picture_is_found_if_it_is_smoothed(palms: PalmDetector) -> None:
+    picture, random = draw(open_right_hand(320, 240, size=110)), np.random.default_rng(1)
+    grainy = [np.clip(picture + random.normal(0, 40, (*picture.shape[:2], 1)), 0, 255) for _ in range(12)]
+    found = [len(palms.detect(each.astype(np.uint8), 1, smoothed=True)) for each in grainy]
+    assert sum(found) == 12
+    assert sum(len(palms.detect(each.astype(np.uint8), 1)) for each in grainy) < 6
+
+
+class Lens:
+    """In place of a detection model: finds nothing, and keeps the picture that it was given."""
+
+    side = 192
+
+    def run(self, picture: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        self.picture = picture
+        return np.zeros((2016, 18)), np.full((2016, 1), -100.0)
+
+    def middle_of_the_light(self) -> np.ndarray:
+        light = self.picture[..., 0].astype(float)
+        return np.array([np.average(each, weights=light) for each in np.meshgrid(*2 * [np.arange(192)])])
+
+
+@pytest.mark.parametrize("widened", [1.0, 1.25, 2.0])
+@pytest.mark.parametrize(("width", "height"), [(640, 480), (480, 640), (641, 479), (250, 180), (100, 90), (1280, 720)])
+def test_smoothing_leaves_everything_where_it_is(width: int, height: int, widened: float) -> None:
+    picture = np.zeros((height, width, 3), np.uint8)
+    picture[height // 2 :, : width // 3] = 255
+    lens = Lens()
+    detector = Detector(lens, ((8, 2), (16, 6)), 0.5)  # type: ignore[arg-type]
+    middles = []
+    for smoothed in (False, True):
+        assert detector.find(picture, 1, widened=widened, smoothed=smoothed) == []
+        middles.append(lens.middle_of_the_light())
+    # An edge that is sampled, not averaged, is up to half a pixel off.
+    assert middles[1] == pytest.approx(middles[0], abs=0.6)

@@ -1,5 +1,6 @@
 """Where hands are looked for, with palms that are where a test says."""
 
+from collections import Counter
 from collections.abc import Iterator
 from itertools import islice, pairwise
 
@@ -12,22 +13,29 @@ from handsteer.hand.poses import THUMB, Pinhole, View
 from handsteer.hand.renderer import Look, make_background, render
 from handsteer.recognition.landmarker import MediaPipeLandmarker
 from handsteer.recognition.regions import Palm, PalmDetector, Roi
-from handsteer.recognition.search import Pace, Places, Search, Stillness, cells_of_frame, cells_of_hands
+from handsteer.recognition.search import Pace, PalmView, Places, Search, Stillness, cells_of_frame, cells_of_hands
 from tests.recognition.drawn_hand import draw, open_left_hand, open_right_hand
 
 FRAME = np.zeros((480, 640, 3), np.uint8)
 
 
 class Palms(PalmDetector):
-    """Stands in for the palm model; finds the same palms however the frame is widened, and notes how it was."""
+    """Stands in for the palm model; finds the same palms however the frame is seen, and notes how it was."""
 
     def __init__(self, *palms: Palm) -> None:
         self.palms = list(palms)
-        self.widened: list[float] = []
+        self.views: list[PalmView] = []
 
-    def detect(self, image: np.ndarray, limit: int, *, widened: float = 1.0) -> list[Palm]:
-        self.widened.append(widened)
+    def detect(self, image: np.ndarray, limit: int, *, widened: float = 1.0, smoothed: bool = False) -> list[Palm]:
+        self.views.append(PalmView(widened, smoothed))
         return self.palms[:limit]
+
+    @property
+    def widened(self) -> list[float]:
+        return [view.widened for view in self.views]
+
+
+PLAIN, SMOOTHED, WIDENED, MORE_WIDENED = PalmView(), *(PalmView(factor, smoothed=True) for factor in (1.0, 1.25, 2.0))
 
 
 def palm(size: float, score: float = 0.9) -> Palm:
@@ -38,22 +46,22 @@ def palm(size: float, score: float = 0.9) -> Palm:
     return Palm(corners, keypoints, score)
 
 
-def frame_by_frame(search: Search, palms: Palms, frames: int) -> Iterator[tuple[list[float], list[Roi]]]:
+def frame_by_frame(search: Search, palms: Palms, frames: int) -> Iterator[tuple[list[PalmView], list[Roi]]]:
     """Yield how palms were looked for in each frame, and where there may be hands without any."""
     for _ in range(frames):
-        palms.widened.clear()
+        palms.views.clear()
         places = list(search.places(FRAME, beside_a_hand=False))
-        yield list(palms.widened), [roi for each in places for roi in each.regions]
+        yield list(palms.views), [roi for each in places for roi in each.regions]
 
 
 def test_the_first_frame_is_looked_at_in_all_ways_one_after_another() -> None:
     palms = Palms()
     places = Search(palms, 2, wide=True).places(FRAME, beside_a_hand=False)
-    assert (next(places), palms.widened) == (Places([]), [1.0, 1.25])
+    assert (next(places), palms.views) == (Places([]), [PLAIN, SMOOTHED, WIDENED])
     assert next(places).regions == []
-    assert palms.widened == [1.0, 1.25, 2.0]
+    assert palms.views == [PLAIN, SMOOTHED, WIDENED, MORE_WIDENED]
     middles = list(places)
-    assert palms.widened == [1.0, 1.25, 2.0]
+    assert palms.views == [PLAIN, SMOOTHED, WIDENED, MORE_WIDENED]
     assert [roi.center_x for each in middles for roi in each.regions] == [320] * 4
     assert len({roi.rotation for each in middles for roi in each.regions}) == 4
     assert all(each.min_presence >= 0.9 for each in middles)
@@ -63,9 +71,9 @@ def test_later_frames_without_a_hand_take_one_search_of_palms_each_and_all_ways_
     palms = Palms()
     search = Search(palms, 2, wide=True)
     later = list(islice(frame_by_frame(search, palms, 13), 1, None))
-    assert all(len(widened) == 1 and len(middle) <= 1 for widened, middle in later)
-    assert [widened[0] for widened, _ in later].count(1.0) == 6, "every second frame is looked at as MediaPipe does"
-    assert {widened[0] for widened, _ in later} == {1.0, 1.25, 2.0}
+    assert all(len(views) == 1 and len(middle) <= 1 for views, middle in later)
+    ways = Counter(views[0] for views, _ in later)
+    assert ways == {PLAIN: 3, SMOOTHED: 3, WIDENED: 3, MORE_WIDENED: 3}, "every fourth frame is seen as MediaPipe does"
     assert len({roi.rotation for _, middle in later for roi in middle}) == 4
     assert sum(len(middle) for _, middle in later) == 6
 
@@ -85,14 +93,14 @@ def test_a_hand_that_has_just_been_lost_is_looked_for_in_the_plain_frame_first()
     for frames in (1, 2, 3):
         list(frame_by_frame(search, palms, frames))
         search.begin_again()
-        assert [widened for widened, _ in frame_by_frame(search, palms, 2)] == [[1.0], [1.25]]
+        assert [views for views, _ in frame_by_frame(search, palms, 2)] == [[PLAIN], [WIDENED]]
 
 
 def test_enough_sure_palms_in_the_plain_frame_end_the_search() -> None:
-    for sure, widened in ((palm(100, 0.9), [1.0]), (palm(100, 0.6), [1.0, 1.25])):
+    for sure, views in ((palm(100, 0.9), [PLAIN]), (palm(100, 0.6), [PLAIN, SMOOTHED, WIDENED])):
         palms = Palms(sure)
         next(Search(palms, 1, wide=True).places(FRAME, beside_a_hand=False))
-        assert palms.widened == widened
+        assert palms.views == views
 
 
 def test_only_near_hands_are_looked_for_in_a_frame_that_is_much_widened() -> None:

@@ -84,7 +84,7 @@ class LandmarksConfig(Section):
     refine_new_hands: bool = Field(True, description="Run the landmark model twice on a new hand, for better landmarks")
     wide_search: bool = Field(
         True,
-        description="Also search a widened frame, where hands are smaller, and its middle; finds more close hands",
+        description="Also search a smoothed and a widened frame, and its middle; finds more dark and close hands",
     )
     reject_resting: bool = Field(
         True,

@@ -29,6 +29,11 @@ _PALM_GRIDS: Final = ((8, 2), (16, 6))
 _WRIST: Final = 0
 _MIDDLE_BASE: Final = 2
 _SAME_PALM_OVERLAP: Final = 0.3
+_SMOOTHING: Final = 0.6
+"""Standard deviation of the blur of a smoothed frame, in pixels of the model's input.
+
+With 0.35 a tenth fewer of the hands are found that only a smoothed frame shows; without a blur two thirds fewer.
+"""
 
 
 @dataclass(frozen=True)
@@ -168,10 +173,17 @@ class Detector:
         self._min_logit = _logit(min_score)
         self._anchors = _anchors(model.side, grids)
 
-    def find(self, image: NDArray[np.uint8], limit: int, *, widened: float = 1.0) -> list[tuple[Array, float]]:
+    def find(
+        self, image: NDArray[np.uint8], limit: int, *, widened: float = 1.0, smoothed: bool = False
+    ) -> list[tuple[Array, float]]:
         """Return at most ``limit`` detections in ``image``, (height, width, 3) uint8 BGR, by descending score.
 
-        ``widened`` enlarges the frame by this factor with a black border, so that what is in it appears smaller.
+        Args:
+            image: The frame.
+            limit: Maximum number of detections.
+            widened: Factor that enlarges the frame with a black border, so that what is in it appears smaller.
+            smoothed: Whether to average the pixels of the frame that become one of the model's input, instead of
+                sampling them as MediaPipe does: noise and grain, as of dark pictures, hide hands.
 
         Returns:
             Pairs of (n, 2) points in pixels of the frame, the top left and the bottom right of the box, then the
@@ -179,7 +191,8 @@ class Detector:
         """
         height, width = image.shape[:2]
         square = whole_frame(width, height, widened)
-        values, logits = self._model.run(square.crop(image, self._model.side, cv2.BORDER_CONSTANT))
+        seen, region = _reduced(image, square, self._model.side) if smoothed else (image, square)
+        values, logits = self._model.run(region.crop(seen, self._model.side, cv2.BORDER_CONSTANT))
         logits = logits[:, 0]
         found = np.flatnonzero(logits >= self._min_logit)
         found = found[np.argsort(-logits[found], kind="stable")]
@@ -203,9 +216,25 @@ class PalmDetector:
     def __init__(self, path: Path, threads: int, min_score: float) -> None:
         self._detector = Detector(PictureModel(path, threads), _PALM_GRIDS, min_score)
 
-    def detect(self, image: NDArray[np.uint8], limit: int, *, widened: float = 1.0) -> list[Palm]:
+    def detect(
+        self, image: NDArray[np.uint8], limit: int, *, widened: float = 1.0, smoothed: bool = False
+    ) -> list[Palm]:
         """Return at most ``limit`` palms, as :meth:`Detector.find` describes."""
-        return [Palm(each[:2], each[2:], score) for each, score in self._detector.find(image, limit, widened=widened)]
+        found = self._detector.find(image, limit, widened=widened, smoothed=smoothed)
+        return [Palm(each[:2], each[2:], score) for each, score in found]
+
+
+def _reduced(image: NDArray[np.uint8], square: Roi, side: int) -> tuple[NDArray[np.uint8], Roi]:
+    """Return ``image`` blurred and reduced to the resolution of ``square`` at ``side`` pixels, and the square in it."""
+    scale = min(1.0, side / square.side)
+    height, width = image.shape[:2]
+    if scale < 1.0:
+        size = max(1, round(width * scale)), max(1, round(height * scale))
+        image = np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)
+    x, y = image.shape[1] / width, image.shape[0] / height
+    # Pixels have their coordinates in their middle.
+    moved = Roi((square.center_x + 0.5) * x - 0.5, (square.center_y + 0.5) * y - 0.5, square.side * x)
+    return np.asarray(cv2.GaussianBlur(image, (0, 0), _SMOOTHING), np.uint8), moved
 
 
 def _anchors(side: int, grids: Sequence[tuple[int, int]]) -> Array:

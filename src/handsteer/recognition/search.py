@@ -1,7 +1,8 @@
 """Decides where to search for new hands, and when: not in a picture that has not changed.
 
-Palms are detected in the plain frame as MediaPipe does. The palm model misses hands that nearly fill a frame, fists
-above all, so palms are also detected in a widened frame, where they appear smaller; and while there is no hand, the
+Palms are detected in the plain frame as MediaPipe does. The palm model misses hands in dark, noisy pictures, so palms
+are also detected in a smoothed frame, in which it misses some small hands instead; and hands that nearly fill a frame,
+fists above all, so palms are also detected in a widened frame, where they appear smaller. While there is no hand, the
 landmark model is applied to the middle of the frame without any palm.
 """
 
@@ -54,21 +55,29 @@ class Places:
 
 
 @dataclass(frozen=True)
-class Palms:
-    """Detect palms in a frame that is ``widened`` by these factors, optionally only those of ``near`` hands.
+class PalmView:
+    """How the palm model sees a frame: ``widened`` by a factor, and ``smoothed``; see ``regions``."""
 
-    The factors are tried in order, until there are enough palms with a high score.
+    widened: float = 1.0
+    smoothed: bool = False
+
+
+@dataclass(frozen=True)
+class Palms:
+    """Detect palms in these ``views`` of a frame, optionally only those of ``near`` hands.
+
+    The views are tried in order, until there are enough palms with a high score.
     """
 
-    widened: tuple[float, ...] = (1.0,)
+    views: tuple[PalmView, ...] = (PalmView(),)
     near: bool = False
 
     def places(self, image: NDArray[np.uint8], palms: PalmDetector, limit: int) -> Places:
-        """Return the regions of palms, at most ``limit`` in each of the widened frames."""
+        """Return the regions of palms, at most ``limit`` in each of the views."""
         found: list[Palm] = []
-        for widened in self.widened:
+        for view in self.views:
             if sum(palm.score >= _SURE_PALM for palm in found) < limit:
-                found += palms.detect(image, limit, widened=widened)
+                found += palms.detect(image, limit, widened=view.widened, smoothed=view.smoothed)
         regions = [palm.roi for palm in sorted(found, key=lambda palm: -palm.score)]
         if not self.near:
             return Places(regions)
@@ -97,16 +106,18 @@ class Middle:
 Turn = tuple[Palms | Middle, ...]
 """Ways to search one frame; each is used only if the previous ones find no hand."""
 
+_SMOOTHED, _WIDENED, _MORE_WIDENED = (PalmView(widened, smoothed=True) for widened in (1.0, 1.25, 2.0))
 _PLAIN: Final = Palms()
-_WIDE: Final = Palms((1.25,))
-_VERY_WIDE: Final = Palms((2.0,), near=True)
+_SMOOTH: Final = Palms((_SMOOTHED,))
+_WIDE: Final = Palms((_WIDENED,))
+_VERY_WIDE: Final = Palms((_MORE_WIDENED,), near=True)
 _MIDDLE_UP, *_MIDDLES_TURNED = (Middle(turned_deg) for turned_deg in (0.0, 180.0, 90.0, 270.0))
 
 _AS_MEDIAPIPE: Final[Turn] = (_PLAIN,)
-_FIRST: Final[Turn] = (Palms((1.0, 1.25)), _VERY_WIDE, _MIDDLE_UP, *_MIDDLES_TURNED)
+_FIRST: Final[Turn] = (Palms((PalmView(), _SMOOTHED, _WIDENED)), _VERY_WIDE, _MIDDLE_UP, *_MIDDLES_TURNED)
 # Palm detection takes longest, so there is one per frame. Most hands that are shown point upwards.
 _WITHOUT_HANDS: Final[tuple[Turn, ...]] = tuple(
-    turn for turned in _MIDDLES_TURNED for turn in ((_PLAIN,), (_WIDE, _MIDDLE_UP), (_PLAIN,), (_VERY_WIDE, turned))
+    turn for turned in _MIDDLES_TURNED for turn in ((_PLAIN,), (_WIDE, _MIDDLE_UP), (_SMOOTH,), (_VERY_WIDE, turned))
 )
 # A tracked hand was usually found in the plain frame, in which a second one would have been found too.
 _BESIDE_A_HAND: Final[tuple[Turn, ...]] = ((_WIDE,), (_PLAIN,))

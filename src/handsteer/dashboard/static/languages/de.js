@@ -1042,7 +1042,7 @@ const WORDS = {
   "Refine new hands": "Neue Hände verfeinern",
   "Run the landmark model twice on a new hand, for better landmarks.": "Das Landmarken-Modell bei einer neuen Hand zweimal anwenden, für bessere Landmarken.",
   "Wide search": "Weite Suche",
-  "Also search a widened frame, where hands are smaller, and its middle; finds more close hands.": "Auch ein erweitertes Bild durchsuchen, in dem Hände kleiner sind, und seine Mitte; findet mehr nahe Hände.",
+  "Also search a smoothed and a widened frame, and its middle; finds more dark and close hands.": "Auch ein geglättetes und ein erweitertes Bild durchsuchen, und seine Mitte; findet mehr dunkle und nahe Hände.",
   "Reject resting": "Ruhende ablehnen",
   "Ignore signs, other than Stop, of hands that hang or lie in the lap; finds the person for that.": "Zeichen außer Stop von Händen übergehen, die hängen oder im Schoß liegen; sucht dazu die Person.",
   "Minimum presence": "Mindestpräsenz",
