@@ -139,6 +139,37 @@ def test_no_further_hands_are_looked_for_unless_asked(two_hand_landmarker: Media
     assert len(two_hand_landmarker.detect(both, search=False)) == 2, "without a hand to follow it always looks"
 
 
+def test_hands_beyond_the_wanted_number_take_turns_while_further_ones_are_looked_for() -> None:
+    """Two hands that show nothing, of somebody who watches, must not hide the one that shows a sign."""
+    landmarker = MediaPipeLandmarker(LandmarksConfig(max_hands=2))
+    watching = [open_right_hand(120, 300, size=60), open_left_hand(280, 300, size=60)]
+    late = [open_right_hand(430, 180, size=60), open_left_hand(560, 340, size=60)]
+    random = np.random.default_rng(0)
+
+    def frame(*hands: np.ndarray) -> np.ndarray:
+        return np.clip(draw(*hands) + random.normal(0, 3, (480, 640, 1)), 0, 255).astype(np.uint8)
+
+    def found(hands: list[Hand]) -> set[int]:
+        places = [*watching, *late]
+        return {min(range(4), key=lambda index: distance(hand, places[index])) for hand in hands}
+
+    for _ in range(30):
+        assert len(landmarker.detect(frame(*watching), dt_s=1 / 30)) <= 2
+    assert found(landmarker.detect(frame(*watching), dt_s=1 / 30)) == {0, 1}
+    first, *_ = landmarker.detect(frame(*watching), dt_s=1 / 30)
+    seen, together = set(), []
+    for _ in range(60):
+        hands = landmarker.detect(frame(*watching, *late), dt_s=1 / 30)
+        seen |= found(hands)
+        together.append(len(hands))
+    assert seen >= {2, 3}
+    assert max(together) == 2
+    assert distance(hands[0], first.pixels[:, :2]) < 10, "the first one keeps its place"
+    for _ in range(10):
+        same = landmarker.detect(frame(*watching, *late), search=False, dt_s=1 / 30)
+    assert found(same) == found(hands), "nothing changes once a sign is about to count"
+
+
 def test_only_the_hand_that_is_named_is_followed_on(two_hand_landmarker: MediaPipeLandmarker) -> None:
     both = draw(open_right_hand(150, 250), open_left_hand(480, 250))
     for handedness in ("Left", "Right"):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from handsteer.recognition.recognizer import Recognizer
-from handsteer.types import MOTION_SIGNS, NONE
+from handsteer.types import MOTION_SIGNS, NONE, STOP
 
 pytestmark = pytest.mark.slow
 
@@ -66,3 +66,25 @@ def test_a_bystander_does_not_take_over_until_the_operator_has_stopped(data_dir:
     assert show(idle, other_idle, 1.0) == {"Forward", NONE}
     assert show(idle, other, 2.0) == {NONE, "Turn Left"}
     assert show(signing, other, 2.0) == {"Turn Left"}
+
+
+def test_a_person_who_watches_does_not_hide_the_operator(data_dir: Path, recognizer: Recognizer) -> None:
+    """The hands of somebody else are in view first, and as large as the operator's."""
+    paths = sorted((data_dir / "photos" / "negatives" / "hand_no_sign").glob("emre*"))
+    people = [np.asarray(cv2.imread(str(path)), np.uint8) for path in paths]
+    watching = [person for person in people if recognizer.recognize(person).sign == NONE]
+    random, wall = np.random.default_rng(0), np.full((480, 640, 3), 190, np.uint8)
+    palms = sorted((data_dir / "photos" / "stop").glob("emre*"))[:6]
+
+    def frame(left: np.ndarray, right: np.ndarray) -> np.ndarray:
+        both = np.hstack([left, right])
+        return np.clip(both + random.normal(0, 4, (*both.shape[:2], 1)), 0, 255).astype(np.uint8)
+
+    stopped = 0
+    for person, palm in zip(watching, palms, strict=False):
+        recognizer.reset()
+        for _ in range(30):
+            assert recognizer.step(frame(person, wall), 1 / 30).sign == NONE
+        operator = np.asarray(cv2.imread(str(palm)))
+        stopped += any(recognizer.step(frame(person, operator), 1 / 30).sign == STOP for _ in range(45))
+    assert stopped == len(palms)

@@ -41,7 +41,8 @@ _RUNS_WITH_PALMS: Final = 2
 """Likewise in a frame with palm detection; a lost hand's count too. MediaPipe's ``full`` models take longer for one."""
 _SEARCH: Final = Pace(change=6, settle_s=0.12, period_s=0.2)
 """How often to search without a hand: when settled, each of the four main ways has had its frame at 30 Hz."""
-_SEARCH_BESIDE_A_HAND: Final = Pace(change=6, settle_s=0.2, period_s=1.0, least_s=0.2)
+_SEARCH_BESIDE_A_HAND: Final = Pace(change=6, settle_s=0.6, period_s=1.0, least_s=0.2)
+"""Likewise beside a hand: after a change, each of the three ways has its frame."""
 _FOLLOW: Final = Pace(change=3, settle_s=0.08, period_s=0.1)
 """How often to process tracked hands: below three levels, landmarks deviate by at most 0.03 of the hand."""
 _MAX_SIDE: Final = 32766
@@ -119,6 +120,7 @@ class MediaPipeLandmarker:
         self._has_rough = False
         self._has_tracked = False
         self._waiting: Places | None = None
+        self._had_turn: list[Roi] = []
         self._runs_left = inf
         self._is_first = True
 
@@ -176,7 +178,7 @@ class MediaPipeLandmarker:
         """Return whether to search for hands; while one is tracked, only if ``further`` ones are requested."""
         searched, pace = self._searched, _SEARCH
         if self._followed:
-            if not further or len(self._followed) >= self._config.max_hands:
+            if not further or self._config.max_hands == 1:
                 return False
             searched, pace = self._searched_beside, _SEARCH_BESIDE_A_HAND
         if searched.is_too_early(pace) or not searched.wants_look(cells := cells_of_frame(image), pace):
@@ -218,7 +220,7 @@ class MediaPipeLandmarker:
             if self._runs_left < 1 or self._is_present(self._run(image, places.regions[0])):
                 self._waiting = places
             return []
-        regions = _distinct([*followed, *places.regions])[: self._config.max_hands]
+        regions = self._chosen(followed, places.regions)
         if len(regions) > self._runs_left:
             # The hand that points upwards may show Stop.
             regions.sort(key=lambda region: abs(region.rotation))
@@ -226,9 +228,27 @@ class MediaPipeLandmarker:
         if left:
             self._waiting = Places(left, places.min_presence)
         if not present or not places.rivals:
-            return present
+            return present[: self._config.max_hands]
         rivals, _ = self._of_regions(image, places.rivals, places.min_presence)
         return [max(present + rivals, key=lambda each: each.presence)]
+
+    def _chosen(self, followed: list[Roi], found: list[Roi]) -> list[Roi]:
+        """Return different regions, in a stream at most ``max_hands``: those ``followed``, then of those ``found``.
+
+        The found ones take turns, and without room they replace the last followed one. Otherwise a face that the
+        palm model takes for a hand, or two hands of a person who watches, would hide the hand that shows a sign.
+        """
+        new = _distinct([*followed, *found])[len(followed) :]
+        if self._runs_left == inf or not new:
+            return [*followed, *new]
+        limit = self._config.max_hands
+        room = max(limit - len(followed), min(1, limit - 1))
+        had = {region for region in new if any(region.overlap(one) > _SAME_HAND_OVERLAP for one in self._had_turn)}
+        if len(had) == len(new):
+            self._had_turn, had = followed[limit - room :], set()
+        chosen = sorted(new, key=lambda region: region in had)[:room]
+        self._had_turn += chosen
+        return [*followed[: limit - room], *chosen]
 
     def _of_regions(
         self, image: NDArray[np.uint8], regions: Sequence[Roi], min_presence: float

@@ -27,6 +27,8 @@ _NEAR_PRESENCE: Final = 0.9
 _TURNED_PRESENCE: Final = 0.95
 """Likewise of a hand that does not point upwards: faces and people sometimes resemble one."""
 _SURE_PALM: Final = 0.8
+_FURTHER: Final = 2
+"""Palms beyond the wanted number: one that shows a sign may have a lower score than those of another person."""
 
 Cells = NDArray[np.uint8]
 """Mean colours of the cells of a picture, as a small picture; a hand may be as bright as its background."""
@@ -73,11 +75,11 @@ class Palms:
     near: bool = False
 
     def places(self, image: NDArray[np.uint8], palms: PalmDetector, limit: int) -> Places:
-        """Return the regions of palms, at most ``limit`` in each of the views."""
+        """Return the regions of palms, those of ``limit`` hands and a few more."""
         found: list[Palm] = []
         for view in self.views:
             if sum(palm.score >= _SURE_PALM for palm in found) < limit:
-                found += palms.detect(image, limit, widened=view.widened, smoothed=view.smoothed)
+                found += palms.detect(image, limit + _FURTHER, widened=view.widened, smoothed=view.smoothed)
         regions = [palm.roi for palm in sorted(found, key=lambda palm: -palm.score)]
         if not self.near:
             return Places(regions)
@@ -106,21 +108,21 @@ class Middle:
 Turn = tuple[Palms | Middle, ...]
 """Ways to search one frame; each is used only if the previous ones find no hand."""
 
-_SMOOTHED, _WIDENED, _MORE_WIDENED = (PalmView(widened, smoothed=True) for widened in (1.0, 1.25, 2.0))
-_PLAIN: Final = Palms()
-_SMOOTH: Final = Palms((_SMOOTHED,))
-_WIDE: Final = Palms((_WIDENED,))
-_VERY_WIDE: Final = Palms((_MORE_WIDENED,), near=True)
+_VIEWS: Final = tuple(PalmView(widened, smoothed) for widened in (1.0, 1.25) for smoothed in (False, True))
+_PLAIN, _SMOOTH, _WIDE, _SMOOTH_WIDE = (Palms((view,)) for view in _VIEWS)
+_VERY_WIDE: Final = Palms((PalmView(2.0),), near=True)
 _MIDDLE_UP, *_MIDDLES_TURNED = (Middle(turned_deg) for turned_deg in (0.0, 180.0, 90.0, 270.0))
 
 _AS_MEDIAPIPE: Final[Turn] = (_PLAIN,)
-_FIRST: Final[Turn] = (Palms((PalmView(), _SMOOTHED, _WIDENED)), _VERY_WIDE, _MIDDLE_UP, *_MIDDLES_TURNED)
+_FIRST: Final[Turn] = (Palms(_VIEWS), _VERY_WIDE, _MIDDLE_UP, *_MIDDLES_TURNED)
 # Palm detection takes longest, so there is one per frame. Most hands that are shown point upwards.
 _WITHOUT_HANDS: Final[tuple[Turn, ...]] = tuple(
-    turn for turned in _MIDDLES_TURNED for turn in ((_PLAIN,), (_WIDE, _MIDDLE_UP), (_SMOOTH,), (_VERY_WIDE, turned))
+    turn
+    for turned, wide in zip(_MIDDLES_TURNED, itertools.cycle((_WIDE, _SMOOTH_WIDE)), strict=False)
+    for turn in ((_PLAIN,), (wide, _MIDDLE_UP), (_SMOOTH,), (_VERY_WIDE, turned))
 )
 # A tracked hand was usually found in the plain frame, in which a second one would have been found too.
-_BESIDE_A_HAND: Final[tuple[Turn, ...]] = ((_WIDE,), (_PLAIN,))
+_BESIDE_A_HAND: Final[tuple[Turn, ...]] = ((_WIDE,), (_SMOOTH,), (_PLAIN,))
 
 
 class Search:

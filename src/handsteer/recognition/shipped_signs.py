@@ -56,7 +56,7 @@ _HANGING: Final = 145.0
 """Smallest angle of a hanging hand's palm to upwards: 156 to 178 degrees for people at rest."""
 _HANGING_TRUST: Final = 0.82
 """Factor on the thumb's likelihood for a hanging hand: next to the fingers, it may seem to point sideways."""
-_BENT_UP: Final = 0.5
+_BENT_UP: Final = 0.6
 """Share of the likelihood of an index finger that is bent at its knuckle, or has the thumb out, that counts upwards.
 
 So such a finger is ``Backward`` if it points down, and no sign if it points up, unless it may as well be straight.
