@@ -24,7 +24,7 @@ from handsteer.errors import ConfigError, DashboardError, FrameError, TransportE
 from handsteer.graph import Graph
 from handsteer.messages import CMD_VEL, STOP, Bool, Twist
 from handsteer.robots.editing import add, remove
-from handsteer.robots.world import load_world
+from handsteer.robots.world import World, load_world
 from handsteer.transports.base import Received
 from handsteer.types import Pose2D
 from tests.contracts.transport_contract import eventually
@@ -184,6 +184,16 @@ def test_the_world_is_changed_from_afar(near: Graph, far: RemoteGraph) -> None:
     far.enter_world(load_world("obstacles")).result(30)
     assert near.robot.world == load_world("obstacles") == far.state.world
     far.reset().result(30)
+
+
+def _fail(_: World) -> World:
+    raise ValueError("no world")
+
+
+def test_a_request_that_fails_unexpectedly_is_answered_in_words(far: RemoteGraph) -> None:
+    with pytest.raises(TransportError, match="failed to do it"):
+        far.change_world(_fail).result(30)
+    far.change_world(partial(add, shape="box", robot=Pose2D(0.0, 0.0, 0.0))).result(30)
 
 
 def test_settings_reach_the_nodes_of_both_processes(near: Graph, far: RemoteGraph) -> None:

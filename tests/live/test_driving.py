@@ -8,6 +8,7 @@ from contextlib import contextmanager
 
 import pytest
 from playwright.sync_api import Page
+from websockets.exceptions import InvalidStatus
 
 from handsteer.clock import RealClock
 from handsteer.config import FoxgloveConfig, load
@@ -172,6 +173,25 @@ def speed(graph: Graph) -> float:
 
 def stands(graph: Graph) -> bool:
     return abs(speed(graph)) < 0.005
+
+
+ORIGINS = (None, "http://localhost:5000", "file://", "chrome-extension://abcdef", "https://app.foxglove.dev", "null")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("origin", ORIGINS)
+def test_who_may_drive_has_the_token(origin: str | None) -> None:
+    headers = [] if origin is None else [("Origin", origin)]
+    with standing() as graph, served(graph) as address:
+        bare, _, token = address.partition("/?token=")
+        assert token
+        for stranger in (bare, f"{bare}/?token=", f"{bare}/?token={token[:-1]}"):
+            with pytest.raises(InvalidStatus, match="401"):
+                Viewer(stranger, headers=headers)
+        with Viewer(address, headers=headers) as viewer:
+            viewer.advertise()
+            with repeated(lambda: viewer.command(0.2)):
+                eventually(lambda: speed(graph) > 0.1)
 
 
 @pytest.mark.slow

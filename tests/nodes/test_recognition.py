@@ -1,3 +1,4 @@
+import dataclasses
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -442,3 +443,23 @@ def test_a_model_that_cannot_be_used_is_refused_before_anything_changes(tmp_path
     parameters.set({"model": str(path)})  # again, as it may have been written anew
     parameters.set({"model": ""})
     assert [config.signs.model for config in applied] == [path, path, None]
+
+
+def test_a_publisher_of_one_picture_gets_a_hint_once(caplog: pytest.LogCaptureFixture) -> None:
+    bench = RecognitionBench()
+    frozen = image_message(bench.picture(), HEADER)
+    bench.show(frozen, frames=300)
+    hints = [record.getMessage() for record in caplog.records if "Only new pictures count" in record.getMessage()]
+    assert len(hints) == 1
+    assert hints[0].startswith("/image_raw: the same picture for 3 s.")
+
+
+@pytest.mark.parametrize("encoding", ["yuv420", "16UC1", "\x1b[2J" * 100])
+def test_an_unsupported_encoding_is_one_line_with_what_to_do(encoding: str, caplog: pytest.LogCaptureFixture) -> None:
+    bench = RecognitionBench()
+    sent = image_message(bench.picture(), HEADER)
+    bench.show(dataclasses.replace(sent, encoding=encoding), frames=20)
+    (record,) = caplog.records
+    assert record.exc_info is None
+    assert "use one of bgr8" in record.getMessage()
+    assert record.getMessage().isprintable()

@@ -52,6 +52,7 @@ const WORDS = {
   "Reset": "Zurücksetzen",
   "Reset: let the robot be driven again": "Zurücksetzen: den Roboter wieder fahren lassen",
   "Stop": "Stopp",
+  "Sent": "Gesendet",
   "Stop the robot (space key)": "Den Roboter anhalten (Leertaste)",
   "Driving": "Fahrt",
   "Standing": "Stillstand",
@@ -1235,8 +1236,8 @@ const WORDS = {
   "Whether run opens the page in a browser; never with token: always, as command lines are public.": "Ob run die Seite in einem Browser öffnet; nie bei token: always, da Befehlszeilen öffentlich sind.",
   "Port on which `run` serves all topics; # picks a free one, # serves none.": "Port, auf dem `run` alle Topics anbietet; # nimmt einen freien, # bietet keine an.",
   "Address that they are served on; any other than #.# makes them reachable from other machines, which need the token in the printed address.": "Adresse, auf der sie angeboten werden; jede andere als #.# macht sie von anderen Rechnern erreichbar, die das Token in der ausgegebenen Adresse brauchen.",
-  "When a program needs the token: auto if other machines can reach the address, or always, for machines with several users and for viewers on other web sites.": "Wann ein Programm das Token braucht: auto, wenn andere Rechner die Adresse erreichen können, oder always, für Rechner mit mehreren Benutzern und für Anzeigen auf anderen Websites.",
-  "Whether these programs may drive, one at a time, by Twist on /cmd_vel; else they only look.": "Ob diese Programme fahren dürfen, eines zur Zeit, durch Twist auf /cmd_vel; sonst sehen sie nur zu.",
+  "When a program needs the token: auto if other machines can reach the address or programs may drive, or always, for machines with several users and for viewers on other web sites.": "Wann ein Programm das Token braucht: auto, wenn andere Rechner die Adresse erreichen können oder Programme fahren dürfen, oder always, für Rechner mit mehreren Benutzern und für Anzeigen auf anderen Websites.",
+  "Whether these programs may drive, one at a time, by Twist on /cmd_vel, which needs the token; else they only look.": "Ob diese Programme fahren dürfen, eines zur Zeit, durch Twist auf /cmd_vel, wozu sie das Token brauchen; sonst sehen sie nur zu.",
 
   // The page of a study
   "Study": "Studie",
