@@ -223,6 +223,7 @@ def test_a_browsers_camera_is_offered_from_afar(near: Graph, far: RemoteGraph) -
 
 def test_steering_from_afar_drives_and_its_end_stops(near: Graph, far: RemoteGraph) -> None:
     driven = Driven(near)
+    far.steering.steer(0.0, 0.0)
 
     def drives() -> bool:
         far.steering.steer(0.2, 0.0)

@@ -222,6 +222,8 @@ class Drive(MonitorBench):
         self.robot = RobotNode(self.transport, self.clock, robot, RobotConfig())
         self.steering = SteeringNode(self.transport, self.clock)
         self.nodes = [self.steering, self.robot, self.control]
+        self.steering.steer(0.0, 0.0)
+        self.run(0.1)
 
     def steer(self, linear_mps: float, angular_radps: float, seconds: float) -> None:
         self.steering.steer(linear_mps, angular_radps)
