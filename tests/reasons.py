@@ -1,0 +1,36 @@
+"""Whether every motion in the recordings that tests make has a live reason."""
+
+from pathlib import Path
+
+from handsteer.errors import RecordingError
+from handsteer.recordings import open_recording
+from handsteer.recordings.recorder import Recorder
+from handsteer.replay.drive_reader import read_drive
+
+_made: list[Path] = []
+
+
+def watch_recordings() -> None:
+    """Note each recording of this process that is closed from now on."""
+    close = Recorder.close
+
+    def close_and_note(recorder: Recorder) -> None:
+        close(recorder)
+        _made.append(recorder.path)
+
+    Recorder.close = close_and_note  # type: ignore[method-assign]
+
+
+def check_made() -> None:
+    """Check the recordings that were closed since the last call."""
+    while _made:
+        check(_made.pop())
+
+
+def check(path: Path) -> None:
+    """Fail if the robot is commanded to move without a live reason in the recording ``path``."""
+    try:
+        facts = read_drive(open_recording(path))
+    except RecordingError:
+        return  # of nothing that drives, or cut off by the test
+    assert not facts.unexplained, f"{path}: motion without a live reason: {facts.unexplained}"
