@@ -11,6 +11,7 @@ import argparse
 import ast
 import contextlib
 import datetime
+import functools
 import importlib
 import os
 import signal
@@ -96,7 +97,7 @@ def _problem_of(test: str) -> str:
         return f"there is no test {test}"
     if path.name in INDIRECT:
         return f"{test} tests this guard only by chance"
-    nodes: Sequence[ast.AST] = ast.parse(path.read_bytes()).body
+    nodes: Sequence[ast.AST] = _parsed(path).body
     for name in names:
         found = [node for node in nodes if isinstance(node, ast.FunctionDef | ast.ClassDef) and node.name == name]
         if not found:
@@ -105,6 +106,11 @@ def _problem_of(test: str) -> str:
             return f"{test} finds it only by chance"
         nodes = found[0].body
     return ""
+
+
+@functools.cache
+def _parsed(path: Path) -> ast.Module:
+    return ast.parse(path.read_bytes())
 
 
 def read_table() -> list[Mutant]:

@@ -14,11 +14,11 @@ def watch_recordings() -> None:
     """Note each recording of this process that is closed from now on."""
     close = Recorder.close
 
-    def close_and_note(recorder: Recorder) -> None:
-        close(recorder)
-        _made.append(recorder.path)
+    def close_and_note(self: Recorder) -> None:
+        close(self)
+        _made.append(self.path)
 
-    Recorder.close = close_and_note  # type: ignore[method-assign]
+    setattr(Recorder, "close", close_and_note)  # noqa: B010 - mypy allows no assignment
 
 
 def check_made() -> None:

@@ -71,6 +71,13 @@ def test_what_is_wrong_in_a_file_is_named(tmp_path: Path, text: str, message: st
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.parametrize("sign", ["Stop", "NONE", "stop"])
+def test_no_configuration_takes_stop_away(sign: str) -> None:
+    """The guard: ``ALWAYS_STOP``."""
+    with pytest.raises(ConfigError, match="can always be stopped"):
+        load(None, None, {"control": {"actions": {sign: "forward"}}})
+
+
 def test_a_file_that_is_not_there() -> None:
     with pytest.raises(ConfigError, match=r"cannot read the configuration gone\.yaml: No such file"):
         config.load(Path("gone.yaml"))

@@ -444,3 +444,56 @@ def test_a_held_joystick_is_followed_only_after_it_was_released() -> None:
     safety.admits_stick(held=False)
     safety.admits_steering(is_zero=False)
     assert not safety.admits_stick(held=True), "it was steered meanwhile"
+
+
+def test_a_stop_holds_against_steering_that_was_seen_released() -> None:
+    """The guard: ``is_stopped`` in ``admits_steering``."""
+    safety = Safety(CONFIG, arming=False)
+    safety.stop()
+    assert not safety.admits_steering(is_zero=True)
+    assert not safety.admits_steering(is_zero=False)
+    assert not safety.steering_waits
+
+
+def test_a_joystick_that_was_released_drives_nothing_while_the_hand_is_not_engaged() -> None:
+    """The guard: ``engaged`` in ``admits_stick``."""
+    safety = Safety(CONFIG, arming=False, engage=True)
+    safety.admits_stick(held=False)
+    assert not safety.admits_stick(held=True)
+    free = Safety(CONFIG, arming=False)
+    free.admits_stick(held=False)
+    assert free.admits_stick(held=True)
+
+
+def test_empty_pictures_that_come_seldom_count_as_one_frame_each() -> None:
+    """The guard: ``MOST_OF_ONE_NONE_S`` in ``_note_none``."""
+    safety = Safety(CONFIG, arming=True)
+    show(safety, "Forward", ARMING_S)
+    show(safety, "NONE", 1.0, period_s=0.25)
+    assert not show(safety, "Forward")
+    show(safety, "NONE", 2.0, period_s=0.25)
+    assert show(safety, "Forward")
+
+
+def test_odometry_that_is_no_number_is_none() -> None:
+    """The guard: ``is_finite`` in ``Following.note``."""
+    following, said = Following(), []
+    following.note(Velocity(0.5, 0.0))
+    for _ in range(30):
+        following.note(Velocity(math.nan, 0.0))
+        said.append(following.step(0.02, Velocity(0.5, 0.0)))
+    assert said[-1] == "the robot's odometry has stopped"
+
+
+def test_allowance_that_was_not_used_expires() -> None:
+    """The guard: ``BURST_S`` in ``Allowance.step``."""
+    allowance = Allowance(60.0)
+    allowance.step(100.0)
+    assert sum(allowance.take() for _ in range(1000)) == 60.0 * Allowance.BURST_S
+
+
+def test_a_limit_of_jerk_lets_acceleration_grow_slowly() -> None:
+    """The guard: ``max_jerk`` in ``_Axis.step``."""
+    ramp = Ramp(ControlConfig(max_linear_jerk=2.0))
+    speeds = [ramp.step(Velocity(1.0, 0.0), 0.1).linear_mps for _ in range(4)]
+    assert speeds == [pytest.approx(0.02), pytest.approx(0.06), pytest.approx(0.12), pytest.approx(0.2)]

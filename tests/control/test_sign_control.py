@@ -185,3 +185,17 @@ def test_cruise_is_within_limits_and_no_message_makes_it_faster_than_time_does(
         interrupted = sign == NONE or (sign is None and interrupted)
         if not interrupted:
             before = now
+
+
+def test_extra_messages_do_not_make_it_faster() -> None:
+    """The guard: ``Allowance.take``."""
+    control = SignControl(ControlConfig(max_linear=10.0))
+    for _ in range(1000):
+        control.step(FORWARD, 1 / 1000)
+    assert control.velocity.linear_mps <= 0.01 * (60 + 15 + 1)
+
+
+def test_turbo_keeps_to_the_limit() -> None:
+    """The guard: ``clamped`` in ``_boosted``."""
+    control = SignControl(ControlConfig(max_linear=0.3, linear_step=0.2, actions={"Peace": "turbo"}))
+    assert drive(control, FORWARD, "Peace") == [Velocity(0.2, 0.0), Velocity(0.3, 0.0)]

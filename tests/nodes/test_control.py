@@ -34,6 +34,7 @@ from handsteer.messages import (
     TwistWithCovariance,
     cmd_vel,
     joy_of,
+    stick_in,
     twist,
 )
 from handsteer.nodes.control import HandSignControlNode
@@ -908,3 +909,29 @@ def test_a_palm_engages_the_joystick_too() -> None:
         bench.hold(RELEASED)
     bench.hold(AHEAD)
     assert bench.last() == (0.5, 0)
+
+
+def test_steering_that_was_held_while_the_control_was_stalled_has_to_let_go() -> None:
+    """The guard: ``stall`` in ``_elapsed``."""
+    bench = ControlBench(ControlConfig(steering_timeout=2.0))
+    slider = bench.transport.advertise("slider", STEERING_CMD_VEL)
+
+    def steer(speed: float) -> None:
+        slider.publish(twist(speed, 0.0))
+        bench.run(0.1)
+
+    steer(0.0)
+    steer(0.5)
+    assert bench.last() == (0.5, 0)
+    bench.clock.advance(0.5)  # the process stood still
+    bench.run(0.2)  # and what comes in the next moment is ignored anyway
+    steer(0.5)
+    assert bench.last() == (0, 0)
+    steer(0.0)
+    steer(0.5)
+    assert bench.last() == (0.5, 0)
+
+
+def test_the_axes_of_any_joystick_are_read_within_one() -> None:
+    """The guard: the limits in ``stick_in``."""
+    assert stick_in(joy_of(Stick(held=True, forward=50.0, left=-1e30), HEADER)) == Stick(True, 1.0, -1.0)

@@ -463,3 +463,15 @@ def test_an_unsupported_encoding_is_one_line_with_what_to_do(encoding: str, capl
     assert record.exc_info is None
     assert "use one of bgr8" in record.getMessage()
     assert record.getMessage().isprintable()
+
+
+def test_a_picture_that_was_passed_over_is_not_new_when_it_comes_again(bench: RecognitionBench) -> None:
+    """The guard: ``pass_over`` in ``_on_frame``, for pictures that are refused before they are compared."""
+    late = [image_message(NOISE.on(GREY, float(number)), HEADER) for number in range(6)]
+    for image in late:
+        bench.show(image, age_s=0.6)
+    assert bench.names == []
+    for image in late:
+        bench.show(image)
+    assert set(bench.names) <= {"NONE"}
+    assert bench.node.counts == {}

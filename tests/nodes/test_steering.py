@@ -217,3 +217,17 @@ def test_after_a_stop_it_stands_also_where_its_own_topic_was_given_to_a_robot(be
     let_go_once(bench)
     bench.node.steer(0.3, 0.0)
     assert bench.mux[-1] == (0.3, 0.0)
+
+
+def test_its_stop_is_repeated_until_it_is_reset(bench: Bench) -> None:
+    """The guard: ``_halted`` in ``_repeat``; false from elsewhere must not undo it."""
+    said: list[bool] = []
+    bench.transport.subscribe("test", STOP, lambda received: said.append(received.message.data))
+    bench.node.halt()
+    for _ in range(10):
+        bench.step()
+    assert said == [True] * 11
+    bench.node.reset()
+    for _ in range(10):
+        bench.step()
+    assert said == [*[True] * 11, False]
