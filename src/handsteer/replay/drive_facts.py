@@ -91,6 +91,7 @@ class Stand:
         sign: The confirmed sign; empty if unknown.
         code: The control's reason code; empty if unknown.
         reason: The reason in words.
+        cause: What camera and recognition reported as a problem about then; empty if nothing that may explain it.
         place: x and y on the map, in metres; None if unknown.
         picture: The frame that led to it, or the one of that moment, as a small JPEG; None if there is none.
         has_led: Whether the command is known to have followed from the picture.
@@ -101,6 +102,7 @@ class Stand:
     sign: str = ""
     code: str = ""
     reason: str = ""
+    cause: str = ""
     place: tuple[float, float] | None = None
     picture: bytes | None = None
     has_led: bool = False

@@ -25,7 +25,7 @@ from handsteer.messages import (
 )
 from handsteer.nodes.diagnostics import read_status
 from handsteer.nodes.journal import journal_topic
-from handsteer.nodes.status import CameraStatus, ControlStatus, RecognitionStatus, RobotStatus
+from handsteer.nodes.status import OK, CameraStatus, ControlStatus, RecognitionStatus, RobotStatus, Status
 from handsteer.recordings.recorded import Recorded, Recording
 from handsteer.replay.drive_facts import Curve, DriveFacts, Event
 from handsteer.replay.drive_logs import MapThings, RobotLog, SignLog
@@ -245,12 +245,18 @@ class _Reader:
             status = read_status(reported)
             if isinstance(status, CameraStatus):
                 self._facts.camera = self._facts.camera or status.short_name
+                self._note_trouble(recorded, status)
             elif isinstance(status, RecognitionStatus):
+                self._note_trouble(recorded, status)
                 self._signs.note_confidence(time_s, status.seen or NONE, status.confidence)
             elif isinstance(status, ControlStatus):
                 self._note_control(status, time_s)
             elif isinstance(status, RobotStatus):
                 self._robot.note_status(time_s, status)
+
+    def _note_trouble(self, recorded: Recorded, status: Status) -> None:
+        if status.level != OK:
+            self._stands.note_trouble(recorded.time_s, status.node, status.message)
 
     def _note_control(self, status: ControlStatus, time_s: float) -> None:
         self._stands.note_status(status)

@@ -43,7 +43,7 @@ Span = tuple[float, float]
 
 
 class Level:
-    """When something held, of which messages tell: from one that says so to the next, or for ``holds_s``."""
+    """When something held, of which messages tell: from each to the next, or for ``holds_s``."""
 
     def __init__(self) -> None:
         self._edges = array("d")  # begin and end in turn
@@ -112,7 +112,7 @@ class ReasonLog:
         self._stopped.note(time_s, on=is_stopped)
 
     def note_command(self, time_s: float, topic: str, velocity: Velocity) -> None:
-        """Note a command to a robot, which follows it until the next one, or brakes by itself after a while."""
+        """Note a command to a robot, which follows it until the next one, or brakes on its own after a while."""
         self._moves.setdefault(topic, Level()).note(time_s, on=not velocity.is_zero, holds_s=ROBOT_S)
 
     def note_status(self, time_s: float, status: ControlStatus) -> None:

@@ -192,9 +192,10 @@ def _stand(number: int, stand: Stand) -> str:
         picture = f'<img src="data:image/jpeg;base64,{data}" alt="{what}" title="{what}" loading="lazy">'
     lasted = "to the end" if stand.duration_s is None else f"for {stand.duration_s:.1f} s"
     sign = f'<p class="quiet">sign: {_text(stand.sign)}</p>' if stand.sign else ""
+    cause = f'<p class="quiet">then: {_text(stand.cause)}</p>' if stand.cause else ""
     return (
         f"<li>{picture}<div><p><b>{number}.</b> at {stand.time_s:.2f} s, {lasted}</p>"
-        f"<p>{_text(stand.reason)}</p>{sign}</div></li>"
+        f"<p>{_text(stand.reason)}</p>{cause}{sign}</div></li>"
     )
 
 
