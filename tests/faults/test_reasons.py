@@ -5,7 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from handsteer.messages import CMD_VEL, RECORDED
+from handsteer.audit import read_event
+from handsteer.messages import AUDIT, CMD_VEL, RECORDED
+from handsteer.nodes.auditing import HOLD_S
 from handsteer.recordings import open_recording
 from handsteer.recordings.recorder import Recorder
 from handsteer.replay.drive_facts import DriveFacts
@@ -32,6 +34,10 @@ CAUSES = {
 """What the stop says of the pictures."""
 
 
+HOLDS_S = HOLD_S + 0.1
+"""States that last for less need not be in the audit."""
+
+
 def recorded(name: str, path: Path) -> DriveFacts:
     """Let the fault happen; return what a recording of it says."""
     recorders = []
@@ -48,6 +54,13 @@ def recorded(name: str, path: Path) -> DriveFacts:
     return read_drive(open_recording(path))
 
 
+def told_stops(path: Path) -> list[float]:
+    """Return when the audit says that the robot stands, in seconds since the recording began."""
+    file = open_recording(path)
+    audit = file.messages({AUDIT.name})
+    return [each.time_s - file.began_s for each in audit if getattr(read_event(each.message), "code", "") == "stands"]
+
+
 @pytest.mark.exhaustive
 @pytest.mark.parametrize("name", ROWS)
 def test_each_motion_has_a_reason_and_each_stop_too(name: str, tmp_path: Path) -> None:
@@ -55,6 +68,11 @@ def test_each_motion_has_a_reason_and_each_stop_too(name: str, tmp_path: Path) -
     assert bool(facts.unexplained) == (name in PAST_THE_CONTROL)
     assert facts.stands
     assert all(stand.code for stand in facts.stands)
+    stops, is_ours = told_stops(tmp_path / "drive.mcap"), name not in PAST_THE_CONTROL
+    for stand in facts.stands:
+        is_long = stand.duration_s is None or stand.duration_s >= HOLDS_S
+        if is_long and is_ours and stand.code != "no_command":  # nobody is left to tell of it
+            assert any(abs(told_s - stand.time_s) <= HOLDS_S for told_s in stops)
 
 
 @pytest.mark.parametrize("name", CAUSES)

@@ -147,6 +147,8 @@ class HandSignControlNode(Node):
     def on_stop(self) -> None:
         """Stop the robot, and those that were selected a moment ago."""
         self._control.halt()
+        if not self._commanded.is_zero:
+            self._audit.ended(self._last_step_s)
         self._publish(ZERO)
         if self._selection:
             self._selection.beat()
