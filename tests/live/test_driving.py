@@ -80,6 +80,13 @@ def test_a_zero_of_a_program_is_a_release() -> None:
     assert wheel.newest() == (0.3, 0.1)
 
 
+def test_a_late_zero_of_a_program_is_no_release() -> None:
+    wheel = Wheel()
+    wheel.driving.command("A", ZERO, is_late=True)
+    wheel.repeat(1.0)
+    assert all(newest == twist(0.0, 0.0) for newest in wheel.heard)
+
+
 def test_commands_count_after_a_moment_and_end_with_the_last(wheel: Wheel) -> None:
     wheel.repeat(CONFIRM_S - 0.01)
     assert set(map(str, wheel.heard)) == {str(twist(0.0, 0.0))}
