@@ -46,10 +46,10 @@ def test_signs_drive_from_the_start_only_where_the_robot_is_known_to_be_simulate
 
 
 class Namespaced(InProcessTransport):
-    """As where all nodes are in /r1."""
+    """As in ROS, where all nodes are in /r1."""
 
     def full_name(self, node: str) -> str:
-        return f"/r1/{node}"
+        return f"r1/{node}: {node}"
 
     def topic_name(self, topic: Topic[Any]) -> str:
         return f"/r1{topic.name}"

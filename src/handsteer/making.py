@@ -140,8 +140,8 @@ def make_control(
 
 def _is_the_courses(cmd_vel: Topic[Any], transport: Transport) -> bool:
     """Return whether commands go where the simulated robot of the ROS 101 course has them, in its namespace or none."""
-    namespace = transport.full_name("hand_sign_control").partition(":")[0].rpartition("/")[0]
-    return transport.topic_name(cmd_vel) in (CMD_VEL.name, namespace + CMD_VEL.name)
+    namespace = _namespace(transport, "hand_sign_control")
+    return transport.topic_name(cmd_vel) in (CMD_VEL.name, f"/{namespace}{CMD_VEL.name}")
 
 
 def make_robot(
@@ -213,8 +213,13 @@ def frame_prefix(transport: Transport, node: str) -> str:
 
     It is empty without a namespace, and if ``/tf`` is remapped so that each robot has its own tree.
     """
-    namespace = transport.full_name(node).partition(":")[0].rpartition("/")[0]
+    namespace = _namespace(transport, node)
     return f"{namespace}/" if namespace and transport.topic_name(TF) == TF.name else ""
+
+
+def _namespace(transport: Transport, node: str) -> str:
+    """Return the namespace of ``node``, such as ``r1``; empty without one."""
+    return transport.full_name(node).partition(":")[0].rpartition("/")[0].strip("/")
 
 
 def prefixed(config: RobotConfig, transport: Transport) -> RobotConfig:

@@ -254,7 +254,7 @@ def test_recordings_are_for_those_with_the_token_only(open_site: Site) -> None:
         assert open_site.get(path, Authorization=f"Bearer {token_of(open_site)}").status == 404
 
 
-@pytest.mark.parametrize("frame", ["IFRAME", "Frame", " iframe ", "OBJECT"])
+@pytest.mark.parametrize("frame", ["IFRAME", "Frame", " iframe ", "OBJECT", "document, iframe"])
 def test_frames_are_refused_in_any_case_of_letters(site: Site, frame: str) -> None:
     assert site.get("/", **{"Sec-Fetch-Dest": frame}).status == 403
 

@@ -5,7 +5,7 @@ import threading
 import time
 
 import pytest
-from nicegui import core
+from nicegui import Client, core
 
 from handsteer.dashboard.front import Presses
 from tests.dashboard.network import client_of, cookies_of
@@ -49,6 +49,17 @@ def test_stop_is_answered_while_the_pages_loop_is_busy(site: Site) -> None:
         assert stands(site)
     finally:
         end.set()
+
+
+def test_a_page_that_the_server_has_forgotten_stops_the_robot(site: Site) -> None:
+    html, cookies = site.page()
+    page = client_of(html)
+    Client.instances[page].delete()  # as when its websocket was gone for some seconds
+    assert page not in Client.instances
+    assert press(site, page, "") == 403
+    assert not stands(site)
+    assert press(site, page, cookies) == 200
+    assert stands(site)
 
 
 def test_a_stranger_cannot_stop_by_it(site: Site) -> None:

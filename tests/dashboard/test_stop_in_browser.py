@@ -9,6 +9,7 @@ import pytest
 from playwright.sync_api import Route
 
 from handsteer.messages import STOP
+from tests.dashboard.test_sticks_in_browser import PLUG_IN
 from tests.dashboard.visits import NEEDS_A_BROWSER, Visit, visiting
 
 pytestmark = NEEDS_A_BROWSER
@@ -42,7 +43,11 @@ def shows(visit: Visit, stop: str) -> None:
 
 @pytest.mark.parametrize(
     ("locale", "sent", "confirmed", "key"),
-    [("en-US", "Sent", "Stopped", ""), ("de-DE", "Gesendet", "Gestoppt", "Space")],
+    [
+        ("en-US", "Sent", "Stopped", ""),
+        ("de-DE", "Gesendet", "Gestoppt", "Space"),
+        ("en-US", "Sent", "Stopped", "B of a gamepad"),
+    ],
 )
 def test_stop_shows_how_far_it_is_and_is_repeated_until_confirmed(
     locale: str, sent: str, confirmed: str, key: str
@@ -58,7 +63,9 @@ def test_stop_shows_how_far_it_is_and_is_repeated_until_confirmed(
 
         with others_open_settings(visit):
             visit.page.route("**/stop?*", lose)
-            if key:
+            if key.startswith("B"):
+                visit.page.evaluate(PLUG_IN, [1])
+            elif key:
                 visit.page.keyboard.press(key)
             else:
                 visit.page.locator(".banner .stop").click()

@@ -88,6 +88,9 @@ _HOST = re.compile(r"(\[[0-9A-Fa-f:.]+\]|[A-Za-z0-9_.-]+)(:[0-9]{1,5})?", re.ASC
 SESSION = "handsteer_session"
 """Key of a request's session in the ``state`` of its scope."""
 
+HAD_SESSION = "handsteer_had_session"
+"""Key of whether the request came with its session, and was not given it, next to it."""
+
 
 @dataclass(frozen=True)
 class Access:
@@ -149,6 +152,7 @@ class AccessMiddleware:
                 session = access.sessions.new()
                 send = _with_session(send, scope, session)
             scope.setdefault("state", {})[SESSION] = session if session and access.sessions.knows(session) else ""
+            scope["state"][HAD_SESSION] = is_known
             await self._app(scope, receive, send)
 
 
@@ -247,7 +251,7 @@ def _is_of_another_site(headers: Headers) -> bool:
     origin = headers.get("origin")
     if origin is not None and _parts(origin).netloc.lower() != _only(headers, "host").lower():
         return True
-    if _only(headers, "sec-fetch-dest").lower() in _FRAMES:  # none of our pages has frames
+    if _FRAMES & {each.strip() for each in _only(headers, "sec-fetch-dest").lower().split(",")}:  # we have no frames
         return True
     # Requests for pictures and the like have no Origin. Another port of this machine counts as the same site, but is
     # not ours. Following a link from elsewhere is allowed.

@@ -11,9 +11,11 @@ from collections.abc import Awaitable, Callable, Coroutine
 from typing import Any, Final, TypeVar
 from urllib.parse import parse_qsl
 
+from nicegui import Client
 from starlette.responses import JSONResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from handsteer.dashboard.access import HAD_SESSION
 from handsteer.dashboard.limits import PAGES_THREAD
 from handsteer.dashboard.socket_events import is_page_of
 
@@ -59,6 +61,8 @@ class Presses:
 class StopPath:
     """Answers ``POST /stop?page=PAGE&press=NUMBER`` once the robot is stopped, for a page of the browser's own session.
 
+    The page need not exist any more on the server, which deletes one whose websocket is gone for some seconds.
+
     Args:
         app: Answers all other requests.
         halt: Stops the robot for a page, on any thread.
@@ -83,11 +87,16 @@ class StopPath:
         query = scope.get("query_string", b"")
         sent = dict(parse_qsl(query.decode("latin-1"))) if len(query) <= _LONGEST_QUERY else {}
         page, press = sent.get("page", ""), sent.get("press", "")
-        if not is_page_of(page, scope):
+        if not (is_page_of(page, scope) or _is_forgotten(page, scope)):
             return JSONResponse({"stopped": False}, 403)
         number = int(press) if press.isascii() and press.isdecimal() and len(press) <= 16 else None
         self._presses.obey(page, number, lambda: self._halt(page))
         return JSONResponse({"stopped": True}, headers={"Cache-Control": "no-store"})
+
+
+def _is_forgotten(page: str, scope: Scope) -> bool:
+    """Return whether ``page`` may be one that was deleted, as when its websocket is lost: it is still on a screen."""
+    return bool(page) and page not in Client.instances and bool(scope.get("state", {}).get(HAD_SESSION))
 
 
 class PagesLoop:
