@@ -178,7 +178,7 @@ class _Run:
             # What tests leave behind goes with the folder.
             os.environ["TMPDIR"] = tempfile.tempdir = str(self.folder)
             os.environ["HYPOTHESIS_STORAGE_DIRECTORY"] = str(self.folder / "hypothesis")
-            options = ["-q", "-p", "no:cacheprovider", "-p", "no:randomly", f"--basetemp={self.folder / 'tests'}"]
+            options = ["-q", "-p", "no:cacheprovider", f"--basetemp={self.folder / 'tests'}"]
             skips = _Skips()
             code = pytest.main([*options, *([] if self.mutant is None else ["-x"]), *self.tests], [skips])
             code = _SKIPPED if code == 0 and skips.count else code

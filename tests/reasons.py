@@ -7,6 +7,9 @@ from handsteer.recordings import open_recording
 from handsteer.recordings.recorder import Recorder
 from handsteer.replay.drive_reader import read_drive
 
+DELAY_S = 0.3
+"""In real time, a machine that is busy with other tests delays a message on its way to the control by as much."""
+
 _made: list[Path] = []
 
 
@@ -38,4 +41,6 @@ def check(path: Path) -> None:
         facts = read_drive(open_recording(path))
     except RecordingError:
         return  # of nothing that drives, or cut off by the test
-    assert not facts.unexplained, f"{path}: motion without a live reason: {facts.unexplained}"
+    is_stepped = facts.about.get("clock_offset_s") in (None, "0.0")
+    found = [each for each in facts.unexplained if is_stepped or each.end_s - each.begin_s > DELAY_S]
+    assert not found, f"{path}: motion without a live reason: {found}"
