@@ -31,12 +31,14 @@ from handsteer.nodes.diagnostics import write_status
 from handsteer.nodes.status import ControlStatus
 from handsteer.recordings.mcap_reader import McapFile
 from handsteer.recordings.mcap_writer import McapWriter
+from handsteer.recordings.recorder import Recorder
 from handsteer.replay.drive_facts import DriveFacts
 from handsteer.replay.drive_reader import read_drive
 from handsteer.replay.reason_log import Span, common, less, union
+from handsteer.transports.in_process import InProcessTransport
 from handsteer.transports.ros2.encoding import encode
 from handsteer.types import RELEASED, Stick
-from tests.reasons import check
+from tests.reasons import check, check_made
 
 Message = tuple[float, Topic[Any], Any]
 
@@ -183,6 +185,19 @@ def test_a_forged_command_in_a_recording_fails_the_check_of_every_test(recording
     writer.close()
     with pytest.raises(AssertionError, match="motion without a live reason"):
         check(path)
+
+
+def test_every_recording_that_a_test_makes_is_looked_through(tmp_path: Path) -> None:
+    transport, clock = InProcessTransport(), SteppedClock()
+    recorder = Recorder(tmp_path / "drive.mcap", transport, clock, (CMD_VEL,), {})
+    commands = transport.advertise("hand_sign_control", CMD_VEL)
+    commands.publish(twist(0.3, 0.0))
+    clock.advance(1.0)
+    commands.publish(twist(0.0, 0.0))
+    recorder.close()
+    with pytest.raises(AssertionError, match="motion without a live reason"):
+        check_made()
+    check_made()
 
 
 @pytest.mark.slow
