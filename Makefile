@@ -5,6 +5,8 @@ BIN := $(VENV)/bin
 ARGS ?=
 # Cases per fuzzer; `make test` runs 1,000.
 CASES ?= 100000
+# `make test-all` breaks the guards of this day, a third of all.
+DAY ?= $(shell date +%F)
 # As many containers set: pytest would then rewrite every test file again for each worker.
 unexport PYTHONDONTWRITEBYTECODE
 # The matrices are small and tests run in parallel, so NumPy's threads would only wait for each other.
@@ -16,7 +18,7 @@ WORKERS ?= $(shell expr $$(getconf _NPROCESSORS_ONLN) + 1)
 PARALLEL = -n $(WORKERS) --dist loadgroup --no-loadscope-reorder
 PLAIN := not (ros1 or ros2 or netns or exhaustive)
 
-.PHONY: help run check test test-all ros1 test-ros1 ros2 test-ros2 lint fuzz format lock bench bench-drive bench-signs signs-model landmark-model models docs site faults soak screenshots \
+.PHONY: help run check test test-all mutants ros1 test-ros1 ros2 test-ros2 lint fuzz format lock bench bench-drive bench-signs signs-model landmark-model models docs site faults soak screenshots \
 	screenshots-ros1 clean
 
 help:
@@ -24,6 +26,7 @@ help:
 	@echo "make check        format, lint, types and the fast tests: before each commit"
 	@echo "make test         all tests that need neither ROS nor root, and do not take long"
 	@echo "make test-all     all tests, as in CI: also ROS 1, ROS 2, networks of several machines, every kill"
+	@echo "make mutants      break each guard of tests/mutants.toml; the tests that name it have to fail"
 	@echo "make fuzz         try 100,000 damaged or hostile inputs on each reader (fewer: make fuzz CASES=5000)"
 	@echo "make ros1         install ROS 1 from Debian's or Ubuntu's packages, for --transport ros1"
 	@echo "make test-ros1    the tests with ROS 1"
@@ -54,6 +57,10 @@ test: lint models
 
 test-all: lint models
 	@HANDSTEER_STEPS=20000 $(BIN)/pytest $(PARALLEL) --durations=30 $(ARGS)
+	@$(BIN)/python -m scripts.mutants --day $(DAY)
+
+mutants: $(BIN)/.dev models
+	@$(BIN)/python -m scripts.mutants $(ARGS)
 
 lint: $(BIN)/.dev
 	@$(BIN)/ruff format --check .

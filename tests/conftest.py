@@ -15,6 +15,7 @@ from hypothesis import settings
 from handsteer.clock import SteppedClock
 from handsteer.config import DEFAULT_FILE, Config, VirtualHandConfig
 from handsteer.graph import Graph
+from tests.reasons import check_made, watch_recordings
 from tests.ros1.graph import Ros1Graph, ros1_graph
 
 # The machines that run the tests are shared: how long an example takes says nothing of the code.
@@ -74,6 +75,16 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
         graph.record(path)
         graph.run_stepped(8.0)
     return path
+
+
+watch_recordings()
+
+
+@pytest.fixture(autouse=True)
+def every_motion_has_a_reason() -> Iterator[None]:
+    """Look through each recording that a test, or a fixture before it, has made."""
+    yield
+    check_made()
 
 
 # What runs write for their users, such as the audit, must not be in the home of who runs the tests.

@@ -60,6 +60,7 @@ def test_an_empty_file_is_the_defaults(tmp_path: Path) -> None:
         ("control: {actions: {' ': go}}", r"control.actions: .*should name each sign once"),
         ("- 1", r"expected sections such as 'control:' at the top, found list"),
         ("control: {", r"line 1: not valid YAML"),
+        ('signs: {model: "a\\0b"}', r"signs.model: 'a\\x00b' must have no null character"),
     ],
 )
 def test_what_is_wrong_in_a_file_is_named(tmp_path: Path, text: str, message: str) -> None:
@@ -69,6 +70,13 @@ def test_what_is_wrong_in_a_file_is_named(tmp_path: Path, text: str, message: st
         config.load(file)
     assert "bad.yaml" in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("sign", ["Stop", "NONE", "stop"])
+def test_no_configuration_takes_stop_away(sign: str) -> None:
+    """The guard: ``ALWAYS_STOP``."""
+    with pytest.raises(ConfigError, match="can always be stopped"):
+        load(None, None, {"control": {"actions": {sign: "forward"}}})
 
 
 def test_a_file_that_is_not_there() -> None:

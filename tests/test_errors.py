@@ -1,11 +1,31 @@
 """What is said where a package is not installed."""
 
+import json
 import subprocess
 import sys
 
 import pytest
 
-from handsteer.errors import PackageMissing, needing
+from handsteer.errors import LONGEST_QUOTE, PackageMissing, needing, quoted
+
+OUTSIDE = (
+    "x" * 5000, "\x1b[2J\r\n", "\u202e\ud800", 10**5000, [[[[[[[[1]]]]]]]], {"a": ["y" * 5000] * 50},
+    b"\x00" * 5000, None, 0.5,
+    json.loads("[" * 500 + "]" * 500),
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("value", OUTSIDE, ids=range(len(OUTSIDE)))
+def test_a_value_from_outside_is_quoted_short_and_printable(value: object) -> None:
+    assert len(quoted(value)) <= 6 * LONGEST_QUOTE
+    assert quoted(value).isprintable()
+
+
+def test_a_short_value_is_quoted_as_it_is() -> None:
+    assert quoted("bax") == "'bax'"
+    assert quoted([1.5, "a"]) == "[1.5, 'a']"
+    assert len(quoted("a" * 61)) == LONGEST_QUOTE + 2
+
 
 VIRTUAL = ("--camera", "virtual", "--camera.width", "320", "--camera.height", "240", "--duration", "5")
 

@@ -95,7 +95,7 @@ def test_more_than_8_bits_are_refused(encoding: str) -> None:
         bgr_image(message(encoding, BGR))
 
 
-@pytest.mark.parametrize("encoding", ["", "bayer_rggb8", "BGR8"])
+@pytest.mark.parametrize("encoding", ["", "yuv420", "BGR8"])
 def test_an_encoding_that_is_not_known(encoding: str) -> None:
     with pytest.raises(FrameError, match=rf"'{encoding}' is not known: use one of bgr8, rgb8"):
         bgr_image(message(encoding, BGR))
@@ -159,3 +159,38 @@ def test_a_raw_image_beyond_all_cameras_is_refused() -> None:
     for height, width in ((-1, 4), (4, -1)):
         with pytest.raises(FrameError, match="has no pixels"):
             bgr_image(Image(HEADER, height, width, "mono8", 0, 4, np.zeros(16, np.uint8)))
+
+
+BAYER = {"rggb": ((2, 1), (1, 0)), "bggr": ((0, 1), (1, 2)), "gbrg": ((1, 0), (2, 1)), "grbg": ((1, 2), (0, 1))}
+COLOURS = ((10, 200, 60), (250, 20, 120), (90, 90, 240))
+
+
+@pytest.mark.parametrize("bgr", COLOURS)
+@pytest.mark.parametrize("pattern", BAYER)
+@pytest.mark.parametrize("padding", [0, 3])
+def test_bayer_patterns(pattern: str, bgr: tuple[int, int, int], padding: int) -> None:
+    tile = np.array([[bgr[channel] for channel in row] for row in BAYER[pattern]], np.uint8)
+    picture = bgr_image(message(f"bayer_{pattern}8", np.tile(tile, (6, 8))[..., None], padding))
+    assert picture.shape == (12, 16, 3)
+    np.testing.assert_array_equal(picture[2:-2, 2:-2], np.broadcast_to(np.array(bgr, np.uint8), (8, 12, 3)))
+
+
+@pytest.mark.parametrize(("encoding", "order"), [("nv12", (1, 2)), ("nv21", (2, 1))])
+@pytest.mark.parametrize("bgr", COLOURS)
+@pytest.mark.parametrize("padding", [0, 5])
+def test_two_planes(encoding: str, order: tuple[int, int], bgr: tuple[int, int, int], padding: int) -> None:
+    blue, green, red = bgr
+    luma = 16 + 0.257 * red + 0.504 * green + 0.098 * blue  # ITU-R BT.601
+    u, v = 128 - 0.148 * red - 0.291 * green + 0.439 * blue, 128 + 0.439 * red - 0.368 * green - 0.071 * blue
+    yuv = np.round((luma, u, v)).astype(np.uint8)
+    planes = np.full((12, 16), yuv[0], np.uint8)
+    planes[8:] = np.tile(yuv[list(order)], (4, 8))
+    padded = np.pad(planes, ((0, 0), (0, padding)))
+    sent = Image(HEADER, 8, 16, encoding, 0, 16 + padding, padded.reshape(-1))
+    picture = bgr_image(sent)
+    assert picture.shape == (8, 16, 3)
+    np.testing.assert_allclose(picture.astype(int), np.broadcast_to(bgr, (8, 16, 3)), atol=4)
+    with pytest.raises(FrameError, match="needs a step"):
+        bgr_image(Image(HEADER, 8, 16, encoding, 0, 16, planes[:8].reshape(-1)))
+    with pytest.raises(FrameError, match="squares of pixels"):
+        bgr_image(Image(HEADER, 7, 16, encoding, 0, 16, planes.reshape(-1)))

@@ -65,5 +65,9 @@ def test_reads_files_no_further_than_they_may_go(tmp_path: Path) -> None:
     assert plain_yaml.read(path, str(path), ConfigError, "cannot") == {"name": "\u00e9"}
     with pytest.raises(ConfigError, match=r"^cannot: No such file"):
         plain_yaml.read(tmp_path / "none.yaml", "", ConfigError, "cannot")
+    with path.open("wb") as file:
+        file.truncate(10_000_000_000)
     with pytest.raises(ConfigError, match="is larger than 1000 kB"):
+        plain_yaml.read(path, str(path), ConfigError, "cannot")
+    with pytest.raises(ConfigError, match="not a regular file"):
         plain_yaml.read(Path("/dev/zero"), "/dev/zero", ConfigError, "cannot")

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterable
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -98,6 +99,18 @@ def test_a_broken_image_raises_and_leaves_the_robot_standing() -> None:
     with pytest.raises(FrameError):
         teleop.step(GREY[:, :, 0], DT_S)
     assert teleop.step(None, DT_S) == ZERO
+
+
+def test_an_image_that_cannot_be_looked_at_stops_a_robot_that_drives(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The guard: the fault in ``_sign_of``."""
+    person = Person()
+    person.drives()
+    with monkeypatch.context() as broken:
+        broken.setattr(Recognizer, "step", Mock(side_effect=FrameError("broken")))
+        with pytest.raises(FrameError):
+            person.teleop.step(person.image("Forward"), DT_S)
+    assert person.teleop.step(None, DT_S) == ZERO
+    assert set(person.shows("Forward", 1.0)) == {ZERO}
 
 
 def test_stop_holds_until_it_is_reset_and_neutral_was_seen() -> None:

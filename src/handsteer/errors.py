@@ -5,8 +5,12 @@ and exits (with code 2).
 """
 
 import difflib
+import reprlib
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from typing import Final
+
+_SHORT: Final = reprlib.Repr()
 
 
 class HandsteerError(Exception):
@@ -113,6 +117,32 @@ def did_you_mean(word: str, known: Iterable[str]) -> str:
     """Return ``: did you mean X?`` with the nearest of the ``known`` words, for a message; empty if none is near."""
     near = difflib.get_close_matches(word, list(known), n=1)
     return f": did you mean {near[0]}?" if near else ""
+
+
+LONGEST_QUOTE: Final = 60
+"""Characters of a text from outside that a message repeats."""
+
+
+def quoted(value: object, most: int = LONGEST_QUOTE) -> str:
+    """Return a value from outside for a message: in quotes if it is a text, printable, on one line, and cut.
+
+    Args:
+        value: Anything; of nested lists and tables, the first few are shown.
+        most: Characters of a text, before unprintable ones are escaped; of other values, characters in all.
+    """
+    if isinstance(value, str):
+        return repr(str(value) if len(value) <= most else f"{value[: most - 3]}...")
+    try:
+        words = _SHORT.repr(value)
+    except (ValueError, RecursionError):  # a number of thousands of digits, or an object's own repr
+        words = f"a {type(value).__name__}"
+    return words if len(words) <= most else f"{words[: most - 3]}..."
+
+
+def as_name(value: object) -> str:
+    """Return a name from outside, such as a field's, for a message: quoted unless it is short and printable."""
+    text = str(value)
+    return text if len(text) <= LONGEST_QUOTE and text.isprintable() else quoted(text)
 
 
 def reason_of(error: Exception) -> str:

@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from handsteer.errors import FrameError
+from handsteer.errors import FrameError, quoted
 from handsteer.messages import CompressedImage, Header, Image
 from handsteer.picture_files import MOST_PIXELS, decode
 
@@ -25,7 +25,14 @@ _ENCODINGS: Final[Mapping[str, tuple[int, int | None]]] = {
     "uyvy": (2, cv2.COLOR_YUV2BGR_UYVY),
     "yuv422_yuy2": (2, cv2.COLOR_YUV2BGR_YUY2),
     "yuyv": (2, cv2.COLOR_YUV2BGR_YUY2),
+    # OpenCV names a pattern after the pixels of its second row and column.
+    "bayer_rggb8": (1, cv2.COLOR_BayerBG2BGR),
+    "bayer_bggr8": (1, cv2.COLOR_BayerRG2BGR),
+    "bayer_gbrg8": (1, cv2.COLOR_BayerGR2BGR),
+    "bayer_grbg8": (1, cv2.COLOR_BayerGB2BGR),
 }
+# A plane of brightness, then one of half its height with both colours of each 2x2 pixels in turn.
+_TWO_PLANES: Final[Mapping[str, int]] = {"nv12": cv2.COLOR_YUV2BGR_NV12, "nv21": cv2.COLOR_YUV2BGR_NV21}
 
 
 def image_message(bgr: NDArray[np.uint8], header: Header) -> Image:
@@ -41,10 +48,14 @@ def bgr_image(message: Image) -> NDArray[np.uint8]:
     Raises:
         FrameError: The encoding is not a supported one of 8 bits, or the data does not fit the size.
     """
+    if message.encoding in _TWO_PLANES:
+        return _from_two_planes(message)
     if message.encoding not in _ENCODINGS:
         deep = "16" in message.encoding or "32" in message.encoding or "64" in message.encoding
         why = "has more than 8 bits a channel" if deep else "is not known"
-        raise FrameError(f"image encoding {message.encoding[:60]!r} {why}: use one of {', '.join(_ENCODINGS)}")
+        raise FrameError(
+            f"image encoding {quoted(message.encoding)} {why}: use one of {', '.join((*_ENCODINGS, *_TWO_PLANES))}"
+        )
     pixel_bytes, to_bgr = _ENCODINGS[message.encoding]
     picture = _pixels(message, pixel_bytes)
     if to_bgr is None:
@@ -54,13 +65,25 @@ def bgr_image(message: Image) -> NDArray[np.uint8]:
     return np.asarray(cv2.cvtColor(np.ascontiguousarray(picture), to_bgr), np.uint8)
 
 
-def _pixels(message: Image, pixel_bytes: int) -> NDArray[np.uint8]:
-    """Return a view of ``message`` as (height, width, pixel_bytes), without the padding at the end of each row."""
-    height, width, step = message.height, message.width, message.step
+def _from_two_planes(message: Image) -> NDArray[np.uint8]:
+    if message.width % 2 or message.height % 2:
+        raise FrameError(
+            f"a {message.encoding} image has squares of pixels, it cannot be of {message.width}x{message.height}"
+        )
+    planes = np.ascontiguousarray(_pixels(message, 1, message.height * 3 // 2))
+    return np.asarray(cv2.cvtColor(planes, _TWO_PLANES[message.encoding]), np.uint8)
+
+
+def _pixels(message: Image, pixel_bytes: int, rows: int | None = None) -> NDArray[np.uint8]:
+    """Return a view of ``message`` as (rows, width, pixel_bytes), without the padding at the end of each row.
+
+    ``rows`` is the height by default.
+    """
+    height, width, step = message.height if rows is None else rows, message.width, message.step
     row = width * pixel_bytes
     if not (height > 0 and width > 0):
         raise FrameError(f"an image of {width}x{height} has no pixels")
-    if height * width > MOST_PIXELS:
+    if message.height * width > MOST_PIXELS:
         raise FrameError(f"an image of {width}x{height}: it should have at most {MOST_PIXELS} pixels")
     # The last row needs no padding after it.
     if step < row or not step * (height - 1) + row <= message.data.size <= step * height:

@@ -118,25 +118,30 @@ def make_control(
     """Return the node ``hand_sign_control``.
 
     ``simulated`` is whether the robot is known to be simulated; ``control.arming`` and ``control.engage`` are then off
-    if they are ``auto``. ``others_keep_stop`` is whether nodes of other processes may remember a Stop.
+    if they are ``auto`` or ``course``. ``others_keep_stop`` is whether nodes of other processes may remember a Stop.
     """
     from handsteer.nodes.control import HandSignControlNode
 
-    def is_on(choice: str) -> bool:
-        return choice == "on" or (choice == "auto" and not simulated)
-
     topics = {"cmd_vel": cmd_vel_topic(config), **topics}
+    of_course = _is_the_courses(topics["cmd_vel"], transport)
+    choices = {"on": True, "off": False, "auto": not simulated, "course": not (simulated or of_course)}
     return HandSignControlNode(
         transport,
         clock,
         config.control,
         collision_monitor=config.collision_monitor,
         gamepad=config.joy,
-        arming=is_on(config.control.arming),
-        engage=is_on(config.control.engage),
+        arming=choices[config.control.arming],
+        engage=choices[config.control.engage],
         others_keep_stop=others_keep_stop,
         **topics,
     )
+
+
+def _is_the_courses(cmd_vel: Topic[Any], transport: Transport) -> bool:
+    """Return whether commands go where the simulated robot of the ROS 101 course has them, in its namespace or none."""
+    namespace = _namespace(transport, "hand_sign_control")
+    return transport.topic_name(cmd_vel) in (CMD_VEL.name, f"/{namespace}{CMD_VEL.name}")
 
 
 def make_robot(
@@ -208,8 +213,13 @@ def frame_prefix(transport: Transport, node: str) -> str:
 
     It is empty without a namespace, and if ``/tf`` is remapped so that each robot has its own tree.
     """
-    namespace = transport.full_name(node).partition(":")[0].rpartition("/")[0]
+    namespace = _namespace(transport, node)
     return f"{namespace}/" if namespace and transport.topic_name(TF) == TF.name else ""
+
+
+def _namespace(transport: Transport, node: str) -> str:
+    """Return the namespace of ``node``, such as ``r1``; empty without one."""
+    return transport.full_name(node).partition(":")[0].rpartition("/")[0].strip("/")
 
 
 def prefixed(config: RobotConfig, transport: Transport) -> RobotConfig:

@@ -151,7 +151,8 @@ SELECTED_ROBOT = Topic("/selected_robot", String, latched=True)
 STOP = Topic("/stop", Bool, depth=10)
 # The state of /stop that each node remembers and publishes, for nodes that restart.
 STOPPED = Topic("/stopped", Bool, latched=True)
-STEERING_CMD_VEL = Topic("/steering/cmd_vel", Twist, lifespan_s=STALE_S, stops=is_zero)
+# A pad begins with a zero, which must not be replaced by the deflection that follows.
+STEERING_CMD_VEL = Topic("/steering/cmd_vel", Twist, depth=10, lifespan_s=STALE_S, stops=is_zero)
 ODOM = Topic("/robot_diff_drive_controller/odom", Odometry)
 TF = Topic("/tf", TFMessage, is_global=True, depth=10)
 JOINT_STATES = Topic("/joint_states", JointState)

@@ -10,7 +10,8 @@ from typing import Any, Final
 
 import yaml
 
-from handsteer.errors import HandsteerError
+from handsteer.errors import HandsteerError, quoted
+from handsteer.regular_files import open_regular
 
 LARGEST_BYTES: Final = 1_000_000
 """Size of a text; the largest that is shipped has 4 kB."""
@@ -86,7 +87,7 @@ def read(path: Path, source: str, error: type[HandsteerError], unreadable: str) 
         HandsteerError: As :func:`parse`, or the file cannot be read.
     """
     try:
-        with path.open("rb") as file:
+        with open_regular(path) as file:
             content = file.read(LARGEST_BYTES + 1)
     except OSError as problem:
         raise error(f"{unreadable}: {problem.strerror}") from None
@@ -103,7 +104,7 @@ def line_of(path: Path, place: Sequence[str | int]) -> int | None:
     None if it is not there, or the file can no longer be read.
     """
     try:
-        with path.open("rb") as file:
+        with open_regular(path) as file:
             text = file.read(LARGEST_BYTES).decode("utf-8-sig")
         _look_through(text)
         node = yaml.compose(text, _Loader)
@@ -167,15 +168,11 @@ def _check_scalar(event: Any) -> None:
         raise _ProblemError(f"a number of {len(event.value)} characters: {LONGEST_NUMBER} are enough", event.start_mark)
     if tag not in (f"{_TAG}str", found) and not (tag == f"{_TAG}float" and found == f"{_TAG}int"):
         name = tag.removeprefix(_TAG)
-        raise _ProblemError(f"{_short(event.value)} cannot be read as !!{name}", event.start_mark)
+        raise _ProblemError(f"{quoted(event.value)} cannot be read as !!{name}", event.start_mark)
 
 
 def _unknown_tag(event: Any) -> _ProblemError:
-    return _ProblemError(f"the tag {_short(event.tag)} is not read here: leave it out", event.start_mark)
-
-
-def _short(text: str) -> str:
-    return repr(text if len(text) <= 40 else f"{text[:37]}...")
+    return _ProblemError(f"the tag {quoted(event.tag)} is not read here: leave it out", event.start_mark)
 
 
 class _Resolver(yaml.resolver.BaseResolver):

@@ -35,9 +35,6 @@ HEAR_STOP_S: Final = 3.0
 """A control that starts waits no longer than this to hear from other nodes whether a Stop stands. Over Fast DDS, what a
 node has published before it arrives up to 2.2 s after the start (measured over 8 starts)."""
 
-STEERING_AT_START_S: Final = 2.0
-"""Steering first received later than this after the start was not held before it."""
-
 DISTRUST_S: Final = 0.1
 """For this long after a stall of the process, messages may still come from sockets and queues, and are ignored."""
 

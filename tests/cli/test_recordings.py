@@ -14,6 +14,7 @@ from handsteer.recordings.mcap_reader import McapFile
 from handsteer.replay.compare import Comparison, compare
 from handsteer.replay.rerun import recorded_config, rerun
 from tests.processes import Process, eventually
+from tests.reasons import check
 
 KILLS = int(os.environ.get("HANDSTEER_KILLS", "3"))
 MOST_LOST_S = 1.0
@@ -52,6 +53,7 @@ def test_after_kill_9_all_but_the_last_second_is_read(tmp_path: Path) -> None:
         assert killed_s - last_s < MOST_LOST_S, process.text
         assert list(compare(rerun(file, recorded_config(file)), comparison, file.began_s)) == []
         assert comparison.signs > 5
+        check(path)
 
 
 @pytest.mark.slow
@@ -64,6 +66,7 @@ def test_a_recording_ends_with_ctrl_c_and_is_whole(tmp_path: Path) -> None:
     file = McapFile(path)
     assert sum(recorded.topic == HAND_SIGN.name for recorded in file.messages()) > 5
     assert file.problem is None
+    check(path)
 
 
 @pytest.mark.slow

@@ -34,7 +34,8 @@ class Mux(Bench):
         self.reports = self.record(DIAGNOSTICS)
 
     def let_go(self) -> None:
-        """Show once that no hand is there, and let that time out."""
+        """Show once that no hand is there, and that the stick is released, and let that time out."""
+        self._steering.publish(twist(*ZERO))
         self._signs.publish(String(data="NONE"), self.clock.now())
         self.run(LONGER_THAN_A_TIMEOUT_S)
         self._came.clear()
@@ -128,6 +129,9 @@ def test_a_lock_can_be_given_free_again(mux: Mux) -> None:
     mux.lock(locked=True)
     mux.lock(locked=False)
     mux.run(LONGER_THAN_A_TIMEOUT_S)
+    mux.speak(steering=STEERED)
+    assert set(mux.take()) == {ZERO}, "unlike twist_mux's, our steering has to be seen released"
+    mux.speak(steering=ZERO, seconds=PERIOD_S)
     mux.speak(steering=STEERED)
     assert mux.take()[-1] == STEERED
 

@@ -103,6 +103,15 @@ def test_a_higher_limit_says_nothing_and_speeds_up_nothing() -> None:
     assert driver.step(DT, sign=GO) == Velocity(0.2, 0.0)
 
 
+def test_a_limit_that_is_lowered_and_raised_again_makes_nothing_faster() -> None:
+    """The guard: ``clamped`` in ``SignControl.reconfigure``."""
+    driver = TwistMux(ControlConfig(linear_step=0.5))
+    driver.step(DT, sign=FORWARD)
+    driver.reconfigure(ControlConfig(max_linear=0.2))
+    assert driver.reconfigure(ControlConfig(max_linear=10.0)) is None
+    assert driver.step(DT, sign=GO) == Velocity(0.2, 0.0)
+
+
 def test_steering_is_clamped_by_a_lower_limit_at_once() -> None:
     driver = TwistMux(ControlConfig())
     driver.step(DT, steering=Velocity(-0.8, 1.0))
@@ -159,3 +168,23 @@ def test_a_time_that_cannot_be_stops_it_until_neutral_was_seen(dt_s: float) -> N
     assert control.step(dt_s, sign="Forward") == ZERO
     assert control.step(DT, sign="Forward") == ZERO
     assert drives(control).linear_mps > 0
+
+
+def test_a_hand_that_is_disengaged_between_two_frames_stops_at_once() -> None:
+    """The guard: ``engaged`` in ``Control.step``."""
+    control = Control(ControlConfig(), arming=False, engage=True)
+    control.safety.engagement.engaged = True
+    velocity = control.step(DT, sign=FORWARD)
+    assert velocity is not None
+    assert velocity.linear_mps > 0
+    control.safety.fault("a fault")
+    assert control.step(DT) == ZERO
+
+
+def test_when_steering_is_ended_signs_start_from_standing() -> None:
+    """The guard: the signs are halted in ``TwistMux.halt``."""
+    driver = TwistMux(ControlConfig())
+    for _ in range(20):
+        driver.step(DT, sign=FORWARD)
+    driver.halt()
+    assert driver.step(DT, sign=FORWARD) == Velocity(0.01, 0.0)

@@ -38,6 +38,7 @@ class Onlooker:
     sign_s: float = -math.inf
     steered_s: float = -math.inf
     steering_asks: bool = False
+    steering_was_released: bool = False
     was_released: bool = False
     neutral_s: float = 0.0
     palm_s: float = 0.0
@@ -50,6 +51,21 @@ class Onlooker:
         self.palm_s, self.palm_seen_s = 0.0, -math.inf
         if disarms:
             self.neutral_s = 0.0
+
+    def hold_up(self, *, disarms: bool) -> None:
+        """Something happened after which what steers has to be released too."""
+        self.interrupt(disarms=disarms)
+        self.steering_was_released = False
+
+    def steer(self, speed: float, timeout_s: float) -> None:
+        """A pad says how far it is pushed."""
+        is_lost = self.steering_asks and self.now_s - self.steered_s >= timeout_s - _SLACK
+        self.steered_s, self.steering_asks = self.now_s, speed != 0.0
+        self.was_released = False
+        if speed == 0.0:
+            self.steering_was_released = True
+        elif is_lost or not math.isfinite(speed):
+            self.steering_was_released = False
 
     def wait(self, seconds: float, timeout_s: float) -> None:
         """Time passes."""
@@ -87,7 +103,10 @@ class Onlooker:
         """Return why ``source`` must not move the robot now; None if it may."""
         if source == "steering":
             live = self.now_s - self.steered_s < config.steering_timeout + _SLACK
-            reasons = {"nobody steers": not live or not self.steering_asks}
+            reasons = {
+                "nobody steers": not live or not self.steering_asks,
+                "what steers was not released before": not self.steering_was_released,
+            }
         else:
             reasons = {
                 "no frame has come for a while": self.now_s - self.hand_s >= config.sign_timeout + _SLACK,
@@ -173,6 +192,7 @@ class Histories(RuleBasedStateMachine):
 
     @rule()
     def steer_for_a_moment_while_the_fist_is_closed(self) -> None:
+        self.steer(0.0, 1, 0.1)
         self.steer(0.5, 2, 0.1)
         self.drive_on("Go")
         self.drive_on("Go")
@@ -204,8 +224,7 @@ class Histories(RuleBasedStateMachine):
     )
     def steer(self, speed: float, count: int, period_s: float) -> None:
         for _ in range(count):
-            self.onlooker.steered_s, self.onlooker.steering_asks = self.onlooker.now_s, speed in {0.5, -0.5}
-            self.onlooker.was_released = False
+            self.onlooker.steer(speed, self.config.steering_timeout)
             self.look(self.control.step(0.0, steering=Velocity(speed, 0.0)))
             self.pass_time(period_s)
 
@@ -218,13 +237,13 @@ class Histories(RuleBasedStateMachine):
     @rule()
     def reset(self) -> None:
         if self.onlooker.is_stopped:
-            self.onlooker.interrupt()
+            self.onlooker.hold_up(disarms=True)
         self.onlooker.is_stopped = False
         self.control.reset()
 
     @rule()
     def the_robot_is_away(self) -> None:
-        self.onlooker.interrupt(disarms=self.onlooker.arming)
+        self.onlooker.hold_up(disarms=self.onlooker.arming)
         self.control.safety.robot_is_away("nobody listens")
         self.look(self.control.halt())
 
@@ -232,14 +251,14 @@ class Histories(RuleBasedStateMachine):
     def change_the_rule(self, mode: str, by: str) -> None:
         config = self.config.model_copy(update={"mode": mode, "rule": by})
         if (mode, by) != (self.config.mode, self.config.rule):
-            self.onlooker.interrupt()
+            self.onlooker.hold_up(disarms=True)
             self.onlooker.mode = mode
         self.config = config
         self.look(self.control.reconfigure(config))
 
     @rule(dt_s=st.sampled_from([-1.0, math.nan, math.inf]))
     def the_clock_is_wrong(self, dt_s: float) -> None:
-        self.onlooker.interrupt(disarms=self.onlooker.arming)
+        self.onlooker.hold_up(disarms=self.onlooker.arming)
         self.look(self.control.step(dt_s, sign="Forward", stick=Stick(held=True, forward=1.0)))
 
 

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from handsteer.config import ControlConfig
 from handsteer.control.safety import Allowance, Engagement, Following, Ramp, Safety
-from handsteer.timeouts import ARMING_S, FAULT_GAP_S, NEUTRAL_S, STEERING_AT_START_S
+from handsteer.timeouts import ARMING_S, DISENGAGE_S, FAULT_GAP_S, NEUTRAL_S
 from handsteer.types import ZERO, Velocity
 
 FRAME_S = 1 / 30
@@ -134,21 +134,68 @@ def test_steering_that_was_held_since_before_the_start_has_to_let_go() -> None:
     assert safety.admits_steering(is_zero=False)
 
 
-def test_without_arming_a_pause_of_the_steering_is_letting_go() -> None:
-    safety = Safety(CONFIG, arming=False)
+@pytest.mark.parametrize("arming", [False, True])
+@pytest.mark.parametrize("silent_s", [0.0, 2.1, 600.0])
+def test_no_clock_stands_for_a_release(arming: bool, silent_s: float) -> None:
+    safety = Safety(CONFIG, arming=arming)
+    safety.step(silent_s)
+    assert not safety.admits_steering(is_zero=False), "its first command is already deflected"
     safety.disarm()
-    assert safety.admits_steering(is_zero=False)
-    safety.disarm()
-    safety.step(0.1)
+    safety.step(silent_s)
     assert not safety.admits_steering(is_zero=False)
     safety.step(CONFIG.steering_timeout)
+    assert not safety.admits_steering(is_zero=False)
+    assert safety.admits_steering(is_zero=True)
+    safety.step(silent_s)
+    assert safety.admits_steering(is_zero=False), "it was released before it fell silent"
+
+
+@pytest.mark.parametrize(
+    "happens",
+    [
+        lambda safety: safety.disarm("the camera was changed"),
+        lambda safety: safety.robot_is_away("no robot listens"),
+        lambda safety: safety.stall("the control was stalled"),
+        lambda safety: (safety.stop(), safety.reset()),
+        lambda safety: safety.admits_steering(is_zero=False, is_valid=False),
+    ],
+    ids=["disarm", "robot is away", "stall", "reset", "no number"],
+)
+@pytest.mark.parametrize("arming", [False, True])
+def test_a_pad_that_is_held_while_something_happens_has_to_be_released(
+    happens: Callable[[Safety], None], arming: bool
+) -> None:
+    safety = Safety(CONFIG, arming=arming)
+    safety.admits_steering(is_zero=True)
+    assert safety.admits_steering(is_zero=False)
+    happens(safety)
+    assert not safety.admits_steering(is_zero=False)
+    assert safety.steering_waits
+    safety.admits_steering(is_zero=True)
     assert safety.admits_steering(is_zero=False)
 
 
-def test_a_key_that_is_pressed_some_time_after_the_start_steers_at_once() -> None:
+def test_a_pad_that_falls_silent_while_it_is_deflected_has_to_be_released() -> None:
+    """The guard: ``is_lost`` in ``Release.admits``."""
     safety = Safety(CONFIG, arming=True)
-    safety.step(STEERING_AT_START_S)
+    safety.admits_steering(is_zero=True)
     assert safety.admits_steering(is_zero=False)
+    safety.step(CONFIG.steering_timeout)
+    assert not any(safety.admits_steering(is_zero=False) for _ in range(5))
+
+
+def test_the_camera_alone_does_not_stop_the_pad() -> None:
+    safety = Safety(CONFIG, arming=True)
+    safety.admits_steering(is_zero=True)
+    safety.fault("no sign came")
+    assert safety.admits_steering(is_zero=False)
+
+
+def test_a_gamepad_at_rest_does_not_release_the_pad() -> None:
+    safety = Safety(CONFIG, arming=True)
+    safety.note_rest("gamepad")
+    assert not safety.admits_steering(is_zero=False)
+    assert safety.admits_steering(is_zero=False, by="gamepad")
 
 
 EVENTS = st.lists(
@@ -184,6 +231,16 @@ def test_a_robot_whose_odometry_stops_is_not_there() -> None:
     assert following.step(0.2, Velocity(0.5, 0.0)) == "the robot's odometry has stopped"
     following.note(Velocity(0.5, 0.0))
     assert following.step(0.02, Velocity(0.5, 0.0)) is None
+
+
+def test_where_motion_is_not_checked_silence_still_is() -> None:
+    following = Following(checks_motion=False)
+    for _ in range(200):
+        following.note(ZERO)
+        assert following.step(0.02, Velocity(1.0, 0.0)) is None
+    assert not following.is_silent
+    assert following.step(0.5, Velocity(1.0, 0.0)) == "the robot's odometry has stopped"
+    assert following.is_silent
 
 
 @pytest.mark.parametrize("commanded", [Velocity(0.5, 0.0), Velocity(-0.5, 0.0), Velocity(0.0, 1.0)])
@@ -329,6 +386,54 @@ def test_a_stop_and_every_fault_disengage(end: Callable[[Safety], None], arming:
     assert not safety.engagement.engaged
 
 
+def test_a_stop_holds_against_a_released_joystick_and_its_reset_requires_another_release() -> None:
+    """The guards: ``is_stopped`` in ``admits_stick``, and the disarming in ``reset``."""
+    safety = Safety(ControlConfig(), arming=False)
+    safety.admits_stick(held=False)
+    safety.stop()
+    safety.admits_stick(held=False)
+    assert not safety.admits_stick(held=True)
+    show(safety, "Stop")
+    safety.reset()
+    assert safety.signs_wait == ""
+    assert not safety.admits_stick(held=True)
+    show(safety, "Stop")
+    assert not safety.admits_stick(held=True), "it was not released since the reset"
+    safety.admits_stick(held=False)
+    assert safety.admits_stick(held=True)
+
+
+def test_the_time_between_two_palms_with_a_gap_does_not_engage() -> None:
+    """The guard: ``FAULT_GAP_S`` in ``note_sign``."""
+    engagement = Engagement(enabled=True)
+    palm(engagement, 0.7)
+    engagement.step(FAULT_GAP_S)
+    engagement.note_sign("Stop")
+    assert not palm(engagement, 0.5)
+    assert palm(engagement, 0.6)
+
+
+def test_an_idle_hand_disengages_while_frames_come() -> None:
+    """The guard: ``DISENGAGE_S`` in ``Engagement.step``."""
+    safety = Safety(ControlConfig(), arming=False, engage=True)
+    show_and_note(safety, "Stop", 1.1)
+    assert show_and_note(safety, "Forward", 0.1)
+    show_and_note(safety, "NONE", DISENGAGE_S - 0.2)
+    assert show_and_note(safety, "Forward", 0.1)
+    show_and_note(safety, "NONE", DISENGAGE_S + 0.1)
+    assert not show_and_note(safety, "Forward", 0.1)
+
+
+def show_and_note(safety: Safety, sign: str, seconds: float) -> bool:
+    """Show a sign, which may also engage; return whether it may be followed in the end."""
+    admitted = False
+    for _ in range(round(seconds / FRAME_S)):
+        safety.step(FRAME_S)
+        safety.engagement.note_sign(sign)
+        admitted = safety.admits_sign(sign, stops=sign in {"Stop", "NONE"})
+    return admitted
+
+
 def test_a_held_joystick_is_followed_only_after_it_was_released() -> None:
     safety = Safety(ControlConfig(), arming=False)
     assert not any(safety.admits_stick(held=True) for _ in range(10))
@@ -339,3 +444,56 @@ def test_a_held_joystick_is_followed_only_after_it_was_released() -> None:
     safety.admits_stick(held=False)
     safety.admits_steering(is_zero=False)
     assert not safety.admits_stick(held=True), "it was steered meanwhile"
+
+
+def test_a_stop_holds_against_steering_that_was_seen_released() -> None:
+    """The guard: ``is_stopped`` in ``admits_steering``."""
+    safety = Safety(CONFIG, arming=False)
+    safety.stop()
+    assert not safety.admits_steering(is_zero=True)
+    assert not safety.admits_steering(is_zero=False)
+    assert not safety.steering_waits
+
+
+def test_a_joystick_that_was_released_drives_nothing_while_the_hand_is_not_engaged() -> None:
+    """The guard: ``engaged`` in ``admits_stick``."""
+    safety = Safety(CONFIG, arming=False, engage=True)
+    safety.admits_stick(held=False)
+    assert not safety.admits_stick(held=True)
+    free = Safety(CONFIG, arming=False)
+    free.admits_stick(held=False)
+    assert free.admits_stick(held=True)
+
+
+def test_empty_pictures_that_come_seldom_count_as_one_frame_each() -> None:
+    """The guard: ``MOST_OF_ONE_NONE_S`` in ``_note_none``."""
+    safety = Safety(CONFIG, arming=True)
+    show(safety, "Forward", ARMING_S)
+    show(safety, "NONE", 1.0, period_s=0.25)
+    assert not show(safety, "Forward")
+    show(safety, "NONE", 2.0, period_s=0.25)
+    assert show(safety, "Forward")
+
+
+def test_odometry_that_is_no_number_is_none() -> None:
+    """The guard: ``is_finite`` in ``Following.note``."""
+    following, said = Following(), []
+    following.note(Velocity(0.5, 0.0))
+    for _ in range(30):
+        following.note(Velocity(math.nan, 0.0))
+        said.append(following.step(0.02, Velocity(0.5, 0.0)))
+    assert said[-1] == "the robot's odometry has stopped"
+
+
+def test_allowance_that_was_not_used_expires() -> None:
+    """The guard: ``BURST_S`` in ``Allowance.step``."""
+    allowance = Allowance(60.0)
+    allowance.step(100.0)
+    assert sum(allowance.take() for _ in range(1000)) == 60.0 * Allowance.BURST_S
+
+
+def test_a_limit_of_jerk_lets_acceleration_grow_slowly() -> None:
+    """The guard: ``max_jerk`` in ``_Axis.step``."""
+    ramp = Ramp(ControlConfig(max_linear_jerk=2.0))
+    speeds = [ramp.step(Velocity(1.0, 0.0), 0.1).linear_mps for _ in range(4)]
+    assert speeds == [pytest.approx(0.02), pytest.approx(0.06), pytest.approx(0.12), pytest.approx(0.2)]

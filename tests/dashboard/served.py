@@ -53,8 +53,8 @@ class Site:
     def __init__(self, **config: Any) -> None:
         self.clock = RealClock()
         self.transport = InProcessTransport()
-        steering = SteeringNode(self.transport, self.clock)
-        self.dashboard = Dashboard(self.transport, self.clock, steering, DashboardConfig(**{"port": 0, **config}))
+        self.steering = SteeringNode(self.transport, self.clock)
+        self.dashboard = Dashboard(self.transport, self.clock, self.steering, DashboardConfig(**{"port": 0, **config}))
         self.pictures = self.transport.advertise("hand_sign_recognition", IMAGE_ANNOTATED)
         self.reports = self.transport.advertise("robot", DIAGNOSTICS)
         self.image: NDArray[np.uint8] = np.full((480, 640, 3), (40, 160, 220), np.uint8)

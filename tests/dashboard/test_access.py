@@ -12,6 +12,7 @@ import pytest
 import websockets
 from hypothesis import given
 from hypothesis import strategies as st
+from nicegui import Client
 
 from handsteer.config import DashboardConfig
 from handsteer.dashboard.access import Access
@@ -251,3 +252,47 @@ def test_recordings_are_for_those_with_the_token_only(open_site: Site) -> None:
     for path in ("/recordings/drive.mcap", "/recordings/drive.mcap/report"):
         assert open_site.get(path).status == 401
         assert open_site.get(path, Authorization=f"Bearer {token_of(open_site)}").status == 404
+
+
+@pytest.mark.parametrize("frame", ["IFRAME", "Frame", " iframe ", "OBJECT", "document, iframe"])
+def test_frames_are_refused_in_any_case_of_letters(site: Site, frame: str) -> None:
+    assert site.get("/", **{"Sec-Fetch-Dest": frame}).status == 403
+
+
+@pytest.mark.parametrize("there", ["cross-site", "Cross-Site", "SAME-SITE", "none, cross-site", "nonsense"])
+def test_other_sites_are_refused_in_any_case_of_letters(site: Site, there: str) -> None:
+    assert site.get("/", **{"Sec-Fetch-Site": there, "Sec-Fetch-Mode": "no-cors"}).status == 403
+    assert site.get("/", **{"Sec-Fetch-Site": "SAME-ORIGIN", "Sec-Fetch-Mode": "no-cors"}).status == 200
+
+
+HOSTS = ("", "a, b", "127.0.0.1, evil.example", "127.0.0.1 a", "user@127.0.0.1", "127.0.0.1/x", "127.0.0.1:x", "[::1")
+
+
+@pytest.mark.parametrize("host", HOSTS)
+def test_a_host_that_is_none_is_refused(site: Site, host: str) -> None:
+    assert site.get("/", Host=host).status == 400
+
+
+def test_two_hosts_are_refused(site: Site) -> None:
+    with socket.create_connection(("127.0.0.1", site.port), PATIENCE_S) as connection:
+        own = f"Host: 127.0.0.1:{site.port}\r\n"
+        connection.sendall(f"GET /settings HTTP/1.1\r\n{own}{own}Connection: close\r\n\r\n".encode())
+        assert b" 400 " in connection.recv(100)
+
+
+@pytest.mark.parametrize("there", ["cross-site", "same-site", "CROSS-SITE"])
+@pytest.mark.parametrize(("language", "words"), [("en", "Continue to handsteer"), ("de-CH, en;q=0.5", "Weiter zu")])
+def test_a_link_of_another_site_builds_no_page_but_leads_to_it(
+    site: Site, there: str, language: str, words: str
+) -> None:
+    pages = len(Client.instances)
+    navigation = {"Sec-Fetch-Mode": "navigate", "Sec-Fetch-Dest": "document", "Accept-Language": language}
+    answer = site.get("/settings?a=%22%3E%3Cscript%3E", **navigation, **{"Sec-Fetch-Site": there})
+    text = answer.read().decode()
+    assert answer.status == 200
+    assert f'<a href="/settings?a=%22%3E%3Cscript%3E">{words}' in text
+    assert len(Client.instances) == pages
+    assert site.get("/settings", **navigation, **{"Sec-Fetch-Site": "same-origin"}).status == 200
+    assert len(Client.instances) == pages + 1
+    door = site.get("//evil.example/%22%3E", **navigation, **{"Sec-Fetch-Site": there}).read().decode()
+    assert '<a href="/evil.example/%22%3E">' in door

@@ -1,5 +1,6 @@
 """A crowd of silent connections leaves room for who stops the robot; with real sockets."""
 
+import asyncio
 import contextlib
 import http.client
 import resource
@@ -89,3 +90,57 @@ def test_a_handshake_of_https_that_does_not_come_is_not_waited_for(tmp_path: Pat
             assert connection.getresponse().status == 200
     finally:
         site.close()
+
+
+class Line(asyncio.Transport):
+    """A connection of which only the address and the end are known."""
+
+    def __init__(self, address: str, port: int) -> None:
+        super().__init__({"peername": (address, port)})
+        self.is_aborted = False
+
+    def is_closing(self) -> bool:
+        return self.is_aborted
+
+    def abort(self) -> None:
+        self.is_aborted = True
+
+
+def test_only_so_many_unknown_connections_stay_open_and_known_ones_all() -> None:
+    """The guard: the limits in ``Connections.add``."""
+
+    async def come() -> tuple[Line, list[int]]:
+        connections, viewer = limits.Connections(), Line("192.0.2.1", 1)
+        connections.add(viewer)
+        with connections.serving(("192.0.2.1", 1), is_known=True):
+            pass
+        crowds = [
+            [Line("198.51.100.1", port) for port in range(300)],
+            [Line(f"203.0.113.{port % 100}", port) for port in range(300)],
+        ]
+        counts = []
+        for crowd in crowds:
+            for line in crowd:
+                connections.add(line)
+            counts.append(sum(not line.is_aborted for each in crowds for line in each))
+        return viewer, counts
+
+    viewer, counts = asyncio.run(come())
+    assert not viewer.is_aborted
+    assert counts[0] - 300 <= limits.MOST_OF_ONE_ADDRESS
+    assert counts[1] <= limits.MOST_UNKNOWN
+
+
+def test_a_silent_connection_is_closed_in_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The guard: ``close_if_silent``."""
+    monkeypatch.setattr(limits, "FIRST_REQUEST_S", 0.0)
+
+    async def come() -> list[bool]:
+        connections, lines = limits.Connections(), [Line("192.0.2.1", port) for port in (1, 2)]
+        for line in lines:
+            connections.add(line)
+        with connections.serving(("192.0.2.1", 1), is_known=False):
+            await asyncio.sleep(0.01)
+        return [line.is_aborted for line in lines]
+
+    assert asyncio.run(come()) == [False, True]

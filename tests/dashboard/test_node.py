@@ -199,20 +199,49 @@ def test_knows_the_robots_shape_and_joints(bench: Bench) -> None:
 
 
 def test_steers_as_long_as_the_pad_is_held(bench: Bench) -> None:
+    bench.node.steer("me", 0.0, 0.0)
     for _ in range(10):
         bench.node.steer("me", 0.3, -0.2)
         bench.step(HOLD_TIMEOUT_S / 2)
-    assert set(bench.steered) == {(0.3, -0.2)}
+    assert set(bench.steered[1:]) == {(0.3, -0.2)}
+
+
+def test_a_pad_that_was_held_already_has_to_be_released_and_the_page_says_that(bench: Bench) -> None:
+    for _ in range(10):
+        bench.node.steer("me", 0.3, 0.0)  # the page's process has started again, say
+        bench.step(HOLD_TIMEOUT_S / 2)
+    assert set(bench.steered) == {(0.0, 0.0)}
+    assert bench.node.state("me").reason == "the steering is held: release it first"
+    bench.node.release("me")
+    press(bench, "me", 0.3)
+    assert bench.steered[-1] == (0.3, 0.0)
+
+
+def test_a_pad_whose_messages_were_held_up_has_to_be_released(bench: Bench) -> None:
+    press(bench, "me", 0.3)
+    for _ in range(5):
+        bench.step(0.1)
+    for _ in range(5):
+        bench.node.steer("me", 0.3, 0.0)
+        bench.step(0.1)
+        assert bench.steered[-1] == (0.0, 0.0)
+
+
+def press(bench: Bench, viewer: str, linear_mps: float) -> None:
+    """Touch the pad: the page sends a zero first."""
+    bench.node.steer(viewer, 0.0, 0.0)
+    bench.node.steer(viewer, linear_mps, 0.0)
+    bench.steered.remove((0.0, 0.0))
 
 
 def test_stops_at_once_when_the_pad_is_let_go(bench: Bench) -> None:
-    bench.node.steer("me", 0.3, 0.0)
+    press(bench, "me", 0.3)
     bench.node.release("me")
     assert bench.steered == [(0.3, 0.0), (0.0, 0.0)]
 
 
 def test_stops_when_the_page_falls_silent_with_the_pad_held(bench: Bench) -> None:
-    bench.node.steer("me", 0.3, 0.0)
+    press(bench, "me", 0.3)
     for _ in range(6):
         bench.step(0.1)
     assert bench.steered[-1] == (0.0, 0.0)
@@ -222,23 +251,35 @@ def test_stops_when_the_page_falls_silent_with_the_pad_held(bench: Bench) -> Non
 
 
 def test_one_viewer_cannot_stop_what_another_one_steers(bench: Bench) -> None:
-    bench.node.steer("me", 0.3, 0.0)
+    press(bench, "me", 0.3)
     bench.node.release("you")
     assert bench.steered == [(0.3, 0.0)]
 
 
 def test_who_watches_cannot_steer_until_the_driver_has_left(bench: Bench) -> None:
-    bench.node.steer("driver", 0.3, 0.0)
+    press(bench, "driver", 0.3)
     bench.node.steer("watcher", -0.4, 0.0)
     assert bench.steered == [(0.3, 0.0)]
     bench.node.leave("driver")
     assert bench.steered[-1] == (0.0, 0.0)
     bench.node.steer("watcher", -0.4, 0.0)
+    assert bench.steered[-1] == (0.0, 0.0), "that pad was held before"
+    press(bench, "watcher", -0.4)
     assert bench.steered[-1] == (-0.4, 0.0)
 
 
+def test_who_watches_cannot_reset(bench: Bench) -> None:
+    """The guard: the control lease in ``reset``."""
+    press(bench, "driver", 0.3)
+    bench.node.halt("watcher")
+    bench.node.reset("watcher")
+    assert bench.steering.is_stopped
+    bench.node.reset("driver")
+    assert not bench.steering.is_stopped
+
+
 def test_the_robot_stops_when_another_takes_over(bench: Bench) -> None:
-    bench.node.steer("driver", 0.3, 0.0)
+    press(bench, "driver", 0.3)
     bench.node.lease.ask("watcher", bench.clock.now())
     bench.node.lease.answer("driver", hand_over=True)
     bench.node.steer("driver", 0.3, 0.0)
@@ -247,14 +288,14 @@ def test_the_robot_stops_when_another_takes_over(bench: Bench) -> None:
 
 
 def test_leaves_nothing_in_motion_when_it_stops(bench: Bench) -> None:
-    bench.node.steer("me", 0.3, 0.0)
+    press(bench, "me", 0.3)
     bench.node.stop()
     assert bench.steered[-1] == (0.0, 0.0)
 
 
 def test_understands_what_control_really_says(bench: Bench) -> None:
     control = HandSignControlNode(bench.transport, bench.clock, ControlConfig())
-    bench.node.steer("me", 0.3, 0.0)
+    press(bench, "me", 0.3)
     for node in (control, control, bench.node):
         bench.clock.advance(0.1)
         node.spin_once()

@@ -24,7 +24,7 @@ from handsteer.errors import ConfigError, DashboardError, FrameError, TransportE
 from handsteer.graph import Graph
 from handsteer.messages import CMD_VEL, STOP, Bool, Twist
 from handsteer.robots.editing import add, remove
-from handsteer.robots.world import load_world
+from handsteer.robots.world import World, load_world
 from handsteer.transports.base import Received
 from handsteer.types import Pose2D
 from tests.contracts.transport_contract import eventually
@@ -186,6 +186,16 @@ def test_the_world_is_changed_from_afar(near: Graph, far: RemoteGraph) -> None:
     far.reset().result(30)
 
 
+def _fail(_: World) -> World:
+    raise ValueError("no world")
+
+
+def test_a_request_that_fails_unexpectedly_is_answered_in_words(far: RemoteGraph) -> None:
+    with pytest.raises(TransportError, match="failed to do it"):
+        far.change_world(_fail).result(30)
+    far.change_world(partial(add, shape="box", robot=Pose2D(0.0, 0.0, 0.0))).result(30)
+
+
 def test_settings_reach_the_nodes_of_both_processes(near: Graph, far: RemoteGraph) -> None:
     slower = near.config.control.model_copy(update={"max_linear": 0.1})
     far.reconfigure(near.config.model_copy(update={"control": slower}))
@@ -213,6 +223,7 @@ def test_a_browsers_camera_is_offered_from_afar(near: Graph, far: RemoteGraph) -
 
 def test_steering_from_afar_drives_and_its_end_stops(near: Graph, far: RemoteGraph) -> None:
     driven = Driven(near)
+    far.steering.steer(0.0, 0.0)
 
     def drives() -> bool:
         far.steering.steer(0.2, 0.0)

@@ -1,5 +1,6 @@
 """What a stranger's script says by a page's websocket: it speaks for its own page only, and harms nothing."""
 
+import json
 import logging
 from typing import Any
 
@@ -50,6 +51,19 @@ def test_a_page_is_joined_only_by_the_browser_that_it_was_served_to(site: Site, 
     with PageSocket(site, site.page()[0], mine, query="") as socket:
         said = {"client_id": socket.client, "tab_id": "t", "document_id": "d", "next_message_id": 0}
         assert socket.answered("handshake", said) == [False]
+
+
+@pytest.mark.parametrize(
+    "argument", ["[" * 9 + "]" * 9, '{"a":' * 400 + "0" + "}" * 400, "[" * 5000, json.dumps("x" * 600_000), "nothing"]
+)
+def test_an_argument_that_is_deep_or_long_does_not_reach_the_page(site: Site, argument: str) -> None:
+    html, cookies = site.page()
+    with PageSocket(site, html, cookies) as page:
+        page.answered("event", space(html, page.client) | {"args": [argument]})
+        page.answered("event", space(html, page.client) | {"args": ["{}", argument]})
+        assert not stopped(site)
+        page.answered("event", space(html, page.client) | {"args": ["[" * 8 + "]" * 8]})
+        eventually(lambda: stopped(site), PATIENCE_S)
 
 
 MALFORMED: tuple[list[Any], ...] = (

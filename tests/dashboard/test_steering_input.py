@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from handsteer.dashboard.steering_input import SLIDERS_TIMEOUT_S, SteeringInput
+from handsteer.dashboard.steering_input import SLIDERS_TIMEOUT_S, SteeringInput, read_deflection, read_number
 from handsteer.types import ZERO, Velocity
 
 SLOW, FAST = Velocity(0.2, 0.1), Velocity(-0.4, 1.0)
@@ -103,3 +103,11 @@ def test_sliders_never_outlast_the_pages_word(events: list[tuple[str, float, flo
             heard_s = now_s
             if manual.keep_sliders(sent(now_s, late_s), now_s) is not None:
                 assert now_s - before_s <= SLIDERS_TIMEOUT_S + 1e-9
+
+
+def test_a_number_of_a_page_is_clamped() -> None:
+    """The guard: the limits in ``read_number`` and ``read_deflection``."""
+    assert [read_number(sent, -1.0, 2.0, 0.5) for sent in (9.0, -9, 10**400, float("nan"), True, "1")] == [
+        *(2.0, -1.0, 2.0, 0.5, 0.5, 0.5)
+    ]
+    assert read_deflection({"x": 1.5, "y": -0.5}) == (0.0, -0.5)

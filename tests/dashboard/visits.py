@@ -75,7 +75,7 @@ class Visit:
             if abs(state.linear_mps) + abs(state.angular_radps) > 0.01:
                 stood_s = now_s
             elif now_s - stood_s > _STANDS_S:
-                steering.release()
+                steering.steer(0.0, 0.0)
                 steering.steer(linear_mps, angular_radps)
                 stood_s = now_s
             return condition()

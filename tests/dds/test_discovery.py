@@ -7,8 +7,9 @@ import os
 import signal
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from types import MappingProxyType
 
 import pytest
 
@@ -30,9 +31,16 @@ pytestmark = pytest.mark.slow
 class Meeting(Processes):
     """A control of ours, with nothing said of the network, and a plain program, each on a machine."""
 
-    def __init__(self, home: Path, domain: int, ours: list[str], theirs: list[str]) -> None:
+    def __init__(
+        self,
+        home: Path,
+        domain: int,
+        ours: list[str],
+        theirs: list[str],
+        variables: Mapping[str, str] = MappingProxyType({}),
+    ) -> None:
         kept = {name: value for name, value in os.environ.items() if name not in ROS_VARIABLES}
-        self._env = {**kept, "ROS_DOMAIN_ID": str(domain), "PYTHONUNBUFFERED": "1"}
+        self._env = {**kept, "ROS_DOMAIN_ID": str(domain), "PYTHONUNBUFFERED": "1", **variables}
         self._ours, self._theirs, self._domain = ours, theirs, domain
         super().__init__(home)
 
@@ -68,6 +76,21 @@ def test_who_looks_at_the_subnet_is_met_on_one_machine(tmp_path: Path, first: st
         eventually(lambda: drives(peer), 15.0, what=f"messages to pass both ways: {control.text}")
         control.signal(signal.SIGTERM)
         assert control.code() == 0
+    finally:
+        meeting.stop()
+
+
+@pytest.mark.exhaustive
+@pytest.mark.parametrize("variables", [{}, {"ROS_STATIC_PEERS": "127.0.0.1"}], ids=["alone", "static peers"])
+def test_who_starts_long_after_us_is_met_too(tmp_path: Path, variables: dict[str, str]) -> None:
+    """By default, Cyclone DDS drops the addresses at which it has found no other for half a minute."""
+    meeting = Meeting(tmp_path, free_domain(), [], [], variables)
+    try:
+        control = meeting.control()
+        eventually(lambda: "is ready" in control.text)
+        time.sleep(40.0)
+        peer = meeting.peer()
+        eventually(lambda: drives(peer), 15.0, what=f"messages to pass both ways: {control.text}")
     finally:
         meeting.stop()
 

@@ -59,7 +59,7 @@ def test_ros2_sees_the_node_by_its_names_types_and_hashes(dds: DdsGraph) -> None
         "typehash=RIHS01_df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18;",
     ]
     eventually(lambda: "rt/base/cmd_vel" in dds.nodes()["/far/driver"]["writers"])
-    eventually(lambda: len(topics(dds.nodes()["/far/driver"]["readers"])) == 4)
+    eventually(lambda: len(topics(dds.nodes()["/far/driver"]["readers"])) == 5)
     eventually(lambda: len(topics(dds.nodes()["/far/driver"]["writers"])) == 6)
     node = dds.nodes()["/far/driver"]
     assert node["participant"] == "enclave=/;"
@@ -68,7 +68,8 @@ def test_ros2_sees_the_node_by_its_names_types_and_hashes(dds: DdsGraph) -> None
         *("rt/base/cmd_vel", "rt/far/audit", "rt/diagnostics", "rt/far/stopped", "rt/parameter_events", "rt/rosout")
     }
     assert topics(node["readers"]) == {
-        *("rt/far/gesture/hand_sign", "rt/far/steering/cmd_vel", "rt/far/stop", "rt/far/stopped")
+        *("rt/far/gesture/hand_sign", "rt/far/steering/cmd_vel", "rt/far/stop", "rt/far/stopped"),
+        "rt/far/robot_diff_drive_controller/odom",
     }
     assert node["readers"]["rt/far/gesture/hand_sign"] == string
     assert node["readers"]["rt/far/steering/cmd_vel"] == twist

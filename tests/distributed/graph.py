@@ -180,6 +180,11 @@ class Drive:
         """Wait until the robot drives at whatever speed."""
         self.until(lambda: self._last().speed_mps > 0.05, "the robot to drive")
 
+    def show_neutral(self, *, on: Machine | None = None) -> None:
+        """Show Stop for a while, then Forward, by a new camera on its machine; repeated, as it may not be seen yet."""
+        self.nodes.pop("camera").kill()
+        self.nodes["camera"] = self.machines.camera("Stop:3 Forward:12", on=on)
+
     def until_standing(self) -> None:
         """Wait until the robot stands."""
         self.until(lambda: abs(self._last().speed_mps) < 0.005, "the robot to stand")

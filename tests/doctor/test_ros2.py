@@ -124,6 +124,19 @@ def test_somebody_in_the_domain_looks_elsewhere(alone: Doctor, tmp_path: Path) -
 
 
 @pytest.mark.slow
+def test_a_node_that_others_do_not_find_is_reported(alone: Doctor, tmp_path: Path) -> None:
+    """We find it, as we announce ourselves on loopback; a program of ROS 2 with the default range does not."""
+    add_network_card(alone)
+    with controls(alone, tmp_path, "seen"):
+        eventually(lambda: alone.says() == "ok: domain 0, this machine: /seen", what="the node to be seen")
+        with controls(alone, tmp_path, "shy", ROS_LOCALHOST_ONLY="1"):
+            eventually(lambda: "/shy" in alone.says().splitlines()[0], what="the node to start")
+            line = "wrong: domain 0, this machine: /shy not found by programs that start now with ROS 2's default range"
+            assert line in alone.says()
+            assert alone.says(ROS_LOCALHOST_ONLY="1").startswith("ok: domain 0, this machine: /s")
+
+
+@pytest.mark.slow
 def test_no_multicast(alone: Doctor) -> None:
     assert "wrong: no multicast, which finds the nodes on the subnet: no network interface supports it" in alone.says(
         **SUBNET

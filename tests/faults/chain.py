@@ -182,12 +182,15 @@ class _Page(Node):
 
     def __init__(self, chain: Chain) -> None:
         super().__init__("page", Domain(), chain.clock)
-        self.holds_stick = False
+        self.holds_stick = self._held = False
         self._chain = chain
         self.every(0.1, self._steer)
 
     def _steer(self) -> None:
+        takes, self._held = self.holds_stick and not self._held, self.holds_stick
         if self.holds_stick and self._chain.is_well("steering"):
+            if takes:
+                self._chain.steering.steer(0.0, 0.0)  # as the page does where a pad is touched
             self._chain.steering.steer(SPEED_MPS, 0.0)
 
 

@@ -12,7 +12,7 @@ PATIENCE_S = 0.5
 SURELY_A_GAP_S = 0.6
 """A silence of this length is one for every node."""
 STICK_PAUSE_S = 0.35
-"""Steering that was silent for so long has let go."""
+"""Steering that was silent for so long, and had not let go before, has to."""
 BRIDGED_S = 0.2
 """A sign that was shown so recently may still be seen."""
 CONFIRMED_S = 0.2
@@ -36,6 +36,7 @@ class Rules:
     _hand_asked_s: float = -math.inf
     _stick_asked_s: float = -math.inf
     _stick_spoke_s: float = -math.inf
+    _stick_asks: bool = False
     _picture_s: float = -math.inf
     _hand_was_neutral: bool = False
     _stick_was_neutral: bool = False
@@ -65,10 +66,12 @@ class Rules:
             self._hand_was_neutral = True
 
     def stick(self, *, asks: bool) -> None:
-        """Somebody holds the stick, or lets go."""
+        """Somebody holds the stick, or lets go: no pause stands for that."""
         paused = self.now_s - self._stick_spoke_s >= STICK_PAUSE_S - _EPSILON_S
-        self._robot_waits = self._robot_waits and asks and not paused
-        self._stick_was_neutral = self._stick_was_neutral or paused or not asks
+        self._robot_waits = self._robot_waits and asks
+        is_lost = paused and self._stick_asks
+        self._stick_asks = asks
+        self._stick_was_neutral = not asks or (self._stick_was_neutral and not is_lost)
         self._stick_spoke_s = self.now_s
         if asks:
             self._stick_asked_s = self.now_s
@@ -87,9 +90,10 @@ class Rules:
             self._hand_was_neutral = shows_neutral
         self.is_stopped = False
 
-    def disarm(self) -> None:
-        """Something was started, frozen, or away: whoever drives has to let go before anything moves."""
-        self._hand_was_neutral = self._stick_was_neutral = False
+    def disarm(self, *, stick: bool = True) -> None:
+        """Something was started, frozen, or away: whoever drives, by the stick too, has to let go first."""
+        self._hand_was_neutral = False
+        self._stick_was_neutral = self._stick_was_neutral and not stick
         self._changes = 0
         self._stands_by_s = min(self._stands_by_s, self.now_s + PATIENCE_S)
 

@@ -226,7 +226,7 @@ class Histories(RuleBasedStateMachine):
     def freeze(self, name: str, seconds: float) -> None:
         self.graph.frozen.add(name)
         if seconds > 0.6:
-            self.oracle.disarm()
+            self.oracle.disarm(stick=name == "control")  # steering does not depend on the camera
         self.wait(seconds)
         self.graph.frozen.discard(name)
         self.wait(_TICK_S)

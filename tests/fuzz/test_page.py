@@ -20,11 +20,13 @@ from tests.fuzz.mutants import CASES, mutants
 from tests.processes import eventually
 from tests.study.plans import a_task
 
+NESTED = json.loads("[" * 500 + "]" * 500)
 VALUES: tuple[object, ...] = (
     None, True, 0, -1, 0.5, 1e308, 2**63, "", "Stop", "x" * 5000, "\x1b[2J\n", "../../etc/passwd", [], [1, 2], [[[]]],
     {}, {"value": 0}, {"value": 99}, {"value": "x"}, {"x": 1, "y": "1", "at": 1e400}, {"x": 0.1, "y": 0.2, "at": 1},
     {"name": "w.yaml", "text": corpus.ALIASES}, {"name": 1, "text": corpus.MERGES}, {"name": "w", "text": "[" * 9999},
     {"words": {"a": 1}}, {"object_id": "x", "x": "1", "y": None, "z": 1}, "rtsp://a:b@c/", "9" * 5000, ".nan",
+    NESTED, {"value": NESTED}, {"section": NESTED, "index": NESTED}, {"name": "w", "text": NESTED},
 )  # fmt: skip
 
 
@@ -64,7 +66,7 @@ def said(chance: random.Random) -> list[str]:
     return texts
 
 
-@pytest.mark.parametrize("path", ["/", "/teach", "/settings", "/study"])
+@pytest.mark.parametrize("path", ["/", "/teach", "/settings", "/study", "/world"])
 def test_nothing_that_is_said_keeps_the_page_from_stopping_the_robot(
     whole: Whole, path: str, caplog: pytest.LogCaptureFixture
 ) -> None:

@@ -97,6 +97,16 @@ def test_the_control_tells_why_the_robot_drives_and_stands() -> None:
     assert len(audit) < 12
 
 
+@pytest.mark.parametrize("shown", ["Forward", "NONE"])
+def test_the_control_tells_that_it_ends_while_the_robot_drives(shown: str) -> None:
+    bench = ControlBench()
+    audit = bench.record(AUDIT)
+    bench.show(*[shown] * 30)
+    bench.control.stop()
+    is_told = [event.about for event in events(audit) if event.code == "stands"][-1] == "ended"
+    assert is_told == (shown == "Forward")
+
+
 def test_the_control_tells_who_stops_and_resets_it() -> None:
     bench = ControlBench()
     audit = bench.record(AUDIT)

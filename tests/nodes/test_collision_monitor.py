@@ -46,10 +46,12 @@ def ahead(metres: float) -> RangeScan:
 
 
 class MonitorBench(Bench):
-    def __init__(self, rule: CollisionMonitorConfig = RULE, control: ControlConfig | None = None) -> None:
+    def __init__(
+        self, rule: CollisionMonitorConfig = RULE, control: ControlConfig | None = None, *, arming: bool = False
+    ) -> None:
         super().__init__()
         self.control = HandSignControlNode(
-            self.transport, self.clock, control or ControlConfig(), collision_monitor=rule
+            self.transport, self.clock, control or ControlConfig(), collision_monitor=rule, arming=arming
         )
         self.nodes = [self.control]
         self.signs = self.transport.advertise("recognition", HAND_SIGN)
@@ -222,6 +224,8 @@ class Drive(MonitorBench):
         self.robot = RobotNode(self.transport, self.clock, robot, RobotConfig())
         self.steering = SteeringNode(self.transport, self.clock)
         self.nodes = [self.steering, self.robot, self.control]
+        self.steering.steer(0.0, 0.0)
+        self.run(0.1)
 
     def steer(self, linear_mps: float, angular_radps: float, seconds: float) -> None:
         self.steering.steer(linear_mps, angular_radps)
@@ -281,3 +285,23 @@ def test_the_message_is_a_whole_laser_scan() -> None:
     assert 9 <= len(scans) <= 11
     assert scan.angle_min + 359 * scan.angle_increment == pytest.approx(scan.angle_max)
     assert scan.ranges[180] == pytest.approx(3.9, abs=0.01)
+
+
+def test_after_missing_scans_neutral_is_shown_first() -> None:
+    """The guard: ``why_blind`` in ``_look_after_the_robot``."""
+    bench = MonitorBench()
+    bench.show("Forward", 10, ahead(7.0))
+    bench.show("Forward", 30)
+    bench.show("Forward", 10, ahead(7.0))
+    assert bench.command[0] > 0.0, "without arming, the hand goes on"
+    bench = MonitorBench(arming=True)
+    bench.show("NONE", 60, ahead(7.0))
+    bench.show("Forward", 10, ahead(7.0))
+    assert bench.command[0] > 0.0
+    bench.show("Forward", 30)
+    bench.show("Forward", 30, ahead(7.0))
+    assert bench.command == (0.0, 0.0)
+    assert "laser scans did not come" in bench.report()[0]
+    bench.show("Stop", 1, ahead(7.0))
+    bench.show("Forward", 1, ahead(7.0))
+    assert bench.command[0] > 0.0

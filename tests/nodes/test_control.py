@@ -34,11 +34,12 @@ from handsteer.messages import (
     TwistWithCovariance,
     cmd_vel,
     joy_of,
+    stick_in,
     twist,
 )
 from handsteer.nodes.control import HandSignControlNode
 from handsteer.nodes.steering import SteeringNode
-from handsteer.transports.base import Publisher
+from handsteer.transports.base import Publisher, Received
 from handsteer.types import RELEASED, Stick
 from tests.nodes.stepping import Bench
 
@@ -113,6 +114,30 @@ def test_a_stop_from_a_stale_frame_stops(bench: ControlBench) -> None:
     assert bench.commands == [(0.01, 0), (0, 0)]
 
 
+def test_a_sign_that_the_transport_delivers_late_moves_and_arms_nothing() -> None:
+    """The guard: ``is_late`` in ``_is_stale``, for signs, which have no stamp over ROS."""
+    bench = ControlBench(arming=True)
+    bench.run(2.0)
+    for sign in ("Stop", *["Forward"] * 10):
+        bench.control._on_sign(Received(String(data=sign), is_late=True))
+        bench.run(1 / 30)
+    assert set(bench.commands) <= {(0, 0)}
+    bench.show(*["Forward"] * 10)
+    assert set(bench.commands) <= {(0, 0)}, "the late Stop was no neutral"
+    bench.show("Stop", "Forward")
+    assert bench.last() == (0.01, 0)
+
+
+def test_a_late_zero_is_not_a_release(bench: ControlBench) -> None:
+    """The guard: a late input only stops in ``_take``."""
+    bench.control._on_steering(Received(twist(0.0, 0.0), is_late=True))
+    bench.control._on_steering(Received(twist(0.3, 0.0)))
+    assert bench.last() == (0, 0)
+    bench.control._on_steering(Received(twist(0.0, 0.0)))
+    bench.control._on_steering(Received(twist(0.3, 0.0)))
+    assert bench.last() == (0.3, 0)
+
+
 def test_one_zero_at_the_end(bench: ControlBench) -> None:
     bench.show("Forward")
     bench.control.stop()
@@ -121,7 +146,9 @@ def test_one_zero_at_the_end(bench: ControlBench) -> None:
 
 def test_steering_goes_before_signs_and_is_repeated_until_released(bench: ControlBench) -> None:
     bench.show("Forward")
+    bench.steering.steer(0.0, 0.0)
     bench.steering.steer(0.5, -1.0)
+    bench.run(0.0)
     bench.twists.clear()
     bench.show(*["Forward"] * 60)
     assert set(bench.commands) == {(0.5, -1.0)}
@@ -134,9 +161,11 @@ def test_steering_goes_before_signs_and_is_repeated_until_released(bench: Contro
 
 
 def test_steering_that_falls_silent_stops_the_robot(bench: ControlBench) -> None:
-    bench.transport.advertise("slider", STEERING_CMD_VEL).publish(twist(0.5, 0.0))
+    slider = bench.transport.advertise("slider", STEERING_CMD_VEL)
+    slider.publish(twist(0.0, 0.0))
+    slider.publish(twist(0.5, 0.0))
     bench.run(1.0)
-    assert bench.commands == [(0.5, 0), (0, 0)]
+    assert bench.commands == [(0, 0), (0.5, 0), (0, 0)]
 
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
@@ -284,8 +313,47 @@ def test_a_none_that_a_fault_made_is_not_a_hand_let_go(bench: ControlBench) -> N
     assert set(bench.commands) == {(0, 0)}
 
 
+@pytest.mark.parametrize("after_s", [0.0, 2.1, 30.0])
+def test_steering_that_is_held_when_it_starts_has_to_let_go_and_the_reason_says_that(after_s: float) -> None:
+    bench = ControlBench()
+    statuses = bench.record(DIAGNOSTICS)
+    slider = bench.transport.advertise("slider", STEERING_CMD_VEL)
+    bench.run(after_s)
+    for _ in range(50):
+        slider.publish(twist(0.3, 0.0))
+        bench.run(0.1)
+    assert set(bench.commands) == {(0, 0)}
+    assert statuses[-1].status[0].message == "standing: the steering is held: release it first"
+    slider.publish(twist(0.0, 0.0))
+    slider.publish(twist(0.3, 0.0))
+    bench.run(0.1)
+    assert bench.last() == (0.3, 0)
+
+
+def test_a_gamepad_that_is_held_when_it_starts_has_to_let_go() -> None:
+    bench = ControlBench(JOYSTICK)
+    bench.hold(*[AHEAD] * 90, on=bench.gamepad)
+    assert set(bench.commands) == {(0, 0)}
+    bench.hold(RELEASED, AHEAD, on=bench.gamepad)
+    assert bench.last() == (0.5, 0)
+
+
+def test_a_gamepad_at_rest_was_seen_released_and_leaves_a_held_pad_waiting() -> None:
+    bench = ControlBench(JOYSTICK)
+    slider = bench.transport.advertise("slider", STEERING_CMD_VEL)
+    for _ in range(30):
+        bench.hold(RELEASED, on=bench.gamepad)
+        slider.publish(twist(0.3, 0.0))
+        bench.run(0.05)
+    assert set(bench.commands) == {(0, 0)}
+    bench.run(1.0)
+    bench.hold(RELEASED, AHEAD, on=bench.gamepad)
+    assert bench.last() == (0.5, 0)
+
+
 def test_steering_that_was_held_through_a_reset_has_to_let_go(bench: ControlBench) -> None:
     slider = bench.transport.advertise("slider", STEERING_CMD_VEL)
+    slider.publish(twist(0.0, 0.0))
 
     def steer(speed: float) -> None:
         slider.publish(twist(speed, 0.0))
@@ -326,10 +394,11 @@ def test_says_that_it_is_stopped_and_then_disarmed_and_how_it_moves_again(bench:
     stop(bench, False)
     bench.show("Forward")
     assert says() == "ready: show Stop or lower your hand to begin"
+    bench.steering.steer(0.0, 0.0)
     bench.steering.steer(0.5, 0.0)
     stop(bench, True)
     stop(bench, False)
-    assert says() == "standing: release the steering to begin"
+    assert says() == "standing: the steering is held: release it first"
     bench.steering.release()
     assert says() == "standing: steered by hand, at zero"
 
@@ -348,7 +417,9 @@ def test_a_reset_without_a_stop_changes_nothing(bench: ControlBench) -> None:
     assert bench.commands[-1] == (0.04, 0)
 
 
-STOP_EVENTS = st.lists(st.sampled_from(["Forward", "Backward", "NONE", "Stop", "steer", "pause", "stop", "reset"]))
+STOP_EVENTS = st.lists(
+    st.sampled_from(["Forward", "Backward", "NONE", "Stop", "steer", "let go", "pause", "stop", "reset"])
+)
 
 
 @given(events=STOP_EVENTS)
@@ -363,8 +434,9 @@ def test_whatever_happens_a_stopped_robot_stands(events: list[str]) -> None:
                 assert bench.commands[-1:] == before
         elif event == "pause":
             bench.run(1.0)
-        elif event == "steer":
-            bench.transport.advertise("slider", STEERING_CMD_VEL).publish(twist(0.5, 0.0))
+        elif event in {"steer", "let go"}:
+            speed_mps = 0.5 if event == "steer" else 0.0
+            bench.transport.advertise("slider", STEERING_CMD_VEL).publish(twist(speed_mps, 0.0))
             bench.run(0.0)
         else:
             bench.show(event)
@@ -439,6 +511,7 @@ def test_a_sign_that_is_held_selects_the_next_robot_once() -> None:
 
 def test_steering_has_to_let_go_too_before_it_drives_the_next_robot() -> None:
     bench = FleetBench()
+    bench.steering.steer(0.0, 0.0)
     bench.steering.steer(0.2, 0.0)
     bench.run(0.5)
     assert bench.moving() == ["r1"]
@@ -477,7 +550,7 @@ def test_a_robot_that_is_not_there_is_not_selected(caplog: pytest.LogCaptureFixt
 
 EVENTS = st.lists(
     st.sampled_from(
-        ["Forward", "Turn Left", "Stop", "NONE", "Peace", "select r1", "select r2", "select next", "steer"]
+        ["Forward", "Turn Left", "Stop", "NONE", "Peace", "select r1", "select r2", "select next", "steer", "let go"]
     ),
     max_size=40,
 )
@@ -488,8 +561,8 @@ def test_only_one_robot_is_ever_driven_and_none_before_its_hand_let_go(events: l
     bench = FleetBench()
     for event in events:
         before = bench.selected[-1].data
-        if event == "steer":
-            bench.steering.steer(0.2, 0.0)
+        if event in {"steer", "let go"}:
+            bench.steering.steer(0.2 if event == "steer" else 0.0, 0.0)
         elif event.startswith("select"):
             bench.choose(event.removeprefix("select "))
         else:
@@ -576,6 +649,43 @@ def test_a_robot_that_nobody_hears_is_not_driven_on() -> None:
     assert "no robot listens" in statuses[-1].status[0].message
 
 
+@pytest.mark.parametrize("arming", [False, True])
+def test_odometry_that_falls_silent_stops_the_ramp_and_disarms(arming: bool) -> None:
+    """A robot whose process slept must not wake to what was shown meanwhile, wherever it is simulated."""
+    bench = ControlBench(arming=arming)
+    odom = bench.transport.advertise("robot", ODOM)
+
+    def show(sign: str, count: int, *, is_heard: bool) -> None:
+        for _ in range(count):
+            if is_heard:
+                odom.publish(odometry(bench.twists[-1] if bench.twists else twist(0.0, 0.0)))
+            bench.show(sign)
+
+    show("NONE", 60, is_heard=True)
+    show("Forward", 30, is_heard=True)
+    assert bench.last() == (0.3, 0)
+    show("Forward", 90, is_heard=False)
+    assert bench.last() == (0, 0)
+    show("Forward", 30, is_heard=True)
+    assert bench.last() == (0, 0)
+    assert bench.control._report().message.endswith("to begin (the robot's odometry has stopped)")
+    show("Stop", 1, is_heard=True)
+    show("Forward", 1, is_heard=True)
+    assert bench.last() == (0.01, 0)
+
+
+def test_nothing_ramps_while_no_robot_listens() -> None:
+    bench = Bench()
+    bench.nodes = [HandSignControlNode(bench.transport, bench.clock, ControlConfig())]
+    signs = bench.transport.advertise("recognition", HAND_SIGN)
+    for number in range(60):
+        if number == 50:
+            twists = bench.record(CMD_VEL)
+        signs.publish(String(data="Forward"), bench.clock.now())
+        bench.run(1 / 30)
+    assert twists[0].linear.x <= 0.02
+
+
 def test_topics_may_be_others() -> None:
     bench = Bench()
     sign, steering = replace(HAND_SIGN, name="/my_sign"), replace(STEERING_CMD_VEL, name="/my_steering")
@@ -589,6 +699,7 @@ def test_topics_may_be_others() -> None:
     bench.transport.advertise("recognition", sign).publish(String(data="Forward"))
     bench.run(0.05)
     assert [command.linear.x for command in commands] == [0.01]
+    pad.steer(0.0, 0.0)
     pad.steer(0.2, 0.0)
     bench.run(0.05)
     assert not pad.is_direct
@@ -701,6 +812,7 @@ def test_another_camera_stops_steering_and_the_joystick_too() -> None:
         if joystick:
             bench.hold(RELEASED, AHEAD, AHEAD)
         else:
+            bench.steering.steer(0.0, 0.0)
             bench.steering.steer(0.3, 0.0)
             bench.run(0.1)
         assert bench.last()[0] > 0
@@ -713,7 +825,7 @@ def test_another_camera_stops_steering_and_the_joystick_too() -> None:
 def test_a_gamepad_goes_before_the_hand_while_its_button_is_held() -> None:
     bench = ControlBench(JOYSTICK)
     bench.hold(RELEASED, AHEAD)
-    bench.hold(LEFT, LEFT, on=bench.gamepad)
+    bench.hold(RELEASED, LEFT, LEFT, on=bench.gamepad)
     assert bench.last() == (0, 2)
     bench.hold(AHEAD)
     assert bench.last() == (0, 2)
@@ -724,6 +836,44 @@ def test_a_gamepad_goes_before_the_hand_while_its_button_is_held() -> None:
     assert set(bench.commands[count:]) <= {(0, 0)}
     bench.hold(RELEASED, AHEAD)
     assert bench.last() == (0.5, 0), "a gamepad at rest leaves the robot to the hand"
+
+
+@pytest.mark.parametrize("age_s", [0.6, 3600.0, -3600.0], ids=["a moment ago", "an hour ago", "in an hour"])
+def test_a_gamepad_with_a_stamp_of_another_time_is_not_followed(age_s: float, caplog: pytest.LogCaptureFixture) -> None:
+    bench = ControlBench(JOYSTICK)
+    bench.clock.advance(7200.0)
+    bench.run(0.5)
+    bench.hold(RELEASED, *[AHEAD] * 10, age_s=age_s, on=bench.gamepad)
+    assert set(bench.commands) <= {(0, 0)}
+    assert caplog.text.count("/joy is stamped") == 1
+    bench.hold(*[AHEAD] * 10, on=bench.gamepad)
+    assert set(bench.commands) <= {(0, 0)}, "its release was of another time too"
+    bench.hold(RELEASED, AHEAD, on=bench.gamepad)
+    assert bench.last() == (0.5, 0)
+
+
+def test_a_gamepad_whose_stamp_stands_is_one_message() -> None:
+    bench = ControlBench(JOYSTICK)
+    bench.hold(RELEASED, AHEAD, on=bench.gamepad)
+    stamped_s = bench.clock.now()
+    for _ in range(13):  # longer than the timeout, less than the age at which it is stale and then times out
+        bench.gamepad.publish(joy_of(AHEAD, HEADER), stamped_s)
+        bench.run(1 / 30)
+    assert bench.last() == (0, 0)
+    bench.hold(*[AHEAD] * 3, on=bench.gamepad)
+    assert bench.last() == (0, 0), "it may have been held since long"
+    bench.hold(RELEASED, AHEAD, on=bench.gamepad)
+    assert bench.last() == (0.5, 0)
+
+
+def test_a_gamepad_without_stamps_counts_on_arrival() -> None:
+    bench = ControlBench(JOYSTICK)
+    for stick in (RELEASED, *[AHEAD] * 60):
+        bench.gamepad.publish(joy_of(stick, HEADER))
+        bench.run(1 / 30)
+    assert bench.last() == (0.5, 0)
+    bench.run(0.5)
+    assert bench.last() == (0, 0)
 
 
 def test_button_and_axes_of_the_gamepad_are_those_of_the_configuration() -> None:
@@ -759,3 +909,29 @@ def test_a_palm_engages_the_joystick_too() -> None:
         bench.hold(RELEASED)
     bench.hold(AHEAD)
     assert bench.last() == (0.5, 0)
+
+
+def test_steering_that_was_held_while_the_control_was_stalled_has_to_let_go() -> None:
+    """The guard: ``stall`` in ``_elapsed``."""
+    bench = ControlBench(ControlConfig(steering_timeout=2.0))
+    slider = bench.transport.advertise("slider", STEERING_CMD_VEL)
+
+    def steer(speed: float) -> None:
+        slider.publish(twist(speed, 0.0))
+        bench.run(0.1)
+
+    steer(0.0)
+    steer(0.5)
+    assert bench.last() == (0.5, 0)
+    bench.clock.advance(0.5)  # the process stood still
+    bench.run(0.2)  # and what comes in the next moment is ignored anyway
+    steer(0.5)
+    assert bench.last() == (0, 0)
+    steer(0.0)
+    steer(0.5)
+    assert bench.last() == (0.5, 0)
+
+
+def test_the_axes_of_any_joystick_are_read_within_one() -> None:
+    """The guard: the limits in ``stick_in``."""
+    assert stick_in(joy_of(Stick(held=True, forward=50.0, left=-1e30), HEADER)) == Stick(True, 1.0, -1.0)

@@ -1,3 +1,4 @@
+import dataclasses
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -198,11 +199,18 @@ def test_the_same_picture_again_is_no_frame_whoever_publishes_it(bench: Recognit
     assert bench.names[-1] == "Forward"
 
 
-def test_a_picture_is_not_new_when_it_comes_again_with_another_stamp(bench: RecognitionBench) -> None:
-    again = image_message(bench.picture(), HEADER)
-    bench.show(again, age_s=-5.0)
-    bench.show(again)
-    assert bench.names == []
+def test_a_picture_is_not_new_when_it_comes_again_with_another_stamp() -> None:
+    bench = RecognitionBench(hands=[show_sign(FORWARD)] * 200)
+    bench.show(frames=6)
+    for age_s in (-5.0, 1.0):
+        again = image_message(bench.picture(), HEADER)
+        bench.show(again, age_s=age_s)
+        bench.run(0.5)
+        bench.show(frames=60)  # until its clock is trusted again
+        assert bench.names[-1] == "Forward"
+        seen = len(bench.names)
+        bench.show(again)
+        assert len(bench.names) == seen
 
 
 def test_a_second_camera_that_is_frozen_adds_nothing_to_one_that_is_not(bench: RecognitionBench) -> None:
@@ -442,3 +450,35 @@ def test_a_model_that_cannot_be_used_is_refused_before_anything_changes(tmp_path
     parameters.set({"model": str(path)})  # again, as it may have been written anew
     parameters.set({"model": ""})
     assert [config.signs.model for config in applied] == [path, path, None]
+
+
+def test_a_publisher_of_one_picture_gets_a_hint_once(caplog: pytest.LogCaptureFixture) -> None:
+    bench = RecognitionBench()
+    frozen = image_message(bench.picture(), HEADER)
+    bench.show(frozen, frames=300)
+    hints = [record.getMessage() for record in caplog.records if "Only new pictures count" in record.getMessage()]
+    assert len(hints) == 1
+    assert hints[0].startswith("/image_raw: the same picture for 3 s.")
+
+
+@pytest.mark.parametrize("encoding", ["yuv420", "16UC1", "\x1b[2J" * 100])
+def test_an_unsupported_encoding_is_one_line_with_what_to_do(encoding: str, caplog: pytest.LogCaptureFixture) -> None:
+    bench = RecognitionBench()
+    sent = image_message(bench.picture(), HEADER)
+    bench.show(dataclasses.replace(sent, encoding=encoding), frames=20)
+    (record,) = caplog.records
+    assert record.exc_info is None
+    assert "use one of bgr8" in record.getMessage()
+    assert record.getMessage().isprintable()
+
+
+def test_a_picture_that_was_passed_over_is_not_new_when_it_comes_again(bench: RecognitionBench) -> None:
+    """The guard: ``pass_over`` in ``_on_frame``, for pictures that are refused before they are compared."""
+    late = [image_message(NOISE.on(GREY, float(number)), HEADER) for number in range(6)]
+    for image in late:
+        bench.show(image, age_s=0.6)
+    assert bench.names == []
+    for image in late:
+        bench.show(image)
+    assert set(bench.names) <= {"NONE"}
+    assert bench.node.counts == {}

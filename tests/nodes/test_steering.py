@@ -25,6 +25,7 @@ class Bench:
         self.node = SteeringNode(self.transport, self.clock, config, kind)
         self.mux = self._record(STEERING_CMD_VEL)
         self.robot = self._record(robot)
+        self.node.release()  # what steers was seen released
 
     def _record(self, topic: Topic[Any]) -> list[tuple[float, float]]:
         said: list[tuple[float, float]] = []
@@ -60,6 +61,30 @@ def test_after_it_was_held_up_whoever_steers_has_to_let_go_once(bench: Bench) ->
     bench.node.release()
     bench.node.steer(0.5, 0.0)
     assert bench.mux[1:] == [(0.0, 0.0), (0.5, 0.0)]
+
+
+def test_what_is_held_when_it_starts_has_to_be_released() -> None:
+    clock, transport = SteppedClock(), InProcessTransport()
+    node, heard = SteeringNode(transport, clock), list[float]()
+    transport.subscribe("test", STEERING_CMD_VEL, lambda received: heard.append(received.message.linear.x))
+    for _ in range(40):
+        node.steer(0.3, 0.0)
+        clock.advance(0.1)
+    assert set(heard) == {0.0}
+    assert node.waits
+    node.steer(0.0, 0.0)
+    node.steer(0.3, 0.0)
+    assert heard[-1] == 0.3
+
+
+def test_what_was_lost_has_to_be_released(bench: Bench) -> None:
+    bench.node.steer(0.3, 0.0)
+    bench.node.lose()
+    bench.node.steer(0.3, 0.0)
+    assert bench.mux == [(0.3, 0.0), (0.0, 0.0), (0.0, 0.0)]
+    bench.node.release()
+    bench.node.steer(0.3, 0.0)
+    assert bench.mux[-1] == (0.3, 0.0)
 
 
 def let_go_once(bench: Bench) -> None:
@@ -192,3 +217,17 @@ def test_after_a_stop_it_stands_also_where_its_own_topic_was_given_to_a_robot(be
     let_go_once(bench)
     bench.node.steer(0.3, 0.0)
     assert bench.mux[-1] == (0.3, 0.0)
+
+
+def test_its_stop_is_repeated_until_it_is_reset(bench: Bench) -> None:
+    """The guard: ``_halted`` in ``_repeat``; false from elsewhere must not undo it."""
+    said: list[bool] = []
+    bench.transport.subscribe("test", STOP, lambda received: said.append(received.message.data))
+    bench.node.halt()
+    for _ in range(10):
+        bench.step()
+    assert said == [True] * 11
+    bench.node.reset()
+    for _ in range(10):
+        bench.step()
+    assert said == [*[True] * 11, False]

@@ -102,6 +102,18 @@ class TestBesideOtherProcesses:
         assert started.speed_after(*["Forward"] * round(30 * (HEAR_STOP_S - 0.2))) == 0.0
         assert started.speed_after(*["Forward"] * 9) > 0.0
 
+    def test_in_a_graph_that_runs_without_a_stop_it_waits_for_a_moment_only(self, bench: KeeperBench) -> None:
+        bench.run(HEAR_STOP_S + 0.1)
+        for _ in range(2):  # the first one passes the knowledge on
+            control = HandSignControlNode(bench.transport, bench.clock, ControlConfig(), others_keep_stop=True)
+            bench.nodes = [bench.other, control]
+            assert bench.speed_after(*["Forward"] * 6) > 0.0
+        assert not any(word.data for word in bench.words)
+
+    def test_a_node_that_has_just_started_says_nothing_of_what_it_does_not_know(self, bench: KeeperBench) -> None:
+        bench.run(HEAR_STOP_S - 0.1)
+        assert bench.words == []
+
     def test_the_steering_waits_too(self, started: KeeperBench) -> None:
         steering = started.transport.advertise("steering", STEERING_CMD_VEL)
         for _ in range(5):

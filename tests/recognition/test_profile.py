@@ -206,7 +206,7 @@ def test_other_files_are_refused_with_one_sentence(tmp_path: Path) -> None:
     with pytest.raises(ProfileError, match="of format 2 is not known, expected 1"):
         load_profile(path)
     np.savez(path, format=np.array(1), name=np.array("odd"), views=np.zeros(300_000))
-    with pytest.raises(ProfileError, match="should have at most 1"):
+    with pytest.raises(ProfileError, match="larger than 1 MB"):
         load_profile(path)
     with pytest.raises(ProfileError, match="cannot write the profile"):
         save_profile(widest(), tmp_path / "nowhere" / "odd.npz")

@@ -129,6 +129,7 @@ def test_bags_of_others_have_a_report(kind: str, recording: Path, tmp_path: Path
     facts = write_report(bag, tmp_path / "drive.html")
     parsed = Page(tmp_path / "drive.html")
     assert facts.totals()["frames"] == 241
+    assert facts.unexplained == []
     assert facts.totals()["distance_m"] == pytest.approx(2.63, abs=0.05)
     assert parsed.figures.keys() == {"timeline", "map"}
     assert parsed.count("img") == 3
@@ -169,6 +170,24 @@ def test_the_verb_prints_the_totals(recording: Path, tmp_path: Path, capsys: pyt
     assert run(["report", str(copy)]) == 2
     assert "exists already" in capsys.readouterr().err
     assert run(["report", str(copy), "--force"]) == 0
+
+
+def test_motion_without_a_reason_is_a_section_of_the_page_and_a_line_of_the_totals(
+    recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write_report(recording, tmp_path / "drive.html")
+    texts = Page(tmp_path / "drive.html").texts
+    assert texts[texts.index("Motion without a live reason") + 1] == "There was none."
+    writer = McapWriter(tmp_path / "forged.mcap")
+    for time_s, velocity in ((0.0, 0.0), (1.0, 0.2), (1.3, 0.0), (2.0, 0.0)):
+        writer.write(CMD_VEL, CMD_VEL.name, encode(twist(velocity, 0.0)), int(time_s * 1e9))
+    writer.close()
+    assert run(["report", str(tmp_path / "forged.mcap")]) == 0
+    why = "no sign, no steering and no joystick was live"
+    assert f"no reason:  0.3 s (motion without a live reason, at 1.00 s: {why})" in capsys.readouterr().out
+    texts = Page(tmp_path / "forged.html").texts
+    section = texts[texts.index("Motion without a live reason") :]
+    assert section[:7] == ["Motion without a live reason", "at", "for", "why not", "1.00 s", "0.30 s", why]
 
 
 def test_the_verb_prints_json(recording: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -35,7 +35,7 @@ STRING = [
     "std_msgs::msg::dds_::String_",
     "RIHS01_df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18",
 ]
-RELIABLE_10, RELIABLE_1, LATCHED_1 = "::,10:,:,:,,", "::,1:,:,:,,", ":1:,1:,:,:,,"
+RELIABLE_10, LATCHED_1 = "::,10:,:,:,,", ":1:,1:,:,:,,"
 
 
 @pytest.fixture(scope="module")
@@ -113,14 +113,14 @@ def test_a_stop_that_was_held_up_on_its_way_is_obeyed(network: ZenohGraph) -> No
 def test_ros2_sees_the_node_by_its_names_types_hashes_and_profiles(network: ZenohGraph) -> None:
     words = ("-r", "__ns:=/far", "-r", "__node:=driver", "-r", f"{CMD_VEL[1:]}:=/base/cmd_vel")
     control = network.node("control", name="/far/driver", ros=words)
-    eventually(lambda: len(network.nodes()["/far/driver"]["MS"]) == 4)
+    eventually(lambda: len(network.nodes()["/far/driver"]["MS"]) == 5)
     eventually(lambda: len(network.nodes()["/far/driver"]["MP"]) >= 2)
     node = network.nodes()["/far/driver"]
     assert node["alive"]
     assert node["MP"]["/base/cmd_vel"][:3] == [*TWIST, RELIABLE_10]
     assert {"/base/cmd_vel", "/diagnostics"} <= set(node["MP"])
     assert node["MS"]["/far/gesture/hand_sign"][:3] == [*STRING, RELIABLE_10]
-    assert node["MS"]["/far/steering/cmd_vel"][:3] == [*TWIST, RELIABLE_1]
+    assert node["MS"]["/far/steering/cmd_vel"][:3] == [*TWIST, RELIABLE_10]
     token = node["MP"]["/base/cmd_vel"][3].split("/")
     assert token[:2] == ["@ros2_lv", str(DOMAIN)]
     assert token[3] == "0"  # the node's own number

@@ -105,3 +105,23 @@ def test_not_a_number_is_a_zero() -> None:
     relay = linked()
     drive(relay, AHEAD, 1.0)
     assert relay.command(Velocity(math.nan, 0.0)) == ZERO
+
+
+def test_a_zero_before_the_link_does_not_count() -> None:
+    """The guard: ``_linked`` in ``command``."""
+    relay = CommandLimiter(CONFIG)
+    relay.command(ZERO)
+    relay.step(DT_S, linked=True)
+    assert set(drive(relay, AHEAD, 1.0)) == {ZERO}
+
+
+def test_a_robot_that_is_linked_from_the_start_waits_for_a_zero() -> None:
+    """The guard: ``holds`` at the start."""
+    relay = CommandLimiter(CONFIG)
+    relay.step(DT_S, linked=True)
+    assert set(drive(relay, AHEAD, 1.0)) == {ZERO}
+
+
+def test_speeds_are_clamped() -> None:
+    """The guard: ``highest`` in ``_approach``."""
+    assert drive(linked(), Velocity(9.0, -9.0), 4.0)[-1] == Velocity(1.0, -2.0)

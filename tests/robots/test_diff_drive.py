@@ -63,6 +63,14 @@ def test_it_accelerates_and_reaches_the_command() -> None:
     assert run(state, Velocity(0.3, 0.4), 0.4).velocity == Velocity(0.3, 0.4)
 
 
+def test_a_command_beyond_its_limits_is_clamped() -> None:
+    """The guard: ``clamped`` in ``step``."""
+    state = DriveState()
+    for _ in range(1000):
+        state = step(state, Velocity(9.0, -99.0), 0.01, CONFIG)
+    assert state.velocity == Velocity(CONFIG.max_linear, -CONFIG.max_angular)
+
+
 def test_without_a_new_command_it_brakes_after_the_timeout() -> None:
     state = run(DriveState(velocity=Velocity(1.0, 0.0)), Velocity(1.0, 0.0), 0.38)
     assert state.velocity.linear_mps == 1.0

@@ -7,7 +7,21 @@ import pytest
 
 from handsteer.clock import SteppedClock
 from handsteer.config import RobotConfig
-from handsteer.messages import CMD_VEL, Header, LaserScan, Topic, Twist
+from handsteer.messages import (
+    CMD_VEL,
+    Header,
+    LaserScan,
+    Odometry,
+    Point,
+    Pose,
+    PoseWithCovariance,
+    Quaternion,
+    Time,
+    Topic,
+    Twist,
+    TwistWithCovariance,
+    twist,
+)
 from handsteer.robots.remote import RemoteRobot
 from handsteer.transports.base import Publisher
 from handsteer.transports.in_process import InProcessTransport
@@ -22,7 +36,9 @@ class Link:
     def __init__(self) -> None:
         self.clock = SteppedClock()
         self.transport = InProcessTransport()
-        self.transport.subscribe("base", Topic("/cmd_vel", Twist, depth=CMD_VEL.depth), lambda _: None)
+        self.sent: list[float] = []
+        topic = Topic("/cmd_vel", Twist, depth=CMD_VEL.depth)
+        self.transport.subscribe("base", topic, lambda received: self.sent.append(received.message.linear.x))
         self.scanner: Publisher[LaserScan] = self.transport.advertise("scanner", Topic("/front/scan", LaserScan))
 
     def scan(self, metres: float) -> None:
@@ -70,3 +86,39 @@ def test_it_knows_who_else_commands_it() -> None:
     teleop = link.transport.advertise("teleop", Topic("/cmd_vel", Twist, depth=CMD_VEL.depth))
     assert robot.commanders() == ["robot", "teleop"]
     assert teleop.has_subscribers
+
+
+def odometry() -> Odometry:
+    at = Pose(Point(0.0, 0.0, 0.0), Quaternion(0.0, 0.0, 0.0, 1.0))
+    pose, moving = PoseWithCovariance(at, np.zeros(36)), TwistWithCovariance(twist(0.0, 0.0), np.zeros(36))
+    return Odometry(Header(Time(1, 0), "odom"), "base_link", pose, moving)
+
+
+def test_a_robot_whose_odometry_falls_silent_gets_zeros_until_it_is_back_and_a_zero_was_commanded() -> None:
+    """The guard: ``is_silent`` in ``step``."""
+    link, robot = join(odom_timeout=0.5)
+    odom = link.transport.advertise("base", Topic("/odom", Odometry))
+
+    def drive(linear_mps: float, seconds: float, *, is_heard: bool = True) -> float:
+        for _ in range(round(seconds / 0.02)):
+            if is_heard:
+                odom.publish(odometry())
+            robot.command(linear_mps, 0.0)
+            link.clock.advance(0.02)
+            robot.step(0.02)
+        return link.sent[-1]
+
+    drive(0.0, 0.1)
+    assert drive(0.1, 1.0) == pytest.approx(0.1)
+    assert drive(0.1, 0.6, is_heard=False) == 0.0
+    assert drive(0.1, 1.0) == 0.0
+    drive(0.0, 0.1)
+    assert drive(0.1, 1.0) == pytest.approx(0.1)
+
+
+def test_it_gets_several_zeros_at_the_end() -> None:
+    """The guard: ``close``."""
+    link, robot = join()
+    robot.step(0.02)
+    robot.close()
+    assert link.sent[-5:] == [0.0] * 5

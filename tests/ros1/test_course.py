@@ -23,10 +23,10 @@ OURS = "ros_hand_gesture_recognition"
 
 @pytest.fixture
 def course(ros: LaunchGraph, tmp_path: Path) -> LaunchGraph:
-    """A graph that finds the package ``course`` too, with our robot and a camera that shows Forward."""
+    """A graph that finds the package ``course`` too, with our robot and a camera that shows Stop, then Forward."""
     make_package(tmp_path)
     ros.env["ROS_PACKAGE_PATH"] = f"{ROS}:{tmp_path}"
-    settings = {"source": "virtual", "virtual_hand/script": "Forward:600", "width": 320, "height": 240, "fps": 15}
+    settings = {"source": "virtual", "virtual_hand/script": "Stop:2 Forward:8", "width": 320, "height": 240, "fps": 15}
     for name, value in settings.items():
         ros.set_parameter(f"/drawn/{name}", value)
     # The chapter's file gives its camera no args, so it is a webcam that is not there, and another shows the hand.
@@ -69,6 +69,29 @@ def test_the_chapters_args_count(course: LaunchGraph, tmp_path: Path) -> None:
     launch = course.launch_file(file, "control_topic:=/other/cmd_vel", "publish_gesture_topic:=/words")
     eventually(lambda: any(twist["linear"] > 0.05 for twist in record.of("/other/cmd_vel")), what="it drives elsewhere")
     assert "publish_gesture_topic is /words, but signs are read from gesture/hand_sign" in launch.text
+
+
+def test_with_any_other_control_topic_the_hand_has_to_engage_first(ros: LaunchGraph) -> None:
+    record = ros.record({"/cmd_vel": "geometry_msgs/Twist"})
+    ros.run("rosrun", OURS, "sign_to_controller.py", "_control_topic:=/cmd_vel")
+    peer = ros.peer()
+    peer.ask("advertise", topic="gesture/hand_sign", package="std_msgs", type="String")
+    eventually(lambda: peer.ask("listeners", topic="gesture/hand_sign") > 0)
+    eventually(lambda: ros.connected("/hand_sign_control", "/cmd_vel"))
+
+    def show(sign: str, count: int) -> None:
+        peer.ask("publish", topic="gesture/hand_sign", values={"data": sign}, count=count, period_s=0.05)
+
+    show("Forward", 60)
+    assert {twist["linear"] for twist in record.of("/cmd_vel")} <= {0.0}
+    assert ros.listeners("/odom") == ["/hand_sign_control"]
+
+    def drives_on() -> bool:
+        show("Stop", 30)  # again, where a busy machine left a gap
+        show("Forward", 10)
+        return any(twist["linear"] > 0.0 for twist in record.of("/cmd_vel"))
+
+    eventually(drives_on, what="it drives once it is engaged")
 
 
 def test_the_courses_recognition_file_starts_ours(course: LaunchGraph, tmp_path: Path) -> None:

@@ -118,11 +118,17 @@ def test_photos_as_a_30_hz_video_drive_the_robot(ros: LaunchGraph, data_dir: Pat
 
 
 def test_the_topics_are_those_that_the_args_say(ros: LaunchGraph) -> None:
-    show(ros, "Forward:600")
-    ros.launch(*SIGN_CONTROL, VIRTUAL, "publish_gesture_topic:=/words", "control_topic:=/other/cmd_vel")
+    show(ros, "Forward:5 Stop:3")
     record = ros.record({"/words": "std_msgs/String", "/other/cmd_vel": "geometry_msgs/Twist"})
-    eventually(lambda: any(twist["linear"] > 0.05 for twist in record.of("/other/cmd_vel")), what="it drives elsewhere")
-    assert {word["word"] for word in record.of("/words")} >= {"Forward"}
+    ros.launch(*SIGN_CONTROL, VIRTUAL, "publish_gesture_topic:=/words", "control_topic:=/other/cmd_vel")
+
+    def driven() -> dict[str, Any] | None:
+        return next((twist for twist in record.of("/other/cmd_vel") if twist["linear"] > 0.05), None)
+
+    driven_s = eventually(driven, what="it drives elsewhere")["at_s"]
+    before = [sign["word"] for sign in record.of("/words") if sign["at_s"] < driven_s]
+    assert "Stop" in before, "elsewhere the robot may be real: an open palm comes first"
+    assert "Forward" in before
     assert not {HAND_SIGN, CMD_VEL} & set(ros.topics())
 
 
@@ -169,8 +175,38 @@ def test_each_node_that_is_killed_stops_the_robot_and_comes_back(ros: LaunchGrap
         print(f"{node}: zero after {times_s[-1]:.3f} s")  # noqa: T201 - shown by pytest -rP
         assert times_s[-1] <= LONGEST_S, times_s
     assert_starts_standing(record, kill(ros, "/robot", record))
+    drives_after_a_stop(ros, record)
+
+
+def drives_after_a_stop(ros: LaunchGraph, record: Recorder) -> None:
+    """Wait until the robot, whose odometry was silent, drives; it does once Stop was shown."""
     now_s = time.monotonic()
-    eventually(lambda: drives(record, now_s), what="it drives again after all that")
+
+    def does() -> bool:
+        ros.tell("rostopic", "pub", "-1", HAND_SIGN, "std_msgs/String", "data: Stop")
+        return bool(drives(record, now_s))
+
+    eventually(does, what="it drives again after a Stop")
+
+
+def test_a_robot_that_slept_does_not_wake_to_what_was_shown_meanwhile(ros: LaunchGraph) -> None:
+    show(ros, "Forward:600")
+    record = ros.record(TOPICS)
+    ros.launch(*SIGN_CONTROL, VIRTUAL)
+    ros.launch(*DRIVE_ROBOT, "world:=empty")
+    eventually(lambda: drives(record), what="it drives")
+    pid = ros.pid("/robot")
+    assert pid is not None
+    os.kill(pid, signal.SIGSTOP)
+    try:
+        time.sleep(3.0)
+        resumed_s = time.monotonic()
+    finally:
+        os.kill(pid, signal.SIGCONT)
+    eventually(lambda: record.of(ODOM, resumed_s + 1.0), what="the robot is awake")
+    assert {twist["linear"] for twist in record.of(CMD_VEL, resumed_s - 1.0)} <= {0.0}
+    assert all(odom["linear"] < 0.35 for odom in record.of(ODOM, resumed_s))
+    drives_after_a_stop(ros, record)
 
 
 def kill(ros: LaunchGraph, node: str, record: Recorder) -> float:

@@ -56,6 +56,8 @@ def test_nodes_follow_the_clock_and_stop_the_robot_when_it_stands(simulated: Ros
     moving = [row for row in stamps(peer) if row[1] > START_S]
     first, last = moving[0], moving[-1]
     assert (last[1] - first[1]) / (last[0] - first[0]) == pytest.approx(2.0, rel=0.2)
+    # Before the clock was heard, no time passed: the robot was as silent as one that is away.
+    peer.ask("publish", topic="/gesture/hand_sign", values={"data": "Stop"}, count=3, period_s=0.02)
     show = {"topic": "/gesture/hand_sign", "values": {"data": "Forward"}, "period_s": 0.02}
     peer.ask("publish", count=100, **show)
     assert max(values[1] for _, values in peer.ask("get", topic=ODOM)) > 0.1

@@ -67,9 +67,10 @@ class TestChain(ChainContract):
 def test_ros2_lists_the_node_its_topics_types_hashes_and_profiles(ros2: Ros2Graph) -> None:
     words = ("-r", "__ns:=/far", "-r", "__node:=driver", "-r", f"{CMD_VEL[1:]}:=/base/cmd_vel")
     control = ros2.node("control", name="/far/driver", ros=words)
-    eventually(lambda: len(ros2.nodes()["/far/driver"]["subscribes"]) == 4)
+    eventually(lambda: len(ros2.nodes()["/far/driver"]["subscribes"]) == 5)
     assert ros2.nodes()["/far/driver"]["subscribes"] == {
         "/far/gesture/hand_sign": ["std_msgs/msg/String"],
+        "/far/robot_diff_drive_controller/odom": ["nav_msgs/msg/Odometry"],
         "/far/steering/cmd_vel": ["geometry_msgs/msg/Twist"],
         "/far/stop": ["std_msgs/msg/Bool"],
         "/far/stopped": ["std_msgs/msg/Bool"],

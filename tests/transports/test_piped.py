@@ -187,23 +187,55 @@ def test_an_end_that_takes_nothing_is_not_said_more_than_a_thousand_things() -> 
         far.say("number", 1000)
 
 
-def test_damage_ends_the_pipe() -> None:
+def test_a_message_that_is_cut_short_ends_the_pipe() -> None:
     source, sink = os.pipe()
     pipe = Pipe(os.fdopen(source, "rb"), os.fdopen(os.open(os.devnull, os.O_WRONLY), "wb"))
     pipe.start()
-    os.write(sink, pickle.dumps(("kind",))[:-1] + b"no pickle")
+    os.write(sink, b"\x00\x00\x00")
     os.close(sink)
     assert pipe.ended.wait(10)
 
 
-def test_what_cannot_be_told_ends_the_pipe_and_is_logged(caplog: pytest.LogCaptureFixture) -> None:
-    near, far = joined()
-    near.start()
-    far.start()
-    far.say("function", lambda: None)
-    assert far.ended.wait(10)
-    assert near.ended.wait(10)
-    assert "cannot be sent" in caplog.text
+def nested(depth: int) -> list[Any]:
+    """Return lists in each other, as JSON of twice as many characters can contain them."""
+    value: list[Any] = []
+    for _ in range(depth):
+        value = [value]
+    return value
+
+
+class Unreadable:
+    """Can be pickled, but raises when it is read."""
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return int, ("\x1b[2Jno number",)
+
+
+UNSENDABLE = {"function": lambda: None, "nested": nested(5000), "unreadable": Unreadable(), "lock": threading.Lock()}
+
+
+@pytest.mark.parametrize("from_near", [True, False], ids=["near", "far"])
+@pytest.mark.parametrize("kind", UNSENDABLE)
+def test_what_cannot_be_sent_is_one_line_of_the_log_and_what_follows_arrives(
+    kind: str, from_near: bool, caplog: pytest.LogCaptureFixture
+) -> None:
+    sender, reader = joined() if from_near else joined()[::-1]
+    heard: list[object] = []
+    reader.on("number", heard.append)
+    sender.start()
+    reader.start()
+    for _ in range(3):
+        sender.say("number", UNSENDABLE[kind])
+    sender.say("number", 1)
+    assert eventually(lambda: heard == [1])
+    assert not sender.ended.is_set()
+    assert not reader.ended.is_set()
+    lines = [record.getMessage() for record in caplog.records]
+    assert len(lines) == 1, lines
+    assert "about number cannot be " in lines[0]
+    assert lines[0].isprintable()
+    assert not any(record.exc_info for record in caplog.records)
+    sender.close()
 
 
 @pytest.mark.parametrize("topic", TOPICS, ids=lambda topic: topic.name)

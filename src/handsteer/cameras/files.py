@@ -12,6 +12,7 @@ from handsteer.cameras import EndOfStream, Frame
 from handsteer.clock import Clock, SteppedClock
 from handsteer.errors import CameraNotFound, CameraUnreadable, FrameError
 from handsteer.picture_files import MOST_PIXELS, decode
+from handsteer.regular_files import open_regular
 
 AtEnd = Literal["loop", "hold", "end"]
 PHOTO_SUFFIXES = frozenset({".jpg", ".jpeg", ".png"})
@@ -192,7 +193,7 @@ def read_photo(path: Path) -> NDArray[np.uint8]:
         CameraUnreadable: The file cannot be read or decoded, is truncated, or has more than :data:`MOST_PHOTO_PIXELS`.
     """
     try:
-        with path.open("rb") as file:
+        with open_regular(path) as file:
             data = file.read(LARGEST_PHOTO_BYTES + 1)
     except OSError as error:
         raise CameraUnreadable(f"cannot read the photo {path}: {error.strerror}") from None

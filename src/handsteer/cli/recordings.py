@@ -132,7 +132,8 @@ def replay(
 def report(recording: Path, *, output: Path | None = None, force: Flag = False, json: Flag = False) -> None:
     """Report what happened in a recording, in one HTML page that needs no network, and print the totals.
 
-    The page shows signs, velocities, the driven path, latencies, and each stop with its reason and frame.
+    The page shows signs, velocities, the driven path, latencies, each stop with its reason and frame, and each motion
+    without a live reason.
 
     For example:
       handsteer report drive.mcap                     writes drive.html next to it

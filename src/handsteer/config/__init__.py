@@ -22,7 +22,7 @@ from handsteer.config.recognition import (
     VirtualHandConfig,
 )
 from handsteer.config.section import Section
-from handsteer.errors import ConfigError, did_you_mean
+from handsteer.errors import ConfigError, as_name, did_you_mean, quoted
 from handsteer.types import CmdVelType
 
 __all__ = [
@@ -128,11 +128,13 @@ class FoxgloveConfig(Section):
     )
     token: Literal["auto", "always"] = Field(
         "auto",
-        description="When a program needs the token: auto if other machines can reach the address, or always, for "
-        "machines with several users and for viewers on other web sites",
+        description="When a program needs the token: auto if other machines can reach the address or programs may "
+        "drive, or always, for machines with several users and for viewers on other web sites",
     )
     drive: bool = Field(
-        False, description="Whether these programs may drive, one at a time, by Twist on /cmd_vel; else they only look"
+        False,
+        description="Whether these programs may drive, one at a time, by Twist on /cmd_vel, which needs the token; "
+        "else they only look",
     )
 
 
@@ -236,15 +238,14 @@ def describe(error: ValidationError, section: type[Section] | None = None) -> st
         section: The model that was validated, to find the nearest name of an unknown field.
     """
     problem = error.errors(include_url=False)[0]
-    field = ".".join(str(part) for part in problem["loc"]) or "configuration"
+    field = ".".join(as_name(part) for part in problem["loc"]) or "configuration"
     if problem["type"] == "extra_forbidden":
         known = _fields_beside(section, problem["loc"])
-        return f"{field}: there is no such parameter{did_you_mean(str(problem['loc'][-1]), known)}"
+        return f"{field}: there is no such parameter{did_you_mean(str(problem['loc'][-1])[:_LONGEST_SHOWN], known)}"
     reason = problem["msg"].removeprefix("Input ").removeprefix("Value error, ")
-    given = repr(problem["input"])
     if problem["type"] == "literal_error":
-        reason += did_you_mean(str(problem["input"]), re.findall(r"'([^']*)'", reason))
-    return f"{field}: {given if len(given) <= _LONGEST_SHOWN else given[:_LONGEST_SHOWN] + '...'} {reason}"
+        reason += did_you_mean(str(problem["input"])[:_LONGEST_SHOWN], re.findall(r"'([^']*)'", reason))
+    return f"{field}: {quoted(problem['input'], _LONGEST_SHOWN)} {reason}"
 
 
 def _fields_beside(section: type[Section] | None, place: tuple[str | int, ...]) -> list[str]:

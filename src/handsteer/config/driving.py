@@ -130,15 +130,16 @@ class ControlConfig(Section):
     actions: dict[str, Action] = live(
         {}, description="Actions of signs, such as {Hi: stop, Peace: turbo}; Stop and NONE always stop"
     )
-    arming: Literal["auto", "on", "off"] = Field(
+    arming: Literal["auto", "on", "off", "course"] = Field(
         "auto",
-        description="Whether the robot moves only after neutral (Stop, or no hand) at start-up and after each fault; "
-        "auto is on unless the robot is simulated in the same process",
+        description="Whether signs move the robot only after neutral (Stop, or no hand) at start-up and after each "
+        "fault; auto is on unless the robot is simulated in the same process; course is also off while commands go to "
+        "robot_diff_drive_controller/cmd_vel, that of the tutorial's simulated robot",
     )
-    engage: Literal["auto", "on", "off"] = Field(
+    engage: Literal["auto", "on", "off", "course"] = Field(
         "auto",
         description="Whether the hand drives only after an open palm was held for 1 s, until 5 s without a sign, a "
-        "Stop or a fault; auto is on unless the robot is simulated in the same process",
+        "Stop or a fault; auto and course are as for arming",
     )
     cmd_vel_type: CmdVelType = Field(
         "auto",

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Final
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, JsonValue, model_validator
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, JsonValue, field_validator, model_validator
 
 log = logging.getLogger(__name__)
 
@@ -36,6 +36,14 @@ class Section(BaseModel):
             _OLD_NAMES_SEEN.add(name)
             log.warning("parameter %s is deprecated: use %s", name, new)
         return new
+
+    @field_validator("*")
+    @classmethod
+    def without_null(cls, value: Any) -> Any:
+        """Return ``value``; a text with a null character is no name, path or address, and no system call takes it."""
+        if isinstance(value, str | Path) and "\0" in str(value):
+            raise ValueError("must have no null character")
+        return value
 
     @model_validator(mode="before")
     @classmethod

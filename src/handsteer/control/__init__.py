@@ -8,7 +8,7 @@ from typing import Literal
 
 from handsteer.config import ControlConfig
 from handsteer.control.explain import Reason
-from handsteer.control.safety import Ramp, Safety
+from handsteer.control.safety import Ramp, Safety, SteeredBy
 from handsteer.control.sign_control import CruiseControl, SignControl
 from handsteer.types import NONE, RELEASED, ZERO, Stick, Velocity, action_of
 
@@ -20,7 +20,7 @@ class Control:
 
     Args:
         config: Limits, steps and timeouts.
-        arming: Whether neutral is required before the first movement (:mod:`handsteer.control.safety`).
+        arming: Whether signs must show neutral before the first movement (:mod:`handsteer.control.safety`).
         engage: Whether an open palm must engage the hand first.
 
     Attributes:
@@ -36,7 +36,13 @@ class Control:
         self._since_command_s = 0.0
 
     def step(
-        self, dt_s: float, *, sign: str | None = None, steering: Velocity | None = None, stick: Stick | None = None
+        self,
+        dt_s: float,
+        *,
+        sign: str | None = None,
+        steering: Velocity | None = None,
+        by: SteeredBy = "steering",
+        stick: Stick | None = None,
     ) -> Velocity | None:
         """Advance time by ``dt_s``, then process the inputs.
 
@@ -46,13 +52,14 @@ class Control:
             dt_s: Seconds since the last step, >= 0; any other value is a fault and stops the robot.
             sign: The sign of one frame, if one was received.
             steering: A steering command, if one was received.
+            by: What steers; each has to be released on its own.
             stick: The hand as a joystick in one frame, if that was received.
 
         Returns:
             The velocity to command now, or None to command nothing new.
         """
         if not (math.isfinite(dt_s) and dt_s >= 0):
-            self.safety.fault(f"{dt_s} s is no time between two steps")
+            self.safety.stall(f"{dt_s} s is no time between two steps")
             return self.halt()
         self.safety.step(dt_s)
         self._since_command_s += dt_s
@@ -62,7 +69,9 @@ class Control:
             stick = None
         elif stick is not None and not self.safety.admits_stick(held=stick.held):
             stick = RELEASED
-        if steering is not None and not self.safety.admits_steering(is_zero=steering.is_zero):
+        if steering is not None and not self.safety.admits_steering(
+            is_zero=steering.is_zero, is_valid=steering.is_finite, by=by
+        ):
             steering = ZERO
         velocity = self.mux.step(dt_s, sign=sign, steering=steering, stick=stick)
         if self.mux.source in ("signs", "joystick") and not self.safety.engagement.engaged:

@@ -36,7 +36,7 @@ _SENTENCES: dict[ReasonCode, str] = {
     "starting": "has just started: whether the robot was stopped before is not known yet",
     "disarmed": "show Stop or lower your hand to begin{}",
     "disengaged": "hold an open palm for {} s to begin",
-    "steering_disarmed": "release the steering to begin",
+    "steering_disarmed": "the steering is held: release it first",
     "no_image": "{}",
     "no_scan": "{}",
     "obstacle": "stopped before an {}",

@@ -6,6 +6,7 @@ signs, and :class:`Ramp` acceleration and jerk. The times are in :mod:`handsteer
 """
 
 import math
+from typing import Literal
 
 from handsteer.config import ControlConfig
 from handsteer.timeouts import (
@@ -17,12 +18,13 @@ from handsteer.timeouts import (
     NEUTRAL_S,
     NOT_FOLLOWING_S,
     ODOMETRY_S,
-    STEERING_AT_START_S,
     STOOD_BY_ITSELF_S,
 )
 from handsteer.types import NONE, STOP, Velocity
 
 _SLACK_S = 1e-9
+
+SteeredBy = Literal["steering", "gamepad"]
 
 
 class Engagement:
@@ -77,28 +79,58 @@ class Engagement:
         self.engaged = not self._enabled
 
 
+class Release:
+    """Whether a pad or stick was seen released: since the start, since each fault, and since it fell silent deflected.
+
+    Only a zero is a release: a pause may be a cut link, and what comes first may have been held since long before.
+
+    Attributes:
+        waits: Whether it has to be released first.
+    """
+
+    def __init__(self) -> None:
+        self.waits = True
+        self._age_s = 0.0
+        self._was_zero = True
+
+    def step(self, dt_s: float) -> None:
+        """Advance time by ``dt_s`` seconds."""
+        self._age_s += dt_s
+
+    def admits(self, *, is_zero: bool, is_valid: bool, timeout_s: float) -> bool:
+        """Record a command; return whether it may be followed.
+
+        Args:
+            is_zero: Whether it is a zero.
+            is_valid: Whether it is a velocity at all; if not, it is a fault.
+            timeout_s: After a longer pause that began at another command, it has to be released.
+        """
+        is_lost = self._age_s >= timeout_s and not self._was_zero
+        self.waits = not is_zero and (self.waits or is_lost or not is_valid)
+        self._age_s, self._was_zero = 0.0, is_zero
+        return not self.waits
+
+
 class Safety:
     """Keeps the robot stopped until neutral was seen.
 
     Neutral for signs is a sign that stops, or no hand for :data:`~handsteer.timeouts.NEUTRAL_S`; a ``NONE`` caused by a
-    fault does not count. Neutral for steering is a zero, or a pause. Both inputs must show it after a Stop was reset
-    and after another robot was selected; with ``arming`` also after the start and after each fault. With ``arming``, a
-    pause of steering that was not at zero is a fault too. So a hand that is already up, or a joystick that is held,
-    does not start the robot.
+    fault does not count. Both signs and steering must show neutral after a Stop was reset and after another robot was
+    selected; signs with ``arming`` also after the start and after each fault. So a hand that is already up does not
+    start the robot.
 
-    The hand as a joystick must always be released before it is followed: at the start, after each fault, and after
-    steering.
+    Steering, a gamepad and the hand as a joystick must always be seen released (:class:`Release`) before they are
+    followed: at the start, and after each fault. The hand also after steering.
 
     Args:
         config: Timeouts of signs and steering.
-        arming: Whether neutral is required after the start and after faults.
+        arming: Whether signs must show neutral after the start and after faults.
         engage: Whether the hand must also be engaged.
 
     Attributes:
         is_stopped: Whether a Stop is active, until :meth:`reset`.
         signs_wait: Why signs have to show neutral first, as ``no sign came``; empty after a reset, None if they need
             not.
-        steering_waits: Whether steering has to be released first.
         engagement: The clutch.
     """
 
@@ -109,19 +141,24 @@ class Safety:
         self._stick_waits = True
         self._age_s = 0.0
         self._sign_age_s = math.inf
-        self._steering_age_s = math.inf
-        self._last_steering_was_zero = True
+        self._releases: dict[SteeredBy, Release] = {"steering": Release(), "gamepad": Release()}
+        self._steered_by: SteeredBy = "steering"
         self._neutral_s = 0.0
         self._was_fault = False
         self.signs_wait: str | None = "has just started" if arming else None
-        self.steering_waits = arming
         self.is_stopped = False
+
+    @property
+    def steering_waits(self) -> bool:
+        """Whether what steered last has to be released first."""
+        return self._releases[self._steered_by].waits
 
     def step(self, dt_s: float) -> None:
         """Advance time by ``dt_s`` seconds, >= 0; a timeout of signs is a fault."""
         self._age_s += dt_s
         self._sign_age_s += dt_s
-        self._steering_age_s += dt_s
+        for release in self._releases.values():
+            release.step(dt_s)
         self.engagement.step(dt_s)
         if self._config.sign_timeout <= self._sign_age_s < math.inf:
             self.fault("no sign came")
@@ -139,12 +176,18 @@ class Safety:
 
     def disarm(self, why: str = "") -> None:
         """Require neutral of signs and steering before either is followed again."""
-        self.signs_wait, self.steering_waits = why, True
+        self.signs_wait = why
         self._neutral_s = 0.0
+        self._require_release()
         self._disengage()
 
+    def stall(self, why: str) -> None:
+        """Record that time was lost, for all inputs; what was held meanwhile has to be released."""
+        self.fault(why)
+        self._require_release()
+
     def fault(self, why: str) -> None:
-        """Record a fault; with ``arming``, signs have to show neutral again."""
+        """Record a fault of the hand's input; with ``arming``, signs have to show neutral again."""
         self._neutral_s = 0.0
         self._was_fault = True
         self._disengage()
@@ -152,10 +195,11 @@ class Safety:
             self.signs_wait = why
 
     def robot_is_away(self, why: str) -> None:
-        """Record that no robot follows the commands; with ``arming``, neutral is required when one does again."""
+        """Record that no robot follows the commands; steering, with ``arming`` also signs, must show neutral again."""
         if self._arming:
             self.disarm(why)
         else:
+            self._require_release()
             self._disengage()
 
     def admits_sign(self, sign: str, *, stops: bool) -> bool:
@@ -171,20 +215,18 @@ class Safety:
         waits = self._stick_waits or self.signs_wait is not None
         return self.engagement.engaged and not (waits or self.is_stopped)
 
-    def admits_steering(self, *, is_zero: bool) -> bool:
-        """Record a steering command; return whether the robot may follow it."""
-        age_s, self._steering_age_s = self._steering_age_s, 0.0
+    def admits_steering(self, *, is_zero: bool, is_valid: bool = True, by: SteeredBy = "steering") -> bool:
+        """Record a steering command, and whether it ``is_valid``; return whether the robot may follow it."""
         self._stick_waits = True
-        # Steering first received soon after the start may have been held since before it.
-        is_first_at_start = math.isinf(age_s) and self._arming and self._age_s < STEERING_AT_START_S
-        after_pause = age_s >= self._config.steering_timeout and not is_first_at_start
-        is_lost = after_pause and self._arming and not self._last_steering_was_zero
-        self._last_steering_was_zero = is_zero
-        if is_lost:
-            self.steering_waits = True
-        if is_zero or (after_pause and not is_lost):
-            self.steering_waits = False
-        return not (self.steering_waits or self.is_stopped)
+        self._steered_by = by
+        timeout_s = self._config.steering_timeout
+        return (
+            self._releases[by].admits(is_zero=is_zero, is_valid=is_valid, timeout_s=timeout_s) and not self.is_stopped
+        )
+
+    def note_rest(self, by: SteeredBy) -> None:
+        """Record that what could steer is at rest, which leaves the robot to others."""
+        self._releases[by].admits(is_zero=True, is_valid=True, timeout_s=math.inf)
 
     def reconfigure(self, config: ControlConfig) -> None:
         """Change the timeouts."""
@@ -209,15 +251,28 @@ class Safety:
         else:
             self._was_fault = False  # what happened since the fault was not observed
 
+    def _require_release(self) -> None:
+        for release in self._releases.values():
+            release.waits = True
+
     def _disengage(self) -> None:
         self._stick_waits = True
         self.engagement.disengage()
 
 
 class Following:
-    """Checks by odometry whether the robot does what is commanded; without odometry, it assumes so."""
+    """Checks by odometry whether the robot does what is commanded; without odometry, it assumes so.
 
-    def __init__(self) -> None:
+    Args:
+        checks_motion: Whether it has to move as commanded; otherwise only that its odometry does not stop.
+
+    Attributes:
+        is_silent: Whether its odometry has stopped.
+    """
+
+    def __init__(self, *, checks_motion: bool = True) -> None:
+        self._checks_motion = checks_motion
+        self.is_silent = False
         self._measured: Velocity | None = None
         self._age_s = 0.0
         self._refuses_s = 0.0
@@ -234,8 +289,11 @@ class Following:
         if self._measured is None:
             return None
         self._age_s += dt_s
-        if self._age_s >= ODOMETRY_S:
+        self.is_silent = self._age_s >= ODOMETRY_S
+        if self.is_silent:
             return "the robot's odometry has stopped"
+        if not self._checks_motion:
+            return None
         done = _done(commanded, self._measured)
         turns_round = self._follows is not None and not _same_way(commanded, self._follows)
         if not done or turns_round:

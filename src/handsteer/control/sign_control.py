@@ -4,7 +4,7 @@ import math
 
 from handsteer.config import ControlConfig
 from handsteer.control.safety import Allowance
-from handsteer.types import MOTION_ACTIONS, NONE, ZERO, Action, Velocity, action_of
+from handsteer.types import ZERO, Action, Velocity, action_of
 
 _DIGITS = 9
 _TURBO = 2.0
@@ -114,20 +114,15 @@ class CruiseControl(SignControl):
     ``Forward`` raises the set speed by a step when it begins, and by another one each ``cruise_step_time`` while it is
     held; ``Backward`` lowers it; at zero it waits for twice that time. The velocity follows the set speed whatever
     is shown, so the robot also speeds up in a curve. ``Turn Left`` and ``Turn Right`` turn while they are shown;
-    ``Forward`` and ``Backward`` keep the turn, ``Go`` ends it. ``Stop`` and ``NONE`` command zero at once. After a
-    ``NONE`` of at most :data:`BETWEEN_SIGNS_S`, as there is while the fingers go from one sign to another, a sign that
-    moves restores the set speed, and continues from the velocity that braking has left.
+    ``Forward`` and ``Backward`` keep the turn, ``Go`` ends it. ``Stop`` and ``NONE`` command zero at once, and set the
+    speed to zero: nothing shows whose hand comes after a ``NONE``. To keep the speed, change signs through ``Go``.
     """
-
-    BETWEEN_SIGNS_S = 0.5
 
     def __init__(self, config: ControlConfig) -> None:
         super().__init__(config)
         self._set_mps = 0.0
         self._shown: Action = "stop"
         self._shown_s = 0.0
-        self._unseen_s = 0.0
-        self._left_mps = 0.0
 
     def reconfigure(self, config: ControlConfig) -> None:
         """Change the configuration; velocity and set speed are clamped to the new limits."""
@@ -145,17 +140,13 @@ class CruiseControl(SignControl):
         return super().halt()
 
     def _forget(self) -> None:
-        self._set_mps, self._left_mps, self._unseen_s, self._shown = 0.0, 0.0, 0.0, "stop"
+        self._set_mps, self._shown = 0.0, "stop"
 
-    def _next(self, sign: str, action: Action, interval_s: float) -> Velocity:
+    def _next(self, _sign: str, action: Action, interval_s: float) -> Velocity:
         config = self._config
-        if sign == NONE:
-            return self._brake(interval_s)
-        if action == "stop" or (self._unseen_s and action not in MOTION_ACTIONS):
+        if action == "stop":
             self._forget()
             return ZERO
-        if self._unseen_s:
-            self.velocity, self._unseen_s = Velocity(self._left_mps), 0.0
         begins = action != self._shown
         self._shown = action
         if action in ("forward", "backward"):
@@ -166,16 +157,6 @@ class CruiseControl(SignControl):
         wanted = {"turn_left": turn, "turn_right": -turn, "go": 0.0}.get(action, now.angular_radps)
         angular = _approach(now.angular_radps, wanted, config.cruise_angular_acceleration * interval_s)
         return Velocity(round(linear, _DIGITS), round(angular, _DIGITS))
-
-    def _brake(self, interval_s: float) -> Velocity:
-        """Command zero, and remember how fast the robot still is at least, if it brakes as this rule does."""
-        if not self._unseen_s:
-            self._left_mps = self.velocity.linear_mps
-        self._unseen_s += interval_s
-        self._left_mps = _approach(self._left_mps, 0.0, self._config.cruise_acceleration * interval_s)
-        if self._unseen_s > self.BETWEEN_SIGNS_S:
-            self._forget()
-        return ZERO
 
     def _change_set_speed(self, way: float, interval_s: float, *, begins: bool) -> None:
         self._shown_s = 0.0 if begins else self._shown_s + interval_s

@@ -7,14 +7,16 @@ page in a frame either.
 
 import hashlib
 import hmac
+import html
+import re
 import secrets
 from dataclasses import dataclass, field
 from typing import Final, Literal
-from urllib.parse import SplitResult, parse_qsl, urlencode, urlsplit
+from urllib.parse import SplitResult, parse_qsl, quote, urlencode, urlsplit
 
 from starlette.datastructures import Headers, MutableHeaders, State
 from starlette.requests import cookie_parser
-from starlette.responses import PlainTextResponse, RedirectResponse, Response
+from starlette.responses import HTMLResponse, PlainTextResponse, RedirectResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from handsteer.dashboard.limits import Connections
@@ -80,9 +82,14 @@ _LOOPBACK_NAMES = frozenset({"127.0.0.1", "localhost", "::1"})
 _KINDS = frozenset({"http", "websocket"})
 _FRAMES = frozenset({"iframe", "frame", "fencedframe", "embed", "object"})
 _LONGEST_COOKIES = 8192
+_HOST = re.compile(r"(\[[0-9A-Fa-f:.]+\]|[A-Za-z0-9_.-]+)(:[0-9]{1,5})?", re.ASCII)
+"""A name or an address, with a port or not (RFC 9110, section 7.2)."""
 
 SESSION = "handsteer_session"
 """Key of a request's session in the ``state`` of its scope."""
+
+HAD_SESSION = "handsteer_had_session"
+"""Key of whether the request came with its session, and was not given it, next to it."""
 
 
 @dataclass(frozen=True)
@@ -145,6 +152,7 @@ class AccessMiddleware:
                 session = access.sessions.new()
                 send = _with_session(send, scope, session)
             scope.setdefault("state", {})[SESSION] = session if session and access.sessions.knows(session) else ""
+            scope["state"][HAD_SESSION] = is_known
             await self._app(scope, receive, send)
 
 
@@ -157,11 +165,29 @@ async def _refuse(answer: Response, scope: Scope, receive: Receive, send: Send) 
 
 def _answer(access: Access, scope: Scope) -> Response | None:
     headers = Headers(scope=scope)
-    if access.is_local and _parts(f"//{headers.get('host', '')}").hostname not in _LOOPBACK_NAMES:
+    host = _only(headers, "host")
+    if not _HOST.fullmatch(host):
+        return PlainTextResponse("the request needs one header Host, with a name or an address", 400)
+    if access.is_local and _parts(f"//{host}").hostname not in _LOOPBACK_NAMES:
         return PlainTextResponse("this page is served to this machine only", 400)
     if _is_of_another_site(headers):
         return PlainTextResponse("pages of other sites may not use this one", 403)
-    return None if access.token is None else _ask_for_token(access, scope, headers)
+    refusal = None if access.token is None else _ask_for_token(access, scope, headers)
+    return refusal or (_door(scope, headers) if _follows_a_link(headers) else None)
+
+
+def _door(scope: Scope, headers: Headers) -> Response:
+    """Return a page with a link to the one that another site's link leads to; so that site cannot make us build any."""
+    words, language = ("Continue to handsteer", "en")
+    if headers.get("accept-language", "").lower().startswith("de"):
+        words, language = ("Weiter zu handsteer", "de")
+    rest = scope.get("query_string", b"").decode("latin-1")
+    address = html.escape(f"/{quote(scope['path'].lstrip('/'))}{'?' if rest else ''}{rest}")
+    body = f'<!doctype html><html lang="{language}"><meta name="viewport" content="width=device-width">'
+    return HTMLResponse(
+        f'{body}<title>handsteer</title><p><a href="{address}">{words}</a></p></html>',
+        headers={"Cache-Control": "no-store"},
+    )
 
 
 def _ask_for_token(access: Access, scope: Scope, headers: Headers) -> Response | None:
@@ -223,14 +249,26 @@ def session_cookie_name(scope: Scope) -> str:
 
 def _is_of_another_site(headers: Headers) -> bool:
     origin = headers.get("origin")
-    if origin is not None and _parts(origin).netloc != headers.get("host"):
+    if origin is not None and _parts(origin).netloc.lower() != _only(headers, "host").lower():
         return True
-    if headers.get("sec-fetch-dest") in _FRAMES:  # none of our pages has frames
+    if _FRAMES & {each.strip() for each in _only(headers, "sec-fetch-dest").lower().split(",")}:  # we have no frames
         return True
     # Requests for pictures and the like have no Origin. Another port of this machine counts as the same site, but is
     # not ours. Following a link from elsewhere is allowed.
-    is_ours = headers.get("sec-fetch-site", "none") in {"same-origin", "none"}
-    return not is_ours and headers.get("sec-fetch-mode") != "navigate"
+    return not (_is_ours(headers) or _follows_a_link(headers))
+
+
+def _is_ours(headers: Headers) -> bool:
+    return _only(headers, "sec-fetch-site").lower() in {"same-origin", "none", ""}
+
+
+def _follows_a_link(headers: Headers) -> bool:
+    return not _is_ours(headers) and _only(headers, "sec-fetch-mode").lower() == "navigate"
+
+
+def _only(headers: Headers, name: str) -> str:
+    """Return the value of a header; of several, a list, which is no valid value of those used here."""
+    return ", ".join(headers.getlist(name)).strip()
 
 
 def _parts(address: str) -> SplitResult:

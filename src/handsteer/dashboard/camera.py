@@ -163,8 +163,8 @@ class PictureNode(Node):
         self._answer(jpeg)
 
     def _answer(self, jpeg: bytes | None) -> None:
-        # A deque, because the server's thread appends concurrently.
-        while self._waiting:
+        # A deque, because the server's thread appends concurrently: also whoever has got this picture already.
+        for _ in range(len(self._waiting)):
             future = self._waiting.popleft()
             with suppress(RuntimeError):  # the server has stopped
                 future.get_loop().call_soon_threadsafe(_resolve, future, jpeg)

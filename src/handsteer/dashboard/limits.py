@@ -55,7 +55,7 @@ class Connection:
 
 
 class Connections:
-    """Accepts and limits connections, secure ones with a ``certificate``; runs on the server's thread only."""
+    """Accepts and limits connections, secure ones with a ``certificate``; runs on the front's thread only."""
 
     def __init__(self, certificate: ssl.SSLContext | None = None) -> None:
         self._certificate = certificate
@@ -163,7 +163,7 @@ MOST_UNCONNECTED_PAGES: Final = 64
 
 
 class UnconnectedPages:
-    """Deletes the oldest page without a websocket if there are too many; runs on the server's thread.
+    """Deletes the oldest page without a websocket if there are too many; runs on the pages' thread.
 
     A browser whose page is deleted before its websocket connects reloads it. Without this limit, clients that fetch
     pages but run no scripts or keep no cookies would fill the memory.
@@ -187,7 +187,9 @@ class UnconnectedPages:
 LOG_PERIOD_S: Final = 10.0
 
 _LONGEST: Final = 300
-_THREAD: Final = "dashboard"
+FRONT_THREAD: Final = "dashboard_front"
+PAGES_THREAD: Final = "dashboard"
+_THREADS: Final = frozenset({FRONT_THREAD, PAGES_THREAD})
 # Loggers of the server's libraries; a filter applies to its own logger only.
 _LOGGERS: Final = (
     "asyncio",
@@ -212,7 +214,7 @@ class LogLimit(logging.Filter):
 
     def filter(self, record: logging.LogRecord) -> bool:
         """Return whether to log ``record``; shortens it."""
-        if record.threadName != _THREAD or logging.getLogger(record.name).isEnabledFor(logging.DEBUG):
+        if record.threadName not in _THREADS or logging.getLogger(record.name).isEnabledFor(logging.DEBUG):
             return True
         error = record.exc_info[1] if record.exc_info else None
         kind = (record.name, record.pathname, record.lineno, record.levelno, type(error))
@@ -238,7 +240,7 @@ def _shorten(record: logging.LogRecord, error: BaseException | None, left_out: i
 
 @functools.cache
 def limit_log() -> None:
-    """Shorten the logs of the server's libraries that come from the page's thread."""
+    """Shorten the logs of the server's libraries that come from the page's threads."""
     limit = LogLimit()
     for name in _LOGGERS:
         logging.getLogger(name).addFilter(limit)

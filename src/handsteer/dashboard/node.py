@@ -105,6 +105,7 @@ class DashboardNode(Node):
         self._lock = threading.RLock()  # guards the steering viewer and its topic; the server's thread uses them too
         self._holder: tuple[str, float] | None = None
         self._steered: tuple[str, float] | None = None  # who steered last, and when
+        self._last_holder: str | None = None
         self._stopper: str | None = None
         self._scan_came_s = -math.inf
         self.subscribe(DIAGNOSTICS, self._on_diagnostics, key=_reporter)
@@ -131,18 +132,23 @@ class DashboardNode(Node):
             may_reset=may_reset,
             topic=self._steering.topic if self._steering.is_direct else "",
             stands=self._steering.is_stopped,
+            waits=holder is not None and self._steering.waits,
         )
         return compose(self._observed, now, viewers)
 
     def steer(self, viewer: str, linear_mps: float, angular_radps: float) -> None:
         """Drive at this velocity if ``viewer`` has the control lease or the lease is free.
 
-        The command holds while the viewer repeats it within :data:`~handsteer.timeouts.HOLD_TIMEOUT_S`.
+        The command holds while the viewer repeats it within :data:`~handsteer.timeouts.HOLD_TIMEOUT_S`. A viewer who
+        has not steered last, or who was silent for longer, has to begin with a zero.
         """
         if self.lease.take(viewer, self.clock.now()):
             with self._lock:
                 if self._holder is None:
                     self._audit.say("steers", viewer, "steers by hand")
+                if viewer != self._last_holder:
+                    self._last_holder = viewer
+                    self._steering.lose()
                 self._holder = (viewer, self.clock.now())
                 self._steered = (self._audit.person_of(viewer), self.clock.now())
                 self._steering.steer(linear_mps, angular_radps)
@@ -214,7 +220,8 @@ class DashboardNode(Node):
         with self._lock:
             holder, now = self._holder, self.clock.now()
             if holder is not None and (now - holder[1] > HOLD_TIMEOUT_S or not self.lease.drives(holder[0])):
-                self.release(holder[0])
+                self._holder = None
+                self._steering.lose()  # whether the person has released it is not known
 
     def _sample(self) -> None:
         now, observed = self.clock.now(), self._observed

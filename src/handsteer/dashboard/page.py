@@ -3,13 +3,14 @@
 import copy
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from nicegui import ui
 
 from handsteer.dashboard.access import SESSION
 from handsteer.dashboard.calibration import Calibrations
 from handsteer.dashboard.elements import STATIC, switch, tag, text
+from handsteer.dashboard.front import Presses
 from handsteer.dashboard.lessons import Lessons
 from handsteer.dashboard.node import DashboardNode
 from handsteer.dashboard.recordings import Recordings, duration_text
@@ -94,6 +95,7 @@ class PageContext:
         study: Leads a participant through a study; None without one.
         recordings: Serves recordings; None if none can be made.
         calibrations: Adapts the signs to a person; None if the graph's nodes run elsewhere.
+        presses: Recognises repetitions of a press of Stop.
     """
 
     node: OnDemandNode[DashboardNode]
@@ -104,6 +106,7 @@ class PageContext:
     study: Session | None = None
     recordings: Recordings | None = None
     calibrations: Calibrations | None = None
+    presses: Presses = field(default_factory=Presses)
 
 
 class Page:
@@ -216,8 +219,10 @@ class Page:
             self._unread = (oldest, now_s)
         return oldest is None or now_s - self._unread[1] < _ACK_PATIENCE_S
 
-    def _halt(self) -> None:
-        self.do(DashboardNode.halt)
+    def _halt(self, sent: object) -> None:
+        press = sent.get("press") if isinstance(sent, dict) else None
+        if node := self.node:
+            self._context.presses.obey(self.client.id, press, lambda: node.halt(self.client.id))
 
     def _reset(self) -> None:
         self.do(DashboardNode.reset)

@@ -6,6 +6,7 @@ Topics pass through it as well (:mod:`handsteer.transports.piped`).
 import contextlib
 import datetime
 import itertools
+import logging
 import threading
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -20,7 +21,7 @@ from handsteer.cameras.choice import BROWSER, OWN, CameraChoice, Size
 from handsteer.clock import Clock
 from handsteer.config import Config
 from handsteer.dashboard.viewers import PageAudit
-from handsteer.errors import ConfigError, FrameError, HandsteerError, TransportError
+from handsteer.errors import ConfigError, FrameError, HandsteerError, TransportError, quoted
 from handsteer.graph import Graph
 from handsteer.making import make_steering
 from handsteer.nodes.steering import SteeringNode
@@ -31,6 +32,9 @@ from handsteer.transports.piped import Gateway, Pipe, PipedTransport
 
 _ANSWER_TIMEOUT_S = 5.0
 _LOOK_PERIOD_S = 0.2
+_FAILED = "the robot's process failed to do it; its log says why"
+
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -124,6 +128,9 @@ class GraphServer:
             result = self._actions[action](*arguments)
         except HandsteerError as error:
             self._answer(number, error)
+        except Exception:
+            self._answer(number, TransportError(_FAILED))
+            raise
         else:
             if isinstance(result, Future):
                 result.add_done_callback(lambda done: self._answer(number, done.exception()))
@@ -131,6 +138,9 @@ class GraphServer:
                 self._answer(number, None)
 
     def _answer(self, number: int, error: BaseException | None) -> None:
+        if error is not None and not isinstance(error, HandsteerError):
+            log.error("a request of the page failed: %s %s", type(error).__name__, quoted(str(error)))
+            error = TransportError(_FAILED)  # others may not survive the way
         self._send_state()
         self._pipe.say("answer", number, error)
 

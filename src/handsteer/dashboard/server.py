@@ -1,4 +1,4 @@
-"""The web server of the page, on its own thread next to the graph."""
+"""The web server of the page, on its own threads next to the graph."""
 
 import functools
 import ssl
@@ -11,10 +11,13 @@ from typing import Any
 import uvicorn
 from fastapi import FastAPI
 from nicegui import app, core, ui
+from starlette.datastructures import State
 from starlette.responses import JSONResponse, Response
 from starlette.staticfiles import StaticFiles
+from starlette.types import ASGIApp
 from starlette.websockets import WebSocket
 
+from handsteer.audit import WARN
 from handsteer.cameras.browser import LARGEST_BYTES
 from handsteer.clock import Clock
 from handsteer.config import DEFAULT_FILE, DashboardConfig
@@ -23,10 +26,11 @@ from handsteer.dashboard.calibration import Calibrations
 from handsteer.dashboard.camera import FrameSocket, PictureNode, PictureResponse
 from handsteer.dashboard.drive_page import DrivePage
 from handsteer.dashboard.elements import STATIC
+from handsteer.dashboard.front import PagesLoop, StopPath
 from handsteer.dashboard.lesson_files import serve_lesson_files
 from handsteer.dashboard.lesson_page import LessonPage
 from handsteer.dashboard.lessons import Lessons
-from handsteer.dashboard.limits import Connections, UnconnectedPages, limit_log
+from handsteer.dashboard.limits import FRONT_THREAD, Connections, UnconnectedPages, limit_log
 from handsteer.dashboard.node import DashboardNode
 from handsteer.dashboard.page import (
     ASSETS_PATH,
@@ -122,7 +126,9 @@ class Dashboard:
             self.context = PageContext(self.node, audit, graph, settings, lessons, study, recordings, calibrations)
         self.webcam = FrameSocket(graph, self._drives)
         self._config = config
+        self._steering = steering
         self._server: uvicorn.Server | None = None
+        self._pages: PagesLoop | None = None
         self._thread: threading.Thread | None = None
 
     @classmethod
@@ -158,8 +164,11 @@ class Dashboard:
         application.state.dashboard = self
         application.state.access = access
         application.state.connections = Connections(certificate)
-        self._server = uvicorn.Server(_settings(application))
-        self._thread = threading.Thread(target=self._server.run, args=([listener],), name="dashboard", daemon=True)
+        self._pages = PagesLoop(application)
+        front = StopPath(self._pages, self.halt, self.context.presses)
+        self._server = uvicorn.Server(_settings(front, application.state))
+        self._thread = threading.Thread(target=self._server.run, args=([listener],), name=FRONT_THREAD, daemon=True)
+        self._pages.start()
         self._thread.start()
         self._wait_until_served()
         scheme = "https" if certificate else "http"
@@ -181,7 +190,18 @@ class Dashboard:
             self._server.should_exit = True
             self._thread.join(_STOP_TIMEOUT_S)
             self._server = None
+            if self._pages is not None:
+                self._pages.stop()
             _one_at_a_time.release()
+
+    def halt(self, viewer: str) -> None:
+        """Stop the robot for a page, whether or not its websocket is connected; may be called on any thread."""
+        node = self.node.join(viewer) if self.node.is_watched_by(viewer) else None
+        if node is not None:
+            node.halt(viewer)
+        else:
+            self._steering.halt()
+            self.context.audit.say("stop_pressed", viewer, "pressed Stop", level=WARN)
 
     def _drives(self, viewer: str) -> bool:
         if not self.node.is_watched_by(viewer):
@@ -199,16 +219,16 @@ class Dashboard:
             time.sleep(0.01)
 
 
-def _settings(application: FastAPI) -> uvicorn.Config:
+def _settings(front: ASGIApp, state: State) -> uvicorn.Config:
     settings = uvicorn.Config(
         # Outermost, so that it covers everything, errors included.
-        AccessMiddleware(application, application.state),
-        http=application.state.connections.protocol,
+        AccessMiddleware(front, state),
+        http=state.connections.protocol,
         headers=list(HEADERS),
         server_header=False,
         proxy_headers=False,  # other users of this machine could forge the header
         # uvloop keeps reading for a protocol that has paused it before TLS begins.
-        loop="asyncio" if application.state.connections.is_secure else "auto",
+        loop="asyncio" if state.connections.is_secure else "auto",
         log_config=None,
         access_log=False,
         lifespan="on",

@@ -16,6 +16,8 @@ from handsteer.dashboard.settings_fields import FIELDS, FORM, Field
 from handsteer.errors import ConfigError, HandsteerError
 from handsteer.hand.script import parse_script
 from handsteer.parameters import plain
+from handsteer.plain_yaml import LARGEST_BYTES
+from handsteer.regular_files import read_regular
 from handsteer.robots.world import load_world
 
 _COMMENT = re.compile(r"(^|\s)#", re.MULTILINE)
@@ -306,7 +308,7 @@ class SettingsFile:
 
     def _content(self) -> bytes | None:
         try:
-            return self.path.read_bytes()
+            return read_regular(self.path, LARGEST_BYTES)
         except FileNotFoundError:
             return None
         except OSError as error:

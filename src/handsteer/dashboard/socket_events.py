@@ -4,6 +4,8 @@ NiceGUI reads an event's page from the event itself. Here a websocket may only s
 the same browser, and only in the format of its script.
 """
 
+import itertools
+import json
 import logging
 from collections.abc import Awaitable, Callable, Mapping
 from inspect import isawaitable
@@ -15,6 +17,7 @@ from socketio import AsyncServer
 from socketio.exceptions import ConnectionRefusedError as Refused
 
 from handsteer.dashboard.access import SESSION
+from handsteer.errors import quoted
 
 Check = Callable[[Any], bool]
 log = logging.getLogger(__name__)
@@ -25,6 +28,12 @@ _REFUSED: Final = "Implicit handshake failed"
 _LONGEST_NAME: Final = 100
 _LONGEST_LOG: Final = 300
 _MOST_ARGUMENTS: Final = 20
+_LONGEST_ARGUMENT: Final = 512 * 1024
+"""Characters; the longest is a world file of 64 kB, some of whose characters take six in JSON."""
+
+_DEEPEST: Final = 8
+"""Nested lists and objects in an argument; the pages' own need three."""
+
 _LEVELS: Final = ("debug", "info", "warning", "error")
 
 
@@ -41,11 +50,30 @@ def _is_decimal(value: Any) -> bool:
 
 
 def _are_arguments(values: Any) -> bool:
-    return (
-        isinstance(values, list)
-        and len(values) <= _MOST_ARGUMENTS
-        and all(each is None or isinstance(each, str) for each in values)
-    )
+    return isinstance(values, list) and len(values) <= _MOST_ARGUMENTS and all(map(_is_argument, values))
+
+
+def _is_argument(value: Any) -> bool:
+    """Return whether it is JSON that is not too long and not too deep, so that others can copy and send it."""
+    if value is None:
+        return True
+    if not isinstance(value, str) or len(value) > _LONGEST_ARGUMENT:
+        return False
+    try:
+        return _is_flat(json.loads(value))
+    except (ValueError, RecursionError):
+        return False
+
+
+def _is_flat(value: Any) -> bool:
+    """Return whether lists and objects are nested :data:`_DEEPEST` deep at most."""
+    level = [value]
+    for _ in range(_DEEPEST + 1):
+        inner = [each.values() if isinstance(each, dict) else each for each in level if isinstance(each, dict | list)]
+        if not inner:
+            return True
+        level = list(itertools.chain.from_iterable(inner))
+    return False
 
 
 _HANDSHAKE: Final[dict[str, Check]] = {
@@ -58,7 +86,11 @@ _SHAPES: Final[dict[str, dict[str, Check]]] = {
     "event": {"client_id": _is_name, "id": _is_count, "listener_id": _is_name, "args": _are_arguments},
     "javascript_response": {"client_id": _is_name, "request_id": _is_name},
     "ack": {"client_id": _is_name, "next_message_id": _is_count},
-    "log": {"client_id": _is_name, "level": lambda level: level in _LEVELS, "message": lambda _: True},
+    "log": {
+        "client_id": _is_name,
+        "level": lambda level: level in _LEVELS,
+        "message": lambda message: isinstance(message, str),
+    },
 }
 
 
@@ -104,7 +136,7 @@ class SocketEvents:
                 _note(name)
                 return
             if name == "log":
-                sent = {**sent, "message": f"the browser says: {str(sent['message'])[:_LONGEST_LOG]!r}"}
+                sent = {**sent, "message": f"the browser says: {quoted(sent['message'], _LONGEST_LOG)}"}
             try:
                 answer = self._handlers[name](socket, sent)
                 if isawaitable(answer):
@@ -131,4 +163,6 @@ def _old(sent: dict[str, Any]) -> dict[str, Any]:
 
 
 def _note(name: str, error: Exception | None = None) -> None:
-    log.warning("an event %r of a browser makes no sense, and was left out%s", name, f": {error!r}" if error else "")
+    log.warning(
+        "an event %r of a browser makes no sense, and was left out%s", name, f": {quoted(str(error))}" if error else ""
+    )

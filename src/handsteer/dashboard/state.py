@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import Literal, TypeVar
 
 from handsteer.config import ControlConfig
+from handsteer.control.explain import Reason
 from handsteer.nodes.status import ERROR, OK, CameraStatus, ControlStatus, RecognitionStatus, RobotStatus, Status
 from handsteer.timeouts import ODOMETRY_S, ROBOT_S
 from handsteer.types import NONE, SIGNS, ZERO, Velocity
@@ -44,6 +45,7 @@ class Viewers:
         may_reset: Whether this viewer may reset Stop.
         topic: The topic of steering that bypasses the control; empty otherwise.
         stands: Whether steering is disabled by Stop; used if no control reports Stop.
+        waits: Whether what steers has to be released first.
     """
 
     steers: Person = ""
@@ -52,6 +54,7 @@ class Viewers:
     may_reset: bool = True
     topic: str = ""
     stands: bool = False
+    waits: bool = False
 
 
 NO_VIEWERS = Viewers()
@@ -228,8 +231,8 @@ def explain(reporting: Reporting, viewers: Viewers = NO_VIEWERS, *, is_moving: b
     The control reports whether the robot is commanded to move. If it is not, because no sign is confirmed, the reason
     lies upstream: the camera gives no picture, no hand is in view, or the hand shows no sign.
     """
-    if viewers.topic and viewers.steers:
-        return "driving", "Driving", f"steered by hand, straight on {viewers.topic}"
+    if viewers.steers and (by_hand := _explain_steering(reporting, viewers, is_moving=is_moving)):
+        return by_hand
     control, robot = reporting.control, reporting.robot or RobotStatus()
     stopped = is_stopped(control, viewers)
     if control is None and not stopped:
@@ -250,6 +253,13 @@ def explain(reporting: Reporting, viewers: Viewers = NO_VIEWERS, *, is_moving: b
     # What lies upstream is why it stands, whatever the control waits for.
     state = control.reason.state() if control.reason and not upstream else "standing"
     return mood, "Stopping" if is_moving else state.capitalize(), upstream or reason
+
+
+def _explain_steering(reporting: Reporting, viewers: Viewers, *, is_moving: bool) -> tuple[Mood, str, str] | None:
+    """Return what only the page's own steering knows, in place of what the control reports."""
+    if viewers.waits and not is_stopped(reporting.control, viewers):
+        return "standing", "Stopping" if is_moving else "Standing", Reason("steering_disarmed").explanation
+    return ("driving", "Driving", f"steered by hand, straight on {viewers.topic}") if viewers.topic else None
 
 
 def _why_standing(control: ControlStatus, reporting: Reporting) -> tuple[Mood, str | None]:

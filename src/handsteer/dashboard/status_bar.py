@@ -83,10 +83,17 @@ def spoken(state: PageState) -> str:
     return ". ".join([f"{state.headline}: {_TIME.sub('', state.reason)}", *state.warnings])
 
 
-class Banner:
-    """A sentence that reports what the robot does, and why, and buttons that call ``halt`` and ``reset``."""
+_PRESS = "() => emit({ press: window.pressStop?.() ?? 0 })"
 
-    def __init__(self, halt: Callable[[], None], reset: Callable[[], None]) -> None:
+
+class Banner:
+    """A sentence that reports what the robot does, and why, and buttons that call ``halt`` and ``reset``.
+
+    ``halt`` is called with what the browser sent: the number of the press, which ``static/page.js`` also sends by a
+    request of its own, until that is answered.
+    """
+
+    def __init__(self, halt: Callable[[object], None], reset: Callable[[], None]) -> None:
         with ui.element("section").classes("card banner") as self._banner:
             self._spoken = text("spoken", "").props('role="status"')
             box("lamp")
@@ -96,9 +103,13 @@ class Banner:
             self._warning = text("warning hidden", "")
             with box("buttons"):
                 self._reset = button("Reset", reset, "Reset: let the robot be driven again").classes("hidden")
-                stop = button("Stop", halt, "Stop the robot (space key)").classes("stop")
+                stop = button("Stop", label="Stop the robot (space key)").classes("stop")
                 stop.props('aria-keyshortcuts="Space"')
-        ui.on("space", halt)
+                stop.on("click", lambda event: halt(event.args), js_handler=_PRESS)
+                with stop:
+                    text("pressed sent", "Sent")
+                    text("pressed confirmed", "Stopped")
+        ui.on("space", lambda event: halt(event.args))
         self._mood = ""
 
     def update(self, state: PageState) -> None:

@@ -145,6 +145,8 @@ class SteerPanel:
         if wanted.is_zero:
             self.release()
         else:
+            if self._input.sliders.is_zero:
+                self._steer(ZERO)  # they were released until now
             self._input.slide(wanted, time.monotonic())
             self._show_sliders()
 

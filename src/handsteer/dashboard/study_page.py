@@ -128,7 +128,7 @@ class StudyPage(Page):
             return
         self.lead(lambda: session.note(state.robot.course, state.robot.path_length_m, node.clock.now()))
         if session.lap is None:
-            self._halt()
+            node.halt(self.client.id)
         elif lap.course is None and session.lap.course is not None:
             node.reset(self.client.id)
 

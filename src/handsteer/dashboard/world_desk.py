@@ -8,7 +8,7 @@ from typing import Literal
 
 from handsteer.dashboard.page import Page
 from handsteer.dashboard.remote_graph import RemoteGraph
-from handsteer.errors import WorldError
+from handsteer.errors import HandsteerError
 from handsteer.robots.editing import Change, replace
 from handsteer.robots.world import World
 
@@ -148,7 +148,7 @@ class WorldDesk:
         """Return whether ``change`` succeeded; show ``done``, or the error."""
         try:
             await asyncio.wait_for(asyncio.wrap_future(change), _ANSWER_TIMEOUT_S)
-        except WorldError as error:
+        except HandsteerError as error:
             self._show(str(error))
         except TimeoutError:
             self._show("The robot does not answer; nothing has changed.")

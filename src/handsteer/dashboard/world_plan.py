@@ -154,17 +154,18 @@ class ThingForm:
                 colour = ui.element("input").props(f'type="color" ^value="{thing.colour}"')
                 colour.on("change", lambda event: self._on_field("colour", event.args), js_handler=_EMIT_VALUE)
             self._movable = ui.checkbox("can be pushed", value=thing.movable)
-            self._movable.on_value_change(lambda event: self._on_field("movable", bool(event.value)))
+            self._movable.on_value_change(lambda event: self._on_field("movable", event.value))
 
     async def _on_number(self, index: int, value: float | None) -> None:
-        if self._shown is None or value is None:
+        if self._shown is None or value is None or not math.isfinite(value):
             return
         each = numeric_properties(self._shown)[index]
         if round(value, _DIGITS) != round(each.value, _DIGITS):
             await self._edit(self._shown.name, each.fields(value))
 
     async def _on_field(self, name: str, value: object) -> None:
-        if self._shown is not None and value != getattr(self._shown, name):
+        now = getattr(self._shown, name, None)  # a gate has neither field
+        if self._shown is not None and now is not None and isinstance(value, type(now)) and value != now:
             await self._edit(self._shown.name, {name: value})
 
 

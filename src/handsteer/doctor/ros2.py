@@ -8,7 +8,7 @@ import re
 import socket
 import subprocess
 import sys
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -28,9 +28,16 @@ _TIMEOUT_S = 20.0
 # Cyclone DDS prefixes its lines with the time, the domain and the program.
 _ENGINE_LINE = re.compile(r"^\d+\.\d+ \[\d+\]\s+\S+: (.*)$", re.MULTILINE)
 
+_RANGE_VARIABLES = frozenset(
+    {"CYCLONEDDS_URI", "ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_LOCALHOST_ONLY", "ROS_STATIC_PEERS"}
+)
 _NAME = "dds"
 _NEWEST_PYTHON = (3, 13)
 _DOMAINS_AT_ONCE = 4
+_HIDDEN = (
+    "not found by programs that start now with ROS 2's default range, the subnet: start what is not found without "
+    "ROS_LOCALHOST_ONLY, or those programs with ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST"
+)
 # Linux assigns ports from 32768 on dynamically.
 _LARGEST_SAFE_DOMAIN = 101
 
@@ -135,16 +142,25 @@ class Sight:
 def look(environments: Mapping[int, Mapping[str, str]]) -> dict[int, Sight]:
     """Return what is observed in each domain, looked at simultaneously with its environment variables."""
     processes = {
-        domain: subprocess.Popen(
-            [sys.executable, "-m", "handsteer.transports.dds.look"],
-            env={**environment, "ROS_DOMAIN_ID": str(domain)},
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-        )
-        for domain, environment in environments.items()
+        domain: _looking({**environment, "ROS_DOMAIN_ID": str(domain)}) for domain, environment in environments.items()
     }
     return {domain: _sight(process) for domain, process in processes.items()}
+
+
+def not_found_by_others(environment: Mapping[str, str], nodes: Collection[str]) -> list[str]:
+    """Return which of ``nodes`` a new participant does not find that looks at the subnet, as ROS 2 does by default.
+
+    Unlike one with the range of ``environment``, it is found by nodes that are limited to this machine only if these
+    still announce themselves.
+    """
+    plain = {name: value for name, value in environment.items() if name not in _RANGE_VARIABLES}
+    sight = _sight(_looking({**plain, "ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"}, nodes))
+    return [] if sight.graph is None else sorted(set(nodes) - set(sight.graph["nodes"]))
+
+
+def _looking(environment: Mapping[str, str], awaited: Collection[str] = ()) -> subprocess.Popen[str]:
+    command = [sys.executable, "-m", "handsteer.transports.dds.look", *awaited]
+    return subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
 
 def _sight(process: subprocess.Popen[str]) -> Sight:
@@ -239,8 +255,17 @@ def _domain(environment: Mapping[str, str], here: Network) -> list[Finding]:
         return [_wrong(_not_joined(ours.problem, here, taken))]
     found = [_wrong(warning) for warning in ours.graph["warnings"]]
     if ours.others:
-        return [Finding(_NAME, "ok", f"{here.place}: {_some(ours.others)}"), *found]
+        return [Finding(_NAME, "ok", f"{here.place}: {_some(ours.others)}"), *found, *_hidden(environment, here, ours)]
     return [_no_others(here, here.domain in in_use, sights)]
+
+
+def _hidden(environment: Mapping[str, str], here: Network, ours: Sight) -> list[Finding]:
+    nodes = (ours.graph or {"nodes": []})["nodes"]
+    is_alone = environment.get("ROS_LOCALHOST_ONLY") == "1" or not multicast_addresses()
+    if here.reach != "LOCALHOST" or is_alone or not nodes:
+        return []
+    hidden = not_found_by_others(environment, nodes)
+    return [_wrong(f"{here.place}: {_some(hidden)} {_HIDDEN}")] if hidden else []
 
 
 def _not_joined(problem: str, here: Network, taken: set[int]) -> str:

@@ -63,6 +63,9 @@ class SharedSeat(Seat):
 class Driving:
     """Steers by the commands of the program that has the seat; thread-safe.
 
+    A program has to be seen released before it drives: by a zero, or by the end of its commands, as those of Foxglove's
+    panel end. So what it commands first, since the start or after a network held its commands back, moves nothing.
+
     Args:
         steering: Publishes the velocity until it is released; not started yet.
         seat: Decides which program drives.
@@ -73,6 +76,7 @@ class Driving:
         self._seat = seat
         self._lock = threading.Lock()
         self._program: str | None = None
+        self._released: str | None = None  # the program that was seen released last
         self._heard_s = self._began_s = self._asked_s = -math.inf
         # On the thread that repeats the velocity: while it hangs, nothing is repeated.
         steering.every(_WATCH_PERIOD_S, self._watch)
@@ -98,11 +102,14 @@ class Driving:
         if self._seat.driver != program:
             return False
         with self._lock:
-            if program != self._program or now - self._heard_s > HOLD_TIMEOUT_S or is_late:
-                self._program, self._began_s = program, now
-                self._steering.release()
+            if program == self._program and now - self._heard_s > HOLD_TIMEOUT_S:
+                self._release()
+            if program != self._program or is_late:
+                self._begin(program, now, is_late=is_late)
             self._heard_s = now
-            if wanted.is_zero or now - self._began_s >= CONFIRM_S:
+            if wanted.is_zero and not is_late:
+                self._released = program
+            if wanted.is_zero or (self._released == program and now - self._began_s >= CONFIRM_S):
                 self._steering.steer(wanted.linear_mps, wanted.angular_radps)
         return True
 
@@ -110,17 +117,30 @@ class Driving:
         """Stop if ``program`` steers, and give back its seat."""
         with self._lock:
             if self._program == program:
-                self._release()
+                self._lose()
         self._seat.leave(program)
 
     def _watch(self) -> None:
         with self._lock:
             if self._program is None:
                 return
-            is_silent = self._steering.clock.now() - self._heard_s > HOLD_TIMEOUT_S
-            if is_silent or self._seat.driver != self._program:
+            if self._seat.driver != self._program:
+                self._lose()
+            elif self._steering.clock.now() - self._heard_s > HOLD_TIMEOUT_S:
                 self._release()
 
+    def _begin(self, program: str, now_s: float, *, is_late: bool) -> None:
+        self._program, self._began_s = program, now_s
+        if is_late or self._released != program:
+            self._released = None
+            self._steering.lose()
+        else:
+            self._steering.steer(0.0, 0.0)
+
     def _release(self) -> None:
-        self._program = None
+        self._released, self._program = self._program, None
         self._steering.release()
+
+    def _lose(self) -> None:
+        self._released = self._program = None
+        self._steering.lose()

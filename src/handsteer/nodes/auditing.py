@@ -132,6 +132,10 @@ class ControlAudit:
         """Publish that the control was stalled until ``at_s``."""
         self._auditor.say(self._auditor.event("fault", "was stalled, and stopped the robot", "stalled", WARN), at_s)
 
+    def ended(self, at_s: float) -> None:
+        """Publish that the control ends at ``at_s``, and stops the robot."""
+        self._auditor.say(self._auditor.event("stands", "standing: the control has ended", "ended"), at_s)
+
     def _stop_event(self, stopped: bool) -> AuditEvent:
         by = f"; /stop is published by {self._stoppers()}"
         if stopped:

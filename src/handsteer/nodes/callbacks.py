@@ -7,6 +7,7 @@ from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field
 from typing import Generic, TypeVar
 
+from handsteer.errors import HandsteerError
 from handsteer.transports.base import Received
 
 M = TypeVar("M")
@@ -94,7 +95,10 @@ class FailureLog:
         failure.count += 1
         if now_s - failure.logged_s < FAILURES_LOGGED_EVERY_S:
             return
-        if failure.count == 1:
+        if failure.count == 1 and isinstance(error, HandsteerError):
+            # Something from outside that is wrong: where it was noticed in our code helps no one.
+            log.error("%s: callback of %s failed: %s", self._node, source, error)
+        elif failure.count == 1:
             log.error("%s: callback of %s failed", self._node, source, exc_info=error)
         else:
             reason = str(error)[:_LONGEST_REASON]

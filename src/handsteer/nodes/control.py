@@ -8,7 +8,7 @@ from handsteer.clock import Clock
 from handsteer.config import CollisionMonitorConfig, Config, ControlConfig, JoyConfig
 from handsteer.control import Control
 from handsteer.control.explain import Reason
-from handsteer.control.safety import Following
+from handsteer.control.safety import Following, SteeredBy
 from handsteer.messages import (
     CMD_VEL,
     GESTURE_JOY,
@@ -97,8 +97,7 @@ class HandSignControlNode(Node):
         self._config = config
         self._control = Control(config, arming=arming, engage=engage)
         self._safety, self._mux = self._control.safety, self._control.mux
-        self._following = Following() if arming and not config.robots else None
-        self._arming = arming
+        self._following = None if config.robots else Following(checks_motion=arming)
         self._measured = MeasuredVelocity()
         self._moved: tuple[float, bool] | None = None
         self._commanded = ZERO
@@ -148,6 +147,8 @@ class HandSignControlNode(Node):
     def on_stop(self) -> None:
         """Stop the robot, and those that were selected a moment ago."""
         self._control.halt()
+        if not self._commanded.is_zero:
+            self._audit.ended(self._last_step_s)
         self._publish(ZERO)
         if self._selection:
             self._selection.beat()
@@ -181,9 +182,14 @@ class HandSignControlNode(Node):
     def _on_stick(self, stick: Stick, received: Received[Joy]) -> None:
         self._take(received.captured_s, is_late=self._is_stale(received), is_stop=not stick.held, stick=stick)
 
-    def _on_gamepad(self, stick: Stick, received: Received[Joy]) -> None:
-        limits = self._config
-        self._steer(Velocity(stick.forward * limits.max_linear, stick.left * limits.max_angular), received)
+    def _on_gamepad(self, stick: Stick, received: Received[Joy], *, is_at_rest: bool) -> None:
+        """Follow a gamepad; one that stays at rest leaves the robot to others, and was seen released."""
+        limits, is_late = self._config, self._is_stale(received)
+        if not is_at_rest:
+            wanted = Velocity(stick.forward * limits.max_linear, stick.left * limits.max_angular)
+            self._steer(wanted, is_late=is_late, by="gamepad")
+        elif not (is_late or self._waits_for_others() or self._stall_guard.distrusts(self.clock.now())):
+            self._safety.note_rest("gamepad")
 
     def _is_stale(self, received: Received[Any]) -> bool:
         """Return whether a message shows what is too old, or was seen by another camera; the watchdog keeps running."""
@@ -193,10 +199,11 @@ class HandSignControlNode(Node):
         return is_old or is_of_other or received.is_late
 
     def _on_steering(self, received: Received[Twist]) -> None:
-        self._steer(Velocity(received.message.linear.x, received.message.angular.z), received)
+        wanted = Velocity(received.message.linear.x, received.message.angular.z)
+        self._steer(wanted, is_late=received.is_late, by="steering")
 
-    def _steer(self, wanted: Velocity, received: Received[Any]) -> None:
-        self._take(None, is_late=received.is_late, is_stop=wanted.is_zero, steering=wanted)
+    def _steer(self, wanted: Velocity, *, is_late: bool, by: SteeredBy) -> None:
+        self._take(None, is_late=is_late, is_stop=wanted.is_zero, steering=wanted, by=by)
 
     def _take(
         self,
@@ -207,6 +214,7 @@ class HandSignControlNode(Node):
         sign: str | None = None,
         stick: Stick | None = None,
         steering: Velocity | None = None,
+        by: SteeredBy = "steering",
     ) -> None:
         """Follow an input; a late one can only stop: it does not show what is seen now, so it does not arm."""
         if self._waits_for_others():
@@ -219,7 +227,8 @@ class HandSignControlNode(Node):
                 sign = stick = steering = None
             self._look_after_the_robot(elapsed_s)
             self._select_by(sign)
-            self._publish(self._control.step(elapsed_s, sign=sign, stick=stick, steering=steering), captured_s)
+            velocity = self._control.step(elapsed_s, sign=sign, stick=stick, steering=steering, by=by)
+            self._publish(velocity, captured_s)
             self._calm_down()
 
     def _waits_for_others(self) -> bool:
@@ -253,16 +262,18 @@ class HandSignControlNode(Node):
 
     def _look_after_the_robot(self, elapsed_s: float) -> None:
         changed = self._selection.follow() if self._selection else self._cmd_vel.follow()
-        if not (self._arming or changed):
-            return
         away = "another robot listens" if changed else None if self._cmd_vel.has_subscribers else "no robot listens"
         if away is None and self._following is not None:
             away = self._following.step(elapsed_s, self._commanded)
         if self._monitor.why_blind():
             away = "laser scans did not come"
-        if away is not None:
+        if away is None:
+            return
+        if self._following is not None and self._following.is_silent:
+            self._safety.disarm(away)  # whatever the robot is: what it does now is not known
+        else:
             self._safety.robot_is_away(away)
-            self._publish(self._control.halt())
+        self._publish(self._control.halt())
 
     def _select_by(self, sign: str | None) -> None:
         """Select the next robot when a sign with that action begins."""
@@ -294,7 +305,7 @@ class HandSignControlNode(Node):
         now = self.clock.now()
         elapsed_s, self._last_step_s = now - self._last_step_s, now
         if self._stall_guard.note(now):
-            self._safety.fault("the control was stalled")
+            self._safety.stall("the control was stalled")
             self._audit.stalled(now)
         return elapsed_s
 

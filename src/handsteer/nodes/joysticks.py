@@ -1,14 +1,29 @@
 """Subscribes the control to joysticks: the hand on ``/gesture/joy``, and a gamepad on ``/joy``."""
 
+import logging
+import math
 from collections.abc import Callable
+from typing import Protocol
 
 from handsteer.config import JoyConfig
 from handsteer.messages import JOY, Joy, Topic, stick_in
 from handsteer.nodes.base import Node
+from handsteer.nodes.timing import duration_in_words
+from handsteer.timeouts import STALE_S
 from handsteer.transports.base import Received, Subscription
 from handsteer.types import Stick
 
+log = logging.getLogger(__name__)
+
 OnStick = Callable[[Stick, Received[Joy]], None]
+
+
+class OnGamepad(Protocol):
+    """Receives the states of a gamepad."""
+
+    def __call__(self, stick: Stick, received: Received[Joy], *, is_at_rest: bool) -> None:
+        """Process one; ``is_at_rest`` is whether its button is not held, and was not before."""
+        ...
 
 
 class Joysticks:
@@ -19,15 +34,15 @@ class Joysticks:
         hand: Topic of the hand as a joystick.
         on_hand: Receives each of its states.
         rule: How the gamepad's messages are read.
-        on_gamepad: Receives the gamepad's states while its button is held, and the first one after its release: one at
-            rest leaves the robot to others.
+        on_gamepad: Receives each state of the gamepad; a message whose stamp does not advance is not another one.
     """
 
-    def __init__(self, node: Node, hand: Topic[Joy], on_hand: OnStick, rule: JoyConfig, on_gamepad: OnStick) -> None:
+    def __init__(self, node: Node, hand: Topic[Joy], on_hand: OnStick, rule: JoyConfig, on_gamepad: OnGamepad) -> None:
         self._node, self._hand = node, hand
         self._on_hand, self._on_gamepad = on_hand, on_gamepad
         self._rule = rule.model_dump()
-        self._is_gamepad_held = False
+        self._is_gamepad_held = self._has_warned = False
+        self._stamped_s = -math.inf
         self._subscriptions: list[Subscription] = []
 
     def listen(self, *, on: bool) -> None:
@@ -46,8 +61,24 @@ class Joysticks:
             else []
         )
 
+    def _is_new(self, stamped_s: float | None) -> bool:
+        """Return whether a gamepad's message was not sent before; one without a stamp counts as sent on arrival."""
+        if stamped_s is None:
+            return True
+        ahead_s = stamped_s - self._node.clock.now()
+        if abs(ahead_s) > STALE_S and not self._has_warned:
+            self._has_warned = True
+            when = f"{duration_in_words(abs(ahead_s))} {'ahead' if ahead_s > 0 else 'ago'}"
+            name = self._node.transport.topic_name(JOY)
+            log.warning("%s is stamped %s, and not followed: are the clocks of the machines synchronised?", name, when)
+        if ahead_s > STALE_S or stamped_s <= self._stamped_s:
+            return False
+        self._stamped_s = stamped_s
+        return True
+
     def _take(self, received: Received[Joy]) -> None:
+        if not self._is_new(received.captured_s):
+            return
         stick = stick_in(received.message, **self._rule)
         was_held, self._is_gamepad_held = self._is_gamepad_held, stick.held
-        if stick.held or was_held:
-            self._on_gamepad(stick, received)
+        self._on_gamepad(stick, received, is_at_rest=not (stick.held or was_held))

@@ -49,6 +49,12 @@ log = logging.getLogger(__name__)
 
 M = TypeVar("M", Image, CompressedImage)
 
+_FREEZE_EXPLAINED_S = 3.0
+_FROZEN = (
+    "Only new pictures count, so that a camera that hangs cannot drive: start it again. To try a photo, publish it "
+    "with noise that changes, as handsteer's own camera does with a folder of photos"
+)
+
 
 class HandSignRecognitionNode(Node):
     """Publishes one sign per frame, and ``NONE`` while no frames arrive.
@@ -100,6 +106,7 @@ class HandSignRecognitionNode(Node):
         self._stall_guard = StallGuard(config.max_frame_age, clock.now())
         self._recording = Recording(config.recorded, config.max_frame_age)
         self._refused: str | None = None
+        self._has_explained_freeze = False
         self._refused_s = -math.inf
         self._recognition: Recognition | None = None
         self._camera_since_s = -math.inf
@@ -193,6 +200,7 @@ class HandSignRecognitionNode(Node):
         self._unseen_s += dt_s
         self._refused = self._freshness.why_refused(image, dt_s)
         if self._refused is not None:
+            self._explain_freeze()
             return
         # The time of skipped pictures counts: a sign is bridged from when it was last seen.
         recognition = self._recognizer.step(image, self._unseen_s)
@@ -223,6 +231,11 @@ class HandSignRecognitionNode(Node):
             picture = annotate(image, recognition)
             self._joystick.draw(picture)
             self._annotated.publish(image_message(picture, header), received.captured_s)
+
+    def _explain_freeze(self) -> None:
+        if not self._has_explained_freeze and self._freshness.frozen_s > _FREEZE_EXPLAINED_S:
+            self._has_explained_freeze = True
+            log.warning("%s: the same picture for %.0f s. %s", self._frames.name, _FREEZE_EXPLAINED_S, _FROZEN)
 
     def _why_too_late(self, began_s: float) -> str | None:
         """Return why a fresh frame has no sign: this process was stopped or stalled while it was processed."""

@@ -36,8 +36,9 @@ class SteeringNode(Node):
 
     Its commands go to ``hand_sign_control``, where steering overrides signs, and which applies limits and Stop. They
     can be sent to another topic instead (:meth:`send_to`), for which this node applies limits and Stop itself. After
-    :meth:`halt` it commands no movement on any topic, because ROS may have remapped it to that of a robot. After this
-    node stalled, steering must be released once: what is received then may be old, and the situation may have changed.
+    :meth:`halt` it commands no movement on any topic, because ROS may have remapped it to that of a robot. At the
+    start, and after this node stalled, steering must be released once (:meth:`release`, or a zero): what is received
+    then may be old, and the situation may have changed.
 
     All methods may be called from any thread.
 
@@ -92,6 +93,11 @@ class SteeringNode(Node):
         """Whether a Stop is active: from here, or on ``/stop`` since commands went to another topic."""
         return self._halted or bool(self._heard_stop)
 
+    @property
+    def waits(self) -> bool:
+        """Whether steering has to be released before anything moves."""
+        return self._safety.steering_waits
+
     def send_to(self, name: str) -> None:
         """Send commands to the topic ``name`` from now on; a zero is sent to the previous one first.
 
@@ -129,11 +135,16 @@ class SteeringNode(Node):
             self._publish(self._wanted)
 
     def release(self) -> None:
-        """Stop, and release the robot to other inputs."""
+        """Stop, and release the robot to other inputs: the person has released what steers."""
         with self._lock:
-            if self._wanted is not None or self._was_held_up:
-                self._wanted, self._was_held_up = None, False
-                self._publish(ZERO)
+            self._end()
+            self._safety.note_rest("steering")
+
+    def lose(self) -> None:
+        """Stop as :meth:`release` does, where no release was seen: it is required then."""
+        with self._lock:
+            self._end()
+            self._safety.disarm()
 
     def halt(self) -> None:
         """Stop the robot, overriding all inputs, until :meth:`reset`; repeated, for a control that restarts."""
@@ -151,6 +162,11 @@ class SteeringNode(Node):
     def on_stop(self) -> None:
         """Stop the robot."""
         self.release()
+
+    def _end(self) -> None:
+        if self._wanted is not None or self._was_held_up:
+            self._wanted, self._was_held_up = None, False
+            self._publish(ZERO)
 
     def _find(self, name: str) -> _Target:
         if len(name) > _LONGEST_NAME or not _TOPIC_NAME.fullmatch(name):
@@ -178,7 +194,7 @@ class SteeringNode(Node):
         now = self.clock.now()
         elapsed_s, self._last_step_s = now - self._last_step_s, now
         self._safety.step(elapsed_s)
-        if not self._safety.admits_steering(is_zero=wanted.is_zero) or self.is_stopped:
+        if not self._safety.admits_steering(is_zero=wanted.is_zero, is_valid=wanted.is_finite) or self.is_stopped:
             return ZERO
         if not self.is_direct:
             return wanted
@@ -213,6 +229,8 @@ class SteeringNode(Node):
             if self._target.commands.follow():
                 self._stand()
             if self._wanted is not None:
+                if not self._wanted.is_zero:  # what is repeated here does not pause; a zero would count as a release
+                    self._wanted = self._admitted(self._wanted)
                 self._publish(self._wanted)
             elif self.is_direct and self.is_stopped:
                 self._publish(ZERO)

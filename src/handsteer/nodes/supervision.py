@@ -24,7 +24,8 @@ class StopKeeper:
     """A node's record of ``/stop``; it is published on ``/stopped``, latched, and updated from that of other nodes.
 
     Every node of the graph has one, so that a Stop survives the restart of any of them. Only false on ``/stop`` ends
-    it.
+    it. A node publishes that there is no Stop once it knows: from another one, or because none was reported for
+    :data:`~handsteer.timeouts.HEAR_STOP_S`.
 
     Args:
         on_stop: Called with true at a Stop, from either topic, and with false at a reset.
@@ -36,6 +37,7 @@ class StopKeeper:
         self._waits_until_s = node.clock.now() + HEAR_STOP_S
         self._is_stopped: bool | None = None
         self._stopped = node.publisher(STOPPED)
+        node.every(HEAR_STOP_S, self._settle).delay_until(self._waits_until_s)
         # Several nodes publish at once: one's true must not be replaced by another's false.
         node.subscribe(STOPPED, self._on_word_of_others, key=lambda message: bool(message.data))
         node.subscribe(STOP, self._on_stop_or_reset)
@@ -55,6 +57,14 @@ class StopKeeper:
         # A node that missed a reset must not undo a Stop by its false; resets are accepted from /stop only.
         if received.message.data and not self._is_stopped:
             self._take(True)
+        elif self._is_stopped is None:
+            self._settle()
+
+    def _settle(self) -> None:
+        """Publish that there is no Stop, if none was reported since the start."""
+        if self._is_stopped is None:
+            self._is_stopped = False
+            self._stopped.publish(Bool(data=False))
 
     def _take(self, is_stopped: bool) -> None:
         is_news = is_stopped != self._is_stopped

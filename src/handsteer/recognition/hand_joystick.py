@@ -34,7 +34,8 @@ _PAUSE_S: Final = 0.25
 """A held hand that may have done anything between two frames this far apart is released."""
 
 _OTHER_S: Final = 0.05
-"""A held hand that has looked like the person's other one for longer is another hand."""
+"""A held hand that has looked like the person's other one for longer is another hand; frames in which it did not make
+up for half as much, so that alternating ones count."""
 
 _UNCLEAR_S: Final = 0.1
 """A held hand that has not been recognised as a fist for longer is released."""
@@ -47,6 +48,16 @@ _EDGE: Final = 0.01
 
 _JUMP: Final = 0.8
 """Largest movement between two frames, in palm lengths, of one hand."""
+
+_TREMOR: Final = 0.12
+"""A held hand may be so far from where its velocity takes it, in palm lengths: the largest distance of 1,100 frames of
+two people's clips is 0.10."""
+
+_ACCELERATION: Final = 110.0
+"""Largest acceleration of a held hand, in palm lengths/s²: that of a movement over the stick's range in 0.25 s."""
+
+_RESIZE_A_FRAME: Final = 1.3
+"""Largest change of the palm's length between two frames, as a ratio, of a held hand; 1.14 in these clips."""
 
 _RESIZE: Final = 1.6
 """Largest change of the palm's length since the fist was closed, as a ratio, of one hand."""
@@ -99,6 +110,7 @@ class HandJoystick:
         self.stick = RELEASED
         self.grip: Grip | None = None
         self._last: _Seen | None = None
+        self._speed = (0.0, 0.0)
         self._open_s = self._closed_s = self._unseen_s = self._unclear_s = self._other_s = 0.0
         self._since_open_s = math.inf
         self._closing: deque[_Seen] = deque(maxlen=30)
@@ -121,8 +133,8 @@ class HandJoystick:
         if self.grip is not None and dt_s > _PAUSE_S:
             self.reset()
         seen = _Seen.of(hand)
-        if self._last is not None and not seen.is_same_hand(self._last, self.grip):
-            self.reset()
+        if self._last is not None:
+            self._compare(seen, self._last, dt_s + self._unseen_s)
         self._last, self._unseen_s = seen, 0.0
         is_open = recognition.seen == STOP or recognition.likelihoods.get(STOP, 0.0) >= _LIKELY
         fist = recognition.likelihoods.get(GO, float(recognition.seen == GO))
@@ -150,6 +162,13 @@ class HandJoystick:
         cv2.line(picture, neutral, now, _STICK, 3 * thickness, cv2.LINE_AA)
         cv2.circle(picture, now, 6 * thickness, _STICK, -1, cv2.LINE_AA)
 
+    def _compare(self, seen: "_Seen", last: "_Seen", dt_s: float) -> None:
+        """Release it if ``seen`` cannot be the hand of ``last``, ``dt_s`` seconds before; else note its speed."""
+        if not seen.is_same_hand(last, self.grip) or (self.grip and not seen.continues(last, self._speed, dt_s)):
+            self.reset()
+        elif dt_s > 0.0:
+            self._speed = (seen.x - last.x) / dt_s, (seen.y - last.y) / dt_s
+
     def _miss(self, dt_s: float) -> None:
         self._unseen_s += dt_s
         if self._unseen_s > (_UNSEEN_S if self.grip else _BLURRED_S):
@@ -174,13 +193,14 @@ class HandJoystick:
         self.grip = Grip(seen.handedness, (x, y), palm_px, (x, y))
         self.stick = Stick(True)
         self._filter = _OneEuro(np.zeros(2))
-        self._unclear_s = 0.0
+        self._unclear_s = self._other_s = 0.0
         self._since_open_s = math.inf
 
     def _move(self, grip: Grip, seen: "_Seen", dt_s: float, *, is_open: bool, is_fist: bool) -> None:
         """Process a frame with the held hand."""
         self._unclear_s = 0.0 if is_fist else self._unclear_s + dt_s
-        self._other_s = 0.0 if seen.handedness == grip.handedness else self._other_s + dt_s
+        is_other = seen.handedness != grip.handedness
+        self._other_s = self._other_s + dt_s if is_other else max(0.0, self._other_s - 0.5 * dt_s)
         if is_open or self._unclear_s > _UNCLEAR_S or self._other_s > _OTHER_S:
             self.reset()
             self._last = seen
@@ -233,6 +253,13 @@ class _Seen:
         is_near = math.hypot(self.x - last.x, self.y - last.y) <= _JUMP * max(self.palm_px, last.palm_px)
         ratio = self.palm_px / (grip or last).palm_px
         return is_near and 1 / _RESIZE <= ratio <= _RESIZE
+
+    def continues(self, last: "_Seen", speed: tuple[float, float], dt_s: float) -> bool:
+        """Return whether this continues the movement of a hand that was ``last`` at ``speed``, in pixels/s."""
+        off = math.hypot(self.x - last.x - speed[0] * dt_s, self.y - last.y - speed[1] * dt_s)
+        ratio = self.palm_px / last.palm_px
+        is_near = off <= min(_JUMP, _TREMOR + _ACCELERATION * dt_s**2) * max(self.palm_px, last.palm_px)
+        return is_near and 1 / _RESIZE_A_FRAME <= ratio <= _RESIZE_A_FRAME
 
 
 class _OneEuro:

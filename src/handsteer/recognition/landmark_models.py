@@ -27,6 +27,7 @@ from ai_edge_litert.interpreter import Interpreter
 from numpy.typing import NDArray
 
 from handsteer.errors import ModelCorrupt, ModelError, ModelMissing
+from handsteer.regular_files import read_regular
 
 MODELS: Final = {
     "palm_detection_full.tflite": "1b14e9422c6ad006cde6581a46c8b90dd573c07ab7f3934b5589e7cea3f89a54",
@@ -56,6 +57,8 @@ _OFFLINE: Final = "set HANDSTEER_MODELS to a folder that has them"
 _TRIES = 5
 _BETWEEN_TRIES_S = 0.001
 
+_LARGEST_BYTES: Final = 100_000_000
+
 
 def are_elsewhere() -> bool:
     """Return whether ``HANDSTEER_MODELS`` names the folder of the model files."""
@@ -83,7 +86,7 @@ def find_model(name: str, directory: Path | None = None) -> Path:
     path = (directory or (Path(__file__).parent if is_shipped else models_dir())) / name
     remedy = "install handsteer again" if is_shipped else _REMEDY
     try:
-        content = path.read_bytes()
+        content = read_regular(path, _LARGEST_BYTES)
     except OSError as error:
         raise ModelMissing(f"cannot read the landmark model {path} ({error.strerror}): {remedy}") from None
     _check(name, content, f"the landmark model {path} is damaged: {remedy}")

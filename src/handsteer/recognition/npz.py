@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handsteer.errors import HandsteerError
+from handsteer.regular_files import open_regular
 
 Arrays = dict[str, NDArray[Any]]
 Content = TypeVar("Content")
@@ -66,7 +67,7 @@ class NpzFormat:
 
     def _arrays(self, path: Path, most_bytes: int) -> Arrays:
         try:
-            with zipfile.ZipFile(path) as file:
+            with open_regular(path, most_bytes) as content, zipfile.ZipFile(content) as file:
                 _check_sizes(file, most_bytes)
                 arrays = {entry.filename.removesuffix(".npy"): _array(file, entry) for entry in file.infolist()}
         except OSError as error:

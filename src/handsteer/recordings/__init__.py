@@ -12,12 +12,15 @@ from handsteer import __version__
 from handsteer.clock import Clock
 from handsteer.config import Config
 from handsteer.errors import RecordingError
+from handsteer.regular_files import read_regular
 
 if TYPE_CHECKING:
     from handsteer.recordings.recorded import Recording
 
 _BAGS = frozenset({".bag", ".db3"})
 _PACKAGES = ("ai-edge-litert", "mujoco", "numpy", "opencv-python-headless")
+
+_LARGEST_MODEL_BYTES = 300_000_000
 
 
 def is_recording(path: Path) -> bool:
@@ -66,4 +69,6 @@ def describe(config: Config | None, clock: Clock, models: Sequence[Path]) -> dic
             continue
     if config is not None:
         about["config"] = config.model_dump_json()
-    return about | {f"model {path.name}": hashlib.sha256(path.read_bytes()).hexdigest() for path in models}
+    return about | {
+        f"model {path.name}": hashlib.sha256(read_regular(path, _LARGEST_MODEL_BYTES)).hexdigest() for path in models
+    }

@@ -9,6 +9,7 @@ from rosbags.rosbag2 import Reader as Ros2Reader
 
 from handsteer.errors import RecordingError
 from handsteer.recordings.recorded import Recorded, Recording
+from handsteer.regular_files import open_regular
 from handsteer.transports.ros2.encoding import types
 
 
@@ -31,6 +32,8 @@ class Bag(Recording):
     def messages(self, topics: Collection[str] | None = None) -> Iterator[Recorded]:
         """Yield the messages of ``topics``, of all by default, in the order of their times."""
         try:
+            if not self.path.is_dir():
+                open_regular(self.path).close()
             reader: Any = Ros1Reader(self.path) if self._is_ros1 else Ros2Reader(self.path)
             with reader:
                 chosen = [known for known in reader.connections if topics is None or known.topic in topics]

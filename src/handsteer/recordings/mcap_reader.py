@@ -9,6 +9,7 @@ from typing import IO, Any
 
 from handsteer.errors import RecordingError, needing
 from handsteer.recordings.recorded import Recorded, Recording
+from handsteer.regular_files import open_regular
 
 with needing("reading MCAP files", "record", "mcap"):
     import lz4.frame
@@ -81,7 +82,7 @@ class McapFile(Recording):
     def _records(self) -> Iterator[tuple[int, bytes]]:
         try:
             size = self.path.stat().st_size
-            with self.path.open("rb") as file:
+            with open_regular(self.path) as file:
                 if file.read(len(MCAP0_MAGIC)) != MCAP0_MAGIC:
                     raise RecordingError(f"{self.path} is no MCAP file: it does not begin as one")
                 at = file.tell()

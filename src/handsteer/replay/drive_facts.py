@@ -91,6 +91,7 @@ class Stand:
         sign: The confirmed sign; empty if unknown.
         code: The control's reason code; empty if unknown.
         reason: The reason in words.
+        cause: What camera and recognition reported as a problem about then; empty if nothing that may explain it.
         place: x and y on the map, in metres; None if unknown.
         picture: The frame that led to it, or the one of that moment, as a small JPEG; None if there is none.
         has_led: Whether the command is known to have followed from the picture.
@@ -101,9 +102,25 @@ class Stand:
     sign: str = ""
     code: str = ""
     reason: str = ""
+    cause: str = ""
     place: tuple[float, float] | None = None
     picture: bytes | None = None
     has_led: bool = False
+
+
+@dataclass(frozen=True)
+class Unexplained:
+    """The robot was commanded to move without a live reason.
+
+    Attributes:
+        begin_s: When it began, in seconds since the recording began.
+        end_s: When it ended.
+        why: What was missing, in words.
+    """
+
+    begin_s: float
+    end_s: float
+    why: str
 
 
 @dataclass
@@ -187,6 +204,7 @@ class DriveFacts:
         stands: Each time that it was commanded to stand after it drove; only the first 10,000.
         stand_count: How often that was.
         stops: How often ``/stop`` was set.
+        unexplained: When it was commanded to move without a live reason; only the first 1,000.
         bumps: Where it began to touch an obstacle, each time; None if unknown.
         knows_bumps: Whether the robot reports what it touches.
         laps: On the world's course.
@@ -222,6 +240,7 @@ class DriveFacts:
     stands: list[Stand] = field(default_factory=list)
     stand_count: int = 0
     stops: int = 0
+    unexplained: list[Unexplained] = field(default_factory=list)
     bumps: list[tuple[float, float] | None] = field(default_factory=list)
     knows_bumps: bool = False
     laps: list[Lap] = field(default_factory=list)
@@ -263,6 +282,10 @@ class DriveFacts:
             "stands": self.stand_count,
             "stands_by_reason": dict(Counter(stand.code or "unknown" for stand in self.stands).most_common()),
             "stops": self.stops,
+            "motion_without_reason": [
+                {"begin_s": round(each.begin_s, 3), "end_s": round(each.end_s, 3), "why": each.why}
+                for each in self.unexplained
+            ],
             "bumps": len(self.bumps) if self.knows_bumps else None,
             "gates": sum(lap.course.passed for lap in self.laps) if self.laps else None,
             "laps": [{"began_s": round(lap.began_s, 3), **lap.course.as_dict()} for lap in self.laps],

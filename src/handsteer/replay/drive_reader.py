@@ -2,30 +2,35 @@
 
 import json
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
 from handsteer.audit import read_event
+from handsteer.config import ControlConfig, JoyConfig
 from handsteer.errors import RecordingError
 from handsteer.messages import (
     AUDIT,
     CAMERA_INFO,
     DIAGNOSTICS,
+    GESTURE_JOY,
     HAND_SIGN,
     IMAGE_RAW,
+    JOY,
     STEERING_CMD_VEL,
     STOP,
+    STOPPED,
     WORLD_MARKERS,
     twist_in,
 )
 from handsteer.nodes.diagnostics import read_status
 from handsteer.nodes.journal import journal_topic
-from handsteer.nodes.status import CameraStatus, ControlStatus, RecognitionStatus, RobotStatus
+from handsteer.nodes.status import OK, CameraStatus, ControlStatus, RecognitionStatus, RobotStatus, Status
 from handsteer.recordings.recorded import Recorded, Recording
 from handsteer.replay.drive_facts import Curve, DriveFacts, Event
 from handsteer.replay.drive_logs import MapThings, RobotLog, SignLog
 from handsteer.replay.journals import parse_spin
+from handsteer.replay.reason_log import ReasonLog
 from handsteer.replay.stand_log import StandLog
 from handsteer.types import NONE, Velocity
 
@@ -88,6 +93,7 @@ class _Reader:
         self._offset_s = _number(file.about.get("clock_offset_s", ""))
         self._stands = StandLog(facts, began_s, self._offset_s or 0.0)
         self._signs = SignLog(facts)
+        self._reasons = ReasonLog(facts, *_recorded_rules(file.about))
         self._robot = RobotLog(facts)
         self._map = MapThings()
         self._markers: Recorded | None = None
@@ -130,6 +136,7 @@ class _Reader:
                 f"robot{_why(self._file)}: there is nothing to report"
             )
         self._stands.end(self._now_s)
+        self._reasons.end(self._now_s - self._began_s)
         self._signs.end()
         self._take_markers()
         facts.things = self._map.all()
@@ -148,12 +155,15 @@ class _Reader:
             is_camera = IMAGE_RAW.name in topic or "annotated" not in topic
             return self._on_frame if is_camera and self._is_first("camera", topic) else None
         if kind in ("Twist", "TwistStamped"):
-            return None if topic.endswith(STEERING_CMD_VEL.name) else self._on_command
+            return self._on_steering if topic.endswith(STEERING_CMD_VEL.name) else self._on_command
         if kind == "Odometry":
             return self._on_odometry if self._is_first(kind, topic) else None
         endings = {
             HAND_SIGN.name: ("String", self._on_sign),
+            GESTURE_JOY.name: ("Joy", self._on_joystick),
+            JOY.name: ("Joy", self._on_gamepad),
             STOP.name: ("Bool", self._on_stop),
+            STOPPED.name: ("Bool", self._on_stopped),
             WORLD_MARKERS.name: ("MarkerArray", self._on_markers),
             DIAGNOSTICS.name: ("DiagnosticArray", self._on_diagnostics),
             CAMERA_INFO.name: ("CameraInfo", self._on_camera_info),
@@ -176,13 +186,23 @@ class _Reader:
     def _on_sign(self, recorded: Recorded, time_s: float) -> None:
         self._signs.note(str(recorded.message.data), time_s)
         self._stands.note_sign(recorded.number, self._signs.sign)
+        self._reasons.note_sign(time_s, self._signs.sign)
+
+    def _on_steering(self, recorded: Recorded, time_s: float) -> None:
+        self._reasons.note_steering(time_s, _velocity(recorded))
+
+    def _on_joystick(self, recorded: Recorded, time_s: float) -> None:
+        self._reasons.note_joystick(time_s, recorded.message)
+
+    def _on_gamepad(self, recorded: Recorded, time_s: float) -> None:
+        self._reasons.note_gamepad(time_s, recorded.message)
 
     def _on_command(self, recorded: Recorded, time_s: float) -> None:
-        twist = twist_in(recorded.message)
-        velocity = Velocity(twist.linear.x, twist.angular.z)
+        velocity = _velocity(recorded)
         if not (abs(velocity.linear_mps) < _LARGEST and abs(velocity.angular_radps) < _LARGEST):
             raise RecordingError(f"a velocity that is not finite: {velocity}")
         self._facts.commands += 1
+        self._reasons.note_command(time_s, recorded.topic, velocity)
         self._facts.commanded.add(time_s, velocity.linear_mps, velocity.angular_radps)
         self._robot.note_command(time_s, velocity)
         self._stands.note_command(recorded.time_s, velocity, self._robot.place)
@@ -194,6 +214,11 @@ class _Reader:
         is_set = bool(recorded.message.data)
         self._facts.stops += is_set and not self._is_set
         self._is_set = is_set
+        self._reasons.note_stop(time_s, is_stopped=is_set)
+
+    def _on_stopped(self, recorded: Recorded, time_s: float) -> None:
+        if recorded.message.data:  # false on it has no effect
+            self._reasons.note_stop(time_s, is_stopped=True)
 
     def _on_event(self, recorded: Recorded, time_s: float) -> None:
         event = read_event(recorded.message)
@@ -220,15 +245,22 @@ class _Reader:
             status = read_status(reported)
             if isinstance(status, CameraStatus):
                 self._facts.camera = self._facts.camera or status.short_name
+                self._note_trouble(recorded, status)
             elif isinstance(status, RecognitionStatus):
+                self._note_trouble(recorded, status)
                 self._signs.note_confidence(time_s, status.seen or NONE, status.confidence)
             elif isinstance(status, ControlStatus):
                 self._note_control(status, time_s)
             elif isinstance(status, RobotStatus):
                 self._robot.note_status(time_s, status)
 
+    def _note_trouble(self, recorded: Recorded, status: Status) -> None:
+        if status.level != OK:
+            self._stands.note_trouble(recorded.time_s, status.node, status.message)
+
     def _note_control(self, status: ControlStatus, time_s: float) -> None:
         self._stands.note_status(status)
+        self._reasons.note_status(time_s, status)
         before_s, self._reported_s = self._reported_s, time_s
         if before_s is not None and status.reason is not None and status.reason.is_driving:
             sources = self._facts.sources
@@ -274,6 +306,20 @@ class _Reader:
             facts.latencies_ms = Curve(2)
         elif not len(facts.latencies_ms):
             facts.no_latency = "no command followed from a frame"
+
+
+def _velocity(recorded: Recorded) -> Velocity:
+    twist = twist_in(recorded.message)
+    return Velocity(twist.linear.x, twist.angular.z)
+
+
+def _recorded_rules(about: Mapping[str, str]) -> tuple[ControlConfig | None, JoyConfig | None]:
+    """Return the recorded parameters of the control and the gamepad; None if there are none that can be read."""
+    try:
+        sections = json.loads(about.get("config", "{}"))
+        return ControlConfig.model_validate(sections["control"]), JoyConfig.model_validate(sections["joy"])
+    except (ValueError, KeyError, TypeError, RecursionError):
+        return None, None
 
 
 def _number(text: str) -> float | None:

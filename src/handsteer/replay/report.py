@@ -82,6 +82,7 @@ def _page(facts: DriveFacts) -> str:
         _chart("map", "Map", charts["map"], "It contains no path and no obstacles."),
         _laps(facts),
         _stands(facts),
+        _unexplained(facts),
         _chart(
             "latency", "Latency", charts["latency"], f"Latencies are unknown: {facts.no_latency}.", _percentiles(facts)
         ),
@@ -168,6 +169,21 @@ def _stands(facts: DriveFacts) -> str:
     return f'<section><h2>Stops</h2><ol class="stands">{items}</ol>{more}</section>'
 
 
+def _unexplained(facts: DriveFacts) -> str:
+    title = "Motion without a live reason"
+    if not facts.unexplained:
+        return f'<section><h2>{title}</h2><p class="quiet">There was none.</p></section>'
+    rows = "".join(
+        f"<tr><td>{each.begin_s:.2f} s</td><td>{each.end_s - each.begin_s:.2f} s</td><td>{_text(each.why)}</td></tr>"
+        for each in facts.unexplained[:_MOST_STANDS]
+    )
+    rest = len(facts.unexplained) - _MOST_STANDS
+    more = f"<p>and {rest} more</p>" if rest > 0 else ""
+    head = "<tr><th>at</th><th>for</th><th>why not</th></tr>"
+    table = f'<div class="wide"><table>{head}{rows}</table></div>'
+    return f'<section class="problems"><h2>{title}</h2>{table}{more}</section>'
+
+
 def _stand(number: int, stand: Stand) -> str:
     picture = ""
     if stand.picture is not None:
@@ -176,9 +192,10 @@ def _stand(number: int, stand: Stand) -> str:
         picture = f'<img src="data:image/jpeg;base64,{data}" alt="{what}" title="{what}" loading="lazy">'
     lasted = "to the end" if stand.duration_s is None else f"for {stand.duration_s:.1f} s"
     sign = f'<p class="quiet">sign: {_text(stand.sign)}</p>' if stand.sign else ""
+    cause = f'<p class="quiet">then: {_text(stand.cause)}</p>' if stand.cause else ""
     return (
         f"<li>{picture}<div><p><b>{number}.</b> at {stand.time_s:.2f} s, {lasted}</p>"
-        f"<p>{_text(stand.reason)}</p>{sign}</div></li>"
+        f"<p>{_text(stand.reason)}</p>{cause}{sign}</div></li>"
     )
 
 

@@ -36,6 +36,7 @@ def totals(facts: DriveFacts) -> list[Total]:
         Total("driven by", ", ".join(facts.sources), _seconds(facts.sources)) if facts.sources else None,
         Total("commands", str(facts.commands)) if facts.commands else None,
         _stops(facts),
+        _unexplained(facts),
         Total("bumps", str(len(facts.bumps))) if facts.knows_bumps else None,
         _gates(facts),
         _latency(facts),
@@ -87,6 +88,17 @@ def _stops(facts: DriveFacts) -> Total | None:
     return Total(
         "stops", str(facts.stand_count), "; ".join([f"{n}: {reason[:80]}" for reason, n in by_count] + pressed)
     )
+
+
+def _unexplained(facts: DriveFacts) -> Total | None:
+    if not facts.commands:
+        return None
+    if not facts.unexplained:
+        return Total("no reason", "never", "motion without a live reason")
+    first = facts.unexplained[0]
+    duration_s = sum(each.end_s - each.begin_s for each in facts.unexplained)
+    more = f"motion without a live reason, at {first.begin_s:.2f} s: {first.why}"
+    return Total("no reason", f"{duration_s:.1f} s", more)
 
 
 def _gates(facts: DriveFacts) -> Total | None:

@@ -3,7 +3,7 @@
 import math
 from collections import OrderedDict, deque
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import cv2
 import numpy as np
@@ -32,6 +32,9 @@ _PASSES_ZERO_S = 0.15
 _NEW_FRAME_S = 1.0
 _REASONS = {NONE: Reason("no_sign"), STOP: Reason("stop_sign", STOP)}
 _OF_SIGNS = ("no_sign", "stop_sign", "not_started")
+# What a camera without new pictures leads to, and how soon before or after the stop it is reported.
+_OF_PICTURES = ("no_sign", "no_input", "not_held", "disarmed", "disengaged")
+_TROUBLE_HOLDS_S = 1.0
 
 
 @dataclass
@@ -41,6 +44,7 @@ class _Open:
     stand: Stand
     frame: Recorded | None
     sign_number: int = 0
+    causes: dict[str, str] = field(default_factory=dict)
     needs_reason: bool = True
 
 
@@ -64,6 +68,7 @@ class StandLog:
         self._signs: OrderedDict[int, str] = OrderedDict()
         self._sign = ""
         self._open: _Open | None = None
+        self._troubles: dict[str, tuple[float, str]] = {}
         self._picture_every = 1
 
     def note_frame(self, frame: Recorded) -> None:
@@ -98,6 +103,11 @@ class StandLog:
         if waits and status.reason is not None and not status.reason.is_driving:
             self._explain(status.reason.code, status.reason.explanation)
 
+    def note_trouble(self, time_s: float, node: str, trouble: str) -> None:
+        """Note what ``my_camera`` or ``hand_sign_recognition`` reports as a problem."""
+        self._troubles[node] = (time_s, trouble)
+        self._find_cause()
+
     def note_spin(self, spin: Spin) -> None:
         """Note what the control has processed: which frames have led to its last commands."""
         if spin.is_stop and self._open is not None and self._open.needs_reason:
@@ -125,6 +135,17 @@ class StandLog:
         assert self._open is not None
         self._open.needs_reason = False
         self._open.stand.code, self._open.stand.reason = code, reason
+        self._find_cause()
+
+    def _find_cause(self) -> None:
+        """Give the stand that has begun the problems that were reported about then, if they may have led to it."""
+        opened = self._open
+        if opened is None or opened.stand.code not in _OF_PICTURES:
+            return
+        for node, (reported_s, trouble) in self._troubles.items():
+            if abs(reported_s - self._began_s - opened.stand.time_s) <= _TROUBLE_HOLDS_S:
+                opened.causes.setdefault(node, trouble)
+        opened.stand.cause = "; ".join(opened.causes.values())
 
     def _lead(self, opened: _Open, captured_s: float, number: int) -> None:
         """Note which frame and sign have led to a stand."""

@@ -22,7 +22,7 @@ from pydantic import Field, ValidationError, model_validator
 
 from handsteer import plain_yaml
 from handsteer.config import Section
-from handsteer.errors import WorldError, did_you_mean
+from handsteer.errors import WorldError, as_name, did_you_mean, quoted
 from handsteer.robots import Shape
 
 _SHIPPED = Path(__file__).parent / "worlds"
@@ -138,7 +138,7 @@ class World(Section):
             seen: set[str] = set()
             for thing in named:
                 if thing.name in seen:
-                    raise ValueError(f"two are called {thing.name!r}; every {kind} needs a name of its own")
+                    raise ValueError(f"two are called {quoted(thing.name)}; every {kind} needs a name of its own")
                 seen.add(thing.name)
         return self
 
@@ -163,7 +163,9 @@ def load_world(name_or_path: str | Path) -> World:
         return read_world(path)
     known = shipped_worlds()
     near = did_you_mean(name, known)
-    raise WorldError(f"there is no world {name!r}{near or ':'} use {', '.join(known)}, or the path of a .yaml file")
+    raise WorldError(
+        f"there is no world {quoted(name)}{near or ':'} use {', '.join(known)}, or the path of a .yaml file"
+    )
 
 
 def read_world(path: Path) -> World:
@@ -228,11 +230,11 @@ def describe_problem(error: ValidationError, values: Any) -> str:
         "missing": "is missing",
         "extra_forbidden": "there is no such field",
         "union_tag_not_found": f"shape is missing; use {shapes}",
-        "union_tag_invalid": f"shape must be {shapes}, not {problem.get('ctx', {}).get('tag', '')}",
-        "string_pattern_mismatch": f"{given!r} should be a colour such as '#c04020'",
+        "union_tag_invalid": f"shape must be {shapes}, not {as_name(problem.get('ctx', {}).get('tag', ''))}",
+        "string_pattern_mismatch": f"{quoted(given)} should be a colour such as '#c04020'",
         "value_error": problem["msg"].removeprefix("Value error, "),
     }
-    return f"{where}: {reasons.get(kind) or _short(given) + problem['msg'].removeprefix('Input')}"
+    return f"{where}: {reasons.get(kind) or quoted(given) + problem['msg'].removeprefix('Input')}"
 
 
 def _where(location: tuple[int | str, ...], values: Any) -> str:
@@ -242,14 +244,9 @@ def _where(location: tuple[int | str, ...], values: Any) -> str:
             thing = values[section][index]
             name = thing.get("name") if isinstance(thing, dict) else None
             shapes: tuple[Shape, ...] = ("box", "cylinder", "sphere")
-            fields = [str(part) for part in rest if part not in shapes]
-            return " ".join([f"{section}[{index}]", *([repr(name)] if name else []), ".".join(fields)]).rstrip()
+            fields = [as_name(part) for part in rest if part not in shapes]
+            return " ".join([f"{section}[{index}]", *([quoted(name)] if name else []), ".".join(fields)]).rstrip()
         case ():
             return "obstacles" if isinstance(values, dict) else "world"
         case _:
-            return ".".join(str(part) for part in location)
-
-
-def _short(value: Any) -> str:
-    text = repr(value)
-    return text if len(text) <= 60 else text[:57] + "..."
+            return ".".join(as_name(part) for part in location)

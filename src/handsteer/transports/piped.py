@@ -8,7 +8,9 @@ continues, keeps the newest messages for it, and drops the rest.
 import contextlib
 import itertools
 import logging
+import math
 import pickle
+import struct
 import threading
 import time
 import weakref
@@ -16,7 +18,7 @@ from collections import deque
 from collections.abc import Callable, Hashable
 from typing import IO, Any, TypeVar
 
-from handsteer.errors import TransportError
+from handsteer.errors import TransportError, quoted
 from handsteer.messages import CompressedImage, Image, Topic
 from handsteer.transports.base import Deliver, Publisher, Received, Subscription, Transport
 from handsteer.transports.in_process import BasePublisher, BaseTransport, Receive
@@ -30,9 +32,16 @@ _KEPT = 16
 _MOST_WAITING = 1000
 """How many undroppable messages may wait: a process that reads none of them is stuck."""
 
+_LENGTHS = struct.Struct("<IQ")
+"""Bytes of a message's kind and of its content; precede both, so that a message that cannot be read is left out."""
+
+_LOG_PERIOD_S = 10.0
+
 
 class Pipe:
     """One end of a pipe to another process of this program, which is trusted: received data is unpickled.
+
+    A message that cannot be sent or read is left out, and logged in one line; the next ones pass.
 
     Args:
         source: Written by the other process.
@@ -49,6 +58,7 @@ class Pipe:
         self._news = threading.Condition()
         self._queues: dict[Hashable, deque[tuple[Any, ...]]] = {}
         self._order: deque[Hashable] = deque()
+        self._logged_s: dict[tuple[str, str], float] = {}
         self._writer = threading.Thread(target=self._write, name="pipe_write", daemon=True)
         self.ended = threading.Event()
 
@@ -98,12 +108,27 @@ class Pipe:
     def _read(self) -> None:
         try:
             while True:
-                kind, *what = pickle.load(self._source)
-                self._handle(kind, what)
-        except (EOFError, OSError, ValueError, pickle.UnpicklingError):
+                kind_bytes, content_bytes = _LENGTHS.unpack(self._read_whole(_LENGTHS.size))
+                kind = self._read_whole(kind_bytes).decode()
+                self._take(kind, self._read_whole(content_bytes))
+        except (EOFError, OSError, ValueError):
             self.close()
 
-    def _handle(self, kind: str, what: list[Any]) -> None:
+    def _read_whole(self, size: int) -> bytes:
+        data = self._source.read(size)
+        if len(data) < size:
+            raise EOFError
+        return data
+
+    def _take(self, kind: str, content: bytes) -> None:
+        try:
+            what = pickle.loads(content)
+        except Exception as error:
+            self._leave_out(kind, "read", error)
+        else:
+            self._handle(kind, what)
+
+    def _handle(self, kind: str, what: tuple[Any, ...]) -> None:
         try:
             self._handlers[kind](*what)
         except Exception:
@@ -112,16 +137,31 @@ class Pipe:
     def _write(self) -> None:
         try:
             while (message := self._next()) is not None:
-                pickle.dump(message, self._sink, protocol=5)
-                self._sink.flush()
+                self._write_one(*message)
         except (OSError, ValueError):
             pass  # the other end is closed
-        except Exception:
-            log.exception("a message to another process cannot be sent")
         # Nothing can be sent any more, so the other end must be informed.
         self.ended.set()
         with contextlib.suppress(OSError):
             self._sink.close()
+
+    def _write_one(self, kind: str, *what: object) -> None:
+        try:
+            content = pickle.dumps(what, protocol=5)  # as a whole: half a message would make the rest unreadable
+        except Exception as error:
+            self._leave_out(kind, "sent", error)
+            return
+        name = kind.encode()
+        self._sink.write(_LENGTHS.pack(len(name), len(content)) + name)
+        self._sink.write(content)
+        self._sink.flush()
+
+    def _leave_out(self, kind: str, verb: str, error: Exception) -> None:
+        now_s = time.monotonic()
+        if now_s - self._logged_s.get((kind, verb), -math.inf) >= _LOG_PERIOD_S:
+            self._logged_s[kind, verb] = now_s
+            reason = f"{type(error).__name__} {quoted(str(error))}"
+            log.error("a message between processes about %s cannot be %s, and is left out: %s", kind, verb, reason)
 
     def _next(self) -> tuple[Any, ...] | None:
         with self._news:

@@ -77,6 +77,16 @@ def test_to_others_we_say_often_that_we_are_there(environment: dict[str, str], i
     assert ET.fromstring(config).findtext(".//SPDPInterval") == interval
 
 
+@pytest.mark.parametrize(
+    "environment",
+    [{}, {"ROS_LOCALHOST_ONLY": "1"}, {"ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"}, {"ROS_STATIC_PEERS": "10.0.0.1"}],
+)
+def test_no_address_is_dropped_because_it_was_silent(environment: dict[str, str]) -> None:
+    config = network(environment, ["10.0.0.7"]).config
+    assert config is not None
+    assert ET.fromstring(config).findtext(".//Discovery/InitialLocatorPruneDelay") == "inf"
+
+
 def test_the_users_configuration_wins() -> None:
     assert network({"CYCLONEDDS_URI": "file:///my.xml", "ROS_LOCALHOST_ONLY": "1"}).config is None
     assert network({"ROS_AUTOMATIC_DISCOVERY_RANGE": "SYSTEM_DEFAULT"}).config is None

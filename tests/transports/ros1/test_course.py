@@ -4,7 +4,7 @@ from typing import Any
 import pytest
 
 from handsteer.errors import ConfigError
-from handsteer.messages import CMD_VEL, HAND_SIGN, IMAGE_RAW
+from handsteer.messages import CMD_VEL, HAND_SIGN, IMAGE_RAW, ODOM
 from handsteer.transports.ros1.course import Translation, translate
 
 RECOGNITION, CONTROL = "hand_sign_recognition", "hand_sign_control"
@@ -20,7 +20,16 @@ def test_the_courses_names_become_topics_and_the_rest_is_left() -> None:
         {"min_confidence": 0.9}, {IMAGE_RAW.name: "/usb/image", HAND_SIGN.name: "words"}
     )
     given = {"publish_gesture_topic": "/words", "control_topic": "/cmd_vel"}
-    assert told(CONTROL, given) == Translation({}, {HAND_SIGN.name: "/words", CMD_VEL.name: "/cmd_vel"})
+    topics = {HAND_SIGN.name: "/words", CMD_VEL.name: "/cmd_vel", ODOM.name: "/odom"}
+    assert told(CONTROL, given) == Translation({}, topics)
+
+
+@pytest.mark.parametrize(
+    ("commands", "odometry"),
+    [("r1/cmd_vel", "r1/odom"), ("cmd_vel", "odom"), ("/base/velocity", None), ("/base/my_cmd_vel", "/base/my_odom")],
+)
+def test_the_odometry_of_a_robot_is_beside_its_commands(commands: str, odometry: str | None) -> None:
+    assert told(CONTROL, {"control_topic": commands}).topics.get(ODOM.name) == odometry
 
 
 def test_a_camera_has_the_courses_name_and_ours() -> None:

@@ -1,10 +1,48 @@
 // What needs the browser: stopping the robot by a key, and remembering light or dark, and what a first visit has shown.
 
+// Stop goes two ways: by the websocket, which the caller uses, and by requests that the server answers even while it
+// builds pages. These are repeated until one is answered. data-stop on the root shows how far it is.
+const STOP_REPEAT_MS = 200, PATIENCE_MS = 4000, SHOWN_MS = 2000, MOST_AT_ONCE = 4;
+let press = 0, confirmed = 0, shownUntil = 0;
+function pressStop() {
+  const number = ++press;
+  document.documentElement.dataset.stop = "sent";
+  repeatStop(number);
+  return number;
+}
+async function repeatStop(number) {
+  let open = 0;
+  while (confirmed < number && number === press) {
+    if (open < MOST_AT_ONCE) {
+      open++;
+      sendStop(number).finally(() => open--);
+    }
+    await new Promise((resolve) => setTimeout(resolve, STOP_REPEAT_MS));
+  }
+}
+async function sendStop(number) {
+  try {
+    const signal = AbortSignal.timeout(PATIENCE_MS);
+    const answer = await fetch(`/stop?page=${window.clientId}&press=${number}`, { method: "POST", signal });
+    if (!answer.ok || confirmed >= number) return;
+  } catch {
+    return; // repeated
+  }
+  confirmed = number;
+  if (number < press) return;
+  document.documentElement.dataset.stop = "confirmed";
+  shownUntil = performance.now() + SHOWN_MS;
+  setTimeout(() => {
+    if (confirmed === press && performance.now() >= shownUntil) delete document.documentElement.dataset.stop;
+  }, SHOWN_MS + 50);
+}
+window.pressStop = pressStop;
+
 // Anywhere except in text inputs; a focused button would otherwise take the space key as a click.
 document.addEventListener("keydown", (event) => {
   if (event.code !== "Space" || event.target.closest?.("input:not([type=number]), textarea, select, [contenteditable]")) return;
   event.preventDefault();
-  if (!event.repeat) emitEvent("space");
+  if (!event.repeat) emitEvent("space", { press: pressStop() });
 }, true);
 document.addEventListener("keyup", (event) => {
   if (event.code === "Space" && event.target.closest?.("button")) event.preventDefault();

@@ -25,6 +25,7 @@ function hold(pad, x, y, follow) {
   const reach = (pad.clientWidth - pad.querySelector(".knob").clientWidth) / 2;
   pad.querySelector(".knob").style.transform = `translate(${held.x * reach}px, ${-held.y * reach}px)`;
   if (fresh) {
+    say("pad_held", { x: 0, y: 0 }); // it was released until now: nothing follows a pad that may be held since long
     held.timer = setInterval(sayHeld, REPEAT_MS);
     sayHeld();
   }

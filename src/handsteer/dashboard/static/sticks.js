@@ -38,7 +38,7 @@ function followGamepad() {
   const isPressed = (button) => found?.mapping === "standard" && found.buttons[button]?.pressed;
   if (isPressed(STOPS) && !stopped) {
     letGo();
-    emitEvent("space");
+    emitEvent("space", { press: window.pressStop() });
   }
   stopped = isPressed(STOPS);
   const isSame = found?.index === gamepad && document.hasFocus() && !document.hidden;

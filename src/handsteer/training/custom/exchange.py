@@ -15,7 +15,7 @@ import itertools
 import zlib
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import Final, TextIO, cast
+from typing import BinaryIO, Final, TextIO, cast
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from handsteer.errors import DatasetError, reason_of
 from handsteer.recognition.custom_signs import CustomModel, model_arrays, model_from
 from handsteer.recognition.hand import Hand
 from handsteer.recognition.npz import Arrays, NpzFormat
+from handsteer.regular_files import open_regular
 from handsteer.training.custom.dataset import Dataset, Take, dataset_arrays, dataset_from
 
 LARGEST_SHARED_BYTES: Final = 24_000_000
@@ -139,7 +140,7 @@ def read_class_names(path: Path) -> dict[str, str]:
         DatasetError: The file cannot be read, or a line is empty.
     """
     try:
-        with path.open(encoding="utf-8-sig") as file:
+        with io.TextIOWrapper(open_regular(path), "utf-8-sig") as file:
             names = file.read(_LONGEST_LINE).splitlines()
     except (OSError, UnicodeDecodeError) as error:
         raise DatasetError(f"cannot read the names of the classes {path}: {reason_of(error)}") from None
@@ -156,12 +157,17 @@ def _parts(hands: Iterable[Hand]) -> Iterator[tuple[Hand, ...]]:
 
 def _rows(path: Path, *, mirrored: bool) -> Iterator[tuple[str, Hand]]:
     try:
-        with gzip.open(path, "rt", newline="") if path.suffix == ".gz" else path.open(newline="") as file:
-            for number, row in enumerate(csv.reader(_lines(cast(TextIO, file), path)), start=1):
+        with open_regular(path) as content, _lines_of(content, path.suffix) as file:
+            for number, row in enumerate(csv.reader(_lines(file, path)), start=1):
                 if row:
                     yield row[0].strip(), _hand(row, f"{path}, line {number}", mirrored=mirrored)
     except (OSError, EOFError, UnicodeDecodeError, csv.Error, zlib.error) as error:
         raise DatasetError(f"cannot read the keypoints {path}: {reason_of(error)}") from None
+
+
+def _lines_of(content: BinaryIO, suffix: str) -> TextIO:
+    plain = gzip.GzipFile(fileobj=content) if suffix == ".gz" else content
+    return io.TextIOWrapper(cast(BinaryIO, plain), newline="")
 
 
 def _lines(file: TextIO, path: Path) -> Iterator[str]:

@@ -1,12 +1,14 @@
 """Reads the labels of photos and videos."""
 
 import csv
+import io
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from handsteer.cameras.files import PHOTO_SUFFIXES
 from handsteer.errors import LabelError, reason_of
+from handsteer.regular_files import open_regular
 from handsteer.types import NONE, find_sign
 
 INDEX = "index.csv"
@@ -29,6 +31,9 @@ class LabelledPhoto:
     truth: str | None
     kind: str = ""
     person_set: str = ""
+
+
+_LARGEST_BYTES = 100_000_000
 
 
 def read_photo_labels(folder: Path, signs: Sequence[str]) -> list[LabelledPhoto]:
@@ -130,7 +135,7 @@ def _truth(name: str, signs: Sequence[str], where: str) -> str | None:
 def _rows(path: Path, needed: tuple[str, ...]) -> Iterator[tuple[str, dict[str, str]]]:
     """Yield each line of a CSV file: its place, for messages, and its fields without surrounding spaces."""
     try:
-        with path.open(encoding="utf-8-sig", newline="") as file:
+        with io.TextIOWrapper(open_regular(path, _LARGEST_BYTES), "utf-8-sig", newline="") as file:
             reader = csv.DictReader(file, skipinitialspace=True)
             missing = [column for column in needed if column not in (reader.fieldnames or ())]
             if missing:

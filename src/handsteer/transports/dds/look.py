@@ -1,11 +1,14 @@
-"""``python -m handsteer.transports.dds.look``: prints the ROS 2 graph in the environment's domain, as JSON."""
+"""``python -m handsteer.transports.dds.look``: prints the ROS 2 graph in the environment's domain, as JSON.
+
+Arguments, if any, are full names of nodes to wait for, which announce themselves every few seconds only.
+"""
 
 import json
 import os
 import sys
 import time
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import asdict, dataclass
 
 from handsteer.errors import TransportError
@@ -22,6 +25,8 @@ _TOPIC = "rt/"
 _LOOK_S = 0.02
 _VELOCITIES = {"geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped"}
 _AT_LEAST_S, _QUIET_S, _AT_MOST_S = 0.6, 0.4, 3.0
+# More than two announcements of our nodes to others, see network.py.
+_FOUND_WITHIN_S = 6.0
 # Fast DDS announces the names of nodes up to three seconds after their publishers and subscribers, most sooner.
 _NAMES_S = 2.0
 
@@ -77,8 +82,12 @@ def problems_of(nodes: Iterable[str], topics: Iterable[ObservedTopic]) -> list[s
     return found
 
 
-def observe_domain(network: Network) -> ObservedGraph:
+def observe_domain(network: Network, awaited: Collection[str] = ()) -> ObservedGraph:
     """Return the graph in a domain.
+
+    Args:
+        network: The domain, and how to find others.
+        awaited: Full names of nodes to wait for, for six seconds at most.
 
     Raises:
         TransportError: The domain cannot be joined.
@@ -86,6 +95,7 @@ def observe_domain(network: Network) -> ObservedGraph:
     participant = Participant(network, NodeName("handsteer_graph"), is_observer=True)
     try:
         _wait_until_quiet(participant)
+        _wait_for(participant, set(awaited))
         return _graph(network.place, *participant.others())
     finally:
         participant.close()
@@ -102,6 +112,12 @@ def _wait_until_quiet(participant: Participant) -> None:
         is_quiet = now_s - began_s >= _AT_LEAST_S and now_s - changed_s >= _QUIET_S
         if is_quiet and (now_s - began_s >= _NAMES_S or all(node for _, node in ends)):
             return
+        time.sleep(_LOOK_S)
+
+
+def _wait_for(participant: Participant, awaited: set[str]) -> None:
+    deadline_s = time.monotonic() + _FOUND_WITHIN_S
+    while not awaited <= set(participant.others()[0]) and time.monotonic() < deadline_s:
         time.sleep(_LOOK_S)
 
 
@@ -142,7 +158,7 @@ def _is_hidden(node: str) -> bool:
 def main() -> None:
     """Print nodes, topics and problems; exit code 2 if the domain cannot be joined."""
     try:
-        seen = asdict(observe_domain(network(os.environ)))
+        seen = asdict(observe_domain(network(os.environ), sys.argv[1:]))
     except TransportError as error:
         sys.stderr.write(f"{error}\n")
         sys.stderr.flush()

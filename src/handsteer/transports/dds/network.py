@@ -22,6 +22,8 @@ _ADDRESS = re.compile(r"[A-Za-z0-9_.:%\[\]-]+")
 # How soon others find us if they cannot reach us by their own announcements, or again after a loss of connection;
 # Cyclone's default is half a minute.
 _ANNOUNCE_S = 2
+# Others may start at any time: by default, Cyclone drops an address at which no other was found for half a minute.
+_KEEP_ADDRESSES = "inf"
 # A packet per port is sent to each address. Participants of Cyclone DDS with range subnet use only one network card,
 # the first suitable one.
 _OWN_ADDRESSES = 3
@@ -132,11 +134,12 @@ def _config(reach: str, peers: Sequence[str], places: int, own: Sequence[str]) -
     found = "".join(f'<Peer address="{peer}"/>' for peer in everyone)
     index = f"<ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>{places - 1}</MaxAutoParticipantIndex>"
     announce = f"<SPDPInterval>{_ANNOUNCE_S} s</SPDPInterval>"
+    keep = f"<InitialLocatorPruneDelay>{_KEEP_ADDRESSES}</InitialLocatorPruneDelay>"
     within = reach in {"LOCALHOST", "OFF"} and not peers
     return (
         "<CycloneDDS><Domain>"
         f"<General>{_interfaces(own) if within else ''}<AllowMulticast>{multicast}</AllowMulticast></General>"
-        f"<Discovery>{index}{announce if own or not within else ''}<Peers>{found}</Peers></Discovery>"
+        f"<Discovery>{index}{announce if own or not within else ''}{keep}<Peers>{found}</Peers></Discovery>"
         f'<Internal><SocketReceiveBufferSize min="default" max="{_RECEIVE_BUFFER}"/>'
         f"<Watermarks><WhcHigh>{_UNCONFIRMED}</WhcHigh></Watermarks></Internal>"
         "</Domain></CycloneDDS>"

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from handsteer.errors import ConfigError
-from handsteer.messages import CMD_VEL, HAND_SIGN, IMAGE_ANNOTATED, IMAGE_RAW, Topic
+from handsteer.messages import CMD_VEL, HAND_SIGN, IMAGE_ANNOTATED, IMAGE_RAW, ODOM, Topic
 
 _TOPICS: dict[str, dict[str, Topic[Any]]] = {
     "hand_sign_recognition": {"subscribe_image_topic": IMAGE_RAW, "publish_gesture_topic": HAND_SIGN},
@@ -59,6 +59,9 @@ def translate(kind: str, node: str, parameters: Mapping[str, Any], read: Callabl
         camera = found.parameters.pop("camera_name")
         found.parameters.setdefault("source", camera)
     elif kind == "hand_sign_control":
+        commands = found.topics.get(CMD_VEL.name, "")
+        if commands.endswith("cmd_vel"):  # the odometry is next to the commands: /cmd_vel, /odom
+            found.topics[ODOM.name] = commands.removesuffix("cmd_vel") + "odom"
         _follow_the_recognition(found, node, read(_OF_THE_RECOGNITION))
     elif kind == "hand_sign_recognition":
         _take_window(found.parameters, node)

@@ -1,0 +1,62 @@
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from handsteer.clock import SteppedClock
+from handsteer.config import Config
+from handsteer.making import make_control
+from handsteer.messages import CMD_VEL, HAND_SIGN, String, Topic
+from handsteer.nodes.control import HandSignControlNode
+from handsteer.transports.in_process import InProcessTransport
+from tests.nodes.stepping import Bench
+
+
+def drives(choice: str, *, cmd_vel: str = CMD_VEL.name, simulated: bool = False) -> bool:
+    """Return whether the first sign moves a robot on ``cmd_vel``, with that choice of arming and engaging."""
+    bench = Bench()
+    config = Config.model_validate({"control": {"arming": choice, "engage": choice}})
+    topic = replace(CMD_VEL, name=cmd_vel)
+    node = make_control(config, bench.transport, bench.clock, simulated=simulated, cmd_vel=topic)
+    bench.nodes, twists = [node], bench.record(topic)
+    signs = bench.transport.advertise("recognition", HAND_SIGN)
+    for _ in range(60):
+        signs.publish(String(data="Forward"), bench.clock.now())
+        bench.run(1 / 30)
+    return twists[-1].linear.x > 0.0
+
+
+@pytest.mark.parametrize(
+    ("choice", "cmd_vel", "simulated", "first_sign_drives"),
+    [
+        ("auto", CMD_VEL.name, False, False),
+        ("auto", CMD_VEL.name, True, True),
+        ("course", CMD_VEL.name, False, True),
+        ("course", "/cmd_vel", False, False),
+        ("course", "/real/robot_diff_drive_controller/cmd_vel", False, False),
+        ("course", "/cmd_vel", True, True),
+        ("on", CMD_VEL.name, True, False),
+        ("off", "/cmd_vel", False, True),
+    ],
+)
+def test_signs_drive_from_the_start_only_where_the_robot_is_known_to_be_simulated(
+    choice: str, cmd_vel: str, simulated: bool, first_sign_drives: bool
+) -> None:
+    assert drives(choice, cmd_vel=cmd_vel, simulated=simulated) == first_sign_drives
+
+
+class Namespaced(InProcessTransport):
+    """As in ROS, where all nodes are in /r1."""
+
+    def full_name(self, node: str) -> str:
+        return f"r1/{node}: {node}"
+
+    def topic_name(self, topic: Topic[Any]) -> str:
+        return f"/r1{topic.name}"
+
+
+def test_the_courses_robot_may_be_in_the_namespace_of_its_control() -> None:
+    config = Config.model_validate({"control": {"engage": "course", "arming": "course"}})
+    node = make_control(config, Namespaced(), SteppedClock())
+    assert isinstance(node, HandSignControlNode)
+    assert node._report().engaged
