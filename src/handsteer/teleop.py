@@ -48,7 +48,7 @@ class Teleop:
         self.recognition: Recognition | None = None
         self._recognizer = recognizer or Recognizer(config)
         self._max_frame_age_s = config.signs.max_frame_age
-        self._freshness = Freshness(self._max_frame_age_s)
+        self._freshness = Freshness()
         self._refused: str | None = "no image has come"
         self._since_image_s = self._since_seen_s = 0.0
         self._joystick = HandJoystick(config.joystick)

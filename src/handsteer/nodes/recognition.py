@@ -102,7 +102,7 @@ class HandSignRecognitionNode(Node):
         self._last_sign_s = clock.now()
         self._last_hand_s: float | None = None
         self._age = FrameAge(config.max_frame_age, one_clock=transport.is_one_machine)
-        self._freshness = Freshness(config.max_frame_age)
+        self._freshness = Freshness()
         self._stall_guard = StallGuard(config.max_frame_age, clock.now())
         self._recording = Recording(config.recorded, config.max_frame_age)
         self._refused: str | None = None
@@ -154,7 +154,7 @@ class HandSignRecognitionNode(Node):
             self._models = versions
         self._config = config.signs
         limit_s = config.signs.max_frame_age
-        self._age.limit_s = self._freshness.limit_s = self._recording.limit_s = self._stall_guard.limit_s = limit_s
+        self._age.limit_s = self._recording.limit_s = self._stall_guard.limit_s = limit_s
         self._recognizer.reconfigure(config.signs)
         self._joystick.reconfigure(config.joystick)
 
@@ -198,7 +198,7 @@ class HandSignRecognitionNode(Node):
     def _look_at(self, image: NDArray[np.uint8], received: Received[M], began_s: float, captured_s: float) -> None:
         dt_s = self._since_last_frame(captured_s)
         self._unseen_s += dt_s
-        self._refused = self._freshness.why_refused(image, dt_s)
+        self._refused = self._freshness.why_refused(image, dt_s, recorded=self._recording.is_followed)
         if self._refused is not None:
             self._explain_freeze()
             return
