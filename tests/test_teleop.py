@@ -67,6 +67,24 @@ def test_without_arming_and_engaging_the_first_sign_drives() -> None:
     assert person.shows("Forward", 1.0)[-1].linear_mps > 0.1
 
 
+def test_a_sign_that_never_changes_has_to_be_shown_anew() -> None:
+    person = Person(Config(control=ControlConfig(renew_time=3.0)))
+    person.drives()
+    assert person.shows("Forward", 1.5)[-1] != ZERO
+    assert person.teleop.reason == "driving: Forward; stops in 1 s unless it changes"
+    assert person.shows("Forward", 1.0)[-1] == ZERO
+    assert person.teleop.reason.startswith("ready: the same sign for 3 s")
+    assert set(person.shows("Forward", 3.0)) == {ZERO}
+    person.shows("Stop", 0.1)
+    assert person.shows("Forward", 1.0)[-1].linear_mps > 0.1
+
+
+def test_where_nothing_has_to_be_shown_anew_a_sign_drives_on() -> None:
+    person = Person(Config(control=ControlConfig(renew_time=3.0, renew="off")))
+    person.drives()
+    assert person.shows("Forward", 6.0)[-1] != ZERO
+
+
 @pytest.mark.parametrize("image", [None, GREY], ids=["no image", "a frozen camera"])
 def test_without_new_images_the_robot_stands_and_waits_for_neutral(image: NDArray[np.uint8] | None) -> None:
     person = Person()

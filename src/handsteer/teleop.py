@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from handsteer.cameras.freshness import Freshness
 from handsteer.config import Config
 from handsteer.control import Control
-from handsteer.control.explain import Reason
+from handsteer.control.explain import Reason, seconds_to_renew, warned
 from handsteer.recognition.hand_joystick import HandJoystick
 from handsteer.recognition.recognizer import Recognition, Recognizer
 from handsteer.timeouts import ENGAGE_S
@@ -29,8 +29,8 @@ class Teleop:
     """Drives a robot by the hand signs in a stream of images.
 
     Nothing moves before an open palm was held for a second. It is required again after a pause or a frozen camera
-    (:doc:`/safety`). To disable this, for example for a simulated robot, set ``control.engage`` and ``control.arming``
-    to ``off``.
+    (:doc:`/safety`), and a sign that drives for 20 s has to be shown again. To disable this, for example for a
+    simulated robot, set ``control.engage``, ``arming`` and ``renew`` to ``off``.
 
     Args:
         config: All parameters; the defaults when None.
@@ -55,7 +55,10 @@ class Teleop:
         self._is_joystick = config.control.mode == "joystick"
         self._stick = RELEASED
         self._control = Control(
-            config.control, arming=config.control.arming != "off", engage=config.control.engage != "off"
+            config.control,
+            arming=config.control.arming != "off",
+            engage=config.control.engage != "off",
+            renew=config.control.renew != "off",
         )
         self._velocity = ZERO
 
@@ -103,7 +106,7 @@ class Teleop:
     @property
     def reason(self) -> str:
         """A sentence on what is commanded, and why the robot is stopped if it is."""
-        return str(self._reason())
+        return warned(str(self._reason()), seconds_to_renew(self._control.renew_left_s))
 
     def _reason(self) -> Reason:
         safety = self._control.safety
@@ -113,9 +116,9 @@ class Teleop:
             return Reason("no_image", self._refused)
         if not safety.engagement.engaged:
             return Reason("disengaged", f"{ENGAGE_S:g}")
-        if safety.signs_wait is not None:
+        if safety.signs_wait is not None and not safety.must_renew("signs"):
             return Reason("disarmed", safety.signs_wait or "reset")
-        return self._control.mux.reason
+        return self._control.reason
 
     def _sign_of(self, image: NDArray[np.uint8]) -> str | None:
         """Return the confirmed sign; None if the image is not new, as from a frozen camera."""

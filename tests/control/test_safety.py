@@ -6,7 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from handsteer.config import ControlConfig
-from handsteer.control.safety import Allowance, Engagement, Following, Ramp, Safety
+from handsteer.control.engagement import Engagement
+from handsteer.control.safety import Allowance, Following, Ramp, Safety
 from handsteer.timeouts import ARMING_S, DISENGAGE_S, FAULT_GAP_S, NEUTRAL_S
 from handsteer.types import ZERO, Velocity
 

@@ -74,6 +74,14 @@ DISENGAGED = ControlStatus(Reason("disengaged", "1"), "signs", engaged=False, en
             (control(Reason("stop_sign", "Stop")), RecognitionStatus("Stop", seen="Stop", handedness="Left")),
             ("standing", "Standing", "the Stop sign is shown"),
         ),
+        (
+            (replace(control(Reason("sign", "Forward"), linear=0.3), renew_s=3),),
+            ("driving", "Driving", "Forward; stops in 3 s unless it changes"),
+        ),
+        (
+            (replace(DISARMED, reason=Reason("renew", "20")), NO_HAND),
+            ("standing", "Ready", "the same sign for 20 s: show Stop or lower your hand, then show it again"),
+        ),
         ((DISENGAGED, NO_HAND), ("standing", "Disengaged", "hold an open palm for 1 s to begin")),
         (
             (DISENGAGED, RecognitionStatus(no_frame_s=2.0), UNPLUGGED),

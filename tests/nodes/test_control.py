@@ -48,11 +48,24 @@ AHEAD, LEFT = Stick(held=True, forward=0.5), Stick(held=True, left=1.0)
 
 
 class ControlBench(Bench):
-    def __init__(self, config: ControlConfig | None = None, *, arming: bool = False, engage: bool = False) -> None:
+    def __init__(
+        self,
+        config: ControlConfig | None = None,
+        *,
+        arming: bool = False,
+        engage: bool = False,
+        renew: bool = False,
+    ) -> None:
         super().__init__()
         config = config or ControlConfig()
         self.control = HandSignControlNode(
-            self.transport, self.clock, config, arming=arming, engage=engage, camera_changed=CAMERA_CHANGED
+            self.transport,
+            self.clock,
+            config,
+            arming=arming,
+            engage=engage,
+            renew=renew,
+            camera_changed=CAMERA_CHANGED,
         )
         self.steering = SteeringNode(self.transport, self.clock)
         self.nodes = [self.steering, self.control]
@@ -899,6 +912,50 @@ def test_nothing_moves_before_an_open_palm_engaged_the_hand() -> None:
     bench.run(1.0)
     bench.show("NONE", "Forward")
     assert bench.last() == (0, 0), "a fault disengages"
+
+
+def test_a_sign_that_does_not_change_ends_after_a_warning_and_has_to_be_shown_anew() -> None:
+    bench = ControlBench(ControlConfig(renew_time=6.0), renew=True)
+    diagnostics = bench.record(DIAGNOSTICS)
+    bench.show(*["Forward"] * 60)
+    assert bench.last()[0] > 0.0
+    bench.show(*["Forward"] * 90)
+    assert diagnostics[-1].status[0].message == "driving: Forward; stops in 2 s unless it changes"
+    bench.show(*["Forward"] * 60)
+    assert bench.last() == (0, 0)
+    reported = {pair.key: pair.value for pair in diagnostics[-1].status[0].values}
+    assert reported["reason_code"] == "renew"
+    words = "ready: the same sign for 6 s: show Stop or lower your hand, then show it again"
+    assert diagnostics[-1].status[0].message == words
+    bench.show("Stop", "Forward")
+    assert bench.last() == (0.01, 0)
+
+
+def test_a_stick_that_is_stuck_ends_and_has_to_be_released() -> None:
+    bench = ControlBench(JOYSTICK.model_copy(update={"renew_time": 2.0}), renew=True)
+    diagnostics = bench.record(DIAGNOSTICS)
+    bench.hold(RELEASED, *[AHEAD] * 70)
+    assert bench.last() == (0, 0)
+    assert diagnostics[-1].status[0].message == "standing: the stick has not moved for 2 s: release it first"
+    bench.hold(RELEASED, AHEAD)
+    assert bench.last() == (0.5, 0)
+
+
+def test_steering_that_never_changes_ends_and_has_to_be_released() -> None:
+    bench = ControlBench(ControlConfig(renew_time=2.0), renew=True)
+    diagnostics = bench.record(DIAGNOSTICS)
+    bench.steering.steer(0.0, 0.0)
+    bench.run(0.1)
+    for _ in range(25):
+        bench.steering.steer(0.3, 0.0)
+        bench.run(0.1)
+    assert bench.last() == (0, 0)
+    assert diagnostics[-1].status[0].message == "standing: the stick has not moved for 2 s: release it first"
+    bench.steering.steer(0.0, 0.0)
+    bench.run(0.1)
+    bench.steering.steer(0.3, 0.0)
+    bench.run(0.1)
+    assert bench.last() == (0.3, 0)
 
 
 def test_a_palm_engages_the_joystick_too() -> None:

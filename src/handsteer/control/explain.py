@@ -1,9 +1,11 @@
 """Explains in words why the robot drives or stands, and what signs do, with the configured values."""
 
+import math
 from dataclasses import dataclass
 from typing import Literal
 
 from handsteer.config import ControlConfig
+from handsteer.timeouts import RENEW_WARNING_S
 from handsteer.types import CRUISE_EFFECTS, EFFECTS, Action
 
 ReasonCode = Literal[
@@ -15,6 +17,8 @@ ReasonCode = Literal[
     "disarmed",
     "disengaged",
     "steering_disarmed",
+    "renew",
+    "renew_stick",
     "no_image",
     "no_scan",
     "obstacle",
@@ -37,6 +41,8 @@ _SENTENCES: dict[ReasonCode, str] = {
     "disarmed": "show Stop or lower your hand to begin{}",
     "disengaged": "hold an open palm for {} s to begin",
     "steering_disarmed": "the steering is held: release it first",
+    "renew": "the same sign for {} s: show Stop or lower your hand, then show it again",
+    "renew_stick": "the stick has not moved for {} s: release it first",
     "no_image": "{}",
     "no_scan": "{}",
     "obstacle": "stopped before an {}",
@@ -80,7 +86,9 @@ class Reason:
             return "driving"
         if is_moving:
             return "stopping"
-        return "ready" if self.code == "disarmed" else "disengaged" if self.code == "disengaged" else "standing"
+        return (
+            "ready" if self.code in ("disarmed", "renew") else "disengaged" if self.code == "disengaged" else "standing"
+        )
 
     @property
     def explanation(self) -> str:
@@ -96,6 +104,16 @@ class Reason:
     def __str__(self) -> str:
         """Return a sentence, as ``standing: no sign is seen``."""
         return f"{self.state()}: {self.explanation}"
+
+
+def seconds_to_renew(left_s: float) -> int | None:
+    """Return the whole seconds to warn of, if what drives must be shown again soon, in ``left_s``; else None."""
+    return math.ceil(left_s) if 0.0 < left_s <= RENEW_WARNING_S else None
+
+
+def warned(explanation: str, renew_s: int | None) -> str:
+    """Return ``explanation`` with the warning that what drives must change within ``renew_s`` seconds, if any."""
+    return explanation if renew_s is None else f"{explanation}; stops in {renew_s} s unless it changes"
 
 
 def effect_of(action: Action, rule: ControlConfig) -> str:

@@ -2,13 +2,15 @@
 
 import logging
 import math
+from dataclasses import replace
 from typing import Any
 
 from handsteer.clock import Clock
 from handsteer.config import CollisionMonitorConfig, Config, ControlConfig, JoyConfig
 from handsteer.control import Control
-from handsteer.control.explain import Reason
-from handsteer.control.safety import Following, SteeredBy
+from handsteer.control.engagement import SteeredBy
+from handsteer.control.explain import Reason, seconds_to_renew
+from handsteer.control.safety import Following
 from handsteer.messages import (
     CMD_VEL,
     GESTURE_JOY,
@@ -62,6 +64,7 @@ class HandSignControlNode(Node):
         arming: Whether nothing moves before neutral was seen, or while no robot is subscribed
             (:mod:`handsteer.control.safety`).
         engage: Whether the hand drives nothing before an open palm engaged it.
+        renew: Whether what drives without any change must be shown again.
         others_keep_stop: Whether nodes of other processes may remember a Stop from before the start; nothing moves
             before one of them was heard, for at most :data:`~handsteer.timeouts.HEAR_STOP_S`.
         sign, joy, steering, odom, scan: Topics of what it subscribes to.
@@ -84,6 +87,7 @@ class HandSignControlNode(Node):
         gamepad: JoyConfig | None = None,
         arming: bool = False,
         engage: bool = False,
+        renew: bool = False,
         others_keep_stop: bool = False,
         sign: Topic[String] = HAND_SIGN,
         joy: Topic[Joy] = GESTURE_JOY,
@@ -95,7 +99,7 @@ class HandSignControlNode(Node):
         super().__init__("hand_sign_control", transport, clock)
         self.latency = LatencyLog()
         self._config = config
-        self._control = Control(config, arming=arming, engage=engage)
+        self._control = Control(config, arming=arming, engage=engage, renew=renew)
         self._safety, self._mux = self._control.safety, self._control.mux
         self._following = None if config.robots else Following(checks_motion=arming)
         self._measured = MeasuredVelocity()
@@ -321,6 +325,7 @@ class HandSignControlNode(Node):
             linear_mps=round(velocity.linear_mps, 3),
             angular_radps=round(velocity.angular_radps, 3),
             moving=self._is_moving,
+            renew_s=seconds_to_renew(self._control.renew_left_s),
             robot=self._selection.robot if self._selection else None,
             blind=bool(self._monitor.why_blind()),
             obstacle_m=self._monitor.obstacle_m,
@@ -350,11 +355,13 @@ class HandSignControlNode(Node):
     def _reason_by_input(self) -> Reason:
         safety, source, why = self._safety, self._mux.source, self._safety.signs_wait
         robot = self._selection.robot if self._selection else ""
-        if source == "steering" and safety.steering_waits:
-            return Reason("steering_disarmed", robot=robot)
         # Without any input, that is the reason after a reset, which needs no explanation.
         if source != "steering" and not safety.engagement.engaged:
             return Reason("disengaged", f"{ENGAGE_S:g}", robot)
+        if self._control.must_renew:
+            return replace(self._control.reason, robot=robot)
+        if source == "steering" and safety.steering_waits:
+            return Reason("steering_disarmed", robot=robot)
         if source == "steering" or why is None or (source == "none" and not why):
             return self._monitor.explain(self._mux.reason)
         return Reason("disarmed", why, robot)

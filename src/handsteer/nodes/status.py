@@ -5,7 +5,7 @@ from typing import ClassVar, Literal
 
 from handsteer.config import ControlConfig
 from handsteer.control import Source
-from handsteer.control.explain import Reason
+from handsteer.control.explain import Reason, warned
 from handsteer.types import NONE, CourseState, Handedness, Pose2D, describe_seen
 
 OK, WARN, ERROR = 0, 1, 2
@@ -154,6 +154,7 @@ class ControlStatus(Status):
         linear_mps: Commanded forward velocity.
         angular_radps: Commanded angular velocity, left positive.
         moving: Whether the robot is measured to move; None if it is unknown.
+        renew_s: Seconds until the robot stops unless what drives changes; None if that is not soon.
         robot: The selected one of several robots; None if there is one.
         blind: Whether laser scans are required and missing.
         obstacle_m: Distance of the obstacle that limits the robot; None if none does.
@@ -174,6 +175,7 @@ class ControlStatus(Status):
     linear_mps: float = 0.0
     angular_radps: float = 0.0
     moving: bool | None = None
+    renew_s: int | None = None
     robot: str | None = None
     blind: bool = False
     obstacle_m: float | None = None
@@ -192,12 +194,12 @@ class ControlStatus(Status):
         """A sentence for people."""
         if self.reason is None:
             return "gives no reason"
-        return f"{self.reason.state(is_moving=bool(self.moving))}: {self.reason.explanation}"
+        return f"{self.reason.state(is_moving=bool(self.moving))}: {self.explanation}"
 
     @property
     def explanation(self) -> str:
         """The message without what the robot does."""
-        return self.reason.explanation if self.reason else self.message
+        return warned(self.reason.explanation, self.renew_s) if self.reason else self.message
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from itertools import chain, groupby
 from statistics import median
 from typing import Any
 
-from handsteer.control.safety import Engagement
+from handsteer.control.engagement import Engagement
 from handsteer.training.evaluation.intervals import Rate, Share
 from handsteer.training.evaluation.photo_metrics import Confusion
 from handsteer.types import NONE
