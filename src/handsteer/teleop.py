@@ -19,18 +19,18 @@ from handsteer.cameras.freshness import Freshness
 from handsteer.config import Config
 from handsteer.control import Control
 from handsteer.control.explain import Reason, seconds_to_renew, warned
+from handsteer.recognition.engage_gesture import EngageGesture
 from handsteer.recognition.hand_joystick import HandJoystick
 from handsteer.recognition.recognizer import Recognition, Recognizer
-from handsteer.timeouts import ENGAGE_S
 from handsteer.types import RELEASED, ZERO, Stick, Velocity
 
 
 class Teleop:
     """Drives a robot by the hand signs in a stream of images.
 
-    Nothing moves before an open palm was held for a second. It is required again after a pause or a frozen camera
-    (:doc:`/safety`), and a sign that drives for 20 s has to be shown again. To disable this, for example for a
-    simulated robot, set ``control.engage``, ``arming`` and ``renew`` to ``off``.
+    Nothing moves before the hand has engaged: it opens, closes and opens. That is required again after a pause or a
+    frozen camera (:doc:`/safety`), and a sign that drives for 20 s has to be shown again. To disable this, for example
+    for a simulated robot, set ``control.engage``, ``arming`` and ``renew`` to ``off``.
 
     Args:
         config: All parameters; the defaults when None.
@@ -53,6 +53,7 @@ class Teleop:
         self._since_image_s = self._since_seen_s = 0.0
         self._joystick = HandJoystick(config.joystick)
         self._is_joystick = config.control.mode == "joystick"
+        self._gesture = EngageGesture()
         self._stick = RELEASED
         self._control = Control(
             config.control,
@@ -83,9 +84,11 @@ class Teleop:
         sign = None if image is None else self._sign_of(image)
         if sign is not None:
             self._command(self._control.step(0.0, sign=sign, stick=self._stick))
+            self._control.note_gesture(is_done=self._gesture.progress == 1.0)
         elif self._since_seen_s > self._max_frame_age_s:
             self._recognizer.reset()
             self._joystick.reset()
+            self._gesture.reset()
             self._stick = RELEASED
             self.recognition = None
         return self._velocity
@@ -115,7 +118,7 @@ class Teleop:
         if self._refused is not None and self._velocity.is_zero:
             return Reason("no_image", self._refused)
         if not safety.engagement.engaged:
-            return Reason("disengaged", f"{ENGAGE_S:g}")
+            return safety.engagement.reason
         if safety.signs_wait is not None and not safety.must_renew("signs"):
             return Reason("disarmed", safety.signs_wait or "reset")
         return self._control.reason
@@ -129,6 +132,7 @@ class Teleop:
         try:
             # The time of skipped images counts too: a sign is timed from when it was last seen.
             self.recognition = self._recognizer.step(image, self._since_seen_s)
+            self._gesture.step(self.recognition, self._since_seen_s)
             if self._is_joystick:
                 self._stick = self._joystick.step(self.recognition, self._since_seen_s)
         except Exception:

@@ -11,7 +11,7 @@ from handsteer.messages import Header, Time
 
 Picture = NDArray[np.uint8]
 DT_S = 1 / 30
-BOX = (200, 120, 330, 300)
+BOX = (200, 120, 310, 260)
 TEXTURE = np.random.default_rng(0).integers(0, 250, (48, 64, 3), dtype=np.uint8).repeat(10, axis=0).repeat(10, axis=1)
 NOISE = SensorNoise()
 

@@ -45,6 +45,8 @@ class Onlooker:
     palm_s: float = 0.0
     palm_seen_s: float = -math.inf
     is_engaged: bool = False
+    engage_by: str = "hold"
+    was_made: bool = True
     renew: bool = False
     shown: dict[str, object] = field(default_factory=dict)
     changed_s: dict[str, float] = field(default_factory=dict)
@@ -68,6 +70,7 @@ class Onlooker:
         """Something happened after which the hand must show neutral, and engage."""
         self.was_released = self.is_engaged = False
         self.palm_s, self.palm_seen_s = 0.0, -math.inf
+        self.was_made = True
         if disarms:
             self.neutral_s = 0.0
 
@@ -94,7 +97,7 @@ class Onlooker:
         if self.now_s - self.hand_s >= timeout_s - _SLACK:
             self.interrupt(disarms=self.arming)
         if self.now_s - self.sign_s >= 5.0 - _SLACK:
-            self.is_engaged = False
+            self.is_engaged, self.was_made = False, True
 
     def hand(self, *, asks: bool, released: bool, stops: bool) -> None:
         """The input that drives comes from the hand."""
@@ -117,12 +120,20 @@ class Onlooker:
         if sign != "NONE":
             self.sign_s = self.now_s
         gap_s = self.now_s - self.palm_seen_s
-        if sign == "Stop":
+        if self.engage_by == "gesture" and sign == "Stop":
+            self.palm_seen_s = self.now_s
+        elif sign == "Stop":
             self.palm_s = self.palm_s + gap_s if gap_s < 0.3 else 0.0
             self.palm_seen_s = self.now_s
             self.is_engaged = self.is_engaged or self.palm_s >= 1.0 - _SLACK
         else:
             self.palm_s, self.palm_seen_s = 0.0, -math.inf
+
+    def gesture(self, *, is_made: bool) -> None:
+        """A frame shows whether the gesture has just been made."""
+        if is_made and not self.was_made and self.engage_by == "gesture" and not self.is_stopped:
+            self.is_engaged = self.is_engaged or self.now_s - self.palm_seen_s < 0.3
+        self.was_made = is_made
 
     def why_not(self, source: str, config: ControlConfig) -> str | None:
         """Return why ``source`` must not move the robot now; None if it may."""
@@ -154,10 +165,12 @@ class Histories(RuleBasedStateMachine):
         by=st.sampled_from(["course", "cruise"]),
         ramp=st.sampled_from(["per_message", "per_second"]),
         guards=st.tuples(st.booleans(), st.booleans(), st.booleans()),
+        engage_by=st.sampled_from(["gesture", "hold"]),
     )
-    def begin(self, mode: str, by: str, ramp: str, guards: tuple[bool, bool, bool]) -> None:
+    def begin(self, mode: str, by: str, ramp: str, guards: tuple[bool, bool, bool], engage_by: str) -> None:
         arming, engage, renew = guards
         limits = {
+            "engage_by": engage_by,
             "renew_time": RENEW_S,
             "max_linear_acceleration": ACCELERATION,
             "max_angular_jerk": JERK,
@@ -165,7 +178,7 @@ class Histories(RuleBasedStateMachine):
         }
         self.config = ControlConfig.model_validate({"mode": mode, "rule": by, "ramp": ramp, **limits})
         self.control = Control(self.config, arming=arming, engage=engage, renew=renew)
-        self.onlooker = Onlooker(mode, arming, engage, renew=renew)
+        self.onlooker = Onlooker(mode, arming, engage, engage_by=engage_by, renew=renew)
         self.commanded, self.commanded_s, self.source = ZERO, 0.0, "none"
         self.get_ready()
 
@@ -207,10 +220,24 @@ class Histories(RuleBasedStateMachine):
             self.onlooker.hand(asks=sign not in {"Stop", "NONE"}, released=False, stops=sign == "Stop")
         self.look(self.control.step(0.0, sign=sign, stick=stick))
 
+        self.note_gesture(is_made=False)
+
+    def note_gesture(self, *, is_made: bool) -> None:
+        self.onlooker.gesture(is_made=is_made)
+        self.control.note_gesture(is_done=is_made)
+
     @rule()
     def get_ready(self) -> None:
         for _ in range(65):
             self.frame("Stop", Stick())
+        self.note_gesture(is_made=True)
+
+    @rule(sign=st.sampled_from(["Stop", "Forward", "NONE"]), wait_s=st.sampled_from([0.0, 0.1, 0.33]))
+    def claim_the_gesture(self, sign: str, wait_s: float) -> None:
+        self.frame(sign, Stick())
+        self.pass_time(wait_s)
+        self.note_gesture(is_made=True)
+        self.drive_on("Forward")
 
     @rule(
         sign=st.sampled_from(SIGNS),

@@ -22,6 +22,7 @@ from handsteer.messages import (
     Image,
     String,
     Time,
+    engages_in,
 )
 from handsteer.nodes.diagnostics import read_status
 from handsteer.nodes.recognition import HandSignRecognitionNode
@@ -35,6 +36,7 @@ from handsteer.types import FORWARD
 from tests.nodes.stepping import Bench
 from tests.recognition.hands import RecordedLandmarker, show_fingers, show_sign
 from tests.recognition.models import model
+from tests.recognition.test_engage_gesture import GESTURE
 
 HEADER = Header(stamp=Time(0, 0), frame_id="camera")
 GREY = np.full((480, 640, 3), 100, np.uint8)
@@ -103,7 +105,7 @@ def test_the_hand_as_a_joystick_is_published_for_who_subscribes() -> None:
     bench.show(frames=30)
     joys = bench.record(GESTURE_JOY)
     bench.show(frames=10)
-    assert [joy.buttons.tolist() for joy in joys] == [[0]] * 10, "nobody saw the hand open"
+    assert [joy.buttons.tolist() for joy in joys] == [[0, 0]] * 10, "nobody saw the hand open"
     assert joys[0].header == HEADER
 
 
@@ -114,7 +116,21 @@ def test_a_fist_that_closes_is_held_until_no_frames_come() -> None:
     assert [int(joy.buttons[0]) for joy in joys] == [0] * 23 + [1] * 7
     assert joys[-1].axes.tolist() == [0.0, 0.0]
     bench.run(1.0)
-    assert joys[-1].buttons.tolist() == [0]
+    assert joys[-1].buttons.tolist() == [0, 0]
+
+
+def test_the_gesture_that_engages_is_published_with_the_joystick() -> None:
+    bench = RecognitionBench(hands=GESTURE)
+    joys, statuses = bench.record(GESTURE_JOY), bench.record(DIAGNOSTICS)
+    bench.show(frames=len(GESTURE) - 6)
+    assert not any(engages_in(joy) for joy in joys)
+    status = read_status(statuses[-1].status[0])
+    assert isinstance(status, RecognitionStatus)
+    assert status.engage_progress == pytest.approx(0.67)
+    bench.show(frames=6)
+    assert engages_in(joys[-1])
+    bench.run(1.0)
+    assert not engages_in(joys[-1])
 
 
 def test_a_stale_frame_is_no_frame(bench: RecognitionBench) -> None:

@@ -138,8 +138,13 @@ class ControlConfig(Section):
     )
     engage: Literal["auto", "on", "off", "course"] = Field(
         "auto",
-        description="Whether the hand drives only after an open palm was held for 1 s, until 5 s without a sign, a "
-        "Stop or a fault; auto and course are as for arming",
+        description="Whether the hand drives only after it has engaged, until 5 s without a sign, a Stop or a fault; "
+        "auto and course are as for arming",
+    )
+    engage_by: Literal["gesture", "hold"] = live(
+        "gesture",
+        description="How the hand engages: gesture is open, close, open, which no picture can do; hold is an open palm "
+        "for 1 s, for recognisers without /gesture/joy",
     )
     renew: Literal["auto", "on", "off", "course"] = Field(
         "auto",

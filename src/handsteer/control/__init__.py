@@ -24,7 +24,7 @@ class Control:
     Args:
         config: Limits, steps and timeouts.
         arming: Whether signs must show neutral before the first movement (:mod:`handsteer.control.safety`).
-        engage: Whether an open palm must engage the hand first.
+        engage: Whether the hand must engage first.
         renew: Whether what drives without any change for ``config.renew_time`` must be shown again.
 
     Attributes:
@@ -126,6 +126,11 @@ class Control:
             renewal.note("joystick", (stick.forward, stick.left) if stick.held else (0.0, 0.0))
         if steering is not None:
             renewal.note(by, (steering.linear_mps / config.max_linear, steering.angular_radps / config.max_angular))
+
+    def note_gesture(self, *, is_done: bool) -> None:
+        """Record of a frame whether the hand has just made the gesture that engages."""
+        if not self.safety.is_stopped:
+            self.safety.engagement.note_gesture(is_done=is_done)
 
     def halt(self) -> Velocity | None:
         """Stop the active input; return one zero, or None if there is none."""

@@ -6,9 +6,11 @@ Pure rules without a clock, as in :mod:`handsteer.control.safety`.
 import math
 from typing import Literal
 
+from handsteer.control.explain import Reason
 from handsteer.timeouts import DISENGAGE_S, ENGAGE_S, FAULT_GAP_S
 from handsteer.types import NONE, STOP
 
+EngagedBy = Literal["gesture", "hold"]
 SteeredBy = Literal["steering", "gamepad"]
 
 Steered = SteeredBy | Literal["signs", "joystick"]
@@ -23,28 +25,39 @@ _TREMOR = 0.05
 class Engagement:
     """The clutch between hand and robot: while disengaged, nothing moves whatever is shown.
 
-    An open palm (``Stop``) held for :data:`~handsteer.timeouts.ENGAGE_S` engages, and
-    :data:`~handsteer.timeouts.DISENGAGE_S` without a sign, a Stop or a fault disengage. It prevents what is known as
-    the Midas touch: everyday movements of the hand that are taken for commands.
+    A gesture engages, which recognition sees: open, close, open. Or, if so configured, an open palm (``Stop``) held for
+    :data:`~handsteer.timeouts.ENGAGE_S`, which a picture of one can do too. :data:`~handsteer.timeouts.DISENGAGE_S`
+    without a sign, a Stop or a fault disengage. It prevents what is known as the Midas touch: everyday movements of the
+    hand that are taken for commands.
 
     Args:
         enabled: If not, the hand is always engaged.
+        by: What engages; may be changed.
 
     Attributes:
         engaged: Whether the hand drives.
     """
 
-    def __init__(self, *, enabled: bool) -> None:
+    def __init__(self, *, enabled: bool, by: EngagedBy = "hold") -> None:
         self._enabled = enabled
+        self.by: EngagedBy = by
         self.engaged = not enabled
+        self._was_done = True
         self._palm_s = 0.0
         self._idle_s = 0.0
         self._gap_s = math.inf
 
     @property
     def progress(self) -> float:
-        """Progress of engaging, 0 to 1."""
-        return 1.0 if self.engaged else min(1.0, self._palm_s / ENGAGE_S)
+        """Progress of engaging, 0 to 1; that of the gesture is not known here."""
+        if self.engaged or self.by == "gesture":
+            return float(self.engaged)
+        return min(1.0, self._palm_s / ENGAGE_S)
+
+    @property
+    def reason(self) -> Reason:
+        """What has to be done to engage."""
+        return Reason("disengaged", f"{ENGAGE_S:g}" if self.by == "hold" else "")
 
     def step(self, dt_s: float) -> None:
         """Advance time by ``dt_s`` seconds, >= 0."""
@@ -63,12 +76,19 @@ class Engagement:
         # The time before the first palm, or of a pause, was not observed.
         self._palm_s = self._palm_s + self._gap_s if self._gap_s < FAULT_GAP_S else 0.0
         self._gap_s = 0.0
-        if self._palm_s >= ENGAGE_S - _SLACK_S:
+        if self.by == "hold" and self._palm_s >= ENGAGE_S - _SLACK_S:
             self.engaged = True
 
+    def note_gesture(self, *, is_done: bool) -> None:
+        """Record of a frame whether the gesture has just been made; only where it was not yet in the frame before."""
+        if is_done and not self._was_done and self.by == "gesture" and self._gap_s < FAULT_GAP_S:
+            self.engaged = True
+        self._was_done = is_done
+
     def disengage(self) -> None:
-        """Require the open palm again; without effect if not enabled."""
+        """Require that the hand engages again; without effect if not enabled."""
         self._palm_s, self._gap_s = 0.0, math.inf
+        self._was_done = True
         self.engaged = not self._enabled
 
 

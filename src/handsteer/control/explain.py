@@ -39,7 +39,7 @@ _SENTENCES: dict[ReasonCode, str] = {
     "stopped": "stopped, until it is reset",
     "starting": "has just started: whether the robot was stopped before is not known yet",
     "disarmed": "show Stop or lower your hand to begin{}",
-    "disengaged": "hold an open palm for {} s to begin",
+    "disengaged": "open, close and open your hand to begin",
     "steering_disarmed": "the steering is held: release it first",
     "renew": "the same sign for {} s: show Stop or lower your hand, then show it again",
     "renew_stick": "the stick has not moved for {} s: release it first",
@@ -95,6 +95,8 @@ class Reason:
         """The reason in words, without what the robot does, as ``no sign is seen``."""
         robot = f" with {self.robot}" if self.robot else ""
         detail = self.detail
+        if self.code == "disengaged" and detail:
+            return f"hold an open palm for {detail} s to begin{robot}"
         if self.code == "disarmed":
             detail = f"{robot} ({detail})" if detail else robot
             robot = ""

@@ -83,7 +83,7 @@ class Safety:
     def __init__(self, config: ControlConfig, *, arming: bool, engage: bool = False, renew: bool = False) -> None:
         self._config = config
         self._arming = arming
-        self.engagement = Engagement(enabled=engage)
+        self.engagement = Engagement(enabled=engage, by=config.engage_by)
         self.renewal = Renewal(enabled=renew, limit_s=config.renew_time)
         self._renews: set[Steered] = set()
         self._stick_waits = True
@@ -160,7 +160,6 @@ class Safety:
         """Record that ``by`` has driven for too long without any change: it must show neutral before it is followed."""
         self._renews.add(by)
         if by == "signs":
-            self._neutral_s = 0.0
             self.signs_wait = f"the same sign for {self.renewal.limit_s:g} s"
         elif by == "joystick":
             self._stick_waits = True
@@ -200,6 +199,7 @@ class Safety:
         """Change the timeouts."""
         self._config = config
         self.renewal.limit_s = config.renew_time
+        self.engagement.by = config.engage_by
 
     def _releases_by(self, by: SteeredBy, *, is_zero: bool, is_valid: bool, timeout_s: float) -> bool:
         if is_zero:

@@ -26,6 +26,7 @@ from handsteer.messages import (
     String,
     Topic,
     Twist,
+    engages_in,
 )
 from handsteer.nodes.auditing import ControlAudit
 from handsteer.nodes.base import Node
@@ -35,7 +36,7 @@ from handsteer.nodes.selection import NEXT, Selection
 from handsteer.nodes.status import ControlStatus
 from handsteer.nodes.supervision import Rivals, StopKeeper
 from handsteer.nodes.timing import CALM_S, LatencyLog, StallGuard
-from handsteer.timeouts import ENGAGE_S, ODOMETRY_S
+from handsteer.timeouts import ODOMETRY_S
 from handsteer.transports.base import Call, Received, Transport
 from handsteer.transports.commands import Commands
 from handsteer.types import NONE, ZERO, Stick, Velocity, action_of
@@ -63,7 +64,7 @@ class HandSignControlNode(Node):
         gamepad: How ``/joy`` is read.
         arming: Whether nothing moves before neutral was seen, or while no robot is subscribed
             (:mod:`handsteer.control.safety`).
-        engage: Whether the hand drives nothing before an open palm engaged it.
+        engage: Whether the hand drives nothing before it has engaged.
         renew: Whether what drives without any change must be shown again.
         others_keep_stop: Whether nodes of other processes may remember a Stop from before the start; nothing moves
             before one of them was heard, for at most :data:`~handsteer.timeouts.HEAR_STOP_S`.
@@ -124,7 +125,8 @@ class HandSignControlNode(Node):
         self.subscribe(steering, self._on_steering)
         self.subscribe(sign, self._on_sign)
         self._joysticks = Joysticks(self, joy, self._on_stick, gamepad or JoyConfig(), self._on_gamepad)
-        self._joysticks.listen(on=config.mode == "joystick")
+        self._engages = engage
+        self._listen()
         if self._following:
             self.subscribe(odom, self._on_odometry)
         self._watchdog = self.every(_WATCHDOG_PERIOD_S, self._watch)
@@ -136,7 +138,12 @@ class HandSignControlNode(Node):
         self._stall_guard.limit_s = config.control.sign_timeout
         self._monitor.reconfigure(config.collision_monitor)
         self._publish(self._control.reconfigure(config.control))
-        self._joysticks.listen(on=config.control.mode == "joystick")
+        self._listen()
+
+    def _listen(self) -> None:
+        is_joystick = self._config.mode == "joystick"
+        by_gesture = self._engages and self._config.engage_by == "gesture"
+        self._joysticks.listen(hand=is_joystick or by_gesture, gamepad=is_joystick)
 
     def services(self) -> dict[str, Call]:
         """Return ``stop`` and ``reset``, which are equivalent to true and false on ``/stop``."""
@@ -182,6 +189,13 @@ class HandSignControlNode(Node):
         self._look_for_changes(self.clock.now())
 
     def _on_stick(self, stick: Stick, received: Received[Joy]) -> None:
+        """Note whether the hand engages; follow it as a joystick if it is one."""
+        is_old = self._is_stale(received) or self._waits_for_others()
+        self._control.note_gesture(is_done=engages_in(received.message) and not is_old)
+        if self._config.mode == "joystick":
+            self._follow_stick(stick, received)
+
+    def _follow_stick(self, stick: Stick, received: Received[Joy]) -> None:
         self._take(received.captured_s, is_late=self._is_stale(received), is_stop=not stick.held, stick=stick)
 
     def _on_gamepad(self, stick: Stick, received: Received[Joy], *, is_at_rest: bool) -> None:
@@ -357,7 +371,7 @@ class HandSignControlNode(Node):
         robot = self._selection.robot if self._selection else ""
         # Without any input, that is the reason after a reset, which needs no explanation.
         if source != "steering" and not safety.engagement.engaged:
-            return Reason("disengaged", f"{ENGAGE_S:g}", robot)
+            return replace(safety.engagement.reason, robot=robot)
         if self._control.must_renew:
             return replace(self._control.reason, robot=robot)
         if source == "steering" and safety.steering_waits:

@@ -90,6 +90,7 @@ class RecognitionStatus(Status):
         confidences: Of each of ``signs`` in the newest frame, 0 to 1, in the same order; empty without a hand.
         min_confidence: The smallest confidence that counts.
         progress: Progress of confirming ``seen``, 0 to 1.
+        engage_progress: Progress of the gesture that engages, 0 to 1; 0 where nothing asks for it.
         handedness: Of the active hand; empty if there is none.
         no_hand_s: Time since a hand was seen; None if one is in view, or none was seen yet.
         no_frame_s: Time since the last frame; None if there are frames, even if they are refused.
@@ -111,6 +112,7 @@ class RecognitionStatus(Status):
     confidences: tuple[float, ...] = ()
     min_confidence: float | None = None
     progress: float = 0.0
+    engage_progress: float = 0.0
     handedness: Handedness | Literal[""] = ""
     no_hand_s: float | None = None
     no_frame_s: float | None = None
@@ -149,7 +151,7 @@ class ControlStatus(Status):
         source: The active input.
         stopped: Whether the robot is stopped until reset.
         armed: Whether signs count; otherwise they must show neutral first.
-        engaged: Whether the hand drives; otherwise an open palm must engage it first.
+        engaged: Whether the hand drives; otherwise it must engage first.
         engage_progress: Progress of engaging, 0 to 1.
         linear_mps: Commanded forward velocity.
         angular_radps: Commanded angular velocity, left positive.

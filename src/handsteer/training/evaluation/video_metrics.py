@@ -273,7 +273,7 @@ def _while_engaged(
 
 
 def _engaged(frames: Sequence[FrameVerdict]) -> Iterator[bool]:
-    clutch, before_s = Engagement(enabled=True), 0.0
+    clutch, before_s = Engagement(enabled=True, by="hold"), 0.0
     for frame in frames:
         clutch.step(max(0.0, frame.time_s - before_s))
         clutch.note_sign(frame.counts)
