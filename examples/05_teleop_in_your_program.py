@@ -12,14 +12,14 @@ from handsteer.clock import SteppedClock
 from handsteer.config import VirtualHandConfig
 
 FPS = 30
-SCRIPT = VirtualHandConfig(script="Stop:1 Forward:2 Go:1 Turn Left:1 Stop:1")
+SCRIPT = VirtualHandConfig(script="Stop:0.7 Go:0.6 Stop:0.7 Forward:2 Go:1 Turn Left:1 Stop:1")
 
 
 def main() -> None:
     teleop, clock = Teleop(Config()), SteppedClock()
     camera = VirtualHandCamera(SCRIPT, width=320, height=240, fps=FPS, clock=clock)
     x = y = yaw = 0.0
-    for frame in range(6 * FPS):
+    for frame in range(7 * FPS):
         clock.advance(1 / FPS)
         velocity = teleop.step(camera.read().image, 1 / FPS)
         yaw += velocity.angular_radps / FPS

@@ -187,7 +187,7 @@ class Processes:
 
 def as_tests_drive(verb: str, options: tuple[str, ...]) -> tuple[str, ...]:
     """Return the options of one of handsteer's nodes; a control follows the first sign, unless they say otherwise."""
-    for switch in ("arming", "engage") if verb == "control" else ():
+    for switch in ("arming", "engage", "renew") if verb == "control" else ():
         if not any(switch in option for option in options):
             options = (f"--control.{switch}", "off", *options)
     return options

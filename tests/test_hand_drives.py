@@ -24,8 +24,8 @@ Picture = NDArray[np.uint8]
 class Person:
     """Shows a drawn hand to a teleop, frame by frame."""
 
-    def __init__(self) -> None:
-        control = ControlConfig(mode="joystick", arming="off", engage="off")
+    def __init__(self, config: ControlConfig | None = None) -> None:
+        control = config or ControlConfig(mode="joystick", arming="off", engage="off")
         self.teleop = Teleop(Config(control=control))
         self._noise, self._frames = SensorNoise(), 0
         self._background = make_background("cluttered", WIDTH, HEIGHT, 0)
@@ -80,3 +80,32 @@ def test_it_stops_within_a_tenth_of_a_second_and_must_be_closed_again(end: str) 
     fist = person.picture(sign_pose(GO), forward_m=0.06)
     assert set(person.shows(fist, 15)) == {ZERO}
     person.drives()
+
+
+def half_closed(share: float) -> HandPose:
+    open_hand, fist = sign_pose(STOP), sign_pose(GO)
+    return HandPose((1 - share) * open_hand.angles + share * fist.angles, open_hand.view)
+
+
+def test_a_hand_that_opens_closes_and_opens_engages() -> None:
+    person = Person(ControlConfig())
+    between = [person.picture(half_closed(share)) for share in (0.15, 0.3, 0.45, 0.6, 0.75, 0.9)]
+    person.shows(person.picture(half_closed(0.0)), 15)
+    assert person.teleop.reason == "disengaged: open, close and open your hand to begin"
+    for picture in between:
+        person.shows(picture)
+    person.shows(person.picture(half_closed(1.0)), 8)
+    for picture in reversed(between):
+        person.shows(picture)
+    person.shows(person.picture(half_closed(0.0)), 10)
+    assert person.shows(person.picture(sign_pose("Forward")), 15)[-1].linear_mps > 0.0
+
+
+def test_pictures_of_a_palm_and_a_fist_in_turn_do_not_engage() -> None:
+    person = Person(ControlConfig())
+    palm, fist = (person.picture(half_closed(share)) for share in (0.0, 1.0))
+    for frames in (8, 3, 15):
+        for picture in (palm, fist, palm, fist, palm):
+            person.shows(picture, frames)
+    assert person.teleop.reason == "disengaged: open, close and open your hand to begin"
+    assert set(person.shows(person.picture(sign_pose("Forward")), 15)) == {ZERO}

@@ -45,6 +45,21 @@ def test_signs_drive_from_the_start_only_where_the_robot_is_known_to_be_simulate
     assert drives(choice, cmd_vel=cmd_vel, simulated=simulated) == first_sign_drives
 
 
+@pytest.mark.parametrize(("choice", "simulated", "drives_on"), [("auto", False, False), ("auto", True, True)])
+def test_a_sign_drives_for_ever_only_where_the_robot_is_known_to_be_simulated(
+    choice: str, simulated: bool, drives_on: bool
+) -> None:
+    bench = Bench()
+    config = Config.model_validate({"control": {"arming": "off", "engage": "off", "renew": choice, "renew_time": 2.0}})
+    bench.nodes = [make_control(config, bench.transport, bench.clock, simulated=simulated)]
+    twists = bench.record(CMD_VEL)
+    signs = bench.transport.advertise("recognition", HAND_SIGN)
+    for _ in range(80):
+        signs.publish(String(data="Forward"), bench.clock.now())
+        bench.run(1 / 30)
+    assert (twists[-1].linear.x > 0.0) == drives_on
+
+
 class Namespaced(InProcessTransport):
     """As in ROS, where all nodes are in /r1."""
 

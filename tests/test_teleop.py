@@ -29,7 +29,7 @@ class Person:
     """Shows painted signs to a camera, which a teleop looks at."""
 
     def __init__(self, config: Config | None = None) -> None:
-        config = config or Config()
+        config = config or Config(control=ControlConfig(engage_by="hold"))
         self.clock = SteppedClock()
         self.camera = PaintedCamera(self.clock)
         self.teleop = Teleop(config, painted_recognizer(config.signs))
@@ -66,6 +66,24 @@ def test_without_the_clutch_neutral_is_still_required() -> None:
 def test_without_arming_and_engaging_the_first_sign_drives() -> None:
     person = Person(Config(control=ControlConfig(arming="off", engage="off")))
     assert person.shows("Forward", 1.0)[-1].linear_mps > 0.1
+
+
+def test_a_sign_that_never_changes_has_to_be_shown_anew() -> None:
+    person = Person(Config(control=ControlConfig(renew_time=3.0, engage_by="hold")))
+    person.drives()
+    assert person.shows("Forward", 1.5)[-1] != ZERO
+    assert person.teleop.reason == "driving: Forward; stops in 1 s unless it changes"
+    assert person.shows("Forward", 1.0)[-1] == ZERO
+    assert person.teleop.reason.startswith("ready: the same sign for 3 s")
+    assert set(person.shows("Forward", 3.0)) == {ZERO}
+    person.shows("Stop", 0.1)
+    assert person.shows("Forward", 1.0)[-1].linear_mps > 0.1
+
+
+def test_where_nothing_has_to_be_shown_anew_a_sign_drives_on() -> None:
+    person = Person(Config(control=ControlConfig(renew_time=3.0, renew="off", engage_by="hold")))
+    person.drives()
+    assert person.shows("Forward", 6.0)[-1] != ZERO
 
 
 @pytest.mark.parametrize("image", [None, GREY], ids=["no image", "a frozen camera"])
@@ -138,15 +156,15 @@ def test_it_commands_what_the_nodes_command() -> None:
     """The same images through the graph of nodes, and through the spine."""
     config = Config(
         camera=CameraConfig(source="virtual", width=320, height=240),
-        virtual_hand=VirtualHandConfig(script="Stop:1 Forward:1.5 Turn Left:1 NONE:0.5 Stop:1"),
-        control=ControlConfig(arming="on"),
+        virtual_hand=VirtualHandConfig(script="Stop:0.7 Go:0.6 Stop:0.7 Forward:1.5 Turn Left:1 NONE:0.5 Stop:1"),
+        control=ControlConfig(arming="on", engage="on"),
     )
     images: list[NDArray[np.uint8]] = []
     commands: list[Velocity] = []
     with Graph(config, SteppedClock()) as graph:
         graph.transport.subscribe("test", IMAGE_RAW, lambda image: images.append(bgr_image(image.message)))
         graph.transport.subscribe("test", CMD_VEL, lambda twist: commands.append(_velocity(twist.message)))
-        graph.run_stepped(5.0)
+        graph.run_stepped(6.0)
 
     teleop = Teleop(config)
     assert commands[-1] == ZERO

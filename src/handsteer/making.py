@@ -117,8 +117,8 @@ def make_control(
 ) -> "HandSignControlNode":
     """Return the node ``hand_sign_control``.
 
-    ``simulated`` is whether the robot is known to be simulated; ``control.arming`` and ``control.engage`` are then off
-    if they are ``auto`` or ``course``. ``others_keep_stop`` is whether nodes of other processes may remember a Stop.
+    ``simulated`` is whether the robot is known to be simulated; ``control.arming``, ``engage`` and ``renew`` are then
+    off if they are ``auto`` or ``course``. ``others_keep_stop`` is whether other processes' nodes may remember a Stop.
     """
     from handsteer.nodes.control import HandSignControlNode
 
@@ -133,6 +133,7 @@ def make_control(
         gamepad=config.joy,
         arming=choices[config.control.arming],
         engage=choices[config.control.engage],
+        renew=choices[config.control.renew],
         others_keep_stop=others_keep_stop,
         **topics,
     )

@@ -139,7 +139,7 @@ CAMERA_CHANGED = Topic("/camera_changed", String)
 CAMERA_INFO = Topic("/camera_info", CameraInfo, beneath=IMAGE_RAW)
 # Each sign changes the speed by one step, so none may be lost when several arrive at once.
 HAND_SIGN = Topic("/gesture/hand_sign", String, depth=10, lifespan_s=STALE_S, stops=is_stopping)
-# The hand as a joystick: axes left and forward, -1 to 1, and button 0 while it is held.
+# The hand as a joystick: axes left and forward, -1 to 1, button 0 while it is held, button 1 when it engages.
 GESTURE_JOY = Topic("/gesture/joy", Joy, lifespan_s=STALE_S, stops=is_released)
 # A gamepad, from ROS's joy.
 JOY = Topic("/joy", Joy, lifespan_s=STALE_S)
@@ -209,10 +209,18 @@ def twist_in(message: Twist | TwistStamped) -> Twist:
     return message.twist if isinstance(message, TwistStamped) else message
 
 
-def joy_of(stick: Stick, header: Header) -> Joy:
-    """Return ``stick`` as a message for :data:`GESTURE_JOY`: axes (left, forward), button 0 while it is held."""
+def joy_of(stick: Stick, header: Header, *, engages: bool = False) -> Joy:
+    """Return ``stick`` as a message for :data:`GESTURE_JOY`: axes (left, forward), button 0 while it is held.
+
+    Button 1 is whether it ``engages``: the hand has just made that gesture.
+    """
     axes = np.array([stick.left, stick.forward], np.float32)
-    return Joy(header=header, axes=axes, buttons=np.array([stick.held], np.int32))
+    return Joy(header=header, axes=axes, buttons=np.array([stick.held, engages], np.int32))
+
+
+def engages_in(message: Joy) -> bool:
+    """Return whether the hand has just made the gesture that engages, in a message from any source."""
+    return len(message.buttons) > 1 and bool(message.buttons[1])
 
 
 def stick_in(message: Joy, *, enable_button: int = 0, axis_linear: int = 1, axis_angular: int = 0) -> Stick:

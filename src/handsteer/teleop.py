@@ -18,19 +18,19 @@ from numpy.typing import NDArray
 from handsteer.cameras.freshness import Freshness
 from handsteer.config import Config
 from handsteer.control import Control
-from handsteer.control.explain import Reason
+from handsteer.control.explain import Reason, seconds_to_renew, warned
+from handsteer.recognition.engage_gesture import EngageGesture
 from handsteer.recognition.hand_joystick import HandJoystick
 from handsteer.recognition.recognizer import Recognition, Recognizer
-from handsteer.timeouts import ENGAGE_S
 from handsteer.types import RELEASED, ZERO, Stick, Velocity
 
 
 class Teleop:
     """Drives a robot by the hand signs in a stream of images.
 
-    Nothing moves before an open palm was held for a second. It is required again after a pause or a frozen camera
-    (:doc:`/safety`). To disable this, for example for a simulated robot, set ``control.engage`` and ``control.arming``
-    to ``off``.
+    Nothing moves before the hand has engaged: it opens, closes and opens. That is required again after a pause or a
+    frozen camera (:doc:`/safety`), and a sign that drives for 20 s has to be shown again. To disable this, for example
+    for a simulated robot, set ``control.engage``, ``arming`` and ``renew`` to ``off``.
 
     Args:
         config: All parameters; the defaults when None.
@@ -48,14 +48,18 @@ class Teleop:
         self.recognition: Recognition | None = None
         self._recognizer = recognizer or Recognizer(config)
         self._max_frame_age_s = config.signs.max_frame_age
-        self._freshness = Freshness(self._max_frame_age_s)
+        self._freshness = Freshness()
         self._refused: str | None = "no image has come"
         self._since_image_s = self._since_seen_s = 0.0
         self._joystick = HandJoystick(config.joystick)
         self._is_joystick = config.control.mode == "joystick"
+        self._gesture = EngageGesture()
         self._stick = RELEASED
         self._control = Control(
-            config.control, arming=config.control.arming != "off", engage=config.control.engage != "off"
+            config.control,
+            arming=config.control.arming != "off",
+            engage=config.control.engage != "off",
+            renew=config.control.renew != "off",
         )
         self._velocity = ZERO
 
@@ -80,9 +84,11 @@ class Teleop:
         sign = None if image is None else self._sign_of(image)
         if sign is not None:
             self._command(self._control.step(0.0, sign=sign, stick=self._stick))
+            self._control.note_gesture(is_done=self._gesture.progress == 1.0)
         elif self._since_seen_s > self._max_frame_age_s:
             self._recognizer.reset()
             self._joystick.reset()
+            self._gesture.reset()
             self._stick = RELEASED
             self.recognition = None
         return self._velocity
@@ -103,7 +109,7 @@ class Teleop:
     @property
     def reason(self) -> str:
         """A sentence on what is commanded, and why the robot is stopped if it is."""
-        return str(self._reason())
+        return warned(str(self._reason()), seconds_to_renew(self._control.renew_left_s))
 
     def _reason(self) -> Reason:
         safety = self._control.safety
@@ -112,10 +118,10 @@ class Teleop:
         if self._refused is not None and self._velocity.is_zero:
             return Reason("no_image", self._refused)
         if not safety.engagement.engaged:
-            return Reason("disengaged", f"{ENGAGE_S:g}")
-        if safety.signs_wait is not None:
+            return safety.engagement.reason
+        if safety.signs_wait is not None and not safety.must_renew("signs"):
             return Reason("disarmed", safety.signs_wait or "reset")
-        return self._control.mux.reason
+        return self._control.reason
 
     def _sign_of(self, image: NDArray[np.uint8]) -> str | None:
         """Return the confirmed sign; None if the image is not new, as from a frozen camera."""
@@ -126,6 +132,7 @@ class Teleop:
         try:
             # The time of skipped images counts too: a sign is timed from when it was last seen.
             self.recognition = self._recognizer.step(image, self._since_seen_s)
+            self._gesture.step(self.recognition, self._since_seen_s)
             if self._is_joystick:
                 self._stick = self._joystick.step(self.recognition, self._since_seen_s)
         except Exception:

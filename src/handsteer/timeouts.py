@@ -59,3 +59,9 @@ ENGAGE_S: Final = 1.0
 
 DISENGAGE_S: Final = 5.0
 """Without a sign for this long, the hand is disengaged."""
+
+RENEW_S: Final = 20.0
+"""A sign or stick that drives without any change for this long has to be shown again (``control.renew``)."""
+
+RENEW_WARNING_S: Final = 5.0
+"""So long before, the driver is warned."""

@@ -1,4 +1,5 @@
 import math
+from typing import Any
 
 import pytest
 from hypothesis import given
@@ -6,7 +7,9 @@ from hypothesis import strategies as st
 
 from handsteer.config import ControlConfig
 from handsteer.control import Control, TwistMux
-from handsteer.types import FORWARD, GO, NONE, STOP, ZERO, Velocity
+from handsteer.control.engagement import SteeredBy
+from handsteer.control.explain import Reason
+from handsteer.types import FORWARD, GO, NONE, STOP, ZERO, Stick, Velocity
 
 DT = 1 / 30
 
@@ -64,6 +67,113 @@ def test_reasons_say_why_the_robot_stands() -> None:
         "driving: Forward",
         "driving: steered by hand",
     ]
+
+
+RENEW = ControlConfig(renew_time=3.0, rule="cruise")
+JOYSTICK = RENEW.model_copy(update={"mode": "joystick"})
+
+
+def drives_s(control: Control, limit_s: float = 10.0, dt_s: float = 0.1, **shown: Any) -> float:
+    """Show the same until the robot stands; return for how long, in seconds, or 0 if it stood all the time."""
+    control.step(0.0, **shown)
+    for count in range(round(limit_s / dt_s)):
+        control.step(dt_s, **shown)
+        if control.mux.velocity.is_zero:
+            return (count + 1) * dt_s if count else 0.0
+    return math.inf
+
+
+def show_for(control: Control, seconds: float, dt_s: float = 0.1, **shown: Any) -> None:
+    for _ in range(round(seconds / dt_s)):
+        control.step(dt_s, **shown)
+
+
+@pytest.mark.parametrize("arming", [False, True])
+def test_a_sign_that_does_not_change_has_to_be_shown_anew_after_neutral(arming: bool) -> None:
+    control = Control(RENEW, arming=arming, renew=True)
+    show_for(control, 1.5, sign=STOP)
+    assert drives_s(control, sign=FORWARD) == pytest.approx(3.0)
+    assert str(control.reason) == "ready: the same sign for 3 s: show Stop or lower your hand, then show it again"
+    assert drives_s(control, sign=FORWARD) == 0.0, "it does not begin by itself"
+    assert drives_s(control, sign="Turn Left") == 0.0, "another sign is no release"
+    show_for(control, 0.3, sign=NONE)
+    assert drives_s(control, sign=FORWARD) == 0.0, "nor is a short loss"
+    show_for(control, 0.6, sign=NONE)
+    assert control.reason.code == "no_sign"
+    assert drives_s(control, sign=FORWARD) == pytest.approx(3.0)
+
+
+def test_a_sign_that_changes_now_and_then_drives_on() -> None:
+    control = Control(RENEW, arming=False, renew=True)
+    for _ in range(10):
+        assert drives_s(control, 2.9, sign=FORWARD) == math.inf
+        assert drives_s(control, 0.2, sign=GO) == math.inf
+
+
+def test_a_sign_that_moves_nothing_needs_not_be_shown_anew() -> None:
+    control = Control(RENEW, arming=False, renew=True)
+    show_for(control, 10.0, sign=GO)
+    assert drives_s(control, 2.0, sign=FORWARD) == math.inf
+
+
+@pytest.mark.parametrize("config", [RENEW, JOYSTICK])
+def test_without_renewing_what_is_shown_drives_on(config: ControlConfig) -> None:
+    control = Control(config, arming=False)
+    control.step(0.1, stick=Stick())
+    assert drives_s(control, sign=FORWARD, stick=Stick(True, 0.5)) == math.inf
+
+
+def test_a_stick_that_does_not_move_has_to_be_released() -> None:
+    control = Control(JOYSTICK, arming=False, renew=True)
+    control.step(0.1, stick=Stick())
+    assert drives_s(control, stick=Stick(True, 0.5, 0.1)) == pytest.approx(3.0)
+    assert str(control.reason) == "standing: the stick has not moved for 3 s: release it first"
+    assert drives_s(control, stick=Stick(True, -1.0)) == 0.0, "a movement is no release"
+    control.step(0.1, stick=Stick())
+    assert control.reason.code == "not_held"
+    assert drives_s(control, stick=Stick(True, 0.5, 0.1)) == pytest.approx(3.0)
+
+
+@pytest.mark.parametrize(("tremor", "expected_s"), [(0.02, 3.0), (0.06, math.inf)])
+def test_a_stick_that_trembles_has_not_moved(tremor: float, expected_s: float) -> None:
+    control = Control(JOYSTICK, arming=False, renew=True)
+    control.step(0.1, stick=Stick())
+    driven_s = 0.0
+    for count in range(100):
+        control.step(0.1, stick=Stick(True, 0.5 + tremor * (count % 2), 0.0))
+        driven_s += 0.0 if control.mux.velocity.is_zero else 0.1
+    assert driven_s == pytest.approx(10.0 if expected_s == math.inf else expected_s)
+
+
+@pytest.mark.parametrize("by", ["steering", "gamepad"])
+def test_steering_that_does_not_change_has_to_be_released(by: SteeredBy) -> None:
+    control = Control(RENEW, arming=False, renew=True)
+    control.step(0.1, steering=ZERO, by=by)
+    assert drives_s(control, steering=Velocity(0.3, 0.1), by=by) == pytest.approx(3.0)
+    assert control.reason == Reason("renew_stick", "3")
+    assert drives_s(control, steering=Velocity(-0.3, 0.1), by=by) == 0.0
+    control.step(0.1, steering=ZERO, by=by)
+    assert control.reason == Reason("steered_at_zero")
+    assert drives_s(control, steering=Velocity(0.3, 0.1), by=by) == pytest.approx(3.0)
+
+
+def test_a_gamepad_at_rest_is_released() -> None:
+    control = Control(RENEW, arming=False, renew=True)
+    control.step(0.1, steering=ZERO, by="gamepad")
+    drives_s(control, steering=Velocity(0.3, 0.1), by="gamepad")
+    control.safety.note_rest("gamepad")
+    assert drives_s(control, steering=Velocity(0.3, 0.1), by="gamepad") > 0.0
+
+
+def test_what_is_left_until_it_has_to_be_shown_anew_is_known() -> None:
+    control = Control(RENEW, arming=False, renew=True)
+    assert control.renew_left_s == math.inf, "nothing moves"
+    show_for(control, 1.0, sign=FORWARD)
+    assert control.renew_left_s == pytest.approx(2.1), "it counts from its first frame"
+    control.reconfigure(RENEW.model_copy(update={"renew_time": 1.5}))
+    assert control.renew_left_s == pytest.approx(0.6)
+    control.step(0.0, sign=GO)
+    assert control.renew_left_s == pytest.approx(1.5)
 
 
 @given(

@@ -6,7 +6,7 @@ HANDSTEER_STEPS says how many steps: ``make check`` takes 4,000, ``make test`` 5
 
 import math
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
@@ -22,6 +22,7 @@ SIGNS = ("Forward", "Backward", "Turn Left", "Turn Right", "Go", "Stop", "NONE",
 PERIOD_S = 1 / 30
 ACCELERATION, JERK = 0.8, 4.0
 _SLACK = 1e-6
+RENEW_S = 4.0
 
 
 @dataclass
@@ -44,11 +45,32 @@ class Onlooker:
     palm_s: float = 0.0
     palm_seen_s: float = -math.inf
     is_engaged: bool = False
+    engage_by: str = "hold"
+    was_made: bool = True
+    renew: bool = False
+    shown: dict[str, object] = field(default_factory=dict)
+    changed_s: dict[str, float] = field(default_factory=dict)
+    was_too_long: set[str] = field(default_factory=set)
+
+    def shows(self, source: str, what: object) -> None:
+        """What drives shows this; it shows nothing new while that stays the same."""
+        if what != self.shown.get(source) or what == 0.0:
+            self.shown[source], self.changed_s[source] = what, self.now_s
+
+    def is_unchanged(self, source: str) -> bool:
+        return self.renew and self.now_s - self.changed_s.get(source, self.now_s) >= RENEW_S - _SLACK
+
+    def too_long(self, source: str) -> None:
+        """It has driven for too long without any change: it must show neutral."""
+        self.was_too_long.add(source)
+        if source == "signs":
+            self.neutral_s = 0.0
 
     def interrupt(self, *, disarms: bool = True) -> None:
         """Something happened after which the hand must show neutral, and engage."""
         self.was_released = self.is_engaged = False
         self.palm_s, self.palm_seen_s = 0.0, -math.inf
+        self.was_made = True
         if disarms:
             self.neutral_s = 0.0
 
@@ -62,8 +84,10 @@ class Onlooker:
         is_lost = self.steering_asks and self.now_s - self.steered_s >= timeout_s - _SLACK
         self.steered_s, self.steering_asks = self.now_s, speed != 0.0
         self.was_released = False
+        self.shows("steering", speed)
         if speed == 0.0:
             self.steering_was_released = True
+            self.was_too_long.discard("steering")
         elif is_lost or not math.isfinite(speed):
             self.steering_was_released = False
 
@@ -73,31 +97,43 @@ class Onlooker:
         if self.now_s - self.hand_s >= timeout_s - _SLACK:
             self.interrupt(disarms=self.arming)
         if self.now_s - self.sign_s >= 5.0 - _SLACK:
-            self.is_engaged = False
+            self.is_engaged, self.was_made = False, True
 
     def hand(self, *, asks: bool, released: bool, stops: bool) -> None:
         """The input that drives comes from the hand."""
         gap_s, self.hand_s = self.now_s - self.hand_s, self.now_s
         self.hand_asks = asks
         self.was_released = self.was_released or released
+        if released:
+            self.was_too_long.discard("joystick")
         if stops:
             self.neutral_s = math.inf
         elif not asks:
             self.neutral_s += min(gap_s, 0.1)
         elif self.neutral_s < 0.5 - _SLACK:
             self.neutral_s = 0.0
+        if self.neutral_s >= 0.5 - _SLACK:
+            self.was_too_long.discard("signs")
 
     def sign(self, sign: str) -> None:
         """A sign comes, which may engage whatever drives."""
         if sign != "NONE":
             self.sign_s = self.now_s
         gap_s = self.now_s - self.palm_seen_s
-        if sign == "Stop":
+        if self.engage_by == "gesture" and sign == "Stop":
+            self.palm_seen_s = self.now_s
+        elif sign == "Stop":
             self.palm_s = self.palm_s + gap_s if gap_s < 0.3 else 0.0
             self.palm_seen_s = self.now_s
             self.is_engaged = self.is_engaged or self.palm_s >= 1.0 - _SLACK
         else:
             self.palm_s, self.palm_seen_s = 0.0, -math.inf
+
+    def gesture(self, *, is_made: bool) -> None:
+        """A frame shows whether the gesture has just been made."""
+        if is_made and not self.was_made and self.engage_by == "gesture" and not self.is_stopped:
+            self.is_engaged = self.is_engaged or self.now_s - self.palm_seen_s < 0.3
+        self.was_made = is_made
 
     def why_not(self, source: str, config: ControlConfig) -> str | None:
         """Return why ``source`` must not move the robot now; None if it may."""
@@ -116,6 +152,8 @@ class Onlooker:
                 "neutral was not seen": self.arming and self.neutral_s < 0.5 - _SLACK,
             }
         reasons["it is stopped"] = self.is_stopped
+        reasons["nothing has changed for too long"] = self.is_unchanged(source)
+        reasons["it was not released since nothing had changed for too long"] = source in self.was_too_long
         return next((reason for reason, holds in reasons.items() if holds), None)
 
 
@@ -126,19 +164,28 @@ class Histories(RuleBasedStateMachine):
         mode=st.sampled_from(["signs", "joystick"]),
         by=st.sampled_from(["course", "cruise"]),
         ramp=st.sampled_from(["per_message", "per_second"]),
-        arming=st.booleans(),
-        engage=st.booleans(),
+        guards=st.tuples(st.booleans(), st.booleans(), st.booleans()),
+        engage_by=st.sampled_from(["gesture", "hold"]),
     )
-    def begin(self, mode: str, by: str, ramp: str, arming: bool, engage: bool) -> None:
-        limits = {"max_linear_acceleration": ACCELERATION, "max_angular_jerk": JERK, "linear_step": 0.2}
+    def begin(self, mode: str, by: str, ramp: str, guards: tuple[bool, bool, bool], engage_by: str) -> None:
+        arming, engage, renew = guards
+        limits = {
+            "engage_by": engage_by,
+            "renew_time": RENEW_S,
+            "max_linear_acceleration": ACCELERATION,
+            "max_angular_jerk": JERK,
+            "linear_step": 0.2,
+        }
         self.config = ControlConfig.model_validate({"mode": mode, "rule": by, "ramp": ramp, **limits})
-        self.control = Control(self.config, arming=arming, engage=engage)
-        self.onlooker = Onlooker(mode, arming, engage)
-        self.commanded, self.commanded_s = ZERO, 0.0
+        self.control = Control(self.config, arming=arming, engage=engage, renew=renew)
+        self.onlooker = Onlooker(mode, arming, engage, engage_by=engage_by, renew=renew)
+        self.commanded, self.commanded_s, self.source = ZERO, 0.0, "none"
         self.get_ready()
 
     def look(self, velocity: Velocity | None) -> None:
         """Compare what is commanded with what the onlooker knows."""
+        if not self.commanded.is_zero and self.onlooker.is_unchanged(self.source):
+            self.onlooker.too_long(self.source)
         if velocity is not None:
             since_s = min(self.onlooker.now_s - self.commanded_s, self.config.sign_timeout)
             before = self.commanded.linear_mps if self.commanded.linear_mps * velocity.linear_mps > 0 else 0.0
@@ -149,6 +196,7 @@ class Histories(RuleBasedStateMachine):
         assert abs(self.commanded.angular_radps) <= self.config.max_angular
         if not self.commanded.is_zero:
             why_not = self.onlooker.why_not(self.control.mux.source, self.config)
+            self.source = self.control.mux.source
             assert why_not is None, f"at {self.onlooker.now_s:.2f} s it commands {self.commanded}, though {why_not}"
 
     def pass_time(self, seconds: float) -> None:
@@ -163,16 +211,33 @@ class Histories(RuleBasedStateMachine):
         """Receive what recognition publishes of one frame."""
         self.pass_time(period_s)
         self.onlooker.sign(sign)
+        self.onlooker.shows("signs", sign)
+        deflection = (stick.forward, stick.left)
+        self.onlooker.shows("joystick", deflection if stick.held and any(deflection) else 0.0)
         if self.config.mode == "joystick":
             self.onlooker.hand(asks=stick.held, released=not stick.held, stops=False)
         else:
             self.onlooker.hand(asks=sign not in {"Stop", "NONE"}, released=False, stops=sign == "Stop")
         self.look(self.control.step(0.0, sign=sign, stick=stick))
 
+        self.note_gesture(is_made=False)
+
+    def note_gesture(self, *, is_made: bool) -> None:
+        self.onlooker.gesture(is_made=is_made)
+        self.control.note_gesture(is_done=is_made)
+
     @rule()
     def get_ready(self) -> None:
         for _ in range(65):
             self.frame("Stop", Stick())
+        self.note_gesture(is_made=True)
+
+    @rule(sign=st.sampled_from(["Stop", "Forward", "NONE"]), wait_s=st.sampled_from([0.0, 0.1, 0.33]))
+    def claim_the_gesture(self, sign: str, wait_s: float) -> None:
+        self.frame(sign, Stick())
+        self.pass_time(wait_s)
+        self.note_gesture(is_made=True)
+        self.drive_on("Forward")
 
     @rule(
         sign=st.sampled_from(SIGNS),
@@ -189,6 +254,14 @@ class Histories(RuleBasedStateMachine):
     def drive_on(self, sign: str) -> None:
         for _ in range(20):
             self.frame(sign, Stick(held=True, forward=0.4))
+
+    @rule(sign=st.sampled_from(["Forward", "Turn Left", "Go"]), changes=st.booleans())
+    def drive_on_for_long(self, sign: str, changes: bool) -> None:
+        self.get_ready()
+        for count in range(150):
+            self.frame("Go" if changes and count % 40 > 35 else sign, Stick(held=True, forward=0.4))
+        self.frame("NONE", Stick(held=True, forward=-0.4))
+        self.drive_on("Backward")
 
     @rule()
     def steer_for_a_moment_while_the_fist_is_closed(self) -> None:

@@ -6,7 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from handsteer.config import ControlConfig
-from handsteer.control.safety import Allowance, Engagement, Following, Ramp, Safety
+from handsteer.control.engagement import Engagement
+from handsteer.control.safety import Allowance, Following, Ramp, Safety
 from handsteer.timeouts import ARMING_S, DISENGAGE_S, FAULT_GAP_S, NEUTRAL_S
 from handsteer.types import ZERO, Velocity
 
@@ -359,6 +360,37 @@ def test_a_palm_without_frames_in_between_does_not_engage() -> None:
     assert not engagement.engaged
 
 
+def gesture(engagement: Engagement, *frames: bool, sign: str = "Stop") -> bool:
+    """Show ``sign``, and whether the gesture has just been made; return whether the hand is engaged in the end."""
+    for is_done in frames:
+        engagement.step(0.03)
+        engagement.note_sign(sign)
+        engagement.note_gesture(is_done=is_done)
+    return engagement.engaged
+
+
+def test_the_gesture_engages_and_a_palm_that_is_held_does_not() -> None:
+    engagement = Engagement(enabled=True, by="gesture")
+    assert not palm(engagement, 3.0)
+    assert engagement.progress == 0.0
+    assert gesture(engagement, False, True)
+    assert engagement.progress == 1.0
+
+
+def test_the_gesture_counts_only_where_it_begins_and_while_the_palm_is_seen() -> None:
+    engagement = Engagement(enabled=True, by="gesture")
+    assert not gesture(engagement, True, True), "when it was made is not known"
+    assert not gesture(engagement, False, True, sign="NONE")
+    assert gesture(engagement, False, True)
+    engagement.disengage()
+    assert not gesture(engagement, True, True), "it was made before"
+    assert gesture(engagement, False, True)
+
+
+def test_where_a_palm_that_is_held_engages_the_gesture_does_not() -> None:
+    assert not gesture(Engagement(enabled=True, by="hold"), False, True)
+
+
 def test_five_seconds_without_a_sign_disengage() -> None:
     engagement = Engagement(enabled=True)
     palm(engagement, 1.05)
@@ -380,7 +412,7 @@ def test_without_a_clutch_the_hand_is_always_engaged() -> None:
 )
 @pytest.mark.parametrize("arming", [False, True])
 def test_a_stop_and_every_fault_disengage(end: Callable[[Safety], None], arming: bool) -> None:
-    safety = Safety(ControlConfig(), arming=arming, engage=True)
+    safety = Safety(ControlConfig(engage_by="hold"), arming=arming, engage=True)
     palm(safety.engagement, 1.05)
     end(safety)
     assert not safety.engagement.engaged
@@ -415,7 +447,7 @@ def test_the_time_between_two_palms_with_a_gap_does_not_engage() -> None:
 
 def test_an_idle_hand_disengages_while_frames_come() -> None:
     """The guard: ``DISENGAGE_S`` in ``Engagement.step``."""
-    safety = Safety(ControlConfig(), arming=False, engage=True)
+    safety = Safety(ControlConfig(engage_by="hold"), arming=False, engage=True)
     show_and_note(safety, "Stop", 1.1)
     assert show_and_note(safety, "Forward", 0.1)
     show_and_note(safety, "NONE", DISENGAGE_S - 0.2)

@@ -41,7 +41,7 @@ def report(site: Site, progress: float | None) -> None:
     """Report as a control does whose hand is engaged so far; None if it is engaged."""
     reason = Reason("not_started") if progress is None else Reason("disengaged", "1")
     control = ControlStatus(reason, "signs", engaged=progress is None, engage_progress=progress or 0.0)
-    for status in (control, RecognitionStatus("Stop", seen="Stop")):
+    for status in (control, RecognitionStatus("Stop", seen="Stop", engage_progress=0.0)):
         site.reports.publish(write_status(status, status.node, site.clock.stamp(site.clock.now())))
 
 

@@ -1,6 +1,6 @@
 import math
 from dataclasses import replace
-from typing import Any
+from typing import Any, Literal
 
 import pytest
 from hypothesis import given
@@ -73,6 +73,18 @@ DISENGAGED = ControlStatus(Reason("disengaged", "1"), "signs", engaged=False, en
         (
             (control(Reason("stop_sign", "Stop")), RecognitionStatus("Stop", seen="Stop", handedness="Left")),
             ("standing", "Standing", "the Stop sign is shown"),
+        ),
+        (
+            (replace(control(Reason("sign", "Forward"), linear=0.3), renew_s=3),),
+            ("driving", "Driving", "Forward; stops in 3 s unless it changes"),
+        ),
+        (
+            (replace(DISARMED, reason=Reason("renew", "20")), NO_HAND),
+            ("standing", "Ready", "the same sign for 20 s: show Stop or lower your hand, then show it again"),
+        ),
+        (
+            (replace(DISENGAGED, reason=Reason("disengaged")), NO_HAND),
+            ("standing", "Disengaged", "open, close and open your hand to begin"),
         ),
         ((DISENGAGED, NO_HAND), ("standing", "Disengaged", "hold an open palm for 1 s to begin")),
         (
@@ -295,6 +307,15 @@ def test_at_most_one_source_has_the_robot(
     assert holding == ([holds] if holds else [])
 
 
+@pytest.mark.parametrize(("by", "engaging"), [("gesture", 0.67), ("hold", 0.67)])
+def test_the_progress_of_the_gesture_is_that_of_the_recognition(
+    by: Literal["gesture", "hold"], engaging: float
+) -> None:
+    control = ControlStatus(engaged=False, engage_progress=0.0, rule=ControlConfig(engage_by=by))
+    state = compose(observed(control, RecognitionStatus(engage_progress=0.67)), 0.1)
+    assert (state.engaging, state.engages_by_gesture) == (engaging, by == "gesture")
+
+
 @pytest.mark.parametrize(("source", "holds"), [("joystick", ["Joystick"]), ("steering", ["By hand"]), ("none", [])])
 def test_the_hand_as_a_joystick_is_a_source_instead_of_the_signs(source: Source, holds: list[str]) -> None:
     status = ControlStatus(source=source, rule=ControlConfig(mode="joystick"))
@@ -311,6 +332,7 @@ def test_the_hand_as_a_joystick_is_a_source_instead_of_the_signs(source: Source,
         (ControlStatus(engaged=False, engage_progress=0.4), 0.4),
         (ControlStatus(engaged=False, engage_progress=7.0), 1.0),
         (ControlStatus(engaged=False, engage_progress=0.4, stopped=True), None),
+        (ControlStatus(engaged=False, engage_progress=0.0, rule=ControlConfig()), 0.0),
     ],
 )
 def test_tells_how_far_the_hand_is_engaged_while_that_matters(

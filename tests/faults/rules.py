@@ -29,14 +29,18 @@ class Rules:
     Attributes:
         now_s: The time.
         is_stopped: Whether somebody has said Stop, and nobody has taken it back.
+        renew_s: For how long the same may be asked for without any change.
     """
 
     now_s: float = 0.0
     is_stopped: bool = False
+    renew_s: float = math.inf
     _hand_asked_s: float = -math.inf
     _stick_asked_s: float = -math.inf
     _stick_spoke_s: float = -math.inf
     _stick_asks: bool = False
+    _stick_speed: float = 0.0
+    _stick_changed_s: float = -math.inf
     _picture_s: float = -math.inf
     _hand_was_neutral: bool = False
     _stick_was_neutral: bool = False
@@ -65,8 +69,10 @@ class Rules:
         else:
             self._hand_was_neutral = True
 
-    def stick(self, *, asks: bool) -> None:
+    def stick(self, *, asks: bool, speed: float) -> None:
         """Somebody holds the stick, or lets go: no pause stands for that."""
+        if speed != self._stick_speed or not asks:
+            self._stick_speed, self._stick_changed_s = speed, self.now_s
         paused = self.now_s - self._stick_spoke_s >= STICK_PAUSE_S - _EPSILON_S
         self._robot_waits = self._robot_waits and asks
         is_lost = paused and self._stick_asks
@@ -112,8 +118,10 @@ class Rules:
 
     def why_not(self) -> str | None:
         """Return why the robot must not be asked to move now; None where it may."""
-        by_hand = self._is_live(self._hand_asked_s) and self._hand_was_neutral
-        by_stick = self._is_live(self._stick_asked_s) and self._stick_was_neutral
+        by_hand = self._is_live(self._hand_asked_s) and self._hand_was_neutral and self._is_new(self._changed_s)
+        by_stick = (
+            self._is_live(self._stick_asked_s) and self._stick_was_neutral and self._is_new(self._stick_changed_s)
+        )
         if (by_hand or by_stick) and not (self.is_stopped or self._robot_waits):
             self._stands_by_s = math.inf
             return None
@@ -124,8 +132,11 @@ class Rules:
         if self._robot_waits:
             return "the robot was away, and nothing else was asked since"
         if self._is_live(self._hand_asked_s) or self._is_live(self._stick_asked_s):
-            return "nobody has let go since it was started, frozen, stopped or away"
+            return "nobody has let go since it was started, frozen, stopped or away, or the same was asked for too long"
         return f"nobody has asked for it for {PATIENCE_S} s"
+
+    def _is_new(self, changed_s: float) -> bool:
+        return self.now_s - changed_s <= self.renew_s + PATIENCE_S + _EPSILON_S
 
     def _is_live(self, asked_s: float) -> bool:
         return self.now_s - asked_s <= PATIENCE_S + _EPSILON_S

@@ -34,6 +34,7 @@ MOTIONS = ("Forward", "Backward", "Turn Left", "Turn Right", "Go")
 NEUTRAL = ("Stop", "NONE")
 _TICK_S = 1 / 30
 _BEGIN_S = 100.0
+RENEW_S = 3.0
 
 
 class Graph:
@@ -98,8 +99,8 @@ class Graph:
         return HandSignRecognitionNode(self.domain, self.clock, painted_recognizer(config), config)
 
     def _control(self) -> Node:
-        config = ControlConfig.model_validate({"linear_step": 0.2, "angular_step": 0.2})
-        return HandSignControlNode(self.domain, self.clock, config, arming=True)
+        config = ControlConfig.model_validate({"linear_step": 0.2, "angular_step": 0.2, "renew_time": RENEW_S})
+        return HandSignControlNode(self.domain, self.clock, config, arming=True, renew=True)
 
 
 _PARTS = ("height", "width", "encoding", "is_bigendian", "step", "data")
@@ -112,7 +113,7 @@ class Histories(RuleBasedStateMachine):
         super().__init__()
         logging.disable(logging.CRITICAL)
         self.graph = Graph()
-        self.oracle = Rules()
+        self.oracle = Rules(renew_s=RENEW_S)
 
     def teardown(self) -> None:
         logging.disable(logging.NOTSET)
@@ -158,6 +159,17 @@ class Histories(RuleBasedStateMachine):
     def hold(self, sign: str, frames: int) -> None:
         self.show(sign, frames)
 
+    @rule(sign=st.sampled_from(MOTIONS), by_stick=st.booleans())
+    def never_change(self, sign: str, by_stick: bool) -> None:
+        """Longer than may be; one who does not let go then drives no more."""
+        if by_stick:
+            self.steer(0.0, 1)
+            self.steer(0.5, 45)
+        else:
+            self.drive(sign)
+            self.show(sign, 120)
+        assert not self.graph.is_asked_to_move
+
     @precondition(lambda self: self.oracle.is_stopped or not self.graph.linked)
     @rule()
     def begin_anew(self) -> None:
@@ -185,7 +197,7 @@ class Histories(RuleBasedStateMachine):
     def steer(self, speed: float, count: int) -> None:
         for _ in range(count):
             self.oracle.now_s = self.graph.clock.now()
-            self.oracle.stick(asks=speed in (0.5, -0.5))
+            self.oracle.stick(asks=speed in (0.5, -0.5), speed=speed)
             self.graph.stick.publish(twist(speed, 0.0))
             self.graph.serve()
             self.look()

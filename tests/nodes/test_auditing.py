@@ -121,7 +121,7 @@ def test_the_control_tells_who_stops_and_resets_it() -> None:
 
 
 def test_the_control_tells_arming_engaging_and_the_source() -> None:
-    bench = ControlBench(ControlConfig(engage="on"), arming=True, engage=True)
+    bench = ControlBench(ControlConfig(engage="on", engage_by="hold"), arming=True, engage=True)
     audit = bench.record(AUDIT)
     bench.show(*["NONE"] * 30, *["Stop"] * 60, *["Forward"] * 30)
     told = Counter(codes(audit))

@@ -49,18 +49,39 @@ AHEAD, LEFT = Stick(held=True, forward=0.5), Stick(held=True, left=1.0)
 
 
 class ControlBench(Bench):
-    def __init__(self, config: ControlConfig | None = None, *, arming: bool = False, engage: bool = False) -> None:
+    def __init__(
+        self,
+        config: ControlConfig | None = None,
+        *,
+        arming: bool = False,
+        engage: bool = False,
+        renew: bool = False,
+    ) -> None:
         super().__init__()
         config = config or ControlConfig()
         self.control = HandSignControlNode(
-            self.transport, self.clock, config, arming=arming, engage=engage, camera_changed=CAMERA_CHANGED
+            self.transport,
+            self.clock,
+            config,
+            arming=arming,
+            engage=engage,
+            renew=renew,
+            camera_changed=CAMERA_CHANGED,
         )
         self.steering = SteeringNode(self.transport, self.clock)
         self.nodes = [self.steering, self.control]
         self.signs = self.transport.advertise("recognition", HAND_SIGN)
         self.joys = self.transport.advertise("recognition", GESTURE_JOY)
         self.gamepad = self.transport.advertise("gamepad", JOY)
+        self.stop = self.transport.advertise("red_button", STOP)
         self.twists = self.record(CMD_VEL)
+
+    def make_gesture(self, *, sign: str = "Stop", is_new: bool = True) -> None:
+        """Publish what recognition does at the end of the gesture that engages."""
+        for engages in ([False] if is_new else []) + [True] * 3:
+            self.signs.publish(String(data=sign), self.clock.now())
+            self.joys.publish(joy_of(RELEASED, HEADER, engages=engages), self.clock.now())
+            self.run(1 / 30)
 
     def show(self, *signs: str, age_s: float = 0.0) -> None:
         for sign in signs:
@@ -892,8 +913,77 @@ def test_button_and_axes_of_the_gamepad_are_those_of_the_configuration() -> None
     assert bench.last() == (0.25, 0)
 
 
-def test_nothing_moves_before_an_open_palm_engaged_the_hand() -> None:
+def test_nothing_moves_before_the_gesture_engaged_the_hand() -> None:
     bench = ControlBench(engage=True)
+    diagnostics = bench.record(DIAGNOSTICS)
+    bench.show(*["Stop"] * 60)
+    bench.show(*["Forward"] * 3)
+    assert set(bench.commands) == {(0, 0)}, "a palm that is held does not engage"
+    assert diagnostics[-1].status[0].message == "disengaged: open, close and open your hand to begin"
+    bench.make_gesture()
+    bench.show("Stop", "Forward")
+    assert bench.last() == (0.01, 0)
+    bench.run(1.0)
+    bench.show("Stop", "Forward")
+    assert bench.last() == (0, 0), "a fault disengages"
+
+
+def test_a_gesture_that_is_old_or_was_made_before_engages_nothing() -> None:
+    bench = ControlBench(engage=True)
+    bench.show("Stop", "Stop")
+    for engages in (False, True, True):
+        bench.joys.publish(joy_of(RELEASED, HEADER, engages=engages), bench.clock.now() - 0.6)
+        bench.show("Stop")
+    assert not bench.control._report().engaged, "it is old"
+    bench.make_gesture()
+    assert bench.control._report().engaged
+    for is_stopped in (True, False):
+        bench.stop.publish(Bool(data=is_stopped))
+        bench.run(0.01)
+    bench.make_gesture(is_new=False)
+    assert not bench.control._report().engaged, "it was made before the Stop"
+    bench.make_gesture()
+    assert bench.control._report().engaged
+
+
+def test_a_gesture_while_it_is_stopped_engages_nothing() -> None:
+    bench = ControlBench(engage=True)
+    bench.stop.publish(Bool(data=True))
+    bench.make_gesture()
+    assert not bench.control._report().engaged
+
+
+def test_a_gesture_without_an_open_palm_engages_nothing() -> None:
+    bench = ControlBench(engage=True)
+    bench.show("Stop", "Forward")
+    bench.make_gesture(sign="NONE")
+    assert not bench.control._report().engaged
+
+
+def test_the_hand_as_a_joystick_moves_nothing_while_signs_drive() -> None:
+    bench = ControlBench(engage=True)
+    bench.make_gesture()
+    bench.show("Stop")
+    bench.hold(RELEASED, AHEAD, AHEAD)
+    assert set(bench.commands) == {(0, 0)}
+    bench.show("Forward", "Forward")
+    bench.hold(RELEASED, age_s=0.6)
+    bench.show("Forward")
+    assert bench.last() == (0.03, 0), "nor does an old release stop them"
+
+
+def test_how_the_hand_engages_may_be_changed() -> None:
+    bench = ControlBench(engage=True)
+    bench.control.reconfigure(Config(control=ControlConfig(engage_by="hold")))
+    bench.run(0.02)
+    bench.make_gesture()
+    assert not bench.control._report().engaged
+    bench.show(*["Stop"] * 32)
+    assert bench.control._report().engaged
+
+
+def test_nothing_moves_before_an_open_palm_that_is_held_engaged_the_hand() -> None:
+    bench = ControlBench(ControlConfig(engage_by="hold"), engage=True)
     diagnostics = bench.record(DIAGNOSTICS)
     bench.show(*["Forward"] * 30)
     assert set(bench.commands) == {(0, 0)}
@@ -907,9 +997,55 @@ def test_nothing_moves_before_an_open_palm_engaged_the_hand() -> None:
     assert bench.last() == (0, 0), "a fault disengages"
 
 
-def test_a_palm_engages_the_joystick_too() -> None:
+def test_a_sign_that_does_not_change_ends_after_a_warning_and_has_to_be_shown_anew() -> None:
+    bench = ControlBench(ControlConfig(renew_time=6.0), renew=True)
+    diagnostics = bench.record(DIAGNOSTICS)
+    bench.show(*["Forward"] * 60)
+    assert bench.last()[0] > 0.0
+    bench.show(*["Forward"] * 90)
+    assert diagnostics[-1].status[0].message == "driving: Forward; stops in 2 s unless it changes"
+    bench.show(*["Forward"] * 60)
+    assert bench.last() == (0, 0)
+    reported = {pair.key: pair.value for pair in diagnostics[-1].status[0].values}
+    assert reported["reason_code"] == "renew"
+    words = "ready: the same sign for 6 s: show Stop or lower your hand, then show it again"
+    assert diagnostics[-1].status[0].message == words
+    bench.show("Stop", "Forward")
+    assert bench.last() == (0.01, 0)
+
+
+def test_a_stick_that_is_stuck_ends_and_has_to_be_released() -> None:
+    bench = ControlBench(JOYSTICK.model_copy(update={"renew_time": 2.0}), renew=True)
+    diagnostics = bench.record(DIAGNOSTICS)
+    bench.hold(RELEASED, *[AHEAD] * 70)
+    assert bench.last() == (0, 0)
+    assert diagnostics[-1].status[0].message == "standing: the stick has not moved for 2 s: release it first"
+    bench.hold(RELEASED, AHEAD)
+    assert bench.last() == (0.5, 0)
+
+
+def test_steering_that_never_changes_ends_and_has_to_be_released() -> None:
+    bench = ControlBench(ControlConfig(renew_time=2.0), renew=True)
+    diagnostics = bench.record(DIAGNOSTICS)
+    bench.steering.steer(0.0, 0.0)
+    bench.run(0.1)
+    for _ in range(25):
+        bench.steering.steer(0.3, 0.0)
+        bench.run(0.1)
+    assert bench.last() == (0, 0)
+    assert diagnostics[-1].status[0].message == "standing: the stick has not moved for 2 s: release it first"
+    bench.steering.steer(0.0, 0.0)
+    bench.run(0.1)
+    bench.steering.steer(0.3, 0.0)
+    bench.run(0.1)
+    assert bench.last() == (0.3, 0)
+
+
+def test_the_gesture_engages_the_joystick_too() -> None:
     bench = ControlBench(JOYSTICK, arming=True, engage=True)
-    for _ in range(70):
+    for frame in range(40):
+        if frame == 35:
+            bench.make_gesture()
         bench.signs.publish(String(data="Stop"), bench.clock.now())
         bench.hold(RELEASED)
     bench.hold(AHEAD)

@@ -73,7 +73,7 @@ def test_the_chapters_args_count(course: LaunchGraph, tmp_path: Path) -> None:
 
 def test_with_any_other_control_topic_the_hand_has_to_engage_first(ros: LaunchGraph) -> None:
     record = ros.record({"/cmd_vel": "geometry_msgs/Twist"})
-    ros.run("rosrun", OURS, "sign_to_controller.py", "_control_topic:=/cmd_vel")
+    ros.run("rosrun", OURS, "sign_to_controller.py", "_control_topic:=/cmd_vel", "_engage_by:=hold")
     peer = ros.peer()
     peer.ask("advertise", topic="gesture/hand_sign", package="std_msgs", type="String")
     eventually(lambda: peer.ask("listeners", topic="gesture/hand_sign") > 0)

@@ -10,7 +10,7 @@ try:
     # Signals stay blocked until handsteer can shut down cleanly: a new program inherits the mask.
     signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT, signal.SIGTERM))
     node = Path(__file__).resolve().parents[2] / "handsteer_node"
-    # The parameters ~arming and ~engage override this file.
+    # The parameters ~arming, ~engage and ~renew override this file.
     course = Path(__file__).resolve().with_name("course.yaml")
     given = sys.argv[1:]
     file = [] if any(word.startswith("--config") for word in given) else ["--config", str(course)]

@@ -174,7 +174,7 @@ def run_lap(
 
 def _opened(name: str, conditions: Conditions, skill: Skill, seed: int, config: Config) -> Interface:
     kind = KINDS[name]
-    control = config.control.model_copy(update={"arming": "off", "engage": "off", **kind.control})
+    control = config.control.model_copy(update={"arming": "off", "engage": "off", "renew": "off", **kind.control})
     random = np.random.default_rng([seed, 1])
     if not kind.by_hand:
         return kind.make(control, skill, random)

@@ -220,6 +220,12 @@ class SensorNoise:
         if self._grain.shape[:2] != (height + _SHIFTS, width + _SHIFTS):
             shape = (height + _SHIFTS, width + _SHIFTS, 3)
             self._grain = np.random.default_rng(self._seed).integers(0, 3, shape, dtype=np.uint8)
-        top, left = np.random.default_rng(round(time_s * _TICKS_PER_S)).integers(0, _SHIFTS, 2)
-        grain = self._grain[top : top + height, left : left + width]
-        return np.asarray(cv2.add(image, grain), np.uint8)
+        # Each half has a place of its own in the grain, or of two thousand pictures of a photo some would be equal.
+        random = np.random.default_rng(round(time_s * _TICKS_PER_S))
+        noisy = np.empty_like(image)
+        for rows in (slice(0, height // 2), slice(height // 2, height)):
+            top, left = random.integers(0, _SHIFTS, 2)
+            grain = self._grain[top : top + height, left : left + width]
+            if rows.start < rows.stop:
+                noisy[rows] = cv2.add(image[rows], grain[rows])
+        return noisy

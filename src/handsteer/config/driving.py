@@ -17,7 +17,7 @@ from typing import Any, Literal, get_args
 from pydantic import Field, field_validator
 
 from handsteer.config.section import Section, live
-from handsteer.timeouts import ODOMETRY_S, ROBOT_S, STALE_S
+from handsteer.timeouts import ODOMETRY_S, RENEW_S, ROBOT_S, STALE_S
 from handsteer.types import ALWAYS_STOP, BUILT_IN, Action, CmdVelType, find_sign
 
 Preset = Literal["generic", "turtlebot3_burger", "turtlebot3_waffle", "turtlebot4", "turtlesim"]
@@ -138,8 +138,21 @@ class ControlConfig(Section):
     )
     engage: Literal["auto", "on", "off", "course"] = Field(
         "auto",
-        description="Whether the hand drives only after an open palm was held for 1 s, until 5 s without a sign, a "
-        "Stop or a fault; auto and course are as for arming",
+        description="Whether the hand drives only after it has engaged, until 5 s without a sign, a Stop or a fault; "
+        "auto and course are as for arming",
+    )
+    engage_by: Literal["gesture", "hold"] = live(
+        "gesture",
+        description="How the hand engages: gesture is open, close, open, which no picture can do; hold is an open palm "
+        "for 1 s, for recognisers without /gesture/joy",
+    )
+    renew: Literal["auto", "on", "off", "course"] = Field(
+        "auto",
+        description="Whether a sign or stick that drives without any change for renew_time stops the robot until it is "
+        "released and shown again, as the vigilance device of a train; auto and course are as for arming",
+    )
+    renew_time: float = live(
+        RENEW_S, ge=1, le=600, description="After this long without any change, what drives is to be shown again [s]"
     )
     cmd_vel_type: CmdVelType = Field(
         "auto",
@@ -153,7 +166,7 @@ class ControlConfig(Section):
         description="Namespaces of robots that one hand drives in turn, such as [r1, r2]; empty for a single robot",
     )
 
-    @field_validator("arming", "engage", mode="before")
+    @field_validator("arming", "engage", "renew", mode="before")
     @classmethod
     def _from_yaml(cls, value: object) -> object:
         # YAML, and so ROS, converts on and off to true and false.

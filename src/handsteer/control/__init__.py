@@ -7,10 +7,13 @@ import math
 from typing import Literal
 
 from handsteer.config import ControlConfig
+from handsteer.control.engagement import Steered, SteeredBy
 from handsteer.control.explain import Reason
-from handsteer.control.safety import Ramp, Safety, SteeredBy
+from handsteer.control.safety import Ramp, Safety
 from handsteer.control.sign_control import CruiseControl, SignControl
 from handsteer.types import NONE, RELEASED, ZERO, Stick, Velocity, action_of
+
+_SLACK_S = 1e-6
 
 Source = Literal["none", "signs", "joystick", "steering"]
 
@@ -21,16 +24,17 @@ class Control:
     Args:
         config: Limits, steps and timeouts.
         arming: Whether signs must show neutral before the first movement (:mod:`handsteer.control.safety`).
-        engage: Whether an open palm must engage the hand first.
+        engage: Whether the hand must engage first.
+        renew: Whether what drives without any change for ``config.renew_time`` must be shown again.
 
     Attributes:
         safety: Decides whether signs and steering are followed; receives Stop, resets and faults.
         mux: Selects the active input, and explains why the robot is stopped.
     """
 
-    def __init__(self, config: ControlConfig, *, arming: bool, engage: bool = False) -> None:
+    def __init__(self, config: ControlConfig, *, arming: bool, engage: bool = False, renew: bool = False) -> None:
         self._config = config
-        self.safety = Safety(config, arming=arming, engage=engage)
+        self.safety = Safety(config, arming=arming, engage=engage, renew=renew)
         self.mux = TwistMux(config)
         self._ramp = Ramp(config)
         self._since_command_s = 0.0
@@ -63,6 +67,7 @@ class Control:
             return self.halt()
         self.safety.step(dt_s)
         self._since_command_s += dt_s
+        self._note(sign, steering, by, stick)
         if sign is not None:
             sign = self._admitted(sign)
         if self._config.mode == "signs":
@@ -76,7 +81,56 @@ class Control:
         velocity = self.mux.step(dt_s, sign=sign, steering=steering, stick=stick)
         if self.mux.source in ("signs", "joystick") and not self.safety.engagement.engaged:
             velocity = self.mux.halt()  # it may be disengaged between two frames
+        if self.renew_left_s <= _SLACK_S:
+            velocity = self._end_unchanged(self._driven_by)
         return self._ramped(velocity)
+
+    @property
+    def renew_left_s(self) -> float:
+        """Seconds until what drives must be shown again, unless it changes; infinite if nothing moves."""
+        is_driven = self.mux.source != "none" and not self.mux.velocity.is_zero
+        return self.safety.renewal.left_s(self._driven_by) if is_driven else math.inf
+
+    @property
+    def reason(self) -> Reason:
+        """Why this velocity is commanded, or what has to be shown again first."""
+        if not self.must_renew:
+            return self.mux.reason
+        is_sign = self.mux.source != "steering" and self._config.mode == "signs"
+        return Reason("renew" if is_sign else "renew_stick", f"{self._config.renew_time:g}")
+
+    @property
+    def must_renew(self) -> bool:
+        """Whether what would drive has to be shown again first."""
+        by_hand: Steered = "signs" if self._config.mode == "signs" else "joystick"
+        return self.safety.must_renew(self._driven_by if self.mux.source == "steering" else by_hand)
+
+    @property
+    def _driven_by(self) -> Steered:
+        source = self.mux.source
+        return source if source in ("signs", "joystick") else self.safety.steered_by
+
+    def _end_unchanged(self, by: Steered) -> Velocity | None:
+        """Command zero as if ``by`` had shown neutral, and require that it does."""
+        self.safety.require_renewal(by)
+        if by == "signs":
+            return self.mux.step(0.0, sign=NONE)
+        return self.mux.step(0.0, stick=RELEASED) if by == "joystick" else self.mux.step(0.0, steering=ZERO)
+
+    def _note(self, sign: str | None, steering: Velocity | None, by: SteeredBy, stick: Stick | None) -> None:
+        """Record what is shown, whether it is followed or not."""
+        renewal, config = self.safety.renewal, self._config
+        if sign is not None:
+            renewal.note("signs", sign)
+        if stick is not None:
+            renewal.note("joystick", (stick.forward, stick.left) if stick.held else (0.0, 0.0))
+        if steering is not None:
+            renewal.note(by, (steering.linear_mps / config.max_linear, steering.angular_radps / config.max_angular))
+
+    def note_gesture(self, *, is_done: bool) -> None:
+        """Record of a frame whether the hand has just made the gesture that engages."""
+        if not self.safety.is_stopped:
+            self.safety.engagement.note_gesture(is_done=is_done)
 
     def halt(self) -> Velocity | None:
         """Stop the active input; return one zero, or None if there is none."""

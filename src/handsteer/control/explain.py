@@ -1,9 +1,11 @@
 """Explains in words why the robot drives or stands, and what signs do, with the configured values."""
 
+import math
 from dataclasses import dataclass
 from typing import Literal
 
 from handsteer.config import ControlConfig
+from handsteer.timeouts import RENEW_WARNING_S
 from handsteer.types import CRUISE_EFFECTS, EFFECTS, Action
 
 ReasonCode = Literal[
@@ -15,6 +17,8 @@ ReasonCode = Literal[
     "disarmed",
     "disengaged",
     "steering_disarmed",
+    "renew",
+    "renew_stick",
     "no_image",
     "no_scan",
     "obstacle",
@@ -35,8 +39,10 @@ _SENTENCES: dict[ReasonCode, str] = {
     "stopped": "stopped, until it is reset",
     "starting": "has just started: whether the robot was stopped before is not known yet",
     "disarmed": "show Stop or lower your hand to begin{}",
-    "disengaged": "hold an open palm for {} s to begin",
+    "disengaged": "open, close and open your hand to begin",
     "steering_disarmed": "the steering is held: release it first",
+    "renew": "the same sign for {} s: show Stop or lower your hand, then show it again",
+    "renew_stick": "the stick has not moved for {} s: release it first",
     "no_image": "{}",
     "no_scan": "{}",
     "obstacle": "stopped before an {}",
@@ -80,13 +86,17 @@ class Reason:
             return "driving"
         if is_moving:
             return "stopping"
-        return "ready" if self.code == "disarmed" else "disengaged" if self.code == "disengaged" else "standing"
+        return (
+            "ready" if self.code in ("disarmed", "renew") else "disengaged" if self.code == "disengaged" else "standing"
+        )
 
     @property
     def explanation(self) -> str:
         """The reason in words, without what the robot does, as ``no sign is seen``."""
         robot = f" with {self.robot}" if self.robot else ""
         detail = self.detail
+        if self.code == "disengaged" and detail:
+            return f"hold an open palm for {detail} s to begin{robot}"
         if self.code == "disarmed":
             detail = f"{robot} ({detail})" if detail else robot
             robot = ""
@@ -96,6 +106,16 @@ class Reason:
     def __str__(self) -> str:
         """Return a sentence, as ``standing: no sign is seen``."""
         return f"{self.state()}: {self.explanation}"
+
+
+def seconds_to_renew(left_s: float) -> int | None:
+    """Return the whole seconds to warn of, if what drives must be shown again soon, in ``left_s``; else None."""
+    return math.ceil(left_s) if 0.0 < left_s <= RENEW_WARNING_S else None
+
+
+def warned(explanation: str, renew_s: int | None) -> str:
+    """Return ``explanation`` with the warning that what drives must change within ``renew_s`` seconds, if any."""
+    return explanation if renew_s is None else f"{explanation}; stops in {renew_s} s unless it changes"
 
 
 def effect_of(action: Action, rule: ControlConfig) -> str:

@@ -1,18 +1,16 @@
 """Decides when the robot may move, and how fast it may accelerate: pure rules without a clock.
 
-A robot moves only while there is a current reason. :class:`Safety` decides whether inputs are followed, with the clutch
-:class:`Engagement`, :class:`Following` whether the robot does what is commanded, :class:`Allowance` limits the rate of
+A robot moves only while there is a current reason. :class:`Safety` decides whether inputs are followed,
+:class:`Following` whether the robot does what is commanded, :class:`Allowance` limits the rate of
 signs, and :class:`Ramp` acceleration and jerk. The times are in :mod:`handsteer.timeouts`.
 """
 
 import math
-from typing import Literal
 
 from handsteer.config import ControlConfig
+from handsteer.control.engagement import Engagement, Renewal, Steered, SteeredBy
 from handsteer.timeouts import (
     ARMING_S,
-    DISENGAGE_S,
-    ENGAGE_S,
     FAULT_GAP_S,
     MOST_OF_ONE_NONE_S,
     NEUTRAL_S,
@@ -20,63 +18,9 @@ from handsteer.timeouts import (
     ODOMETRY_S,
     STOOD_BY_ITSELF_S,
 )
-from handsteer.types import NONE, STOP, Velocity
+from handsteer.types import NONE, Velocity
 
 _SLACK_S = 1e-9
-
-SteeredBy = Literal["steering", "gamepad"]
-
-
-class Engagement:
-    """The clutch between hand and robot: while disengaged, nothing moves whatever is shown.
-
-    An open palm (``Stop``) held for :data:`~handsteer.timeouts.ENGAGE_S` engages, and
-    :data:`~handsteer.timeouts.DISENGAGE_S` without a sign, a Stop or a fault disengage. It prevents what is known as
-    the Midas touch: everyday movements of the hand that are taken for commands.
-
-    Args:
-        enabled: If not, the hand is always engaged.
-
-    Attributes:
-        engaged: Whether the hand drives.
-    """
-
-    def __init__(self, *, enabled: bool) -> None:
-        self._enabled = enabled
-        self.engaged = not enabled
-        self._palm_s = 0.0
-        self._idle_s = 0.0
-        self._gap_s = math.inf
-
-    @property
-    def progress(self) -> float:
-        """Progress of engaging, 0 to 1."""
-        return 1.0 if self.engaged else min(1.0, self._palm_s / ENGAGE_S)
-
-    def step(self, dt_s: float) -> None:
-        """Advance time by ``dt_s`` seconds, >= 0."""
-        self._idle_s += dt_s
-        self._gap_s += dt_s
-        if self._idle_s >= DISENGAGE_S - _SLACK_S:
-            self.disengage()
-
-    def note_sign(self, sign: str) -> None:
-        """Record the sign of a frame."""
-        if sign != NONE:
-            self._idle_s = 0.0
-        if sign != STOP:
-            self._palm_s, self._gap_s = 0.0, math.inf
-            return
-        # The time before the first palm, or of a pause, was not observed.
-        self._palm_s = self._palm_s + self._gap_s if self._gap_s < FAULT_GAP_S else 0.0
-        self._gap_s = 0.0
-        if self._palm_s >= ENGAGE_S - _SLACK_S:
-            self.engaged = True
-
-    def disengage(self) -> None:
-        """Require the open palm again; without effect if not enabled."""
-        self._palm_s, self._gap_s = 0.0, math.inf
-        self.engaged = not self._enabled
 
 
 class Release:
@@ -126,18 +70,22 @@ class Safety:
         config: Timeouts of signs and steering.
         arming: Whether signs must show neutral after the start and after faults.
         engage: Whether the hand must also be engaged.
+        renew: Whether what drives without any change must be shown again.
 
     Attributes:
         is_stopped: Whether a Stop is active, until :meth:`reset`.
         signs_wait: Why signs have to show neutral first, as ``no sign came``; empty after a reset, None if they need
             not.
         engagement: The clutch.
+        renewal: Whether what drives has changed lately.
     """
 
-    def __init__(self, config: ControlConfig, *, arming: bool, engage: bool = False) -> None:
+    def __init__(self, config: ControlConfig, *, arming: bool, engage: bool = False, renew: bool = False) -> None:
         self._config = config
         self._arming = arming
-        self.engagement = Engagement(enabled=engage)
+        self.engagement = Engagement(enabled=engage, by=config.engage_by)
+        self.renewal = Renewal(enabled=renew, limit_s=config.renew_time)
+        self._renews: set[Steered] = set()
         self._stick_waits = True
         self._age_s = 0.0
         self._sign_age_s = math.inf
@@ -153,6 +101,11 @@ class Safety:
         """Whether what steered last has to be released first."""
         return self._releases[self._steered_by].waits
 
+    @property
+    def steered_by(self) -> SteeredBy:
+        """What steered last."""
+        return self._steered_by
+
     def step(self, dt_s: float) -> None:
         """Advance time by ``dt_s`` seconds, >= 0; a timeout of signs is a fault."""
         self._age_s += dt_s
@@ -160,6 +113,7 @@ class Safety:
         for release in self._releases.values():
             release.step(dt_s)
         self.engagement.step(dt_s)
+        self.renewal.step(dt_s)
         if self._config.sign_timeout <= self._sign_age_s < math.inf:
             self.fault("no sign came")
 
@@ -202,6 +156,20 @@ class Safety:
             self._require_release()
             self._disengage()
 
+    def require_renewal(self, by: Steered) -> None:
+        """Record that ``by`` has driven for too long without any change: it must show neutral before it is followed."""
+        self._renews.add(by)
+        if by == "signs":
+            self.signs_wait = f"the same sign for {self.renewal.limit_s:g} s"
+        elif by == "joystick":
+            self._stick_waits = True
+        else:
+            self._releases[by].waits = True
+
+    def must_renew(self, by: Steered) -> bool:
+        """Return whether ``by`` waits for neutral since :meth:`require_renewal`."""
+        return by in self._renews
+
     def admits_sign(self, sign: str, *, stops: bool) -> bool:
         """Record a sign, and whether it ``stops``; return whether the robot may follow it."""
         self._note(sign, stops=stops)
@@ -212,6 +180,7 @@ class Safety:
         self._note("" if held else NONE, stops=not held)
         if not held:
             self._stick_waits = False
+            self._renews.discard("joystick")
         waits = self._stick_waits or self.signs_wait is not None
         return self.engagement.engaged and not (waits or self.is_stopped)
 
@@ -220,17 +189,23 @@ class Safety:
         self._stick_waits = True
         self._steered_by = by
         timeout_s = self._config.steering_timeout
-        return (
-            self._releases[by].admits(is_zero=is_zero, is_valid=is_valid, timeout_s=timeout_s) and not self.is_stopped
-        )
+        return self._releases_by(by, is_zero=is_zero, is_valid=is_valid, timeout_s=timeout_s) and not self.is_stopped
 
     def note_rest(self, by: SteeredBy) -> None:
         """Record that what could steer is at rest, which leaves the robot to others."""
-        self._releases[by].admits(is_zero=True, is_valid=True, timeout_s=math.inf)
+        self._releases_by(by, is_zero=True, is_valid=True, timeout_s=math.inf)
 
     def reconfigure(self, config: ControlConfig) -> None:
         """Change the timeouts."""
         self._config = config
+        self.renewal.limit_s = config.renew_time
+        self.engagement.by = config.engage_by
+
+    def _releases_by(self, by: SteeredBy, *, is_zero: bool, is_valid: bool, timeout_s: float) -> bool:
+        if is_zero:
+            self._renews.discard(by)
+            self.renewal.note(by, (0.0, 0.0))
+        return self._releases[by].admits(is_zero=is_zero, is_valid=is_valid, timeout_s=timeout_s)
 
     def _note(self, sign: str, *, stops: bool) -> None:
         gap_s, self._sign_age_s = self._sign_age_s, 0.0
@@ -242,6 +217,7 @@ class Safety:
             self._neutral_s = 0.0
         if self._neutral_s >= NEUTRAL_S - _SLACK_S and not (self._arming and self._age_s < ARMING_S):
             self.signs_wait = None
+            self._renews.discard("signs")
 
     def _note_none(self, gap_s: float) -> None:
         if gap_s >= FAULT_GAP_S:

@@ -239,7 +239,7 @@ class CameraPanel:
                     self._no_picture = text("", "waiting for the first picture")
                 self._caption = text("caption", "as in a mirror")
                 with box("overlay"):
-                    self._engaging, self._engage = _engage_ring()
+                    self._engaging, self._engage, self._how_to_engage = _engage_ring()
                     self._coach = Coach(page) if coaches else None
                     self._offer = CameraOffer(page, graph) if graph is not None else None
             with box("foot"):
@@ -263,6 +263,7 @@ class CameraPanel:
         self._ring.style(f"--confirmed: {confirmed}%").props(f"aria-valuenow={confirmed}")
         switch(self._ring, "whole", on=confirmed == 100)
         switch(self._engage, "hidden", on=state.engaging is None)
+        self._how_to_engage.set_text("Open, close, open" if state.engages_by_gesture else "Hold an open palm")
         engaged = round(100 * (state.engaging or 0.0))
         self._engaging.style(f"--engaged: {engaged}%").props(f"aria-valuenow={engaged}")
         self._hand.set_text(f"{state.recognition.handedness} hand" if state.recognition.handedness else "No hand")
@@ -281,11 +282,11 @@ class CameraPanel:
             self._coach.update(state, is_driver=self._page.lease(node).role == "driver")
 
 
-def _engage_ring() -> tuple[ui.element, ui.element]:
-    """Create the ring that shows how far an open palm has engaged the hand; return it, and what to hide with it."""
+def _engage_ring() -> tuple[ui.element, ui.element, ui.label]:
+    """Create the ring that shows how far the hand has engaged; return it, what to hide with it, and the words."""
     with box("engage hidden") as element:
         ring = box("ring").props('role="progressbar" aria-label="Engaged" aria-valuemax="100"')
         with ring:
             ui.html(DRAWN[STOP][1], sanitize=False)
-        text("", "Hold an open palm")
-    return ring, element
+        words = text("", "Open, close, open")
+    return ring, element, words

@@ -136,6 +136,7 @@ class PageState:
         confirmed: Progress of confirming ``seen``, 0 to 1 (confirmed).
         viewers: The viewers' activity.
         engaging: Progress of engaging the hand, 0 to 1; None if it is engaged, or cannot be.
+        engages_by_gesture: Whether it engages by opening, closing and opening; otherwise by an open palm that is held.
         sides_swapped: Whether the picture is as the camera sees it, because recognition swaps left and right.
         warnings: Problems that do not stop operation, such as two nodes that command one robot; a sentence each.
     """
@@ -158,6 +159,7 @@ class PageState:
     confirmed: float
     viewers: Viewers
     engaging: float | None
+    engages_by_gesture: bool
     warnings: tuple[str, ...]
     sides_swapped: bool
 
@@ -194,7 +196,10 @@ def compose(observed: Observed, now_s: float, viewers: Viewers = NO_VIEWERS) -> 
         fps=frame_rate(observed.frame_counts, now_s),
         confirmed=confirmed(recognition),
         viewers=viewers,
-        engaging=None if control.engaged or stopped else max(0.0, min(control.engage_progress, 1.0)),
+        engaging=None if control.engaged or stopped else engaging(recognition, control),
+        engages_by_gesture=last_control is None
+        or last_control.rule is None
+        or last_control.rule.engage_by == "gesture",
         sides_swapped=last_seen is not None and last_seen.sides_swapped,
         warnings=tuple(dict.fromkeys(warning for warning in (control.warning, robot.warning) if warning)),
     )
@@ -223,6 +228,11 @@ def confirmed(recognition: RecognitionStatus) -> float:
     if recognition.seen == recognition.sign:
         return 1.0
     return max(0.0, min(recognition.progress, 1.0))
+
+
+def engaging(recognition: RecognitionStatus, control: ControlStatus) -> float:
+    """Return the progress of engaging, 0 to 1, of the gesture or of the open palm that is held."""
+    return max(0.0, min(max(recognition.engage_progress, control.engage_progress), 1.0))
 
 
 def explain(reporting: Reporting, viewers: Viewers = NO_VIEWERS, *, is_moving: bool = False) -> tuple[Mood, str, str]:

@@ -122,7 +122,7 @@ class ControlAudit:
         self._log_arming(waits)
         look("stopped", stopped, at_s, lambda: self._stop_event(stopped), first=False)
         look("armed", waits, at_s, lambda: self._arming_event(waits))
-        words = "the hand drives" if engaged else "the hand drives nothing until an open palm is held"
+        words = "the hand drives" if engaged else "the hand drives nothing until it has engaged"
         look("engaged", engaged, at_s, lambda: event("engaged" if engaged else "disengaged", words), first=True)
         look("source", source, at_s, lambda: event("source_changed", f"follows {_SOURCES[source]}", source), "none")
         code: AuditCode = "drives" if reason.is_driving else "stands"

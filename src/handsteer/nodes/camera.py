@@ -71,7 +71,7 @@ class CameraNode(Node):
         self._fits = True
         self._retry_s = _FIRST_RETRY_S
         self._status = CameraStatus(camera.name)
-        self._freshness = Freshness(STALE_S)
+        self._freshness = Freshness()
         self._last_read_s = clock.now()
         self._is_frozen = False
         StopKeeper(self)

@@ -2,13 +2,15 @@
 
 import logging
 import math
+from dataclasses import replace
 from typing import Any
 
 from handsteer.clock import Clock
 from handsteer.config import CollisionMonitorConfig, Config, ControlConfig, JoyConfig
 from handsteer.control import Control
-from handsteer.control.explain import Reason
-from handsteer.control.safety import Following, SteeredBy
+from handsteer.control.engagement import SteeredBy
+from handsteer.control.explain import Reason, seconds_to_renew
+from handsteer.control.safety import Following
 from handsteer.messages import (
     CMD_VEL,
     GESTURE_JOY,
@@ -24,6 +26,7 @@ from handsteer.messages import (
     String,
     Topic,
     Twist,
+    engages_in,
 )
 from handsteer.nodes.auditing import ControlAudit
 from handsteer.nodes.base import Node
@@ -33,7 +36,7 @@ from handsteer.nodes.selection import NEXT, Selection
 from handsteer.nodes.status import ControlStatus
 from handsteer.nodes.supervision import Rivals, StopKeeper
 from handsteer.nodes.timing import CALM_S, LatencyLog, StallGuard
-from handsteer.timeouts import ENGAGE_S, ODOMETRY_S
+from handsteer.timeouts import ODOMETRY_S
 from handsteer.transports.base import Call, Received, Transport
 from handsteer.transports.commands import Commands
 from handsteer.transports.timing import Repeats
@@ -62,7 +65,8 @@ class HandSignControlNode(Node):
         gamepad: How ``/joy`` is read.
         arming: Whether nothing moves before neutral was seen, or while no robot is subscribed
             (:mod:`handsteer.control.safety`).
-        engage: Whether the hand drives nothing before an open palm engaged it.
+        engage: Whether the hand drives nothing before it has engaged.
+        renew: Whether what drives without any change must be shown again.
         others_keep_stop: Whether nodes of other processes may remember a Stop from before the start; nothing moves
             before one of them was heard, for at most :data:`~handsteer.timeouts.HEAR_STOP_S`.
         sign, joy, steering, odom, scan: Topics of what it subscribes to.
@@ -85,6 +89,7 @@ class HandSignControlNode(Node):
         gamepad: JoyConfig | None = None,
         arming: bool = False,
         engage: bool = False,
+        renew: bool = False,
         others_keep_stop: bool = False,
         sign: Topic[String] = HAND_SIGN,
         joy: Topic[Joy] = GESTURE_JOY,
@@ -96,7 +101,7 @@ class HandSignControlNode(Node):
         super().__init__("hand_sign_control", transport, clock)
         self.latency = LatencyLog()
         self._config = config
-        self._control = Control(config, arming=arming, engage=engage)
+        self._control = Control(config, arming=arming, engage=engage, renew=renew)
         self._safety, self._mux = self._control.safety, self._control.mux
         self._following = None if config.robots else Following(checks_motion=arming)
         self._measured, self._repeats = MeasuredVelocity(), Repeats()
@@ -121,7 +126,8 @@ class HandSignControlNode(Node):
         self.subscribe(steering, self._on_steering)
         self.subscribe(sign, self._on_sign)
         self._joysticks = Joysticks(self, joy, self._on_stick, gamepad or JoyConfig(), self._on_gamepad)
-        self._joysticks.listen(on=config.mode == "joystick")
+        self._engages = engage
+        self._listen()
         if self._following:
             self.subscribe(odom, self._on_odometry)
         self._watchdog = self.every(_WATCHDOG_PERIOD_S, self._watch)
@@ -133,7 +139,12 @@ class HandSignControlNode(Node):
         self._stall_guard.limit_s = config.control.sign_timeout
         self._monitor.reconfigure(config.collision_monitor)
         self._publish(self._control.reconfigure(config.control))
-        self._joysticks.listen(on=config.control.mode == "joystick")
+        self._listen()
+
+    def _listen(self) -> None:
+        is_joystick = self._config.mode == "joystick"
+        by_gesture = self._engages and self._config.engage_by == "gesture"
+        self._joysticks.listen(hand=is_joystick or by_gesture, gamepad=is_joystick)
 
     def services(self) -> dict[str, Call]:
         """Return ``stop`` and ``reset``, which are equivalent to true and false on ``/stop``."""
@@ -181,6 +192,13 @@ class HandSignControlNode(Node):
         self._look_for_changes(self.clock.now())
 
     def _on_stick(self, stick: Stick, received: Received[Joy]) -> None:
+        """Note whether the hand engages; follow it as a joystick if it is one."""
+        is_old = self._is_stale(received) or self._waits_for_others()
+        self._control.note_gesture(is_done=engages_in(received.message) and not is_old)
+        if self._config.mode == "joystick":
+            self._follow_stick(stick, received)
+
+    def _follow_stick(self, stick: Stick, received: Received[Joy]) -> None:
         self._take(received.captured_s, is_late=self._is_stale(received), is_stop=not stick.held, stick=stick)
 
     def _on_gamepad(self, stick: Stick, received: Received[Joy], *, is_at_rest: bool) -> None:
@@ -326,6 +344,7 @@ class HandSignControlNode(Node):
             linear_mps=round(velocity.linear_mps, 3),
             angular_radps=round(velocity.angular_radps, 3),
             moving=self._is_moving,
+            renew_s=seconds_to_renew(self._control.renew_left_s),
             robot=self._selection.robot if self._selection else None,
             blind=bool(self._monitor.why_blind()),
             obstacle_m=self._monitor.obstacle_m,
@@ -355,11 +374,13 @@ class HandSignControlNode(Node):
     def _reason_by_input(self) -> Reason:
         safety, source, why = self._safety, self._mux.source, self._safety.signs_wait
         robot = self._selection.robot if self._selection else ""
-        if source == "steering" and safety.steering_waits:
-            return Reason("steering_disarmed", robot=robot)
         # Without any input, that is the reason after a reset, which needs no explanation.
         if source != "steering" and not safety.engagement.engaged:
-            return Reason("disengaged", f"{ENGAGE_S:g}", robot)
+            return replace(safety.engagement.reason, robot=robot)
+        if self._control.must_renew:
+            return replace(self._control.reason, robot=robot)
+        if source == "steering" and safety.steering_waits:
+            return Reason("steering_disarmed", robot=robot)
         if source == "steering" or why is None or (source == "none" and not why):
             return self._monitor.explain(self._mux.reason)
         return Reason("disarmed", why, robot)

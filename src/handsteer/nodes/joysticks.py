@@ -43,23 +43,20 @@ class Joysticks:
         self._rule = rule.model_dump()
         self._is_gamepad_held = self._has_warned = False
         self._stamped_s = -math.inf
-        self._subscriptions: list[Subscription] = []
+        self._subscriptions: dict[str, Subscription] = {}
 
-    def listen(self, *, on: bool) -> None:
-        """Subscribe or unsubscribe; without effect if that is so already."""
-        if on == bool(self._subscriptions):
-            return
-        for subscription in self._subscriptions:
-            subscription.close()
-        self._is_gamepad_held = False
-        self._subscriptions = (
-            [
-                self._node.subscribe(self._hand, lambda received: self._on_hand(stick_in(received.message), received)),
-                self._node.subscribe(JOY, self._take),
-            ]
-            if on
-            else []
-        )
+    def listen(self, *, hand: bool, gamepad: bool) -> None:
+        """Subscribe to what is wanted, and unsubscribe from the rest; without effect if that is so already."""
+        if not gamepad:
+            self._is_gamepad_held = False
+        self._listen(self._hand, hand, lambda received: self._on_hand(stick_in(received.message), received))
+        self._listen(JOY, gamepad, self._take)
+
+    def _listen(self, topic: Topic[Joy], on: bool, deliver: Callable[[Received[Joy]], None]) -> None:
+        if on and topic.name not in self._subscriptions:
+            self._subscriptions[topic.name] = self._node.subscribe(topic, deliver)
+        elif not on and topic.name in self._subscriptions:
+            self._subscriptions.pop(topic.name).close()
 
     def _is_new(self, stamped_s: float | None) -> bool:
         """Return whether a gamepad's message was not sent before; one without a stamp counts as sent on arrival."""

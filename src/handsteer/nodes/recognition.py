@@ -32,6 +32,7 @@ from handsteer.nodes.base import Node
 from handsteer.nodes.status import RecognitionStatus
 from handsteer.nodes.supervision import StopKeeper
 from handsteer.nodes.timing import CALM_S, TOO_SLOW, FrameAge, LatencyLog, Recording, StallGuard, far_and_late
+from handsteer.recognition.engage_gesture import EngageGesture
 from handsteer.recognition.hand import Hand
 from handsteer.recognition.hand_joystick import HandJoystick
 from handsteer.recognition.profile import profile_path
@@ -95,6 +96,7 @@ class HandSignRecognitionNode(Node):
         self._recognizer = recognizer
         self._config = config
         self._joystick = joystick or HandJoystick()
+        self._gesture = EngageGesture()
         self._models = _versions_of(config)
         self._last_captured_s: float | None = None
         self._unseen_s = 0.0
@@ -102,7 +104,7 @@ class HandSignRecognitionNode(Node):
         self._last_sign_s = clock.now()
         self._last_hand_s: float | None = None
         self._age = FrameAge(config.max_frame_age, one_clock=transport.is_one_machine)
-        self._freshness = Freshness(config.max_frame_age)
+        self._freshness = Freshness()
         self._stall_guard = StallGuard(config.max_frame_age, clock.now())
         self._recording = Recording(config.recorded, config.max_frame_age)
         self._refused: str | None = None
@@ -150,11 +152,11 @@ class HandSignRecognitionNode(Node):
         if self._has_other_models(config.signs):
             versions = _versions_of(config.signs)
             self._recognizer.use(open_classifier(config.signs))
-            self._joystick.reset()
+            self._forget_hand()
             self._models = versions
         self._config = config.signs
         limit_s = config.signs.max_frame_age
-        self._age.limit_s = self._freshness.limit_s = self._recording.limit_s = self._stall_guard.limit_s = limit_s
+        self._age.limit_s = self._recording.limit_s = self._stall_guard.limit_s = limit_s
         self._recognizer.reconfigure(config.signs)
         self._joystick.reconfigure(config.joystick)
 
@@ -169,7 +171,7 @@ class HandSignRecognitionNode(Node):
         """Forget the hand, and what it showed to the camera before."""
         self._camera_since_s = self.clock.now() if received.captured_s is None else received.captured_s
         self._recognizer.reset()
-        self._joystick.reset()
+        self._forget_hand()
         self._recognition = None
 
     def _on_frame(self, received: Received[M], picture_of: Callable[[M], NDArray[np.uint8]]) -> None:
@@ -198,7 +200,7 @@ class HandSignRecognitionNode(Node):
     def _look_at(self, image: NDArray[np.uint8], received: Received[M], began_s: float, captured_s: float) -> None:
         dt_s = self._since_last_frame(captured_s)
         self._unseen_s += dt_s
-        self._refused = self._freshness.why_refused(image, dt_s)
+        self._refused = self._freshness.why_refused(image, dt_s, recorded=self._recording.is_followed)
         if self._refused is not None:
             self._explain_freeze()
             return
@@ -207,8 +209,9 @@ class HandSignRecognitionNode(Node):
         is_joystick_wanted = self._joy.has_subscribers
         if is_joystick_wanted:
             self._joystick.step(recognition, self._unseen_s)
+            self._gesture.step(recognition, self._unseen_s)
         else:
-            self._joystick.reset()
+            self._forget_hand()
         self._unseen_s = 0.0
         self._refused = self._why_too_late(began_s)
         if self._refused is not None:
@@ -224,13 +227,19 @@ class HandSignRecognitionNode(Node):
         self.counts[recognition.sign] = self.counts.get(recognition.sign, 0) + 1
         self._sign.publish(String(data=recognition.sign), received.captured_s)
         if is_joystick_wanted:
-            self._joy.publish(joy_of(self._joystick.stick, received.message.header), received.captured_s)
+            engages = self._gesture.progress == 1.0
+            message = joy_of(self._joystick.stick, received.message.header, engages=engages)
+            self._joy.publish(message, received.captured_s)
         self.processing.add(self.clock.now() - began_s)
         if self._annotated.has_subscribers:
             header = received.message.header
             picture = annotate(image, recognition)
             self._joystick.draw(picture)
             self._annotated.publish(image_message(picture, header), received.captured_s)
+
+    def _forget_hand(self) -> None:
+        self._joystick.reset()
+        self._gesture.reset()
 
     def _explain_freeze(self) -> None:
         if not self._has_explained_freeze and self._freshness.frozen_s > _FREEZE_EXPLAINED_S:
@@ -244,7 +253,7 @@ class HandSignRecognitionNode(Node):
         if age_s <= self._config.max_frame_age:
             return None
         self._recognizer.reset()
-        self._joystick.reset()
+        self._forget_hand()
         if self.is_camera_far and came_s > age_s / 2:
             return far_and_late(came_s)
         return f"{TOO_SLOW}: a picture was {age_s:.1f} s old when its sign was known"
@@ -287,7 +296,7 @@ class HandSignRecognitionNode(Node):
         if now - self._last_sign_s > period_s:
             self._last_sign_s = now
             self._recognizer.reset()
-            self._joystick.reset()
+            self._forget_hand()
             self._recognition = None
             self._sign.publish(String(data=NONE))
             if self._joy.has_subscribers:
@@ -308,6 +317,7 @@ class HandSignRecognitionNode(Node):
             confidences=tuple(round(each, 2) for each in self._recognizer.confidences(seen)),
             min_confidence=self._config.min_confidence,
             progress=round(seen.progress, 2),
+            engage_progress=round(self._gesture.progress, 2),
             handedness=self._handedness(seen.hand) if seen.hand else "",
             sides_swapped=self._config.swap_sides,
             no_hand_s=round(now - (self._last_hand_s or 0.0), 1) if is_hand_lost else None,

@@ -5,7 +5,7 @@ from typing import ClassVar, Literal
 
 from handsteer.config import ControlConfig
 from handsteer.control import Source
-from handsteer.control.explain import Reason
+from handsteer.control.explain import Reason, warned
 from handsteer.types import NONE, CourseState, Handedness, Pose2D, describe_seen
 
 OK, WARN, ERROR = 0, 1, 2
@@ -90,6 +90,7 @@ class RecognitionStatus(Status):
         confidences: Of each of ``signs`` in the newest frame, 0 to 1, in the same order; empty without a hand.
         min_confidence: The smallest confidence that counts.
         progress: Progress of confirming ``seen``, 0 to 1.
+        engage_progress: Progress of the gesture that engages, 0 to 1; 0 where nothing asks for it.
         handedness: Of the active hand; empty if there is none.
         no_hand_s: Time since a hand was seen; None if one is in view, or none was seen yet.
         no_frame_s: Time since the last frame; None if there are frames, even if they are refused.
@@ -111,6 +112,7 @@ class RecognitionStatus(Status):
     confidences: tuple[float, ...] = ()
     min_confidence: float | None = None
     progress: float = 0.0
+    engage_progress: float = 0.0
     handedness: Handedness | Literal[""] = ""
     no_hand_s: float | None = None
     no_frame_s: float | None = None
@@ -149,11 +151,12 @@ class ControlStatus(Status):
         source: The active input.
         stopped: Whether the robot is stopped until reset.
         armed: Whether signs count; otherwise they must show neutral first.
-        engaged: Whether the hand drives; otherwise an open palm must engage it first.
+        engaged: Whether the hand drives; otherwise it must engage first.
         engage_progress: Progress of engaging, 0 to 1.
         linear_mps: Commanded forward velocity.
         angular_radps: Commanded angular velocity, left positive.
         moving: Whether the robot is measured to move; None if it is unknown.
+        renew_s: Seconds until the robot stops unless what drives changes; None if that is not soon.
         robot: The selected one of several robots; None if there is one.
         blind: Whether laser scans are required and missing.
         obstacle_m: Distance of the obstacle that limits the robot; None if none does.
@@ -174,6 +177,7 @@ class ControlStatus(Status):
     linear_mps: float = 0.0
     angular_radps: float = 0.0
     moving: bool | None = None
+    renew_s: int | None = None
     robot: str | None = None
     blind: bool = False
     obstacle_m: float | None = None
@@ -192,12 +196,12 @@ class ControlStatus(Status):
         """A sentence for people."""
         if self.reason is None:
             return "gives no reason"
-        return f"{self.reason.state(is_moving=bool(self.moving))}: {self.reason.explanation}"
+        return f"{self.reason.state(is_moving=bool(self.moving))}: {self.explanation}"
 
     @property
     def explanation(self) -> str:
         """The message without what the robot does."""
-        return self.reason.explanation if self.reason else self.message
+        return warned(self.reason.explanation, self.renew_s) if self.reason else self.message
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from itertools import chain, groupby
 from statistics import median
 from typing import Any
 
-from handsteer.control.safety import Engagement
+from handsteer.control.engagement import Engagement
 from handsteer.training.evaluation.intervals import Rate, Share
 from handsteer.training.evaluation.photo_metrics import Confusion
 from handsteer.types import NONE
@@ -273,7 +273,7 @@ def _while_engaged(
 
 
 def _engaged(frames: Sequence[FrameVerdict]) -> Iterator[bool]:
-    clutch, before_s = Engagement(enabled=True), 0.0
+    clutch, before_s = Engagement(enabled=True, by="hold"), 0.0
     for frame in frames:
         clutch.step(max(0.0, frame.time_s - before_s))
         clutch.note_sign(frame.counts)
