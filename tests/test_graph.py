@@ -111,6 +111,29 @@ def test_topics_and_rates() -> None:
     assert counts[TF.name] == counts[ODOM.name]
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "control",
+    [
+        {"mode": "joystick"},
+        {"mode": "joystick", "engage": "on", "arming": "on"},
+        {"mode": "joystick", "engage": "on", "engage_by": "hold"},
+        {"engage": "on", "arming": "on"},
+        {"engage": "on", "engage_by": "hold"},
+        {"rule": "cruise"},
+        {"rule": "cruise", "engage": "on", "arming": "on"},
+        {"ramp": "per_second"},
+    ],
+    ids=lambda control: " ".join(map(str, control.values())),
+)
+def test_the_virtual_hand_drives_in_every_mode_without_a_script(control: dict[str, str]) -> None:
+    camera = {"source": "virtual", "width": 320, "height": 240}
+    config = Config.model_validate({"camera": camera, "control": control, "robot": {"world": "empty"}})
+    with Graph(config, SteppedClock()) as graph:
+        graph.run_stepped(14.0)
+    assert graph.summary().path_length_m > 0.3
+
+
 def test_a_real_clock_cannot_be_stepped() -> None:
     with (
         Graph(Config(camera=CameraConfig(source="virtual"))) as graph,

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from handsteer.clock import Clock, SimulatedClock, WallClock
-from handsteer.config import Config, RobotConfig, cmd_vel_type
+from handsteer.config import Config, RobotConfig, VirtualHandConfig, cmd_vel_type
 from handsteer.errors import ConfigError, needing
 from handsteer.messages import CMD_VEL, STEERING_CMD_VEL, TF, Topic, Twist, cmd_vel
 from handsteer.recordings import is_recording
@@ -68,7 +68,7 @@ def open_cameras(config: Config, clock: Clock) -> "ChoiceOfCameras":
 
     has_own = config.camera.source != "browser"
     own = _open_camera(config, clock) if has_own else NoCamera()
-    machine = MachineCameras(config.camera, config.virtual_hand, clock, own)
+    machine = MachineCameras(config.camera, _virtual_hand(config), clock, own)
     return ChoiceOfCameras(own, BrowserCamera(clock), machine, OWN if has_own else BROWSER)
 
 
@@ -80,7 +80,16 @@ def _open_camera(config: Config, clock: Clock) -> "Camera":
         from handsteer.recordings.camera import RecordingCamera
 
         return RecordingCamera(path, clock, config.camera.at_end)
-    return open_camera(config.camera, config.virtual_hand, clock)
+    return open_camera(config.camera, _virtual_hand(config), clock)
+
+
+def _virtual_hand(config: Config) -> VirtualHandConfig:
+    """Return the virtual hand, with the script that drives where none is set."""
+    from handsteer.hand.script import chosen_script
+
+    engage = config.control.engage == "on" or (config.control.engage == "auto" and config.robot.kind != "sim")
+    script = chosen_script(config.virtual_hand.script, joystick=config.control.mode == "joystick", engage=engage)
+    return config.virtual_hand.model_copy(update={"script": script})
 
 
 def make_recognition(

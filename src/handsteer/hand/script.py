@@ -11,6 +11,13 @@ from handsteer.hand.kinematics import ANGLES, Array, clamp
 from handsteer.hand.poses import HandPose, View, sign_pose
 from handsteer.types import Handedness
 
+AUTO = "auto"
+"""The script that shows what the run needs to drive: :func:`chosen_script`."""
+
+_SIGNS = "Forward:3 Turn Left:2 Forward:2 Turn Right:2 Go:1 Backward:3 Stop:2 NONE:1"
+_JOYSTICK = "Stop:1.5 Go:1 Go@0,-0.06:2 Go@0.05,-0.06:1.5 Go@-0.05,-0.06:1.5 Go@0.06,0:3 Stop:1"
+_ENGAGES = "Stop:1.2 Go:0.6 Stop:0.7"  # by the gesture, and by a palm that is held
+
 _CHANGE_S = 0.30
 _MAX_S = 3600.0
 _MAX_M = 0.5
@@ -54,16 +61,31 @@ class Moment:
     settled: bool
 
 
+def chosen_script(text: str, *, joystick: bool, engage: bool) -> str:
+    """Return ``text``; if it is ``auto``, a script that drives.
+
+    Args:
+        text: A script, or ``auto``.
+        joystick: Whether the hand is a joystick, instead of showing signs.
+        engage: Whether the hand has to engage before it drives.
+    """
+    if text.strip() != AUTO:
+        return text
+    shown = _JOYSTICK if joystick else _SIGNS
+    return f"{_ENGAGES} {shown}" if engage else shown
+
+
 def parse_script(text: str) -> tuple[Part, ...]:
     """Return the parts of ``text``: signs with durations in seconds, ``SIGN:SECONDS``, separated by spaces.
 
     ``SIGN@RIGHT,DOWN:SECONDS`` shows the sign so many metres to the person's right of the usual place, and below it.
+    ``auto`` is all six signs.
 
     Raises:
         PoseError: The script is empty, or a sign, place or duration in it is wrong; the message names the part.
     """
     parts: list[Part] = []
-    rest = text.strip()
+    rest = chosen_script(text, joystick=False, engage=False).strip()
     while rest:
         number = len(parts) + 1
         match = _PART.match(rest)

@@ -1031,7 +1031,7 @@ const WORDS = {
 
   // Parameters: virtual hand
   "Script": "Skript",
-  "Signs to show, with their durations in seconds, repeated; NONE lowers the hand; Peace, Three, Four, Horns, Call and OK are for teaching; Go@#,#:# is # m to the right and # m up.": "Zeichen, die gezeigt werden, mit ihrer Dauer in Sekunden, immer wieder; NONE senkt die Hand; Peace, Three, Four, Horns, Call und OK sind zum Lehren; Go@#,#:# ist # m nach rechts und # m nach oben.",
+  "Signs to show, with their durations in seconds, repeated; NONE lowers the hand; auto shows what the run needs to drive: all six signs or, as a joystick, a fist that moves, and first what engages; Peace, Three, Four, Horns, Call and OK are for teaching; Go@#,#:# is # m to the right and # m up.": "Zeichen, die gezeigt werden, mit ihrer Dauer in Sekunden, immer wieder; NONE senkt die Hand; auto zeigt, was der Lauf zum Fahren braucht: alle sechs Zeichen oder, als Joystick, eine Faust, die sich bewegt, und zuerst, was die Hand aktiviert; Peace, Three, Four, Horns, Call und OK sind zum Lehren; Go@#,#:# ist # m nach rechts und # m nach oben.",
   "Handedness": "Händigkeit",
   "Left or right hand.": "Linke (Left) oder rechte (Right) Hand.",
   "Skin": "Haut",
