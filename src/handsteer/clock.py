@@ -21,6 +21,8 @@ _LOOK_AGAIN_S = 0.005
 _STANDS_AFTER_S = 0.15
 # Minimum change that counts as a set clock; less may be a delay.
 _LEAST_SET_S = 1.0
+# More than every timeout of what moves the robot.
+_RESTART_S = 1.0
 
 
 class Clock(Protocol):
@@ -135,8 +137,9 @@ class SimulatedClock:
     """Follows a simulator's time from the topic ``/clock``; may be used from any thread.
 
     When the simulator's time stops, the stamps stop too, but this clock continues in real seconds: watchdogs must still
-    expire, and frames stamped with the stopped time must become stale. When the simulator's time continues, or restarts
-    at an earlier time, this clock continues from where it is; it never goes back.
+    expire, and frames stamped with the stopped time must become stale. When the simulator's time continues, this clock
+    continues from where it is; it never goes back. When the time restarts at an earlier one, the world is another: this
+    clock continues a second later, so that everything from before has expired.
 
     Args:
         real: Returns real, monotonic seconds.
@@ -164,8 +167,9 @@ class SimulatedClock:
                 return  # the simulator is paused
             now = self._now()
             if time_s + self._offset_s < now:
+                is_restart = self._told_s - time_s > _LEAST_SET_S
                 self._old_until_s, self._old_offset_s = min(self._told_s, time_s), self._offset_s
-                self._offset_s = now - time_s
+                self._offset_s = now - time_s + (_RESTART_S if is_restart else 0.0)
             self._told_s, self._told_at_s = time_s, self._real()
 
     @property
@@ -195,7 +199,8 @@ class SimulatedClock:
         wake.wait(_LOOK_AGAIN_S if timeout_s is None or timeout_s > 0 else 0)
 
     def _now(self) -> float:
-        stood_s = max(0.0, self._real() - self._told_at_s - _STANDS_AFTER_S)
+        silent_s = self._real() - self._told_at_s
+        stood_s = silent_s if silent_s > _STANDS_AFTER_S else 0.0
         # The maximum, because sums of the same seconds in another order differ in their last digit.
         self._newest_s = max(self._newest_s, self._told_s + self._offset_s + stood_s)
         return self._newest_s

@@ -14,7 +14,7 @@ HOLD_TIMEOUT_S: Final = 0.3
 ROBOT_S: Final = 0.4
 """A robot without commands for this long brakes on its own; longer than :data:`STALE_S`, so that a zero comes first."""
 
-ODOMETRY_S: Final = 0.45
+ODOMETRY_S: Final = 0.4
 """Without odometry for this long, the robot is considered absent."""
 
 FAULT_GAP_S: Final = 0.3

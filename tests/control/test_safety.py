@@ -227,8 +227,8 @@ def test_a_robot_whose_odometry_stops_is_not_there() -> None:
     following = Following()
     assert following.step(10.0, Velocity(0.5, 0.0)) is None, "it never gave any"
     following.note(Velocity(0.5, 0.0))
-    assert following.step(0.4, Velocity(0.5, 0.0)) is None
-    assert following.step(0.2, Velocity(0.5, 0.0)) == "the robot's odometry has stopped"
+    assert following.step(0.35, Velocity(0.5, 0.0)) is None
+    assert following.step(0.06, Velocity(0.5, 0.0)) == "the robot's odometry has stopped"
     following.note(Velocity(0.5, 0.0))
     assert following.step(0.02, Velocity(0.5, 0.0)) is None
 

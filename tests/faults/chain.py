@@ -1,6 +1,5 @@
 """All five nodes in stepped time, on a transport with faults; each can be frozen, killed and made anew."""
 
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -45,6 +44,8 @@ from tests.faults.painted import PaintedCamera, painted_recognizer
 # Where a stamp of zero would stand for none.
 _BEGIN_S = 100.0
 SPEED_MPS = 0.3
+SECOND_CONTROL = "second_hand_sign_control"
+"""Name of a control that runs beside the first, or in its place."""
 REAL_CMD_VEL = Topic("/cmd_vel", Twist, depth=10)
 REAL_ODOM = Topic("/odom", Odometry)
 NO_COVARIANCE = np.zeros(36)
@@ -77,7 +78,7 @@ class Chain:
             "control": self._control,
             "recognition": self._recognition,
             "camera": lambda: CameraNode(self.faults, self.clock, self.camera),
-            "steering": lambda: SteeringNode(self.faults, self.clock, self._limits()),
+            "steering": lambda: SteeringNode(self.faults, self.clock, self.limits()),
         }
         self.nodes = {name: make() for name, make in self._make.items()}
         self.page = _Page(self)
@@ -98,6 +99,11 @@ class Chain:
     def is_well(self, name: str) -> bool:
         """Return whether a node runs."""
         return name not in self._frozen | self._dead
+
+    @property
+    def speakers(self) -> list[str]:
+        """Names of the nodes that say why the robot stands, those first that know best."""
+        return [*(["hand_sign_control"] if self.is_well("control") else []), SECOND_CONTROL, "robot"]
 
     def show(self, sign: str = NONE) -> None:
         """Let the hand show ``sign`` from now on."""
@@ -160,11 +166,12 @@ class Chain:
         for status in received.message.status:
             self.said[status.name] = status.message
 
-    def _limits(self) -> ControlConfig:
+    def limits(self) -> ControlConfig:
+        """Return the configuration of every control."""
         return ControlConfig.model_validate({"max_linear": SPEED_MPS, "linear_step": 0.05})
 
     def _control(self) -> Node:
-        return HandSignControlNode(self.faults, self.clock, self._limits(), arming=True)
+        return HandSignControlNode(self.faults, self.clock, self.limits(), arming=True)
 
     def _robot(self) -> Node:
         return RobotNode(self.faults, self.clock, self._driven(), RobotConfig())
@@ -228,11 +235,15 @@ class _Session(Session):
 
 
 class RealRobot(Node):
-    """Listens on ``/cmd_vel`` and says 20 times a second on ``/odom`` where it is."""
+    """Listens on ``/cmd_vel`` and says 20 times a second on ``/odom`` where it is.
+
+    Attributes:
+        lies: Returns what it says instead of the truth.
+    """
 
     def __init__(self, chain: Chain) -> None:
         super().__init__("real_robot", chain.faults, chain.clock)
-        self.is_senseless = False
+        self.lies: Callable[[Odometry], Odometry] = lambda odometry: odometry
         self._base = chain.base
         self._odom = self.publisher(REAL_ODOM)
         self.subscribe(REAL_CMD_VEL, lambda received: self._base.command(*_speeds(received.message)))
@@ -242,8 +253,9 @@ class RealRobot(Node):
         pose = Pose(Point(0.0, 0.0, 0.0), Quaternion(0.0, 0.0, 0.0, 1.0))
         at = PoseWithCovariance(pose, NO_COVARIANCE)
         speed_mps = self._base.speed_mps if self._base.is_asked_to_move else 0.0
-        moving = TwistWithCovariance(twist(math.nan if self.is_senseless else speed_mps, 0.0), NO_COVARIANCE)
-        self._odom.publish(Odometry(Header(self.clock.stamp(self.clock.now()), "odom"), "base_link", at, moving))
+        moving = TwistWithCovariance(twist(speed_mps, 0.0), NO_COVARIANCE)
+        stamp = self.clock.stamp(self.clock.now())
+        self._odom.publish(self.lies(Odometry(Header(stamp, "odom"), "base_link", at, moving)))
 
 
 def _speeds(message: Twist) -> tuple[float, float]:

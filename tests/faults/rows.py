@@ -1,20 +1,43 @@
 """Every node and every topic, with every fault that can be had in stepped time: the rows of the table."""
 
-from collections.abc import Iterator
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import Any
 
-from handsteer.messages import CMD_VEL, HAND_SIGN, IMAGE_RAW, STEERING_CMD_VEL, STOP, Topic
+from handsteer.messages import (
+    CMD_VEL,
+    HAND_SIGN,
+    IMAGE_RAW,
+    STEERING_CMD_VEL,
+    STOP,
+    Odometry,
+    Topic,
+    TwistWithCovariance,
+    twist,
+)
 from handsteer.testing.fault_transport import CUT, FROZEN, LinkFault
 from handsteer.testing.faulty_camera import CameraFault
-from tests.faults.chain import REAL_CMD_VEL, REAL_ODOM, Chain, RealRobot, RemoteChain
+from tests.faults.chain import NO_COVARIANCE, REAL_CMD_VEL, REAL_ODOM, SPEED_MPS, Chain, RealRobot, RemoteChain
 from tests.faults.others import others
 from tests.faults.row import Act, Row, ended, frozen, killed, lower_the_hand, made, nothing, unfrozen
 from tests.faults.scanners import scanners
+from tests.faults.second import seconds
 
 
 def rows() -> list[Row]:
     """Return all rows."""
-    return [*_cameras(), *_links(), *_nodes(), *_clocks(), *others(), *_stops(), *_real_robots(), *scanners()]
+    return [
+        *_cameras(),
+        *_links(),
+        *_nodes(),
+        *_clocks(),
+        *others(),
+        *seconds(),
+        *_stops(),
+        *_real_robots(),
+        *scanners(),
+    ]
 
 
 _CAMERA: dict[CameraFault, tuple[str, bool]] = {
@@ -159,20 +182,49 @@ def _real_robots() -> Iterator[Row]:
 
     yield Row("real robot", "is switched off, and on again later", leave, come_back, make=RemoteChain)
 
-    def senseless(chain: Chain) -> None:
-        assert isinstance(chain, RemoteChain)
-        assert chain.real is not None
-        chain.real.is_senseless = True
-
-    def sensible(chain: Chain) -> None:
-        assert isinstance(chain, RemoteChain)
-        assert chain.real is not None
-        chain.real.is_senseless = False
-
-    yield Row("real robot", "reports NaN in its odometry", senseless, sensible, make=RemoteChain)
+    yield from _lies()
     for words, begin, end in (
         ("the node in front of it is frozen", frozen("robot"), unfrozen("robot")),
         ("the node in front of it is killed, started again later", killed("robot"), made("robot")),
         ("the control in front of it is killed, started again later", killed("control"), made("control")),
     ):
         yield Row("real robot", words, begin, end, make=RemoteChain)
+
+
+def _lies() -> Iterator[Row]:
+    def truth(chain: Chain) -> None:
+        _robot(chain).lies = lambda odometry: odometry
+
+    def repeats(chain: Chain) -> None:
+        heard: list[Odometry] = []
+
+        def last(odometry: Odometry) -> Odometry:
+            heard.append(odometry)
+            return heard[0]
+
+        _robot(chain).lies = last
+
+    for words, speed in (
+        ("NaN in its odometry", lambda _: math.nan),
+        ("in its odometry that it stands", lambda _: 0.0),
+        ("in its odometry that it goes the other way; then the driver stops", lambda real: -real),
+        ("ten times its speed; then the driver stops", lambda real: 10.0 * real),
+        ("that it moves whatever it does; then the driver stops", lambda _: SPEED_MPS),
+    ):
+
+        def lie(chain: Chain, speed: Callable[[float], float] = speed) -> None:
+            _robot(chain).lies = lambda odometry: _with_speed(odometry, speed(odometry.twist.twist.linear.x))
+
+        leaves = "then" in words
+        yield Row("real robot", f"reports {words}", lie, truth, lower_the_hand if leaves else nothing, make=RemoteChain)
+    yield Row("real robot", "repeats its last odometry", repeats, truth, make=RemoteChain)
+
+
+def _robot(chain: Chain) -> RealRobot:
+    assert isinstance(chain, RemoteChain)
+    assert chain.real is not None
+    return chain.real
+
+
+def _with_speed(odometry: Odometry, speed_mps: float) -> Odometry:
+    return replace(odometry, twist=TwistWithCovariance(twist(speed_mps, 0.0), NO_COVARIANCE))

@@ -29,7 +29,7 @@ class ScannedChain(Chain):
 
     def _control(self) -> Node:
         rule = CollisionMonitorConfig(enabled=True)
-        return HandSignControlNode(self.faults, self.clock, self._limits(), collision_monitor=rule, arming=True)
+        return HandSignControlNode(self.faults, self.clock, self.limits(), collision_monitor=rule, arming=True)
 
 
 class ScannedBase(Base):

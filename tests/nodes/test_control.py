@@ -625,10 +625,10 @@ def test_a_robot_that_is_let_grow_slowly_is_not_said_to_stand() -> None:
         assert statuses[-1].status[0].message == f"{says}: steered by hand, at zero"
 
 
-def odometry(moving: Twist) -> Odometry:
+def odometry(moving: Twist, stamp: Time | None = None) -> Odometry:
     origin = Pose(position=Point(0.0, 0.0, 0.0), orientation=Quaternion(0.0, 0.0, 0.0, 1.0))
     return Odometry(
-        header=Header(stamp=Time(0, 0), frame_id="odom"),
+        header=Header(stamp=stamp or Time(0, 0), frame_id="odom"),
         child_frame_id="base_link",
         pose=PoseWithCovariance(pose=origin, covariance=np.zeros(36)),
         twist=TwistWithCovariance(twist=moving, covariance=np.zeros(36)),
@@ -649,16 +649,21 @@ def test_a_robot_that_nobody_hears_is_not_driven_on() -> None:
     assert "no robot listens" in statuses[-1].status[0].message
 
 
+@pytest.mark.parametrize("repeats", [False, True])
 @pytest.mark.parametrize("arming", [False, True])
-def test_odometry_that_falls_silent_stops_the_ramp_and_disarms(arming: bool) -> None:
+def test_odometry_that_falls_silent_stops_the_ramp_and_disarms(arming: bool, repeats: bool) -> None:
     """A robot whose process slept must not wake to what was shown meanwhile, wherever it is simulated."""
     bench = ControlBench(arming=arming)
     odom = bench.transport.advertise("robot", ODOM)
+    said: list[Odometry] = []
 
     def show(sign: str, count: int, *, is_heard: bool) -> None:
         for _ in range(count):
             if is_heard:
-                odom.publish(odometry(bench.twists[-1] if bench.twists else twist(0.0, 0.0)))
+                stamp = bench.clock.stamp(1.0 + bench.clock.now())
+                said.append(odometry(bench.twists[-1] if bench.twists else twist(0.0, 0.0), stamp))
+            if is_heard or repeats:
+                odom.publish(said[-1])
             bench.show(sign)
 
     show("NONE", 60, is_heard=True)

@@ -123,7 +123,7 @@ metres = st.floats(0.005, 100)
 places = st.tuples(numbers, numbers)
 colours = st.from_regex(r"\A#[0-9a-f]{6}\Z")
 common = {
-    "name": st.text(st.characters(codec="utf-8"), min_size=1, max_size=60),
+    "name": st.text(st.characters(codec="utf-8", exclude_characters="\0"), min_size=1, max_size=60),
     "position": places,
     "yaw": st.floats(-6.28, 6.28),
     "colour": colours,

@@ -1,7 +1,8 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from handsteer.transports.timing import StaleMessageFilter
+from handsteer.clock import to_stamp
+from handsteer.transports.timing import Repeats, StaleMessageFilter
 
 APART = st.floats(-1e9, 1e9)
 
@@ -62,3 +63,24 @@ def test_it_does_not_grow() -> None:
     for number in range(1000):
         lateness.is_late(number.to_bytes(2, "big"), 0.0, 0.0)
     assert len(lateness._least) <= 32
+
+
+def repeats(*messages: tuple[float, float]) -> list[bool]:
+    """Return whether each message, given as its stamp and its arrival, says nothing of now."""
+    watch = Repeats()
+    return [watch.has(to_stamp(stamp_s), now_s) for stamp_s, now_s in messages]
+
+
+def test_a_message_again_says_nothing_of_now_and_one_without_a_stamp_may() -> None:
+    assert repeats((5.0, 0.0), (5.05, 0.05), (5.05, 0.1), (5.05, 0.15), (5.2, 0.2)) == [False, False, True, True, False]
+    assert repeats((0.0, 0.0), (0.0, 0.05)) == [False, False]
+
+
+def test_stamps_that_crawl_say_nothing_of_now() -> None:
+    assert repeats(*((5.0 + 0.001 * count, 0.05 * count) for count in range(5))) == [False, True, True, True, True]
+    assert not any(repeats(*((5.0 + 0.015 * count, 0.05 * count) for count in range(5))))
+
+
+def test_a_clock_that_is_set_back_or_that_was_paused_is_followed_from_its_second_message() -> None:
+    assert repeats((5.0, 0.0), (1.0, 0.05), (1.05, 0.1)) == [False, False, False]
+    assert repeats((5.0, 0.0), (5.02, 60.0), (5.04, 60.02)) == [False, True, False]

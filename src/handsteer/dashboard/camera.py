@@ -163,7 +163,7 @@ class PictureNode(Node):
         self._answer(jpeg)
 
     def _answer(self, jpeg: bytes | None) -> None:
-        # A deque, because the server's thread appends concurrently: also whoever has got this picture already.
+        # A deque, because the server's thread appends concurrently, also of a viewer that has this picture already.
         for _ in range(len(self._waiting)):
             future = self._waiting.popleft()
             with suppress(RuntimeError):  # the server has stopped

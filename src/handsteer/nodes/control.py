@@ -36,6 +36,7 @@ from handsteer.nodes.timing import CALM_S, LatencyLog, StallGuard
 from handsteer.timeouts import ENGAGE_S, ODOMETRY_S
 from handsteer.transports.base import Call, Received, Transport
 from handsteer.transports.commands import Commands
+from handsteer.transports.timing import Repeats
 from handsteer.types import NONE, ZERO, Stick, Velocity, action_of
 
 log = logging.getLogger(__name__)
@@ -98,7 +99,7 @@ class HandSignControlNode(Node):
         self._control = Control(config, arming=arming, engage=engage)
         self._safety, self._mux = self._control.safety, self._control.mux
         self._following = None if config.robots else Following(checks_motion=arming)
-        self._measured = MeasuredVelocity()
+        self._measured, self._repeats = MeasuredVelocity(), Repeats()
         self._moved: tuple[float, bool] | None = None
         self._commanded = ZERO
         self._last_step_s = clock.now()
@@ -236,6 +237,8 @@ class HandSignControlNode(Node):
 
     def _on_odometry(self, received: Received[Odometry]) -> None:
         assert self._following is not None
+        if self._repeats.has(received.message.header.stamp, self.clock.now()):
+            return  # it says nothing of now: a robot that hangs is as silent
         measured = self._measured.read(received.message)
         self._following.note(self._commanded if measured is None else measured)
         self._moved = (self.clock.now(), measured is None or not measured.is_rest)

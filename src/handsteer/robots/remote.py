@@ -14,6 +14,7 @@ from handsteer.robots.command_limiter import CommandLimiter
 from handsteer.robots.description import robot_description
 from handsteer.transports.base import Received, Session
 from handsteer.transports.commands import Commands
+from handsteer.transports.timing import Repeats
 from handsteer.types import ZERO, Pose2D, Velocity
 
 log = logging.getLogger(__name__)
@@ -66,6 +67,7 @@ class RemoteRobot:
         self._topic = replace(topic, or_type=cmd_vel.or_type)
         self._odom_topic = _full_name(session, config.odom_topic)
         self._seen: _Seen | None = None
+        self._repeats = Repeats()
         self._scanned: tuple[LaserScan, float] | None = None
         self._listens_to_scans = False
         self._senseless = False
@@ -157,6 +159,8 @@ class RemoteRobot:
 
     def _on_odometry(self, received: Received[Any]) -> None:
         message = received.message
+        if isinstance(message, Odometry) and self._repeats.has(message.header.stamp, self._session.clock.now()):
+            return  # it says nothing of now
         read = _of_turtle if self._config.odom_type == "turtlesim_pose" else _of_odometry
         seen = read(message, self._session.clock.now())
         pose = seen.pose

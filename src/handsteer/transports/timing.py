@@ -1,10 +1,11 @@
-"""Times of messages: their capture times, late ones after an interruption of the link, and a ``/clock`` that stops."""
+"""Times of messages: their capture times, repeated and late ones, and a ``/clock`` that stops."""
 
 import logging
+import math
 from collections import OrderedDict
 from typing import Any
 
-from handsteer.clock import Clock, ClockWatch, SimulatedClock
+from handsteer.clock import Clock, ClockWatch, SimulatedClock, to_seconds
 from handsteer.messages import Time
 
 _NO_STAMP = Time(sec=0, nanosec=0)
@@ -12,6 +13,8 @@ _NO_STAMP = Time(sec=0, nanosec=0)
 # A sender's clock that is set back by a second is trusted again after a minute and a half; delays are shorter.
 _LEAK = 0.01
 _SENDERS = 32
+# Of simulators that are slower than real time.
+_LEAST_PACE = 0.2
 _CLOCK_SILENCE_S = 2.0
 
 log = logging.getLogger(__name__)
@@ -26,6 +29,28 @@ def capture_time(message: Any, clock: Clock) -> float | None:
     if header is None or header.stamp == _NO_STAMP:
         return None
     return clock.time_of(header.stamp)
+
+
+class Repeats:
+    """Recognises messages that say nothing of now, by their stamps: a program that hangs may repeat its last one.
+
+    Stamps have to advance at a fifth of the pace at which time passes here, of whatever clock they are.
+    """
+
+    def __init__(self) -> None:
+        self._stamp_s, self._came_s = -math.inf, -math.inf
+
+    def has(self, stamp: Time, now_s: float) -> bool:
+        """Return whether a message that arrives at ``now_s`` has no newer stamp; one without a stamp always counts."""
+        if stamp == _NO_STAMP:
+            return False
+        stamp_s = to_seconds(stamp)
+        advanced_s = stamp_s - self._stamp_s
+        if advanced_s == 0.0:
+            return True
+        passed_s, self._came_s = now_s - self._came_s, now_s
+        self._stamp_s = stamp_s
+        return 0.0 < advanced_s < _LEAST_PACE * passed_s
 
 
 class StaleMessageFilter:
