@@ -147,11 +147,11 @@ class BagChain(Chain):
         self._bag: list[tuple[float, Topic[Any], Any]] = []
         topics: tuple[Topic[Any], ...] = (IMAGE_RAW, HAND_SIGN, STEERING_CMD_VEL, CMD_VEL)
         for topic in topics:
-            self.faults.subscribe("recorder", topic, partial(self._keep, topic))
+            self.faults.subscribe("bag", topic, partial(self._keep, topic))
 
     def play(self, *topics: Topic[Any]) -> None:
         """Play these topics from now on."""
-        self.domain.kill("recorder")
+        self.domain.kill("bag")
         began_s = self.clock.now() - BAG_S
         bag = [each for each in self._bag if each[0] >= began_s and each[1] in topics]
         assert bag, topics

@@ -21,6 +21,7 @@ ROWS = {row.name: row for row in rows()}
 PAST_THE_CONTROL = {
     f"{CMD_VEL.name}: delayed by 0 to 0.3 s; then the driver stops",
     f"{CMD_VEL.name}: a second publisher drives, the hand is lowered; then it stops",
+    "all nodes: a bag of the drive is played: its commands; the hand is lowered; then it ends",
 }
 """Where the robot is commanded to move after the reason for it has ended, by the network or by another program."""
 

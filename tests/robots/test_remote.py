@@ -16,7 +16,6 @@ from handsteer.messages import (
     Pose,
     PoseWithCovariance,
     Quaternion,
-    Time,
     Topic,
     Twist,
     TwistWithCovariance,
@@ -88,10 +87,10 @@ def test_it_knows_who_else_commands_it() -> None:
     assert teleop.has_subscribers
 
 
-def odometry() -> Odometry:
+def odometry(link: Link) -> Odometry:
     at = Pose(Point(0.0, 0.0, 0.0), Quaternion(0.0, 0.0, 0.0, 1.0))
     pose, moving = PoseWithCovariance(at, np.zeros(36)), TwistWithCovariance(twist(0.0, 0.0), np.zeros(36))
-    return Odometry(Header(Time(1, 0), "odom"), "base_link", pose, moving)
+    return Odometry(Header(link.clock.stamp(link.clock.now()), "odom"), "base_link", pose, moving)
 
 
 def test_a_robot_whose_odometry_falls_silent_gets_zeros_until_it_is_back_and_a_zero_was_commanded() -> None:
@@ -102,7 +101,7 @@ def test_a_robot_whose_odometry_falls_silent_gets_zeros_until_it_is_back_and_a_z
     def drive(linear_mps: float, seconds: float, *, is_heard: bool = True) -> float:
         for _ in range(round(seconds / 0.02)):
             if is_heard:
-                odom.publish(odometry())
+                odom.publish(odometry(link))
             robot.command(linear_mps, 0.0)
             link.clock.advance(0.02)
             robot.step(0.02)
