@@ -5,8 +5,9 @@ JSON from its input and answers each by one line of JSON. ``record`` (topic, typ
 messages, ``get`` (topic, since_s) returns what was noted as ``[time_s, [values]]``. ``advertise`` (topic, type,
 reliable) comes before ``listeners`` (topic), which returns how many listen, ``publish`` (topic, values, count,
 period_s) and ``publish_raw`` (topic, hex); ``repeat`` (topic, values or null, every_s) publishes in the background
-until the next one. ``introduce`` (name) makes it a node for ROS 2, and ``graph`` and ``user_data`` (topic) return what
-a ROS 2 node would know of others. ``call`` (service, type, fields) asks as a client of rmw_cyclonedds_cpp does, and
+until the next one. ``set_clock`` (rate, jump_s) tells simulated time. ``introduce`` (name) makes it a node for ROS 2,
+and ``graph`` and ``user_data`` (topic) return what a ROS 2 node would know of others. ``call`` (service, type, fields)
+asks as a client of rmw_cyclonedds_cpp does, and
 returns the reply's fields; ``parameter_client.py`` has its types.
 
 Arguments: the number of the domain; a configuration of Cyclone DDS where it shall not keep to this machine; the name of
@@ -80,6 +81,7 @@ readers: dict[str, tuple[Any, list[str]]] = {}
 writers: dict[str, Any] = {}
 repeated: dict[str, dict[str, Any] | None] = {}
 repeating: set[str] = set()
+simulated = {"from_s": 10_000.0, "began_s": 0.0, "rate": 0.0, "told": 0.0}
 participants = BuiltinDataReader(participant, BuiltinTopicDcpsParticipant)
 endpoints = {
     "writers": BuiltinDataReader(participant, BuiltinTopicDcpsPublication),
@@ -196,6 +198,27 @@ def run_clock(order: dict[str, Any]) -> bool:
 
     threading.Thread(target=run, daemon=True).start()
     return True
+
+
+def set_clock(order: dict[str, Any]) -> bool:
+    """Tell the time on /clock from now on, ``rate`` times as fast as real time; first jump by ``jump_s``."""
+    now_s = simulated_s()
+    simulated.update(from_s=now_s + order.get("jump_s", 0.0), began_s=time.monotonic(), rate=order.get("rate", 1.0))
+    if not simulated["told"]:
+        simulated["told"] = 1.0
+        threading.Thread(target=tell_time, daemon=True).start()
+    return True
+
+
+def simulated_s() -> float:
+    return simulated["from_s"] + (time.monotonic() - simulated["began_s"]) * simulated["rate"]
+
+
+def tell_time() -> None:
+    while True:
+        now_s = simulated_s()
+        writers["/clock"].write(Clock(Time(int(now_s), int(now_s % 1 * 1e9))))
+        time.sleep(0.01)
 
 
 def introduce(order: dict[str, Any], client: Client | None = None) -> bool:

@@ -56,11 +56,12 @@ class Link:
         log: Where the relay says what goes wrong.
 
     Attributes:
+        robot, workstation: Its ends.
         kind: ``netem`` or ``relay``.
     """
 
     def __init__(self, robot: Machine, workstation: Machine, log: Path) -> None:
-        self._ends = (robot, workstation)
+        self.robot, self.workstation = self._ends = (robot, workstation)
         self._limiter: Peer | None = None
         self._shape = (0.0, 0.0, 0.0)
         self.kind = "netem" if has_netem(robot) else "relay"
@@ -82,6 +83,16 @@ class Link:
     def cut(self) -> float:
         """Let nothing pass; return when, in Unix time."""
         return self._apply(0.0, 0.0, 1.0)
+
+    def cut_off(self, machine: Machine) -> float:
+        """Let nothing come to ``machine``, which is still heard; return when, in Unix time."""
+        if self._limiter is not None:
+            number = self._ends.index(machine)
+            return float(self._limiter.ask("shape", delay_s=0.0, jitter_s=0.0, loss=0.0, cut_off=number)["at_s"])
+        began_s = time.time()
+        other = self._ends[1 - self._ends.index(machine)]
+        other.run("tc", "qdisc", "replace", "dev", DEVICE, "root", "netem", "loss", "100%")
+        return began_s
 
     def restore(self) -> float:
         """Let frames pass as before the cut; return when, in Unix time."""

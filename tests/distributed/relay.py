@@ -3,7 +3,8 @@
 It stands in for ``tc netem`` where the kernel has none. Run as root: ``relay.py NAMESPACE DEVICE NAMESPACE DEVICE``
 makes a device in each namespace and relays Ethernet frames between them, until its input ends; then both devices are
 gone. It reads orders as lines of JSON and answers each by one line: ``shape`` (delay_s, jitter_s, loss) is for both
-directions; the answer says when it was done, in Unix time, and how many frames have been dropped.
+directions, and with ``cut_off``, 0 or 1, nothing comes to that end; the answer says when it was done, in Unix time, and
+how many frames have been dropped.
 """
 
 import contextlib
@@ -39,6 +40,7 @@ class Wire:
         delay_s: How long a frame takes at least, but for the jitter.
         jitter_s: The time is evenly spread over ``delay_s`` ± this; never less than 0. Frames may overtake others.
         loss: Which share of the frames is lost, 0 to 1; at 1 the cable is cut, also for what is under way.
+        cut_off: The end to which nothing comes, if the cable is cut in one direction.
         dropped: How many frames were lost.
     """
 
@@ -47,6 +49,7 @@ class Wire:
         self._waiting: list[tuple[float, int, int, bytes]] = []
         self._number = 0
         self.delay_s = self.jitter_s = self.loss = 0.0
+        self.cut_off: int | None = None
         self.dropped = 0
 
     def shape(self, delay_s: float = 0.0, jitter_s: float = 0.0, loss: float = 0.0) -> None:
@@ -58,7 +61,7 @@ class Wire:
 
     def put(self, frame: bytes, end: int, now_s: float) -> None:
         """Let ``frame`` go to the given end; as a real queue does, this one drops what is too much."""
-        if len(self._waiting) >= MOST_WAITING or self._draw() < self.loss:
+        if end == self.cut_off or len(self._waiting) >= MOST_WAITING or self._draw() < self.loss:
             self.dropped += 1
             return
         due_s = now_s + max(0.0, self.delay_s + (2 * self._draw() - 1) * self.jitter_s)
@@ -124,6 +127,8 @@ def main() -> None:
     def serve(line: str) -> None:
         order: dict[str, Any] = json.loads(line)
         assert order.pop("order") == "shape", line
+        cut_off = order.pop("cut_off", None)
+        wire.cut_off = None if cut_off is None else ends[cut_off]
         wire.shape(**order)
         print(json.dumps({"at_s": time.time(), "dropped": wire.dropped}), flush=True)
 

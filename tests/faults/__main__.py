@@ -3,11 +3,17 @@
 import logging
 import sys
 
-from tests.faults import networks, processes
+from tests.faults import browser, networks, people, processes
 from tests.faults.stepped import outcomes
 from tests.faults.table import write
 
-PARTS = {"stepped": lambda: list(outcomes().values()), "processes": processes.outcomes, "networks": networks.outcomes}
+PARTS = {
+    "stepped": lambda: list(outcomes().values()),
+    "processes": processes.outcomes,
+    "networks": networks.outcomes,
+    "browser": browser.outcomes,
+    "people": people.outcomes,
+}
 
 
 def main(parts: list[str]) -> None:

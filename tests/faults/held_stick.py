@@ -9,6 +9,8 @@ from typing import Any
 from handsteer.cli import main, one_node
 
 SPEED_MPS = 0.3
+RELEASED = 15
+"""Zeros before it is pushed."""
 
 
 @contextmanager
@@ -16,7 +18,9 @@ def held(node: Any, config: Any) -> Iterator[None]:
     ended = threading.Event()
 
     def hold() -> None:
-        node.steer(0.0, 0.0)  # whoever takes the stick has not pushed it yet
+        for _ in range(RELEASED):  # who takes the stick has not pushed it yet, and the control may not hear it yet
+            node.steer(0.0, 0.0)
+            ended.wait(0.1)
         while not ended.wait(0.1):
             node.steer(SPEED_MPS, 0.0)
 

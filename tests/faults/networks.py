@@ -2,6 +2,7 @@
 
 import sys
 import tempfile
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -14,6 +15,8 @@ from tests.faults.stepped import Outcome
 
 SCRIPT = "NONE:4 Forward:600"
 FAULT_S, AFTER_S = 2.0, 1.5
+FLAPS, CUT_S, JOINED_S = 4, 0.6, 0.4
+FLAPPING_S = FLAPS * (CUT_S + JOINED_S) + 0.5
 BRAKES_S = 0.6
 MOVES_MPS = 0.02
 LAYOUTS = {
@@ -52,6 +55,9 @@ def rows() -> list[Row]:
             ("the link is cut", Link.cut, FAULT_S),
             ("the link is cut", Link.cut, 0.7),
             ("all messages are delayed by 0.8 s", _slow, FAULT_S),
+            ("nothing comes to the robot's machine, which is still heard", _deafen, FAULT_S),
+            ("nothing comes from the robot's machine, which still hears", _mute, FAULT_S),
+            (f"the link is cut for {CUT_S:g} s and there for {JOINED_S:g} s, again and again", _flap, FLAPPING_S),
         )
     ]
 
@@ -59,6 +65,28 @@ def rows() -> list[Row]:
 def _slow(link: Link) -> float:
     began_s = time.time()
     link.shape(delay_s=0.8)
+    return began_s
+
+
+def _deafen(link: Link) -> float:
+    return link.cut_off(link.robot)
+
+
+def _mute(link: Link) -> float:
+    return link.cut_off(link.workstation)
+
+
+def _flap(link: Link) -> float:
+    began_s = link.cut()
+
+    def flap() -> None:
+        for _ in range(FLAPS):
+            time.sleep(CUT_S)
+            link.restore()
+            time.sleep(JOINED_S)
+            link.cut()
+
+    threading.Thread(target=flap, daemon=True).start()
     return began_s
 
 
@@ -100,10 +128,10 @@ def outcome_of(row: Row, drive: Drive) -> Outcome:
     time.sleep(AFTER_S)
     slower = [one.at_s for one in drive.odometry(began_s) if one.speed_mps < SPEED_MPS - 0.02]
     moves = any(one.speed_mps > MOVES_MPS for one in drive.odometry(ended_s + BRAKES_S))
-    said = [text for text in drive.reports("hand_sign_control", heard_s) if text.startswith("standing")]
+    said = [text for text in drive.reports("hand_sign_control", heard_s) if not text.startswith("driving")]
     drive.nodes.pop("camera").kill()
     zero_s = slower[0] - began_s if slower else None
-    return Outcome(row.where, row.fault, zero_s, moves, True, said[0] if said else "nothing")
+    return Outcome(row.where, row.fault, zero_s, moves, True, said[-1] if said else "nothing")
 
 
 def outcomes() -> list[Outcome]:

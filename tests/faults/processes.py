@@ -39,10 +39,14 @@ NAMES = {
 }
 OPTIONS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "robot": (("--world", "empty"), ()),
-    "control": (("--control.arming", "on"), ("-p", f"max_linear:={SPEED_MPS}", "-p", "linear_step:=0.02")),
+    "control": (
+        ("--control.arming", "on", "--control.engage", "off"),
+        ("-p", f"max_linear:={SPEED_MPS}", "-p", "linear_step:=0.02"),
+    ),
     "recognition": ((), ()),
     "camera": (FORWARD, ()),
 }
+SIGNS, SIMULATED = "signs", "simulated time"
 SIGNALS = ("SIGKILL", "SIGSTOP", "SIGHUP", "SIGQUIT", "SIGTSTP", "SIGABRT", "SIGTERM", "SIGINT")
 
 
@@ -52,8 +56,8 @@ class Rig:
 
     Attributes:
         graph: The domain.
-        by: What sets the robot in motion: ``signs`` by the plain program, a ``camera`` before a virtual hand, or a
-            ``stick`` that is held.
+        by: What sets the robot in motion: ``signs`` by the plain program, the same in ``simulated time``, a ``camera``
+            before a virtual hand, or a ``stick`` that is held.
         more_env: Further variables of the environment, by node.
     """
 
@@ -67,9 +71,12 @@ class Rig:
         peer.ask("record", topic=CMD_VEL, type="Twist", fields=["linear.x"])
         peer.ask("record", topic=ODOM, type="Odometry", fields=["twist.twist.linear.x"])
         peer.ask("record", topic=DIAGNOSTICS, type="DiagnosticArray", fields=["status.0.name", "status.0.message"])
+        if self.by == SIMULATED:
+            peer.ask("advertise", topic="/clock", type="Clock")
+            peer.ask("set_clock", rate=1.0)
         for verb in ("robot", "control"):
             self.start(verb)
-        if self.by == "signs":
+        if self.by in (SIGNS, SIMULATED):
             peer.ask("advertise", topic=SIGN, type="String")
         elif self.by == "camera":
             self.start("recognition")
@@ -84,6 +91,8 @@ class Rig:
             self.graph.adopt(self.nodes[verb])
             return
         options, ros = OPTIONS[verb]
+        if self.by == SIMULATED:
+            ros = (*ros, "-p", "use_sim_time:=true")
         if verb == "camera":
             ros = ("-p", f"virtual_hand.script:={script}")
         before, self.graph.env = self.graph.env, {**self.graph.env, **self.more_env.get(verb, {})}
@@ -101,7 +110,7 @@ class Rig:
 
     def _has_set_off(self) -> bool:
         """Let go once, and try to drive; a machine that is busy with other things may need more than one try."""
-        if self.by == "signs":
+        if self.by in (SIGNS, SIMULATED):
             self.show("NONE")
             time.sleep(NEUTRAL_S)
             self.show("Forward")
@@ -125,7 +134,7 @@ class Rig:
 
     def let_go(self) -> None:
         """End the reason to drive."""
-        if self.by == "signs":
+        if self.by in (SIGNS, SIMULATED):
             self.show("NONE")
         else:
             self.end("camera" if self.by == "camera" else "steering")
@@ -183,11 +192,11 @@ class Row:
 
 def rows() -> list[Row]:
     """Return all rows; those of one way to drive come one after the other."""
-    return sorted([*_signals(), *_memory(), *_clocks(), *_disk()], key=lambda row: row.by)
+    return sorted([*_signals(), *_memory(), *_clocks(), *_disk(), *_simulated_time()], key=lambda row: row.by)
 
 
 def _signals() -> Iterator[Row]:
-    drives = {"camera": "camera", "recognition": "camera", "control": "signs", "robot": "signs", "steering": "stick"}
+    drives = {"camera": "camera", "recognition": "camera", "control": SIGNS, "robot": SIGNS, "steering": "stick"}
     for verb, by in drives.items():
         for name in SIGNALS:
 
@@ -211,7 +220,7 @@ def _signals() -> Iterator[Row]:
 
 
 def _memory() -> Iterator[Row]:
-    for verb, by in (("control", "signs"), ("recognition", "camera")):
+    for verb, by in (("control", SIGNS), ("robot", SIGNS), ("recognition", "camera")):
 
         def starve(rig: Rig, verb: str = verb) -> None:
             pid = rig.nodes[verb].popen.pid
@@ -237,7 +246,7 @@ def _clocks() -> Iterator[Row]:
         "DONT_FAKE_MONOTONIC": "1",
         "FAKETIME_DONT_FAKE_MONOTONIC": "1",
     }
-    for verb, by in (("camera", "camera"), ("recognition", "camera"), ("control", "signs"), ("robot", "signs")):
+    for verb, by in (("camera", "camera"), ("recognition", "camera"), ("control", SIGNS), ("robot", SIGNS)):
         for words, seconds in (("ahead", "+3600"), ("back", "-3600")):
 
             def prepare(rig: Rig, verb: str = verb) -> None:
@@ -277,7 +286,25 @@ def _disk() -> Iterator[Row]:
         rig.end("control")
 
     fault = "its log is on a full disk; then the driver stops"
-    yield Row("control", fault, "signs", shout, over, leaves_reason=True, prepare=prepare)
+    yield Row("control", fault, SIGNS, shout, over, leaves_reason=True, prepare=prepare)
+
+
+def _simulated_time() -> Iterator[Row]:
+    for words, clock, leaves in (
+        ("stands still for a while", {"rate": 0.0}, False),
+        ("jumps ahead by an hour", {"jump_s": 3600.0}, False),
+        ("jumps back by an hour", {"jump_s": -3600.0}, False),
+        ("runs three times as fast; then the driver stops", {"rate": 3.0}, True),
+        ("runs at a third of its speed; then the driver stops", {"rate": 1 / 3}, True),
+    ):
+
+        def begin(rig: Rig, clock: dict[str, float] = clock) -> None:
+            rig.graph.peer.ask("set_clock", **clock)
+
+        def end(rig: Rig) -> None:
+            rig.graph.peer.ask("set_clock", rate=1.0)
+
+        yield Row("/clock", words, SIMULATED, begin, end, leaves_reason=leaves)
 
 
 @contextmanager
@@ -309,6 +336,9 @@ def outcome_of(row: Row, rig: Rig) -> Outcome:
     return Outcome(row.where, row.fault, zero_s, rig.moves(ended_s + BRAKES_S), True, said)
 
 
+_ORDER = ("camera", "recognition", "control", "steering", "robot", "/clock")
+
+
 def outcomes() -> list[Outcome]:
     """Return what becomes of all rows."""
     found = []
@@ -318,5 +348,5 @@ def outcomes() -> list[Outcome]:
                 if row.by == by:
                     found.append(outcome_of(row, made))
                     print(found[-1], file=sys.stderr, flush=True)  # noqa: T201 - it takes minutes
-    order = {verb: number for number, verb in enumerate(("camera", "recognition", "control", "steering", "robot"))}
+    order = {verb: number for number, verb in enumerate(_ORDER)}
     return sorted(found, key=lambda outcome: order[outcome.where])
