@@ -53,7 +53,7 @@ class VirtualHandConfig(Section):
     """The rendered hand that replaces a webcam."""
 
     script: str = Field(
-        "Forward:3 Turn Left:2 Forward:2 Turn Right:2 Go:1 Backward:3 Stop:2 NONE:1",
+        "Forward:3 Turn Left:2 Forward:2 Turn Right:2 Go:1 Backward:3 Stop:0.7 Go:0.6 Stop:0.7 NONE:1",
         description="Signs to show, with their durations in seconds, repeated; NONE lowers the hand; "
         "Peace, Three, Four, Horns, Call and OK are for teaching; Go@0.1,-0.05:2 is 0.1 m to the right and 0.05 m up",
     )
