@@ -107,7 +107,7 @@ def cost_ms() -> float:
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--seconds", type=float, default=5.0, help="how long each fault lasts [s]")
+    parser.add_argument("--seconds", type=float, default=25.0, help="how long each fault lasts [s]")
     arguments = parser.parse_args()
     recognizer = Recognizer()
     print(f"A picture costs {cost_ms():.3f} ms.\n\n| the camera | stops after [s] |\n|---|---|")

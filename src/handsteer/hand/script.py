@@ -14,7 +14,7 @@ from handsteer.types import Handedness
 AUTO = "auto"
 """The script that shows what the run needs to drive: :func:`chosen_script`."""
 
-_SIGNS = "Forward:3 Turn Left:2 Forward:2 Turn Right:2 Go:1 Backward:3 Stop:2 NONE:1"
+_SIGNS = "Forward:3 Turn Left:2 Forward:2 Turn Right:2 Go:1 Backward:3 Stop:0.7 Go:0.6 Stop:0.7 NONE:1"
 _JOYSTICK = "Stop:1.5 Go:1 Go@0,-0.06:2 Go@0.05,-0.06:1.5 Go@-0.05,-0.06:1.5 Go@0.06,0:3 Stop:1"
 _ENGAGES = "Stop:1.2 Go:0.6 Stop:0.7"  # by the gesture, and by a palm that is held
 
