@@ -71,13 +71,20 @@ def one_pixel(picture: Picture, index: int) -> Picture:
     return changed
 
 
+def few_pixels(picture: Picture, index: int) -> Picture:
+    """Change a part of the hand that lies in several tiles."""
+    changed = picture.copy()
+    changed[200:220, 250:270] = np.random.default_rng(index).integers(0, 255, (20, 20, 3))
+    return changed
+
+
 def stamped(picture: Picture, index: int) -> Picture:
     changed = picture.copy()
     changed[10:40, 10:300] = np.random.default_rng(index).integers(0, 255, (30, 290, 3))
     return changed
 
 
-@pytest.mark.parametrize("spoil", [torn, one_pixel, stamped])
+@pytest.mark.parametrize("spoil", [torn, one_pixel, few_pixels, stamped])
 @pytest.mark.parametrize("length", [1, 9])
 def test_a_picture_in_which_the_hand_is_old_does_not_show_it(
     spoil: Callable[[Picture, int], Picture], length: int
