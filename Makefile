@@ -56,8 +56,8 @@ test: lint models
 	@HANDSTEER_STEPS=5000 $(BIN)/pytest $(PARALLEL) -m "$(PLAIN)" --durations=10 $(ARGS)
 
 test-all: lint models
-	@HANDSTEER_STEPS=20000 $(BIN)/pytest $(PARALLEL) --durations=30 $(ARGS)
 	@$(BIN)/python -m scripts.mutants --day $(DAY)
+	@HANDSTEER_STEPS=20000 $(BIN)/pytest $(PARALLEL) --durations=30 $(ARGS)
 
 mutants: $(BIN)/.dev models
 	@$(BIN)/python -m scripts.mutants $(ARGS)

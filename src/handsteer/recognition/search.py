@@ -45,7 +45,7 @@ class Places:
     """Possible regions of hands in a frame.
 
     Attributes:
-        regions: By descending score.
+        regions: The most promising first.
         min_presence: Minimum presence of a hand, 0 to 1.
         rivals: Other rotations of a single region; of those that show a hand, the one with the highest presence is
             used.
@@ -75,12 +75,17 @@ class Palms:
     near: bool = False
 
     def places(self, image: NDArray[np.uint8], palms: PalmDetector, limit: int) -> Places:
-        """Return the regions of palms, those of ``limit`` hands and a few more."""
-        found: list[Palm] = []
+        """Return the regions of palms, those of ``limit`` hands and a few more.
+
+        A palm that is found as sampled comes before those that only smoothing shows: the landmark model reads more
+        hands in its region.
+        """
+        found: list[tuple[bool, Palm]] = []
         for view in self.views:
-            if sum(palm.score >= _SURE_PALM for palm in found) < limit:
-                found += palms.detect(image, limit + _FURTHER, widened=view.widened, smoothed=view.smoothed)
-        regions = [palm.roi for palm in sorted(found, key=lambda palm: -palm.score)]
+            if sum(palm.score >= _SURE_PALM for _, palm in found) < limit:
+                seen = palms.detect(image, limit + _FURTHER, widened=view.widened, smoothed=view.smoothed)
+                found += [(view.smoothed, palm) for palm in seen]
+        regions = [palm.roi for _, palm in sorted(found, key=lambda each: (each[0], -each[1].score))]
         if not self.near:
             return Places(regions)
         return Places([roi for roi in regions if roi.side >= _NEAR * max(image.shape[:2])], _NEAR_PRESENCE)
