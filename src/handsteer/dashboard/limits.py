@@ -158,7 +158,7 @@ def _network(host: str) -> str:
     return host if address.version == 4 else str(ipaddress.ip_network((address, 64), strict=False))
 
 
-MOST_UNCONNECTED_PAGES: Final = 64
+MOST_UNCONNECTED_PAGES: Final = 16
 """Each takes half a megabyte or more; NiceGUI keeps it for a minute."""
 
 
