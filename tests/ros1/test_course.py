@@ -65,6 +65,7 @@ def test_the_chapters_args_count(course: LaunchGraph, tmp_path: Path) -> None:
     """The recognition is not given the arg, so it publishes where it does by itself, and the control follows that."""
     file = tmp_path / "sign_control.launch"
     file.write_text(sign_control_xml())
+    course.set_parameter("/sign_to_controller/engage_by", "hold")
     record = course.record({"/other/cmd_vel": "geometry_msgs/Twist"})
     launch = course.launch_file(file, "control_topic:=/other/cmd_vel", "publish_gesture_topic:=/words")
     eventually(lambda: any(twist["linear"] > 0.05 for twist in record.of("/other/cmd_vel")), what="it drives elsewhere")

@@ -119,6 +119,7 @@ def test_photos_as_a_30_hz_video_drive_the_robot(ros: LaunchGraph, data_dir: Pat
 
 def test_the_topics_are_those_that_the_args_say(ros: LaunchGraph) -> None:
     show(ros, "Forward:5 Stop:3")
+    ros.set_parameter("/hand_sign_control/engage_by", "hold")
     record = ros.record({"/words": "std_msgs/String", "/other/cmd_vel": "geometry_msgs/Twist"})
     ros.launch(*SIGN_CONTROL, VIRTUAL, "publish_gesture_topic:=/words", "control_topic:=/other/cmd_vel")
 
