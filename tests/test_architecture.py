@@ -12,7 +12,7 @@ LINE = re.compile(r"^\| `([\w/.]+)` \| (\d+) \|", re.MULTILINE)
 
 
 @pytest.mark.parametrize(
-    ("begin", "end", "most"), [("A frame,", "A steering command,", 10), ("A steering", "## Th", 7)]
+    ("begin", "end", "most"), [("way of a frame,", "way of a steering", 10), ("way of a steering", "## Th", 7)]
 )
 def test_the_ways_of_a_frame_and_of_a_command_are_as_short_as_shown(begin: str, end: str, most: int) -> None:
     rows = LINE.findall(TEXT[TEXT.index(begin) : TEXT.index(end, TEXT.index(begin) + 1)])
