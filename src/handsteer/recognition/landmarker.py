@@ -41,8 +41,8 @@ _RUNS_WITH_PALMS: Final = 2
 """Likewise in a frame with palm detection; a lost hand's count too. MediaPipe's ``full`` models take longer for one."""
 _SEARCH: Final = Pace(change=6, settle_s=0.12, period_s=0.2)
 """How often to search without a hand: when settled, each of the four main ways has had its frame at 30 Hz."""
-_SEARCH_BESIDE_A_HAND: Final = Pace(change=6, settle_s=0.6, period_s=1.0, least_s=0.2)
-"""Likewise with a hand in view: after a change, each of the three ways has its frame."""
+_SEARCH_BESIDE_A_HAND: Final = Pace(change=6, settle_s=0.6, period_s=1.0, least_s=0.3)
+"""Likewise with a hand in view: after a change, both ways have their frame."""
 _FOLLOW: Final = Pace(change=3, settle_s=0.08, period_s=0.1)
 """How often to process tracked hands: below three levels, landmarks deviate by at most 0.03 of the hand."""
 _MAX_SIDE: Final = 32766

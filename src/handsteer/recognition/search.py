@@ -127,7 +127,7 @@ _WITHOUT_HANDS: Final[tuple[Turn, ...]] = tuple(
     for turn in ((_PLAIN,), (wide, _MIDDLE_UP), (_SMOOTH,), (_VERY_WIDE, turned))
 )
 # A tracked hand was usually found in the plain frame, in which a second one would have been found too.
-_BESIDE_A_HAND: Final[tuple[Turn, ...]] = ((_WIDE,), (_SMOOTH,), (_PLAIN,))
+_BESIDE_A_HAND: Final[tuple[Turn, ...]] = ((_SMOOTH_WIDE,), (_PLAIN,))
 
 
 class Search:
