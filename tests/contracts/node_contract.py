@@ -302,7 +302,10 @@ class ChainContract:
         assert stood_s - resumed_s < 0.6  # 0.3 m/s at 1 m/s², and no more
 
 
-RUN = ("--headless", "--json", *FORWARD, "--virtual-hand.script", "Stop:2 Forward:600", "--control.max-linear", "0.1")
+RUN = (
+    *("--headless", "--json", *FORWARD, "--virtual-hand.script", "Stop:2 Forward:600"),
+    *("--control.max-linear", "0.1", "--control.engage-by", "hold"),
+)
 """A run that drives a robot of another process, at 0.1 m/s in the end."""
 
 

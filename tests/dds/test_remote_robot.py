@@ -41,7 +41,9 @@ class Robots:
         self.robot.ask("add", name="it", cmd_vel=cmd_vel, odom=odom, **kind)
 
     def run(self, *arguments: str, script: str = FORWARD) -> Process:
-        self._process = self.graph.handsteer("run", *CAMERA, "--virtual-hand.script", script, *arguments)
+        # A busy machine may miss frames of the gesture.
+        words = (*CAMERA, "--control.engage-by", "hold", "--virtual-hand.script", script)
+        self._process = self.graph.handsteer("run", *words, *arguments)
         return self._process
 
     @property

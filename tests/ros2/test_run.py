@@ -25,7 +25,7 @@ def test_a_robot_of_a_real_ros2_is_driven_as_it_takes_commands(fresh: Ros2Graph,
     peer.ask("advertise", topic="/odom", type="Odometry", depth=5)
     # It stands still, which a control notices that tells it to go faster than this.
     words = ("--virtual-hand.script", "Stop:6 Forward:60", "--control.max-linear", "0.09", "--robot.odom-timeout", "10")
-    process = fresh.handsteer("run", *CAMERA, "--robot", fresh.transport, *words)
+    process = fresh.handsteer("run", *CAMERA, "--robot", fresh.transport, *words, "--control.engage-by", "hold")
     eventually(lambda: peer.ask("listeners", topic="/odom") or not process.running)
     assert process.running, process.text
     # Both ends have found each other only when each has seen the other, which takes Fast DDS up to three seconds.
