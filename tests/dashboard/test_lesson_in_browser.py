@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from playwright.sync_api import Locator
 
+from handsteer.cameras import freshness
 from handsteer.cameras.files import video_frames
 from handsteer.config import load
 from handsteer.recognition.custom_signs import load_custom_model
@@ -98,6 +99,8 @@ def test_a_sign_is_taught_from_the_browsers_webcam_and_drives(
     two_fingers: Path, plan: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
+    # Chromium repeats a clip in place of a webcam, whose pictures never repeat.
+    monkeypatch.setattr(freshness, "_PICTURES", 8)
     # A machine that draws the world in software, and has little time, is slow to send its camera's frames.
     patient: dict[str, Any] = {"signs": {"max_frame_age": 2.0, "dropout_hold": 1.0}, "control": {"sign_timeout": 2.0}}
     with visiting("NONE:600", "/teach", webcam=two_fingers, teach=plan, **patient) as visit:

@@ -255,6 +255,12 @@ def test_a_program_drives_and_when_it_is_silent_or_gone_the_robot_stops(encoding
                 eventually(lambda: speed(graph) > 0.1)
         eventually(lambda: stands(graph))
         eventually(lambda: seat.driver is None)
+
+        def has_the_seat() -> bool:
+            other.command(-0.2)  # it has asked a moment ago, so this may be too early to ask again
+            return seat.driver is not None
+
+        eventually(has_the_seat)
         tap(lambda: other.command(-0.2))
         with repeated(lambda: other.command(-0.2)):
             eventually(lambda: speed(graph) < -0.1, what="the second program, once the first has gone")
