@@ -23,7 +23,8 @@ from tests.contracts.node_contract import (
 from tests.processes import Peer, Process, Processes, as_tests_drive, eventually
 
 NODE = "hand_sign_control"
-SCRIPT = ("-p", "virtual_hand.script:=Forward:60")
+SCRIPT = ("-p", "virtual_hand.script:=Forward:25 Stop:1.5")
+"""Neutral again and again: a pause of a busy machine may have required it, as of odometry that was silent."""
 SETTLE_S = 0.3
 """One end sees the other first; the other follows within milliseconds."""
 

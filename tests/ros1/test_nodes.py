@@ -34,7 +34,8 @@ from tests.ros1.graph import Ros1Graph, ros1_graph
 
 pytestmark = [pytest.mark.ros1, pytest.mark.slow]
 
-SCRIPT = "_virtual_hand/script:=Forward:60"
+SCRIPT = "_virtual_hand/script:=Forward:25 Stop:1.5"
+"""Neutral again and again: a pause of a busy machine may have required it."""
 
 numbers = itertools.count()
 
