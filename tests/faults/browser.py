@@ -218,7 +218,8 @@ def _lost() -> Iterator[Row]:
         unlimited = (resource.RLIM_INFINITY, resource.RLIM_INFINITY)
         resource.prlimit(rig.process._child.process.pid, resource.RLIMIT_AS, unlimited)
 
-    yield Row("page", "its server cannot allocate memory; then the driver lets go", starve, feed, leaves_reason=True)
+    fault = "its server cannot allocate memory; then the driver releases the pad"
+    yield Row("page", fault, starve, feed, leaves_reason=True)
 
 
 def _others() -> Iterator[Row]:
@@ -227,7 +228,7 @@ def _others() -> Iterator[Row]:
         other.goto(f"{rig.url}/study")
         other.wait_for_function("window.socket?.connected")
 
-    fault = "another browser opens the study; then the driver lets go"
+    fault = "another browser opens the study; then the driver releases the pad"
     yield Row("page", fault, study, leaves_reason=True, studies=True)
 
     def inject(rig: Rig) -> float:

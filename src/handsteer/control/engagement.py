@@ -95,8 +95,8 @@ class Engagement:
 class Renewal:
     """Whether what drives has changed lately, as the vigilance device of a train asks for.
 
-    A picture that a camera repeats with noise cannot be told from a still hand, nor a stick that is stuck from one that
-    is held; neither changes. A change is another sign, a release, or a movement of the stick by more than
+    A picture that a camera repeats with noise cannot be distinguished from a still hand, nor a stick that is stuck from
+    one that is held; neither changes. A change is another sign, a release, or a movement of the stick by more than
     :data:`_TREMOR`.
 
     Args:

@@ -136,7 +136,7 @@ class Safety:
         self._disengage()
 
     def stall(self, why: str) -> None:
-        """Record that time was lost, for all inputs; what was held meanwhile has to be released."""
+        """Record that time was lost, for all inputs; what was held during it has to be released."""
         self.fault(why)
         self._require_release()
 

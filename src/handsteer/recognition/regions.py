@@ -32,7 +32,7 @@ _SAME_PALM_OVERLAP: Final = 0.3
 _SMOOTHING: Final = 0.6
 """Standard deviation of the blur of a smoothed frame, in pixels of the model's input.
 
-With 0.35 a tenth fewer of the hands are found that only a smoothed frame shows; without a blur two thirds fewer.
+With 0.3, a fifth of the hands that only a smoothed frame shows are not found; without a blur, two thirds.
 """
 
 

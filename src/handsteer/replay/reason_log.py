@@ -144,7 +144,7 @@ class ReasonLog:
         self._inputs[name].note(time_s, on=on, holds_s=holds_s)
 
     def _unsaid(self, moved: list[Span], live: list[Span], inputs: Mapping[Input, list[Span]]) -> list[Span]:
-        """Return when it moved by an input that the control did not name meanwhile; none without its statuses."""
+        """Return when it moved by an input that the control did not name then; none without its statuses."""
         if not self._watched:
             return []
         said = {source: level.spans(_STATUS_PERIOD_S, _STATUS_PERIOD_S) for source, level in self._said.items()}
