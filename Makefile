@@ -103,7 +103,7 @@ bench-signs: $(BIN)/.dev models
 	@$(BIN)/python -m scripts.signs_table
 
 signs-model: | $(BIN)/.run
-	@$(BIN)/python -m handsteer.training.synthetic.train
+	@$(BIN)/python -m handsteer.plugins.teach.synthetic.train
 
 QUANTIZER := $(VENV)/quantizer
 landmark-model: models $(QUANTIZER)/.made

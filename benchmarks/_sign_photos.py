@@ -16,12 +16,12 @@ from _sign_table import Row, row_of
 
 from handsteer.cameras.files import read_photo
 from handsteer.config import Config
+from handsteer.plugins.teach.evaluation.labels import LabelledPhoto, read_photo_labels
+from handsteer.plugins.teach.evaluation.sources import evaluate_photos
+from handsteer.plugins.teach.evaluation.views import View
+from handsteer.plugins.teach.synthetic.fit import part_of
 from handsteer.recognition.hand import Classifier, Hand, Landmarker
 from handsteer.recognition.recognizer import Recognizer, open_classifier, open_landmarker
-from handsteer.training.evaluation.labels import LabelledPhoto, read_photo_labels
-from handsteer.training.evaluation.sources import evaluate_photos
-from handsteer.training.evaluation.views import View
-from handsteer.training.synthetic.fit import part_of
 from handsteer.types import MOTION_SIGNS, NONE, SIGNS
 
 FOLDERS: Final = ("hagrid-dev", "photos", "index-down", "thumbs-clip")

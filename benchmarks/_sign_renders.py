@@ -14,10 +14,10 @@ from _sign_photos import Eyes, Seen
 from _sign_table import Row, row_of
 from numpy.typing import NDArray
 
-from handsteer.hand.kinematics import ANGLES, pose_skeleton
-from handsteer.hand.poses import HandPose, Pinhole, View, sign_pose
-from handsteer.hand.renderer import SKINS, make_background, render
-from handsteer.hand.renderer import Look as Appearance
+from handsteer.plugins.virtual_hand.kinematics import ANGLES, pose_skeleton
+from handsteer.plugins.virtual_hand.poses import HandPose, Pinhole, View, sign_pose
+from handsteer.plugins.virtual_hand.renderer import SKINS, make_background, render
+from handsteer.plugins.virtual_hand.renderer import Look as Appearance
 from handsteer.types import BACKWARD, MOTION_SIGNS, SIGNS, TURN_LEFT, TURN_RIGHT, Handedness
 
 RENDERED: Final = "rendered"

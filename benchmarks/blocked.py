@@ -21,9 +21,9 @@ from pathlib import Path
 import numpy as np
 
 from handsteer.config import load
-from handsteer.dashboard.page_process import PageProcess
 from handsteer.graph import Graph
 from handsteer.messages import CMD_VEL, STOP, Bool, Twist
+from handsteer.plugins.page.page_process import PageProcess
 from handsteer.transports.base import Received
 
 BLOCKED_S, HELD_S, FREE_S = 5.0, 0.3, 0.05

@@ -20,19 +20,19 @@ import numpy as np
 from handsteer.cameras.files import read_photo
 from handsteer.config import LandmarksConfig
 from handsteer.errors import ProfileError
-from handsteer.hand.kinematics import ANGLES, BONE_LENGTHS_M, clamp, pose_skeleton
-from handsteer.hand.poses import HandPose, Pinhole, sign_pose
-from handsteer.hand.poses import View as Look
-from handsteer.hand.renderer import Look as Skin
-from handsteer.hand.renderer import make_background, render
+from handsteer.plugins.teach.calibration import calibrate, shown_hand
+from handsteer.plugins.teach.evaluation.labels import read_photo_labels
+from handsteer.plugins.teach.evaluation.views import View
+from handsteer.plugins.virtual_hand.kinematics import ANGLES, BONE_LENGTHS_M, clamp, pose_skeleton
+from handsteer.plugins.virtual_hand.poses import HandPose, Pinhole, sign_pose
+from handsteer.plugins.virtual_hand.poses import View as Look
+from handsteer.plugins.virtual_hand.renderer import Look as Skin
+from handsteer.plugins.virtual_hand.renderer import make_background, render
 from handsteer.recognition.features import shape_features
 from handsteer.recognition.hand import Classifier, Hand
 from handsteer.recognition.landmarker import MediaPipeLandmarker
 from handsteer.recognition.profile import FLOOR, ProfiledClassifier, shape_probability
 from handsteer.recognition.shipped_signs import SURE, ShippedClassifier, load_model
-from handsteer.training.calibration import calibrate, shown_hand
-from handsteer.training.evaluation.labels import read_photo_labels
-from handsteer.training.evaluation.views import View
 from handsteer.types import MOTION_SIGNS, NONE, SIGNS
 
 DATA = Path(__file__).parents[2] / "shared" / "data"

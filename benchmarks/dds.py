@@ -39,9 +39,9 @@ WIDTH, HEIGHT = 640, 480
 SETTLE_S = 0.5
 MODULES = ("handsteer.cli.app", "handsteer.cli.one_node")
 SESSIONS = {
-    "dds": "handsteer.transports.dds.transport",
-    "zenoh": "handsteer.transports.zenoh.transport",
-    "ros2": "handsteer.transports.rclpy.session",
+    "dds": "handsteer.plugins.dds.transport",
+    "zenoh": "handsteer.plugins.zenoh.transport",
+    "ros2": "handsteer.plugins.ros2.session",
 }
 # A Twist carries its send time in a field, because a stamp would change its size.
 TWISTS = Topic("/benchmark/twist", Twist, depth=10)

@@ -15,12 +15,12 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import cv2
 import numpy as np
 
-from handsteer.cameras.virtual import VirtualHandCamera
 from handsteer.clock import SteppedClock
 from handsteer.config import VirtualHandConfig
-from handsteer.hand.kinematics import pose_skeleton
-from handsteer.hand.poses import Pinhole, sign_pose
-from handsteer.hand.renderer import SKINS, Look, make_background, render
+from handsteer.plugins.virtual_hand.camera import VirtualHandCamera
+from handsteer.plugins.virtual_hand.kinematics import pose_skeleton
+from handsteer.plugins.virtual_hand.poses import Pinhole, sign_pose
+from handsteer.plugins.virtual_hand.renderer import SKINS, Look, make_background, render
 from handsteer.types import SIGNS, Handedness
 
 FRAMES, FPS, VIEWS = 480, 30.0, 18

@@ -21,8 +21,8 @@ from _measuring import cpu_s
 
 from handsteer.config import FoxgloveConfig, load
 from handsteer.graph import Graph
-from handsteer.live.process import LiveProcess
 from handsteer.messages import CMD_VEL, Twist
+from handsteer.plugins.foxglove.process import LiveProcess
 from handsteer.transports.base import Received
 
 SETTLED_S = 1.5

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from handsteer.cameras.files import SensorNoise
 from handsteer.cameras.freshness import Freshness
-from handsteer.cameras.virtual import VirtualHandCamera
 from handsteer.clock import SteppedClock
 from handsteer.config import Config, VirtualHandConfig
+from handsteer.plugins.virtual_hand.camera import VirtualHandCamera
 from handsteer.recognition.recognizer import Recognizer
 from handsteer.teleop import Teleop
 

@@ -12,11 +12,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from handsteer.plugins.teach.network import train
+from handsteer.plugins.teach.synthetic.fit import seen_hands
+from handsteer.plugins.teach.synthetic.hands import OTHER, SHAPES, make_hands
+from handsteer.plugins.teach.synthetic.people import draw_people, from_canonical, load_people
 from handsteer.recognition.features import shape_features
-from handsteer.training.network import train
-from handsteer.training.synthetic.fit import seen_hands
-from handsteer.training.synthetic.hands import OTHER, SHAPES, make_hands
-from handsteer.training.synthetic.people import draw_people, from_canonical, load_people
 
 DATA = Path(__file__).parents[2] / "shared" / "data"
 FOLDERS = ("hagrid-dev", "photos")

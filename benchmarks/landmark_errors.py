@@ -1,4 +1,4 @@
-"""Prints the errors of landmarks on videos of people: the constants of ``handsteer.bench.hand_view.LandmarkErrors``.
+"""Prints the errors of landmarks on videos of people: the constants of ``LandmarkErrors`` in the bench's ``hand_view``.
 
 ``python benchmarks/landmark_errors.py [VIDEO...]``, with videos of one hand in view, by default the clips of people.
 The truth is not known: a smooth curve (a polynomial of second degree through 9 frames) stands for it, so slow errors

@@ -16,8 +16,8 @@ from handsteer.nodes.base import Node
 from handsteer.nodes.control import HandSignControlNode
 from handsteer.nodes.robot import RobotNode
 from handsteer.nodes.steering import SteeringNode
+from handsteer.plugins.sim.simulated import SimulatedRobot
 from handsteer.robots import RangeScan
-from handsteer.robots.simulated import SimulatedRobot
 from handsteer.robots.world import World
 from handsteer.transports.in_process import InProcessTransport
 from handsteer.types import Velocity

@@ -32,15 +32,15 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # for the relay an
 
 from _measuring import resident_mb
 from scripts import chromium
-from tests.dashboard.network import Relay, client_of, cookies_of, deaf, deaf_page, drawn, join_query
+from tests.plugins.page.network import Relay, client_of, cookies_of, deaf, deaf_page, drawn, join_query
 
-from handsteer.cameras.virtual import VirtualHandCamera
 from handsteer.clock import SteppedClock
 from handsteer.config import load
-from handsteer.dashboard.page_process import PageProcess
 from handsteer.graph import Graph
 from handsteer.messages import CMD_VEL, Twist
 from handsteer.nodes.timing import LatencyLog
+from handsteer.plugins.page.page_process import PageProcess
+from handsteer.plugins.virtual_hand.camera import VirtualHandCamera
 from handsteer.transports.base import Received
 
 LIMIT_BYTES_PER_S = 2_000_000

@@ -21,9 +21,9 @@ from _measuring import at_rate, cpu_s, resident_mb
 from tests.processes import Peer, eventually
 from tests.ros1.graph import Ros1Graph, ros1_graph
 
-from handsteer.cameras.virtual import VirtualHandCamera
 from handsteer.clock import SteppedClock
 from handsteer.config import VirtualHandConfig
+from handsteer.plugins.virtual_hand.camera import VirtualHandCamera
 
 CMD_VEL = "/robot_diff_drive_controller/cmd_vel"
 ANNOTATED = "/gesture/image_annotated"

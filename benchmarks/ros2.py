@@ -19,11 +19,11 @@ from _measuring import at_rate
 from tests.processes import eventually
 from tests.ros2.graph import Ros2Graph
 
-from handsteer.cameras.virtual import VirtualHandCamera
 from handsteer.clock import WallClock
 from handsteer.config import VirtualHandConfig
 from handsteer.images import image_message, jpeg_message
 from handsteer.messages import IMAGE_COMPRESSED, IMAGE_RAW, Header, Image, Topic, Twist, twist
+from handsteer.plugins.virtual_hand.camera import VirtualHandCamera
 from handsteer.transports import join
 from handsteer.transports.base import Publisher, Session
 

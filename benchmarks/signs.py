@@ -22,7 +22,7 @@ from _sign_renders import rendered_looks
 from _sign_table import LEAST, LEAST_OF_SAMPLE, TABLE, Change, Counts, Row, Table, compare, failures, news, read_table
 from tqdm import tqdm
 
-from handsteer.training.evaluation.intervals import Share
+from handsteer.plugins.teach.evaluation.intervals import Share
 
 DATA = Path(__file__).parents[2] / "shared" / "data"
 _CHUNK = 16

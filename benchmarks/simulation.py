@@ -6,7 +6,7 @@ Run ``python benchmarks/simulation.py``; it takes some seconds, on one core.
 import time
 
 from handsteer.config import RobotConfig
-from handsteer.robots.simulated import SimulatedRobot
+from handsteer.plugins.sim.simulated import SimulatedRobot
 from handsteer.robots.world import shipped_worlds
 
 _SIMULATED_S = 60.0

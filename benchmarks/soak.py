@@ -26,14 +26,14 @@ from page import DRIVE, film, load_now, plain_viewers, served
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # for the chain and the visitors that the tests use
 
-from tests.dashboard.network import client_of, cookies_of, drawn, join_query
 from tests.faults.chain import Chain
 from tests.faults.painted import FPS as CAMERA_FPS
+from tests.plugins.page.network import client_of, cookies_of, drawn, join_query
 
 from handsteer.config import RobotConfig
 from handsteer.messages import CMD_VEL, IMAGE_RAW, ODOM, Topic
+from handsteer.plugins.sim.simulated import SimulatedRobot
 from handsteer.robots import Robot
-from handsteer.robots.simulated import SimulatedRobot
 
 FPS = 60
 WARM_S = 60.0

@@ -19,13 +19,13 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # for the websocket that the tests use
 
-from tests.dashboard.sockets import PageSocket, events_of
-from tests.dashboard.test_front import press
+from tests.plugins.page.sockets import PageSocket, events_of
+from tests.plugins.page.test_front import press
 
 from handsteer.config import load
-from handsteer.dashboard.page_process import PageProcess
 from handsteer.graph import Graph
 from handsteer.messages import STOP, Bool
+from handsteer.plugins.page.page_process import PageProcess
 from handsteer.transports.base import Received
 
 LOST_S = 10.0

@@ -14,11 +14,11 @@ from pathlib import Path
 import numpy as np
 
 from handsteer.config import SignsConfig, load
-from handsteer.dashboard.lesson import Lesson
-from handsteer.dashboard.lessons import Lessons
 from handsteer.graph import Graph
+from handsteer.plugins.page.lesson import Lesson
+from handsteer.plugins.page.lessons import Lessons
+from handsteer.plugins.teach.train import train_signs
 from handsteer.recognition.recognizer import open_classifier
-from handsteer.training.custom.train import train_signs
 
 ALONE_S = 5.0
 TRY_S = 8.0

@@ -11,14 +11,14 @@ from statistics import fmean, median
 import numpy as np
 from numpy.typing import NDArray
 
-from handsteer.bench.courses import open_course
-from handsteer.bench.hand_interfaces import CHOICES, PALM_M, Joystick
-from handsteer.bench.hand_view import HandView
-from handsteer.bench.hands import Limb, OperatorsHand, Slips
-from handsteer.bench.laps import KINDS, run_lap
-from handsteer.bench.operator import Skill
 from handsteer.config import Config, JoystickConfig
-from handsteer.hand.poses import HandPose, View
+from handsteer.plugins.bench.courses import open_course
+from handsteer.plugins.bench.hand_interfaces import CHOICES, PALM_M, Joystick
+from handsteer.plugins.bench.hand_view import HandView
+from handsteer.plugins.bench.hands import Limb, OperatorsHand, Slips
+from handsteer.plugins.bench.laps import KINDS, run_lap
+from handsteer.plugins.bench.operator import Skill
+from handsteer.plugins.virtual_hand.poses import HandPose, View
 from handsteer.recognition.hand_joystick import HandJoystick, deflection
 from handsteer.recognition.recognizer import Recognition
 from handsteer.types import Stick

@@ -28,7 +28,7 @@ import cv2
 import numpy as np
 import platformdirs
 
-from handsteer.hand.renderer import make_background
+from handsteer.plugins.virtual_hand.renderer import make_background
 
 HERE = Path(__file__).resolve().parent
 VIDEOS = HERE.parents[1] / "shared" / "data" / "videos"

@@ -8,9 +8,9 @@ from pathlib import Path
 
 from handsteer import Recognizer
 from handsteer.cameras.files import read_photo
-from handsteer.cameras.virtual import VirtualHandCamera
 from handsteer.clock import SteppedClock
 from handsteer.config import VirtualHandConfig
+from handsteer.plugins.virtual_hand.camera import VirtualHandCamera
 
 
 def main() -> None:

@@ -7,9 +7,9 @@ robot.
 import math
 
 from handsteer import Config, Teleop
-from handsteer.cameras.virtual import VirtualHandCamera
 from handsteer.clock import SteppedClock
 from handsteer.config import VirtualHandConfig
+from handsteer.plugins.virtual_hand.camera import VirtualHandCamera
 
 FPS = 30
 SCRIPT = VirtualHandConfig(script="Stop:0.7 Go:0.6 Stop:0.7 Forward:2 Go:1 Turn Left:1 Stop:1")

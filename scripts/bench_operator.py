@@ -10,8 +10,8 @@ from concurrent.futures import ProcessPoolExecutor
 from itertools import product
 from statistics import median
 
-from handsteer.bench.laps import Conditions, run_lap
-from handsteer.bench.operator import Skill
+from handsteer.plugins.bench.laps import Conditions, run_lap
+from handsteer.plugins.bench.operator import Skill
 
 DELAYS_S = (0.0, 0.25, 0.5, 0.75)
 KP = (0.35, 0.5, 0.7, 1.0, 1.4)

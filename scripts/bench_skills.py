@@ -1,4 +1,4 @@
-"""Searches the skill of an operator for interfaces of the bench: the constants ``KINDS`` of ``handsteer.bench.laps``.
+"""Searches the skill of an operator for interfaces of the bench: the constants ``KINDS`` of its module ``laps``.
 
 ``JOBS=2 python scripts/bench_skills.py INTERFACE...``. The search is the same for each: a start, 9 random skills, the
 same ones, and then 14 variations of the best so far, by the mean score of laps on three courses, with seeds from 1000
@@ -16,8 +16,8 @@ from statistics import fmean
 
 import numpy as np
 
-from handsteer.bench.laps import run_lap
-from handsteer.bench.operator import Skill
+from handsteer.plugins.bench.laps import run_lap
+from handsteer.plugins.bench.operator import Skill
 
 RANGES = {
     "pace_mps": (0.2, 1.0),

@@ -10,10 +10,10 @@ from pathlib import Path
 from scripts.doc_tables import replaced, table
 from tqdm import tqdm
 
-from handsteer.bench.cells import Cell, CellResult, Estimate, run_cells, with_factor
-from handsteer.bench.courses import COURSES, open_course
-from handsteer.bench.laps import INTERFACES, Conditions
-from handsteer.bench.plots import write_plots
+from handsteer.plugins.bench.cells import Cell, CellResult, Estimate, run_cells, with_factor
+from handsteer.plugins.bench.courses import COURSES, open_course
+from handsteer.plugins.bench.laps import INTERFACES, Conditions
+from handsteer.plugins.bench.plots import write_plots
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 PAGE = DOCS / "driving.md"

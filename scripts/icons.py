@@ -2,8 +2,8 @@
 
 import chromium
 
-from handsteer.dashboard.elements import STATIC
-from handsteer.dashboard.page import ICON
+from handsteer.plugins.page.elements import STATIC
+from handsteer.plugins.page.page import ICON
 
 # A launcher cuts a maskable icon to a shape of its own: full to the edges, with the drawing in the middle.
 _MASKABLE = ICON.replace('rx="16" ', "").replace("<g ", '<g transform="translate(6.4 6.4) scale(0.8)" ')

@@ -16,9 +16,9 @@ from playwright.sync_api import Page
 from slalom_lap import COURSE, SlalomLap
 
 from handsteer.config import load
-from handsteer.dashboard.page_process import PageProcess
 from handsteer.errors import HandsteerError
 from handsteer.graph import Graph
+from handsteer.plugins.page.page_process import PageProcess
 
 IMAGES = Path(__file__).resolve().parents[1] / "docs" / "images"
 PICTURE, ANIMATION = IMAGES / "page.png", IMAGES / "drive.webp"

@@ -5,9 +5,9 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from handsteer.hand.kinematics import angles_of, pose_skeleton
-from handsteer.hand.poses import HandPose, Pinhole, View, sign_pose
-from handsteer.hand.renderer import Look, make_background, render
+from handsteer.plugins.virtual_hand.kinematics import angles_of, pose_skeleton
+from handsteer.plugins.virtual_hand.poses import HandPose, Pinhole, View, sign_pose
+from handsteer.plugins.virtual_hand.renderer import Look, make_background, render
 from handsteer.recognition.recognizer import Recognizer
 from handsteer.types import NONE, SIGNS
 

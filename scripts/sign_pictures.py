@@ -5,9 +5,9 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from handsteer.cameras.virtual import VirtualHandCamera
 from handsteer.clock import SteppedClock
 from handsteer.config import VirtualHandConfig
+from handsteer.plugins.virtual_hand.camera import VirtualHandCamera
 from handsteer.types import BACKWARD, FORWARD, GO, STOP, TURN_LEFT, TURN_RIGHT
 
 OUT = Path(__file__).resolve().parents[1] / "docs" / "images" / "signs.png"

@@ -8,7 +8,7 @@ from typing import Final, NamedTuple
 
 from scripts.doc_tables import replaced, table
 
-from handsteer.training.evaluation.intervals import Share
+from handsteer.plugins.teach.evaluation.intervals import Share
 from handsteer.types import GO, SIGNS
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -7,15 +7,15 @@ import time
 import cv2
 import numpy as np
 
-from handsteer.bench.courses import open_course
-from handsteer.bench.hand_interfaces import Joystick
-from handsteer.bench.hand_view import HandCamera, HandView, LandmarkErrors
-from handsteer.bench.hands import Slips
-from handsteer.bench.interfaces import TICK_S
-from handsteer.bench.laps import KINDS
-from handsteer.bench.operator import DECISION_S, REACTION_S, Operator, Seen
 from handsteer.graph import Graph
-from handsteer.hand.poses import Pinhole
+from handsteer.plugins.bench.courses import open_course
+from handsteer.plugins.bench.hand_interfaces import Joystick
+from handsteer.plugins.bench.hand_view import HandCamera, HandView, LandmarkErrors
+from handsteer.plugins.bench.hands import Slips
+from handsteer.plugins.bench.interfaces import TICK_S
+from handsteer.plugins.bench.laps import KINDS
+from handsteer.plugins.bench.operator import DECISION_S, REACTION_S, Operator, Seen
+from handsteer.plugins.virtual_hand.poses import Pinhole
 from handsteer.types import Velocity
 
 COURSE = "slalom"

@@ -26,12 +26,12 @@ _NETWORKS = {"machines", "alone"}
 
 RUN_AGAIN = (
     "tests/cli",
-    "tests/dashboard",
+    "tests/plugins/page",
     "tests/dds",
     "tests/distributed",
     "tests/faults/test_networks.py",
     "tests/faults/test_processes.py",
-    "tests/live",
+    "tests/plugins/foxglove",
     "tests/rmw_zenoh",
     "tests/ros1",
     "tests/ros2",
@@ -152,7 +152,7 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
 def pytest_runtest_teardown(item: pytest.Item, nextitem: pytest.Item | None) -> None:
     """Close the browser after the last test that uses it: without pages, too, it takes a good part of a processor."""
     if item.get_closest_marker("browser") and (nextitem is None or not nextitem.get_closest_marker("browser")):
-        from tests.dashboard.browsers import close_shared  # noqa: PLC0415 - most files need no browser
+        from tests.plugins.page.browsers import close_shared  # noqa: PLC0415 - most files need no browser
 
         close_shared()
 

@@ -19,9 +19,9 @@ NODES = (
     "handsteer.cli.one_node",
     "handsteer.making",
     "handsteer.nodes.control",
-    "handsteer.cameras.virtual",
+    "handsteer.plugins.virtual_hand.camera",
     "handsteer.recognition.recognizer",
-    "handsteer.robots.simulated",
+    "handsteer.plugins.sim.simulated",
 )
 """What handsteer's nodes import, but for their transport."""
 START_S = 60.0

@@ -3,9 +3,9 @@
 from pathlib import Path
 
 from handsteer.errors import RecordingError
-from handsteer.recordings import open_recording
-from handsteer.recordings.recorder import Recorder
-from handsteer.replay.drive_reader import read_drive
+from handsteer.plugins.record import open_recording
+from handsteer.plugins.record.recorder import Recorder
+from handsteer.plugins.record.replay.drive_reader import read_drive
 
 DELAY_S = 0.3
 """In real time, a machine that is busy with other tests delays a message on its way to the control by as much."""

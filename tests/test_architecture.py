@@ -1,5 +1,6 @@
 """What docs/architecture.md says of the code's files is so."""
 
+import ast
 import re
 from pathlib import Path
 
@@ -7,6 +8,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 SOURCE = ROOT / "src" / "handsteer"
+SETTINGS = (ROOT / "pyproject.toml").read_text()
 TEXT = (ROOT / "docs" / "architecture.md").read_text()
 LINE = re.compile(r"^\| `([\w/.]+)` \| (\d+) \|", re.MULTILINE)
 
@@ -23,14 +25,30 @@ def test_the_ways_of_a_frame_and_of_a_command_are_as_short_as_shown(begin: str, 
 
 
 def test_the_layers_shown_are_those_that_the_linter_keeps() -> None:
-    shown = re.search(r"```\n(cli .*?)```", TEXT, re.DOTALL)
-    kept = re.search(r"^layers = \[\n(.*?)^\]", (ROOT / "pyproject.toml").read_text(), re.DOTALL | re.MULTILINE)
+    shown = re.search(r"```\n(plugins .*?)```", TEXT, re.DOTALL)
+    kept = re.search(r"^layers = \[\n(.*?)^\]", SETTINGS, re.DOTALL | re.MULTILINE)
     assert shown
     assert kept
-    layers = [set(line.split("   ")[0].split()) for line in shown[1].splitlines()]
+    layers = [set(re.split(r"\s{3,}", line)[0].split()) for line in shown[1].splitlines()]
     assert layers == [set(re.findall(r"\w+", line)) for line in kept[1].splitlines()]
 
 
-def test_every_package_is_described() -> None:
-    packages = {folder.name for folder in SOURCE.iterdir() if (folder / "__init__.py").is_file()}
-    assert {name for name in packages if f"- **{name}**" not in TEXT} <= {"cli", "config", "doctor", "hand"}
+def test_the_imports_of_plug_ins_shown_are_those_that_the_linter_accepts() -> None:
+    accepted = set(re.findall(r"handsteer\.plugins\.(\w+)[\w.*]* -> handsteer\.plugins\.(\w+)", SETTINGS))
+    table = TEXT[TEXT.index("| plug-in |") :].partition("\n\n")[0]
+    shown = {
+        (name, other)
+        for names, others in re.findall(r"^\| (`.*`) \|[^|]*\|(.*)\|$", table, re.MULTILINE)
+        for name in re.findall(r"`(\w+)`", names)
+        for other in re.findall(r"`(\w+)`", others)
+    }
+    assert shown == accepted
+
+
+def test_every_plug_in_is_shown_and_says_what_it_imports() -> None:
+    folders = [folder for folder in (SOURCE / "plugins").iterdir() if (folder / "__init__.py").is_file()]
+    assert len(folders) > 5
+    for folder in folders:
+        text = ast.get_docstring(ast.parse((folder / "__init__.py").read_text())) or ""
+        assert re.search(r"\bImports\b", text), f"{folder.name} does not say what it imports"
+        assert re.search(rf"^\| .*`{folder.name}`.* \|", TEXT, re.MULTILINE), f"{folder.name} is not shown"

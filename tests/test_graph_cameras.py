@@ -8,15 +8,15 @@ import pytest
 
 from handsteer.cameras import VIRTUAL_HAND, choose
 from handsteer.cameras.choice import OWN
-from handsteer.cameras.virtual import VirtualHandCamera
 from handsteer.clock import SteppedClock
 from handsteer.config import Config, VirtualHandConfig
 from handsteer.errors import CameraNotFound
 from handsteer.graph import Graph
 from handsteer.messages import CAMERA_CHANGED
-from handsteer.recordings.mcap_reader import McapFile
-from handsteer.replay.compare import Comparison, compare
-from handsteer.replay.rerun import recorded_config, rerun
+from handsteer.plugins.record.mcap_reader import McapFile
+from handsteer.plugins.record.replay.compare import Comparison, compare
+from handsteer.plugins.record.replay.rerun import recorded_config, rerun
+from handsteer.plugins.virtual_hand.camera import VirtualHandCamera
 from handsteer.testing import Trace
 
 RATE, SIZE = 15, (320, 240)

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 from handsteer import Config, Teleop, Velocity
 from handsteer.cameras.files import SensorNoise
 from handsteer.config import ControlConfig
-from handsteer.hand.kinematics import pose_skeleton
-from handsteer.hand.poses import HandPose, Pinhole, View, sign_pose
-from handsteer.hand.renderer import Look, make_background, render
+from handsteer.plugins.virtual_hand.kinematics import pose_skeleton
+from handsteer.plugins.virtual_hand.poses import HandPose, Pinhole, View, sign_pose
+from handsteer.plugins.virtual_hand.renderer import Look, make_background, render
 from handsteer.types import GO, STOP, ZERO
 
 WIDTH, HEIGHT, FPS = 640, 480, 30

@@ -10,7 +10,7 @@ from handsteer.errors import FrameError
 from handsteer.images import bgr_image, camera_jpeg_message, image_message, jpeg_message, jpeg_picture
 from handsteer.messages import CompressedImage, Header, Image, Time
 from handsteer.picture_files import decode
-from handsteer.transports.ros2.encoding import encode
+from handsteer.transports.encoding import encode
 from tests.fuzz import corpus
 
 HEADER = Header(stamp=Time(1, 2), frame_id="camera")

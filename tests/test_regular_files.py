@@ -9,14 +9,14 @@ import pytest
 from handsteer.cameras.files import read_photo
 from handsteer.config import load
 from handsteer.errors import HandsteerError
+from handsteer.plugins.record.bags import Bag
+from handsteer.plugins.record.mcap_reader import McapFile
+from handsteer.plugins.teach.dataset import load_dataset
+from handsteer.plugins.teach.exchange import load_shared, read_class_names, read_keypoints
 from handsteer.recognition.custom_signs import load_custom_model
 from handsteer.recognition.shipped_signs import load_model
-from handsteer.recordings.bags import Bag
-from handsteer.recordings.mcap_reader import McapFile
 from handsteer.regular_files import open_regular, read_regular
 from handsteer.robots.world import load_world, parse_world
-from handsteer.training.custom.dataset import load_dataset
-from handsteer.training.custom.exchange import load_shared, read_class_names, read_keypoints
 
 READERS: dict[str, Callable[[Path], object]] = {
     "configuration": load,

@@ -10,9 +10,9 @@ import cv2
 import numpy as np
 
 from handsteer.config import LandmarksConfig
+from handsteer.plugins.teach.evaluation.views import View
 from handsteer.recognition.landmarker import MediaPipeLandmarker
 from handsteer.recognition.regions import from_landmarks
-from handsteer.training.evaluation.views import View
 
 SIDE = 224
 Half = Literal["choose", "judge"]

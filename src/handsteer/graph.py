@@ -53,8 +53,8 @@ from handsteer.nodes.base import Node
 from handsteer.nodes.journal import JOURNALS, Journal
 from handsteer.nodes.run_recording import RunRecording
 from handsteer.nodes.steering import SteeringNode
+from handsteer.plugins.record import describe
 from handsteer.recognition.recognizer import model_files
-from handsteer.recordings import describe
 from handsteer.summary import Summary
 from handsteer.transports.base import Session, Transport
 from handsteer.transports.in_process import InProcessTransport

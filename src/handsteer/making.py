@@ -14,7 +14,7 @@ from handsteer.clock import Clock, SimulatedClock, WallClock
 from handsteer.config import Config, RobotConfig, VirtualHandConfig, cmd_vel_type
 from handsteer.errors import ConfigError, needing
 from handsteer.messages import CMD_VEL, STEERING_CMD_VEL, TF, Topic, Twist, cmd_vel
-from handsteer.recordings import is_recording
+from handsteer.plugins.record import is_recording
 from handsteer.transports.base import Session, Transport
 from handsteer.types import NONE, find_sign
 
@@ -77,7 +77,7 @@ def _open_camera(config: Config, clock: Clock) -> "Camera":
 
     path = Path(config.camera.source).expanduser()
     if is_recording(path) and path.exists():
-        from handsteer.recordings.camera import RecordingCamera
+        from handsteer.plugins.record.camera import RecordingCamera
 
         return RecordingCamera(path, clock, config.camera.at_end)
     return open_camera(config.camera, _virtual_hand(config), clock)
@@ -85,7 +85,7 @@ def _open_camera(config: Config, clock: Clock) -> "Camera":
 
 def _virtual_hand(config: Config) -> VirtualHandConfig:
     """Return the virtual hand, with the script that drives where none is set."""
-    from handsteer.hand.script import chosen_script
+    from handsteer.plugins.virtual_hand.script import chosen_script
 
     engage = config.control.engage == "on" or (config.control.engage == "auto" and config.robot.kind != "sim")
     script = chosen_script(config.virtual_hand.script, joystick=config.control.mode == "joystick", engage=engage)
@@ -193,7 +193,7 @@ def open_robot(
 
         return RemoteRobot(config, cmd_vel, frame_id, link)
     with needing("the simulated robot", "sim", "mujoco", "xacro"):
-        from handsteer.robots.simulated import SimulatedRobot
+        from handsteer.plugins.sim.simulated import SimulatedRobot
 
     return SimulatedRobot(config)
 

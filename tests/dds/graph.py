@@ -13,7 +13,7 @@ from tests.contracts.ros2_node_contract import PeerGraph
 from tests.processes import NODES, Peer, Process
 
 PEER = Path(__file__).with_name("peer.py")
-MODULES = {"dds": "handsteer.transports.dds.transport", "ros2": "handsteer.transports.rclpy.session"}
+MODULES = {"dds": "handsteer.plugins.dds.transport", "ros2": "handsteer.plugins.ros2.session"}
 # Domains above have their ports among those that the system gives to others.
 _LARGEST_DOMAIN = 100
 # Whoever was killed is still in its domain for others, for ten seconds.

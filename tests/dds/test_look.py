@@ -9,7 +9,7 @@ import pytest
 
 pytest.importorskip("cyclonedds")
 
-from handsteer.transports.dds.look import ObservedTopic, problems_of
+from handsteer.plugins.dds.look import ObservedTopic, problems_of
 from tests.dds.graph import DdsGraph
 from tests.processes import eventually
 
@@ -18,7 +18,7 @@ DRIVEN = "robot_diff_drive_controller/cmd_vel:=/robot_diff_drive_controller/cmd_
 
 
 def look(domain: DdsGraph) -> dict[str, Any]:
-    command = [sys.executable, "-m", "handsteer.transports.dds.look"]
+    command = [sys.executable, "-m", "handsteer.plugins.dds.look"]
     done = subprocess.run(command, env=domain.env, capture_output=True, text=True, timeout=120, check=False)
     assert done.returncode == 0, done.stderr
     return dict(json.loads(done.stdout))

@@ -16,14 +16,14 @@ from playwright.sync_api import Browser, CDPSession, Page
 from playwright.sync_api import Error as PlaywrightError
 
 from handsteer.config import load
-from handsteer.dashboard.page_process import PageProcess
 from handsteer.graph import Graph
 from handsteer.messages import CMD_VEL, DIAGNOSTICS, HAND_SIGN, DiagnosticArray, String, Twist
+from handsteer.plugins.page.page_process import PageProcess
 from handsteer.timeouts import ROBOT_S
 from handsteer.transports.base import Received
-from tests.dashboard.browsers import a_browser
 from tests.faults.stepped import Outcome
-from tests.study.plans import a_task
+from tests.plugins.page.browsers import a_browser
+from tests.plugins.study.plans import a_task
 
 FAULT_S, AFTER_S = 2.0, 1.5
 HELD_S, TRIES_S, PATIENCE_S = 0.3, 4.0, 90.0

@@ -2,9 +2,9 @@
 
 import pytest
 
-from tests.dashboard.visits import NEEDS_A_BROWSER
 from tests.faults.browser import Row, outcome_of, rows
 from tests.faults.table import LIMIT_S, written
+from tests.plugins.page.visits import NEEDS_A_BROWSER
 
 SEEN_AGAIN = ("hangs", "network", "scripts")
 

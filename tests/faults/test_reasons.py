@@ -8,10 +8,10 @@ import pytest
 from handsteer.audit import read_event
 from handsteer.messages import AUDIT, CMD_VEL, RECORDED
 from handsteer.nodes.auditing import HOLD_S
-from handsteer.recordings import open_recording
-from handsteer.recordings.recorder import Recorder
-from handsteer.replay.drive_facts import DriveFacts
-from handsteer.replay.drive_reader import read_drive
+from handsteer.plugins.record import open_recording
+from handsteer.plugins.record.recorder import Recorder
+from handsteer.plugins.record.replay.drive_facts import DriveFacts
+from handsteer.plugins.record.replay.drive_reader import read_drive
 from tests.faults.chain import Chain
 from tests.faults.rows import rows
 from tests.faults.stepped import outcome_of

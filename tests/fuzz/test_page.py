@@ -10,15 +10,15 @@ from urllib.parse import urlsplit
 import pytest
 
 from handsteer.config import load
-from handsteer.dashboard.remote_graph import RemoteGraph
-from handsteer.dashboard.server import Dashboard
 from handsteer.graph import Graph
-from tests.dashboard.served import PATIENCE_S, Site, remote
-from tests.dashboard.sockets import PageSocket, events_of
+from handsteer.plugins.page.remote_graph import RemoteGraph
+from handsteer.plugins.page.server import Dashboard
 from tests.fuzz import corpus
 from tests.fuzz.mutants import CASES, mutants
+from tests.plugins.page.served import PATIENCE_S, Site, remote
+from tests.plugins.page.sockets import PageSocket, events_of
+from tests.plugins.study.plans import a_task
 from tests.processes import eventually
-from tests.study.plans import a_task
 
 NESTED = json.loads("[" * 500 + "]" * 500)
 VALUES: tuple[object, ...] = (

@@ -17,10 +17,6 @@ from handsteer.cameras.browser import BrowserCamera
 from handsteer.cameras.files import read_photo
 from handsteer.clock import SteppedClock
 from handsteer.config import Config, ControlConfig, load
-from handsteer.dashboard.elements import read_words
-from handsteer.dashboard.settings_fields import FIELDS
-from handsteer.dashboard.steering_input import SteeringInput, read_deflection, read_number
-from handsteer.dashboard.world_editor import read_file
 from handsteer.errors import FrameError, HandsteerError, TransportError
 from handsteer.images import bgr_image, jpeg_picture
 from handsteer.messages import (
@@ -40,23 +36,27 @@ from handsteer.messages import (
     Topic,
     type_name,
 )
+from handsteer.plugins.page.elements import read_words
+from handsteer.plugins.page.settings_fields import FIELDS
+from handsteer.plugins.page.steering_input import SteeringInput, read_deflection, read_number
+from handsteer.plugins.page.world_editor import read_file
+from handsteer.plugins.ros2.arguments import parse_arguments
+from handsteer.plugins.study.plan import read_plan
+from handsteer.plugins.study.session import Session
+from handsteer.plugins.teach.dataset import load_dataset
+from handsteer.plugins.teach.evaluation.labels import read_photo_labels
+from handsteer.plugins.teach.exchange import read_class_names, read_keypoints
 from handsteer.recognition.custom_signs import load_custom_model, save_custom_model
 from handsteer.recognition.shipped_signs import DEFAULT_MODEL, load_model
 from handsteer.robots.description import joints, robot_description, visuals
 from handsteer.robots.editing import edit
 from handsteer.robots.world import load_world, parse_world
-from handsteer.study.plan import read_plan
-from handsteer.study.session import Session
-from handsteer.training.custom.dataset import load_dataset
-from handsteer.training.custom.exchange import read_class_names, read_keypoints
-from handsteer.training.evaluation.labels import read_photo_labels
-from handsteer.transports.ros2.arguments import parse_arguments
-from handsteer.transports.ros2.encoding import decode, encode
+from handsteer.transports.encoding import decode, encode
 from handsteer.types import SIGNS
 from tests.fuzz import corpus
 from tests.fuzz.mutants import CASES, hold, mutants
+from tests.plugins.study.plans import a_task
 from tests.recognition.models import model
-from tests.study.plans import a_task
 
 HEADER = Header(stamp=Time(1, 2), frame_id="camera")
 WORLDS = [

@@ -16,15 +16,15 @@ from rosbags.rosbag2 import StoragePlugin
 from handsteer.config import Config
 from handsteer.errors import RecordingError
 from handsteer.messages import CAMERA_INFO, ODOM, WORLD_MARKERS
-from handsteer.recordings import open_recording
-from handsteer.recordings.mcap_reader import McapFile
-from handsteer.replay.by_time import rerun_by_time
-from handsteer.replay.drive_reader import read_drive
-from handsteer.replay.report_charts import drive_map, latencies, timeline
-from handsteer.replay.report_words import totals
-from handsteer.replay.rerun import has_journals, recorded_config, rerun
+from handsteer.plugins.record import open_recording
+from handsteer.plugins.record.mcap_reader import McapFile
+from handsteer.plugins.record.replay.by_time import rerun_by_time
+from handsteer.plugins.record.replay.drive_reader import read_drive
+from handsteer.plugins.record.replay.report_charts import drive_map, latencies, timeline
+from handsteer.plugins.record.replay.report_words import totals
+from handsteer.plugins.record.replay.rerun import has_journals, recorded_config, rerun
 from tests.fuzz.mutants import hold, mutants
-from tests.recordings.test_bags import as_ros1, as_ros2
+from tests.plugins.record.test_bags import as_ros1, as_ros2
 
 KEPT = ("/replay/hand_sign_control", "/gesture/hand_sign", "/robot_diff_drive_controller/cmd_vel", "/diagnostics")
 BOMB_BYTES = 2_000_000_000

@@ -10,9 +10,9 @@ from nicegui import Client
 
 from handsteer.config import load
 from handsteer.graph import Graph
-from tests.dashboard.served import PATIENCE_S, remote
-from tests.dashboard.sockets import PageSocket, events_of
 from tests.fuzz.test_page import NESTED, Whole
+from tests.plugins.page.served import PATIENCE_S, remote
+from tests.plugins.page.sockets import PageSocket, events_of
 from tests.processes import eventually
 
 COLOURS: tuple[object, ...] = (

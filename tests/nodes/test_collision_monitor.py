@@ -28,8 +28,8 @@ from handsteer.messages import (
 from handsteer.nodes.control import HandSignControlNode
 from handsteer.nodes.robot import RobotNode, scan_message
 from handsteer.nodes.steering import SteeringNode
+from handsteer.plugins.sim.simulated import SimulatedRobot
 from handsteer.robots import RangeScan
-from handsteer.robots.simulated import SimulatedRobot
 from handsteer.robots.world import World
 from tests.about import about
 from tests.nodes.stepping import Bench

@@ -20,7 +20,7 @@ from handsteer.nodes.base import Node
 from handsteer.nodes.control import HandSignControlNode
 from handsteer.nodes.robot import RobotNode
 from handsteer.nodes.supervision import StopKeeper
-from handsteer.robots.simulated import SimulatedRobot
+from handsteer.plugins.sim.simulated import SimulatedRobot
 from handsteer.timeouts import HEAR_STOP_S
 from tests.nodes.stepping import Bench
 

@@ -5,10 +5,10 @@ from math import inf
 
 import numpy as np
 
-from handsteer.hand.kinematics import angles_of, pose_joints, turn_z
-from handsteer.hand.poses import FIST, HandPose, Pinhole, Placement, View, sign_pose
+from handsteer.plugins.teach.synthetic.hands import BONES_M
+from handsteer.plugins.virtual_hand.kinematics import angles_of, pose_joints, turn_z
+from handsteer.plugins.virtual_hand.poses import FIST, HandPose, Pinhole, Placement, View, sign_pose
 from handsteer.recognition.hand import Hand
-from handsteer.training.synthetic.hands import BONES_M
 from handsteer.types import Handedness
 
 SIZE = (640, 480)

@@ -4,8 +4,8 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from handsteer.hand.kinematics import ANGLES, clamp
-from handsteer.hand.poses import HandPose, View, sign_pose
+from handsteer.plugins.virtual_hand.kinematics import ANGLES, clamp
+from handsteer.plugins.virtual_hand.poses import HandPose, View, sign_pose
 from handsteer.recognition.hand import Classifier, Hand
 from handsteer.recognition.shipped_signs import SURE
 from handsteer.types import SIGNS, STOP, TURN_LEFT, TURN_RIGHT

@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from handsteer.cameras.virtual import VirtualHandCamera
 from handsteer.clock import SteppedClock
 from handsteer.config import VirtualHandConfig
-from handsteer.hand.poses import FIST, HandPose, View, sign_pose
+from handsteer.plugins.virtual_hand.camera import VirtualHandCamera
+from handsteer.plugins.virtual_hand.poses import FIST, HandPose, View, sign_pose
 from handsteer.recognition.engage_gesture import EngageGesture, openness
 from handsteer.recognition.hand import Hand
 from handsteer.recognition.recognizer import Recognition, Recognizer

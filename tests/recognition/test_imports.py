@@ -38,4 +38,4 @@ def test_a_node_loads_nothing_of_cameras_and_robots_that_other_processes_have() 
     modules = loaded_by("import handsteer.cli.nodes\n")
     packages = {name.partition(".")[0] for name in modules}
     assert not packages & {"mujoco", "nicegui", "rospy", "xacro"}
-    assert "handsteer.hand" not in modules
+    assert "handsteer.plugins.virtual_hand" not in modules

@@ -13,10 +13,10 @@ from hypothesis import strategies as st
 from handsteer.cameras.files import read_photo
 from handsteer.config import LandmarksConfig
 from handsteer.errors import FrameError, ModelMissing
+from handsteer.plugins.teach.evaluation.views import View
 from handsteer.recognition.hand import Hand
 from handsteer.recognition.landmark_models import PictureModel
 from handsteer.recognition.landmarker import MediaPipeLandmarker
-from handsteer.training.evaluation.views import View
 from handsteer.types import Handedness
 from tests.recognition.drawn_hand import draw, open_left_hand, open_right_hand
 

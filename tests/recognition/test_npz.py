@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from handsteer.errors import DatasetError
-from handsteer.training.custom.dataset import load_dataset
+from handsteer.plugins.teach.dataset import load_dataset
 from tests.fuzz import corpus
 
 MANY: dict[str, Any] = {f"a{n}": corpus.saved(1) for n in range(200)}

@@ -8,6 +8,7 @@ import pytest
 
 from handsteer.config import SignsConfig
 from handsteer.errors import ProfileError
+from handsteer.plugins.teach.synthetic.hands import make_hands
 from handsteer.recognition.features import COUNT, shape_features
 from handsteer.recognition.hand import Hand
 from handsteer.recognition.npz import NpzFormat
@@ -29,7 +30,6 @@ from handsteer.recognition.profile import (
 )
 from handsteer.recognition.recognizer import open_classifier
 from handsteer.recognition.shipped_signs import SURE, ShippedClassifier, load_model
-from handsteer.training.synthetic.hands import make_hands
 from handsteer.types import FORWARD, NONE, SIGNS, STOP
 from tests.recognition.hands import hand_of, show_fingers, show_sign
 from tests.recognition.odd_person import errors, odd_hands

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from handsteer.config import LandmarksConfig
-from handsteer.hand.kinematics import pose_skeleton
-from handsteer.hand.poses import THUMB, Pinhole, View
-from handsteer.hand.renderer import Look, make_background, render
+from handsteer.plugins.virtual_hand.kinematics import pose_skeleton
+from handsteer.plugins.virtual_hand.poses import THUMB, Pinhole, View
+from handsteer.plugins.virtual_hand.renderer import Look, make_background, render
 from handsteer.recognition.landmarker import MediaPipeLandmarker
 from handsteer.recognition.regions import Palm, PalmDetector, Roi
 from handsteer.recognition.search import Pace, PalmView, Places, Search, Stillness, cells_of_frame, cells_of_hands

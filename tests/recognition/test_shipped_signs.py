@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from handsteer.errors import ModelCorrupt, ModelMissing
-from handsteer.hand.kinematics import angles_of
-from handsteer.hand.poses import FIST, HandPose, View
+from handsteer.plugins.virtual_hand.kinematics import angles_of
+from handsteer.plugins.virtual_hand.poses import FIST, HandPose, View
 from handsteer.recognition.features import COUNT
 from handsteer.recognition.hand import Hand
 from handsteer.recognition.shipped_signs import DEFAULT_MODEL, ShippedClassifier, load_model, save_model
@@ -201,7 +201,7 @@ def test_the_shipped_model_is_small_and_says_what_it_was_trained_on() -> None:
     model = load_model()
     assert len(CONTENT) < 300_000
     assert model.shapes == ("open", "index", "index_down", "thumb", "fist", "other")
-    assert "handsteer.training.synthetic" in model.trained_on["source"]
+    assert "handsteer.plugins.teach.synthetic" in model.trained_on["source"]
     assert sum(model.trained_on["hands"].values()) > 100_000
 
 

@@ -4,9 +4,9 @@ import itertools
 
 import pytest
 
-from handsteer.cameras.virtual import VirtualHandCamera
 from handsteer.clock import SteppedClock
 from handsteer.config import VirtualHandConfig
+from handsteer.plugins.virtual_hand.camera import VirtualHandCamera
 from handsteer.recognition.recognizer import Recognizer
 from handsteer.types import MOTION_SIGNS, NONE, SIGNS
 

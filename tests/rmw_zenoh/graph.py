@@ -8,7 +8,7 @@ from tests.contracts.ros2_node_contract import PeerGraph
 from tests.processes import NODES, Peer, Process, eventually, free_port
 
 PEER = Path(__file__).with_name("peer.py")
-MODULES = (*NODES, "handsteer.transports.zenoh.transport")
+MODULES = (*NODES, "handsteer.plugins.zenoh.transport")
 DOMAIN = 7
 _VARIABLES = (
     "ZENOH_CONFIG_OVERRIDE",

@@ -7,8 +7,8 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from handsteer.config import RobotConfig
+from handsteer.plugins.sim.simulated import SimulatedRobot
 from handsteer.robots.course import LEAP_M, Referee, crosses
-from handsteer.robots.simulated import SimulatedRobot
 from handsteer.robots.world import Gate, load_world
 from handsteer.types import BUMP_S, MISS_S, CourseState, Pose2D, stopwatch
 

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from handsteer.config import RobotConfig
 from handsteer.errors import WorldError
+from handsteer.plugins.sim.simulated import SimulatedRobot
 from handsteer.robots import Shape
 from handsteer.robots.editing import (
     MOST_OBSTACLES,
@@ -22,7 +23,6 @@ from handsteer.robots.editing import (
     remove,
     reorder,
 )
-from handsteer.robots.simulated import SimulatedRobot
 from handsteer.robots.world import Box, Thing, World, load_world
 from handsteer.types import Pose2D
 

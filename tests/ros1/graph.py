@@ -15,7 +15,7 @@ from tests.processes import NODES, Peer, Process, Processes, as_tests_drive, eve
 PEER = Path(__file__).with_name("peer.py")
 ROSPY = ("rosgraph.xmlrpc", "rosgraph.roslogging", "roscpp.srv", "rosgraph_msgs.msg", "roslib.message", "rospkg")
 """What rospy imports; it reads the namespace of the command line while it is imported itself."""
-MODULES = (*NODES, *ROSPY, "handsteer.transports.ros1.conversion")
+MODULES = (*NODES, *ROSPY, "handsteer.plugins.ros1.conversion")
 
 
 class Ros1Graph(Processes):

@@ -118,7 +118,7 @@ def test_a_node_that_is_ended_leaves_at_once(ros2: Ros2Graph) -> None:
 
 
 def test_the_transport_keeps_its_contract_where_rclpy_is() -> None:
-    tests = "tests/transports/rclpy/in_ros2.py"
+    tests = "tests/plugins/ros2/in_ros2.py"
     command = [str(PYTHON), "-m", "pytest", "-q", "-p", "no:cacheprovider", "-p", "no:xdist", tests]
     done = subprocess.run(command, capture_output=True, text=True, timeout=600.0, check=False)
     assert done.returncode == 0, done.stdout + done.stderr

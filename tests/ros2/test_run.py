@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from handsteer.recordings.mcap_reader import McapFile
+from handsteer.plugins.record.mcap_reader import McapFile
 from tests.processes import eventually
 from tests.ros2.graph import NEEDS_ROS2, Ros2Graph
 

@@ -12,7 +12,7 @@ import pytest
 import yaml
 
 from handsteer.parameters import from_parameters
-from handsteer.transports.ros2.arguments import parse_arguments
+from handsteer.plugins.ros2.arguments import parse_arguments
 
 PACKAGE = Path(__file__).resolve().parents[2] / "ros" / "handsteer_ros2"
 SECTIONS = {

@@ -31,4 +31,4 @@ def test_auto_takes_cyclone_dds_where_there_is_no_rclpy(without: None) -> None:
     pytest.importorskip("cyclonedds")
     with pytest.raises(TransportError, match="'nonsense' is no argument of ROS 2"):  # as DDS says it, before it joins
         join("auto", "tests", ["nonsense"])
-    assert "handsteer.transports.dds.transport" in sys.modules
+    assert "handsteer.plugins.dds.transport" in sys.modules

@@ -1,4 +1,9 @@
-"""Sources of frames: webcam, video file, folder of photos, virtual hand, browser; and their interface."""
+"""Sources of frames: webcam, video file, folder of photos, virtual hand, browser; and their interface.
+
+A frame carries its capture time on the graph's monotonic clock. Frames are as the camera saw them; only pictures for
+people are mirrored. ``choice`` changes the camera while nodes run: it publishes ``/camera_changed`` when another camera
+is chosen and before its first frame, so recognition and control forget the one before.
+"""
 
 import os
 from dataclasses import dataclass

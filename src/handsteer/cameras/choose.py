@@ -65,7 +65,7 @@ def _webcam(source: str, config: CameraConfig, clock: Clock) -> Camera:
 
 def _virtual(config: CameraConfig, virtual_hand: VirtualHandConfig, clock: Clock) -> Camera:
     # All nodes import this module; only the process that shows the virtual hand loads what draws it.
-    from handsteer.cameras.virtual import VirtualHandCamera  # noqa: PLC0415
+    from handsteer.plugins.virtual_hand.camera import VirtualHandCamera  # noqa: PLC0415
 
     return VirtualHandCamera(virtual_hand, width=config.width, height=config.height, fps=config.fps, clock=clock)
 

@@ -92,9 +92,9 @@ for verb in ("run", "recognize", "study", "parameters"):
 for verb in ("completion", "models", "doctor", "ros"):
     app.command(f"handsteer.cli.installation:{verb}", name=verb, help_epilogue="")
 for verb in ("record", "replay", "report"):
-    app.command(f"handsteer.cli.recordings:{verb}", name=verb, help_epilogue="")
-app.command("handsteer.cli.signs:app", name="signs")
-app.command("handsteer.cli.bench:bench", name="bench", help_epilogue="")
+    app.command(f"handsteer.plugins.record.verbs:{verb}", name=verb, help_epilogue="")
+app.command("handsteer.plugins.teach.verbs:app", name="signs")
+app.command("handsteer.plugins.bench.verb:bench", name="bench", help_epilogue="")
 for verb in _NODES:
     app.command(f"handsteer.cli.nodes:{verb}", name=verb, group=_GRAPH, help_epilogue="")
 app.command("handsteer.cli.nodes:zenoh_router", name="zenoh-router", group=_GRAPH, help_epilogue="")

@@ -10,13 +10,13 @@ from handsteer.cli import signals
 from handsteer.cli.running import freeze_loaded_objects, say, signals_ignored
 from handsteer.clock import RealClock, SteppedClock
 from handsteer.config import Config
-from handsteer.dashboard.page_process import PageProcess
 from handsteer.errors import ConfigError
 from handsteer.graph import Graph
-from handsteer.live.process import LiveProcess
 from handsteer.parameters import from_parameters
-from handsteer.recordings.audit_log import AuditLog, audit_log_path
-from handsteer.study.session import Task
+from handsteer.plugins.foxglove.process import LiveProcess
+from handsteer.plugins.page.page_process import PageProcess
+from handsteer.plugins.record.audit_log import AuditLog, audit_log_path
+from handsteer.plugins.study.session import Task
 from handsteer.summary import Summary
 from handsteer.transports import join
 from handsteer.transports.base import Session

@@ -1,7 +1,6 @@
-"""``handsteer doctor``, ``models``, ``ros`` and ``completion``: the installation on this machine."""
+"""``handsteer models``, ``ros`` and ``completion``: the installation on this machine."""
 
 import inspect
-import json as json_format
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -9,47 +8,15 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import App, Parameter
 
-from handsteer.cli.app import Flag, app, loads
+from handsteer.cli.app import app, loads
 from handsteer.cli.running import say
 from handsteer.errors import ModelMissing
 
 if TYPE_CHECKING:
     from handsteer.config import Config
-    from handsteer.doctor import Finding
     from handsteer.parameters import Description
 
 _PACKAGE = Path(__file__).parents[1]
-
-
-@loads("handsteer.doctor")
-def doctor(*, port: int = 8080, json: Flag = False) -> int:
-    """Check what works on this machine; exit code 1 if something required is missing.
-
-    For example:
-      handsteer doctor              what works here, and what to do about the rest
-      handsteer doctor --port 9000  for a page on another port
-      handsteer doctor --json       for programs
-
-    Parameters
-    ----------
-    port
-        Port of the page.
-    json
-        Print one JSON list.
-    """
-    from handsteer.doctor import examine
-
-    findings = examine(port)
-    if json:
-        print(json_format.dumps([vars(finding) for finding in findings]))
-    else:
-        print("\n".join(_text(finding) for finding in findings))
-    return 1 if any(finding.verdict == "missing" for finding in findings) else 0
-
-
-def _text(finding: "Finding") -> str:
-    mark = {"ok": "ok", "optional": "--", "wrong": "??", "missing": "!!"}[finding.verdict]
-    return f"{mark}  {finding.name:8s} {finding.detail}"
 
 
 @loads("handsteer.recognition.landmark_models", "tqdm")

@@ -1,9 +1,7 @@
-"""Processes of a graph: one node each, several simulated robots, and the Zenoh router."""
+"""Processes of a graph: one node each, and several simulated robots."""
 
-import os
 import subprocess
 import sys
-import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -14,7 +12,7 @@ from cyclopts import Parameter
 
 from handsteer.cli.app import PageOptions, Parameters, Transport, loads
 from handsteer.cli.running import say, settings, signals_ignored
-from handsteer.errors import ConfigError, did_you_mean, needing
+from handsteer.errors import ConfigError, did_you_mean
 
 _MOST = 30
 _LOOK_PERIOD_S = 0.2
@@ -135,38 +133,6 @@ def _run(
     from handsteer.cli.one_node import run
 
     return run(verb, transport, words, lambda service: settings(file, given, shorthand, service=service))
-
-
-def zenoh_router(*, listen: str | None = None) -> int:
-    """Run the router through which nodes over Zenoh find each other, until you press Ctrl-C.
-
-    ROS 2's own does the same (ros2 run rmw_zenoh_cpp rmw_zenohd); each machine
-    needs only one of them.
-
-    For example:
-      handsteer zenoh-router                         for this machine
-      handsteer zenoh-router --listen tcp/[::]:7447  for other machines too
-
-    Parameters
-    ----------
-    listen
-        Endpoint, by default tcp/localhost:7447, for this machine only; tcp/[::]:7447 accepts other machines.
-    """
-    router = _open(listen)
-    try:
-        say(f"the Zenoh router listens at {' and '.join(router.endpoints)}")
-        threading.Event().wait()
-    except KeyboardInterrupt:
-        pass  # the usual end of a router
-    finally:
-        router.close()
-    return 0
-
-
-def _open(listen: str | None) -> Any:
-    with needing("the Zenoh router", "zenoh", "zenoh", "xxhash"):
-        from handsteer.transports.zenoh.configuration import Router
-    return Router(os.environ, listen)
 
 
 def robots(count: int, /, *, transport: str, world: str | None = None) -> int:

@@ -29,7 +29,7 @@ log = logging.getLogger(__name__)
 def _served(node: Any, config: Config) -> Iterator[None]:
     # The page's libraries take a second to load, which the other nodes do not need.
     with needing("the page", "page", "nicegui"):
-        from handsteer.dashboard.server import Dashboard
+        from handsteer.plugins.page.server import Dashboard
 
     wires = (node.transport, node.clock, node)
     dashboard = Dashboard(*wires, config.dashboard, cmd_vel=making.cmd_vel_topic(config))

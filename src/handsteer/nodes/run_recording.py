@@ -14,11 +14,11 @@ from handsteer.messages import RECORDED, Topic
 from handsteer.nodes.auditing import Auditor
 from handsteer.nodes.base import Node
 from handsteer.nodes.journal import journal_topic
-from handsteer.recordings.folder import RecordingState
+from handsteer.plugins.record.folder import RecordingState
 from handsteer.transports.base import Transport
 
 if TYPE_CHECKING:
-    from handsteer.recordings.recorder import Recorder
+    from handsteer.plugins.record.recorder import Recorder
 
 
 class RunRecording:
@@ -86,7 +86,7 @@ class RunRecording:
 
     def _open(self, path: Path, about: Mapping[str, str], prepare: Callable[[], None]) -> "Recorder":
         # Only recordings need the package mcap.
-        from handsteer.recordings.recorder import Recorder  # noqa: PLC0415
+        from handsteer.plugins.record.recorder import Recorder  # noqa: PLC0415
 
         waits = isinstance(self._clock, SteppedClock)
         topics = (*RECORDED, *self._topics)

@@ -1,4 +1,9 @@
-"""Robots to drive, a simulated one or one behind a topic, and their interface."""
+"""Robots to drive, a simulated one or one behind a topic, and their interface.
+
+``remote`` is a real robot behind a topic, whose commands a pure part computes (``command_limiter``). ``handsteer run``
+joins that robot's graph in addition to its own, in which it is the node ``robot`` like a simulated one. ``world`` is a
+world in YAML, ``editing`` changes it, and ``course`` has its gates.
+"""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, Protocol, runtime_checkable

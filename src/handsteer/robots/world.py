@@ -123,7 +123,7 @@ class Stop(Section):
 class World(Section):
     """A floor, the things on it, and the gates of a course in order.
 
-    ``path`` and ``stop`` describe how a course is meant to be driven, for :mod:`handsteer.bench`.
+    ``path`` and ``stop`` describe how a course is meant to be driven, for :mod:`handsteer.plugins.bench`.
     """
 
     floor: Floor = Floor()

@@ -1,4 +1,10 @@
-"""Transports, which carry messages between nodes."""
+"""Transports, which carry messages between nodes.
+
+Each subscription has an inbox that keeps the newest message only, so no queue grows and a slow subscriber delays no
+other. For signs and commands it keeps the newest ten, in order, because each sign changes the speed by one step.
+``in_process`` has the base of all transports: one type per topic, and several subscribers per message. ``encoding`` has
+the types of ROS messages and their bytes, ``commands`` publishes velocities with the type that subscribers use.
+"""
 
 import importlib.util
 import sys
@@ -29,7 +35,7 @@ def join(transport: str, node: str, arguments: Sequence[str]) -> Session:
 
 def _ros1(node: str, arguments: Sequence[str]) -> Session:
     # rospy is not installed everywhere, so it is imported only when it is used.
-    from handsteer.transports.ros1.session import Ros1Session  # noqa: PLC0415
+    from handsteer.plugins.ros1.session import Ros1Session  # noqa: PLC0415
 
     return Ros1Session(node, arguments)
 
@@ -37,19 +43,19 @@ def _ros1(node: str, arguments: Sequence[str]) -> Session:
 def _dds(node: str, arguments: Sequence[str]) -> Session:
     # There is no wheel of cyclonedds for Python 3.14 and newer, nor for Linux on ARM.
     with needing("the transport dds (zenoh works on every system)", "dds", "cyclonedds"):
-        from handsteer.transports.dds.transport import DdsTransport  # noqa: PLC0415
+        from handsteer.plugins.dds.transport import DdsTransport  # noqa: PLC0415
     return _wire(node, arguments, DdsTransport)
 
 
 def _zenoh(node: str, arguments: Sequence[str]) -> Session:
     with needing("the transport zenoh", "zenoh", "zenoh", "xxhash"):
-        from handsteer.transports.zenoh.transport import ZenohTransport  # noqa: PLC0415
+        from handsteer.plugins.zenoh.transport import ZenohTransport  # noqa: PLC0415
     return _wire(node, arguments, ZenohTransport)
 
 
 def _wire(node: str, arguments: Sequence[str], connect: Any) -> Session:
     # It loads all types of ROS 2.
-    from handsteer.transports.ros2.base_session import Ros2Session  # noqa: PLC0415
+    from handsteer.plugins.ros2.base_session import Ros2Session  # noqa: PLC0415
 
     return Ros2Session(node, arguments, connect)
 
@@ -58,7 +64,7 @@ def _ros2(node: str, arguments: Sequence[str]) -> Session:
     if importlib.util.find_spec("rclpy") is None:
         raise TransportError(f"the transport ros2 needs rclpy, {_WITHOUT_RCLPY}; --transport dds needs no ROS 2")
     try:
-        from handsteer.transports.rclpy.session import RclpySession  # noqa: PLC0415
+        from handsteer.plugins.ros2.session import RclpySession  # noqa: PLC0415
     except ImportError as problem:
         raise TransportError(f"rclpy is there but cannot be loaded ({problem}): is a ROS 2 sourced?") from None
     return RclpySession(node, arguments)

@@ -1,1 +1,0 @@
-"""The web page. It imports the graph, never the reverse."""

@@ -1,1 +1,0 @@
-"""The kinematic hand: joints, angles, poses of the signs, and rendered pictures."""

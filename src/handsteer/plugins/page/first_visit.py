@@ -1,0 +1,152 @@
+"""What a first visit shows on the camera's picture: the offer of one's own camera, and three steps to drive by signs.
+
+The browser remembers what was done or dismissed (``static/page.js``); it hides what it has seen.
+"""
+
+import asyncio
+from typing import Final
+
+from nicegui import ui
+
+from handsteer.audit import without_passwords
+from handsteer.cameras import VIRTUAL_HAND
+from handsteer.cameras.choice import BROWSER, OWN, Size
+from handsteer.errors import HandsteerError
+from handsteer.plugins.page.elements import box, button, read_words, sentence, set_property, switch, tag, text
+from handsteer.plugins.page.page import Page
+from handsteer.plugins.page.remote_graph import RemoteGraph
+from handsteer.plugins.page.sign_pictures import DRAWN
+from handsteer.plugins.page.state import PageState
+from handsteer.types import FORWARD, STOP
+
+_DEMO: Final = (
+    "It shows the signs in turn, and the robot obeys. With your own camera you drive: your browser asks for it first, "
+    "choose Allow. The pictures go only to the computer that runs handsteer."
+)
+_REFUSALS: Final = {
+    "NotAllowedError": (
+        "The browser refused the camera. Allow it by the camera or lock symbol next to the page's address, then press "
+        "Use my camera again."
+    ),
+    "NotFoundError": "The browser says: this device has no camera. Plug one in, or open this page on a phone.",
+    "NotReadableError": "Another program uses the camera. Close that program, then press Use my camera again.",
+    "insecure": (
+        "Browsers give a camera only to pages from this computer or over https. Open the page on the computer that "
+        "runs handsteer, or set up https: docs/page.md says how."
+    ),
+    "ended": "The camera was disconnected, or another program took it. Press Use my camera to go on.",
+}
+NOT_THE_DRIVER: Final = "Only the driver can change it: ask to drive first."
+_LONGEST_REASON: Final = 200
+
+
+def refusal(sent: object) -> str:
+    """Return what to do about a camera that a browser does not give, or that the server refused."""
+    if not isinstance(sent, dict):
+        return ""
+    why = sent.get("why")
+    if isinstance(why, str) and why:
+        return _REFUSALS.get(why, f"The browser gives no camera ({why[:_LONGEST_REASON]}): try another browser.")
+    return read_words(sent)
+
+
+async def choose_camera(page: Page, graph: RemoteGraph, source: str, size: Size | None = None) -> str:
+    """Choose a camera of ``graph``, if the viewer of ``page`` drives; return why not, in a sentence, or nothing."""
+    if not page.drives():
+        return NOT_THE_DRIVER
+    try:
+        await asyncio.wrap_future(graph.choose_camera(source, size))
+    except HandsteerError as error:
+        return f"{sentence(without_passwords(str(error)))}."
+    return ""
+
+
+class CameraOffer:
+    """Chooses between the graph's camera and the browser's, and says first that a demo hand is shown."""
+
+    def __init__(self, page: Page, graph: RemoteGraph) -> None:
+        self._page, self._graph = page, graph
+        with box("offer") as self._box:
+            with box("intro"):
+                tag("h2", "", "This is a demo hand, not yours")
+                text("", _DEMO)
+            self._refusal = text("trouble", "").props('role="alert"')
+            with box("choices"):
+                self._browser = button("Use my camera").classes("primary")
+                self._browser.props(f'data-camera="browser" data-viewer="{page.client.id}"')
+                self._own = button(f"Back to {graph.camera_name(OWN)}", self._use_own).props('data-camera="own"')
+                button("Keep watching").classes("keep").props('data-seen="demo"')
+        ui.on("webcam", lambda event: self._refusal.set_text(refusal(event.args)))
+
+    def update(self, state: PageState) -> None:
+        """Show ``state``."""
+        source = self._graph.state.camera_source
+        switch(self._box, "demo", on=state.camera == VIRTUAL_HAND)
+        switch(self._browser, "hidden", on=source == BROWSER and self._graph.state.has_browser)
+        has_own = any(each.source == OWN for each in self._graph.state.cameras)
+        switch(self._own, "hidden", on=source == OWN or not has_own)
+
+    async def _use_own(self) -> None:
+        self._refusal.set_text(await choose_camera(self._page, self._graph, OWN))
+
+
+_STEPS: Final = (
+    (FORWARD, "Show Forward: index finger up"),
+    (FORWARD, "Hold it until the robot drives"),
+    (STOP, "Show Stop: open palm"),
+)
+_DONE: Final = "You can drive. The page lists all signs below."
+
+
+NOT_BEGUN: Final = -1
+"""Until neutral is seen: what the robot does may still be the demo hand's."""
+
+
+def steps_done(done: int, state: PageState) -> int:
+    """Return how many of the three steps are done in ``state``, after ``done`` of them or :data:`NOT_BEGUN`."""
+    happens = (
+        state.seen != FORWARD and state.mood != "driving",
+        state.seen == FORWARD,
+        state.control.source == "signs" and state.mood == "driving" and not state.measured.is_rest,
+        state.recognition.sign == STOP and state.measured.is_rest,
+    )
+    return done + 1 if done < len(_STEPS) and happens[done + 1] else done
+
+
+class Coach:
+    """Three steps to drive by signs, each ticked by what really happens; for the driver, once."""
+
+    def __init__(self, page: Page) -> None:
+        self._page = page
+        self._done = NOT_BEGUN
+        self._steps: list[ui.element] = []
+        with box("coach") as self._box:
+            with ui.element("ol"):
+                for sign, words in _STEPS:
+                    with ui.element("li") as step:
+                        ui.html(DRAWN[sign][1], sanitize=False)
+                        text("", words)
+                    self._steps.append(step)
+            self._end = text("end", "").props('role="status"')
+            button("Skip", label="Skip these steps").props('data-seen="coach"')
+        self._mark()
+
+    def update(self, state: PageState, *, is_driver: bool) -> None:
+        """Show ``state``, and tick what has been done."""
+        is_live = is_driver and state.camera not in ("", VIRTUAL_HAND) and not state.is_joystick
+        switch(self._box, "off", on=not is_live)
+        if self._done == len(_STEPS):
+            return
+        done = steps_done(self._done, state) if is_live else NOT_BEGUN
+        if done == self._done:
+            return
+        self._done = done
+        self._mark()
+        if done == len(_STEPS):
+            self._end.set_text(_DONE)
+            self._page.client.run_javascript("noteSeen('coach', 8000)")
+
+    def _mark(self) -> None:
+        for number, step in enumerate(self._steps):
+            switch(step, "done", on=number < self._done)
+            set_property(step, "aria-current", "step" if number == max(0, self._done) else None)

@@ -1,0 +1,259 @@
+"""What all pages share: the head with links, the bar with the state and Stop, and the timer that updates them."""
+
+import copy
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from nicegui import ui
+
+from handsteer.errors import HandsteerError
+from handsteer.plugins.page.access import SESSION
+from handsteer.plugins.page.calibration import Calibrations
+from handsteer.plugins.page.elements import STATIC, switch, tag, text
+from handsteer.plugins.page.front import Presses
+from handsteer.plugins.page.lessons import Lessons
+from handsteer.plugins.page.node import DashboardNode
+from handsteer.plugins.page.recordings import Recordings, duration_text
+from handsteer.plugins.page.remote_graph import RemoteGraph
+from handsteer.plugins.page.settings import Settings
+from handsteer.plugins.page.state import PageState
+from handsteer.plugins.page.status_bar import Banner, LeasePanel, TimingLine
+from handsteer.plugins.page.viewers import LeaseStatus, OnDemandNode, PageAudit
+from handsteer.plugins.study.session import Session
+
+PICTURE_PATH = "/camera.mjpg"
+WEBCAM_PATH = "/camera"
+ASSETS_PATH = "/assets"
+
+MANIFEST_PATH = "/handsteer.webmanifest"
+MANIFEST = {
+    "name": "handsteer",
+    "short_name": "handsteer",
+    "description": "Drive a mobile robot with your hand signs",
+    "id": "/",
+    "start_url": "/",
+    "scope": "/",
+    "display": "standalone",
+    "background_color": "#eef1f8",
+    "theme_color": "#eef1f8",
+    "icons": [
+        {"src": f"{ASSETS_PATH}/icons/icon-192.png", "sizes": "192x192", "type": "image/png"},
+        {"src": f"{ASSETS_PATH}/icons/icon-512.png", "sizes": "512x512", "type": "image/png"},
+        {"src": f"{ASSETS_PATH}/icons/icon-full.png", "sizes": "512x512", "type": "image/png", "purpose": "maskable"},
+    ],
+}
+"""With this browsers install the page as an app; it has no token, because the browser keeps that as a cookie."""
+
+# With credentials: the cookie gives access. The colours are those of the ground, light and dark.
+_INSTALLABLE = (
+    f'<link rel="manifest" href="{MANIFEST_PATH}" crossorigin="use-credentials">'
+    f'<link rel="apple-touch-icon" href="{ASSETS_PATH}/icons/icon-full.png">'
+    '<meta name="theme-color" content="#eef1f8" media="(prefers-color-scheme: light)">'
+    '<meta name="theme-color" content="#0a0f1c" media="(prefers-color-scheme: dark)">'
+)
+
+ICON = (
+    '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 64 64"><rect width="64" height="64" rx="16" fill="#2457d6"/>'
+    '<g fill="none" stroke="#fff" stroke-linecap="round" stroke-width="6"><path d="M24 30V12M32 28V18M40 29V22"/>'
+    '<path d="M18 34v-2a4 4 0 0 1 4-4h18a5 5 0 0 1 5 5v7a11 11 0 0 1-11 11h-5a11 11 0 0 1-11-11z" fill="#fff"/></g>'
+    "</svg>"
+)
+_ASSET = {"css": '<link rel="stylesheet" href="{}">', "js": '<script src="{}" defer></script>'}
+# Not deferred: they translate the page while the browser reads it.
+_TRANSLATED = '<script src="{0}/languages/{1}.js"></script><script src="{0}/translate.js"></script>'
+# What the browser draws while it still loads the scripts that draw everything else.
+_LOADING = f'<div class="loading" aria-hidden="true" translate="no">{ICON}<b>handsteer</b></div>'
+# The server writes English everywhere. For a browser that prefers another language of static/languages, the script
+# static/translate.js replaces the words where they are shown, by that catalogue.
+ENGLISH = "en"
+LANGUAGES = frozenset({ENGLISH, *(file.stem for file in (STATIC / "languages").glob("*.js"))})
+"""Two-letter codes (ISO 639-1)."""
+
+_LONGEST_HEADER = 500
+_LINKS = (("/", "Drive"), ("/world", "World"), ("/teach", "Teach"), ("/settings", "Settings"))
+_PERIOD_S = 0.1
+_ACK_PATIENCE_S = 5.0
+"""A browser acknowledges received messages every 3 s; after this time without one, sending pauses until the next."""
+
+_THEME_ICON = (
+    '<svg viewBox="0 0 24 24" fill="none" stroke="currentColor" stroke-width="2" aria-hidden="true">'
+    '<circle cx="12" cy="12" r="9"/><path d="M12 3a9 9 0 0 1 0 18z" fill="currentColor"/></svg>'
+)
+
+
+@dataclass(frozen=True)
+class PageContext:
+    """What all pages share.
+
+    Attributes:
+        node: Joined while a browser shows a page.
+        audit: Publishes what viewers do.
+        graph: The graph, for what pages do in addition to its topics; None if its nodes run elsewhere.
+        settings: The graph's parameters, likewise.
+        lessons: Teaches the graph signs, likewise.
+        study: Leads a participant through a study; None without one.
+        recordings: Serves recordings; None if none can be made.
+        calibrations: Adapts the signs to a person; None if the graph's nodes run elsewhere.
+        presses: Recognises repetitions of a press of Stop.
+    """
+
+    node: OnDemandNode[DashboardNode]
+    audit: PageAudit
+    graph: RemoteGraph | None = None
+    settings: Settings | None = None
+    lessons: Lessons | None = None
+    study: Session | None = None
+    recordings: Recordings | None = None
+    calibrations: Calibrations | None = None
+    presses: Presses = field(default_factory=Presses)
+
+
+class Page:
+    """One browser's view at a URL ``path``, with its own stylesheets and scripts (``assets``).
+
+    Its timers run while the browser is connected.
+    """
+
+    def __init__(self, context: PageContext, path: str, *assets: str) -> None:
+        self.client = ui.context.client
+        self._context = context
+        self._introduce()
+        self.client.on_disconnect(self._leave)
+        self.client.on_delete(self._leave)
+        self.client.on_delete(lambda: context.audit.forget(self.client.id))
+        ui.add_head_html(_INSTALLABLE)
+        ui.add_body_html(_LOADING)
+        self._speak(preferred_language(self.client.request.headers.get("accept-language", "")))
+        for name in ("page.css", "page.js", *assets):
+            ui.add_head_html(_ASSET[name.rpartition(".")[2]].format(f"{ASSETS_PATH}/{name}"))
+        self._top(path)
+        self._banner = Banner(self._halt, self._reset)
+        self._unread: tuple[int | None, float] = (None, 0.0)
+        ui.timer(_PERIOD_S, self._update)
+
+    def show(self, node: DashboardNode, state: PageState) -> None:
+        """Show changes, ten times a second; pages extend this."""
+        self._driving.update(self.lease(node))
+        self._timing.update(state)
+        self._source.set_text(state.camera)
+        recording = self._context.graph.state.recording if self._context.graph is not None else None
+        is_on = recording is not None and recording.ended_s is None
+        switch(self._recorded, "hidden", on=not is_on)
+        if recording is not None and is_on:
+            self._recorded.set_text(duration_text(recording, node.clock.now()))
+        self._banner.update(state)
+
+    @property
+    def node(self) -> DashboardNode | None:
+        """The node while the browser is connected and the page is served, else None."""
+        return self._context.node.join(self.client.id) if self.client.has_socket_connection else None
+
+    def do(self, action: Callable[[DashboardNode, str], object]) -> None:
+        """Call ``action`` with the node and this viewer, if the page is in use."""
+        if node := self.node:
+            action(node, self.client.id)
+
+    def drives(self) -> bool:
+        """Return whether this viewer has the control lease; a free lease is given to it."""
+        node = self.node
+        return node is not None and node.lease.take(self.client.id, node.clock.now())
+
+    def change(self, action: Callable[[], object], refusal: str) -> str:
+        """Call ``action`` if this viewer drives; return an error message, or ``refusal``; empty if it succeeded."""
+        if not self.drives():
+            return refusal
+        try:
+            action()
+        except HandsteerError as error:
+            return str(error)
+        return ""
+
+    def lease(self, node: DashboardNode) -> LeaseStatus:
+        """Return the control lease as this viewer sees it."""
+        return node.lease.status_of(self.client.id, node.clock.now())
+
+    def _introduce(self) -> None:
+        request = self.client.request
+        session = request.scope.get("state", {}).get(SESSION, "")
+        self._context.audit.introduce(self.client.id, session, request.client.host if request.client else "")
+
+    def _speak(self, language: str) -> None:
+        if language != ENGLISH:
+            # For this client only: all clients of a path share the page. Quasar's and NiceGUI's own words follow it.
+            self.client.page = copy.copy(self.client.page)
+            self.client.page.language = language  # type: ignore[assignment]
+            ui.add_head_html(_TRANSLATED.format(ASSETS_PATH, language))
+
+    def _top(self, path: str) -> None:
+        with ui.element("header").classes("top"):
+            ui.html(ICON, sanitize=False)
+            tag("h1", "", "handsteer").props("translate=no")
+            with ui.element("nav").classes("links"):
+                for target, name in _LINKS:
+                    ui.link(name, target).props('aria-current="page"' if target == path else "")
+            self._timing = TimingLine()
+            with ui.element("div").classes("right"):
+                self._driving = LeasePanel(
+                    lambda: self.do(DashboardNode.ask_to_drive),
+                    lambda hand_over: self.do(lambda node, viewer: node.lease.answer(viewer, hand_over=hand_over)),
+                )
+                self._recorded = text("recorded hidden", "").props('title="A recording is being made"')
+                self._source = ui.label("").classes("source chip")
+                with ui.element("button").classes("icon-button theme").props('aria-label="Light or dark"'):
+                    ui.html(_THEME_ICON, sanitize=False)
+
+    def _update(self) -> None:
+        node = self.node
+        if node is not None and self._reads():
+            if self._context.node.is_watched_only_by(self.client.id):
+                node.lease.take(self.client.id, node.clock.now())
+            self.show(node, node.state(self.client.id))
+
+    def _reads(self) -> bool:
+        """Return whether the browser acknowledges messages; otherwise they would accumulate."""
+        sent = self.client.outbox.message_history  # messages sent but not acknowledged, oldest first
+        oldest = sent[0][0] if sent else None
+        now_s = time.monotonic()
+        if oldest != self._unread[0]:
+            self._unread = (oldest, now_s)
+        return oldest is None or now_s - self._unread[1] < _ACK_PATIENCE_S
+
+    def _halt(self, sent: object) -> None:
+        press = sent.get("press") if isinstance(sent, dict) else None
+        if node := self.node:
+            self._context.presses.obey(self.client.id, press, lambda: node.halt(self.client.id))
+
+    def _reset(self) -> None:
+        self.do(DashboardNode.reset)
+
+    def _leave(self) -> None:
+        node = self._context.node
+        if node.is_watched_by(self.client.id) and (joined := node.join(self.client.id)):
+            joined.leave(self.client.id)
+        node.leave(self.client.id)
+
+
+def preferred_language(accept: str) -> str:
+    """Return the language of the page that a browser wants most; English if it wants none of them.
+
+    ``accept`` is its ``Accept-Language`` header (RFC 9110, section 12.5.4), for example ``de-CH, de;q=0.9, en;q=0.8``.
+    """
+    wanted: dict[str, float] = {}
+    for item in accept[:_LONGEST_HEADER].split(","):
+        name, _, weight = item.partition(";")
+        language = name.strip().partition("-")[0].lower()
+        if language in LANGUAGES:
+            wanted[language] = max(_weight(weight), wanted.get(language, 0.0))
+    best = max(wanted, key=wanted.__getitem__, default=ENGLISH)  # the first of equals
+    return best if wanted.get(best, 0.0) > 0.0 else ENGLISH
+
+
+def _weight(parameter: str) -> float:
+    name, _, value = parameter.strip().partition("=")
+    if name.strip().lower() != "q":
+        return 1.0
+    try:
+        return float(value)
+    except ValueError:
+        return 0.0

@@ -1,0 +1,126 @@
+"""What the top of every page shows: the control lease, the reaction time, and the banner with the Stop button."""
+
+import math
+import re
+import time
+from collections.abc import Callable
+from typing import ClassVar
+
+from nicegui import ui
+
+from handsteer.plugins.page.elements import box, button, sentence, set_property, switch, text
+from handsteer.plugins.page.state import PageState
+from handsteer.plugins.page.viewers import LeaseStatus, Role
+
+UNKNOWN = "--"
+"""Shown for an unknown value."""
+
+
+class LeasePanel:
+    """Whether this viewer drives, and buttons to request the lease, or to hand it over (``answer(True)``)."""
+
+    _WORDS: ClassVar[dict[Role, str]] = {
+        "driver": "you drive",
+        "watcher": "you watch: another viewer drives",
+        "free": "no viewer drives",
+    }
+
+    def __init__(self, ask: Callable[[], None], answer: Callable[[bool], None]) -> None:
+        with box("lease"):
+            self._question = text("question", "")
+            self._words = text("role chip", "")
+            self._ask = button("Ask to drive", ask).classes("hidden")
+            self._yes = button("Hand over", lambda: answer(True)).classes("hidden")
+            self._no = button("Keep", lambda: answer(False)).classes("hidden")
+
+    def update(self, place: LeaseStatus) -> None:
+        """Show the lease as this viewer sees it."""
+        is_driver = place.role == "driver"
+        asks = f"Another viewer asks to drive, and does in {place.left_s:.0f} s without an answer"
+        waits = f"You drive in {place.left_s:.0f} s, or sooner"
+        self._question.set_text((asks if is_driver else waits) if place.asked else "")
+        self._words.set_text(self._WORDS[place.role])
+        switch(self._words, "driver", on=is_driver)
+        switch(self._ask, "hidden", on=is_driver or place.asked)
+        for answer in (self._yes, self._no):
+            switch(answer, "hidden", on=not (is_driver and place.asked))
+
+
+class TimingLine:
+    """Reaction time from the capture of a picture to the command, and the camera's frame rate.
+
+    It changes once a second: more often, it could not be read, and each change costs a browser the drawing of the page.
+    """
+
+    def __init__(self) -> None:
+        self._due_s = -math.inf
+        with box("timing"):
+            text("name", "Reaction time: typical / slowest 1 %")
+            self._times = text("value times", "")
+            self._rate = text("value rate", "")
+
+    def update(self, state: PageState) -> None:
+        """Show ``state``."""
+        if time.monotonic() < self._due_s:
+            return
+        self._due_s = time.monotonic() + 1.0
+        typical, slowest = (
+            _rounded(value) for value in (state.control.latency_median_ms, state.control.latency_p99_ms)
+        )
+        self._times.set_text(f"{typical} / {slowest} ms")
+        self._rate.set_text(f"{_rounded(state.fps)} frames/s")
+
+
+def _rounded(value: float | None) -> str:
+    return UNKNOWN if value is None else f"{value:.0f}"
+
+
+_TIME = re.compile(r" for \d+(\.\d+)? s\b")
+
+
+def spoken(state: PageState) -> str:
+    """Return the banner's sentence for a screen reader, without times, which would be read out at each change."""
+    return ". ".join([f"{state.headline}: {_TIME.sub('', state.reason)}", *state.warnings])
+
+
+_PRESS = "() => emit({ press: window.pressStop?.() ?? 0 })"
+
+
+class Banner:
+    """A sentence that reports what the robot does, and why, and buttons that call ``halt`` and ``reset``.
+
+    ``halt`` is called with what the browser sent: the number of the press, which ``static/page.js`` also sends by a
+    request of its own, until that is answered.
+    """
+
+    def __init__(self, halt: Callable[[object], None], reset: Callable[[], None]) -> None:
+        with ui.element("section").classes("card banner") as self._banner:
+            self._spoken = text("spoken", "").props('role="status"')
+            box("lamp")
+            with box("words"):
+                self._headline = text("headline", "Starting")
+                self._reason = text("reason", "Waiting for the first report")
+            self._warning = text("warning hidden", "")
+            with box("buttons"):
+                self._reset = button("Reset", reset, "Reset: let the robot be driven again").classes("hidden")
+                stop = button("Stop", label="Stop the robot (space key)").classes("stop")
+                stop.props('aria-keyshortcuts="Space"')
+                stop.on("click", lambda event: halt(event.args), js_handler=_PRESS)
+                with stop:
+                    text("pressed sent", "Sent")
+                    text("pressed confirmed", "Stopped")
+        ui.on("space", lambda event: halt(event.args))
+        self._mood = ""
+
+    def update(self, state: PageState) -> None:
+        """Show ``state``."""
+        self._headline.set_text(state.headline)
+        for label, words in ((self._reason, sentence(state.reason)), (self._warning, "; ".join(state.warnings))):
+            label.set_text(words)
+            set_property(label, "title", words)  # where it does not fit
+        self._spoken.set_text(spoken(state))
+        switch(self._warning, "hidden", on=not state.warnings)
+        switch(self._reset, "hidden", on=not state.stopped)
+        if state.mood != self._mood:
+            self._banner.classes(remove=self._mood, add=state.mood)
+            self._mood = state.mood

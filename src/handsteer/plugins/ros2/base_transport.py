@@ -1,0 +1,299 @@
+"""What transports of ROS 2 share: quality of service, and publishing and receiving of encoded messages.
+
+Commands, signs and what follows from them are reliable. For images, a robot's state and its scans, publishers offer
+reliable and subscribers request best effort, as in REP 2003 for sensor data: this matches every other endpoint, and
+late messages are of no use to us. ``/clock`` is best effort.
+"""
+
+import logging
+import threading
+import time
+from abc import abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, ClassVar, Generic, NamedTuple, Protocol, TypeVar
+
+from handsteer.clock import Clock
+from handsteer.errors import TransportError
+from handsteer.messages import (
+    CameraInfo,
+    ClockMessage,
+    CompressedImage,
+    Image,
+    JointState,
+    LaserScan,
+    Odometry,
+    Topic,
+    type_name,
+)
+from handsteer.transports.base import Deliver, Received
+from handsteer.transports.encoding import NodeName, compile_type, decode, encode
+from handsteer.transports.in_process import BasePublisher, BaseTransport, Receive
+from handsteer.transports.timing import StaleMessageFilter, capture_time
+
+M = TypeVar("M")
+
+IMAGES = (Image, CompressedImage)
+"""Large messages, which have a lower priority than all others on a link."""
+_SENSOR_DATA = (*IMAGES, CameraInfo, Odometry, JointState, LaserScan)
+# Enough to resend lost parts before the next image arrives; older images are of no use.
+_IMAGES_KEPT = 3
+_LAST_S = 0.2
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class Profile:
+    """The quality of service of one endpoint: reliable or best effort, transient local or volatile, keep last."""
+
+    reliable: bool
+    latched: bool
+    depth: int
+
+
+def offered(topic: Topic[Any]) -> Profile:
+    """Return the profile offered by a publisher of ``topic``."""
+    depth = max(topic.depth, _IMAGES_KEPT) if topic.type in IMAGES else topic.depth
+    return Profile(topic.type is not ClockMessage, topic.latched, depth)
+
+
+def requested(topic: Topic[Any]) -> Profile:
+    """Return the profile requested by a subscriber of ``topic``."""
+    return Profile(topic.type not in (*_SENSOR_DATA, ClockMessage), topic.latched, topic.depth)
+
+
+class Writer(Protocol):
+    """Sends the encoded messages of a topic, on any middleware."""
+
+    @property
+    def has_readers(self) -> bool:
+        """Whether there are subscribers, in this process or another."""
+        ...
+
+    def write(self, raw: bytes) -> None:
+        """Send a message; never waits for subscribers, which miss it if they are too slow."""
+        ...
+
+    def flush(self, timeout_s: float) -> bool:
+        """Wait for at most ``timeout_s`` seconds; return whether all reliable subscribers have what was sent."""
+        ...
+
+    def close(self) -> None:
+        """Stop sending; called once."""
+        ...
+
+
+class _Publisher(BasePublisher[M]):
+    """Publisher of a topic by ``writer``, which raises one of ``errors`` if it cannot send.
+
+    Without a writer, there are never subscribers.
+    """
+
+    def __init__(
+        self, node: str, name: str, topic: Topic[M], writer: Writer | None, errors: tuple[type[Exception], ...]
+    ) -> None:
+        super().__init__(node, name, topic)
+        self._lock = threading.Lock()
+        self._writer = writer
+        self._errors = errors
+
+    @property
+    def has_subscribers(self) -> bool:
+        with self._lock:
+            return self._writer is not None and self._writer.has_readers
+
+    def flush(self, timeout_s: float) -> None:
+        writer = self._writer
+        if writer is not None and not writer.flush(timeout_s):
+            log.info("%s: not every subscriber has confirmed the last message", self.name)
+
+    def close(self) -> None:
+        with self._lock:
+            writer, self._writer = self._writer, None
+        if writer is not None:
+            writer.close()
+
+    def _send(self, message: M, captured_s: float | None) -> None:
+        raw = encode(message)
+        try:
+            with self._lock:
+                if self._writer is not None:
+                    self._writer.write(raw)
+        except self._errors as error:
+            raise TransportError(f"{self.name} cannot be published: {error}") from None
+
+
+class Ros2Transport(BaseTransport):
+    """Carries messages as one ROS 2 node for all nodes of this process, on any middleware.
+
+    Capture times are the stamps of message headers; messages without a header have none.
+
+    Args:
+        node: Full name of this process's node, such as ``/r1/my_camera``.
+        clock: The graph's clock.
+    """
+
+    errors: ClassVar[tuple[type[Exception], ...]]
+    """Exceptions of a :class:`Writer` that cannot send."""
+
+    def __init__(self, node: str, clock: Clock) -> None:
+        super().__init__(set())
+        self._node_name = node
+        self._clock = clock
+
+    def subscribed_types(self, topic: Topic[Any]) -> set[str]:
+        """Return the types of other processes' subscribers of ``topic``; none while this process uses it twice."""
+        return set() if self._types.is_shared(self.topic_name(topic)) else self._subscribed_types(topic)
+
+    def withdraw(self, publisher: BasePublisher[Any]) -> None:
+        """Close a publisher once its subscribers have what it sent."""
+        publisher.flush(_LAST_S)
+        with self._lock:
+            self._publishers.remove(publisher)
+        publisher.close()
+        self._types.release(publisher.name)
+
+    def full_name(self, node: str) -> str:
+        """Return the ROS 2 node's name and ``node``, as in ROS's own diagnostics: ``r1/my_camera: my_camera``."""
+        return f"{self._node_name.removeprefix('/')}: {node}"
+
+    def flush(self, timeout_s: float) -> None:
+        """Wait until all subscribers have what was published, for at most ``timeout_s`` seconds."""
+        with self._lock:
+            publishers = list(self._publishers)
+        deadline_s = time.monotonic() + timeout_s
+        for publisher in publishers:
+            publisher.flush(max(0.0, deadline_s - time.monotonic()))
+
+    def _open_publisher(self, node: str, name: str, topic: Topic[M]) -> BasePublisher[M]:
+        compile_type(type_name(topic.type))
+        return _Publisher(self._node_name, name, topic, self._open_writer(name, topic), self.errors)
+
+    def _reception(self, node: str, name: str, topic: Topic[M]) -> Receive[M]:
+        compile_type(type_name(topic.type))
+        return lambda send: self._open_reader(name, topic, Intake(topic, name, self._clock, send).take)
+
+    @abstractmethod
+    def _open_writer(self, name: str, topic: Topic[Any]) -> Writer | None:
+        """Return a new writer of ``topic``, whose full name is ``name``; None if there can be no subscribers."""
+
+    @abstractmethod
+    def _open_reader(self, name: str, topic: Topic[Any], take: "Take") -> Callable[[], None]:
+        """Call ``take`` with the messages of ``topic``, on one thread at a time; return a function that ends it."""
+
+    @abstractmethod
+    def _subscribed_types(self, topic: Topic[Any]) -> set[str]:
+        """Return the types of the subscribers of ``topic`` in other processes."""
+
+
+class Other(NamedTuple):
+    """A publisher or subscriber in another process: the full name of its node, and the type of its messages."""
+
+    node: str
+    type: str
+    publishes: bool
+
+
+class WireTransport(Ros2Transport):
+    """Carries messages without ROS 2's own library, and services too.
+
+    Args:
+        name: Name of this process's node, with its remapping rules.
+        clock: The graph's clock.
+    """
+
+    def __init__(self, name: NodeName, clock: Clock) -> None:
+        super().__init__(name.full, clock)
+        self._name = name
+        self._services: list[Callable[[], None]] = []
+
+    def publishers_of(self, topic: Topic[Any]) -> list[str]:
+        """Return the full names of the ROS 2 nodes that publish ``topic``, in this process and others."""
+        others = [other.node for other in self._others(self.topic_name(topic)) if other.publishes]
+        return sorted([*super().publishers_of(topic), *others])
+
+    def topic_name(self, topic: Topic[Any]) -> str:
+        """Return the topic's full name in the graph, remapped."""
+        return self._name.topic(topic)
+
+    def serve(self, name: str, kind: str, respond: Callable[[bytes], bytes]) -> None:
+        """Offer the service of this full name, and of a type such as ``rcl_interfaces/srv/ListParameters``.
+
+        ``respond`` converts an encoded request to a reply, at once; it raises any exception if the request is invalid.
+        """
+        self._services.append(self._open_service(name, kind, respond))
+
+    def check(self) -> None:
+        """Log problems of the connection to the graph; called regularly."""
+
+    def close(self) -> None:
+        """End all publishing, receiving and services; may be called twice."""
+        while self._services:
+            self._services.pop()()
+        super().close()
+
+    @abstractmethod
+    def _open_service(self, name: str, kind: str, respond: Callable[[bytes], bytes]) -> Callable[[], None]:
+        """Offer a service, as in :meth:`serve`; return a function that ends it, and is called once."""
+
+    @abstractmethod
+    def _others(self, name: str) -> list[Other]:
+        """Return the publishers and subscribers of the topic of this full name in other processes."""
+
+    def _subscribed_types(self, topic: Topic[Any]) -> set[str]:
+        return {other.type for other in self._others(self.topic_name(topic)) if not other.publishes}
+
+
+Take = Callable[[bytes, bytes, float | None], None]
+"""Takes an encoded message, an identifier of its sender, and the time of sending, as :meth:`Intake.take`."""
+
+
+class Intake(Generic[M]):
+    """Decodes the messages of a topic and sends them on, except late ones that do not stop the robot.
+
+    The first invalid message is logged, and the first of several late ones.
+    """
+
+    def __init__(self, topic: Topic[M], name: str, clock: Clock, send: Deliver[M]) -> None:
+        self._topic = topic
+        self._name = name
+        self._clock = clock
+        self._send = send
+        self._stale = None if topic.lifespan_s is None else StaleMessageFilter(topic.lifespan_s)
+        self._was_late = self._is_broken = False
+
+    def take(self, raw: bytes, sender: bytes, sent_s: float | None) -> None:
+        """Process one message.
+
+        Args:
+            raw: The encoded message.
+            sender: Identifies the sender; empty if unknown.
+            sent_s: Time of sending, in seconds of the sender's clock; None if unknown.
+        """
+        is_late = self._is_late(sender, sent_s)
+        try:
+            message = decode(raw, type_name(self._topic.type))
+        except Exception as error:
+            # Invalid messages must not end the subscription.
+            if not self._is_broken:
+                log.warning("%s: a message of %d bytes cannot be read: %s", self._name, len(raw), error)
+            self._is_broken = True
+            return
+        if not is_late or (self._topic.stops is not None and self._topic.stops(message)):
+            self._send(Received(message, capture_time(message, self._clock), is_late=is_late))
+
+    def _is_late(self, sender: bytes, sent_s: float | None) -> bool:
+        if self._stale is None or sent_s is None:
+            return False
+        is_late = self._stale.is_late(sender, sent_s, time.monotonic())
+        if is_late and not self._was_late:
+            log.warning(
+                "%s: messages come over %g s late and are not obeyed, but for stops: has the link stood still, has the "
+                "clock of their sender been set back%s?",
+                self._name,
+                self._topic.lifespan_s,
+                "" if sender else ", or have several senders clocks that differ",
+            )
+        self._was_late = is_late
+        return is_late

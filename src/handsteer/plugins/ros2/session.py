@@ -1,0 +1,290 @@
+"""This process as a node of rclpy: name, parameters, time, and the thread that spins it."""
+
+import logging
+import threading
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
+from functools import partial
+from typing import Any
+
+import rclpy
+from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
+from rclpy.clock import JumpThreshold
+from rclpy.duration import Duration
+from rclpy.exceptions import NameValidationException
+from rclpy.executors import ExternalShutdownException, ShutdownException, SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.parameter_service import ParameterService
+from rclpy.serialization import deserialize_message
+from rclpy.signals import SignalHandlerOptions
+from rclpy.utilities import remove_ros_args
+
+from handsteer.clock import Clock, SimulatedClock, WallClock
+from handsteer.errors import ConfigError, HandsteerError, TransportError
+from handsteer.parameters import Description, NodeParameters, Value
+from handsteer.plugins.ros2.arguments import nested
+from handsteer.plugins.ros2.parameter_services import TYPES, descriptor
+from handsteer.plugins.ros2.topics import RclpyTransport, ros_class
+from handsteer.transports.base import Call, Session
+from handsteer.transports.encoding import encode
+from handsteer.transports.timing import ClockMonitor
+
+_DELIVER_S = 0.2
+_LEAVE_S = 2.0
+_AFTER_FAILURE_S = 0.05
+_ANY_JUMP = JumpThreshold(min_forward=Duration(nanoseconds=1), min_backward=Duration(nanoseconds=-1))
+_TRIGGER = "std_srvs/srv/Trigger"
+_QOS = "qos_overrides."
+_OF_ROS = ("use_sim_time", "start_type_description_service")
+_SCALARS = (Parameter.Type.BOOL, Parameter.Type.INTEGER, Parameter.Type.DOUBLE)
+_SWITCH = {True: "on", False: "off"}
+_ARRAYS = tuple(kind for kind in Parameter.Type if kind.name.endswith("_ARRAY"))
+# One function per level, because rclpy requires that a line of code always logs at the same level.
+_LOG_AS: dict[int, Callable[[Any, str], None]] = {
+    logging.CRITICAL: lambda logger, text: logger.fatal(text),
+    logging.ERROR: lambda logger, text: logger.error(text),
+    logging.WARNING: lambda logger, text: logger.warning(text),
+    logging.INFO: lambda logger, text: logger.info(text),
+    logging.NOTSET: lambda logger, text: logger.debug(text),
+}
+
+log = logging.getLogger(__name__)
+
+
+class _RclpyHandler(logging.Handler):
+    """Forwards log records to the logger of an rclpy node."""
+
+    def __init__(self, logger: Any) -> None:
+        super().__init__()
+        self._logger = logger
+
+    def emit(self, record: logging.LogRecord) -> None:
+        try:
+            level = next(level for level in _LOG_AS if record.levelno >= level)
+            _LOG_AS[level](self._logger, self.format(record))
+        except Exception:
+            self.handleError(record)
+
+
+@contextmanager
+def _logging_by(logger: Any) -> Iterator[None]:
+    """Forward log records of handsteer to a logger of rclpy, whose level is set by ``--log-level``."""
+    ours = logging.getLogger("handsteer")
+    before = (ours.handlers, ours.level, ours.propagate)
+    ours.handlers = [_RclpyHandler(logger)]
+    ours.setLevel(int(logger.get_effective_level()))
+    ours.propagate = False  # rclpy shows them on the screen already
+    try:
+        yield
+    finally:
+        ours.handlers, level, ours.propagate = before
+        ours.setLevel(level)
+
+
+class RclpySession(Session):
+    """A session of ROS 2, by a node of rclpy.
+
+    rclpy itself provides ROS 2's common features of nodes: arguments and remapping, parameters and ``qos_overrides``,
+    ``use_sim_time``, the log, ``get_type_description``.
+
+    Args:
+        node: Name of the node, unless ``arguments`` rename it.
+        arguments: ROS 2's own, after ``--ros-args``.
+
+    Raises:
+        TransportError: An argument is wrong, or the middleware cannot be started.
+    """
+
+    def __init__(self, node: str, arguments: Sequence[str]) -> None:
+        self._left = threading.Event()
+        self._context = rclpy.Context()
+        self._executor: SingleThreadedExecutor | None = None
+        self._log = ExitStack()
+        self._node = _make_node(self._context, node, arguments)
+        try:
+            self._log.enter_context(_logging_by(self._node.get_logger()))
+            self.name: str = self._node.get_fully_qualified_name()
+            self.parameters: dict[str, Any] = take_given(self._node)
+            self.clock = self._make_clock()
+            self._clock_monitor = ClockMonitor(self.clock)
+            self.transport: RclpyTransport = RclpyTransport(self._node, self.clock)
+            self._executor = SingleThreadedExecutor(context=self._context)
+            self._executor.add_node(self._node)
+            self._thread = threading.Thread(target=self._spin, name="rclpy", daemon=True)
+            self._thread.start()
+        except BaseException:  # including interrupts: open resources would keep the process from ending
+            self.close()
+            raise
+
+    def serve(self, parameters: NodeParameters) -> None:
+        """Let rclpy serve ``ros2 param``."""
+        self._parameters = ParameterLink(self._node, parameters)
+
+    def offer(self, services: Callable[[], Mapping[str, Call]]) -> None:
+        """Offer the node's services, as std_srvs/Trigger, if this ROS 2 has that package."""
+        trigger = ros_class(_TRIGGER)
+        if trigger is None:
+            log.info("the node's services are left out: this ROS 2 lacks the package std_srvs")
+            return
+        for name, call in services().items():
+            self._node.create_service(trigger, f"~/{name}", partial(_answer, call))
+
+    def wait(self, timeout_s: float) -> bool:
+        """Wait for at most ``timeout_s`` seconds; return whether rclpy has been shut down, or this session closed."""
+        self._clock_monitor.check()
+        return self._left.wait(timeout_s) or not self._context.ok()
+
+    def close(self) -> None:
+        """Deliver what was published, then leave the graph; may be called twice."""
+        if self._left.is_set():
+            return
+        self._left.set()
+        if self._executor is not None:
+            self.transport.flush(_DELIVER_S)
+            self.transport.close()
+            self._executor.shutdown()
+            self._thread.join(_LEAVE_S)
+        self._log.close()
+        self._node.destroy_node()
+        self._context.try_shutdown()
+        self._context.destroy()
+
+    def _make_clock(self) -> Clock:
+        if not self._node.get_parameter("use_sim_time").value:
+            return WallClock()
+        simulated, theirs = SimulatedClock(), self._node.get_clock()
+        # Referenced, because rclpy does not keep it.
+        self._jumps = theirs.create_jump_callback(
+            _ANY_JUMP, post_callback=lambda _: simulated.tell(theirs.now().nanoseconds / 1e9)
+        )
+        return simulated
+
+    def _spin(self) -> None:
+        executor = self._executor
+        assert executor is not None
+        while not self._left.is_set():
+            try:
+                executor.spin_once()
+            except (ExternalShutdownException, ShutdownException):
+                return
+            except Exception:
+                if not self._left.is_set():
+                    log.exception("ROS 2: a message could not be served")
+                    self._left.wait(_AFTER_FAILURE_S)  # repeated failures must not use up the processor
+
+
+def _answer(call: Call, _request: Any, reply: Any) -> Any:
+    try:
+        reply.message, reply.success = call(), True
+    except HandsteerError as error:
+        reply.message, reply.success = str(error), False
+    return reply
+
+
+def _make_node(context: Any, node: str, arguments: Sequence[str]) -> Node:
+    try:
+        # Our handlers process the signals: the robot must be stopped before the middleware shuts down.
+        rclpy.init(args=list(arguments), context=context, signal_handler_options=SignalHandlerOptions.NO)
+        left_over = remove_ros_args(list(arguments))
+        if left_over:
+            raise TransportError(
+                f"{left_over[0]!r} is no argument of ROS 2: it should be as --ros-args "
+                "-r image_raw:=camera/image -p fps:=15"
+            )
+        return rclpy.create_node(
+            node,
+            context=context,
+            start_parameter_services=False,
+            allow_undeclared_parameters=True,
+            automatically_declare_parameters_from_overrides=True,
+        )
+    except (RuntimeError, ValueError, NameValidationException) as error:
+        context.try_shutdown()
+        raise TransportError(f"cannot join ROS 2 as {node}: {' '.join(str(error).split())}") from None
+
+
+def take_given(node: Node) -> dict[str, Any]:
+    """Return the parameters given to a node at its start, nested at dots, without ROS 2's own.
+
+    They are removed from the node, which declares its parameters later.
+    """
+    found = {name: given for name, given in node.get_parameters_by_prefix("").items() if not _is_of_ros(name)}
+    for name in found:
+        node.undeclare_parameter(name)
+    return nested({name: _plain(given) for name, given in found.items()})
+
+
+class ParameterLink:
+    """Declares parameters to rclpy, and applies changes by others.
+
+    Args:
+        node: The node, without parameters of its own.
+    """
+
+    def __init__(self, node: Node, parameters: NodeParameters) -> None:
+        self._node = node
+        self._parameters = parameters
+        for name, value in parameters.values().items():
+            self._declare(name, value)
+        node.add_pre_set_parameters_callback(self._as_all_declared)
+        node.add_on_set_parameters_callback(self._set)
+        # Only now, because rclpy would accept values for parameters that are not declared yet.
+        self._services = ParameterService(node)
+
+    def _declare(self, name: str, value: Value) -> None:
+        description = self._parameters.describe(name)
+        assert description is not None
+        kind, theirs = Parameter.Type(TYPES[description.kind]), _descriptor(name, description)
+        if description.removable:
+            self._node.declare_parameter(name, value, theirs, ignore_override=True)
+            return
+        self._node.declare_parameter(name, kind, theirs, ignore_override=True)
+        typed = float(value) if kind is Parameter.Type.DOUBLE else value  # type: ignore[arg-type]
+        self._node.set_parameters([Parameter(name, kind, typed)])
+
+    def _as_all_declared(self, given: list[Parameter]) -> list[Parameter]:
+        """Return ``given`` with declared types: an empty list in YAML has no type, and ``off`` is not a text."""
+        return [self._as_declared(one) for one in given]
+
+    def _as_declared(self, one: Parameter) -> Parameter:
+        description = self._parameters.describe(one.name)
+        kind = None if description is None else Parameter.Type(TYPES[description.kind])
+        if kind is Parameter.Type.DOUBLE and one.type_ is Parameter.Type.INTEGER:
+            return Parameter(one.name, kind, float(one.value))
+        if kind is Parameter.Type.STRING_ARRAY and one.type_ in _ARRAYS and len(one.value) == 0:
+            return Parameter(one.name, kind, [])
+        if kind is Parameter.Type.STRING and one.type_ in _SCALARS:
+            text = _SWITCH[one.value] if one.type_ is Parameter.Type.BOOL else str(one.value)
+            return Parameter(one.name, kind, text)
+        return one
+
+    def _set(self, given: Sequence[Parameter]) -> SetParametersResult:
+        try:
+            self._refuse_ros_own(given)
+            self._parameters.set({one.name: _plain(one) for one in given if not _is_of_ros(one.name)})
+        except ConfigError as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        return SetParametersResult(successful=True)
+
+    def _refuse_ros_own(self, given: Sequence[Parameter]) -> None:
+        for one in given:
+            is_set = _is_of_ros(one.name) and self._node.has_parameter(one.name)
+            if is_set and self._node.get_parameter(one.name).value != one.value:
+                raise ConfigError(f"{one.name} cannot be set: it is only read when the node starts")
+
+
+def _is_of_ros(name: str) -> bool:
+    return name in _OF_ROS or name.startswith(_QOS)
+
+
+def _plain(parameter: Parameter) -> Any:
+    return list(parameter.value) if parameter.type_ in _ARRAYS else parameter.value
+
+
+def _descriptor(name: str, description: Description) -> ParameterDescriptor:
+    theirs = deserialize_message(encode(descriptor(name, description)), ParameterDescriptor)
+    # rclpy would refuse even the current value, which `ros2 param load` sets.
+    theirs.read_only = False
+    theirs.dynamic_typing = description.removable  # rclpy does not undeclare parameters of a static type
+    return theirs

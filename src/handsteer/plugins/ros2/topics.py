@@ -1,0 +1,187 @@
+"""Messages by rclpy: one ROS 2 node for all nodes of this process, with serialised messages."""
+
+import importlib
+import logging
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any
+
+from rclpy.duration import Duration
+from rclpy.event_handler import PublisherEventCallbacks
+from rclpy.exceptions import InvalidTopicNameException
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos_overriding_options import InvalidQosOverridesError, QoSOverridingOptions
+
+from handsteer.clock import Clock
+from handsteer.errors import TransportError
+from handsteer.messages import Topic, type_name
+from handsteer.plugins.ros2.base_transport import Profile, Ros2Transport, Take, offered, requested
+
+log = logging.getLogger(__name__)
+
+
+def publisher_qos(topic: Topic[Any]) -> QoSProfile:
+    """Return the QoS offered by a publisher of ``topic``."""
+    qos = _qos(offered(topic))
+    if topic.lifespan_s is not None:
+        qos.lifespan = Duration(seconds=topic.lifespan_s)
+    return qos
+
+
+def subscription_qos(topic: Topic[Any]) -> QoSProfile:
+    """Return the QoS requested by a subscription to ``topic``."""
+    return _qos(requested(topic))
+
+
+def _qos(profile: Profile) -> QoSProfile:
+    return QoSProfile(
+        history=HistoryPolicy.KEEP_LAST,
+        depth=profile.depth,
+        reliability=ReliabilityPolicy.RELIABLE if profile.reliable else ReliabilityPolicy.BEST_EFFORT,
+        durability=DurabilityPolicy.TRANSIENT_LOCAL if profile.latched else DurabilityPolicy.VOLATILE,
+    )
+
+
+class RclpyTransport(Ros2Transport):
+    """A :class:`~handsteer.transports.base.Transport` by a node of rclpy, on whose thread it delivers.
+
+    A topic whose message type is missing in this ROS 2 is logged once and ignored.
+    """
+
+    # Fast DDS loses most raw images even on one machine.
+    crosses_network = True
+    errors = (RuntimeError,)
+
+    def __init__(self, node: Node, clock: Clock) -> None:
+        super().__init__(node.get_fully_qualified_name(), clock)
+        self._node = node
+        self._missing: set[str] = set()
+        self._is_open = True
+
+    def publishers_of(self, topic: Topic[Any]) -> list[str]:
+        """Return the full names of the ROS 2 nodes that publish ``topic``; killed ones remain for a while."""
+        found = self._node.get_publishers_info_by_topic(self._unresolved(topic)) if self._is_open else []
+        return sorted(f"{one.node_namespace.rstrip('/')}/{one.node_name}" for one in found)
+
+    def topic_name(self, topic: Topic[Any]) -> str:
+        """Return the topic's full name in the graph, remapped.
+
+        Raises:
+            TransportError: Remapping results in a name that is not allowed.
+        """
+        with _refusals(topic.name):
+            return str(self._node.resolve_topic_name(self._unresolved(topic)))
+
+    def close(self) -> None:
+        """End all publishing and receiving; may be called twice."""
+        self._is_open = False
+        super().close()
+
+    def _open_writer(self, name: str, topic: Topic[Any]) -> "_Writer | None":
+        kind = self._class_of(name, topic)
+        if kind is None:
+            return None
+        with _refusals(name):
+            publisher = self._node.create_publisher(
+                kind,
+                self._unresolved(topic),
+                publisher_qos(topic),
+                # Event callbacks would keep a reference in the executor, and with it the publisher and the type of its
+                # topic.
+                event_callbacks=PublisherEventCallbacks(use_default_callbacks=topic.or_type is None),
+                qos_overriding_options=self._overriding(name),
+            )
+        return _Writer(self._node, publisher)
+
+    def _open_reader(self, name: str, topic: Topic[Any], take: Take) -> Callable[[], None]:
+        kind = self._class_of(name, topic)
+        if kind is None:
+            return lambda: None
+
+        def on_message(raw: bytes, info: Mapping[str, int]) -> None:
+            sent_ns = info.get("source_timestamp", 0)  # not provided by every middleware
+            take(raw, b"", sent_ns / 1e9 if sent_ns > 0 else None)
+
+        with _refusals(name):
+            subscription = self._node.create_subscription(
+                kind,
+                self._unresolved(topic),
+                on_message,
+                subscription_qos(topic),
+                qos_overriding_options=self._overriding(name),
+                raw=True,
+            )
+        return lambda: self._node.destroy_subscription(subscription)
+
+    def _subscribed_types(self, topic: Topic[Any]) -> set[str]:
+        found = self._node.get_subscriptions_info_by_topic(self._unresolved(topic))
+        return {one.topic_type for one in found}
+
+    def _unresolved(self, topic: Topic[Any]) -> str:
+        """Return the name for rclpy, which expands and remaps it; a topic beneath another is renamed with that."""
+        beneath, name, resolve = topic.beneath, topic.ros_name, self._node.resolve_topic_name
+        if beneath is None or resolve(name) != resolve(name, only_expand=True):
+            return name
+        return topic.moved_with(self.topic_name(beneath))
+
+    def _overriding(self, name: str) -> QoSOverridingOptions | None:
+        """Apply ``qos_overrides`` to the topic of this full name, if any are given."""
+        given = self._node.get_parameters_by_prefix(f"qos_overrides.{name}")
+        return QoSOverridingOptions.with_default_policies() if given else None
+
+    def _class_of(self, name: str, topic: Topic[Any]) -> Any | None:
+        kind = type_name(topic.type)
+        found = ros_class(kind)
+        package = kind.partition("/")[0]
+        if found is None and package not in self._missing:
+            self._missing.add(package)
+            log.warning(
+                "%s is left out: this ROS 2 lacks the package %s (sudo apt install ros-$ROS_DISTRO-%s)",
+                name,
+                package,
+                package.replace("_", "-"),
+            )
+        return found
+
+
+class _Writer:
+    def __init__(self, node: Node, publisher: Any) -> None:
+        self._node = node
+        self._publisher = publisher
+
+    @property
+    def has_readers(self) -> bool:
+        return bool(self._publisher.get_subscription_count() > 0)
+
+    def write(self, raw: bytes) -> None:
+        self._publisher.publish(raw)
+
+    def flush(self, timeout_s: float) -> bool:
+        try:
+            return bool(self._publisher.wait_for_all_acked(Duration(seconds=timeout_s)))
+        except RuntimeError:  # not supported by every middleware
+            return True
+
+    def close(self) -> None:
+        self._node.destroy_publisher(self._publisher)
+
+
+def ros_class(name: str) -> Any | None:
+    """Return ROS 2's class for the type ``name``, as ``std_msgs/msg/String``; None if its package is missing."""
+    package, kind, of = name.split("/")
+    try:
+        found = getattr(importlib.import_module(f"{package}.{kind}"), of, None)
+    except ImportError:
+        return None
+    # A ROS 1 package of the same name does not have this type support.
+    return found if hasattr(type(found), "__import_type_support__") else None
+
+
+@contextmanager
+def _refusals(name: str) -> Iterator[None]:
+    """Convert rclpy's exceptions about the topic of this name to our errors."""
+    try:
+        yield
+    except (InvalidTopicNameException, InvalidQosOverridesError, RuntimeError, ValueError) as error:
+        raise TransportError(f"{name}: {' '.join(str(error).split())}") from None

@@ -1,1 +1,0 @@
-"""The transport over ROS 1; rospy is imported only with this package."""

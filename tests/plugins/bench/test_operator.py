@@ -1,0 +1,65 @@
+import math
+from statistics import median
+
+import numpy as np
+import pytest
+
+from handsteer.plugins.bench.courses import open_course
+from handsteer.plugins.bench.laps import Conditions, run_lap
+from handsteer.plugins.bench.operator import DECISION_S, Operator, Seen, Skill, adapted, projected_displacement
+from handsteer.types import ZERO, Pose2D, Velocity
+
+EIGHT = open_course("figure-eight")
+STRAIGHT = open_course("stop-line")
+
+
+def off_path_m(latency_s: float, ratio_s: float) -> float:
+    skill = Skill(pace_mps=0.5, kp=1.0, kd=ratio_s, projection_s=1.2, reluctance=0.3)
+    laps = [run_lap(EIGHT, "pad", seed, Conditions(latency_s), skill=skill, adapts=False) for seed in range(3)]
+    return median(lap.cross_track_m for lap in laps)
+
+
+@pytest.mark.slow
+def test_laps_get_worse_with_delay_and_the_best_ratio_of_gains_rises() -> None:
+    ratios = (0.15, 0.6)
+    prompt, late = ([off_path_m(latency_s, ratio) for ratio in ratios] for latency_s in (0.0, 0.5))
+    assert min(prompt) < min(late)
+    assert np.argmin(prompt) == 0
+    assert np.argmin(late) == 1
+
+
+def test_the_projected_displacement_is_positive_if_the_path_is_on_the_left() -> None:
+    path = STRAIGHT.path
+    assert projected_displacement(path, Pose2D(2.0, -0.2, 0.0), 2.0, 0.5) == pytest.approx(0.2, abs=0.02)
+    assert projected_displacement(path, Pose2D(2.0, 0.0, 0.1), 2.0, 0.5) == pytest.approx(-0.05, abs=0.01)
+
+
+def test_the_operator_sees_the_robot_a_delay_later() -> None:
+    operator = Operator(STRAIGHT, Skill(), 0.5, np.random.default_rng(0))
+    wanted = [operator.decide(Seen(Pose2D(0.0, 0.0, 0.0), ZERO)) for _ in range(round(0.5 / DECISION_S) + 1)]
+    assert all(each.is_zero for each in wanted[:-1])
+    assert wanted[-1].linear_mps > 0.0
+
+
+def test_the_operator_backs_off_from_an_obstacle() -> None:
+    operator = Operator(STRAIGHT, Skill(), 0.0, np.random.default_rng(0))
+    stuck = Seen(Pose2D(2.0, 0.0, 0.0), ZERO, touches=True)
+    assert any(operator.decide(stuck).linear_mps < 0.0 for _ in range(40))
+
+
+def test_the_operator_stops_at_the_line() -> None:
+    operator = Operator(STRAIGHT, Skill(), 0.0, np.random.default_rng(0))
+    x, speed = 0.0, 0.0
+    for _ in range(600):
+        speed = operator.decide(Seen(Pose2D(x, 0.0, 0.0), Velocity(speed))).linear_mps
+        x += DECISION_S * speed
+    assert x == pytest.approx(6.0, abs=0.1)
+    assert speed == 0.0
+
+
+def test_with_delay_the_pace_falls_and_the_ratio_of_gains_rises() -> None:
+    usual, late = Skill(), adapted(Skill(), 0.5)
+    assert late.pace_mps < usual.pace_mps
+    assert late.kd / late.kp > usual.kd / usual.kp
+    assert adapted(usual, 0.0) == usual
+    assert math.isfinite(adapted(usual, 5.0).pace_mps)

@@ -1,0 +1,68 @@
+"""What the page to teach on says, in words; and what it says where nothing can be taught."""
+
+import pytest
+
+from handsteer.config import TeachConfig
+from handsteer.plugins.page.lesson import Lesson
+from handsteer.plugins.page.lesson_page import mistake_words
+from handsteer.plugins.page.lesson_state import LessonState, Seen, SignClass, counted, instruction, outcome
+from handsteer.plugins.teach.collect import Facts, Status
+from handsteer.plugins.teach.dataset import Dataset
+from handsteer.plugins.teach.evaluation.intervals import Share
+from handsteer.plugins.teach.report import Mistake
+from handsteer.types import EFFECTS, NONE, Action
+from tests.plugins.page.served import Site
+from tests.plugins.teach.takes import take
+
+
+def does(sign: str) -> Action:
+    return "turbo" if sign == "Peace" else "stop"
+
+
+@pytest.mark.parametrize(
+    ("seen", "expected"),
+    [
+        (None, ("No picture", "no picture comes from the camera")),
+        (Seen(hand=False), ("No hand", "the robot would stop: no hand is in view")),
+        (Seen(hand=True), ("No sign", "the robot would stop: the hand shows none of the signs")),
+        (Seen(True, "Peace", 0.79), ("No sign", "the robot would stop: the hand shows none of the signs")),
+        (Seen(True, "Peace", 0.934), ("Peace, 93%", f"would mean: {EFFECTS['turbo']}")),
+        (Seen(True, "Stop", 1.0), ("Stop, 100%", "would mean: stops")),
+    ],
+)
+def test_what_a_hand_would_do(seen: Seen | None, expected: tuple[str, str]) -> None:
+    assert outcome(seen, 0.8, does) == expected
+
+
+def test_takes_are_counted() -> None:
+    def peace(count: int) -> SignClass:
+        takes = tuple(take("Peace", hands=7, seed=number) for number in range(count))
+        return Lesson(Dataset(takes), TeachConfig(), Facts(NONE, "me", "today", "page")).state.classes[0]
+
+    assert [counted(peace(count)) for count in (0, 1, 3)] == ["No takes yet", "1 take, 7 hands", "3 takes, 21 hands"]
+
+
+def test_the_large_letters_say_what_to_do_now() -> None:
+    classes = (SignClass(1, "Peace"), SignClass(2, NONE))
+
+    def state(key: int, status: Status) -> LessonState:
+        return LessonState(classes, classes, recorded=key, status=status)
+
+    assert instruction(state(1, Status("countdown", 2.1, 0))) == ("3", "then show Peace")
+    assert instruction(state(1, Status("recording", 1.0, 34))) == ("34", "hands: show Peace")
+    assert instruction(state(2, Status("recording", 1.0, 34))) == ("34", "hands: show anything else")
+
+
+def test_a_mistake_is_described() -> None:
+    assert mistake_words(Mistake(0, 0, "Peace", NONE, Share(3, 60))) == (
+        "Peace: in this take, 3 of 60 hands were not recognised"
+    )
+    assert mistake_words(Mistake(0, 0, "Peace", "Call", Share(3, 60))).endswith("were recognised as Call")
+
+
+def test_where_the_graph_is_elsewhere_the_page_says_so(site: Site) -> None:
+    answer = site.get("/teach")
+    assert answer.status == 200
+    assert b"handsteer signs collect" in answer.read()
+    for name in ("signs.npz", "takes.csv", "signs.onnx"):
+        assert site.get(f"/lesson/{name}?viewer=x").status == 404

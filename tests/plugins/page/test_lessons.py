@@ -1,0 +1,265 @@
+"""Teaching on the nodes of a graph, without a page: real training, hands that are made."""
+
+import itertools
+import threading
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import cast
+
+import numpy as np
+import pytest
+
+from handsteer.clock import RealClock
+from handsteer.config import Config, TeachConfig
+from handsteer.errors import ConfigError, DatasetError, ModelCorrupt
+from handsteer.graph import Graph
+from handsteer.images import image_message
+from handsteer.messages import IMAGE_RAW, Header
+from handsteer.plugins.page.lesson_node import LessonNode
+from handsteer.plugins.page.lesson_state import SignClass
+from handsteer.plugins.page.lessons import KEPT, KEPT_TAKES, Lessons, with_signs
+from handsteer.plugins.page.sign_pictures import taught_drawings
+from handsteer.plugins.teach.dataset import Dataset, load_dataset, save_dataset
+from handsteer.plugins.teach.exchange import load_shared, save_shared
+from handsteer.recognition.custom_signs import load_custom_model, save_custom_model
+from handsteer.recognition.hand import Hand
+from handsteer.recognition.recognizer import open_classifier
+from handsteer.transports.in_process import InProcessTransport
+from handsteer.types import NONE
+from tests.plugins.teach.takes import shaken, takes
+from tests.recognition.hands import RecordedLandmarker
+from tests.recognition.models import model
+
+PATIENCE_S = 180.0
+IMAGE = np.full((48, 64, 3), 90, np.uint8)
+
+
+class School:
+    """Teaching, and frames that come ten times as fast as the lesson's clock says."""
+
+    def __init__(self, folder: Path, hands: list[Hand]) -> None:
+        self.folder = folder
+        self.clock = RealClock()
+        self.transport = InProcessTransport()
+        plan = TeachConfig(
+            dataset=folder / "signs.npz", model=folder / "mine.npz", takes=3, take_time=1.0, countdown=0.5
+        )
+        self.config = self.initial = Config(teach=plan)
+        self.lessons = Lessons(
+            cast(Graph, self),
+            lambda: (RecordedLandmarker([[hand] for hand in hands] * 1000), open_classifier(Config().signs)),
+        )
+        self.refuses = False
+        self._ended = threading.Event()
+        self._camera = threading.Thread(target=self._publish)
+        self._camera.start()
+
+    def reconfigure(self, config: Config) -> None:
+        if self.refuses:
+            raise ConfigError("signs.model: refused")
+        self.config = config
+
+    def _publish(self) -> None:
+        images = self.transport.advertise("my_camera", IMAGE_RAW)
+        for number in itertools.count():
+            if self._ended.wait(0.005):
+                return
+            header = Header(self.clock.stamp(self.clock.now()), "camera")
+            images.publish(image_message(IMAGE, header), number * 0.05)
+
+    @property
+    def files(self) -> set[str]:
+        return {path.name for path in self.folder.iterdir()}
+
+    def wait_until(self, condition: Callable[[], bool]) -> None:
+        for _ in range(round(PATIENCE_S / 0.02)):
+            lesson = self.lessons.node("ann")
+            if lesson is not None:
+                lesson.attend()
+            if condition():
+                return
+            self._ended.wait(0.02)
+        pytest.fail(f"waited in vain; the lesson is at {self.lessons.node('ann')}")
+
+    def close(self) -> None:
+        self.lessons.close()
+        self._ended.set()
+        self._camera.join()
+
+
+@pytest.fixture
+def school(tmp_path: Path) -> Iterator[School]:
+    random = np.random.default_rng(4)
+    school = School(tmp_path, [shaken("Peace", random) for _ in range(60)])
+    yield school
+    school.close()
+
+
+def ann(school: School) -> LessonNode:
+    node = school.lessons.node("ann")
+    assert node is not None
+    return node
+
+
+def begin(school: School, name: str = "peace", person: str = "", *, restore: bool = False) -> LessonNode:
+    """Begin a lesson of Ann's with one more sign."""
+    school.lessons.begin("ann", person, restore=restore)
+    node = ann(school)
+    node.do(lambda lesson: lesson.add_class(name))
+    return node
+
+
+def own(school: School, label: str = "peace") -> SignClass:
+    return next(one for one in ann(school).state.classes if one.label == label)
+
+
+def collected(school: School, label: str = "peace") -> int:
+    return len(own(school, label).takes)
+
+
+def record(school: School) -> None:
+    key = own(school).key
+    ann(school).do(lambda lesson: lesson.record(key))
+    school.wait_until(lambda: collected(school) == 3)
+
+
+@pytest.mark.slow
+def test_a_sign_is_collected_learnt_kept_and_taken_by_the_graph(school: School) -> None:
+    save_dataset(Dataset(tuple(takes("Call", count=2))), school.folder / "signs.npz")
+    save_custom_model(model(), school.folder / "mine.npz")
+    lessons = school.lessons
+    lesson = begin(school, person="Ann")
+    assert lesson.state.lost == ("Hi", "Ho")
+    assert lessons.node("ben") is None
+    record(school)
+    first = own(school).takes[0].number
+    lesson.do(lambda of: of.delete_take(first))
+    before = (school.folder / "signs.npz").read_bytes()
+
+    lesson.train()
+    school.wait_until(lambda: (lesson.state.progress or 0) > 0)
+    school.wait_until(lambda: lesson.state.is_fresh)
+    school.wait_until(lambda: (seen := lesson.state.seen) is not None and seen.confidences.get("peace", 0) > 0.8)
+    report = lesson.state.report
+    assert report is not None
+    assert report.confusion.labels == ("Call", "peace", "NONE")
+
+    with pytest.raises(ConfigError, match="'fly' is no action: choose one of forward"):
+        lessons.save("ann", {"peace": "fly"})
+    lessons.save("ben", {"peace": "turbo"})
+    school.refuses = True
+    with pytest.raises(ConfigError, match="refused"):
+        lessons.save("ann", {"peace": "turbo"})
+    assert (school.folder / "signs.npz").read_bytes() == before
+    school.refuses = False
+    lessons.save("ann", {"peace": "turbo", "Call": "go"})
+    assert (lesson.state.message, lesson.state.is_changed) == (KEPT, False)
+    assert school.config.control.actions == {"peace": "turbo"}, "what is so by default is not written"
+    assert school.config.signs.model == school.folder / "mine.npz"
+    assert load_custom_model(school.folder / "mine.npz").labels == ("Call", "peace")
+    saved = load_dataset(school.folder / "signs.npz").takes
+    assert [(take.label, take.person) for take in saved] == [("Call", "me")] * 2 + [("peace", "Ann")] * 2
+    assert set(taught_drawings(school.config.signs)) == {"Call", "peace"}
+
+    shared = school.folder / "shared.npz"
+    assert lessons.share("ann", shared)
+    assert not lessons.share("ben", shared)
+    dataset, shared_model = load_shared(shared)
+    assert (len(dataset.takes), shared_model is not None) == (4, True)
+    lessons.save("ann", {"peace": "stop"})
+    assert school.config.control.actions == {"peace": "stop"}, "an action changes without another training"
+    lessons.end("ann")
+    assert (lessons.is_running, lessons.draft) == (False, None)
+
+
+def test_the_takes_alone_are_kept_too(school: School) -> None:
+    begin(school)
+    record(school)
+    school.lessons.save("ann", {"peace": "turbo"})
+    assert ann(school).state.message == KEPT_TAKES
+    assert (school.files, school.config) == ({"signs.npz"}, school.initial)
+    (school.folder / "signs.npz").unlink()
+    with pytest.raises(DatasetError, match="was changed by another program"):
+        school.lessons.save("ann", {})
+
+
+def test_what_is_not_kept_leaves_no_file_and_can_be_continued(school: School) -> None:
+    begin(school)
+    record(school)
+    school.lessons.end("ben")
+    assert school.lessons.is_running, "another one's lesson goes on"
+    school.lessons.end("ann")
+    assert (school.lessons.is_running, school.files, school.config) == (False, set(), school.initial)
+    draft = school.lessons.draft
+    assert draft is not None
+    school.lessons.begin("ann", restore=True)
+    assert ann(school).state.classes == draft.classes
+    assert collected(school) == 3
+    school.lessons.end("ann")
+    school.lessons.begin("ann")
+    assert [one.label for one in ann(school).state.classes] == [NONE]
+
+
+def test_a_file_is_added_or_refused_in_one_sentence(school: School) -> None:
+    school.lessons.begin("ann")
+    path = school.folder / "upload.npz"
+    school.lessons.take_file("ben", path)
+    for hostile in (b"my thesis", b""):
+        path.write_bytes(hostile)
+        school.lessons.take_file("ann", path)
+        message = ann(school).state.message
+        assert message.startswith("The file: not a file of taught signs")
+        assert str(school.folder) not in message
+        assert "\n" not in message
+    save_shared(path, Dataset(tuple(takes("Hi", "Peace", count=2))), model())
+    school.lessons.take_file("ann", path)
+    assert collected(school, "Hi") == 2
+    assert ann(school).state.is_fresh
+
+
+def test_a_training_is_cancelled_with_the_lesson_or_before(school: School) -> None:
+    lesson = begin(school)
+    record(school)
+    lesson.train()
+    lesson.cancel()
+    assert (lesson.state.is_training, collected(school)) == (False, 3)
+    lesson.train()
+    school.lessons.end("ann")
+    school.wait_until(lambda: not any(thread.name == "lesson_training" for thread in threading.enumerate()))
+    assert school.files == set()
+
+
+def test_takes_are_recorded_only_while_the_page_is_there(school: School) -> None:
+    lesson = begin(school)
+    key = own(school).key
+    lesson.do(lambda of: of.record(key))
+    waiting = threading.Event()
+    for _ in range(200):
+        if lesson.state.recorded is None:
+            break
+        waiting.wait(0.05)
+    assert lesson.state.recorded is None
+    assert school.lessons.is_running, "the page may come back"
+
+
+def test_what_is_no_name_of_a_person_is_refused(school: School) -> None:
+    with pytest.raises(DatasetError, match="is no name of a person"):
+        school.lessons.begin("ann", "y" * 41)
+    assert not school.lessons.is_running
+
+
+def test_files_that_are_something_else_are_not_written_over(school: School) -> None:
+    (school.folder / "mine.npz").write_bytes(b"my thesis")
+    with pytest.raises(ModelCorrupt, match="not a model of taught signs"):
+        school.lessons.begin("ann")
+    (school.folder / "signs.npz").write_bytes(b"my thesis")
+    with pytest.raises(DatasetError, match="not a dataset of signs"):
+        school.lessons.begin("ann")
+
+
+def test_a_sign_that_has_an_action_by_another_spelling_gets_another() -> None:
+    config = Config.model_validate({"control": {"actions": {"thumb-up": "go", "Old": "stop"}, "max_linear": 0.5}})
+    changed = with_signs(config, Path("mine.npz"), {"Thumb up": "turbo", "Call": "go"}, ["old"])
+    assert changed.control.actions == {"thumb-up": "turbo"}
+    assert changed.control.max_linear == 0.5
+    assert with_signs(config, Path("mine.npz"), {}).control == config.control

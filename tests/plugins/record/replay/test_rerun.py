@@ -1,0 +1,111 @@
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+from handsteer.config import Config, VirtualHandConfig
+from handsteer.errors import RecordingError
+from handsteer.graph import Graph
+from handsteer.messages import HAND_SIGN
+from handsteer.plugins.record.mcap_reader import McapFile
+from handsteer.plugins.record.mcap_writer import McapWriter
+from handsteer.plugins.record.replay.compare import Comparison, Moment, compare
+from handsteer.plugins.record.replay.rerun import Source, recorded_config, rerun
+
+
+def replayed(path: Path, config: Config | None = None, source: Source = "frames") -> tuple[Comparison, list[Moment]]:
+    file, comparison = McapFile(path), Comparison()
+    moments = list(compare(rerun(file, config or recorded_config(file), source), comparison, file.began_s))
+    assert file.problem is None
+    return comparison, moments
+
+
+def changed(path: Path, section: str, **values: object) -> Config:
+    config = recorded_config(McapFile(path))
+    part = getattr(config, section).model_copy(update=values)
+    return config.model_copy(update={section: part})
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("source", ["frames", "signs"])
+def test_the_same_software_gives_the_same_signs_and_commands(source: Source, recording: Path) -> None:
+    comparison, moments = replayed(recording, source=source)
+    assert moments == []
+    assert comparison.frames == (241 if source == "frames" else 0)
+    assert comparison.commands > 200
+    assert comparison.duration_s == pytest.approx(8.0, abs=0.1)
+
+
+@pytest.mark.slow
+def test_a_run_in_real_time_gives_the_same_however_it_was_disturbed(tmp_path: Path) -> None:
+    config = Config(virtual_hand=VirtualHandConfig(script="Stop:1 Forward:1 Turn Left:1"))
+    with Graph(config) as graph:
+        graph.record(tmp_path / "drive.mcap")
+        graph.start()
+        graph.wait(4.0)
+        slower = config.control.model_copy(update={"max_linear": 0.2})
+        graph.reconfigure(config.model_copy(update={"control": slower}))
+        graph.wait(3.0)
+        graph.steering.halt()
+        graph.wait(1.0)
+    comparison, moments = replayed(tmp_path / "drive.mcap")
+    assert moments == []
+    assert comparison.signs > 50
+    assert comparison.commands > 50
+
+
+@pytest.mark.slow
+def test_a_recording_that_began_in_mid_run_can_be_replayed(tmp_path: Path) -> None:
+    with Graph(Config(virtual_hand=VirtualHandConfig(script="Stop:1 Forward:1"))) as graph:
+        graph.start()
+        graph.wait(3.0)
+        graph.record(tmp_path / "drive.mcap")
+        graph.wait(5.0)
+        graph.end_recording()
+        graph.wait(1.0)
+    comparison, moments = replayed(tmp_path / "drive.mcap")
+    assert comparison.signs > 50
+    assert Counter(moment.what for moment in moments)["sign"] < comparison.signs / 4
+
+
+@pytest.mark.slow
+def test_other_parameters_give_the_moments_that_differ(recording: Path) -> None:
+    comparison, moments = replayed(recording, changed(recording, "control", max_linear=0.2))
+    assert {moment.what for moment in moments} == {"command"}
+    assert comparison.differing == len(moments) > 20
+    first = moments[0]
+    assert 1.0 < first.time_s < 3.0
+    assert first.recorded.startswith("0.2")
+    assert first.replayed == "0.200 m/s, 0.000 rad/s"
+
+
+@pytest.mark.slow
+def test_a_model_that_sees_less_gives_the_frames_where_it_does(recording: Path) -> None:
+    comparison, moments = replayed(recording, changed(recording, "signs", confirm_time=0.5))
+    signs = [moment for moment in moments if moment.what == "sign"]
+    assert 10 < len(signs) < comparison.signs
+    assert all(moment.frame is not None for moment in signs)
+    assert {moment.recorded for moment in signs} >= {"Forward", "Turn Left"}
+    assert "command" in {moment.what for moment in moments}
+
+
+def test_without_a_journal_it_says_so(recording: Path, tmp_path: Path) -> None:
+    writer = McapWriter(tmp_path / "signs.mcap")
+    for recorded in McapFile(recording).messages({HAND_SIGN.name}):
+        writer.write(HAND_SIGN, HAND_SIGN.name, recorded.raw, recorded.time_ns, recorded.number)
+    writer.close()
+    file = McapFile(tmp_path / "signs.mcap")
+    with pytest.raises(RecordingError, match="no journal of hand_sign_recognition"):
+        list(rerun(file, Config()))
+    with pytest.raises(RecordingError, match="contains no parameters"):
+        recorded_config(file)
+
+
+@pytest.mark.slow
+def test_a_recording_that_was_cut_off_is_replayed_up_to_there(recording: Path, tmp_path: Path) -> None:
+    cut = tmp_path / "cut.mcap"
+    cut.write_bytes(recording.read_bytes()[: recording.stat().st_size * 2 // 3])
+    file, comparison = McapFile(cut), Comparison()
+    assert list(compare(rerun(file, recorded_config(file)), comparison, file.began_s)) == []
+    assert comparison.frames > 100
+    assert file.problem is not None

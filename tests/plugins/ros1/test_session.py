@@ -1,0 +1,83 @@
+import threading
+import time
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import pytest
+
+from handsteer.errors import TransportError
+from handsteer.messages import Image, Topic
+from handsteer.nodes.base import Node
+from handsteer.transports import join
+from handsteer.transports.base import Received, Session, Transport
+from tests.contracts.transport_contract import SessionContract, eventually
+from tests.ros1.graph import Ros1Graph, ros1_graph
+
+pytestmark = pytest.mark.ros1
+
+
+@pytest.fixture(scope="session")
+def graph(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Ros1Graph]:
+    """The one master that rospy can have in this process."""
+    with ros1_graph(tmp_path_factory.mktemp("ros")) as graph, pytest.MonkeyPatch.context() as patch:
+        for name in ("ROS_MASTER_URI", "ROS_HOSTNAME", "ROS_HOME"):
+            patch.setenv(name, graph.env[name])
+        yield graph
+
+
+class TestRos1(SessionContract):
+    full_name = "/tests"
+
+    @pytest.fixture(scope="session")
+    def session(self, graph: Ros1Graph) -> Session:
+        """This process as a ROS node; it leaves the graph when the process ends."""
+        return join("ros1", "tests", [])
+
+    @pytest.fixture
+    def transport(self, session: Session) -> Iterator[Transport]:
+        from handsteer.plugins.ros1.topics import Ros1Transport  # noqa: PLC0415 - only where ROS 1 is
+
+        transport = Ros1Transport(session.clock)
+        yield transport
+        transport.close()
+
+    @pytest.mark.slow
+    @pytest.mark.parametrize("through_a_node", [True, False], ids=["node", "callback"])
+    def test_a_slow_subscriber_gets_fresh_images(
+        self, graph: Ros1Graph, make_node: Callable[[str], Node], transport: Transport, *, through_a_node: bool
+    ) -> None:
+        """With rospy's own buffer, images wait in the socket for a callback that is slower than the camera."""
+        listener = make_node("listener")
+        ages_s: list[float] = []
+        done = threading.Event()
+
+        def callback(received: Received[Image]) -> None:
+            assert received.captured_s is not None
+            ages_s.append(listener.clock.now() - received.captured_s)
+            time.sleep(0.1)
+            if len(ages_s) == 40:
+                done.set()
+
+        topic = Topic(f"/fast_camera_{through_a_node}", Image, is_global=True)
+        if through_a_node:
+            listener.subscribe(topic, callback)
+            listener.start()
+        else:
+            transport.subscribe("listener", topic, callback)
+        camera = graph.peer("__name:=fast_camera")
+        camera.ask("advertise", topic=topic.name, package="sensor_msgs", type="Image")
+        assert eventually(lambda: camera.ask("listeners", topic=topic.name) > 0)
+        camera.ask("stream", topic=topic.name, width=320, height=240, period_s=1 / 30, count=100_000)
+        assert done.wait(60.0)
+        camera.kill()
+        # It is 1.3 s with rospy's own buffer; a fresh one is as old as one callback is long, 0.1 s, at the worst.
+        assert float(np.median(ages_s)) < 0.7, ages_s
+
+    def test_a_process_has_one_name(self, session: Session) -> None:
+        with pytest.raises(TransportError, match=r"is the ROS node /tests already.*one a process.*process of its own"):
+            join("ros1", "another", [])
+
+
+def test_a_transport_that_is_not_there() -> None:
+    with pytest.raises(TransportError, match="there is no transport 'carrier_pigeon': use ros1"):
+        join("carrier_pigeon", "camera", [])

@@ -1,0 +1,161 @@
+"""The transport by rclpy, where rclpy is: ``tests/ros2/test_rclpy.py`` runs this by the Python of ``make ros2``."""
+
+import logging
+import sys
+import time
+from collections.abc import Callable, Iterator
+from functools import partial
+from pathlib import Path
+
+import pytest
+import rclpy
+from rclpy.qos import QoSProfile
+from std_msgs.msg import String as TheirString
+
+from handsteer.clock import SimulatedClock
+from handsteer.errors import TransportError
+from handsteer.messages import (
+    CAMERA_INFO,
+    CMD_VEL,
+    HAND_SIGN,
+    IMAGE_COMPRESSED,
+    IMAGE_RAW,
+    ROBOT_DESCRIPTION,
+    TF,
+    String,
+    TFMessage,
+    Topic,
+)
+from handsteer.plugins.ros2.topics import publisher_qos, subscription_qos
+from handsteer.transports import join
+from handsteer.transports.base import Session
+from tests.contracts.transport_contract import SessionContract, eventually, heard
+from tests.dds.graph import free_domain
+
+Join = Callable[..., Session]
+
+
+@pytest.fixture(autouse=True)
+def domain(monkeypatch: pytest.MonkeyPatch) -> int:
+    number = free_domain()
+    monkeypatch.setenv("ROS_DOMAIN_ID", str(number))
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    return number
+
+
+@pytest.fixture
+def joined() -> Iterator[Join]:
+    sessions: list[Session] = []
+
+    def join_as(*words: str) -> Session:
+        sessions.append(join("ros2", "tests", ["--ros-args", *words] if words else []))
+        return sessions[-1]
+
+    yield join_as
+    for session in sessions:
+        session.close()
+
+
+class TestRclpy(SessionContract):
+    @pytest.fixture
+    def session(self, joined: Join, caplog: pytest.LogCaptureFixture) -> Session:
+        session = joined("-r", "__ns:=/r1")
+        # What handsteer logs goes to rclpy alone, and the contract looks for it here.
+        logging.getLogger("handsteer").addHandler(caplog.handler)
+        return session
+
+
+def test_a_type_that_this_ros2_lacks_is_said_once_and_left_out(
+    joined: Join, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "tf2_msgs.msg", None)
+    transport = joined().transport
+    publisher = transport.advertise("robot", TF)
+    transport.subscribe("listener", TF, lambda _: None)
+    publisher.publish(TFMessage(transforms=[]))
+    time.sleep(0.2)
+    assert not publisher.has_subscribers
+    said = capfd.readouterr().err
+    assert said.count("/tf is left out: this ROS 2 lacks the package tf2_msgs") == 1
+    with pytest.raises(TransportError, match="/tf carries tf2_msgs/msg/TFMessage, not std_msgs/msg/String"):
+        publisher.publish(String(data="no"))  # type: ignore[arg-type]
+
+
+def test_the_compressed_topic_and_camera_info_move_with_the_images(joined: Join) -> None:
+    transport = joined("-r", "image_raw:=/eye/picture", "-r", "__ns:=/r1").transport
+    assert transport.topic_name(CAMERA_INFO) == "/eye/camera_info"
+    publishers = [transport.advertise("camera", topic) for topic in (IMAGE_RAW, IMAGE_COMPRESSED)]
+    other = joined("-r", "image_raw:=/eye/picture", "-r", "image_raw/compressed:=/far").transport
+    publishers.append(other.advertise("camera", IMAGE_COMPRESSED))
+    looker = joined("-r", "__node:=looker")
+    for name in ("/eye/picture", "/eye/picture/compressed", "/far"):
+        topic = Topic(name, IMAGE_COMPRESSED.type if name != "/eye/picture" else IMAGE_RAW.type, is_global=True)
+        assert eventually(partial(looker.transport.publishers_of, topic)), name
+    assert len(publishers) == 3
+
+
+@pytest.mark.parametrize(
+    ("words", "line"),
+    [
+        (("image_raw=/x",), "'image_raw=/x' is no argument of ROS 2: it should be as --ros-args -r"),
+        (("--ros-args", "-r", "image_raw"), "cannot join ROS 2 as tests"),
+        (("--ros-args", "--nonsense"), "cannot join ROS 2 as tests"),
+        (("--ros-args", "-r", "__node:=1x"), "cannot join ROS 2 as tests"),
+        (("--ros-args", "--params-file", "/no/such.yaml"), "cannot join ROS 2 as tests"),
+    ],
+)
+def test_wrong_arguments_are_refused_in_one_line(words: tuple[str, ...], line: str) -> None:
+    with pytest.raises(TransportError) as caught:
+        join("ros2", "tests", words)
+    assert line in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_parameters_come_from_files_and_words_and_those_of_ros_are_left_to_it(joined: Join, tmp_path: Path) -> None:
+    file = tmp_path / "my.yaml"
+    file.write_text("/**: {ros__parameters: {fps: 5, virtual_hand: {script: 'Go:1'}, names: [a, b]}}\n")
+    qos = "qos_overrides./gesture/hand_sign.publisher.depth"
+    session = joined("--params-file", str(file), "-p", "fps:=15", "-p", "use_sim_time:=true", "-p", f"{qos}:=3")
+    assert session.parameters == {"fps": 15, "virtual_hand": {"script": "Go:1"}, "names": ["a", "b"]}
+    assert isinstance(session.clock, SimulatedClock)
+    # rclpy's own classes show what became of it.
+    transport = session.transport
+    publisher = transport.advertise("talker", HAND_SIGN)
+    assert publisher._writer._publisher.qos_profile.depth == 3  # type: ignore[attr-defined]
+
+
+def test_commands_live_for_less_than_the_robot_waits_and_what_is_latched_stays() -> None:
+    assert publisher_qos(CMD_VEL).lifespan.nanoseconds == 350_000_000
+    assert publisher_qos(CMD_VEL).depth == subscription_qos(CMD_VEL).depth == 10
+    assert publisher_qos(ROBOT_DESCRIPTION).lifespan.nanoseconds == 0  # not said, so without end
+    assert publisher_qos(ROBOT_DESCRIPTION).durability.name == "TRANSIENT_LOCAL"
+
+
+def test_what_cannot_be_read_and_what_is_said_at_the_end(joined: Join, domain: int) -> None:
+    """The last message before the end arrives, as a robot's zero has to."""
+    context = rclpy.Context()
+    context.init(args=[], domain_id=domain)
+    node = rclpy.create_node("other", context=context)
+    got: list[str] = []
+    node.create_subscription(TheirString, "/gesture/hand_sign", lambda m: got.append(m.data), QoSProfile(depth=10))
+    executor = rclpy.executors.SingleThreadedExecutor(context=context)
+    executor.add_node(node)
+    session = joined()
+    publisher = heard(session.transport.advertise("talker", HAND_SIGN))
+    publisher.publish(String(data="last"))
+    session.close()
+    deadline_s = time.monotonic() + 10.0
+    while not got and time.monotonic() < deadline_s:
+        executor.spin_once(timeout_sec=0.1)
+    assert got == ["last"]
+    assert session.wait(0.0)
+    executor.shutdown()
+    node.destroy_node()
+    context.shutdown()
+
+
+def test_auto_takes_rclpy_where_it_is() -> None:
+    session = join("auto", "tests", ())
+    assert type(session).__name__ == "RclpySession"
+    session.close()
+    session.close()

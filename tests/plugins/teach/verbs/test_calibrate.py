@@ -1,0 +1,79 @@
+"""The signs are calibrated from the command line, as its users do."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from handsteer.plugins.teach.dataset import Dataset, Take, save_dataset
+from handsteer.recognition.landmark_models import models_dir
+from handsteer.recognition.profile import load_profile, profiles_dir
+from handsteer.types import FORWARD, SIGNS, STOP
+from tests.cli.test_cli import fails, prints
+from tests.recognition.odd_person import odd_hands
+
+
+@pytest.fixture(autouse=True)
+def elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("HANDSTEER_MODELS", str(models_dir()))  # which are beside the profiles otherwise
+    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path / "data"))
+
+
+def dataset_of(count: int, seed: int, path: Path) -> str:
+    takes = [
+        Take(sign, "odd", "today", "made up", tuple(hands), tuple(float(at) for at in range(count)))
+        for sign, hands in odd_hands(count, seed).items()
+    ]
+    save_dataset(Dataset(tuple(takes)), path)
+    return str(path)
+
+
+@pytest.mark.slow
+def test_a_profile_is_made_from_a_dataset_and_used_by_name(capsys: pytest.CaptureFixture[str]) -> None:
+    shown = dataset_of(5, 0, Path("shown.npz"))
+    judged = dataset_of(20, 1, Path("judged.npz"))
+    text = prints(capsys, "signs", "calibrate", "--name", "odd one", "--from", shown)
+    assert "with the profile" in text.splitlines()[0]
+    assert text.splitlines()[1].split()[:2] == [STOP, "5"]
+    assert load_profile(profiles_dir() / "odd one.npz").name == "odd one"
+    right = {}
+    for profile in ([], ["--signs.profile", "odd one"]):
+        report = json.loads(prints(capsys, "signs", "evaluate", judged, "--json", *profile))
+        right[bool(profile)] = sum(report["recall"][sign]["count"] for sign in SIGNS)
+    assert 120 - right[True] <= (120 - right[False]) / 2
+    found = json.loads(prints(capsys, "signs", "calibrate", "--from", shown, "--out", "mine.npz", "--json"))
+    assert (found["profile"], [each["sign"] for each in found["signs"]]) == ("mine.npz", list(SIGNS))
+    assert load_profile(Path("mine.npz")).name == "me"
+
+
+@pytest.mark.slow
+def test_the_camera_asks_for_each_sign_and_says_which_was_not_shown(capsys: pytest.CaptureFixture[str]) -> None:
+    camera = ["--camera", "virtual", "--camera.width", "320", "--camera.height", "240"]
+    camera += ["--virtual-hand.script", "Forward:600"]
+    quick = ["--hands", "right", "--seconds", "2", "--countdown", "0.1"]
+    assert prints(capsys, "signs", "calibrate", "--out", "mine.npz", *camera, *quick)
+    profile = load_profile(Path("mine.npz"))
+    assert set(profile.views) == {FORWARD}
+    assert profile.made["signs"][STOP]["why_not"].startswith("it is read as Forward: hold your palm to the camera")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--name", "../me"], "'../me' is no name for a profile"),
+        (["--hands", "foot"], "--hands: 'foot' should be left, right, or left,right"),
+        (["--seconds", "nan"], "--seconds: nan should be from 0.2 to 30"),
+        (["--countdown", "31"], "--countdown: 31 should be from 0 to 30 seconds"),
+        (["--out", "nowhere/me.npz"], "--out: there is no folder"),
+        (["--from", "empty.npz"], "empty.npz: none of its hands shows one of Stop, Forward"),
+        (["--from", "nowhere"], "there is no folder nowhere"),
+    ],
+)
+def test_wrong_options(capsys: pytest.CaptureFixture[str], arguments: list[str], message: str) -> None:
+    save_dataset(Dataset(), Path("empty.npz"))
+    assert message in fails(capsys, "signs", "calibrate", *arguments)
+
+
+def test_a_profile_that_is_missing_ends_the_start(capsys: pytest.CaptureFixture[str]) -> None:
+    assert "cannot read the profile of the signs" in fails(capsys, "signs", "list", "--signs.profile", "anna")
