@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from handsteer.errors import RecordingError
-from handsteer.plugins.record import open_recording
+from handsteer.plugins.record.files import open_recording
 from handsteer.plugins.record.recorder import Recorder
 from handsteer.plugins.record.replay.drive_reader import read_drive
 

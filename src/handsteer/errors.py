@@ -109,6 +109,10 @@ class LiveError(HandsteerError):
     """Topics cannot be served to other programs, or a program asks for them wrongly."""
 
 
+class PluginError(HandsteerError):
+    """A plug-in is not installed, or cannot be loaded."""
+
+
 class PackageMissing(HandsteerError):  # noqa: N818
     """A Python package that is needed is not installed."""
 

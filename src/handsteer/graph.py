@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from handsteer.audit import setting_changes
+from handsteer.cameras import Camera
 from handsteer.cameras.choice import Size
 from handsteer.clock import Clock, RealClock, SteppedClock
 from handsteer.config import Config
@@ -50,11 +51,11 @@ from handsteer.messages import (
 )
 from handsteer.nodes.auditing import Auditor
 from handsteer.nodes.base import Node
-from handsteer.nodes.journal import JOURNALS, Journal
+from handsteer.nodes.journal import Journal
 from handsteer.nodes.run_recording import RunRecording
 from handsteer.nodes.steering import SteeringNode
-from handsteer.plugins.record import describe
-from handsteer.recognition.recognizer import model_files
+from handsteer.recognition.recognizer import Recognizer, model_files
+from handsteer.robots import Robot
 from handsteer.summary import Summary
 from handsteer.transports.base import Session, Transport
 from handsteer.transports.in_process import InProcessTransport
@@ -74,8 +75,12 @@ class Graph:
         config: All parameters; :meth:`reconfigure` changes them.
         clock: Real time by default; a :class:`~handsteer.clock.SteppedClock` for :meth:`run_stepped`.
         transport: Within this process by default.
-        link: This process in the graph of a real robot, for ``robot.kind`` other than ``sim``; the caller closes it
+        link: This process in the graph of a robot behind a topic, for such a ``robot.kind``; the caller closes it
             after this graph.
+        camera: Delivers the frames; by default the one that ``config`` names.
+        recognizer: Recognises the signs; by default one as ``config`` has it.
+        robot: Is driven; by default the one that ``config`` names. It counts as a real one, which the hand has to
+            engage and that needs neutral before it moves, unless ``control.arming`` and ``engage`` are off.
         steering: Whether to include the node ``steering``; the page of another process has its own.
 
     Attributes:
@@ -92,6 +97,9 @@ class Graph:
         transport: Transport | None = None,
         link: Session | None = None,
         *,
+        camera: Camera | None = None,
+        recognizer: Recognizer | None = None,
+        robot: Robot | None = None,
         steering: bool = True,
     ) -> None:
         self.config = config
@@ -101,24 +109,25 @@ class Graph:
         cmd_vel = cmd_vel_topic(config)
         journals = tuple(Journal(*wires) for _ in range(2))
         noted = tuple((journal.transport, journal.clock) for journal in journals)
-        self.robot = make_robot(config, *wires, link, cmd_vel=cmd_vel, odom=ODOM, scan=SCAN)
+        self.robot = make_robot(config, *wires, link, robot, cmd_vel=cmd_vel, odom=ODOM, scan=SCAN)
         self.recognition = make_recognition(
             config,
             *noted[0],
+            recognizer,
             image=IMAGE_RAW,
             compressed=IMAGE_COMPRESSED,
             sign=HAND_SIGN,
             joy=GESTURE_JOY,
             camera_changed=CAMERA_CHANGED,
         )
-        self.cameras = open_cameras(config, self.clock)
+        self.cameras = open_cameras(config, self.clock, camera)
         self.cameras.on_change = self._tell_of_camera
         self._camera_changed = self.transport.advertise("my_camera", CAMERA_CHANGED)
         self.camera = make_camera(config, *wires, self.cameras, image=IMAGE_RAW, compressed=IMAGE_COMPRESSED)
         self.control = make_control(
             config,
             *noted[1],
-            simulated=config.robot.kind == "sim",
+            simulated=robot is None and config.robot.kind == "sim",
             sign=HAND_SIGN,
             joy=GESTURE_JOY,
             camera_changed=CAMERA_CHANGED,
@@ -267,8 +276,7 @@ class Graph:
         Raises:
             RecordingError: The file cannot be created, or another recording is being made.
         """
-        about = describe(self.config, self.clock, model_files(self.config)) | {JOURNALS: "yes"}
-        self.recording.start(path, about, by, self.recognition.look_at_compressed)
+        self.recording.start(path, self.config, model_files(self.config), by, self.recognition.look_at_compressed)
 
     def end_recording(self, by: str = _NAME) -> None:
         """End the recording, if there is one; ``by`` is who ends it, for the audit. May be called from any thread."""

@@ -7,14 +7,13 @@ process with one node does not load what others need.
 # ruff: noqa: PLC0415
 
 import logging
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from handsteer import doors
 from handsteer.clock import Clock, SimulatedClock, WallClock
-from handsteer.config import Config, RobotConfig, VirtualHandConfig, cmd_vel_type
-from handsteer.errors import ConfigError, needing
+from handsteer.config import Config, RobotConfig, cmd_vel_type
+from handsteer.errors import ConfigError
 from handsteer.messages import CMD_VEL, STEERING_CMD_VEL, TF, Topic, Twist, cmd_vel
-from handsteer.plugins.record import is_recording
 from handsteer.transports.base import Session, Transport
 from handsteer.types import NONE, find_sign
 
@@ -26,6 +25,7 @@ if TYPE_CHECKING:
     from handsteer.nodes.recognition import HandSignRecognitionNode
     from handsteer.nodes.robot import RobotNode
     from handsteer.nodes.steering import SteeringNode
+    from handsteer.recognition.recognizer import Recognizer
     from handsteer.robots import Robot
 
 log = logging.getLogger(__name__)
@@ -43,10 +43,10 @@ def make_camera(
     Raises:
         CameraError: The camera, or its calibration, cannot be used.
     """
-    from handsteer.cameras.choose import read_calibration
+    from handsteer.cameras.choose import open_camera, read_calibration
     from handsteer.nodes.camera import CameraNode
 
-    camera = camera or _open_camera(config, clock)
+    camera = camera or open_camera(config, clock)
     calibration = (
         None if config.camera.calibration is None else read_calibration(config.camera.calibration.expanduser())
     )
@@ -56,46 +56,28 @@ def make_camera(
     return CameraNode(transport, clock, camera, frame_id, calibration, **topics)
 
 
-def open_cameras(config: Config, clock: Clock) -> "ChoiceOfCameras":
+def open_cameras(config: Config, clock: Clock, own: "Camera | None" = None) -> "ChoiceOfCameras":
     """Return this machine's cameras and the browser's, one of which is selected at a time.
+
+    ``own`` is selected first; without it, the camera that ``config`` names is opened.
 
     Raises:
         CameraError: The machine's own camera cannot be used.
     """
     from handsteer.cameras.browser import BrowserCamera, NoCamera
     from handsteer.cameras.choice import BROWSER, OWN, ChoiceOfCameras
-    from handsteer.cameras.choose import MachineCameras
+    from handsteer.cameras.choose import MachineCameras, open_camera
 
-    has_own = config.camera.source != "browser"
-    own = _open_camera(config, clock) if has_own else NoCamera()
-    machine = MachineCameras(config.camera, _virtual_hand(config), clock, own)
+    has_own = own is not None or config.camera.source != "browser"
+    own = own or (open_camera(config, clock) if has_own else NoCamera())
+    machine = MachineCameras(config, clock, own)
     return ChoiceOfCameras(own, BrowserCamera(clock), machine, OWN if has_own else BROWSER)
 
 
-def _open_camera(config: Config, clock: Clock) -> "Camera":
-    from handsteer.cameras.choose import open_camera
-
-    path = Path(config.camera.source).expanduser()
-    if is_recording(path) and path.exists():
-        from handsteer.plugins.record.camera import RecordingCamera
-
-        return RecordingCamera(path, clock, config.camera.at_end)
-    return open_camera(config.camera, _virtual_hand(config), clock)
-
-
-def _virtual_hand(config: Config) -> VirtualHandConfig:
-    """Return the virtual hand, with the script that drives where none is set."""
-    from handsteer.plugins.virtual_hand.script import chosen_script
-
-    engage = config.control.engage == "on" or (config.control.engage == "auto" and config.robot.kind != "sim")
-    script = chosen_script(config.virtual_hand.script, joystick=config.control.mode == "joystick", engage=engage)
-    return config.virtual_hand.model_copy(update={"script": script})
-
-
 def make_recognition(
-    config: Config, transport: Transport, clock: Clock, **topics: Topic[Any]
+    config: Config, transport: Transport, clock: Clock, recognizer: "Recognizer | None" = None, **topics: Topic[Any]
 ) -> "HandSignRecognitionNode":
-    """Return the node ``hand_sign_recognition``.
+    """Return the node ``hand_sign_recognition``; without a ``recognizer``, it opens the one that ``config`` names.
 
     Raises:
         ModelError: A landmark model or the sign model is missing or broken.
@@ -104,7 +86,7 @@ def make_recognition(
     from handsteer.recognition.hand_joystick import HandJoystick
     from handsteer.recognition.recognizer import Recognizer
 
-    recognizer = Recognizer(config)
+    recognizer = recognizer or Recognizer(config)
     _warn_of_unknown_signs(config, recognizer.signs)
     joystick = HandJoystick(config.joystick)
     return HandSignRecognitionNode(transport, clock, recognizer, config.signs, joystick=joystick, **topics)
@@ -155,47 +137,49 @@ def _is_the_courses(cmd_vel: Topic[Any], transport: Transport) -> bool:
 
 
 def make_robot(
-    config: Config, transport: Transport, clock: Clock, link: Session | None = None, **topics: Topic[Any]
+    config: Config,
+    transport: Transport,
+    clock: Clock,
+    link: Session | None = None,
+    robot: "Robot | None" = None,
+    **topics: Topic[Any],
 ) -> "RobotNode":
     """Return the node ``robot``; one that publishes ``/clock`` runs on real time, not on its own ``/clock``.
 
-    Arguments and errors are those of :func:`open_robot`.
+    Without a ``robot``, it opens the one that ``config`` names; arguments and errors are those of :func:`open_robot`.
     """
     from handsteer.nodes.robot import RobotNode
 
     if config.robot.publish_clock and isinstance(clock, SimulatedClock):
         clock = WallClock()
     topics = {"cmd_vel": cmd_vel_topic(config), **topics}
-    robot = open_robot(config.robot, link, topics["cmd_vel"], config.control.cmd_vel_frame_id)
+    robot = robot or open_robot(config, clock, link, topics["cmd_vel"])
     return RobotNode(transport, clock, robot, prefixed(config.robot, transport), **topics)
 
 
-def open_robot(
-    config: RobotConfig, link: Session | None = None, cmd_vel: Topic[Any] = CMD_VEL, frame_id: str = "base_link"
-) -> "Robot":
-    """Return the robot that ``config.kind`` names.
+def open_robot(config: Config, clock: Clock, link: Session | None = None, cmd_vel: Topic[Any] = CMD_VEL) -> "Robot":
+    """Return the robot that ``config.robot.kind`` names: a plug-in, or one behind a topic of a transport.
 
     Args:
         config: Names and configures the robot.
-        link: This process in the graph of a real robot; not needed by a simulated one.
-        cmd_vel: Topic of a real robot's commands, with Twist or TwistStamped.
-        frame_id: Coordinate frame of a TwistStamped.
+        clock: The graph's clock.
+        link: This process in the graph of a robot behind a topic.
+        cmd_vel: Topic of that robot's commands, with Twist or TwistStamped.
 
     Raises:
-        ConfigError: It is a real robot, and there is no link to it.
+        ConfigError: It is behind a topic, and there is no link to it.
+        PluginError: It is a plug-in that cannot be loaded.
         WorldError: The world of a simulated robot cannot be used.
         PackageMissing: The simulator is not installed.
     """
-    if config.kind != "sim":
-        if link is None:
-            raise ConfigError(f"robot.kind is {config.kind}: only `handsteer run` drives a real robot; here it is sim")
-        from handsteer.robots.remote import RemoteRobot
+    kind = config.robot.kind
+    if kind in doors.ROBOTS.names():
+        return doors.ROBOTS.load(kind)(config, clock)
+    if link is None:
+        raise ConfigError(f"robot.kind is {kind}: only `handsteer run` drives a real robot; here it is sim")
+    from handsteer.robots.remote import RemoteRobot
 
-        return RemoteRobot(config, cmd_vel, frame_id, link)
-    with needing("the simulated robot", "sim", "mujoco", "xacro"):
-        from handsteer.plugins.sim.simulated import SimulatedRobot
-
-    return SimulatedRobot(config)
+    return RemoteRobot(config.robot, cmd_vel, config.control.cmd_vel_frame_id, link)
 
 
 def make_steering(

@@ -9,7 +9,7 @@ from handsteer.cameras.browser import LARGEST_BYTES, BrowserCamera
 from handsteer.cameras.choice import BROWSER, ChoiceOfCameras
 from handsteer.cameras.choose import MachineCameras, open_camera
 from handsteer.clock import SteppedClock
-from handsteer.config import CameraConfig, VirtualHandConfig
+from handsteer.config import CameraConfig, Config
 from handsteer.errors import FrameError
 from tests.contracts.camera_contract import CameraContract
 from tests.fuzz import corpus
@@ -37,9 +37,9 @@ class Sending:
 
 
 def choice(clock: SteppedClock) -> ChoiceOfCameras:
-    config, hand = CameraConfig(source="virtual", width=64, height=48), VirtualHandConfig()
-    own = open_camera(config, hand, clock)
-    return ChoiceOfCameras(own, BrowserCamera(clock), MachineCameras(config, hand, clock, own))
+    config = Config(camera=CameraConfig(source="virtual", width=64, height=48))
+    own = open_camera(config, clock)
+    return ChoiceOfCameras(own, BrowserCamera(clock), MachineCameras(config, clock, own))
 
 
 class TestBrowserCamera(CameraContract):

@@ -13,7 +13,7 @@ from handsteer.cameras.choice import BROWSER, OWN, CameraChoice, ChoiceOfCameras
 from handsteer.cameras.choose import MachineCameras, open_camera
 from handsteer.cameras.files import VideoFile
 from handsteer.clock import SteppedClock
-from handsteer.config import CameraConfig, VirtualHandConfig
+from handsteer.config import CameraConfig, Config
 from handsteer.errors import CameraError, CameraInUse, CameraNotFound
 from tests.cameras.test_browser import choice, sent
 
@@ -149,9 +149,9 @@ def test_the_last_of_several_choices_counts() -> None:
 
 
 def machine(source: str, **more: object) -> tuple[MachineCameras, Camera]:
-    config = CameraConfig.model_validate({"source": source, "width": 64, "height": 48, **more})
-    own = open_camera(config, VirtualHandConfig(), SteppedClock())
-    return MachineCameras(config, VirtualHandConfig(), SteppedClock(), own), own
+    config = Config.model_validate({"camera": {"source": source, "width": 64, "height": 48, **more}})
+    own = open_camera(config, SteppedClock())
+    return MachineCameras(config, SteppedClock(), own), own
 
 
 def test_the_list_has_the_named_source_the_virtual_hand_and_the_webcams_found(
@@ -206,9 +206,10 @@ def test_names_hide_folders_and_what_an_address_has_besides_the_host() -> None:
     class Stream(Device):
         source = "rtsp://user:secret@10.0.0.7:554/live?token=secret"
 
-    config = CameraConfig(source=Stream.source)
-    named = MachineCameras(config, VirtualHandConfig(), SteppedClock(), Stream(Stream.source, (64, 48)))
+    config = Config(camera=CameraConfig(source=Stream.source))
+    named = MachineCameras(config, SteppedClock(), Stream(Stream.source, (64, 48)))
     assert named.own == CameraChoice(OWN, "rtsp://10.0.0.7")
-    without = MachineCameras(CameraConfig(source="browser"), VirtualHandConfig(), SteppedClock(), Device("", (1, 1)))
+    config = Config(camera=CameraConfig(source="browser"))
+    without = MachineCameras(config, SteppedClock(), Device("", (1, 1)))
     assert without.own is None
     assert without.find()[0].source == "virtual"

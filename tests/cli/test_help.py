@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from handsteer.cli.app import _ros_words_last, app
+from handsteer.cli.app import _ros_words_last, add_plugin_verbs, app
 from handsteer.cli.options import take_parameters
 from tests.cli.test_cli import fails, prints
 
@@ -37,6 +37,7 @@ except SystemExit:
 
 
 def test_the_list_of_verbs_is_complete() -> None:
+    add_plugin_verbs()
     known = [name for name in app if not name.startswith("-")]
     assert {verb.partition(" ")[0] for verb in VERBS} == set(known)
     assert {f"signs {name}" for name in app["signs"] if not name.startswith("-")} <= set(VERBS)

@@ -8,7 +8,7 @@ import pytest
 from handsteer.audit import read_event
 from handsteer.messages import AUDIT, CMD_VEL, RECORDED
 from handsteer.nodes.auditing import HOLD_S
-from handsteer.plugins.record import open_recording
+from handsteer.plugins.record.files import open_recording
 from handsteer.plugins.record.recorder import Recorder
 from handsteer.plugins.record.replay.drive_facts import DriveFacts
 from handsteer.plugins.record.replay.drive_reader import read_drive

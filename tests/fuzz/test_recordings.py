@@ -16,7 +16,7 @@ from rosbags.rosbag2 import StoragePlugin
 from handsteer.config import Config
 from handsteer.errors import RecordingError
 from handsteer.messages import CAMERA_INFO, ODOM, WORLD_MARKERS
-from handsteer.plugins.record import open_recording
+from handsteer.plugins.record.files import open_recording
 from handsteer.plugins.record.mcap_reader import McapFile
 from handsteer.plugins.record.replay.by_time import rerun_by_time
 from handsteer.plugins.record.replay.drive_reader import read_drive

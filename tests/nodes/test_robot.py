@@ -2,7 +2,7 @@ import re
 
 import pytest
 
-from handsteer.config import RobotConfig
+from handsteer.config import Config, RobotConfig
 from handsteer.errors import WorldError
 from handsteer.making import open_robot
 from handsteer.messages import (
@@ -37,7 +37,7 @@ class RobotBench(Bench):
         self.transforms = self.record(TF)
         config = RobotConfig.model_validate({"world": "empty", **settings})
         topic = cmd_vel(config.cmd_vel_type)
-        self.robot = RobotNode(self.transport, self.clock, open_robot(config), config, topic)
+        self.robot = RobotNode(self.transport, self.clock, open_robot(Config(robot=config), self.clock), config, topic)
         self.nodes = [self.robot]
         self.commands = self.transport.advertise("control", topic)
 

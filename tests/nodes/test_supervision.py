@@ -2,7 +2,7 @@ import logging
 
 import pytest
 
-from handsteer.config import ControlConfig, RobotConfig
+from handsteer.config import Config, ControlConfig, RobotConfig
 from handsteer.making import open_robot
 from handsteer.messages import (
     CMD_VEL,
@@ -149,7 +149,8 @@ class Chain(Bench):
         self.reports = self.record(DIAGNOSTICS)
         config = RobotConfig(world="empty")
         self.control = HandSignControlNode(self.transport, self.clock, ControlConfig())
-        self.nodes = [RobotNode(self.transport, self.clock, open_robot(config), config), self.control]
+        robot = open_robot(Config(robot=config), self.clock)
+        self.nodes = [RobotNode(self.transport, self.clock, robot, config), self.control]
         self.recognition = self.transport.advertise("hand_sign_recognition", HAND_SIGN)
 
     def said(self, name: str) -> tuple[DiagnosticStatus, str]:

@@ -25,7 +25,7 @@ def test_a_recogniser_loads_nothing_but_what_recognises() -> None:
     assert packages >= {"ai_edge_litert", "cv2", "numpy", "platformdirs", "pydantic"}
     assert not packages & {"cyclopts", "fastapi", "mujoco", "nicegui", "rosbags", "starlette", "tqdm", "xacro", "yaml"}
     packages = {name.split(".")[1] for name in modules if name.startswith("handsteer.")}
-    assert packages == {"config", "errors", "recognition", "regular_files", "timeouts", "types"}
+    assert packages == {"config", "doors", "errors", "recognition", "regular_files", "timeouts", "types"}
 
 
 def test_photos_and_videos_are_recognised_without_messages_or_robots() -> None:

@@ -201,7 +201,7 @@ def test_the_shipped_model_is_small_and_says_what_it_was_trained_on() -> None:
     model = load_model()
     assert len(CONTENT) < 300_000
     assert model.shapes == ("open", "index", "index_down", "thumb", "fist", "other")
-    assert "handsteer.plugins.teach.synthetic" in model.trained_on["source"]
+    assert "synthetic hands" in model.trained_on["source"]
     assert sum(model.trained_on["hands"].values()) > 100_000
 
 

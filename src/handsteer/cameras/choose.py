@@ -9,41 +9,46 @@ from urllib.parse import urlsplit
 import numpy as np
 from numpy.typing import NDArray
 
-from handsteer import plain_yaml
+from handsteer import doors, plain_yaml
 from handsteer.cameras import VIRTUAL_HAND, Camera
 from handsteer.cameras.choice import OWN, CameraChoice, Size
-from handsteer.cameras.files import PHOTO_SUFFIXES, PhotoFolder, VideoFile
+from handsteer.cameras.files import PHOTO_SUFFIXES, PhotoFolder, VideoFile, is_recording
 from handsteer.cameras.webcam import Webcam, device_path, is_address, is_device, name_of, webcams
 from handsteer.clock import Clock
-from handsteer.config import CameraConfig, VirtualHandConfig
+from handsteer.config import CameraConfig, Config
 from handsteer.errors import CameraError, CameraNotFound
 from handsteer.messages import CameraInfo, Header, RegionOfInterest, Time
 
 log = logging.getLogger(__name__)
 
+_RECORDED = "recorded-file"
 _MATRICES = {"camera_matrix": 9, "rectification_matrix": 9, "projection_matrix": 12}
 _NO_TIME = Time(sec=0, nanosec=0)
 _WHOLE = RegionOfInterest(x_offset=0, y_offset=0, height=0, width=0, do_rectify=False)
 
 
-def open_camera(config: CameraConfig, virtual_hand: VirtualHandConfig, clock: Clock) -> Camera:
-    """Return the camera that ``config.source`` names.
+def open_camera(config: Config, clock: Clock) -> Camera:
+    """Return the camera that ``config.camera.source`` names.
 
     ``auto`` is the first webcam that delivers a frame, else the virtual hand; the log reports which.
 
     Raises:
         CameraError: It cannot be used; the message suggests what to do.
+        PluginError: It is a plug-in that cannot be loaded.
     """
-    source = config.source
+    source = config.camera.source
     if source == "auto":
-        return _first_webcam(config, clock) or _virtual(config, virtual_hand, clock)
+        return _first_webcam(config.camera, clock) or doors.CAMERAS.load(_VIRTUAL.source)(config, clock)
     if source == "browser":
         raise CameraNotFound("the browser's camera needs the page: handsteer run --camera browser")
-    if source == "virtual":
-        return _virtual(config, virtual_hand, clock)
+    if source in doors.CAMERAS.names():
+        return doors.CAMERAS.load(source)(config, clock)
     if is_device(source) or is_address(source):
-        return _webcam(source, config, clock)
-    return _file(Path(source).expanduser(), config, clock)
+        return _webcam(source, config.camera, clock)
+    path = Path(source).expanduser()
+    if is_recording(path) and path.exists():
+        return doors.CAMERAS.load(_RECORDED)(config, clock)
+    return _file(path, config.camera, clock)
 
 
 def _first_webcam(config: CameraConfig, clock: Clock) -> Camera | None:
@@ -63,13 +68,6 @@ def _webcam(source: str, config: CameraConfig, clock: Clock) -> Camera:
     return Webcam(source, clock, width=config.width, height=config.height, fps=config.fps)
 
 
-def _virtual(config: CameraConfig, virtual_hand: VirtualHandConfig, clock: Clock) -> Camera:
-    # All nodes import this module; only the process that shows the virtual hand loads what draws it.
-    from handsteer.plugins.virtual_hand.camera import VirtualHandCamera  # noqa: PLC0415
-
-    return VirtualHandCamera(virtual_hand, width=config.width, height=config.height, fps=config.fps, clock=clock)
-
-
 def _file(path: Path, config: CameraConfig, clock: Clock) -> Camera:
     if not path.exists():
         raise CameraNotFound(
@@ -82,36 +80,39 @@ def _file(path: Path, config: CameraConfig, clock: Clock) -> Camera:
 
 
 class MachineCameras:
-    """A :class:`~handsteer.cameras.choice.Machine`: the own camera, the virtual hand, and the webcams.
+    """A :class:`~handsteer.cameras.choice.Machine`: the own camera, the virtual hand, other plug-ins, and the webcams.
 
     Args:
         config: Names the own camera, and the resolution and rate that webcams are asked for.
-        virtual_hand: The virtual hand.
         clock: Stamps the frames.
         own: The camera that ``config`` names, opened.
     """
 
-    def __init__(self, config: CameraConfig, virtual_hand: VirtualHandConfig, clock: Clock, own: Camera) -> None:
-        self.size: Size = (config.width, config.height)
-        self._config, self._virtual_hand, self._clock = config, virtual_hand, clock
-        self._source = own.source if isinstance(own, Webcam) else config.source
+    def __init__(self, config: Config, clock: Clock, own: Camera) -> None:
+        self.size: Size = (config.camera.width, config.camera.height)
+        self._config, self._clock = config, clock
+        self._source = own.source if isinstance(own, Webcam) else config.camera.source
         is_webcam = is_device(self._source)
-        self.own = None if config.source == "browser" else CameraChoice(OWN, _shown(own.name), is_webcam)
+        self.own = None if config.camera.source == "browser" else CameraChoice(OWN, _shown(own.name), is_webcam)
 
     def find(self) -> tuple[CameraChoice, ...]:
         """Return the cameras that can be chosen now, the own one first."""
         own = () if self.own is None else (self.own,)
         virtual = () if self.own is not None and self.own.name == VIRTUAL_HAND else (_VIRTUAL,)
+        added = [name for name in doors.CAMERAS.names() if name not in (_VIRTUAL.source, _RECORDED, self._source)]
+        plug_ins = (CameraChoice(name, name) for name in added)
         known = device_path(self._source) if is_device(self._source) else None
         others = [source for source in webcams() if device_path(source) != known]
-        return (*own, *virtual, *(CameraChoice(source, name_of(source), has_sizes=True) for source in others))
+        found = (CameraChoice(source, name_of(source), has_sizes=True) for source in others)
+        return (*own, *virtual, *plug_ins, *found)
 
     def open(self, source: str, size: Size) -> Camera:
         """Open the camera of a choice."""
         source = self._source if source == OWN else source
         width, height = size if is_device(source) else self.size
         of = {"source": source, "width": width, "height": height}
-        return open_camera(self._config.model_copy(update=of), self._virtual_hand, self._clock)
+        camera = self._config.camera.model_copy(update=of)
+        return open_camera(self._config.model_copy(update={"camera": camera}), self._clock)
 
 
 _VIRTUAL = CameraChoice("virtual", VIRTUAL_HAND)

@@ -16,6 +16,7 @@ from handsteer.regular_files import open_regular
 
 AtEnd = Literal["loop", "hold", "end"]
 PHOTO_SUFFIXES = frozenset({".jpg", ".jpeg", ".png"})
+BAGS = frozenset({".bag", ".db3"})
 
 LARGEST_PHOTO_BYTES = 100_000_000
 MOST_PHOTO_PIXELS = 8192 * 8192
@@ -26,6 +27,11 @@ _HIGHEST_FPS = 240.0
 
 _SHIFTS = 256
 _TICKS_PER_S = 10_000
+
+
+def is_recording(path: Path) -> bool:
+    """Return whether ``path`` is named as a recording: ``.mcap``, ``.bag``, ``.db3``, or a folder with one of ROS 2."""
+    return path.suffix.lower() in BAGS | {".mcap"} or (path / "metadata.yaml").is_file()
 
 
 class VideoFile:

@@ -8,6 +8,7 @@ import gc
 import importlib
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
@@ -87,18 +88,26 @@ app = App(
     result_action="return_value",
 )
 # Named, not imported: a verb's module is loaded when it is used.
-for verb in ("run", "recognize", "study", "parameters"):
+for verb in ("run", "recognize", "parameters"):
     app.command(f"handsteer.cli.{verb}:{verb}", name=verb, help_epilogue="")
-for verb in ("completion", "models", "doctor", "ros"):
+for verb in ("completion", "models", "ros"):
     app.command(f"handsteer.cli.installation:{verb}", name=verb, help_epilogue="")
-for verb in ("record", "replay", "report"):
-    app.command(f"handsteer.plugins.record.verbs:{verb}", name=verb, help_epilogue="")
-app.command("handsteer.plugins.teach.verbs:app", name="signs")
-app.command("handsteer.plugins.bench.verb:bench", name="bench", help_epilogue="")
-for verb in _NODES:
+for verb in (*_NODES, "robots"):
     app.command(f"handsteer.cli.nodes:{verb}", name=verb, group=_GRAPH, help_epilogue="")
-app.command("handsteer.cli.nodes:zenoh_router", name="zenoh-router", group=_GRAPH, help_epilogue="")
-app.command("handsteer.cli.nodes:robots", name="robots", group=_GRAPH, help_epilogue="")
+
+
+@cache
+def add_plugin_verbs() -> None:
+    """Add the verbs of plug-ins to :data:`app`; they are loaded when they are used."""
+    from handsteer import doors
+
+    known = set(app)
+    for verb in doors.VERBS.names():
+        target = doors.VERBS.target(verb)
+        # An app has an end of its own to its help; it is not loaded here, so its name tells.
+        of_function = {} if target.endswith(":app") else {"help_epilogue": ""}
+        if verb not in known:
+            app.command(target, name=verb, **of_function)
 
 
 def loads(*modules: str) -> Callable[[V], V]:
@@ -114,6 +123,9 @@ def loads(*modules: str) -> Callable[[V], V]:
 def run(words: list[str]) -> int:
     """Run the verb that ``words`` name; return the exit code: 0 for success, 2 for wrong input."""
     set_up_logging()
+    # To search what is installed takes a tenth of the time to load this.
+    if not words or words[0] not in set(app) - set(app.help_flags):
+        add_plugin_verbs()
     _load_what_help_lists(app, words)
     return exit_code(lambda: _run(words))
 

@@ -2,10 +2,11 @@
 
 import webbrowser
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, closing, contextmanager, nullcontext
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from handsteer import doors
 from handsteer.cli import signals
 from handsteer.cli.running import freeze_loaded_objects, say, signals_ignored
 from handsteer.clock import RealClock, SteppedClock
@@ -13,13 +14,14 @@ from handsteer.config import Config
 from handsteer.errors import ConfigError
 from handsteer.graph import Graph
 from handsteer.parameters import from_parameters
-from handsteer.plugins.foxglove.process import LiveProcess
-from handsteer.plugins.page.page_process import PageProcess
-from handsteer.plugins.record.audit_log import AuditLog, audit_log_path
-from handsteer.plugins.study.session import Task
 from handsteer.summary import Summary
-from handsteer.transports import join
+from handsteer.transports import join, transports
 from handsteer.transports.base import Session
+
+if TYPE_CHECKING:
+    from handsteer.plugins.foxglove.process import LiveProcess
+    from handsteer.plugins.page.page_process import PageProcess
+    from handsteer.plugins.study.session import Task
 
 _NODE = "handsteer"
 
@@ -33,9 +35,11 @@ def linked(
     kind = settings.robot.kind
     if settings.control.robots:
         raise ConfigError("control.robots is for `handsteer control`: a run drives one robot")
-    if kind == "sim":
+    if kind not in transports():
         if ros_args:
-            raise ConfigError(f"{ros_args[0]!r}: ROS arguments need a real robot, such as --robot auto")
+            raise ConfigError(f"{ros_args[0]!r}: ROS arguments need a robot in a graph of ROS, such as --robot auto")
+        if fast and kind != "sim":
+            raise ConfigError(f"--fast runs on simulated time, which the robot {kind} does not follow")
         yield settings, None
         return
     if fast:
@@ -53,7 +57,7 @@ def drive(
     link: Session | None = None,
     duration: float | None = None,
     file: Path | None = None,
-    study: Task | None = None,
+    study: "Task | None" = None,
     *,
     record: Path | None = None,
     headless: bool = False,
@@ -61,12 +65,12 @@ def drive(
 ) -> Summary:
     """Run a graph until it ends, ``duration`` seconds have passed, or a signal comes; return its statistics."""
     # Started first: it loads its libraries while this process loads the models.
-    page = None if headless else PageProcess()
-    live = None if settings.foxglove.port < 0 else LiveProcess()
+    page: PageProcess | None = None if headless else doors.COMPANIONS.load("page")()
+    live: LiveProcess | None = None if settings.foxglove.port < 0 else doors.COMPANIONS.load("foxglove")()
     try:
         with (
             Graph(settings, SteppedClock() if fast else RealClock(), link=link, steering=page is None) as graph,
-            _audit_log(graph, is_simulated_time=fast),
+            doors.COMPANIONS.load("audit_log")(graph, is_simulated_time=fast),
         ):
             if record is not None:
                 graph.record(record)
@@ -93,13 +97,14 @@ def drive(
                 live.stop()
 
 
-def _audit_log(graph: Graph, *, is_simulated_time: bool) -> AbstractContextManager[object]:
-    path = audit_log_path(graph.config.recording.audit_log, is_simulated_time=is_simulated_time)
-    return nullcontext() if path is None else closing(AuditLog(graph.transport, path))
-
-
 def _run_until_end(
-    graph: Graph, duration: float | None, file: Path | None, study: Task | None, page: PageProcess | None, *, fast: bool
+    graph: Graph,
+    duration: float | None,
+    file: Path | None,
+    study: "Task | None",
+    page: "PageProcess | None",
+    *,
+    fast: bool,
 ) -> None:
     if fast:
         graph.run_stepped(*([] if duration is None else [duration]))

@@ -151,13 +151,14 @@ def robots(count: int, /, *, transport: str, world: str | None = None) -> int:
     world
         Name of a shipped world, or a YAML file.
     """
-    from handsteer.transports import TRANSPORTS
+    from handsteer.transports import transports
 
     if not 1 <= count <= _MOST:
         raise ConfigError(f"{count} robots: there should be 1 to {_MOST}")
-    if transport not in TRANSPORTS:
-        near = did_you_mean(transport, TRANSPORTS)
-        raise ConfigError(f"there is no transport {transport!r}{near or ':'} use {' or '.join(TRANSPORTS)}")
+    known = transports()
+    if transport not in known:
+        near = did_you_mean(transport, known)
+        raise ConfigError(f"there is no transport {transport!r}{near or ':'} use {' or '.join(known)}")
     names = [f"/r{number}" for number in range(1, count + 1)]
     try:
         with _started({name: _command(name, transport, world) for name in names}) as processes:

@@ -2,19 +2,18 @@
 
 import importlib
 import logging
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-from handsteer import making
+from handsteer import doors, making
 from handsteer.audit import setting_changes
 from handsteer.cli import signals
 from handsteer.cli.running import exit_code, freeze_loaded_objects, say, set_up_logging, settings, signals_ignored
 from handsteer.clock import Clock
 from handsteer.config import Config
-from handsteer.errors import needing
 from handsteer.nodes.base import Node
 from handsteer.parameters import NodeParameters, from_parameters
 from handsteer.transports import join
@@ -25,24 +24,9 @@ _LOOK_PERIOD_S = 0.5
 log = logging.getLogger(__name__)
 
 
-@contextmanager
-def _served(node: Any, config: Config) -> Iterator[None]:
-    # The page's libraries take a second to load, which the other nodes do not need.
-    with needing("the page", "page", "nicegui"):
-        from handsteer.plugins.page.server import Dashboard
-
-    wires = (node.transport, node.clock, node)
-    dashboard = Dashboard(*wires, config.dashboard, cmd_vel=making.cmd_vel_topic(config))
-    url = dashboard.start()
-    try:
-        say(f"the page is at {url}")
-        if config.dashboard.opens_browser:
-            import webbrowser
-
-            webbrowser.open(url)
-        yield
-    finally:
-        dashboard.stop()
+def _served(node: Any, config: Config) -> AbstractContextManager[None]:
+    served: AbstractContextManager[None] = doors.COMPANIONS.load("page_of_node")(node, config, say)
+    return served
 
 
 @dataclass(frozen=True)

@@ -4,12 +4,14 @@ The YAML file, the command line and the settings of the page are generated from 
 units are SI (REP 103), in brackets in each description.
 """
 
+import logging
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal, TypeVar
 
 from pydantic import Field, ValidationError, model_validator
+from pydantic.fields import FieldInfo
 
 from handsteer.config.driving import PRESETS, CollisionMonitorConfig, ControlConfig, RobotConfig, RobotKind
 from handsteer.config.recognition import (
@@ -22,7 +24,8 @@ from handsteer.config.recognition import (
     VirtualHandConfig,
 )
 from handsteer.config.section import Section
-from handsteer.errors import ConfigError, as_name, did_you_mean, quoted
+from handsteer.doors import PARAMETERS
+from handsteer.errors import ConfigError, PluginError, as_name, did_you_mean, quoted
 from handsteer.types import CmdVelType
 
 __all__ = [
@@ -49,6 +52,8 @@ __all__ = [
     "load",
     "validate",
 ]
+
+log = logging.getLogger(__name__)
 
 DEFAULT_FILE = Path("handsteer.yaml")
 """Read by ``handsteer run`` from the working directory, and saved to by the page, if no other file is named."""
@@ -155,11 +160,41 @@ class Config(Section):
     dashboard: DashboardConfig = DashboardConfig()
     foxglove: FoxgloveConfig = FoxgloveConfig()
 
+    def section(self, model: type[S]) -> S:
+        """Return the section of a plug-in, by its ``model``.
+
+        Raises:
+            ConfigError: There is none; the plug-in is not installed.
+        """
+        for name in type(self).model_fields:
+            found = getattr(self, name)
+            if isinstance(found, model):
+                return found
+        raise ConfigError(f"no section of the configuration is a {model.__name__}: its plug-in is not installed")
+
     @model_validator(mode="after")
     def _monitors_one_robot(self) -> "Config":
         if self.collision_monitor.enabled and self.control.robots:
             raise ValueError("collision_monitor.enabled should be false with control.robots: it is for one robot")
         return self
+
+
+def _add_sections() -> None:
+    """Add the sections of plug-ins to :class:`Config`."""
+    found = {}
+    for name in PARAMETERS.names():
+        try:
+            model = PARAMETERS.load(name)
+            found[name] = FieldInfo(annotation=model, default=model())
+        except (PluginError, TypeError, ValueError) as error:  # it must not keep others from driving
+            log.warning("the parameters %s are left out: %s", name, error)
+    added = {name: field for name, field in found.items() if name not in Config.model_fields}
+    if added:
+        Config.model_fields.update(added)
+        Config.model_rebuild(force=True)
+
+
+_add_sections()
 
 
 def load(path: Path | None = None, base: dict[str, Any] | None = None, *overrides: dict[str, Any]) -> Config:

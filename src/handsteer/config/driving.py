@@ -12,11 +12,12 @@ A preset overrides the defaults, and everything else overrides it. Sources, by r
 """
 
 import re
-from typing import Any, Literal, get_args
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from pydantic import Field, field_validator
 
 from handsteer.config.section import Section, live
+from handsteer.doors import ACTIONS, ROBOTS, TRANSPORTS
 from handsteer.timeouts import ODOMETRY_S, RENEW_S, ROBOT_S, STALE_S
 from handsteer.types import ALWAYS_STOP, BUILT_IN, Action, CmdVelType, find_sign
 
@@ -26,8 +27,17 @@ _BRAKES = 0.7
 
 _TURTLESIM = {"cmd_vel_topic": "turtle1/cmd_vel", "odom_topic": "turtle1/pose", "odom_type": "turtlesim_pose"}
 
-RobotKind = Literal["sim", "auto", "ros2", "dds", "zenoh", "ros1"]
-ROBOT_KINDS: tuple[RobotKind, ...] = get_args(RobotKind)
+_KINDS = ("sim", "auto", "ros2", "dds", "zenoh", "ros1")
+ROBOT_KINDS = tuple(dict.fromkeys((*_KINDS, *ROBOTS.names(), *TRANSPORTS.names())))
+"""The kinds of robots: those of plug-ins, and the transports to one behind a topic."""
+if TYPE_CHECKING:
+    RobotKind = str
+    SignEffect = Action
+else:
+    RobotKind = Literal[ROBOT_KINDS]
+    SignEffect = Literal[(*get_args(Action), *ACTIONS.names())]
+SIGN_EFFECTS: tuple[Any, ...] = (*get_args(Action), *ACTIONS.names())
+"""What signs can do: the built-in actions, and those of plug-ins."""
 _NAMESPACE = re.compile(r"[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)
 
 
@@ -127,7 +137,7 @@ class ControlConfig(Section):
         le=5,
         description="Manual steering overrides the signs until this long after its last command [s]",
     )
-    actions: dict[str, Action] = live(
+    actions: dict[str, SignEffect] = live(
         {}, description="Actions of signs, such as {Hi: stop, Peace: turbo}; Stop and NONE always stop"
     )
     arming: Literal["auto", "on", "off", "course"] = Field(

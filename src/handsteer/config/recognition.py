@@ -1,15 +1,20 @@
 """Parameters of the camera and of recognition."""
 
 from collections.abc import Mapping
-from typing import ClassVar, Literal
+from typing import TYPE_CHECKING, ClassVar, Literal
 
 from pydantic import ConfigDict, Field, model_validator
 
 from handsteer.config.section import OptionalPath, Section, live
+from handsteer.doors import CLASSIFIERS
 from handsteer.timeouts import STALE_S
 from handsteer.types import Handedness
 
 Recorded = Literal["auto", "always", "never"]
+if TYPE_CHECKING:
+    ClassifierName = str
+else:
+    ClassifierName = Literal[tuple(dict.fromkeys(("shipped", *CLASSIFIERS.names())))]
 
 
 class CameraConfig(Section):
@@ -103,6 +108,10 @@ class SignsConfig(Section):
     model: OptionalPath = live(
         None,
         description="File of taught signs, written by `handsteer signs train`; none for the shipped signs only",
+    )
+    classifier: ClassifierName = Field(
+        "shipped",
+        description="What recognises the sign of a hand: shipped knows the six, others are plug-ins",
     )
     profile: OptionalPath = live(
         None,

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from handsteer.config import ControlConfig
+from handsteer.control.actions import added_effect
 from handsteer.timeouts import RENEW_WARNING_S
 from handsteer.types import CRUISE_EFFECTS, EFFECTS, Action
 
@@ -126,6 +127,8 @@ def effect_of(action: Action, rule: ControlConfig) -> str:
 
 def effect_words(action: Action, rule: ControlConfig | None) -> str:
     """Return the effect of ``action`` under ``rule``, without figures; None is the default rule."""
+    if action not in EFFECTS:
+        return added_effect(action)
     return (CRUISE_EFFECTS if rule and rule.rule == "cruise" else EFFECTS)[action]
 
 

@@ -3,8 +3,9 @@
 import math
 
 from handsteer.config import ControlConfig
+from handsteer.control.actions import AddedActions
 from handsteer.control.safety import Allowance
-from handsteer.types import ZERO, Action, Velocity, action_of
+from handsteer.types import ACTIONS, ZERO, Action, Velocity, action_of
 
 _DIGITS = 9
 _TURBO = 2.0
@@ -21,6 +22,9 @@ class SignControl:
     A ``turbo`` sign doubles the linear velocity, within the limit, while it is shown, and keeps the angular one. The
     next sign continues from the original velocity. A stopped robot remains stopped.
 
+    Raises:
+        PluginError: An action of ``config.actions`` is of a plug-in, and cannot be made.
+
     Attributes:
         velocity: Sum of the signs so far; it is what is commanded, except for ``turbo``.
         silent: True after a timeout: nothing is commanded until the next sign.
@@ -30,6 +34,8 @@ class SignControl:
         self._config = config
         self._since_sign_s = 0.0
         self._allowance = Allowance(config.max_sign_rate)
+        self._added = AddedActions()
+        self._added.make(config.actions.values())
         self.velocity = ZERO
         self.silent = True
 
@@ -56,12 +62,15 @@ class SignControl:
         self._since_sign_s = 0.0
         self.silent = False
         action = action_of(sign, self._config.actions)
-        self.velocity = self._next(sign, action, interval_s)
+        self.velocity = (
+            self._next(sign, action, interval_s) if action in ACTIONS else self._added_to(action, interval_s)
+        )
         commanded = self._boosted() if action == "turbo" else self.velocity
         return commanded if commanded.is_finite else self.halt()
 
     def reconfigure(self, config: ControlConfig) -> None:
         """Change the configuration; :attr:`velocity` is clamped to the new limits."""
+        self._added.make(config.actions.values())
         self._config = config
         self._allowance.rate = config.max_sign_rate
         self.velocity = self.velocity.clamped(config.max_linear, config.max_angular)
@@ -92,7 +101,15 @@ class SignControl:
                 after = now.linear_mps, now.angular_radps
         # Sums of steps are to be the expected decimals: 0.22, not 0.22000000000000006.
         summed = Velocity(round(after[0], _DIGITS), round(after[1], _DIGITS))
-        limited = summed.clamped(self._config.max_linear, self._config.max_angular)
+        return self._allowed(summed)
+
+    def _added_to(self, action: str, interval_s: float) -> Velocity:
+        """Return the next velocity by an action of a plug-in."""
+        return self._allowed(self._added.velocity(action, self.velocity, interval_s))
+
+    def _allowed(self, wanted: Velocity) -> Velocity:
+        """Return ``wanted`` within the limits; no faster than now if there are too many signs."""
+        now, limited = self.velocity, wanted.clamped(self._config.max_linear, self._config.max_angular)
         if not _is_faster(limited, now) or self._config.ramp == "per_second" or self._allowance.take():
             return limited
         return Velocity(now.linear_mps, limited.angular_radps if limited.angular_radps == 0.0 else now.angular_radps)

@@ -8,9 +8,11 @@ from typing import Any
 from handsteer.clock import Clock
 from handsteer.config import CollisionMonitorConfig, Config, ControlConfig, JoyConfig
 from handsteer.control import Control
+from handsteer.control.actions import AddedActions
 from handsteer.control.engagement import SteeredBy
 from handsteer.control.explain import Reason, seconds_to_renew
 from handsteer.control.safety import Following
+from handsteer.errors import ConfigError, PluginError
 from handsteer.messages import (
     CMD_VEL,
     GESTURE_JOY,
@@ -132,6 +134,13 @@ class HandSignControlNode(Node):
             self.subscribe(odom, self._on_odometry)
         self._watchdog = self.every(_WATCHDOG_PERIOD_S, self._watch)
         self.diagnose_every(_DIAGNOSE_PERIOD_S, self._report)
+
+    def check(self, config: Config) -> None:
+        """Raise ConfigError if an action of ``control.actions`` is of a plug-in, and cannot be made."""
+        try:
+            AddedActions().make(config.control.actions.values())
+        except PluginError as error:
+            raise ConfigError(f"control.actions: {error}") from None
 
     def on_reconfigure(self, config: Config) -> None:
         """Apply all of ``control``; a robot that exceeds new limits is slowed at once."""

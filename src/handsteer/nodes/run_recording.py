@@ -2,23 +2,64 @@
 
 import functools
 import threading
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
+from handsteer import doors
 from handsteer.audit import INFO, WARN, AuditCode, AuditEvent
 from handsteer.clock import Clock, SteppedClock
+from handsteer.config import Config
 from handsteer.errors import RecordingError
-from handsteer.messages import RECORDED, Topic
+from handsteer.messages import RECORDED, String, Topic
 from handsteer.nodes.auditing import Auditor
 from handsteer.nodes.base import Node
-from handsteer.nodes.journal import journal_topic
-from handsteer.plugins.record.folder import RecordingState
+from handsteer.nodes.journal import JOURNALS, journal_topic
 from handsteer.transports.base import Transport
 
-if TYPE_CHECKING:
-    from handsteer.plugins.record.recorder import Recorder
+_RECORDER = "mcap"
+
+
+class Recorder(Protocol):
+    """Writes topics to a file.
+
+    Attributes:
+        path: The file.
+        lost: Number of messages that were left out.
+        ended_by: Why the recording has ended before :meth:`close`; None if it has not.
+    """
+
+    path: Path
+    lost: int
+    ended_by: str | None
+
+    def note(self, topic: Topic[String], text: str) -> None:
+        """Record ``text`` as a message of ``topic``, which no node publishes."""
+        ...
+
+    def close(self) -> None:
+        """Write what waits, and close the file; may be called twice."""
+        ...
+
+
+@dataclass(frozen=True)
+class RecordingState:
+    """A recording of a graph.
+
+    Attributes:
+        path: The file.
+        began_s: When it began, in seconds of the graph's clock.
+        ended_s: When it ended; None while it is being made.
+        ended_by: Which failure ended it, such as a full disk; empty if none did.
+        lost: Number of messages that are missing because the disk was too slow.
+    """
+
+    path: Path
+    began_s: float
+    ended_s: float | None = None
+    ended_by: str = ""
+    lost: int = 0
 
 
 class RunRecording:
@@ -49,23 +90,25 @@ class RunRecording:
         self._recorder: Recorder | None = None
         self._lock = threading.RLock()
 
-    def start(self, path: Path, about: Mapping[str, str], by: str, prepare: Callable[[], None]) -> None:
+    def start(self, path: Path, config: Config, models: Sequence[Path], by: str, prepare: Callable[[], None]) -> None:
         """Record to ``path`` from now on.
 
         Args:
             path: The file, which must not exist yet.
-            about: Its metadata.
+            config: The parameters of all nodes, for the file's metadata.
+            models: The model files of the recognition, likewise.
             by: Who starts it.
             prepare: Called once the file exists, before journals begin.
 
         Raises:
             RecordingError: The file cannot be created, or another recording is being made.
+            PluginError: What records cannot be loaded.
         """
         with self._lock:
             if self._recorder is not None and self._recorder.ended_by is None:
                 raise RecordingError(f"{self._recorder.path} is being recorded: end that first")
             self.end(by)
-            self._recorder = self._open(path, about, prepare)
+            self._recorder = self._open(path, config, models, prepare)
             self.state = RecordingState(path, self._clock.now())
             self._tell("recording_started", f"started the recording {path.name}", by)
 
@@ -84,13 +127,17 @@ class RunRecording:
             self._note_end(recorder)
         self.on_change()
 
-    def _open(self, path: Path, about: Mapping[str, str], prepare: Callable[[], None]) -> "Recorder":
-        # Only recordings need the package mcap.
-        from handsteer.plugins.record.recorder import Recorder  # noqa: PLC0415
-
-        waits = isinstance(self._clock, SteppedClock)
-        topics = (*RECORDED, *self._topics)
-        recorder = Recorder(path, *self._wires, topics, about, waits=waits, on_failure=self._on_failure)
+    def _open(self, path: Path, config: Config, models: Sequence[Path], prepare: Callable[[], None]) -> Recorder:
+        recorder: Recorder = doors.RECORDERS.load(_RECORDER)(
+            path,
+            *self._wires,
+            (*RECORDED, *self._topics),
+            config=config,
+            models=models,
+            about={JOURNALS: "yes"},
+            waits=isinstance(self._clock, SteppedClock),
+            on_failure=self._on_failure,
+        )
         prepare()
         for node in self._nodes:
             assert node.journal is not None
@@ -104,7 +151,7 @@ class RunRecording:
             sentence = f"the recording {recorder.path.name} has ended: {recorder.ended_by}; driving goes on"
             self._tell("recording_ended", sentence, self._auditor.who, WARN)
 
-    def _note_end(self, recorder: "Recorder") -> None:
+    def _note_end(self, recorder: Recorder) -> None:
         if self.state is not None:
             ended_s = self._clock.now() if self.state.ended_s is None else self.state.ended_s
             self.state = replace(self.state, ended_s=ended_s, ended_by=recorder.ended_by or "", lost=recorder.lost)

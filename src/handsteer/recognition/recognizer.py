@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from handsteer import doors
 from handsteer.config import Config, SignsConfig
 from handsteer.recognition.custom_signs import CustomClassifier, load_custom_model
 from handsteer.recognition.features import PALM, directions
@@ -44,11 +45,14 @@ def open_classifier(config: SignsConfig) -> Classifier:
 
     Raises:
         ModelError: A sign model or the profile is missing or broken.
+        PluginError: The classifier is a plug-in that cannot be loaded.
     """
-    shipped = ShippedClassifier(load_model())
-    known: Classifier = shipped
-    if config.profile:
-        known = ProfiledClassifier(shipped, load_profile(profile_path(config.profile)))
+    if config.classifier != "shipped":
+        known = doors.CLASSIFIERS.load(config.classifier)(config)
+    else:
+        shipped = ShippedClassifier(load_model())
+        profile = load_profile(profile_path(config.profile)) if config.profile else None
+        known = shipped if profile is None else ProfiledClassifier(shipped, profile)
     return CustomClassifier(known, load_custom_model(config.model.expanduser())) if config.model else known
 
 

@@ -7,90 +7,48 @@ the types of ROS messages and their bytes, ``commands`` publishes velocities wit
 """
 
 import importlib.util
-import sys
-from collections.abc import Callable, Sequence
-from typing import Any
+from collections.abc import Sequence
+from typing import Final
 
-from handsteer.errors import TransportError, did_you_mean, needing
+from handsteer import doors
+from handsteer.errors import TransportError, did_you_mean
 from handsteer.transports.base import Session
+
+AUTO: Final = "auto"
+"""The transport ``ros2`` if rclpy is installed, else ``dds``."""
+
+
+def transports() -> tuple[str, ...]:
+    """Return the names of all transports that :func:`join` knows."""
+    return (*doors.TRANSPORTS.names(), AUTO)
 
 
 def join(transport: str, node: str, arguments: Sequence[str]) -> Session:
     """Make this process a node of a graph of several processes.
 
     Args:
-        transport: Kind of graph, one of :data:`TRANSPORTS`.
+        transport: Kind of graph, one of :func:`transports`.
         node: Name of the node, unless ``arguments`` rename it.
         arguments: In the syntax of the transport, such as ``image_raw:=/camera/image`` for ROS 1, and ``--ros-args -r
             image_raw:=/camera/image`` for ROS 2.
 
     Raises:
         TransportError: There is no such transport or graph, or an argument is wrong.
+        PluginError: The transport is installed, but cannot be loaded.
     """
-    if transport not in TRANSPORTS:
-        near = did_you_mean(transport, TRANSPORTS)
-        raise TransportError(f"there is no transport {transport!r}{near or ':'} use {' or '.join(TRANSPORTS)}")
-    return TRANSPORTS[transport](node, arguments)
+    known = transports()
+    if transport not in known:
+        near = did_you_mean(transport, known)
+        raise TransportError(f"there is no transport {transport!r}{near or ':'} use {' or '.join(known)}")
+    return doors.TRANSPORTS.load(_found() if transport == AUTO else transport)(node, arguments)
 
 
-def _ros1(node: str, arguments: Sequence[str]) -> Session:
-    # rospy is not installed everywhere, so it is imported only when it is used.
-    from handsteer.plugins.ros1.session import Ros1Session  # noqa: PLC0415
-
-    return Ros1Session(node, arguments)
-
-
-def _dds(node: str, arguments: Sequence[str]) -> Session:
-    # There is no wheel of cyclonedds for Python 3.14 and newer, nor for Linux on ARM.
-    with needing("the transport dds (zenoh works on every system)", "dds", "cyclonedds"):
-        from handsteer.plugins.dds.transport import DdsTransport  # noqa: PLC0415
-    return _wire(node, arguments, DdsTransport)
-
-
-def _zenoh(node: str, arguments: Sequence[str]) -> Session:
-    with needing("the transport zenoh", "zenoh", "zenoh", "xxhash"):
-        from handsteer.plugins.zenoh.transport import ZenohTransport  # noqa: PLC0415
-    return _wire(node, arguments, ZenohTransport)
-
-
-def _wire(node: str, arguments: Sequence[str], connect: Any) -> Session:
-    # It loads all types of ROS 2.
-    from handsteer.plugins.ros2.base_session import Ros2Session  # noqa: PLC0415
-
-    return Ros2Session(node, arguments, connect)
-
-
-def _ros2(node: str, arguments: Sequence[str]) -> Session:
-    if importlib.util.find_spec("rclpy") is None:
-        raise TransportError(f"the transport ros2 needs rclpy, {_WITHOUT_RCLPY}; --transport dds needs no ROS 2")
-    try:
-        from handsteer.plugins.ros2.session import RclpySession  # noqa: PLC0415
-    except ImportError as problem:
-        raise TransportError(f"rclpy is there but cannot be loaded ({problem}): is a ROS 2 sourced?") from None
-    return RclpySession(node, arguments)
-
-
-def _auto(node: str, arguments: Sequence[str]) -> Session:
+def _found() -> str:
     if importlib.util.find_spec("rclpy") is not None:
-        return _ros2(node, arguments)
+        return "ros2"
     if importlib.util.find_spec("cyclonedds") is None:
         raise TransportError(
-            f"there is no ROS 2 here, and nothing that speaks its wire: neither rclpy, {_WITHOUT_RCLPY}; "
-            "nor the package cyclonedds (pip install 'handsteer[dds]')"
+            "there is no ROS 2 here, and nothing that speaks its wire: neither rclpy (source ROS 2, and start "
+            "handsteer with the Python that it is for), nor the package cyclonedds (pip install 'handsteer[dds]')"
         )
-    return _dds(node, arguments)
-
-
-_WITHOUT_RCLPY = (
-    f"which this Python ({sys.version_info[0]}.{sys.version_info[1]}) does not find: source ROS 2 "
-    "(source /opt/ros/jazzy/setup.bash) and start handsteer with the Python that it is for"
-)
-
-TRANSPORTS: dict[str, Callable[[str, Sequence[str]], Session]] = {
-    "ros1": _ros1,
-    "ros2": _ros2,
-    "dds": _dds,
-    "zenoh": _zenoh,
-    "auto": _auto,
-}
-"""Functions that join a graph of several processes, by name of the transport."""
+    return "dds"

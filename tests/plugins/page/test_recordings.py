@@ -10,9 +10,9 @@ from handsteer.clock import SteppedClock
 from handsteer.config import Config, RecordingConfig, VirtualHandConfig
 from handsteer.errors import RecordingError
 from handsteer.graph import Graph
+from handsteer.nodes.run_recording import RecordingState
 from handsteer.plugins.page import recordings as module
 from handsteer.plugins.page.recordings import Recordings, duration_text, size_text
-from handsteer.plugins.record.folder import RecordingState
 from handsteer.plugins.record.mcap_reader import McapFile
 from tests.contracts.transport_contract import eventually
 from tests.plugins.page.served import remote

@@ -7,8 +7,9 @@ from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Ros2Writer
 from rosbags.typesys import Stores, get_typestore
 
+from handsteer.cameras.files import is_recording
 from handsteer.errors import RecordingError
-from handsteer.plugins.record import is_recording, open_recording
+from handsteer.plugins.record.files import open_recording
 from handsteer.plugins.record.mcap_reader import McapFile
 from handsteer.transports.encoding import encode, types
 

@@ -6,7 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from handsteer.config import RobotConfig
+from handsteer.clock import SteppedClock
+from handsteer.config import Config, RobotConfig
 from handsteer.errors import WorldError
 from handsteer.making import open_robot
 from handsteer.plugins.sim.simulated import SimulatedRobot
@@ -189,7 +190,7 @@ def test_reset_puts_everything_back_but_time_goes_on() -> None:
 def test_the_same_commands_give_the_same_path_bit_for_bit() -> None:
     def path() -> list[RobotState]:
         random = np.random.default_rng(7)
-        robot = open_robot(RobotConfig())
+        robot = open_robot(Config(), SteppedClock())
         states = []
         for linear_mps, angular_radps in random.uniform(-1, 1, (150, 2)).tolist():
             robot.command(linear_mps, angular_radps)
@@ -255,7 +256,7 @@ def test_an_obstacle_on_the_robot_is_refused() -> None:
 
 def test_an_unknown_world_is_refused() -> None:
     with pytest.raises(WorldError, match="no world 'moon'"):
-        open_robot(RobotConfig(world="moon"))
+        open_robot(Config(robot=RobotConfig(world="moon")), SteppedClock())
 
 
 def test_first_drive_in_the_shipped_world_is_free() -> None:

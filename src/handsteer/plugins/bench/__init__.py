@@ -4,6 +4,8 @@ The ``operator`` sees the robot on one of the ``courses`` a moment late, and act
 through signs and the virtual hand (``hands``).
 
 :func:`handsteer.plugins.bench.laps.run_lap` drives one lap on stepped time. Simulated laps are no user study: they
-compare interfaces and settings under the same model of a person (:doc:`/driving`). Imports beside the kernel
-:mod:`~handsteer.plugins.sim` and :mod:`~handsteer.plugins.virtual_hand`, whose robot and hand it drives.
+compare interfaces and settings under the same model of a person (:doc:`/driving`).
+
+Imports the kernel, and :mod:`~handsteer.plugins.sim` and :mod:`~handsteer.plugins.virtual_hand`, whose robot and hand
+it drives.
 """

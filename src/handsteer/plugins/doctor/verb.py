@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING
 from handsteer.cli.app import Flag, loads
 
 if TYPE_CHECKING:
-    from handsteer.plugins.doctor import Finding
+    from handsteer.plugins.doctor.examine import Finding
 
 
-@loads("handsteer.plugins.doctor")
+@loads("handsteer.plugins.doctor.examine")
 def doctor(*, port: int = 8080, json: Flag = False) -> int:
     """Check what works on this machine; exit code 1 if something required is missing.
 
@@ -25,7 +25,7 @@ def doctor(*, port: int = 8080, json: Flag = False) -> int:
     json
         Print one JSON list.
     """
-    from handsteer.plugins.doctor import examine
+    from handsteer.plugins.doctor.examine import examine
 
     findings = examine(port)
     if json:

@@ -9,6 +9,7 @@ from typing import Final
 from nicegui import ui
 
 from handsteer.errors import HandsteerError
+from handsteer.nodes.run_recording import RecordingState
 from handsteer.plugins.page.camera import CameraPanel
 from handsteer.plugins.page.elements import STATIC, box, button, card, switch, tag, text
 from handsteer.plugins.page.legend import LegendPanel
@@ -21,7 +22,6 @@ from handsteer.plugins.page.steer_panel import SteerPanel, TopicPanel
 from handsteer.plugins.page.viewers import LeaseStatus
 from handsteer.plugins.page.world_panel import WorldPanel
 from handsteer.plugins.page.world_state import SPAN_S, Sample, VelocityHistory
-from handsteer.plugins.record.folder import RecordingState
 from handsteer.types import Velocity
 
 _PLOTS = ("uplot/uPlot.min.css", "uplot/uPlot.iife.min.js")

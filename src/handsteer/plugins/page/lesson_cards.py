@@ -6,13 +6,14 @@ from typing import Final
 
 from nicegui import ui
 
+from handsteer.control.explain import effect_words
 from handsteer.plugins.page.elements import box, button, switch, tag, text
 from handsteer.plugins.page.lesson import MOST_TAKES, Lesson
 from handsteer.plugins.page.lesson_panels import ViewerLesson, set_words
 from handsteer.plugins.page.lesson_state import Collected, LessonState, Seen, SignClass, counted
 from handsteer.plugins.page.sign_pictures import DRAWN, draw_hand
 from handsteer.plugins.teach.dataset import typical_hand
-from handsteer.types import EFFECTS, NONE
+from handsteer.types import NONE
 
 _SHOWN: Final = 8
 _MOST_SHOWN: Final = 60
@@ -186,7 +187,9 @@ class _ClassCard:
             self._name.on(event, self._rename)
 
     def _foot(self, lesson: ViewerLesson, one: SignClass) -> None:
-        actions = {action: f"{action.replace('_', ' ')}: {EFFECTS[action]}" for action in lesson.lessons.actions()}
+        actions = {
+            action: f"{action.replace('_', ' ')}: {effect_words(action, None)}" for action in lesson.lessons.actions()
+        }
         value = lesson.lessons.action_of(one.label)
         self._action = ui.select(actions, label="What it does", value=value).props("outlined dense options-dense")
         with box("class-foot"):

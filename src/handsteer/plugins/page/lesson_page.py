@@ -39,6 +39,8 @@ _LOST_CALIBRATION: Final = "Another viewer drives now: the calibration has ended
 class LessonPage(Page):
     """Teaches signs, if the graph can be accessed."""
 
+    title = "Teach"
+
     def __init__(self, context: PageContext) -> None:
         super().__init__(context, "/teach", "drive.css", "teach.css", "webcam.js", "teach.js")
         self._lesson: ViewerLesson | None = None

@@ -7,6 +7,7 @@ from typing import Final
 
 import numpy as np
 
+from handsteer.control.explain import effect_words
 from handsteer.plugins.teach.collect import Status
 from handsteer.plugins.teach.dataset import Take
 from handsteer.plugins.teach.report import TrainingReport
@@ -14,7 +15,7 @@ from handsteer.recognition.custom_signs import CustomModel
 from handsteer.recognition.features import KNUCKLES, WRIST
 from handsteer.recognition.hand import Hand, SignGuess
 from handsteer.recognition.shipped_signs import SURE
-from handsteer.types import EFFECTS, NONE, SIGNS, Action
+from handsteer.types import NONE, SIGNS, Action
 
 _SMALL_PX: Final = 60.0
 _ENOUGH_HANDS: Final = 15
@@ -210,4 +211,4 @@ def outcome(seen: Seen | None, least: float, action_of: Callable[[str], Action])
         return "No hand", "the robot would stop: no hand is in view"
     if seen.sign == NONE or seen.confidence < least:
         return "No sign", "the robot would stop: the hand shows none of the signs"
-    return f"{seen.sign}, {seen.confidence:.0%}", f"would mean: {EFFECTS[action_of(seen.sign)]}"
+    return f"{seen.sign}, {seen.confidence:.0%}", f"would mean: {effect_words(action_of(seen.sign), None)}"

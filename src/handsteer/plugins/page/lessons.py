@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Final
 
 from handsteer.config import Config, ControlConfig, SignsConfig, validate
+from handsteer.config.driving import SIGN_EFFECTS
 from handsteer.errors import ConfigError, DatasetError
 from handsteer.graph import Graph
 from handsteer.plugins.page.lesson import Lesson
@@ -21,7 +22,7 @@ from handsteer.plugins.teach.exchange import load_shared, save_shared
 from handsteer.recognition.custom_signs import load_custom_model, save_custom_model
 from handsteer.recognition.hand import Classifier, Landmarker
 from handsteer.recognition.recognizer import open_classifier, open_landmarker
-from handsteer.types import ACTIONS, NONE, Action, action_of, find_sign
+from handsteer.types import NONE, Action, action_of, find_sign
 
 KEPT: Final = "Kept, and in use. End the lesson, then press Reset to drive."
 KEPT_TAKES: Final = "The takes are kept. Train to use them."
@@ -88,7 +89,7 @@ class Lessons:
     def actions(self) -> tuple[Action, ...]:
         """Return the available actions."""
         several = bool(self._graph.config.control.robots)
-        return tuple(action for action in ACTIONS if several or action != "next_robot")
+        return tuple(action for action in SIGN_EFFECTS if several or action != "next_robot")
 
     def action_of(self, label: str) -> Action:
         """Return the current or default action of the sign ``label``."""

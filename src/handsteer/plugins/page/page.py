@@ -1,13 +1,17 @@
 """What all pages share: the head with links, the bar with the state and Stop, and the timer that updates them."""
 
 import copy
+import logging
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cache
+from typing import ClassVar, Final, Protocol
 
 from nicegui import ui
 
-from handsteer.errors import HandsteerError
+from handsteer import doors
+from handsteer.errors import HandsteerError, PluginError
 from handsteer.plugins.page.access import SESSION
 from handsteer.plugins.page.calibration import Calibrations
 from handsteer.plugins.page.elements import STATIC, switch, tag, text
@@ -21,6 +25,8 @@ from handsteer.plugins.page.state import PageState
 from handsteer.plugins.page.status_bar import Banner, LeasePanel, TimingLine
 from handsteer.plugins.page.viewers import LeaseStatus, OnDemandNode, PageAudit
 from handsteer.plugins.study.session import Session
+
+log = logging.getLogger(__name__)
 
 PICTURE_PATH = "/camera.mjpg"
 WEBCAM_PATH = "/camera"
@@ -71,7 +77,7 @@ LANGUAGES = frozenset({ENGLISH, *(file.stem for file in (STATIC / "languages").g
 """Two-letter codes (ISO 639-1)."""
 
 _LONGEST_HEADER = 500
-_LINKS = (("/", "Drive"), ("/world", "World"), ("/teach", "Teach"), ("/settings", "Settings"))
+_FIRST_LINKS: Final = ("/world", "/teach", "/settings")
 _PERIOD_S = 0.1
 _ACK_PATIENCE_S = 5.0
 """A browser acknowledges received messages every 3 s; after this time without one, sending pauses until the next."""
@@ -113,7 +119,12 @@ class Page:
     """One browser's view at a URL ``path``, with its own stylesheets and scripts (``assets``).
 
     Its timers run while the browser is connected.
+
+    Attributes:
+        title: Of the link to it at the top of all pages; empty without one.
     """
+
+    title: ClassVar[str] = ""
 
     def __init__(self, context: PageContext, path: str, *assets: str) -> None:
         self.client = ui.context.client
@@ -190,7 +201,7 @@ class Page:
             ui.html(ICON, sanitize=False)
             tag("h1", "", "handsteer").props("translate=no")
             with ui.element("nav").classes("links"):
-                for target, name in _LINKS:
+                for target, name in links().items():
                     ui.link(name, target).props('aria-current="page"' if target == path else "")
             self._timing = TimingLine()
             with ui.element("div").classes("right"):
@@ -232,6 +243,39 @@ class Page:
         if node.is_watched_by(self.client.id) and (joined := node.join(self.client.id)):
             joined.leave(self.client.id)
         node.leave(self.client.id)
+
+
+class PageMaker(Protocol):
+    """A class of pages, as plug-ins bring them.
+
+    Attributes:
+        title: Of the link to it at the top of all pages; empty without one.
+    """
+
+    title: str
+
+    def __call__(self, context: PageContext) -> Page:
+        """Build the page for one browser."""
+        ...
+
+
+@cache
+def added_pages() -> dict[str, PageMaker]:
+    """Return the pages besides ``/``, those of plug-ins included, by their paths."""
+    pages: dict[str, PageMaker] = {}
+    for name in doors.PAGES.names():
+        try:
+            pages[f"/{name}"] = doors.PAGES.load(name)
+        except PluginError as error:  # it must not keep others from driving
+            log.warning("%s", error)
+    return pages
+
+
+def links() -> dict[str, str]:
+    """Return the titles of the pages that are linked at the top, by their paths: our own first."""
+    titles = {path: page.title for path, page in added_pages().items() if page.title}
+    first = {path: titles[path] for path in _FIRST_LINKS if path in titles}
+    return {"/": "Drive"} | first | titles
 
 
 def preferred_language(accept: str) -> str:

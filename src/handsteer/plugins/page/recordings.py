@@ -12,7 +12,8 @@ from typing import Final, Literal
 from fastapi import FastAPI
 from starlette.responses import FileResponse, PlainTextResponse, Response
 
-from handsteer.plugins.record.folder import RecordingFolder, RecordingState
+from handsteer.nodes.run_recording import RecordingState
+from handsteer.plugins.record.folder import RecordingFolder
 
 RECORDINGS_PATH: Final = "/recordings"
 _TIMEOUT_S: Final = 600.0

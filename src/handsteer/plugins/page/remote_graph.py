@@ -23,9 +23,10 @@ from handsteer.config import Config
 from handsteer.errors import ConfigError, FrameError, HandsteerError, TransportError, quoted
 from handsteer.graph import Graph
 from handsteer.making import make_steering
+from handsteer.nodes.run_recording import RecordingState
 from handsteer.nodes.steering import SteeringNode
 from handsteer.plugins.page.viewers import PageAudit
-from handsteer.plugins.record.folder import RecordingFolder, RecordingState
+from handsteer.plugins.record.folder import RecordingFolder
 from handsteer.plugins.study.session import Task
 from handsteer.robots.world import World
 from handsteer.transports.piped import Gateway, Pipe, PipedTransport

@@ -32,7 +32,6 @@ from handsteer.plugins.page.drive_page import DrivePage
 from handsteer.plugins.page.elements import STATIC
 from handsteer.plugins.page.front import PagesLoop, StopPath
 from handsteer.plugins.page.lesson_files import serve_lesson_files
-from handsteer.plugins.page.lesson_page import LessonPage
 from handsteer.plugins.page.lessons import Lessons
 from handsteer.plugins.page.limits import FRONT_THREAD, Connections, UnconnectedPages, limit_log
 from handsteer.plugins.page.node import DashboardNode
@@ -45,16 +44,14 @@ from handsteer.plugins.page.page import (
     WEBCAM_PATH,
     Page,
     PageContext,
+    added_pages,
 )
 from handsteer.plugins.page.recordings import Recordings, serve_recordings
 from handsteer.plugins.page.remote_graph import RemoteGraph
 from handsteer.plugins.page.settings import Settings, SettingsFile
-from handsteer.plugins.page.settings_page import SettingsPage
 from handsteer.plugins.page.sign_pictures import serve_sign_pictures
 from handsteer.plugins.page.socket_events import SocketEvents
-from handsteer.plugins.page.study_page import StudyPage
 from handsteer.plugins.page.viewers import OnDemandNode, PageAudit
-from handsteer.plugins.page.world_page import WorldPage
 from handsteer.plugins.page.world_state import VelocityHistory
 from handsteer.plugins.study.session import Session
 from handsteer.transports.addresses import host_for_others, listen
@@ -66,8 +63,6 @@ _STOP_TIMEOUT_S = 3.0
 _GRACE_S = 0.4
 # Limits what the system buffers for a slow viewer; more would only be older pictures.
 _SEND_BUFFER_BYTES = 256 * 1024
-
-_PAGES = {"/": DrivePage, "/settings": SettingsPage, "/world": WorldPage, "/teach": LessonPage, "/study": StudyPage}
 
 _one_at_a_time = threading.Lock()
 
@@ -280,8 +275,9 @@ def _application() -> FastAPI:
         def shown() -> None:
             unconnected.add(page(application.state.dashboard.context).client)
 
-    for path, page in _PAGES.items():
-        serve(path, page)
+    serve("/", DrivePage)
+    for path, added in added_pages().items():
+        serve(path, added)
     ui.run_with(
         application,
         title="handsteer",

@@ -25,6 +25,8 @@ _ELSEWHERE = (
 class SettingsPage(Page):
     """Sets all parameters; viewers who do not drive can read them."""
 
+    title = "Settings"
+
     def __init__(self, context: PageContext) -> None:
         super().__init__(context, "/settings", "settings.css", "settings.js")
         self._panel: SettingsPanel | None = None

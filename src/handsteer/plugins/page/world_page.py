@@ -16,6 +16,8 @@ _STOPS = "A change stops the robot, and it stays stopped until you press Reset."
 class WorldPage(Page):
     """Edits the world; nothing on it steers the robot."""
 
+    title = "World"
+
     def __init__(self, context: PageContext) -> None:
         super().__init__(context, "/world", "world-editor.css")
         graph = context.graph

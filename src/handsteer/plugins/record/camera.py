@@ -17,7 +17,7 @@ from handsteer.errors import CameraUnreadable, FrameError, RecordingError
 from handsteer.images import bgr_image, jpeg_picture
 from handsteer.messages import IMAGE_COMPRESSED, IMAGE_RAW, CompressedImage, Image, type_name
 from handsteer.picture_files import is_jpeg
-from handsteer.plugins.record import open_recording
+from handsteer.plugins.record.files import open_recording
 from handsteer.plugins.record.recorded import Recorded
 
 _DEFAULT_PERIOD_S = 1 / 30

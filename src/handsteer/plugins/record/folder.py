@@ -1,33 +1,13 @@
-"""The folder of the recordings that are started on the page, and the state of a recording."""
+"""The folder of the recordings that are started on the page."""
 
 import datetime
 import re
-from dataclasses import dataclass
 from pathlib import Path
 
 from handsteer.errors import RecordingError
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,100}\.mcap", re.ASCII)
 _MOST_OF_ONE_SECOND = 100
-
-
-@dataclass(frozen=True)
-class RecordingState:
-    """A recording of a graph.
-
-    Attributes:
-        path: The file.
-        began_s: When it began, in seconds of the graph's clock.
-        ended_s: When it ended; None while it is being made.
-        ended_by: Which failure ended it, such as a full disk; empty if none did.
-        lost: Number of messages that are missing because the disk was too slow.
-    """
-
-    path: Path
-    began_s: float
-    ended_s: float | None = None
-    ended_by: str = ""
-    lost: int = 0
 
 
 class RecordingFolder:

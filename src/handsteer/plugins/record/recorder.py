@@ -24,7 +24,7 @@ from handsteer.messages import (
     Topic,
     cmd_vel,
 )
-from handsteer.plugins.record import describe
+from handsteer.plugins.record.files import describe
 from handsteer.plugins.record.mcap_writer import McapWriter
 from handsteer.transports.base import Received, Transport
 from handsteer.transports.encoding import encode

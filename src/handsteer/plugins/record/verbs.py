@@ -101,7 +101,7 @@ def replay(
         YAML file with parameters that replace the recorded ones; options override it.
     """
     from handsteer.clock import SteppedClock
-    from handsteer.plugins.record import describe, open_recording
+    from handsteer.plugins.record.files import describe, open_recording
     from handsteer.plugins.record.replay.by_time import rerun_by_time
     from handsteer.plugins.record.replay.compare import Comparison, compare, differing_software
     from handsteer.plugins.record.replay.rerun import has_journals, recorded_config, rerun
@@ -151,7 +151,7 @@ def report(recording: Path, *, output: Path | None = None, force: Flag = False, 
     json
         Print the totals in JSON, and nothing else; no page is written.
     """
-    from handsteer.plugins.record import open_recording
+    from handsteer.plugins.record.files import open_recording
     from handsteer.plugins.record.replay.drive_reader import read_drive
 
     if json:

@@ -7,7 +7,8 @@ makes a person's profile (docs/calibrate.md). ``evaluation`` reads labelled pict
 those of ``recognition.features`` or ``recognition.custom_signs`` is made there too, which its tests check.
 
 The modules here teach a person's own signs, :mod:`~handsteer.plugins.teach.synthetic` trains the model of the shipped
-ones, and :mod:`~handsteer.plugins.teach.evaluation` measures how well either is recognised. Imports beside the kernel
-:mod:`~handsteer.plugins.record`, to learn from recordings, and :mod:`~handsteer.plugins.virtual_hand`, whose joints
-vary.
+ones, and :mod:`~handsteer.plugins.teach.evaluation` measures how well either is recognised.
+
+Imports the kernel, and :mod:`~handsteer.plugins.record`, to learn from recordings, and
+:mod:`~handsteer.plugins.virtual_hand`, whose joints vary.
 """

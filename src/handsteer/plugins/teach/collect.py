@@ -11,10 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handsteer.cameras import Camera, Frame
-from handsteer.cameras.files import PHOTO_SUFFIXES, find_photos, read_photo, video_frames
+from handsteer.cameras.files import PHOTO_SUFFIXES, find_photos, is_recording, read_photo, video_frames
 from handsteer.clock import Clock
 from handsteer.errors import DatasetError
-from handsteer.plugins.record import is_recording
 from handsteer.plugins.record.camera import recorded_frames
 from handsteer.plugins.teach.dataset import Take
 from handsteer.recognition.hand import Hand, Landmarker

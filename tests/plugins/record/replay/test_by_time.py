@@ -5,7 +5,7 @@ import pytest
 from handsteer.config import Config, SignsConfig
 from handsteer.errors import RecordingError
 from handsteer.messages import CMD_VEL, HAND_SIGN, Header, Time, Topic, TwistStamped
-from handsteer.plugins.record import open_recording
+from handsteer.plugins.record.files import open_recording
 from handsteer.plugins.record.mcap_writer import McapWriter
 from handsteer.plugins.record.replay.by_time import rerun_by_time
 from handsteer.plugins.record.replay.compare import Comparison, Moment, compare

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from handsteer.errors import RecordingError, needing
-from handsteer.plugins.record import open_recording
+from handsteer.plugins.record.files import open_recording
 from handsteer.plugins.record.replay.drive_facts import DriveFacts, Stand
 from handsteer.plugins.record.replay.drive_reader import read_drive
 from handsteer.plugins.record.replay.report_charts import drive_map, latencies, timeline

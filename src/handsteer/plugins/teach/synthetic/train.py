@@ -53,7 +53,7 @@ def train_default(progress: Callable[[int], object], chunks: int = _CHUNKS, epoc
     novelty = learn_novelty(features, shapes, network.mean, network.scale)
     counts = {shape: int(count) for shape, count in zip(SHAPES, np.bincount(shapes), strict=True)}
     trained_on = {
-        "source": "hands made by handsteer.plugins.teach.synthetic, and drawn from its statistics of people",
+        "source": "synthetic hands, and hands drawn from statistics of people",
         "seed": SEED,
         "hands": counts,
         "format": FORMAT,

@@ -134,7 +134,7 @@ def _of_photos(config: Config, folder: Path, shipped: ShippedClassifier) -> Show
 def _live(config: Config, hands: Sequence[str], timing: Timing) -> Shown:
     clock = RealClock()
     landmarker = open_landmarker(config)
-    camera = open_camera(config.camera, config.virtual_hand, clock)
+    camera = open_camera(config, clock)
     shown: Shown = {sign: [] for sign in SIGNS}
     # As the recognition sees them: its frames may be mirrored first.
     view = View(flip=config.signs.swap_sides)

@@ -98,7 +98,7 @@ def _live(config: Config, plan: Plan, facts: Facts, known: Dataset) -> Dataset:
     collector = Collector(facts, takes=plan.takes, take_s=plan.take_s, countdown_s=plan.countdown_s, hold=plan.hold)
     clock = RealClock()
     landmarker = open_landmarker(config)
-    camera = open_camera(config.camera, config.virtual_hand, clock)
+    camera = open_camera(config, clock)
     view = _View(facts.label)
     began = len(known.takes)
     try:

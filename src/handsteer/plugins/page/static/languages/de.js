@@ -1061,6 +1061,8 @@ const WORDS = {
   "CPU threads of the landmark model.": "CPU-Threads des Landmarken-Modells.",
 
   // Parameters: recognising signs
+  "Classifier": "Klassifikator",
+  "What recognises the sign of a hand: shipped knows the six, others are plug-ins.": "Was das Zeichen einer Hand erkennt: shipped kennt die sechs, andere sind Plug-ins.",
   "Profile": "Profil",
   "How the driver shows the six signs, written by `handsteer signs calibrate`: a name, or a file; none reads them as everybody shows them.": "Wie der Fahrer die sechs Zeichen zeigt, geschrieben von `handsteer signs calibrate`: ein Name oder eine Datei; keins liest sie, wie alle sie zeigen.",
   "File of taught signs, written by `handsteer signs train`; none for the shipped signs only.": "Datei gelehrter Zeichen, geschrieben von `handsteer signs train`; keine für nur die mitgelieferten Zeichen.",

@@ -1,0 +1,48 @@
+"""Actions of signs that plug-ins bring: made once, and never the reason that a robot drives on."""
+
+import logging
+from collections.abc import Iterable
+
+from handsteer import doors
+from handsteer.errors import PluginError
+from handsteer.types import ACTIONS, ZERO, Velocity
+
+log = logging.getLogger(__name__)
+
+
+class AddedActions:
+    """The actions of plug-ins that a configuration names."""
+
+    def __init__(self) -> None:
+        self._made: dict[str, doors.SignAction] = {}
+
+    def make(self, actions: Iterable[str]) -> None:
+        """Make those of ``actions`` that are new here and not built in; they are kept from then on.
+
+        Raises:
+            PluginError: One is not installed, or cannot be made.
+        """
+        for name in sorted(set(actions) - set(ACTIONS) - self._made.keys()):
+            make = doors.ACTIONS.load(name)
+            try:
+                self._made[name] = make()
+            except Exception as error:
+                reason = f"{type(error).__name__}: {error}"
+                raise PluginError(f"the action {name} cannot be made: {reason}") from error
+
+    def velocity(self, name: str, now: Velocity, shown_s: float) -> Velocity:
+        """Return the velocity that the action ``name`` wants, zero if it fails; its arguments are the action's."""
+        try:
+            wanted = self._made[name].velocity(now, shown_s)
+            return wanted if wanted.is_finite else ZERO
+        except Exception:
+            log.exception("the action %s has failed: the robot stops", name)
+            return ZERO
+
+
+def added_effect(action: str) -> str:
+    """Return the effect of an action of a plug-in, in words."""
+    try:
+        return str(doors.ACTIONS.load(action).effect)
+    except (PluginError, AttributeError):
+        return action.replace("_", " ")

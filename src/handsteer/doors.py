@@ -1,0 +1,159 @@
+"""The doors: entry points by which plug-ins come in, our own and those of other distributions alike.
+
+A distribution declares an object of its own in its ``pyproject.toml``, under the group of a door::
+
+    [project.entry-points."handsteer.robots"]
+    printer = "my_package.robot:open_robot"
+
+Once it is installed, ``--robot printer`` drives it. What is installed is listed at once, and loaded only when it is
+named. docs/plugins.md has an example for each door.
+"""
+
+import importlib.metadata
+import logging
+from collections.abc import Callable, Sequence
+from functools import cache
+from typing import TYPE_CHECKING, Any, Final, Generic, Protocol, TypeVar
+
+from handsteer.errors import PluginError, did_you_mean
+
+if TYPE_CHECKING:
+    from handsteer.cameras import Camera
+    from handsteer.clock import Clock
+    from handsteer.config import Config, Section, SignsConfig
+    from handsteer.recognition.hand import Classifier
+    from handsteer.robots import Robot
+    from handsteer.transports.base import Session
+    from handsteer.types import Velocity
+
+log = logging.getLogger(__name__)
+
+_OURS: Final = "handsteer"
+
+T = TypeVar("T")
+
+
+class SignAction(Protocol):
+    """What a sign does to the velocity, besides the built-in actions.
+
+    Attributes:
+        effect: What it does, for people, such as ``stops and blinks``.
+    """
+
+    effect: str
+
+    def velocity(self, now: "Velocity", shown_s: float) -> "Velocity":
+        """Return the velocity to command for one message with the sign; the limits of the control apply to it.
+
+        It is called on the control's thread, so it must return at once. The robot stops if it raises.
+
+        Args:
+            now: The velocity that is commanded so far.
+            shown_s: Seconds since the last message with a sign, 0 for the first.
+        """
+        ...
+
+
+class Door(Generic[T]):
+    """A group of entry points.
+
+    Args:
+        group: Its name, such as ``handsteer.robots``.
+        what: What comes in, for messages, such as ``robot``.
+    """
+
+    def __init__(self, group: str, what: str) -> None:
+        self.group = group
+        self._what = what
+
+    def names(self) -> tuple[str, ...]:
+        """Return the names of what is installed, our own first."""
+        return tuple(_entries(self.group))
+
+    def target(self, name: str) -> str:
+        """Return where the object is, as ``module:attribute``, without loading it.
+
+        Raises:
+            PluginError: There is none of this name.
+        """
+        return self._entry(name).value
+
+    def load(self, name: str) -> T:
+        """Return the object of this name.
+
+        Raises:
+            PluginError: There is none, or it cannot be loaded.
+        """
+        entry = self._entry(name)
+        try:
+            found: T = entry.load()
+        except Exception as error:  # whatever the code of others raises while it is imported
+            package = entry.dist.name if entry.dist else "an unknown distribution"
+            reason = f"{type(error).__name__}: {error}"
+            raise PluginError(f"the {self._what} {name} of {package} cannot be loaded: {reason}") from error
+        return found
+
+    def _entry(self, name: str) -> importlib.metadata.EntryPoint:
+        entries = _entries(self.group)
+        if name not in entries:
+            near = did_you_mean(name, entries)
+            raise PluginError(f"there is no {self._what} {name!r}{near or ':'} installed are {', '.join(entries)}")
+        return entries[name]
+
+
+@cache
+def _installed() -> tuple[importlib.metadata.EntryPoint, ...]:
+    """Return the entry points of all doors, our own first. All packages are searched, once."""
+    found = (entry for package in importlib.metadata.distributions() for entry in package.entry_points)
+    doors = (entry for entry in found if entry.group.startswith(f"{_OURS}."))
+    return tuple(sorted(doors, key=lambda entry: (not _is_ours(entry), entry.name)))
+
+
+@cache
+def _entries(group: str) -> dict[str, importlib.metadata.EntryPoint]:
+    """Return what is installed by name, our own first; of two with one name ours, or the first found, is kept."""
+    entries: dict[str, importlib.metadata.EntryPoint] = {}
+    for entry in _installed():
+        if entry.group != group:
+            continue
+        if entry.name not in entries:
+            entries[entry.name] = entry
+        elif entry.value != entries[entry.name].value:
+            used = entries[entry.name].value
+            log.warning("%s: %s has the name %s of %s, and is not used", group, entry.value, entry.name, used)
+    return entries
+
+
+def _is_ours(entry: importlib.metadata.EntryPoint) -> bool:
+    return entry.dist is not None and entry.dist.name == _OURS
+
+
+CAMERAS: Final[Door[Callable[["Config", "Clock"], "Camera"]]] = Door("handsteer.cameras", "camera")
+"""Open a camera; ``camera.source`` is its name."""
+
+ROBOTS: Final[Door[Callable[["Config", "Clock"], "Robot"]]] = Door("handsteer.robots", "robot")
+"""Open a robot; ``robot.kind`` is its name."""
+
+TRANSPORTS: Final[Door[Callable[[str, Sequence[str]], "Session"]]] = Door("handsteer.transports", "transport")
+"""Join a graph of several processes, as a node of a name, with arguments in the syntax of the transport."""
+
+CLASSIFIERS: Final[Door[Callable[["SignsConfig"], "Classifier"]]] = Door("handsteer.classifiers", "classifier")
+"""Open a classifier of hands; ``signs.classifier`` is its name."""
+
+ACTIONS: Final[Door[type[SignAction]]] = Door("handsteer.actions", "action")
+"""Classes of what a sign does, made without arguments; an entry of ``control.actions`` is the name."""
+
+PARAMETERS: Final[Door[type["Section"]]] = Door("handsteer.parameters", "section of parameters")
+"""Sections of the configuration; their name is that of the section."""
+
+VERBS: Final[Door[Any]] = Door("handsteer.verbs", "verb")
+"""Functions that the command line runs by their name; an app of cyclopts, which has several, is called ``app``."""
+
+PAGES: Final[Door[Any]] = Door("handsteer.pages", "page")
+"""Pages of the web page, at ``/NAME``."""
+
+RECORDERS: Final[Door[Callable[..., Any]]] = Door("handsteer.recorders", "recorder")
+"""Record the topics of a graph to a file."""
+
+COMPANIONS: Final[Door[Callable[..., Any]]] = Door("handsteer.companions", "companion")
+"""What runs next to the graph, such as the process of the page."""
