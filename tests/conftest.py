@@ -18,6 +18,9 @@ from handsteer.graph import Graph
 from tests.reasons import check_made, watch_recordings
 from tests.ros1.graph import Ros1Graph, ros1_graph
 
+for contract in ("camera", "robot", "transport"):
+    pytest.register_assert_rewrite(f"handsteer.testing.{contract}_contract")
+
 # The machines that run the tests are shared: how long an example takes says nothing of the code.
 settings.register_profile("handsteer", deadline=None)
 settings.load_profile("handsteer")

@@ -11,7 +11,7 @@ from handsteer.cameras.choose import MachineCameras, open_camera
 from handsteer.clock import SteppedClock
 from handsteer.config import CameraConfig, Config
 from handsteer.errors import FrameError
-from tests.contracts.camera_contract import CameraContract
+from handsteer.testing.camera_contract import CameraContract
 from tests.fuzz import corpus
 
 

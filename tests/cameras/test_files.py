@@ -9,7 +9,7 @@ from handsteer.cameras import Camera, EndOfStream
 from handsteer.cameras.files import PhotoFolder, VideoFile
 from handsteer.clock import SteppedClock
 from handsteer.errors import CameraNotFound, CameraUnreadable
-from tests.contracts.camera_contract import CameraContract
+from handsteer.testing.camera_contract import CameraContract
 
 FRAMES = 6
 

@@ -11,7 +11,7 @@ from handsteer.cameras import Camera
 from handsteer.cameras.webcam import Webcam, captures, is_address, is_device
 from handsteer.clock import SteppedClock
 from handsteer.errors import CameraInUse, CameraLost, CameraNotFound, CameraUnreadable
-from tests.contracts.camera_contract import CameraContract
+from handsteer.testing.camera_contract import CameraContract
 
 IMAGE = np.full((48, 64, 3), 7, np.uint8)
 

@@ -6,9 +6,9 @@ import pytest
 from handsteer.clock import RealClock
 from handsteer.messages import CMD_VEL, HAND_SIGN, String, Topic, twist
 from handsteer.testing.fault_transport import CUT, FROZEN, FaultTransport, LinkFault
+from handsteer.testing.transport_contract import TransportContract, eventually
 from handsteer.transports.base import Received, Transport
 from handsteer.transports.in_process import InProcessTransport
-from tests.contracts.transport_contract import TransportContract, eventually
 from tests.nodes.stepping import Bench
 
 WORDS = Topic("/words", String, depth=10)

@@ -6,8 +6,8 @@ import pytest
 from handsteer.cameras import Camera, Frame
 from handsteer.clock import SteppedClock
 from handsteer.errors import CameraLost
+from handsteer.testing.camera_contract import CameraContract
 from handsteer.testing.faulty_camera import CAMERA_FAULTS, CameraFault, FaultyCamera, SpoiltCamera
-from tests.contracts.camera_contract import CameraContract
 
 FPS = 10
 

@@ -5,9 +5,9 @@ from collections.abc import Iterator
 import pytest
 
 from handsteer.messages import String
+from handsteer.testing.transport_contract import TransportContract
 from handsteer.transports.base import Received, Transport
 from handsteer.transports.in_process import Fanout, InProcessTransport
-from tests.contracts.transport_contract import TransportContract
 
 
 class TestInProcess(TransportContract):

@@ -23,10 +23,10 @@ from handsteer.messages import (
     Twist,
     twist,
 )
+from handsteer.testing.transport_contract import TransportContract, eventually
 from handsteer.transports.base import Received, Transport
 from handsteer.transports.in_process import InProcessTransport
 from handsteer.transports.piped import Gateway, Pipe, PipedTransport
-from tests.contracts.transport_contract import TransportContract, eventually
 
 TOPICS = [value for value in vars(messages).values() if isinstance(value, Topic)]
 

@@ -23,7 +23,7 @@ from handsteer.config.recognition import (
     SignsConfig,
     VirtualHandConfig,
 )
-from handsteer.config.section import Section
+from handsteer.config.section import Section, live
 from handsteer.doors import PARAMETERS
 from handsteer.errors import ConfigError, PluginError, as_name, did_you_mean, quoted
 from handsteer.types import CmdVelType
@@ -49,6 +49,7 @@ __all__ = [
     "VirtualHandConfig",
     "cmd_vel_type",
     "describe",
+    "live",
     "load",
     "validate",
 ]
@@ -177,24 +178,6 @@ class Config(Section):
         if self.collision_monitor.enabled and self.control.robots:
             raise ValueError("collision_monitor.enabled should be false with control.robots: it is for one robot")
         return self
-
-
-def _add_sections() -> None:
-    """Add the sections of plug-ins to :class:`Config`."""
-    found = {}
-    for name in PARAMETERS.names():
-        try:
-            model = PARAMETERS.load(name)
-            found[name] = FieldInfo(annotation=model, default=model())
-        except (PluginError, TypeError, ValueError) as error:  # it must not keep others from driving
-            log.warning("the parameters %s are left out: %s", name, error)
-    added = {name: field for name, field in found.items() if name not in Config.model_fields}
-    if added:
-        Config.model_fields.update(added)
-        Config.model_rebuild(force=True)
-
-
-_add_sections()
 
 
 def load(path: Path | None = None, base: dict[str, Any] | None = None, *overrides: dict[str, Any]) -> Config:
@@ -328,3 +311,22 @@ def _merge(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
         below = merged.get(key)
         merged[key] = _merge(below, value) if isinstance(value, dict) and isinstance(below, dict) else value
     return merged
+
+
+def _add_sections() -> None:
+    """Add the sections of plug-ins to :class:`Config`."""
+    found = {}
+    for name in PARAMETERS.names():
+        try:
+            model = PARAMETERS.load(name)
+            found[name] = FieldInfo(annotation=model, default=model())
+        except (PluginError, TypeError, ValueError) as error:  # it must not keep others from driving
+            log.warning("the parameters %s are left out: %s", name, error)
+    added = {name: field for name, field in found.items() if name not in Config.model_fields}
+    if added:
+        Config.model_fields.update(added)
+        Config.model_rebuild(force=True)
+
+
+# Last: the modules of plug-ins import this one.
+_add_sections()

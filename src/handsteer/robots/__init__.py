@@ -5,7 +5,7 @@ joins that robot's graph in addition to its own, in which it is the node ``robot
 world in YAML, ``editing`` changes it, and ``course`` has its gates.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal, Protocol, runtime_checkable
 
 import numpy as np
@@ -28,9 +28,9 @@ class RobotState:
         odometry: Pose from odometry, in frame ``odom``.
         linear_mps: Forward velocity from odometry, in m/s.
         angular_radps: Angular velocity from odometry, in rad/s.
+        truth: The actual pose in the world, or that from odometry if nothing better is known.
         joint_positions: Wheel angles in rad, by joint name.
         joint_velocities: Wheel speeds in rad/s, by joint name.
-        truth: The actual pose in the world.
         contacts: Names of the obstacles that it touches now.
         collisions: How many times it has begun to touch an obstacle since the start; None if unknown.
         located: Whether ``odometry`` and ``truth`` are current; otherwise they are the last known ones.
@@ -41,11 +41,11 @@ class RobotState:
     odometry: Pose2D
     linear_mps: float
     angular_radps: float
-    joint_positions: dict[str, float]
-    joint_velocities: dict[str, float]
     truth: Pose2D
-    contacts: tuple[str, ...]
-    collisions: int | None
+    joint_positions: dict[str, float] = field(default_factory=dict)
+    joint_velocities: dict[str, float] = field(default_factory=dict)
+    contacts: tuple[str, ...] = ()
+    collisions: int | None = None
     located: bool = True
     trouble: str = ""
 

@@ -1,4 +1,8 @@
-"""Helpers for tests: cameras and a transport that fail on request, and a record of a graph's commands."""
+"""Helpers for tests, ours and those of plug-ins: what fails on request, contracts, and a record of a graph's commands.
+
+``faulty_camera`` and ``fault_transport`` fail on request. ``camera_contract``, ``robot_contract`` and
+``transport_contract`` test what each camera, robot and transport must do; these need pytest, and the rest does not.
+"""
 
 import math
 from bisect import bisect_right

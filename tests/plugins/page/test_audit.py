@@ -15,10 +15,10 @@ from handsteer.plugins.page.settings_fields import FIELDS
 from handsteer.plugins.page.viewers import ANSWER_S, ControlLease, PageAudit
 from handsteer.robots.editing import add
 from handsteer.robots.world import World
+from handsteer.testing.transport_contract import eventually
 from handsteer.transports.base import Received
 from handsteer.transports.in_process import InProcessTransport
 from handsteer.types import Pose2D
-from tests.contracts.transport_contract import eventually
 from tests.plugins.page.served import remote
 
 

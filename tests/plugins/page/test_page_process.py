@@ -25,9 +25,9 @@ from handsteer.plugins.page.page_process import PageProcess
 from handsteer.plugins.page.remote_graph import RemoteGraph
 from handsteer.robots.editing import add, remove
 from handsteer.robots.world import World, load_world
+from handsteer.testing.transport_contract import eventually
 from handsteer.transports.base import Received
 from handsteer.types import Pose2D
-from tests.contracts.transport_contract import eventually
 from tests.plugins.page.served import remote
 from tests.processes import Process
 from tests.transports.test_piped import joined

@@ -14,7 +14,7 @@ from handsteer.nodes.run_recording import RecordingState
 from handsteer.plugins.page import recordings as module
 from handsteer.plugins.page.recordings import Recordings, duration_text, size_text
 from handsteer.plugins.record.mcap_reader import McapFile
-from tests.contracts.transport_contract import eventually
+from handsteer.testing.transport_contract import eventually
 from tests.plugins.page.served import remote
 
 NAME = "drive.mcap"

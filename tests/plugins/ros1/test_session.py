@@ -8,9 +8,9 @@ import pytest
 from handsteer.errors import TransportError
 from handsteer.messages import Image, Topic
 from handsteer.nodes.base import Node
+from handsteer.testing.transport_contract import SessionContract, eventually
 from handsteer.transports import join
 from handsteer.transports.base import Received, Session, Transport
-from tests.contracts.transport_contract import SessionContract, eventually
 from tests.ros1.graph import Ros1Graph, ros1_graph
 
 pytestmark = pytest.mark.ros1

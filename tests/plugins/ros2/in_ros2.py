@@ -27,9 +27,9 @@ from handsteer.messages import (
     Topic,
 )
 from handsteer.plugins.ros2.topics import publisher_qos, subscription_qos
+from handsteer.testing.transport_contract import SessionContract, eventually, heard
 from handsteer.transports import join
 from handsteer.transports.base import Session
-from tests.contracts.transport_contract import SessionContract, eventually, heard
 from tests.dds.graph import free_domain
 
 Join = Callable[..., Session]

@@ -6,7 +6,7 @@ from handsteer.clock import RealClock, SteppedClock
 from handsteer.config import VirtualHandConfig
 from handsteer.errors import PoseError
 from handsteer.plugins.virtual_hand.camera import VirtualHandCamera
-from tests.contracts.camera_contract import CameraContract
+from handsteer.testing.camera_contract import CameraContract
 
 
 class TestVirtualHand(CameraContract):

@@ -4,9 +4,9 @@ from collections.abc import Iterator
 
 import pytest
 
+from handsteer.testing.transport_contract import SessionContract
 from handsteer.transports import join
 from handsteer.transports.base import Session
-from tests.contracts.transport_contract import SessionContract
 from tests.processes import free_port
 
 pytest.importorskip("zenoh")

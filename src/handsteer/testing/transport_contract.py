@@ -1,4 +1,4 @@
-"""What every transport must do; each transport's own test module inherits it."""
+"""What every transport must do; each transport's own test module inherits it, those of plug-ins too. Needs pytest."""
 
 import threading
 import time

@@ -1,4 +1,4 @@
-"""What every camera must do; each camera's own test module inherits it."""
+"""What every camera must do; each camera's own test module inherits it, those of plug-ins too. Needs pytest."""
 
 import numpy as np
 import pytest

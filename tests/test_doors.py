@@ -1,0 +1,298 @@
+"""Plug-ins of other distributions come in by entry points: each example of docs/plugins.md, and what is wrong."""
+
+import importlib
+import os
+import re
+import subprocess
+import sys
+import urllib.request
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from handsteer import doors
+from handsteer.clock import SteppedClock
+from handsteer.config import Config
+from handsteer.errors import PluginError
+from handsteer.graph import Graph
+from handsteer.types import Velocity
+
+ROOT = Path(__file__).resolve().parents[1]
+DOCUMENT = (ROOT / "docs" / "plugins.md").read_text()
+MOST_LINES = 40
+VIRTUAL = ["--camera", "virtual", "--camera.width", "320", "--camera.height", "240"]
+Run = Callable[..., subprocess.CompletedProcess[str]]
+
+
+def example(title: str) -> str:
+    """Return the program below a heading of docs/plugins.md."""
+    found = re.search(rf"^## {title}\n.*?```python\n(.*?)```", DOCUMENT, re.DOTALL | re.MULTILINE)
+    assert found, title
+    return found[1]
+
+
+class Installed:
+    """A folder on the path with distributions of others."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+
+    def add(self, name: str, code: str, **groups: str) -> None:
+        """Install the distribution and module ``name``; ``groups`` are entry points, as ``robots="scale = Scale"``."""
+        (self._folder / f"{name}.py").write_text(code)
+        about = self._folder / f"{name}-1.0.dist-info"
+        about.mkdir()
+        (about / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 1.0\n")
+        lines = [f"[handsteer.{group}]\n{entry.replace('= ', f'= {name}:')}\n" for group, entry in groups.items()]
+        (about / "entry_points.txt").write_text("\n".join(lines))
+
+    @contextmanager
+    def started(self, *words: str) -> Iterator[str]:
+        """Run the command line meanwhile; give the address of its page."""
+        command = [sys.executable, "-m", "handsteer", *words]
+        with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env=self._env, cwd=self._folder) as process:
+            assert process.stderr is not None
+            found = (re.search(r"the page is at (http://[\w.:]+)", line) for line in process.stderr)
+            try:
+                yield next(filter(None, found))[1]
+            finally:
+                process.terminate()
+
+    @property
+    def _env(self) -> dict[str, str]:
+        return {**os.environ, "PYTHONPATH": str(self._folder)}
+
+    def run(self, *words: str, code: int = 0) -> subprocess.CompletedProcess[str]:
+        """Run the command line with what is installed here; return what it printed."""
+        command = [sys.executable, "-m", "handsteer", *words]
+        done = subprocess.run(command, capture_output=True, text=True, env=self._env, cwd=self._folder, check=False)
+        assert done.returncode == code, done.stderr
+        return done
+
+
+@pytest.fixture
+def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Installed:
+    monkeypatch.syspath_prepend(str(tmp_path))
+    return Installed(tmp_path)
+
+
+@pytest.fixture(autouse=True)
+def forget() -> Any:
+    """Forget after each test what it has installed."""
+    yield
+    doors._installed.cache_clear()
+    doors._entries.cache_clear()
+
+
+@pytest.mark.parametrize(
+    "title", ["Camera", "Robot", "Transport", "Page", "Verb", "Action", "Classifier", "Parameters"]
+)
+def test_an_example_is_short(title: str) -> None:
+    assert len(example(title).splitlines()) <= MOST_LINES
+
+
+@pytest.mark.slow
+def test_a_camera(installed: Installed) -> None:
+    installed.add("noisy", example("Camera"), cameras="noise = Noise")
+    done = installed.run("run", "--headless", "--fast", "--duration", "2", "--camera", "noise")
+    assert re.search(r"^ran for 2.0 s: 60 frames.*\nsigns: NONE 60$", done.stdout, re.MULTILINE)
+
+
+@pytest.mark.slow
+def test_a_robot_is_driven_by_signs(installed: Installed) -> None:
+    installed.add("scale", example("Robot"), robots="scale = Scale")
+    free = ("--control.arming", "off", "--control.engage", "off")
+    done = installed.run("run", "--headless", "--duration", "6", *VIRTUAL, "--robot", "scale", *free)
+    went = re.search(r"^went (\d\.\d+) m$", done.stdout, re.MULTILINE)
+    assert went
+    assert float(went[1]) > 0.2
+
+
+@pytest.mark.slow
+def test_a_transport(installed: Installed) -> None:
+    installed.add("alone", example("Transport"), transports="alone = Alone")
+    assert "alone" in installed.run("control", "--transport", "alon", code=2).stderr
+    program = "from handsteer.transports import join\nsession = join('alone', 'my_node', [])\nprint(session.name)"
+    env = {**os.environ, "PYTHONPATH": str(installed._folder)}
+    done = subprocess.run([sys.executable, "-c", program], env=env, capture_output=True, text=True, check=True)
+    assert done.stdout == "/my_node\n"
+
+
+@pytest.mark.slow
+def test_a_verb_is_listed_and_runs(installed: Installed) -> None:
+    installed.add("greeting", example("Verb"), verbs="greet = greet")
+    assert "Greet somebody." in installed.run("--help").stdout
+    assert installed.run("greet", "--name", "Ada").stdout == "hello Ada\n"
+    assert "greet" in installed.run("grete", code=2).stderr
+    assert "greet" in installed.run("completion", "bash").stdout
+
+
+def test_an_action_changes_the_velocity_within_the_limits(installed: Installed) -> None:
+    from handsteer.control.sign_control import SignControl  # noqa: PLC0415
+
+    installed.add("crawling", example("Action"), actions="crawl = Crawl")
+    config = Config().control.model_copy(update={"actions": {"Go": "crawl"}, "max_linear": 0.04})
+    control = SignControl(config)
+    assert control.step("Go", 0.03) == Velocity(0.04, 0.0)
+    assert control.step("Stop", 0.03) == Velocity()
+
+
+FAILING = """
+class Breaks:
+    effect = "breaks"
+
+    def velocity(self, now, shown_s):
+        {body}
+"""
+
+
+@pytest.mark.parametrize("body", ["raise ValueError('broken')", "return None", "return type(now)(float('nan'), 1.0)"])
+def test_an_action_that_fails_stops_the_robot(installed: Installed, body: str) -> None:
+    from handsteer.control.sign_control import SignControl  # noqa: PLC0415
+
+    installed.add(f"breaking{len(body)}", FAILING.format(body=body), actions="breaks = Breaks")
+    control = SignControl(Config().control.model_copy(update={"actions": {"Go": "breaks"}}))
+    assert control.step("Forward", 0.03) == Velocity(0.01, 0.0)
+    assert control.step("Go", 0.03) == Velocity()
+    assert control.velocity == Velocity()
+
+
+@pytest.mark.slow
+def test_an_action_is_known_by_the_command_line(installed: Installed) -> None:
+    installed.add("crawling", example("Action"), actions="crawl = Crawl")
+    listed = installed.run("signs", "list", "--control.actions.Go", "crawl").stdout
+    assert "crawls forward while shown" in listed
+    assert "'crawl'" in installed.run("signs", "list", "--control.actions.Go", "crwl", code=2).stderr
+
+
+@pytest.mark.slow
+def test_a_classifier_replaces_ours(installed: Installed) -> None:
+    installed.add("always", example("Classifier"), classifiers="always = Always")
+    done = installed.run("run", "--headless", "--fast", "--duration", "6", *VIRTUAL, "--signs.classifier", "always")
+    assert re.search(r"signs: Stop \d+, NONE \d+$", done.stdout, re.MULTILINE)
+
+
+@pytest.mark.slow
+def test_parameters_are_options_in_the_file_and_listed(installed: Installed) -> None:
+    installed.add("lamp", example("Parameters"), parameters="lamp = Lamp")
+    assert "--lamp.brightness" in installed.run("parameters", "lamp").stdout
+    error = installed.run("run", "--headless", "--lamp.brightness", "2", code=2).stderr
+    assert "lamp.brightness: '2' should be less than or equal to 1" in error
+    (installed._folder / "my.yaml").write_text("lamp:\n  brightness: high\n")
+    assert "lamp.brightness" in installed.run("run", "--headless", "--config", "my.yaml", code=2).stderr
+
+
+@pytest.mark.slow
+def test_the_example_is_installed_by_pip_and_drives(tmp_path: Path, installed: Installed) -> None:
+    pip = ["uv", "pip", "install", "--quiet", "--no-deps", "--no-build-isolation", "--target", str(tmp_path)]
+    folder = str(ROOT / "examples" / "plugin")
+    subprocess.run([str(Path(sys.executable).with_name(pip[0])), *pip[1:], folder], check=True)
+    lines = [line for file in Path(folder).glob("*.*") for line in file.read_text().splitlines()]
+    assert len(lines) <= 80
+    free = ("--control.arming", "off", "--control.engage", "off")
+    driven = ("--robot", "printer", "--printer.period", "0.5", "--control.actions.Go", "blink")
+    script = ("--virtual-hand.script", "Forward:2 Go:2")
+    done = installed.run("run", "--headless", "--duration", "7", *VIRTUAL, *script, *driven, *free)
+    assert "blink" in done.stdout
+    speeds = [float(speed) for speed in re.findall(r"printer: (-?\d\.\d\d) m/s", done.stdout)]
+    assert len(speeds) > 8
+    assert max(speeds) > 0.2
+    drawn = installed.run("run", "--headless", "--fast", "--duration", "2", "--camera", "drawing")
+    assert re.search(r"^ran for 2.0 s: 60 frames.*\nsigns: none$", drawn.stdout, re.MULTILINE)
+
+
+@pytest.mark.slow
+def test_the_example_passes_the_contract_of_robots(tmp_path: Path) -> None:
+    (tmp_path / "test_contract.py").write_text(example("Tests"))
+    path = [str(ROOT / "examples" / "plugin"), str(tmp_path)]
+    add = "[project.entry-points.'handsteer.parameters']"
+    assert add
+    installed = Installed(tmp_path)
+    installed.add(
+        "handsteer_example_parameters",
+        "from handsteer_example import PrinterConfig",
+        parameters="printer = PrinterConfig",
+    )
+    env = {**os.environ, "PYTHONPATH": os.pathsep.join(path)}
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", str(tmp_path / "test_contract.py")]
+    done = subprocess.run(command, env=env, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert re.search(r"^9 passed", done.stdout, re.MULTILINE), done.stdout
+
+
+@pytest.mark.parametrize(
+    ("code", "reason"),
+    [
+        ("import nothing_of_this_name", "ModuleNotFoundError: No module named 'nothing_of_this_name'"),
+        ("raise RuntimeError('no licence')", "RuntimeError: no licence"),
+        ("", "AttributeError: module 'broken"),
+    ],
+)
+def test_what_cannot_be_loaded_is_reported_with_its_distribution(installed: Installed, code: str, reason: str) -> None:
+    name = f"broken{len(code)}"
+    installed.add(name, code, robots="broken = Robot")
+    with pytest.raises(PluginError, match=rf"^the robot broken of {name} cannot be loaded: {reason}"):
+        doors.ROBOTS.load("broken")
+
+
+def test_an_unknown_name_gets_the_nearest(installed: Installed) -> None:
+    installed.add("scale", example("Robot"), robots="scale = Scale")
+    with pytest.raises(PluginError, match=r"^there is no robot 'scal': did you mean scale\? installed are sim, scale$"):
+        doors.ROBOTS.load("scal")
+
+
+def test_ours_cannot_be_replaced(installed: Installed, caplog: pytest.LogCaptureFixture) -> None:
+    installed.add("a_thief", "Robot = None", robots="sim = Robot")
+    assert doors.ROBOTS.target("sim") == "handsteer.plugins.sim.door:open_robot"
+    assert "a_thief:Robot has the name sim of handsteer.plugins.sim.door:open_robot, and is not used" in caplog.text
+
+
+@pytest.mark.slow
+def test_parameters_that_cannot_be_loaded_keep_nobody_from_driving(installed: Installed) -> None:
+    installed.add("broken", "raise RuntimeError('no licence')", parameters="broken = Broken")
+    done = installed.run("run", "--headless", "--fast", "--duration", "1", *VIRTUAL)
+    assert (
+        "the parameters broken are left out: the section of parameters broken of broken cannot be loaded" in done.stderr
+    )
+
+
+def test_all_that_is_ours_can_be_loaded() -> None:
+    for door in (doors.CAMERAS, doors.ROBOTS, doors.TRANSPORTS, doors.VERBS, doors.PAGES, doors.RECORDERS):
+        assert door.names()
+        for name in door.names():
+            module, _, attribute = door.target(name).partition(":")
+            assert hasattr(importlib.import_module(module), attribute)
+
+
+@pytest.mark.slow
+def test_a_graph_takes_a_camera_a_recognizer_and_a_robot() -> None:
+    from handsteer.cameras.choose import open_camera  # noqa: PLC0415
+    from handsteer.making import open_robot  # noqa: PLC0415
+    from handsteer.recognition.recognizer import Recognizer  # noqa: PLC0415
+
+    config = Config.model_validate({"camera": {"source": "virtual", "width": 320, "height": 240}})
+    clock = SteppedClock()
+    parts: dict[str, Any] = {
+        "camera": open_camera(config, clock),
+        "recognizer": Recognizer(config),
+        "robot": open_robot(config, clock),
+    }
+    with Graph(config, clock, **parts) as graph:
+        graph.run_stepped(5.0)
+        # A robot that is given counts as a real one: nobody has engaged.
+        assert graph.robot.path_length_m < 0.001
+        assert graph.summary().signs["Forward"] > 30
+
+
+@pytest.mark.slow
+def test_a_page_is_served_and_linked(installed: Installed) -> None:
+    installed.add("speed", example("Page"), pages="speed = Speed")
+    words = ("run", *VIRTUAL, "--port", "0", "--dashboard.no-open-browser")
+    with installed.started(*words) as address:
+        for path in ("", "speed"):
+            with urllib.request.urlopen(f"{address}/{path}", timeout=30) as answer:
+                text = answer.read().decode()
+            assert '"href":"/speed"' in text.replace(" ", "")
+            assert ("font-size" in text and "20vw" in text) == (path == "speed")
