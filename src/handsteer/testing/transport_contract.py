@@ -53,7 +53,7 @@ def _set(event: threading.Event, _: object) -> None:
 
 
 def heard(publisher: Publisher[M]) -> Publisher[M]:
-    """Return ``publisher`` once somebody listens."""
+    """Return ``publisher`` once a node listens."""
     assert eventually(lambda: publisher.has_subscribers)
     return publisher
 
