@@ -78,7 +78,7 @@ class Tilt(Joystick):
     def __init__(self, config: Config, skill: Skill, view: HandView, slips: Slips, random: np.random.Generator) -> None:
         super().__init__(config, skill, view, slips, random)
         self.hand = TiltingHand(random, slips, CHOICES)
-        view.teleop._joystick = TiltJoystick()
+        view.teleop._pipeline.joystick = TiltJoystick()
 
 
 def main() -> None:

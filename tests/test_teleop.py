@@ -20,6 +20,7 @@ from handsteer.images import bgr_image
 from handsteer.messages import CMD_VEL, IMAGE_RAW, Twist
 from handsteer.types import ZERO
 from tests.faults.painted import PaintedCamera, painted_recognizer
+from tests.recognition.hands import show_sign
 
 DT_S = 1 / 30
 GREY = np.full((48, 64, 3), 100, np.uint8)
@@ -53,6 +54,22 @@ def test_a_hand_that_is_up_at_the_start_moves_nothing_before_neutral_was_seen() 
     assert person.teleop.reason == "disengaged: hold an open palm for 1 s to begin"
     person.drives()
     assert person.teleop.reason == "driving: Forward"
+
+
+def test_a_hand_in_the_part_of_an_image_that_stands_still_drives_nothing() -> None:
+    person = Person()
+    person.drives()
+    left, top, right, bottom = show_sign("Forward").box_px
+    # As large as the picture that the place of the painted hand belongs to.
+    images = (np.repeat(np.repeat(person.image("Forward"), 10, axis=0), 10, axis=1) for _ in range(60))
+    assert person.teleop.step(next(images), DT_S).linear_mps > 0.1
+    still = next(images)[top:bottom, left:right]
+    velocities = []
+    for torn in images:
+        torn[top:bottom, left:right] = still
+        velocities.append(person.teleop.step(torn, DT_S))
+    assert set(velocities[15:]) == {ZERO}
+    assert "torn" in person.teleop.reason
 
 
 def test_without_the_clutch_neutral_is_still_required() -> None:

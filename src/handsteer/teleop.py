@@ -2,12 +2,12 @@
 
 ::
 
-    image ─▶ freshness ─▶ recognizer ─▶ sign ─▶ control ─▶ velocity
+    image ─▶ pipeline: is it new? which sign? ─▶ sign ─▶ control ─▶ velocity
 
 :class:`Teleop` drives a robot in a program of your own. In a ROS graph the same parts run in nodes joined by topics
 (:mod:`handsteer.graph`): the camera's node reads the images,
-:class:`~handsteer.nodes.recognition.HandSignRecognitionNode` contains freshness and recogniser, and
-:class:`~handsteer.nodes.control.HandSignControlNode` contains the control.
+:class:`~handsteer.nodes.recognition.HandSignRecognitionNode` runs the same :class:`~handsteer.pipeline.FramePipeline`,
+and :class:`~handsteer.nodes.control.HandSignControlNode` the same control.
 """
 
 import math
@@ -15,10 +15,10 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from handsteer.cameras.freshness import Freshness
 from handsteer.config import Config
 from handsteer.control import Control
 from handsteer.control.explain import Reason, seconds_to_renew, warned
+from handsteer.pipeline import FramePipeline, Sight
 from handsteer.recognition.engage_gesture import EngageGesture
 from handsteer.recognition.hand_joystick import HandJoystick
 from handsteer.recognition.recognizer import Recognition, Recognizer
@@ -46,14 +46,12 @@ class Teleop:
     def __init__(self, config: Config | None = None, recognizer: Recognizer | None = None) -> None:
         config = config or Config()
         self.recognition: Recognition | None = None
-        self._recognizer = recognizer or Recognizer(config)
+        joystick = HandJoystick(config.joystick)
+        self._pipeline = FramePipeline(recognizer or Recognizer(config), joystick, EngageGesture())
         self._max_frame_age_s = config.signs.max_frame_age
-        self._freshness = Freshness()
         self._refused: str | None = "no image has come"
         self._since_image_s = self._since_seen_s = 0.0
-        self._joystick = HandJoystick(config.joystick)
         self._is_joystick = config.control.mode == "joystick"
-        self._gesture = EngageGesture()
         self._stick = RELEASED
         self._control = Control(
             config.control,
@@ -81,14 +79,12 @@ class Teleop:
         self._command(self._control.step(dt_s))  # the sign timeout applies before the new image counts
         self._since_image_s += dt_s
         self._since_seen_s += dt_s
-        sign = None if image is None else self._sign_of(image)
-        if sign is not None:
-            self._command(self._control.step(0.0, sign=sign, stick=self._stick))
-            self._control.note_gesture(is_done=self._gesture.progress == 1.0)
+        sight = None if image is None else self._look_at(image)
+        if sight is not None and sight.recognition is not None and sight.refused is None:
+            self._command(self._control.step(0.0, sign=sight.recognition.sign, stick=self._stick))
+            self._control.note_gesture(is_done=sight.engages)
         elif self._since_seen_s > self._max_frame_age_s:
-            self._recognizer.reset()
-            self._joystick.reset()
-            self._gesture.reset()
+            self._pipeline.forget()
             self._stick = RELEASED
             self.recognition = None
         return self._velocity
@@ -123,25 +119,19 @@ class Teleop:
             return Reason("disarmed", safety.signs_wait or "reset")
         return self._control.reason
 
-    def _sign_of(self, image: NDArray[np.uint8]) -> str | None:
-        """Return the confirmed sign; None if the image is not new, as from a frozen camera."""
+    def _look_at(self, image: NDArray[np.uint8]) -> Sight:
         since_image_s, self._since_image_s = self._since_image_s, 0.0
-        self._refused = self._freshness.why_refused(image, since_image_s)
-        if self._refused is not None:
-            return None
         try:
-            # The time of skipped images counts too: a sign is timed from when it was last seen.
-            self.recognition = self._recognizer.step(image, self._since_seen_s)
-            self._gesture.step(self.recognition, self._since_seen_s)
-            if self._is_joystick:
-                self._stick = self._joystick.step(self.recognition, self._since_seen_s)
+            sight = self._pipeline.step(image, since_image_s)
         except Exception:
             self._fault("an image could not be looked at")
             raise
-        self._since_seen_s = 0.0
-        if self.recognition.hand is not None:
-            self._refused = self._freshness.why_hand_refused(self.recognition.hand.box_px, since_image_s)
-        return self.recognition.sign if self._refused is None else None
+        self._refused = sight.refused
+        if sight.recognition is not None:
+            self.recognition = sight.recognition
+            self._since_seen_s = 0.0
+            self._stick = sight.stick if self._is_joystick else RELEASED
+        return sight
 
     def _fault(self, why: str) -> Velocity:
         self._control.safety.fault(why)

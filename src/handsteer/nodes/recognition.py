@@ -9,7 +9,6 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from handsteer.cameras.freshness import Freshness
 from handsteer.clock import Clock
 from handsteer.config import Config, SignsConfig
 from handsteer.errors import ConfigError, ModelError, ProfileError
@@ -32,6 +31,7 @@ from handsteer.nodes.base import Node
 from handsteer.nodes.status import RecognitionStatus
 from handsteer.nodes.supervision import StopKeeper
 from handsteer.nodes.timing import CALM_S, TOO_SLOW, FrameAge, LatencyLog, Recording, StallGuard, far_and_late
+from handsteer.pipeline import FramePipeline
 from handsteer.recognition.engage_gesture import EngageGesture
 from handsteer.recognition.hand import Hand
 from handsteer.recognition.hand_joystick import HandJoystick
@@ -93,18 +93,14 @@ class HandSignRecognitionNode(Node):
         self.counts: dict[str, int] = {}
         self.processing = LatencyLog()
         self.is_camera_far = False
-        self._recognizer = recognizer
+        self._pipeline = FramePipeline(recognizer, joystick or HandJoystick(), EngageGesture())
         self._config = config
-        self._joystick = joystick or HandJoystick()
-        self._gesture = EngageGesture()
         self._models = _versions_of(config)
         self._last_captured_s: float | None = None
-        self._unseen_s = 0.0
         self._last_frame_s = clock.now()
         self._last_sign_s = clock.now()
         self._last_hand_s: float | None = None
         self._age = FrameAge(config.max_frame_age, one_clock=transport.is_one_machine)
-        self._freshness = Freshness()
         self._stall_guard = StallGuard(config.max_frame_age, clock.now())
         self._recording = Recording(config.recorded, config.max_frame_age)
         self._refused: str | None = None
@@ -151,14 +147,14 @@ class HandSignRecognitionNode(Node):
         """Apply the confidences and times of ``signs``; its model and profile if a file was replaced or rewritten."""
         if self._has_other_models(config.signs):
             versions = _versions_of(config.signs)
-            self._recognizer.use(open_classifier(config.signs))
-            self._forget_hand()
+            self._pipeline.recognizer.use(open_classifier(config.signs))
+            self._pipeline.forget_gestures()
             self._models = versions
         self._config = config.signs
         limit_s = config.signs.max_frame_age
         self._age.limit_s = self._recording.limit_s = self._stall_guard.limit_s = limit_s
-        self._recognizer.reconfigure(config.signs)
-        self._joystick.reconfigure(config.joystick)
+        self._pipeline.recognizer.reconfigure(config.signs)
+        self._pipeline.joystick.reconfigure(config.joystick)
 
     def _has_other_models(self, config: SignsConfig) -> bool:
         return any(
@@ -170,8 +166,7 @@ class HandSignRecognitionNode(Node):
     def _on_other_camera(self, received: Received[String]) -> None:
         """Forget the hand, and what it showed to the camera before."""
         self._camera_since_s = self.clock.now() if received.captured_s is None else received.captured_s
-        self._recognizer.reset()
-        self._forget_hand()
+        self._pipeline.forget()
         self._recognition = None
 
     def _on_frame(self, received: Received[M], picture_of: Callable[[M], NDArray[np.uint8]]) -> None:
@@ -193,56 +188,42 @@ class HandSignRecognitionNode(Node):
         if self._refused is None:
             self._look_at(image, received, began_s, captured_s)
         else:
-            self._freshness.pass_over(image)
+            self._pipeline.pass_over(image)
         if self._refused is not None:
             self._refused_s = began_s  # a stale or repeated frame does not count: the watchdog publishes NONE
 
     def _look_at(self, image: NDArray[np.uint8], received: Received[M], began_s: float, captured_s: float) -> None:
-        dt_s = self._since_last_frame(captured_s)
-        self._unseen_s += dt_s
-        self._refused = self._freshness.why_refused(image, dt_s, recorded=self._recording.is_followed)
-        if self._refused is not None:
-            self._explain_freeze()
-            return
-        # The time of skipped pictures counts: a sign is bridged from when it was last seen.
-        recognition = self._recognizer.step(image, self._unseen_s)
         is_joystick_wanted = self._joy.has_subscribers
-        if is_joystick_wanted:
-            self._joystick.step(recognition, self._unseen_s)
-            self._gesture.step(recognition, self._unseen_s)
-        else:
-            self._forget_hand()
-        self._unseen_s = 0.0
-        self._refused = self._why_too_late(began_s)
-        if self._refused is not None:
-            return
-        if recognition.hand is not None:
+        sight = self._pipeline.step(
+            image,
+            self._since_last_frame(captured_s),
+            recorded=self._recording.is_followed,
+            as_joystick=is_joystick_wanted,
+            why_too_late=lambda: self._why_too_late(began_s),
+        )
+        self._refused, recognition = sight.refused, sight.recognition
+        self._explain_freeze()
+        if recognition is not None and recognition.hand is not None:
             self._last_hand_s = began_s
-            self._refused = self._freshness.why_hand_refused(recognition.hand.box_px, dt_s)
-            if self._refused is not None:
-                return
+        if self._refused is not None or recognition is None:
+            return
         self._last_frame_s = self._last_sign_s = began_s
         self._watchdog.delay_until(began_s + min(CALM_S, self._config.max_frame_age))
         self._recognition = recognition
         self.counts[recognition.sign] = self.counts.get(recognition.sign, 0) + 1
         self._sign.publish(String(data=recognition.sign), received.captured_s)
         if is_joystick_wanted:
-            engages = self._gesture.progress == 1.0
-            message = joy_of(self._joystick.stick, received.message.header, engages=engages)
+            message = joy_of(sight.stick, received.message.header, engages=sight.engages)
             self._joy.publish(message, received.captured_s)
         self.processing.add(self.clock.now() - began_s)
         if self._annotated.has_subscribers:
             header = received.message.header
             picture = annotate(image, recognition)
-            self._joystick.draw(picture)
+            self._pipeline.joystick.draw(picture)
             self._annotated.publish(image_message(picture, header), received.captured_s)
 
-    def _forget_hand(self) -> None:
-        self._joystick.reset()
-        self._gesture.reset()
-
     def _explain_freeze(self) -> None:
-        if not self._has_explained_freeze and self._freshness.frozen_s > _FREEZE_EXPLAINED_S:
+        if not self._has_explained_freeze and self._pipeline.frozen_s > _FREEZE_EXPLAINED_S:
             self._has_explained_freeze = True
             log.warning("%s: the same picture for %.0f s. %s", self._frames.name, _FREEZE_EXPLAINED_S, _FROZEN)
 
@@ -252,8 +233,6 @@ class HandSignRecognitionNode(Node):
         age_s = came_s + self.clock.now() - began_s
         if age_s <= self._config.max_frame_age:
             return None
-        self._recognizer.reset()
-        self._forget_hand()
         if self.is_camera_far and came_s > age_s / 2:
             return far_and_late(came_s)
         return f"{TOO_SLOW}: a picture was {age_s:.1f} s old when its sign was known"
@@ -295,8 +274,7 @@ class HandSignRecognitionNode(Node):
         period_s = _SILENCE_PERIOD_S if self._recognition is None else self._config.max_frame_age
         if now - self._last_sign_s > period_s:
             self._last_sign_s = now
-            self._recognizer.reset()
-            self._forget_hand()
+            self._pipeline.forget()
             self._recognition = None
             self._sign.publish(String(data=NONE))
             if self._joy.has_subscribers:
@@ -307,17 +285,18 @@ class HandSignRecognitionNode(Node):
         if seen is None:
             refuses_now = self._refused is not None and now - self._refused_s <= self._config.max_frame_age
             no_frame_s = None if refuses_now else round(now - max(self._last_frame_s, self._refused_s), 1)
-            return RecognitionStatus(signs=self._recognizer.signs, no_frame_s=no_frame_s, refused=self._refused or "")
+            signs, refused = self._pipeline.recognizer.signs, self._refused or ""
+            return RecognitionStatus(signs=signs, no_frame_s=no_frame_s, refused=refused)
         is_hand_lost = seen.hand is None and self._last_hand_s is not None
         return RecognitionStatus(
             sign=seen.sign,
-            signs=self._recognizer.signs,
+            signs=self._pipeline.recognizer.signs,
             seen=seen.seen,
             confidence=round(seen.confidence, 2),
-            confidences=tuple(round(each, 2) for each in self._recognizer.confidences(seen)),
+            confidences=tuple(round(each, 2) for each in self._pipeline.recognizer.confidences(seen)),
             min_confidence=self._config.min_confidence,
             progress=round(seen.progress, 2),
-            engage_progress=round(self._gesture.progress, 2),
+            engage_progress=round(self._pipeline.gesture.progress, 2),
             handedness=self._handedness(seen.hand) if seen.hand else "",
             sides_swapped=self._config.swap_sides,
             no_hand_s=round(now - (self._last_hand_s or 0.0), 1) if is_hand_lost else None,
