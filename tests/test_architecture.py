@@ -5,6 +5,7 @@ import re
 from pathlib import Path
 
 import pytest
+from scripts.ways import way_of_a_frame, way_of_steering
 
 ROOT = Path(__file__).resolve().parents[1]
 SOURCE = ROOT / "src" / "handsteer"
@@ -14,7 +15,7 @@ LINE = re.compile(r"^\| `([\w/.]+)` \| (\d+) \|", re.MULTILINE)
 
 
 @pytest.mark.parametrize(
-    ("begin", "end", "most"), [("way of a frame,", "way of a steering", 10), ("way of a steering", "## Th", 7)]
+    ("begin", "end", "most"), [("ones of a frame:", "way of a steering", 11), ("way of a steering", "## Th", 7)]
 )
 def test_the_ways_of_a_frame_and_of_a_command_are_as_short_as_shown(begin: str, end: str, most: int) -> None:
     rows = LINE.findall(TEXT[TEXT.index(begin) : TEXT.index(end, TEXT.index(begin) + 1)])
@@ -52,3 +53,11 @@ def test_every_plug_in_is_shown_and_says_what_it_imports() -> None:
         text = ast.get_docstring(ast.parse((folder / "__init__.py").read_text())) or ""
         assert re.search(r"\b[Ii]mports\b", text), f"{folder.name} does not say what it imports"
         assert re.search(rf"^\| .*`{folder.name}`.* \|", TEXT, re.MULTILINE), f"{folder.name} is not shown"
+
+
+@pytest.mark.slow
+def test_the_files_on_both_ways_are_as_many_as_said() -> None:
+    said = re.search(r"a frame passes (\d+) files of the kernel, and a steering command (\d+)", TEXT)
+    assert said
+    assert way_of_a_frame().typical == pytest.approx(int(said[1]), abs=1)
+    assert way_of_steering().typical == pytest.approx(int(said[2]), abs=1)
