@@ -15,6 +15,6 @@ browser's code is in ``static``, with uPlot for the plots; there ``translate.js`
 ``remote_graph`` stands for the graph: ``transports/piped`` carries its topics, and the same pipe requests to it. So
 nothing on the page can delay a command.
 
-Imports the kernel, and :mod:`~handsteer.plugins.record`, :mod:`~handsteer.plugins.study`,
-:mod:`~handsteer.plugins.teach` and :mod:`~handsteer.plugins.virtual_hand`, whose pages it has.
+Imports the kernel, and :mod:`~handsteer.plugins.study`, :mod:`~handsteer.plugins.teach` and
+:mod:`~handsteer.plugins.virtual_hand`, whose pages and pictures it has.
 """

@@ -13,7 +13,7 @@ from fastapi import FastAPI
 from starlette.responses import FileResponse, PlainTextResponse, Response
 
 from handsteer.nodes.run_recording import RecordingState
-from handsteer.plugins.record.folder import RecordingFolder
+from handsteer.plugins.page.recording_folder import RecordingFolder
 
 RECORDINGS_PATH: Final = "/recordings"
 _TIMEOUT_S: Final = 600.0

@@ -25,8 +25,8 @@ from handsteer.graph import Graph
 from handsteer.making import make_steering
 from handsteer.nodes.run_recording import RecordingState
 from handsteer.nodes.steering import SteeringNode
+from handsteer.plugins.page.recording_folder import RecordingFolder
 from handsteer.plugins.page.viewers import PageAudit
-from handsteer.plugins.record.folder import RecordingFolder
 from handsteer.plugins.study.session import Task
 from handsteer.robots.world import World
 from handsteer.transports.piped import Gateway, Pipe, PipedTransport

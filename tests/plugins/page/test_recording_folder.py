@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from handsteer.errors import RecordingError
-from handsteer.plugins.record.folder import RecordingFolder
+from handsteer.plugins.page.recording_folder import RecordingFolder
 
 NOW = datetime.datetime(2026, 11, 22, 22, 20, 0)
 
