@@ -1,6 +1,6 @@
 """Break each guard of ``tests/mutants.toml`` in turn, and run the tests that name it, of which one has to fail.
 
-A guard that no test fails without is no guard for long. The working tree is never changed: a mutant is a folder of
+A guard that no test fails without does not last. The working tree is never changed: a mutant is a folder of
 links to the sources, with the one changed file in it, that is first on the path of a forked process.
 
 Exit code 0 if all mutants die; 1 if one survives, if a text that is to be replaced does not occur exactly once, or if a
@@ -217,7 +217,7 @@ def _run_all(mutants: Sequence[Mutant], folder: Path, workers: int, *, verbose: 
     for run in _in_parallel(broken, workers):
         assert run.mutant is not None
         is_dead = run.code == pytest.ExitCode.TESTS_FAILED
-        result = "dies" if is_dead else "SURVIVES" if run.code == 0 else "is no mutant"
+        result = "dies" if is_dead else "SURVIVES" if run.code == 0 else "is not a mutant"
         print(f"{result:8} {run.took_s:4.1f} s  {run.mutant.file}: {run.name}", flush=True)
         if verbose and is_dead:
             print(f"{'':17}{run.error}")

@@ -1,4 +1,4 @@
-"""Draws the pictures of docs/signs.md: the virtual hand with each sign, and shapes that are no sign."""
+"""Draws the pictures of docs/signs.md: the virtual hand with each sign, and shapes that are not a sign."""
 
 from pathlib import Path
 

@@ -29,7 +29,7 @@ def test_decodes_what_opencv_decodes_whatever_stands_behind_it(data: bytes) -> N
 @pytest.mark.parametrize("data", [*FILES.values(), PROGRESSIVE], ids=["jpg", "png", "progressive"])
 @pytest.mark.parametrize("part", [0.001, 0.1, 0.5, 0.9, 0.999])
 def test_a_torn_picture_is_refused(data: bytes, part: float) -> None:
-    with pytest.raises(FrameError, match=r"torn|no JPEG or PNG"):
+    with pytest.raises(FrameError, match=r"torn|not a JPEG or PNG"):
         decode(data[: int(len(data) * part)])
 
 
@@ -38,15 +38,15 @@ def test_a_torn_picture_is_refused(data: bytes, part: float) -> None:
     [
         (corpus.png(10000, 10000), "a PNG picture of 10000x10000: it should have 1 to 16777216 pixels"),
         (corpus.resized_jpeg(10000, 10000), "a JPEG picture of 10000x10000"),
-        (corpus.two_faced_jpeg(), "no JPEG picture, or a torn one"),
+        (corpus.two_faced_jpeg(), "not a JPEG picture, or a torn one"),
         (corpus.resized_jpeg(0, 10), "0x10"),
         (PROGRESSIVE.replace(b"\xff\xda", b"\xff\xda" * 40, 1), "of more than 32 scans"),
         (FILES[".png"].replace(b"IDAT", b"acTL", 1), "animated"),
         (corpus.png(20, 20).replace(b"\x00\x00\x00\x00IEND", b"{{{{{{{{\x00\x00\x00\x00IEND"), "a torn PNG picture"),
-        (FILES[".jpg"][:2] + b"\xff\xe0\x00\x02" * 3000 + FILES[".jpg"][2:], "no JPEG picture"),
-        (b"GIF89a" + bytes(50), "56 bytes that are no JPEG or PNG picture"),
-        (cv2.imencode(".bmp", PHOTO)[1].tobytes(), "no JPEG or PNG"),
-        (cv2.imencode(".webp", PHOTO)[1].tobytes(), "no JPEG or PNG"),
+        (FILES[".jpg"][:2] + b"\xff\xe0\x00\x02" * 3000 + FILES[".jpg"][2:], "not a JPEG picture"),
+        (b"GIF89a" + bytes(50), "56 bytes that are not a JPEG or PNG picture"),
+        (cv2.imencode(".bmp", PHOTO)[1].tobytes(), "not a JPEG or PNG"),
+        (cv2.imencode(".webp", PHOTO)[1].tobytes(), "not a JPEG or PNG"),
         (b"", "0 bytes"),
     ],
     ids=[

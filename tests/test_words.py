@@ -43,6 +43,7 @@ BETTER = {
     "hold up": "stall, delay",
     "holds up": "stalls, delays",
     "if you like": "optionally",
+    "x is no y": "x is not a valid y, x is not a y",
     "in step": "synchronised",
     "in the place of": "instead of",
     "in words of": "as",
@@ -87,6 +88,9 @@ BETTER = {
 _UNWANTED = re.compile(
     r"\b(?:" + "|".join(re.escape(word).replace(r"\ ", r"\s+") for word in BETTER) + r")\b", re.IGNORECASE
 )
+_IS_NO = re.compile(r"(?<!there )\b(?:is|was|are)\s+no\s+(?!longer\b|more\b|other\b|such\b)\w+", re.IGNORECASE)
+"""``X is no Y``, instead of which documentation of programs has ``X is not a valid Y``; ``there is no Y`` is usual."""
+
 _NO_PROSE = re.compile(
     r"^( *)```.*?^\1```$|<!-- faults .*?<!-- end of faults \w+ -->|`[^`]*`", re.DOTALL | re.MULTILINE
 )
@@ -100,6 +104,8 @@ def unwanted(text: str) -> Iterator[tuple[int, str]]:
     prose = _NO_PROSE.sub(lambda part: re.sub(r"[^\n]", "`", part[0]), text)
     for found in _UNWANTED.finditer(prose):
         yield prose.count("\n", 0, found.start()) + 1, " ".join(found[0].lower().split())
+    for found in _IS_NO.finditer(prose):
+        yield prose.count("\n", 0, found.start()) + 1, "x is no y"
 
 
 @pytest.mark.parametrize("page", [*PAGES, *SOURCES], ids=lambda page: str(page.relative_to(ROOT)))

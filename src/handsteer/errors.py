@@ -86,7 +86,7 @@ class WorldError(HandsteerError):
 
 
 class BenchError(HandsteerError):
-    """A lap of the bench cannot be driven: an interface or a range is wrong, or a world is no course."""
+    """A lap of the bench cannot be driven: an interface or a range is wrong, or a world is not a course."""
 
 
 class StudyError(HandsteerError):

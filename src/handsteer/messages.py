@@ -131,7 +131,7 @@ def is_released(message: Joy) -> bool:
     return not stick_in(message).held
 
 
-# The functions of topics are no lambdas, so that a topic can be pickled for another process.
+# The functions of topics are not lambdas, so that a topic can be pickled for another process.
 IMAGE_RAW = Topic("/image_raw", Image)
 IMAGE_COMPRESSED = Topic("/image_raw/compressed", CompressedImage, beneath=IMAGE_RAW)
 # The name of the camera whose pictures follow, when another one was chosen; captured when it was.

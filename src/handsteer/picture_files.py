@@ -51,7 +51,7 @@ def size_of(data: bytes) -> FileSize:
         return _jpeg_size(data)
     if data.startswith(_PNG):
         return _png_size(data)
-    raise FrameError(f"{len(data)} bytes that are no JPEG or PNG picture")
+    raise FrameError(f"{len(data)} bytes that are not a JPEG or PNG picture")
 
 
 def decode(data: bytes, most_pixels: int = MOST_PIXELS) -> NDArray[np.uint8]:
@@ -95,7 +95,7 @@ def _jpeg_size(data: bytes) -> FileSize:
             height, width = (int.from_bytes(data[at + 5 + 2 * n : at + 7 + 2 * n], "big") for n in (0, 1))
             size = FileSize("JPEG", width, height)
         at += 2 + length
-    raise FrameError(f"{len(data)} bytes that are no JPEG picture, or a torn one")
+    raise FrameError(f"{len(data)} bytes that are not a JPEG picture, or a torn one")
 
 
 def _check_scans(data: bytes, begin: int) -> None:

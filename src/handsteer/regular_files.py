@@ -18,7 +18,7 @@ def open_regular(path: Path, most_bytes: int | None = None) -> BinaryIO:
         most_bytes: Its largest size; None for no limit.
 
     Raises:
-        OSError: It cannot be read, is no regular file, or is larger; ``strerror`` is the reason, in words.
+        OSError: It cannot be read, is not a regular file, or is larger; ``strerror`` is the reason, in words.
     """
     # The flag is for named pipes; it has no effect on regular files.
     handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))

@@ -21,7 +21,7 @@ HANDSTEER = (sys.executable, "-m", "handsteer")
 
 
 def block() -> None:
-    """As our launch scripts do: signals wait until the program takes them, so the interpreter's own start is no gap."""
+    """As our launch scripts do: signals wait until the program takes them, so the interpreter's start is not a gap."""
     signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT, signal.SIGTERM))
 
 

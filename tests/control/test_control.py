@@ -95,7 +95,7 @@ def test_a_sign_that_does_not_change_has_to_be_shown_anew_after_neutral(arming: 
     assert drives_s(control, sign=FORWARD) == pytest.approx(3.0)
     assert str(control.reason) == "ready: the same sign for 3 s: show Stop or lower your hand, then show it again"
     assert drives_s(control, sign=FORWARD) == 0.0, "it does not begin by itself"
-    assert drives_s(control, sign="Turn Left") == 0.0, "another sign is no release"
+    assert drives_s(control, sign="Turn Left") == 0.0, "another sign is not a release"
     show_for(control, 0.3, sign=NONE)
     assert drives_s(control, sign=FORWARD) == 0.0, "nor is a short loss"
     show_for(control, 0.6, sign=NONE)
@@ -128,7 +128,7 @@ def test_a_stick_that_does_not_move_has_to_be_released() -> None:
     control.step(0.1, stick=Stick())
     assert drives_s(control, stick=Stick(True, 0.5, 0.1)) == pytest.approx(3.0)
     assert str(control.reason) == "standing: the stick has not moved for 3 s: release it first"
-    assert drives_s(control, stick=Stick(True, -1.0)) == 0.0, "a movement is no release"
+    assert drives_s(control, stick=Stick(True, -1.0)) == 0.0, "a movement is not a release"
     control.step(0.1, stick=Stick())
     assert control.reason.code == "not_held"
     assert drives_s(control, stick=Stick(True, 0.5, 0.1)) == pytest.approx(3.0)

@@ -175,7 +175,7 @@ def test_a_robot_that_comes_back_from_the_dead_waits_for_a_fresh_sign(robots: Ro
     assert process.running
 
 
-@pytest.mark.parametrize(("mode", "trouble"), [("nan", "that is no number"), ("far", "")])
+@pytest.mark.parametrize(("mode", "trouble"), [("nan", "that is not a number"), ("far", "")])
 def test_odometry_that_makes_no_sense_breaks_nothing(robots: Robots, mode: str, trouble: str) -> None:
     robots.add()
     process = robots.run("--robot", "dds", "--control.max-linear", "0.1")

@@ -1,6 +1,6 @@
 """The rules of docs/safety.md as an onlooker would keep them: when may a robot be asked to move at all?
 
-This is no copy of the code: it knows no node, no filter and no velocity, only what was shown, said and done, and when.
+This is not a copy of the code: it knows no node, filter or velocity, only what was shown, said and done, and when.
 It is generous: where nodes may take up to half a second, so does it.
 """
 

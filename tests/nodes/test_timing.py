@@ -29,7 +29,7 @@ def test_a_burst_is_distrusted_to_its_end_however_long_it_takes() -> None:
         now_s += BURST_S / 2
     now_s += BURST_S
     assert not interruption.distrusts(now_s)
-    assert not interruption.distrusts(now_s + BURST_S / 2)  # as fast as it may be, it is no backlog
+    assert not interruption.distrusts(now_s + BURST_S / 2)  # as fast as it may be, it is not a backlog
 
 
 def test_what_comes_fast_without_an_interruption_is_trusted() -> None:

@@ -177,7 +177,7 @@ def test_a_profile_is_saved_and_loaded(tmp_path: Path) -> None:
         ),
         (widest(views={"Fly": VIEWS}, reach={"Fly": 0.5}), "its signs are not those of handsteer"),
         (widest(views={FORWARD: VIEWS[:, 1:]}, reach={FORWARD: 0.5}), "its parts do not fit together"),
-        (widest(name="../me"), "is no name for a profile"),
+        (widest(name="../me"), "is not a valid name for a profile"),
     ],
 )
 def test_a_file_that_could_let_others_drive_is_refused(tmp_path: Path, profile: Profile, message: str) -> None:
@@ -226,6 +226,6 @@ def test_profiles_are_chosen_by_name_or_path(tmp_path: Path, monkeypatch: pytest
 
 @pytest.mark.parametrize("name", ["", " ", "../anna", "a/b", ".anna", "anna\n\x1b", "anna.npz", "a" * 41])
 def test_names_of_profiles(name: str) -> None:
-    with pytest.raises(ProfileError, match="is no name for a profile"):
+    with pytest.raises(ProfileError, match="is not a valid name for a profile"):
         profile_name(name)
     assert profile_name("  Anna  Öz-2 ") == "Anna Öz-2"

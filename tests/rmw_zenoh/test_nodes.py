@@ -281,9 +281,15 @@ class TestRouter:
     ("env", "message"),
     [
         ({"ZENOH_ROUTER_CHECK_ATTEMPTS": "x"}, "ZENOH_ROUTER_CHECK_ATTEMPTS is 'x': it should be a whole number"),
-        ({"ZENOH_SESSION_CONFIG_URI": "/none"}, "ZENOH_SESSION_CONFIG_URI is '/none': it is no configuration of Zenoh"),
+        (
+            {"ZENOH_SESSION_CONFIG_URI": "/none"},
+            "ZENOH_SESSION_CONFIG_URI is '/none': it is not a valid configuration of Zenoh",
+        ),
         ({"ZENOH_CONFIG_OVERRIDE": "mode"}, "ZENOH_CONFIG_OVERRIDE has 'mode': it should be as mode="),
-        ({"ZENOH_CONFIG_OVERRIDE": 'mode="x"'}, 'ZENOH_CONFIG_OVERRIDE has mode="x": that is no setting of Zenoh'),
+        (
+            {"ZENOH_CONFIG_OVERRIDE": 'mode="x"'},
+            'ZENOH_CONFIG_OVERRIDE has mode="x": that is not a valid setting of Zenoh',
+        ),
         ({"ROS_DOMAIN_ID": "233"}, "ROS_DOMAIN_ID is '233': it should be a whole number from 0 to 232"),
         (
             {"ZENOH_CONFIG_OVERRIDE": 'mode="client";connect/endpoints=["tcp/127.0.0.1:1"]'},

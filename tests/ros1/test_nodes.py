@@ -136,7 +136,7 @@ def test_camera_info_lies_beside_the_images(ros1: Ros1Graph) -> None:
         (["control", "_linear_step:=quick"], "ROS parameter /hand_sign_control/linear_step: 'quick' should be a valid"),
         (["camera", "_virtual_hand/skin:=green"], "ROS parameter /my_camera/virtual_hand/skin: 'green' should be"),
         (["camera", "_source:=gone.mp4"], "there is no camera gone.mp4"),
-        (["control", "fast"], "'fast' is no argument of ROS: it should be as name:=value"),
+        (["control", "fast"], "'fast' is not a valid argument of ROS: it should be as name:=value"),
         (["control", "--control.linear-step", "7"], "control.linear_step: '7' should be less than or equal to 1"),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else None,

@@ -23,7 +23,7 @@ def test_a_port_in_use() -> None:
 
 @pytest.mark.parametrize("host", ["203.0.113.7", "no such host"])
 def test_an_address_of_another_machine(host: str) -> None:
-    with pytest.raises(DashboardError, match=f"^--where {host} is no address of this machine"):
+    with pytest.raises(DashboardError, match=f"^--where {host} is not an address of this machine"):
         listen(host, 0, 65536, options=OPTIONS, error=DashboardError)
 
 

@@ -29,6 +29,8 @@ def test_where_nothing_speaks_ros2_auto_says_so(without: None) -> None:
 @pytest.mark.parametrize("without", [["rclpy"]], indirect=True)
 def test_auto_takes_cyclone_dds_where_there_is_no_rclpy(without: None) -> None:
     pytest.importorskip("cyclonedds")
-    with pytest.raises(TransportError, match="'nonsense' is no argument of ROS 2"):  # as DDS says it, before it joins
+    with pytest.raises(
+        TransportError, match="'nonsense' is not a valid argument of ROS 2"
+    ):  # as DDS says it, before it joins
         join("auto", "tests", ["nonsense"])
     assert "handsteer.plugins.dds.transport" in sys.modules

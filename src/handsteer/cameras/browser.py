@@ -101,7 +101,7 @@ def check_frame(data: bytes) -> float:
         raise FrameError("a frame without the time of its capture")
     kind, width, height = size_of(data[HEADER_BYTES:])
     if kind != "JPEG":
-        raise FrameError("a frame that is no JPEG picture")
+        raise FrameError("a frame that is not a JPEG picture")
     if not 0 < width * height <= _MOST_PIXELS:
         raise FrameError(f"a frame of {width}x{height}: it should have at most 1920x1080 pixels")
     return float(sent_ms) / 1000

@@ -40,7 +40,7 @@ class Section(BaseModel):
     @field_validator("*")
     @classmethod
     def without_null(cls, value: Any) -> Any:
-        """Return ``value``; a text with a null character is no name, path or address, and no system call takes it."""
+        """Return ``value``; no system call takes a text with a null character as a name, path or address."""
         if isinstance(value, str | Path) and "\0" in str(value):
             raise ValueError("must have no null character")
         return value

@@ -68,7 +68,7 @@ class Control:
             The velocity to command now, or None to command nothing new.
         """
         if not (math.isfinite(dt_s) and dt_s >= 0):
-            self.safety.stall(f"{dt_s} s is no time between two steps")
+            self.safety.stall(f"{dt_s} s is not a valid time between two steps")
             return self.halt()
         self.safety.step(dt_s)
         self._since_command_s += dt_s

@@ -141,7 +141,7 @@ def points_of(scan: LaserScan, rule: CollisionMonitorConfig) -> Points | None:
     """Return the points that the scanner measured; None if the scan is invalid or empty.
 
     Ranges follow REP 117 and ``sensor_msgs/LaserScan``: beyond ``range_max`` and +inf is free; -inf is too near to be
-    measured, so it counts as touching the robot; NaN and values below ``range_min`` are no readings.
+    measured, so it counts as touching the robot; NaN and values below ``range_min`` are not readings.
 
     Args:
         scan: The message, of any size.

@@ -313,7 +313,7 @@ class Ramp:
     """Limits acceleration and jerk of commands; deceleration, also for a change of direction, is not limited.
 
     Args:
-        config: Limits of acceleration and jerk; 0 is no limit.
+        config: Limits of acceleration and jerk; 0 is unlimited.
     """
 
     def __init__(self, config: ControlConfig) -> None:

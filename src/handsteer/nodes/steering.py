@@ -171,7 +171,8 @@ class SteeringNode(Node):
     def _find(self, name: str) -> _Target:
         if len(name) > _LONGEST_NAME or not _TOPIC_NAME.fullmatch(name):
             raise TransportError(
-                f"{name[:_LONGEST_NAME]!r} is no topic's name: letters, digits and _ between slashes, as in /cmd_vel"
+                f"{name[:_LONGEST_NAME]!r} is not a valid topic name: letters, digits and _ between slashes, "
+                "as in /cmd_vel"
             )
         if len(self._targets) > _MOST_TOPICS:
             raise TransportError(f"steering has had {_MOST_TOPICS} topics already: start it again for another")

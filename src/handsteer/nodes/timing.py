@@ -135,7 +135,7 @@ class Recording:
     Args:
         recorded: auto accepts what a player publishes; always accepts also stamps older than any link delay; never
             accepts nothing.
-        limit_s: Frames that are no older than this, in seconds, are not a recording's.
+        limit_s: Frames that are not older than this, in seconds, are not a recording's.
 
     Attributes:
         limit_s: As above; may be changed.

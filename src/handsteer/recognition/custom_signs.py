@@ -163,7 +163,7 @@ def label_for(name: str, known: Sequence[str] = ()) -> str:
     name = " ".join(name.split())
     if not name or not name.isprintable() or len(name) > _LONGEST_NAME:
         raise DatasetError(
-            f"{name[:60]!r} is no name for a sign: give 1 to {_LONGEST_NAME} printable characters, as 'Hi'"
+            f"{name[:60]!r} is not a valid name for a sign: give 1 to {_LONGEST_NAME} printable characters, as 'Hi'"
         )
     return find_sign(name, (*SIGNS, NONE, *known)) or name
 

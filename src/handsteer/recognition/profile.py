@@ -209,7 +209,8 @@ def profile_name(text: str) -> str:
     name = " ".join(text.split())
     if not _NAME.fullmatch(name) or len(name) > _LONGEST_NAME or name.endswith(".npz"):
         raise ProfileError(
-            f"{name[:60]!r} is no name for a profile: give 1 to {_LONGEST_NAME} letters, digits, spaces, - . or _, "
+            f"{name[:60]!r} is not a valid name for a profile: give 1 to {_LONGEST_NAME} letters, digits, spaces, - . "
+            "or _, "
             "as 'Anna'"
         )
     return name

@@ -176,7 +176,7 @@ class RemoteRobot:
         if not listens:
             return f"is not there: {self._no_subscriber()}"
         if self._senseless:
-            return f"sends odometry on {self._odom_topic} that is no number; it is not used"
+            return f"sends odometry on {self._odom_topic} that is not a number; it is not used"
         if is_silent:
             return f"is silent: {self._odom_topic} has stopped, so the robot is commanded to stop"
         if self._seen is None and self._config.odom_topic and self._linked_s > _ODOMETRY_DUE_S:

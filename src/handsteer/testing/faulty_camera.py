@@ -23,7 +23,7 @@ class FaultyCamera:
     """Plays a list of events, one per read; after the last one its stream ends.
 
     Args:
-        events: An image (height, width, 3) uint8 is a frame, None is no frame, an error is raised.
+        events: An image (height, width, 3) uint8 is a frame, None is not a frame, an error is raised.
         clock: Stamps the frames.
         period_s: Time between two frames.
         age_s: Age of each frame when it is read, in seconds.

@@ -35,7 +35,7 @@ def listen(
     try:
         family, _, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)[0]
     except OSError as problem:
-        raise error(f"{for_host} {host} is no address of this machine: {problem.strerror}") from None
+        raise error(f"{for_host} {host} is not an address of this machine: {problem.strerror}") from None
     listener = socket.socket(family, socket.SOCK_STREAM)
     if os.name == "posix":  # on other systems, this option lets two programs use the same port
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -46,7 +46,7 @@ def listen(
     except OSError as problem:
         listener.close()
         if problem.errno == errno.EADDRNOTAVAIL:
-            raise error(f"{for_host} {host} is no address of this machine: 0.0.0.0 stands for all it has") from None
+            raise error(f"{for_host} {host} is not an address of this machine: 0.0.0.0 stands for all it has") from None
         what = "is in use" if problem.errno == errno.EADDRINUSE else f"cannot be used ({problem.strerror})"
         raise error(f"port {port} on {host} {what}: choose another with {for_port} N (0: a free one)") from None
     return listener

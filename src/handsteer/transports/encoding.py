@@ -91,7 +91,7 @@ class NodeName:
             full = f"{base}/{full}"
         if not _FULL.fullmatch(full) or len(full) > _LONGEST:
             raise TransportError(
-                f"{name!r} is no name of a topic in ROS 2: it should have letters, digits and _, as camera/image"
+                f"{name!r} is not a valid topic name in ROS 2: it should have letters, digits and _, as camera/image"
             )
         return full
 

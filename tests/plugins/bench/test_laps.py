@@ -35,7 +35,7 @@ def test_a_practised_operator_finishes_the_slalom_with_the_pad() -> None:
 def test_unknown_names_are_refused() -> None:
     with pytest.raises(BenchError, match="no interface 'thoughts'; use signs"):
         run_lap("slalom", "thoughts", 0)
-    with pytest.raises(BenchError, match="'empty' is no course"):
+    with pytest.raises(BenchError, match="'empty' is not a course"):
         run_lap("empty", "pad", 0)
     with pytest.raises(WorldError, match="no world 'nowhere'"):
         run_lap("nowhere", "pad", 0)

@@ -35,7 +35,7 @@ def test_a_sweep_has_a_row_for_each_value(capsys: pytest.CaptureFixture[str], tm
     ("words", "message"),
     [
         (("--course", "nowhere"), "no world 'nowhere'"),
-        (("--course", "empty"), "'empty' is no course"),
+        (("--course", "empty"), "'empty' is not a course"),
         (("--interface", "thoughts"), "no interface 'thoughts'"),
         (("--seeds", "0"), "--seeds: 0 should be"),
         (("--jobs", "0"), "--jobs: 0 should be"),

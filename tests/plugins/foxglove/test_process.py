@@ -135,7 +135,7 @@ def test_wrong_options_end_the_run() -> None:
     assert "foxglove.port: 70000 should be less than or equal to 65535" in text
     code, text = said_by("--headless", "--foxglove", "0", "--foxglove.host", "203.0.113.7")
     assert code == 2
-    assert "--foxglove.host 203.0.113.7 is no address of this machine" in text
+    assert "--foxglove.host 203.0.113.7 is not an address of this machine" in text
 
 
 def test_a_process_that_dies_before_it_serves_is_reported() -> None:

@@ -229,7 +229,7 @@ def test_a_certificate_that_cannot_be_used_is_named(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("host", ["203.0.113.7", "no.such.host.invalid"])
 def test_an_address_of_another_machine_is_named(host: str) -> None:
-    with pytest.raises(DashboardError, match=rf"^--host {host} is no address of this machine"):
+    with pytest.raises(DashboardError, match=rf"^--host {host} is not an address of this machine"):
         Site(host=host)
 
 

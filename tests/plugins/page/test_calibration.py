@@ -147,7 +147,7 @@ def test_what_is_no_name_or_no_profile_is_refused(room: Room) -> None:
             room.calibrations.begin("ann", name, sides)  # type: ignore[arg-type]
     with pytest.raises(ProfileError, match="cannot read"):
         room.calibrations.choose("ann")
-    with pytest.raises(ProfileError, match="no name"):
+    with pytest.raises(ProfileError, match="not a valid name"):
         room.calibrations.choose("../../etc/ann")
     assert room.config.signs == SignsConfig()
 

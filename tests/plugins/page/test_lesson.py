@@ -169,12 +169,12 @@ def test_signs_are_renamed_and_left_out_with_their_takes(lesson: Lesson) -> None
 @pytest.mark.parametrize(
     ("name", "problem"),
     [
-        ("", "'' is no name for a sign"),
+        ("", "'' is not a valid name for a sign"),
         ("turn left", "Turn Left is known already: give the new sign a name of its own"),
         ("none", "NONE is known already"),
         ("PEACE", "there is a sign Peace already"),
-        ("x" * 41, "is no name for a sign"),
-        ("Hi\x07", "is no name for a sign"),
+        ("x" * 41, "is not a valid name for a sign"),
+        ("Hi\x07", "is not a valid name for a sign"),
     ],
 )
 def test_what_is_no_name_is_refused(lesson: Lesson, name: str, problem: str) -> None:

@@ -144,7 +144,7 @@ def test_a_sign_is_collected_learnt_kept_and_taken_by_the_graph(school: School) 
     assert report is not None
     assert report.confusion.labels == ("Call", "peace", "NONE")
 
-    with pytest.raises(ConfigError, match="'fly' is no action: choose one of forward"):
+    with pytest.raises(ConfigError, match="'fly' is not a valid action: choose one of forward"):
         lessons.save("ann", {"peace": "fly"})
     lessons.save("ben", {"peace": "turbo"})
     school.refuses = True
@@ -243,7 +243,7 @@ def test_takes_are_recorded_only_while_the_page_is_there(school: School) -> None
 
 
 def test_what_is_no_name_of_a_person_is_refused(school: School) -> None:
-    with pytest.raises(DatasetError, match="is no name of a person"):
+    with pytest.raises(DatasetError, match="is not a valid name of a person"):
         school.lessons.begin("ann", "y" * 41)
     assert not school.lessons.is_running
 

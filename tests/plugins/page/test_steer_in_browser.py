@@ -175,7 +175,7 @@ def test_another_topic_is_steered_past_the_control_and_stops_as_well() -> None:
             graph.start()
             visit.wait_until(lambda: visit.text(".banner .headline") == "Standing")
             choose(visit, "/cmd vel")
-            visit.wait_until(lambda: "is no topic's name" in visit.text(".topic .trouble"))
+            visit.wait_until(lambda: "is not a valid topic name" in visit.text(".topic .trouble"))
             choose(visit, topic.name)
             visit.wait_until(lambda: "Past the control" in visit.text(".topic-words"))
             reason = f"Steered by hand, straight on {topic.name}"

@@ -176,7 +176,7 @@ def press_tilt(page: Page) -> None:
 
 
 def test_a_phone_steers_by_tilt_while_its_button_is_held(visit: Visit) -> None:
-    assert visit.page.locator(".tilt").is_hidden(), "this is no phone"
+    assert visit.page.locator(".tilt").is_hidden(), "this is not a phone"
     with phone(visit) as page:
 
         def is_driven() -> bool:

@@ -24,7 +24,7 @@ def test_a_large_file_is_refused(text: str | None) -> None:
 
 @pytest.mark.parametrize("sent", [None, [], "text", {}, {"name": 5, "text": ""}, {"name": "a", "text": 5}])
 def test_what_is_no_file_is_refused(sent: object) -> None:
-    with pytest.raises(WorldError, match="no file"):
+    with pytest.raises(WorldError, match="not a file"):
         read_file(sent)
 
 

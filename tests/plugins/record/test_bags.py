@@ -70,7 +70,7 @@ def test_only_the_asked_topics_are_read(bag: Path) -> None:
 def test_a_damaged_bag_is_refused_in_one_line(name: str, tmp_path: Path) -> None:
     path = tmp_path / name
     path.parent.mkdir(exist_ok=True)
-    path.write_text("#ROSBAG V2.0\nthis is no bag\n")
+    path.write_text("#ROSBAG V2.0\nthis is not a bag\n")
     with pytest.raises(RecordingError, match="cannot read the bag") as error:
         open_recording(path.parent if path.suffix == ".yaml" else path)
     assert "\n" not in str(error.value)

@@ -72,5 +72,5 @@ def test_without_pictures_it_is_refused(tmp_path: Path) -> None:
     with pytest.raises(CameraUnreadable, match="contains no pictures"):
         RecordingCamera(tmp_path / "empty.mcap", SteppedClock())
     (tmp_path / "text.mcap").write_text("no recording")
-    with pytest.raises(CameraUnreadable, match="no MCAP file"):
+    with pytest.raises(CameraUnreadable, match="not an MCAP file"):
         RecordingCamera(tmp_path / "text.mcap", SteppedClock())

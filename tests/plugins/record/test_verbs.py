@@ -95,7 +95,7 @@ def test_a_replay_lists_what_differs_with_its_pictures(
     ("words", "says"),
     [
         (("replay", "missing.mcap"), "there is no recording missing.mcap"),
-        (("replay", "README.md"), "README.md is no MCAP file"),
+        (("replay", "README.md"), "README.md is not an MCAP file"),
         (("run", "--fast", "--duration", "1", "--record", "README.md"), "README.md exists already"),
         (
             ("run", "--fast", "--duration", "1", "--record", "none/drive.mcap"),

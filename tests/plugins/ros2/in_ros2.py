@@ -97,7 +97,7 @@ def test_the_compressed_topic_and_camera_info_move_with_the_images(joined: Join)
 @pytest.mark.parametrize(
     ("words", "line"),
     [
-        (("image_raw=/x",), "'image_raw=/x' is no argument of ROS 2: it should be as --ros-args -r"),
+        (("image_raw=/x",), "'image_raw=/x' is not a valid argument of ROS 2: it should be as --ros-args -r"),
         (("--ros-args", "-r", "image_raw"), "cannot join ROS 2 as tests"),
         (("--ros-args", "--nonsense"), "cannot join ROS 2 as tests"),
         (("--ros-args", "-r", "__node:=1x"), "cannot join ROS 2 as tests"),

@@ -40,9 +40,9 @@ def test_what_launch_files_add_is_taken() -> None:
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        ("fast", "'fast' is no argument of ROS 2: it should be as --ros-args"),
-        ("--ros-args fast", "'fast' is no argument of ROS 2: after --ros-args there may be -r, -p"),
-        ("--ros-args -- fast", "'fast' is no argument of ROS 2"),
+        ("fast", "'fast' is not a valid argument of ROS 2: it should be as --ros-args"),
+        ("--ros-args fast", "'fast' is not a valid argument of ROS 2: after --ros-args there may be -r, -p"),
+        ("--ros-args -- fast", "'fast' is not a valid argument of ROS 2"),
         ("--ros-args -r", "-r lacks its value"),
         ("--ros-args -p --", "-p lacks its value"),
         ("--ros-args -r a=b", "-r a=b: it should be a rule"),

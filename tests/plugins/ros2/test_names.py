@@ -56,7 +56,7 @@ def test_camera_info_lies_beside_the_images_unless_it_has_a_rule_of_its_own(rule
 
 @pytest.mark.parametrize("name", ["", "/", "a//b", "a/", "1a", "a/2b", "a b", "~a", "a-b", "é", "{wrong}/a", "a" * 300])
 def test_names_that_are_not_allowed(name: str) -> None:
-    with pytest.raises(TransportError, match="is no name of a topic in ROS 2"):
+    with pytest.raises(TransportError, match="is not a valid topic name in ROS 2"):
         NodeName("cam", "/r1").expand(name)
 
 
@@ -130,7 +130,7 @@ def test_a_remapped_topic_has_its_target_in_every_namespace(name: str, new: str,
         (Remap("__node", ""), "__node:=: the name of a node"),
         (Remap("__ns", "r1"), "__ns:=r1: a namespace starts with a slash"),
         (Remap("__ns", "/r1/"), "__ns:=/r1/: a namespace"),
-        (Remap("image_raw", "a b"), "'a b' is no name of a topic"),
+        (Remap("image_raw", "a b"), "'a b' is not a valid topic name"),
     ],
 )
 def test_wrong_names_are_refused_at_the_start(rule: Remap, message: str) -> None:

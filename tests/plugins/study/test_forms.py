@@ -45,9 +45,9 @@ def test_a_sus_score_rises_with_odd_items_and_falls_with_even_ones(values: list[
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"tlx_effort": 7}, "question 5: 7 is no answer: 0 to 100 are"),
-        ({"tlx_effort": 105}, "question 5: 105 is no answer"),
-        ({"tlx_mental": True}, "question 1: True is no answer"),
+        ({"tlx_effort": 7}, "question 5: 7 is not a valid answer: 0 to 100 are"),
+        ({"tlx_effort": 105}, "question 5: 105 is not a valid answer"),
+        ({"tlx_mental": True}, "question 1: True is not a valid answer"),
         ({"sus_1": 3}, "tlx has no item sus_1"),
     ],
 )

@@ -71,8 +71,8 @@ def test_the_configuration_is_kept_once(tmp_path: Path) -> None:
         (b"a,b\n1,2\n", r"laps\.csv: has other columns than this version writes"),
         (b"a,b\n1,2", r"laps\.csv: has other columns than this version writes"),
         (",".join(LAP_COLUMNS).encode() + b"\r\n1,2\r\n", r"laps\.csv, line 2: has 2 values instead of"),
-        (b"\xff\xfe\n", r"laps\.csv: is no CSV file in UTF-8"),
-        (",".join(LAP_COLUMNS).encode() + b'\r\n"a\r\n', r"laps\.csv: is no CSV file"),
+        (b"\xff\xfe\n", r"laps\.csv: is not a CSV file in UTF-8"),
+        (",".join(LAP_COLUMNS).encode() + b'\r\n"a\r\n', r"laps\.csv: is not a CSV file"),
     ],
 )
 def test_a_file_of_others_is_refused_and_left_alone(content: bytes, message: str, tmp_path: Path) -> None:
@@ -84,7 +84,7 @@ def test_a_file_of_others_is_refused_and_left_alone(content: bytes, message: str
 
 def test_a_row_that_makes_no_sense_is_named(tmp_path: Path) -> None:
     Results(tmp_path).add_lap(lap(1, practice="maybe"))
-    with pytest.raises(StudyError, match=r"laps\.csv, line 2: is no row that handsteer has written"):
+    with pytest.raises(StudyError, match=r"laps\.csv, line 2: is not a row that handsteer has written"):
         Results(tmp_path).done("P01", "abc")
 
 

@@ -60,7 +60,7 @@ def test_a_name_means_a_sign_that_is_known(name: str, label: str) -> None:
 
 @pytest.mark.parametrize("name", ["", "  ", "x" * 41, "a\x07b"])
 def test_a_name_that_cannot_be_printed_is_refused(name: str) -> None:
-    with pytest.raises(DatasetError, match="no name for a sign"):
+    with pytest.raises(DatasetError, match="not a valid name for a sign"):
         label_for(name)
 
 

@@ -72,8 +72,8 @@ def test_the_domain() -> None:
         ("ROS_DOMAIN_ID", "x", "a whole number from 0 to 232"),
         ("ZENOH_ROUTER_CHECK_ATTEMPTS", "often", "a whole number, 0 to wait, -1 not to look"),
         ("ZENOH_CONFIG_OVERRIDE", "mode", "it should be as mode="),
-        ("ZENOH_CONFIG_OVERRIDE", "no/such=1", "that is no setting of Zenoh"),
-        ("ZENOH_SESSION_CONFIG_URI", "/none.json5", "it is no configuration of Zenoh"),
+        ("ZENOH_CONFIG_OVERRIDE", "no/such=1", "that is not a valid setting of Zenoh"),
+        ("ZENOH_SESSION_CONFIG_URI", "/none.json5", "it is not a valid configuration of Zenoh"),
     ],
 )
 def test_wrong_variables(name: str, value: str, right: str) -> None:

@@ -149,7 +149,7 @@ def run_cells(
         progress: Called with 1 for each lap driven.
 
     Raises:
-        BenchError: An interface is unknown, or a world is no course.
+        BenchError: An interface is unknown, or a world is not a course.
         WorldError: There is no such world.
     """
     cells = list(dict.fromkeys(cells))

@@ -139,7 +139,7 @@ def open_course(name_or_path: str) -> Course:
     """
     world = load_world(name_or_path)
     if len(world.gates) < 2:
-        raise BenchError(f"world {name_or_path!r} is no course: it needs at least two gates, a start and a finish")
+        raise BenchError(f"world {name_or_path!r} is not a course: it needs at least two gates, a start and a finish")
     return Course(name_or_path, world, Path.through(_corners(world)))
 
 

@@ -78,7 +78,7 @@ def bench(
     config_file: ConfigFile = None,
     parameters: Parameters = None,
 ) -> int:
-    """Measure laps that a simulated operator drives through interfaces. Simulated laps are no user study.
+    """Measure laps that a simulated operator drives through interfaces. Simulated laps are not a user study.
 
     For example:
       handsteer bench --course slalom --seeds 5  all interfaces

@@ -3,7 +3,7 @@
 A browser lets any web page connect to a server of this machine, and names the page's site in the header ``Origin``,
 which the page cannot forge. Without the token, only pages of this machine and Foxglove's own are admitted, so that no
 other site can watch the camera; where clients may drive, all need the token. Programs other than browsers send no such
-header, or one that is no web address.
+header, or one that is not a web address.
 """
 
 import hmac

@@ -171,7 +171,7 @@ def read_command(content: bytes, encoding: str) -> Velocity:
     """Return the velocity in a Twist that a client has published.
 
     Raises:
-        LiveError: It is no Twist, or a number of it is not finite.
+        LiveError: It is not a Twist, or a number of it is not finite.
     """
     try:
         if encoding == "cdr":

@@ -61,7 +61,7 @@ _SEND_BUFFER_BYTES: Final = 256 * 1024
 
 log = logging.getLogger(__name__)
 
-# Whatever others send is no matter for our log.
+# Whatever others send does not matter for our log.
 _silent = logging.getLogger(f"{__name__}.connections")
 _silent.setLevel(logging.CRITICAL)
 

@@ -267,7 +267,7 @@ def _follows_a_link(headers: Headers) -> bool:
 
 
 def _only(headers: Headers, name: str) -> str:
-    """Return the value of a header; of several, a list, which is no valid value of those used here."""
+    """Return the value of a header; of several, a list, which is not a valid value of those used here."""
     return ", ".join(headers.getlist(name)).strip()
 
 

@@ -249,7 +249,7 @@ class Calibrations:
         """Let the graph use the saved profile ``name``; with an empty name, everybody's signs.
 
         Raises:
-            ProfileError: It is no name.
+            ProfileError: It is not a valid name.
             ConfigError: There is no such profile, or it is damaged.
         """
         profile = Path(profile_name(name)) if name else None

@@ -44,7 +44,7 @@ class Presses:
         return len(self._last)
 
     def obey(self, page: str, press: object, halt: Callable[[], object]) -> None:
-        """Call ``halt`` unless this press of ``page`` has been obeyed; in any case for what is no press's number."""
+        """Call ``halt`` unless this press of ``page`` has been obeyed; in any case if ``press`` is not a number."""
         is_number = isinstance(press, int) and not isinstance(press, bool) and 0 < press < _LARGEST_PRESS
         number = press if isinstance(press, int) and is_number else 0
         with self._lock:

@@ -67,7 +67,7 @@ class Lesson:
         """Add a class for the sign ``name``.
 
         Raises:
-            DatasetError: It is no name for a sign, or taken; or there are too many.
+            DatasetError: It is not a valid name for a sign, or taken; or there are too many.
         """
         self._put(self._class(self._free_label(name)))
 
@@ -75,7 +75,7 @@ class Lesson:
         """Give a class another name.
 
         Raises:
-            DatasetError: It is no name for a sign, or taken.
+            DatasetError: It is not a valid name for a sign, or taken.
         """
         old = self.state.of(key)
         if old is not None and old.label not in (NONE, name) and not self._is_busy:

@@ -73,7 +73,7 @@ class Collected:
 
 @dataclass(frozen=True)
 class SignClass:
-    """The takes of one sign, or of hands that are no sign.
+    """The takes of one sign, or of hands that are not a sign.
 
     Attributes:
         key: Identifies it in the lesson.

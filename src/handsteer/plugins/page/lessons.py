@@ -206,7 +206,7 @@ class Lessons:
     def _action(self, name: str) -> Action:
         found = next((each for each in self.actions() if each == name), None)
         if found is None:
-            raise ConfigError(f"{name!r} is no action: choose one of {', '.join(self.actions())}")
+            raise ConfigError(f"{name!r} is not a valid action: choose one of {', '.join(self.actions())}")
         return found
 
 
@@ -244,5 +244,7 @@ def _version(path: Path) -> _Version:
 def _person(name: str) -> str:
     name = " ".join(name.split())
     if len(name) > _LONGEST_PERSON or not name.isprintable():
-        raise DatasetError(f"{name[:60]!r} is no name of a person: give up to {_LONGEST_PERSON} printable characters")
+        raise DatasetError(
+            f"{name[:60]!r} is not a valid name of a person: give up to {_LONGEST_PERSON} printable characters"
+        )
     return name or "me"

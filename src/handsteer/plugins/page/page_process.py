@@ -77,7 +77,7 @@ class PageProcess:
             raise DashboardError(f"the page's process did not serve the page within {START_TIMEOUT_S:g} s") from None
 
     def seat(self, request: str, program: str) -> None:
-        """Ask for the seat (``ask``) for a program that is no page, or give it back (``leave``).
+        """Ask for the seat (``ask``) for a program that is not a page, or give it back (``leave``).
 
         Ignored before :meth:`serve`.
         """

@@ -17,8 +17,9 @@ _LONGEST_SEARCH = 100
 _OPEN = frozenset({"common", "camera", "signs", "control"})
 """Groups that are unfolded at first."""
 _ELSEWHERE = (
-    "Here are no settings: this process only serves the page. Each node has its own, where it runs; `ros2 param list` "
-    "and `ros2 param set` show and set them in ROS 2, `handsteer NODE --config FILE` reads them at its start."
+    "There are no settings here: this process only serves the page. Each node has its own, where it runs; "
+    "`ros2 param list` and `ros2 param set` show and set them in ROS 2, `handsteer NODE --config FILE` reads them at "
+    "its start."
 )
 
 

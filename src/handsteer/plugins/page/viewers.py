@@ -209,7 +209,7 @@ class PageAudit:
             self._names[viewer] = f"viewer {number} ({address})" if address else f"viewer {number}"
 
     def introduce_program(self, viewer: str) -> None:
-        """Name a viewer that is no page but a program by its own name."""
+        """Name a viewer that is not a page but a program by its own name."""
         with self._lock:
             self._names[viewer] = viewer
 

@@ -238,7 +238,7 @@ class WorldEditor:
 
 
 def _read_place(sent: Any, x: str | int, y: str | int) -> Place | None:
-    """Return x and y in metres, to 1 mm, from what a browser sent, which may be anything; None if they are no place."""
+    """Return x and y in metres, to 1 mm, from what a browser sent, which may be anything; None if invalid."""
     try:
         values = (sent[x], sent[y])
     except (TypeError, KeyError, IndexError):
@@ -257,7 +257,7 @@ def read_file(sent: object) -> tuple[str, str]:
     values = sent if isinstance(sent, dict) else {}
     name, content = values.get("name"), values.get("text")
     if not isinstance(name, str) or not isinstance(content, str | None):
-        raise WorldError("that was no file")
+        raise WorldError("that was not a file")
     name = name[:60]
     if content is None or len(content.encode(errors="replace")) > LARGEST_FILE_BYTES:
         raise WorldError(f"{name}: is larger than {LARGEST_FILE_BYTES // 1024} kB, which no world should be")

@@ -34,7 +34,7 @@ class McapFile(Recording):
         path: The file.
 
     Raises:
-        RecordingError: It cannot be read, or is no MCAP file.
+        RecordingError: It cannot be read, or is not an MCAP file.
     """
 
     def __init__(self, path: Path) -> None:
@@ -84,7 +84,7 @@ class McapFile(Recording):
             size = self.path.stat().st_size
             with open_regular(self.path) as file:
                 if file.read(len(MCAP0_MAGIC)) != MCAP0_MAGIC:
-                    raise RecordingError(f"{self.path} is no MCAP file: it does not begin as one")
+                    raise RecordingError(f"{self.path} is not an MCAP file: it does not begin as one")
                 at = file.tell()
                 for opcode, body in _split(file, size):
                     at = file.tell()

@@ -30,7 +30,7 @@ from handsteer.transports.timing import ClockMonitor
 _PING_PERIOD_S = 2.0
 _PING_IN_DOUBT_S = 0.5
 _PING_AGAIN_S = 0.02
-# A master that replies slowly is busy, which is no reason to stop a robot.
+# A master that replies slowly is busy, which is not a reason to stop a robot.
 _PINGS_UNTIL_LOST = 3
 _SILENT_UNTIL_LOST_S = 1.5
 # rospy sends on its own threads and does not report when they are done.
@@ -135,7 +135,9 @@ class Ros1Session(Session):
 def _refuse_what_rospy_would_ignore(arguments: Sequence[str]) -> None:
     for argument in arguments:
         if ":=" not in argument[1:]:
-            raise TransportError(f"{argument!r} is no argument of ROS: it should be as name:=value, __ns:=r1, _fps:=15")
+            raise TransportError(
+                f"{argument!r} is not a valid argument of ROS: it should be as name:=value, __ns:=r1, _fps:=15"
+            )
 
 
 def _initialise(node: str, arguments: Sequence[str]) -> None:

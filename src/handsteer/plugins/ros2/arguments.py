@@ -124,7 +124,7 @@ def _pairs(words: Sequence[str]) -> Iterator[tuple[str, str]]:
         flag = _LONG.get(word, word)
         if not inside and word != "--ros-args":
             raise TransportError(
-                f"{word[:_LONGEST_SHOWN]!r} is no argument of ROS 2: it should be as --ros-args "
+                f"{word[:_LONGEST_SHOWN]!r} is not a valid argument of ROS 2: it should be as --ros-args "
                 "-r image_raw:=camera/image -p fps:=15"
             )
         if word in {"--ros-args", "--"}:
@@ -139,7 +139,7 @@ def _pairs(words: Sequence[str]) -> Iterator[tuple[str, str]]:
         elif word not in _WITHOUT_VALUE:
             known = ", ".join(_VALUES)
             raise TransportError(
-                f"{word[:_LONGEST_SHOWN]!r} is no argument of ROS 2: after --ros-args there may be {known}"
+                f"{word[:_LONGEST_SHOWN]!r} is not a valid argument of ROS 2: after --ros-args there may be {known}"
             )
 
 

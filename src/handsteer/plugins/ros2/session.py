@@ -189,7 +189,7 @@ def _make_node(context: Any, node: str, arguments: Sequence[str]) -> Node:
         left_over = remove_ros_args(list(arguments))
         if left_over:
             raise TransportError(
-                f"{left_over[0]!r} is no argument of ROS 2: it should be as --ros-args "
+                f"{left_over[0]!r} is not a valid argument of ROS 2: it should be as --ros-args "
                 "-r image_raw:=camera/image -p fps:=15"
             )
         return rclpy.create_node(

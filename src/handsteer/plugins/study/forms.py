@@ -120,6 +120,8 @@ def _check(form: FormName, answers: Mapping[str, int]) -> None:
         if name not in answers:
             raise StudyError(f"question {number} has no answer yet")
         if isinstance(answers[name], bool) or answers[name] not in possible:
-            raise StudyError(f"question {number}: {answers[name]!r} is no answer: {possible[0]} to {possible[-1]} are")
+            raise StudyError(
+                f"question {number}: {answers[name]!r} is not a valid answer: {possible[0]} to {possible[-1]} are"
+            )
     if unknown := answers.keys() - set(names):
         raise StudyError(f"{form} has no item {min(unknown)}")

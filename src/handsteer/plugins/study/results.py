@@ -188,7 +188,7 @@ class _Table:
             reader = csv.reader(io.StringIO(data.decode("utf-8-sig"), newline=""), strict=True)
             lines = [(reader.line_num, values) for values in reader]
         except (UnicodeDecodeError, csv.Error) as error:
-            raise StudyError(f"{self.path}: is no CSV file in UTF-8: {error}") from None
+            raise StudyError(f"{self.path}: is not a CSV file in UTF-8: {error}") from None
         if not lines:
             return []
         if tuple(lines[0][1]) != self._columns:
@@ -236,4 +236,4 @@ def _step_of(row: Mapping[str, str], where: str) -> Step:
         form = next(name for name in FORMS if name == row["form"])
         return Step("form", int(row["order"]), row["condition"], form=form)
     except (KeyError, ValueError, StopIteration):
-        raise StudyError(f"{where}: is no row that handsteer has written") from None
+        raise StudyError(f"{where}: is not a row that handsteer has written") from None

@@ -234,7 +234,7 @@ def sign_pose(sign: str, handedness: Handedness = "Right") -> HandPose:
 
     A left hand is the mirror image of a right one: it shows ``Turn Left`` as the right hand does ``Turn Right``, with
     the back to the camera. ``NONE`` is the hand lowered out of the picture. ``Peace``, ``Three``, ``Four``, ``Horns``,
-    ``Call`` and ``OK`` are available too, and are no signs until they are taught.
+    ``Call`` and ``OK`` are available too, and are not signs until they are taught.
 
     Raises:
         PoseError: ``sign`` is unknown.

@@ -108,7 +108,7 @@ def _part(shown: str, duration: str, number: int) -> Part:
     right_m, down_m = _read_place(place, where) if at else (0.0, 0.0)
     seconds = _number(duration)
     if not 0 < seconds <= _MAX_S:
-        raise PoseError(f"{where}: {duration!r} is no duration; write seconds above 0 and up to {_MAX_S:g}")
+        raise PoseError(f"{where}: {duration!r} is not a valid duration; write seconds above 0 and up to {_MAX_S:g}")
     return Part(sign, seconds, right_m, down_m)
 
 
@@ -117,7 +117,8 @@ def _read_place(text: str, where: str) -> tuple[float, float]:
     metres = [_number(each) for each in text.split(",")]
     if len(metres) != 2 or not all(abs(each) <= _MAX_M for each in metres):
         raise PoseError(
-            f"{where}: {text!r} is no place; write metres to the right and down, up to {_MAX_M:g}, as in Go@0.1,-0.05:2"
+            f"{where}: {text!r} is not a valid place; write metres to the right and down, up to {_MAX_M:g}, "
+            "as in Go@0.1,-0.05:2"
         )
     return metres[0], metres[1]
 

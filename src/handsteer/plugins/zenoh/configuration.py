@@ -121,7 +121,9 @@ def _config(environment: Mapping[str, str], variable: str, settings: Mapping[str
         try:
             config = zenoh.Config.from_file(file)
         except zenoh.ZError as error:
-            raise TransportError(f"{variable} is {file!r}: it is no configuration of Zenoh ({reason(error)})") from None
+            raise TransportError(
+                f"{variable} is {file!r}: it is not a valid configuration of Zenoh ({reason(error)})"
+            ) from None
     else:
         config = zenoh.Config()
         for name, value in settings.items():
@@ -145,7 +147,9 @@ def _set(config: zenoh.Config, source: str, name: str, value: str) -> None:
     try:
         config.insert_json5(name, value)
     except zenoh.ZError as error:
-        raise TransportError(f"{source} has {name}={value}: that is no setting of Zenoh ({reason(error)})") from None
+        raise TransportError(
+            f"{source} has {name}={value}: that is not a valid setting of Zenoh ({reason(error)})"
+        ) from None
 
 
 def _attempts(environment: Mapping[str, str]) -> int | None:

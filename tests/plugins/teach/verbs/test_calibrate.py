@@ -61,7 +61,7 @@ def test_the_camera_asks_for_each_sign_and_says_which_was_not_shown(capsys: pyte
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--name", "../me"], "'../me' is no name for a profile"),
+        (["--name", "../me"], "'../me' is not a valid name for a profile"),
         (["--hands", "foot"], "--hands: 'foot' should be left, right, or left,right"),
         (["--seconds", "nan"], "--seconds: nan should be from 0.2 to 30"),
         (["--countdown", "31"], "--countdown: 31 should be from 0 to 30 seconds"),

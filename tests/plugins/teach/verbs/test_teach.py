@@ -115,7 +115,7 @@ def test_rows_of_others_are_imported(capsys: pytest.CaptureFixture[str]) -> None
     ("arguments", "message"),
     [
         (["collect"], "--label is missing: name the sign, as in --label Hi"),
-        (["collect", "--label", ""], "'' is no name for a sign"),
+        (["collect", "--label", ""], "'' is not a valid name for a sign"),
         (["collect", "--label", "Hi", "--takes", "0"], "--takes: 0 should be from 1 to 1000"),
         (["collect", "--label", "Hi", "--take-time", "nan"], "--take-time: nan should be from 0.2 to 60 seconds"),
         (["collect", "--label", "Hi", "--countdown", "-1"], "--countdown: -1 should be from 0 to 60 seconds"),

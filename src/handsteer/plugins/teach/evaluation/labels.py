@@ -23,7 +23,7 @@ class LabelledPhoto:
     Attributes:
         path: The file.
         truth: The correct sign, or ``NONE``; None if it is not to be scored.
-        kind: A further description, such as ``thumb_up`` for a hand that is no sign; may be empty.
+        kind: A further description, such as ``thumb_up`` for a hand that is not a sign; may be empty.
         person_set: The person, or the set of photos; may be empty.
     """
 

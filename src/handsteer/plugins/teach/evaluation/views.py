@@ -17,7 +17,7 @@ _MARGIN = 0.3
 _TILT_DEG = 30.0
 
 # Directions in the image, in degrees clockwise from up. The image is not mirrored: the user's right is its left. A
-# sideways index finger, and a thumb up or down, are no signs, but become one when rotated.
+# sideways index finger, and a thumb up or down, are not signs, but become one when rotated.
 _DIRECTIONS: dict[tuple[str, str], tuple[str, float]] = {
     (FORWARD, ""): ("index", 0.0),
     (BACKWARD, ""): ("index", 180.0),
