@@ -24,6 +24,7 @@ from handsteer.config import DEFAULT_FILE, DashboardConfig
 from handsteer.dashboard.access import HEADERS, Access, AccessMiddleware
 from handsteer.dashboard.calibration import Calibrations
 from handsteer.dashboard.camera import FrameSocket, PictureNode, PictureResponse
+from handsteer.dashboard.closed_pages import free_when_closed
 from handsteer.dashboard.drive_page import DrivePage
 from handsteer.dashboard.elements import STATIC
 from handsteer.dashboard.front import PagesLoop, StopPath
@@ -203,6 +204,12 @@ class Dashboard:
             self._steering.halt()
             self.context.audit.say("stop_pressed", viewer, "pressed Stop", level=WARN)
 
+    @property
+    def robot_stands(self) -> bool:
+        """Whether the robot is not commanded to move, as far as viewers are shown; true without viewers."""
+        node = self.node.running
+        return node is None or node.state().commanded.is_zero
+
     def _drives(self, viewer: str) -> bool:
         if not self.node.is_watched_by(viewer):
             return False
@@ -278,7 +285,9 @@ def _application() -> FastAPI:
     def serve(path: str, page: Callable[[PageContext], Page]) -> None:
         @ui.page(path)
         def shown() -> None:
-            unconnected.add(page(application.state.dashboard.context).client)
+            shown_page = page(application.state.dashboard.context)
+            free_when_closed(shown_page)
+            unconnected.add(shown_page.client)
 
     for path, page in _PAGES.items():
         serve(path, page)
