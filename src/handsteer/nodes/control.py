@@ -10,7 +10,7 @@ from handsteer.config import CollisionMonitorConfig, Config, ControlConfig, JoyC
 from handsteer.control import Control
 from handsteer.control.engagement import SteeredBy
 from handsteer.control.explain import Reason, seconds_to_renew
-from handsteer.control.safety import Following
+from handsteer.control.following import Following
 from handsteer.messages import (
     CMD_VEL,
     GESTURE_JOY,
