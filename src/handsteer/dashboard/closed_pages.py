@@ -17,13 +17,15 @@ from nicegui.observables import ObservableCollection
 from handsteer.dashboard.page import Page
 
 _IN_USE_S: Final = 2.0
-"""Tasks of a closed page have ended after this time."""
+"""After a page was deleted, some ten seconds after its browser has left; what it still awaited has ended by then."""
 
 _NEVER: Final = 1_000_000_000
 _YOUNG: Final = (700, 10)
 """Thresholds of Python's two young generations, as by default; these searches take some milliseconds."""
 
-_GROWTH: Final = 1.5
+_GROWTH: Final = 3_000_000
+"""A search is worth while from so many allocated blocks of memory on, of some 75 bytes each; twenty large pages."""
+
 _LARGEST_GROWTH: Final = 8_000_000
 _REST_S: Final = 1.0
 _BETWEEN_S: Final = 10.0
@@ -92,7 +94,7 @@ class Garbage:
             self._stood_since_s = now_s
         blocks = sys.getallocatedblocks()
         rests = self._stood_since_s is not None and now_s - self._stood_since_s >= _REST_S
-        is_due = rests and blocks > _GROWTH * self._blocks and now_s - self._searched_s >= _BETWEEN_S
+        is_due = rests and blocks > self._blocks + _GROWTH and now_s - self._searched_s >= _BETWEEN_S
         if not (is_due or blocks > self._blocks + _LARGEST_GROWTH):
             return False
         gc.collect()
