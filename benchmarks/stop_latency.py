@@ -6,6 +6,7 @@ script sends too, at a planned time, and waits for ``/stop`` in the graph's proc
 """
 
 import argparse
+import contextlib
 import subprocess
 import sys
 import threading
@@ -16,6 +17,8 @@ from pathlib import Path
 from urllib.parse import urlsplit
 
 import numpy as np
+from _measuring import resident_mb
+from websockets.exceptions import ConnectionClosed
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # for the websocket that the tests use
 
@@ -46,6 +49,7 @@ class Served:
         self.graph = Graph(config, steering=False)
         self._page = PageProcess()
         self.url = self._page.serve(self.graph)
+        self.process = self._page.process.pid
         self.port = urlsplit(self.url).port or 0
         self.stopped = threading.Event()
         self.graph.transport.subscribe("benchmark", STOP, self._on_stop)
@@ -64,6 +68,12 @@ class Served:
             self.stopped.set()
 
 
+def stay(page: PageSocket) -> None:
+    """Read what the page sends and answer its pings, as a browser does."""
+    with contextlib.suppress(ConnectionClosed, TimeoutError):
+        page.read_on()
+
+
 def trial(site: Served, ask: threading.Event) -> float:
     site.stopped.clear()
     began_s = time.perf_counter()
@@ -76,6 +86,7 @@ def measure(site: Served, trials: int, openers: int) -> None:
     with PageSocket(site, html, cookies) as page:  # type: ignore[arg-type]
         element, listener = events_of(html)["space"][0]
         event = {"id": element, "client_id": page.client, "listener_id": listener, "args": ["{}"]}
+        threading.Thread(target=stay, args=[page], daemon=True).start()
         command = [sys.executable, "-c", OPENER, f"{site.url}/settings", "0.2"]
         others = [subprocess.Popen(command) for _ in range(openers)]
         time.sleep(2.0)
@@ -91,7 +102,12 @@ def measure(site: Served, trials: int, openers: int) -> None:
                     time.sleep(PAUSE_S)
                 p50, p99 = np.percentile(delays, (50, 99))
                 lost = np.isinf(delays).sum()
-                print(f"{openers} open pages, {way}: median {1e3 * p50:.0f} ms, 99 % {1e3 * p99:.0f} ms, lost {lost}")
+                memory = f"page's process {resident_mb(str(site.process)):.0f} MB"
+                print(
+                    f"{openers} open pages, {way}: median {1e3 * p50:.0f} ms, 99 % {1e3 * p99:.0f} ms, "
+                    f"longest {1e3 * max(delays):.0f} ms, lost {lost} of {trials}, {memory}",
+                    flush=True,
+                )
         finally:
             for other in others:
                 other.kill()

@@ -54,6 +54,10 @@ NOT_FOLLOWING_S: Final = 1.0
 STOOD_BY_ITSELF_S: Final = 0.1
 """A robot that was following, and stops for this long in spite of commands, does not receive them."""
 
+OPPOSES_S: Final = 0.4
+"""A robot that moves against its command for this long is not under control; :data:`NOT_FOLLOWING_S` if it moved so
+when the command came, as a robot that is turned round has to brake first."""
+
 ENGAGE_S: Final = 1.0
 """An open palm held for this long engages the hand (``control.engage``)."""
 

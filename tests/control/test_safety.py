@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from handsteer.config import ControlConfig
 from handsteer.control.engagement import Engagement
-from handsteer.control.safety import Allowance, Following, Ramp, Safety
+from handsteer.control.safety import Allowance, Ramp, Safety
 from handsteer.timeouts import ARMING_S, DISENGAGE_S, FAULT_GAP_S, NEUTRAL_S
 from handsteer.types import ZERO, Velocity
 
@@ -222,64 +222,6 @@ def test_whatever_happens_a_stopped_robot_follows_nobody(events: list[tuple[str,
             assert not (safety.admits_steering(is_zero=event == "zero") and stopped)
         else:
             assert not (safety.admits_sign(event, stops=event in {"NONE", "Stop"}) and stopped)
-
-
-def test_a_robot_whose_odometry_stops_is_not_there() -> None:
-    following = Following()
-    assert following.step(10.0, Velocity(0.5, 0.0)) is None, "it never gave any"
-    following.note(Velocity(0.5, 0.0))
-    assert following.step(0.35, Velocity(0.5, 0.0)) is None
-    assert following.step(0.06, Velocity(0.5, 0.0)) == "the robot's odometry has stopped"
-    following.note(Velocity(0.5, 0.0))
-    assert following.step(0.02, Velocity(0.5, 0.0)) is None
-
-
-def test_where_motion_is_not_checked_silence_still_is() -> None:
-    following = Following(checks_motion=False)
-    for _ in range(200):
-        following.note(ZERO)
-        assert following.step(0.02, Velocity(1.0, 0.0)) is None
-    assert not following.is_silent
-    assert following.step(0.5, Velocity(1.0, 0.0)) == "the robot's odometry has stopped"
-    assert following.is_silent
-
-
-@pytest.mark.parametrize("commanded", [Velocity(0.5, 0.0), Velocity(-0.5, 0.0), Velocity(0.0, 1.0)])
-def test_a_robot_that_stands_though_it_is_told_to_move_does_not_follow(commanded: Velocity) -> None:
-    following, said = Following(), []
-    for _ in range(60):
-        following.note(ZERO)
-        said.append(following.step(0.02, commanded))
-    assert "the robot did not follow its commands" in said[49:]
-    assert set(said[:49]) == {None}
-
-
-def test_a_robot_that_has_followed_and_stands_does_not_hear() -> None:
-    following, forward = Following(), Velocity(0.5, 0.0)
-    following.note(Velocity(0.4, 0.0))
-    assert following.step(0.02, forward) is None
-    said = []
-    for _ in range(6):
-        following.note(ZERO)
-        said.append(following.step(0.02, forward))
-    assert said[-2] == "the robot did not follow its commands"
-
-
-def test_a_robot_that_turns_round_stands_for_a_moment() -> None:
-    following = Following()
-    following.note(Velocity(0.5, 0.0))
-    assert following.step(0.02, Velocity(0.5, 0.0)) is None
-    for number in range(50):
-        following.note(Velocity(0.5 - 0.02 * number, 0.0))
-        assert following.step(0.02, Velocity(-0.5, 0.0)) is None
-
-
-def test_a_robot_that_moves_or_is_told_little_follows() -> None:
-    for commanded, measured in ((Velocity(0.5, 0.0), Velocity(0.3, 0.0)), (Velocity(0.02, 0.0), ZERO), (ZERO, ZERO)):
-        following = Following()
-        for _ in range(200):
-            following.note(measured)
-            assert following.step(0.02, commanded) is None
 
 
 @given(st.floats(30.0, 2000.0), st.floats(1.0, 3.0))
@@ -505,16 +447,6 @@ def test_empty_pictures_that_come_seldom_count_as_one_frame_each() -> None:
     assert not show(safety, "Forward")
     show(safety, "NONE", 2.0, period_s=0.25)
     assert show(safety, "Forward")
-
-
-def test_odometry_that_is_no_number_is_none() -> None:
-    """The guard: ``is_finite`` in ``Following.note``."""
-    following, said = Following(), []
-    following.note(Velocity(0.5, 0.0))
-    for _ in range(30):
-        following.note(Velocity(math.nan, 0.0))
-        said.append(following.step(0.02, Velocity(0.5, 0.0)))
-    assert said[-1] == "the robot's odometry has stopped"
 
 
 def test_allowance_that_was_not_used_expires() -> None:

@@ -207,7 +207,7 @@ def _lies() -> Iterator[Row]:
     for words, speed in (
         ("NaN in its odometry", lambda _: math.nan),
         ("in its odometry that it stands", lambda _: 0.0),
-        ("in its odometry that it goes the other way; then the driver stops", lambda real: -real),
+        ("in its odometry that it goes the other way", lambda real: -real),
         ("ten times its speed; then the driver stops", lambda real: 10.0 * real),
         ("that it moves whatever it does; then the driver stops", lambda _: SPEED_MPS),
     ):

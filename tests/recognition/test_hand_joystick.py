@@ -177,6 +177,28 @@ def test_another_fist_within_reach_that_the_movement_does_not_explain_releases_i
     assert person.closes(other, 60) == RELEASED, "it must be opened first"
 
 
+@pytest.mark.parametrize("fps", [10, 12, 15, 20, 30])
+@pytest.mark.parametrize("palms", [0.6, 0.7, 0.79])
+def test_another_fist_takes_over_at_no_frame_rate(person: Person, fps: int, palms: float) -> None:
+    person.shows(OPEN, STOP, 8, dt_s=1 / fps)
+    assert person.shows(FIST, GO, 6, dt_s=1 / fps) == Stick(held=True)
+    other = moved(FIST, palms * person.palm_px, 0)
+    assert person.shows(other, GO, 1, dt_s=1 / fps) == RELEASED
+    assert person.shows(other, GO, 60, dt_s=1 / fps) == RELEASED, "it must be opened first"
+
+
+@pytest.mark.parametrize("fps", [10, 12, 15, 20, 30])
+@pytest.mark.parametrize("phase", [0.0, 0.2, 0.4, 0.6, 0.8])
+def test_a_fast_movement_keeps_it_at_each_frame_rate(person: Person, fps: int, phase: float) -> None:
+    person.shows(OPEN, STOP, 8, dt_s=1 / fps)
+    assert person.shows(FIST, GO, 6, dt_s=1 / fps) == Stick(held=True)
+    palm_px = person.palm_px
+    for frame in range(fps):
+        share = min(1.0, (frame + phase) / fps / 0.3)
+        done = share**3 * (10 - 15 * share + 6 * share**2)
+        assert person.shows(moved(FIST, done * palm_px, 0), GO, 1, dt_s=1 / fps).held
+
+
 def test_a_movement_of_the_whole_range_in_a_quarter_of_a_second_keeps_it(person: Person) -> None:
     person.grabs()
     palm_px = person.palm_px

@@ -2,10 +2,11 @@
 
 :class:`Control` joins them: it converts signs and steering commands to safe velocities.
 
-Its twist mux selects the active input. ``safety`` decides when the robot may start, and how fast it may accelerate;
-:mod:`handsteer.timeouts` has all times of it, and the defaults of configurable ones. ``explain`` has the sentences on
-why the robot drives or stands, which the page, ``/diagnostics`` and ``Teleop`` share. ``obstacles`` slows commands for
-obstacles in the laser scan (docs/safety.md).
+Its twist mux selects the active input. ``safety`` decides when the robot may start, and how fast it may accelerate,
+``following`` by its odometry whether it does what is commanded; :mod:`handsteer.timeouts` has all times of it, and the
+defaults of configurable ones. ``actions`` are those of plug-ins. ``explain`` has the sentences on why the robot drives
+or stands, which the page, ``/diagnostics`` and ``Teleop`` share. ``obstacles`` slows commands for obstacles in the
+laser scan (docs/safety.md).
 """
 
 import math

@@ -1,8 +1,8 @@
 """Decides when the robot may move, and how fast it may accelerate: pure rules without a clock.
 
 A robot moves only while there is a current reason. :class:`Safety` decides whether inputs are followed,
-:class:`Following` whether the robot does what is commanded, :class:`Allowance` limits the rate of
-signs, and :class:`Ramp` acceleration and jerk. The times are in :mod:`handsteer.timeouts`.
+:class:`Allowance` limits the rate of signs, and :class:`Ramp` acceleration and jerk. The times are in
+:mod:`handsteer.timeouts`.
 """
 
 import math
@@ -14,9 +14,6 @@ from handsteer.timeouts import (
     FAULT_GAP_S,
     MOST_OF_ONE_NONE_S,
     NEUTRAL_S,
-    NOT_FOLLOWING_S,
-    ODOMETRY_S,
-    STOOD_BY_ITSELF_S,
 )
 from handsteer.types import NONE, Velocity
 
@@ -236,55 +233,6 @@ class Safety:
         self.engagement.disengage()
 
 
-class Following:
-    """Checks by odometry whether the robot does what is commanded; without odometry, it assumes so.
-
-    Args:
-        checks_motion: Whether it has to move as commanded; otherwise only that its odometry does not stop.
-
-    Attributes:
-        is_silent: Whether its odometry has stopped.
-    """
-
-    def __init__(self, *, checks_motion: bool = True) -> None:
-        self._checks_motion = checks_motion
-        self.is_silent = False
-        self._measured: Velocity | None = None
-        self._age_s = 0.0
-        self._refuses_s = 0.0
-        self._follows: Velocity | None = None
-
-    def note(self, measured: Velocity) -> None:
-        """Record a velocity from odometry; values that are not finite are ignored."""
-        if measured.is_finite:
-            self._measured = measured
-            self._age_s = 0.0
-
-    def step(self, dt_s: float, commanded: Velocity) -> str | None:
-        """Advance time by ``dt_s`` seconds of ``commanded``; return what is wrong with the robot, or None."""
-        if self._measured is None:
-            return None
-        self._age_s += dt_s
-        self.is_silent = self._age_s >= ODOMETRY_S
-        if self.is_silent:
-            return "the robot's odometry has stopped"
-        if not self._checks_motion:
-            return None
-        done = _done(commanded, self._measured)
-        turns_round = self._follows is not None and not _same_way(commanded, self._follows)
-        if not done or turns_round:
-            self._follows = None
-        elif max(done) >= 0.5:
-            self._follows = commanded
-        stands = bool(done) and max(map(abs, done)) <= 0.1
-        self._refuses_s = self._refuses_s + dt_s if stands else 0.0
-        if self._refuses_s < (STOOD_BY_ITSELF_S if self._follows else NOT_FOLLOWING_S):
-            return None
-        self._refuses_s = 0.0
-        self._follows = None
-        return "the robot did not follow its commands"
-
-
 class Allowance:
     """Limits how many signs may accelerate the robot, so that extra messages beyond a camera's rate have no effect.
 
@@ -351,13 +299,3 @@ class _Axis:
         self._acceleration = (grown - same_way) / dt_s if dt_s > 0 and grown > same_way else 0.0
         self._now = math.copysign(grown, wanted)
         return self._now
-
-
-def _done(commanded: Velocity, measured: Velocity) -> list[float]:
-    """Return measured over commanded velocity, linear and angular, where the command is large enough to compare."""
-    parts = ((commanded.linear_mps, measured.linear_mps, 0.1), (commanded.angular_radps, measured.angular_radps, 0.2))
-    return [does / wanted for wanted, does, least in parts if abs(wanted) >= least]
-
-
-def _same_way(one: Velocity, other: Velocity) -> bool:
-    return one.linear_mps * other.linear_mps >= 0 and one.angular_radps * other.angular_radps >= 0

@@ -11,7 +11,7 @@ from handsteer.control import Control
 from handsteer.control.actions import AddedActions
 from handsteer.control.engagement import SteeredBy
 from handsteer.control.explain import Reason, seconds_to_renew
-from handsteer.control.safety import Following
+from handsteer.control.following import Following
 from handsteer.errors import ConfigError, PluginError
 from handsteer.messages import (
     CMD_VEL,

@@ -56,6 +56,11 @@ two people's clips is 0.10."""
 _ACCELERATION: Final = 110.0
 """Largest acceleration of a held hand, in palm lengths/s²: that of a movement over the stick's range in 0.25 s."""
 
+_CHANGE: Final = 0.45
+"""Largest distance that such an acceleration explains, however far frames are apart, in palm lengths: that of a
+movement over the stick's range in 0.3 s at 10 frames/s, of least jerk (Flash and Hogan 1985). At most 0.15 in these
+clips."""
+
 _RESIZE_A_FRAME: Final = 1.3
 """Largest change of the palm's length between two frames, as a ratio, of a held hand; 1.14 in these clips."""
 
@@ -258,7 +263,7 @@ class _Seen:
         """Return whether this continues the movement of a hand that was ``last`` at ``speed``, in pixels/s."""
         off = math.hypot(self.x - last.x - speed[0] * dt_s, self.y - last.y - speed[1] * dt_s)
         ratio = self.palm_px / last.palm_px
-        is_near = off <= min(_JUMP, _TREMOR + _ACCELERATION * dt_s**2) * max(self.palm_px, last.palm_px)
+        is_near = off <= (_TREMOR + min(_CHANGE, _ACCELERATION * dt_s**2)) * max(self.palm_px, last.palm_px)
         return is_near and 1 / _RESIZE_A_FRAME <= ratio <= _RESIZE_A_FRAME
 
 

@@ -60,6 +60,10 @@ class PageSocket:
         self._socket.send("421" + json.dumps([event, *said]))
         return json.loads(self._await("431")[3:])
 
+    def read_on(self) -> None:
+        """Read, and answer pings, until the connection ends or nothing has come for long."""
+        self._await("41")
+
     def __enter__(self) -> Self:
         return self
 

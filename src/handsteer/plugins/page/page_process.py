@@ -5,6 +5,7 @@ import functools
 import gc
 import importlib.util
 import threading
+import time
 from collections.abc import Callable
 from concurrent.futures import Future, InvalidStateError
 from pathlib import Path
@@ -109,6 +110,7 @@ def _serve(pipe: Pipe) -> None:
     """
     gc.disable()  # imports leave no garbage, and searching for it takes a fifth of their time
     # The graph's process, which imports this module too, does not load NiceGUI.
+    from handsteer.plugins.page.closed_pages import Garbage  # noqa: PLC0415
     from handsteer.plugins.page.server import Dashboard  # noqa: PLC0415
 
     graph, end = RemoteGraph(pipe), threading.Event()
@@ -123,13 +125,10 @@ def _serve(pipe: Pipe) -> None:
     graph.steering.start()
     if graph.study is not None:
         graph.steering.halt()
-    # Objects loaded so far stay. Frozen, they do not slow down collections, which can then run as soon as a few pages
-    # have been closed; each takes a megabyte.
-    gc.collect()
-    gc.freeze()
-    gc.enable()
+    garbage = Garbage()
+    garbage.start(time.monotonic())
     while not (end.wait(_LOOK_PERIOD_S) or pipe.ended.is_set()):
-        pass
+        garbage.look(time.monotonic(), stands=dashboard.robot_stands)
     graph.steering.stop()
     dashboard.stop()
 

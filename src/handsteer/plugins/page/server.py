@@ -28,6 +28,7 @@ from handsteer.nodes.steering import SteeringNode
 from handsteer.plugins.page.access import HEADERS, Access, AccessMiddleware
 from handsteer.plugins.page.calibration import Calibrations
 from handsteer.plugins.page.camera import FrameSocket, PictureNode, PictureResponse
+from handsteer.plugins.page.closed_pages import free_when_closed
 from handsteer.plugins.page.drive_page import DrivePage
 from handsteer.plugins.page.elements import STATIC
 from handsteer.plugins.page.front import PagesLoop, StopPath
@@ -198,6 +199,12 @@ class Dashboard:
             self._steering.halt()
             self.context.audit.say("stop_pressed", viewer, "pressed Stop", level=WARN)
 
+    @property
+    def robot_stands(self) -> bool:
+        """Whether the robot is not commanded to move, as far as viewers are shown; true without viewers."""
+        node = self.node.running
+        return node is None or node.state().commanded.is_zero
+
     def _drives(self, viewer: str) -> bool:
         if not self.node.is_watched_by(viewer):
             return False
@@ -273,7 +280,9 @@ def _application() -> FastAPI:
     def serve(path: str, page: Callable[[PageContext], Page]) -> None:
         @ui.page(path)
         def shown() -> None:
-            unconnected.add(page(application.state.dashboard.context).client)
+            shown_page = page(application.state.dashboard.context)
+            free_when_closed(shown_page)
+            unconnected.add(shown_page.client)
 
     serve("/", DrivePage)
     for path, added in added_pages().items():

@@ -52,6 +52,7 @@ class SettingsPanel:
         self._settings, self._page = settings, page
         self._shown: tuple[object, ...] = ()
         self._groups: list[_Group] = []
+        page.client.on_delete(self._groups.clear)  # rows refer to this panel
         self._toolbar()
         with box("settings"):
             # Unfolded by settings.js on wide screens.

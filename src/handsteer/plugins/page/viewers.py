@@ -137,6 +137,11 @@ class OnDemandNode(Generic[N]):
         self._node: N | None = None
         self._closed = False
 
+    @property
+    def running(self) -> N | None:
+        """The node while a viewer watches, else None."""
+        return self._node
+
     def join(self, viewer: Hashable) -> N | None:
         """Return the running node, or None after :meth:`close`; joining twice counts once."""
         with self._lock:

@@ -96,6 +96,7 @@ const WORDS = {
   "recognition had no frame": "die Erkennung hatte kein Bild",
   "the robot's odometry has stopped": "die Odometrie des Roboters ist ausgeblieben",
   "the robot did not follow its commands": "der Roboter ist den Befehlen nicht gefolgt",
+  "the robot moved against its commands": "der Roboter hat sich gegen die Befehle bewegt",
   "another robot listens": "ein anderer Roboter hört zu",
   "no robot listens": "kein Roboter hört zu",
   "laser scans did not come": "es kamen keine Laserscans",
