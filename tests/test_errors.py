@@ -1,12 +1,13 @@
 """What is said where a package is not installed."""
 
 import json
+import re
 import subprocess
 import sys
 
 import pytest
 
-from handsteer.errors import LONGEST_QUOTE, PackageMissing, needing, quoted
+from handsteer.errors import LONGEST_QUOTE, PackageMissing, install_command, needing, quoted
 
 OUTSIDE = (
     "x" * 5000, "\x1b[2J\r\n", "\u202e\ud800", 10**5000, [[[[[[[[1]]]]]]]], {"a": ["y" * 5000] * 50},
@@ -27,6 +28,7 @@ def test_a_short_value_is_quoted_as_it_is() -> None:
     assert len(quoted("a" * 61)) == LONGEST_QUOTE + 2
 
 
+PIP = f"{sys.executable} -m pip install"
 VIRTUAL = ("--camera", "virtual", "--camera.width", "320", "--camera.height", "240", "--duration", "5")
 
 
@@ -37,15 +39,15 @@ VIRTUAL = ("--camera", "virtual", "--camera.width", "320", "--camera.height", "2
         (
             "mujoco",
             ("run", "--headless", *VIRTUAL),
-            "the simulated robot needs the package mujoco: run pip install 'ha",
+            "the simulated robot needs the package mujoco: run " + PIP + " 'mujoco>=",
         ),
         ("nicegui", ("run", *VIRTUAL), "the page (a run with --headless does without) needs the package nicegui"),
         (
             "websockets",
             ("run", "--headless", "--foxglove", "0", *VIRTUAL),
-            "--foxglove needs the package websockets: run pip install 'handsteer[foxglove]'",
+            "--foxglove needs the package websockets: run " + PIP + " 'websockets>=",
         ),
-        ("zenoh", ("zenoh-router",), "the Zenoh router needs the package zenoh: run pip install 'handsteer[zenoh]'"),
+        ("zenoh", ("zenoh-router",), "the Zenoh router needs the package zenoh: run " + PIP + " 'eclipse-zenoh"),
     ],
 )
 def test_a_verb_says_what_to_install(module: str, command: tuple[str, ...], says: str) -> None:
@@ -61,3 +63,18 @@ def test_what_else_is_missing_is_no_matter_of_an_extra() -> None:
         import not_of_an_extra  # type: ignore[import-not-found]  # noqa: PLC0415
     with pytest.raises(PackageMissing), needing("the page", "page", "not_of_an_extra"):
         import not_of_an_extra.part  # type: ignore[import-not-found]  # noqa: F401, PLC0415
+
+
+def test_the_command_to_install_an_extra_fits_this_installation(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert re.fullmatch(rf"{sys.executable} -m pip install 'matplotlib[<>=.\d,]*'", install_command("plots"))
+    assert "nicegui" in install_command("page")
+    monkeypatch.setattr("importlib.util.find_spec", lambda _: None)
+    assert install_command("plots").startswith(f"uv pip install --python {sys.executable} 'matplotlib")
+    assert install_command("unknown") == "pip install 'handsteer[unknown]'"
+
+
+@pytest.mark.slow
+def test_nothing_but_handsteer_writes_to_standard_error() -> None:
+    command = [sys.executable, "-m", "handsteer", "run", "--headless", "--fast", *VIRTUAL]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert done.stderr == ""

@@ -27,6 +27,8 @@ REFUSED = (
     ("a: !<" + "x" * 5000 + "> 1", "is not read here"),
     ("a: {", r"^w\.yaml, line 1: not valid YAML$"),
     ("? [1]\n: 2", "line 1: not valid YAML"),
+    ("a:\n\tb: 1", "line 2: not valid YAML: indent with spaces, not with a tab$"),
+    ("a:\n  b: 1\n \t c: [", "line 3: not valid YAML: indent with spaces, not with a tab$"),
     ("a: 0b_", "not valid YAML"),
     ("\0", "not valid YAML"),
     ("a: \ud800", "not valid YAML"),

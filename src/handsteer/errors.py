@@ -5,7 +5,9 @@ and exits (with code 2).
 """
 
 import difflib
+import re
 import reprlib
+import sys
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from typing import Final
@@ -154,6 +156,28 @@ def reason_of(error: Exception) -> str:
     return (error.strerror if isinstance(error, OSError) else None) or str(error)
 
 
+def install_command(extra: str) -> str:
+    """Return the command that adds what an extra of handsteer needs to this installation, however it was made.
+
+    Args:
+        extra: One of the extras in ``pyproject.toml``, such as ``plots``.
+    """
+    import importlib.metadata  # noqa: PLC0415 - it takes longer to load than this module, and is rarely needed
+    import importlib.util  # noqa: PLC0415
+
+    of_extra = re.compile(rf"extra == [\"']{extra}[\"']")
+    try:
+        known = importlib.metadata.requires("handsteer") or []
+    except importlib.metadata.PackageNotFoundError:
+        known = []
+    wanted = [f"'{each.partition(';')[0].strip()}'" for each in known if of_extra.search(each)]
+    if not wanted:
+        return f"pip install 'handsteer[{extra}]'"
+    has_pip = importlib.util.find_spec("pip") is not None
+    installer = f"{sys.executable} -m pip install" if has_pip else f"uv pip install --python {sys.executable}"
+    return f"{installer} {' '.join(wanted)}"
+
+
 @contextmanager
 def needing(what: str, extra: str, *modules: str) -> Iterator[None]:
     """Report how to install a package that an import within the block lacks.
@@ -172,4 +196,4 @@ def needing(what: str, extra: str, *modules: str) -> Iterator[None]:
         module = (problem.name or "").partition(".")[0]
         if module not in modules:
             raise
-        raise PackageMissing(f"{what} needs the package {module}: run pip install 'handsteer[{extra}]'") from None
+        raise PackageMissing(f"{what} needs the package {module}: run {install_command(extra)}") from None

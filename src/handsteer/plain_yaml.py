@@ -68,7 +68,10 @@ def parse(text: str | bytes, source: str, error: type[HandsteerError]) -> Any:
     except _ProblemError as problem:
         reason, line = str(problem), problem.line
     except yaml.YAMLError as problem:
-        reason, line = "not valid YAML", getattr(getattr(problem, "problem_mark", None), "line", None)
+        line = getattr(getattr(problem, "problem_mark", None), "line", None)
+        reason = "not valid YAML"
+        if _begins_with_tab(text, line):
+            reason += ": indent with spaces, not with a tab"
     except ValueError:  # not valid UTF-8
         reason, line = "not valid YAML", None
     raise error(f"{source}{_at(line, text)}: {reason}") from None
@@ -126,6 +129,11 @@ def _at(line: int | None, text: str | bytes) -> str:
         return ""
     last = (text if isinstance(text, bytes) else text.encode(errors="replace")).rstrip().count(b"\n")
     return f", line {min(line, last) + 1}"  # libyaml reports the end on the line after the last
+
+
+def _begins_with_tab(text: str | bytes, line: int | None) -> bool:
+    lines = (text if isinstance(text, bytes) else text.encode(errors="replace")).split(b"\n")
+    return line is not None and line < len(lines) and b"\t" in lines[line][: -len(lines[line].lstrip()) or None]
 
 
 def _look_through(text: str | bytes) -> None:

@@ -6,6 +6,7 @@ verb names the modules it works with by :func:`loads`.
 
 import gc
 import importlib
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
@@ -74,6 +75,8 @@ _EXAMPLES = """Examples:
   handsteer parameters control                   what can be set, each as an option
   handsteer doctor                               what works on this machine
 """
+
+_NOT_A_NUMBER = re.compile(r"Invalid value for (\S+): unable to convert (.*) into (float|int)", re.DOTALL)
 
 _GRAPH = "One node of a graph of several processes"
 _NODES = ("camera", "recognition", "control", "robot", "steering")
@@ -179,6 +182,9 @@ def _problem(error: CycloptsError) -> str:
         near = did_you_mean(error.unused_tokens[0], verbs)
         return f'Unknown command "{error.unused_tokens[0]}"{near or ":"} the commands are {", ".join(verbs)}'
     text = str(error).rstrip(".")
+    wrong = _NOT_A_NUMBER.fullmatch(text)
+    if wrong:
+        text = f"{wrong[1]}: {wrong[2]} should be {'a' if wrong[3] == 'float' else 'a whole'} number"
     if isinstance(error, UnknownOptionError) and "Did you mean" not in text:
         text += with_section((error.token.keyword or error.token.value).partition("=")[0])
     return f"{text}; see {chain} --help" if not text.endswith("?") else f"{text} See {chain} --help"

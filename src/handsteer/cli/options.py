@@ -13,6 +13,9 @@ if TYPE_CHECKING:
     from handsteer.config import Section
 
 _PARAMETER = re.compile(r"--([A-Za-z][\w-]*)\.([^=]+)(?:=(.*))?", re.DOTALL)
+_CALLED = {"page": "dashboard"}
+"""Sections by what people call what they are for."""
+
 _NUMBER = re.compile(r"-[\d.].*")
 
 
@@ -95,7 +98,13 @@ def _model(section: str, given: str) -> "type[Section]":
 
     if section not in Config.model_fields:
         dashed = section.replace("_", "-")
-        known = [f"--{each.replace('_', '-')}.{given}" for each in Config.model_fields]
+        known = [
+            f"--{each.replace('_', '-')}.{given}"
+            for each in Config.model_fields
+            if given.replace("-", "_").partition(".")[0] in section_model(each).model_fields
+        ]
+        if section in _CALLED and f"--{_CALLED[section]}.{given}" in known:
+            raise ConfigError(f"there is no option --{dashed}.{given}: did you mean --{_CALLED[section]}.{given}?")
         raise ConfigError(f"there is no option --{dashed}.{given}{did_you_mean(f'--{dashed}.{given}', known)}")
     return section_model(section)
 

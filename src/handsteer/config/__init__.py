@@ -260,6 +260,8 @@ def describe(error: ValidationError, section: type[Section] | None = None) -> st
     if problem["type"] == "extra_forbidden":
         known = _fields_beside(section, problem["loc"])
         return f"{field}: there is no such parameter{did_you_mean(str(problem['loc'][-1])[:_LONGEST_SHOWN], known)}"
+    if problem["type"] == "model_type":
+        return f"{field}: {quoted(problem['input'], _LONGEST_SHOWN)} should be parameters, each with its value"
     reason = problem["msg"].removeprefix("Input ").removeprefix("Value error, ")
     if problem["type"] == "literal_error":
         reason += did_you_mean(str(problem["input"])[:_LONGEST_SHOWN], re.findall(r"'([^']*)'", reason))

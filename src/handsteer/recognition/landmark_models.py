@@ -13,10 +13,11 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 import zipfile
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Final
 
@@ -54,6 +55,9 @@ _LICENCE: Final = "mediapipe-0.10.21.dist-info/LICENSE"
 _REMEDY: Final = "run 'handsteer models', or set HANDSTEER_MODELS to a folder that has it"
 _OFFLINE: Final = "set HANDSTEER_MODELS to a folder that has them"
 
+_STANDARD_ERROR = 2
+_GREETING = b"Created TensorFlow Lite"
+_one_at_a_time = threading.Lock()
 _TRIES = 5
 _BETWEEN_TRIES_S = 0.001
 
@@ -228,6 +232,32 @@ def _write(path: Path, content: bytes) -> None:
             raise
 
 
+@contextmanager
+def _without_greeting() -> Iterator[None]:
+    """Keep the line with which TensorFlow Lite reports on standard error that it has begun; show all other lines.
+
+    There is no setting for it: its library writes to the file descriptor itself.
+    """
+    with ExitStack() as stack:
+        try:
+            kept = stack.enter_context(tempfile.TemporaryFile())
+            own = os.dup(_STANDARD_ERROR)
+        except OSError:  # there is no room, or standard error is closed
+            yield
+            return
+        stack.callback(os.close, own)
+        with _one_at_a_time:
+            os.dup2(kept.fileno(), _STANDARD_ERROR)
+            try:
+                yield
+            finally:
+                os.dup2(own, _STANDARD_ERROR)
+        kept.seek(0)
+        for line in kept:
+            if _GREETING not in line:
+                os.write(_STANDARD_ERROR, line)
+
+
 class PictureModel:
     """A model with one square RGB picture as its input, run on the CPU; not thread-safe.
 
@@ -247,8 +277,9 @@ class PictureModel:
         self._darkest = np.float32(darkest)
         self._per_level = np.float32((1 - darkest) / 255)
         try:
-            self._interpreter = Interpreter(model_path=str(path), num_threads=threads)
-            self._interpreter.allocate_tensors()
+            with _without_greeting():
+                self._interpreter = Interpreter(model_path=str(path), num_threads=threads)
+                self._interpreter.allocate_tensors()
         except (RuntimeError, ValueError) as error:
             raise ModelCorrupt(f"{path}: not a model that can be run ({str(error).splitlines()[0]})") from None
         (picture,) = self._interpreter.get_input_details()

@@ -134,17 +134,23 @@ class Recognizer:
         chances, confidence = recognition.likelihoods, self._classifier.confidence
         return tuple(confidence(sign, chances.get(sign, 0.0)) for sign in self.signs)
 
-    def recognize(self, image: NDArray[np.uint8]) -> Recognition:
+    def recognize(self, image: NDArray[np.uint8] | str | Path) -> Recognition:
         """Return the recognition of one picture alone; resets the stream before and after.
 
-        Its ``sign`` is that of the picture, without confirmation.
+        Its ``sign`` is that of the picture, without confirmation. A picture with other proportions than the camera saw,
+        such as a photo that was squashed to a square, may give ``NONE``: hands are searched for as they look.
 
         Args:
-            image: (height, width, 3) uint8, BGR, not mirrored.
+            image: (height, width, 3) uint8, BGR, not mirrored; or the path of a photo, jpg or png.
 
         Raises:
             FrameError: The image has another shape or type.
+            CameraUnreadable: The photo cannot be read or decoded.
         """
+        if isinstance(image, str | Path):
+            from handsteer.cameras.files import read_photo  # noqa: PLC0415 - a stream of frames does not need it
+
+            image = read_photo(Path(image))
         self.reset()
         recognition = self._step(image, 0.0, alone=True)
         self.reset()

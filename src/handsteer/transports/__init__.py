@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from handsteer import doors
-from handsteer.errors import TransportError, did_you_mean
+from handsteer.errors import TransportError, did_you_mean, install_command
 from handsteer.transports.base import Session
 
 AUTO: Final = "auto"
@@ -49,6 +49,6 @@ def _found() -> str:
     if importlib.util.find_spec("cyclonedds") is None:
         raise TransportError(
             "there is no ROS 2 here, and nothing that speaks its wire: neither rclpy (source ROS 2, and start "
-            "handsteer with the Python that it is for), nor the package cyclonedds (pip install 'handsteer[dds]')"
+            f"handsteer with the Python that it is for), nor the package cyclonedds ({install_command('dds')})"
         )
     return "dds"

@@ -208,7 +208,7 @@ def test_without_cyclonedds(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(platform, "python_version_tuple", lambda: ("3", "13", "0"))
     (said,) = examine_ros2({})
     assert said.verdict == "optional"
-    assert "pip install 'handsteer[dds]'" in said.detail
+    assert "pip install 'cyclonedds" in said.detail
     monkeypatch.setattr(platform, "python_version_tuple", lambda: ("3", "14", "0"))
     monkeypatch.setattr(platform, "python_version", lambda: "3.14.0")
     assert "there is none for Python 3.14.0; use Python 3.11 to 3.13" in examine_ros2({})[0].detail

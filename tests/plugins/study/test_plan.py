@@ -112,7 +112,7 @@ def test_no_hand_moves_the_robot_where_another_input_is_studied() -> None:
     [
         ({"control": {"rampage": 1}}, r"plan\.yaml: config of 'pad': control\.rampage: there is no such parameter"),
         ({"control": {"max_linear": -1}}, r"config of 'pad': control\.max_linear: -1 should be greater than 0"),
-        ({"control": 7}, "config of 'pad': control: 7 should be a valid dictionary"),
+        ({"control": 7}, "config of 'pad': control: 7 should be parameters, each with its value"),
         ({"camera": {"fps": 10}}, r"camera\.fps differs between 'signs' and 'pad', but is read at the start only"),
     ],
 )

@@ -30,5 +30,8 @@ def test_without_zenoh_it_says_what_to_install(module: str) -> None:
     command = [sys.executable, "-c", program, "control", "--transport", "zenoh"]
     done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
     assert done.returncode == 2
-    assert f"the transport zenoh needs the package {module}: run pip install 'handsteer[zenoh]'" in done.stderr
+    assert (
+        f"the transport zenoh needs the package {module}: run {sys.executable} -m pip install 'eclipse-zenoh"
+        in done.stderr
+    )
     assert "Traceback" not in done.stderr

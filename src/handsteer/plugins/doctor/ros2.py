@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-from handsteer.errors import TransportError
+from handsteer.errors import TransportError, install_command
 from handsteer.plugins.dds.network import PLACES_BY_MULTICAST, Network, multicast_addresses, network
 
 Verdict = Literal["ok", "optional", "wrong", "missing"]
@@ -200,7 +200,7 @@ def _no_engine() -> str:
         )
     if platform.system() == "Linux" and platform.machine() != "x86_64":
         return f"no cyclonedds, which --transport dds needs: there is none for Linux on {platform.machine()}"
-    return "no cyclonedds, which --transport dds needs: pip install 'handsteer[dds]'"
+    return f"no cyclonedds, which --transport dds needs: {install_command('dds')}"
 
 
 def _unusual_settings(environment: Mapping[str, str], here: Network) -> list[str]:
