@@ -58,8 +58,10 @@ def test_a_closed_page_is_freed_without_a_search(
 ) -> None:
     monkeypatch.setattr(closed_pages, "_IN_USE_S", 0.0)
     page = Client.instances[client_of(fetched(f"{address}{path}"))]
-    elements = [weakref.ref(each) for each in page.elements.values()]
-    assert len(elements) > 50
+    parts = [part for each in page.elements.values() for part in (each, each.props, each.style)]
+    elements = [weakref.ref(part) for part in parts]
+    del parts
+    assert len(elements) > 150
     on_pages_loop(page.delete)
     del page
 
