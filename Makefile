@@ -114,7 +114,7 @@ faults: $(BIN)/.dev models
 	@$(BIN)/python -m tests.faults $(ARGS)
 
 soak: $(BIN)/.dev models
-	@HANDSTEER_STEPS=1000000 $(BIN)/pytest tests/faults/test_stateful.py tests/control/test_histories.py
+	@HANDSTEER_STEPS=1000000 $(BIN)/pytest --timeout 0 tests/faults/test_stateful.py tests/control/test_histories.py
 	@$(BIN)/python benchmarks/soak.py
 
 docs: $(BIN)/.dev

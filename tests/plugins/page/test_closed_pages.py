@@ -6,13 +6,14 @@ import urllib.request
 import weakref
 from collections.abc import Callable, Iterator
 
+import numpy as np
 import pytest
 from nicegui import Client, core
 
 from handsteer.config import load
 from handsteer.graph import Graph
 from handsteer.plugins.page import closed_pages
-from handsteer.plugins.page.closed_pages import Garbage
+from handsteer.plugins.page.closed_pages import Garbage, memory_mb
 from handsteer.plugins.page.server import Dashboard
 from tests.plugins.page.network import client_of
 from tests.plugins.page.served import PATIENCE_S, remote
@@ -57,8 +58,10 @@ def test_a_closed_page_is_freed_without_a_search(
 ) -> None:
     monkeypatch.setattr(closed_pages, "_IN_USE_S", 0.0)
     page = Client.instances[client_of(fetched(f"{address}{path}"))]
-    elements = [weakref.ref(each) for each in page.elements.values()]
-    assert len(elements) > 50
+    parts = [part for each in page.elements.values() for part in (each, each.props, each.style)]
+    elements = [weakref.ref(part) for part in parts]
+    del parts
+    assert len(elements) > 150
     on_pages_loop(page.delete)
     del page
 
@@ -94,15 +97,13 @@ def old_garbage() -> "weakref.ref[Cycle]":
 
 
 def test_garbage_waits_while_the_robot_moves(garbage: Garbage, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(closed_pages, "_GROWTH", 100_000)
     lost = old_garbage()
-    grown = [[each] for each in range(110_000)]
+    monkeypatch.setattr(closed_pages, "memory_mb", lambda: memory_mb() + 60.0)
     assert not any(garbage.look(float(now_s), stands=False) for now_s in range(60))
     assert lost() is not None
     assert not garbage.look(60.0, stands=True), "it may start again"
     assert garbage.look(61.5, stands=True)
     assert lost() is None
-    assert len(grown) > 0
 
 
 def test_garbage_stays_while_there_is_little(garbage: Garbage) -> None:
@@ -112,12 +113,16 @@ def test_garbage_stays_while_there_is_little(garbage: Garbage) -> None:
 
 
 def test_memory_is_bounded_even_while_the_robot_moves(garbage: Garbage, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(closed_pages, "_LARGEST_GROWTH", 100_000)
     lost = old_garbage()
-    grown = [[each] for each in range(110_000)]
+    monkeypatch.setattr(closed_pages, "memory_mb", lambda: memory_mb() + 420.0)
     assert garbage.look(1.0, stands=False)
     assert lost() is None
-    assert len(grown) > 0
+
+
+def test_memory_is_what_the_process_holds() -> None:
+    before = memory_mb()
+    held = np.ones(8_000_000)
+    assert memory_mb() - before == pytest.approx(1e-6 * held.nbytes, rel=0.5)
 
 
 def test_young_garbage_is_found_as_usual(garbage: Garbage) -> None:

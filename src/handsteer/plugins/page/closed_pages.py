@@ -7,7 +7,9 @@ once, and the search waits until the robot stands.
 
 import asyncio
 import gc
+import os
 import sys
+from pathlib import Path
 from typing import Final
 
 from nicegui import ui
@@ -23,15 +25,14 @@ _NEVER: Final = 1_000_000_000
 _YOUNG: Final = (700, 10)
 """Thresholds of Python's two young generations, as by default; these searches take some milliseconds."""
 
-_GROWTH: Final = 3_000_000
-"""A search is worth while from so many allocated blocks of memory on, of some 75 bytes each; twenty large pages."""
-
-_LARGEST_GROWTH: Final = 8_000_000
+_GROWTH_MB: Final = 50.0
+_LARGEST_GROWTH_MB: Final = 400.0
+_BLOCK_MB: Final = 75e-6
 _REST_S: Final = 1.0
 _BETWEEN_S: Final = 10.0
 
 _ELEMENT_KEEPS: Final = frozenset({"id", "tag", "slots", "_client", "_deleted", "_parent_slot"})
-_PAGE_KEEPS: Final = frozenset({"client", "_context"})
+_PAGE_KEEPS: Final = frozenset({"_context"})
 
 
 def free_when_closed(page: Page) -> None:
@@ -59,6 +60,7 @@ def _take_apart(page: Page, elements: list[Element]) -> None:
     client = page.client
     for handlers in (client.connect_handlers, client.disconnect_handlers, client.delete_handlers):
         handlers.clear()
+    client.outbox.message_history.clear()
     _forget_all_but(_PAGE_KEEPS, page)
 
 
@@ -75,7 +77,7 @@ class Garbage:
 
     def __init__(self) -> None:
         self._stood_since_s: float | None = None
-        self._blocks = 0
+        self._memory_mb = 0.0
         self._searched_s = 0.0
 
     def start(self, now_s: float) -> None:
@@ -84,7 +86,7 @@ class Garbage:
         gc.freeze()
         gc.set_threshold(*_YOUNG, _NEVER)
         gc.enable()
-        self._blocks, self._searched_s = sys.getallocatedblocks(), now_s
+        self._memory_mb, self._searched_s = memory_mb(), now_s
 
     def look(self, now_s: float, *, stands: bool) -> bool:
         """Search if it is due, a few times a second; return whether it was."""
@@ -92,11 +94,20 @@ class Garbage:
             self._stood_since_s = None
         elif self._stood_since_s is None:
             self._stood_since_s = now_s
-        blocks = sys.getallocatedblocks()
+        grown_mb = memory_mb() - self._memory_mb
         rests = self._stood_since_s is not None and now_s - self._stood_since_s >= _REST_S
-        is_due = rests and blocks > self._blocks + _GROWTH and now_s - self._searched_s >= _BETWEEN_S
-        if not (is_due or blocks > self._blocks + _LARGEST_GROWTH):
+        is_due = rests and grown_mb > _GROWTH_MB and now_s - self._searched_s >= _BETWEEN_S
+        if not (is_due or grown_mb > _LARGEST_GROWTH_MB):
             return False
         gc.collect()
-        self._blocks, self._searched_s = sys.getallocatedblocks(), now_s
+        self._memory_mb, self._searched_s = memory_mb(), now_s
         return True
+
+
+def memory_mb() -> float:
+    """Return the resident memory of this process in MB; only that of Python's objects where there is no ``/proc``."""
+    try:
+        pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
+    except OSError:
+        return _BLOCK_MB * sys.getallocatedblocks()
+    return 1e-6 * pages * os.sysconf("SC_PAGE_SIZE")

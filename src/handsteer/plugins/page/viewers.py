@@ -139,7 +139,7 @@ class OnDemandNode(Generic[N]):
 
     @property
     def running(self) -> N | None:
-        """The node while a viewer watches, else None."""
+        """The node while there are viewers, else None."""
         return self._node
 
     def join(self, viewer: Hashable) -> N | None:
