@@ -26,7 +26,7 @@ from handsteer.types import MOTION_SIGNS, NONE, SIGNS
 
 FOLDERS: Final = ("hagrid-dev", "photos", "index-down", "thumbs-clip")
 NO_SIGN, AT_REST, TURNED_THUMB = "no sign", "hand at rest", "turned thumb"
-RAW, MIRRORED, TURNED = "raw", "mirrored", "turned by 90°"
+RAW, MIRRORED, TURNED, GREY = "raw", "mirrored", "turned by 90°", "grey"
 
 _THUMBS = ("thumb_up", "thumb_down", "like", "dislike")
 _TILTS_DEG = (15.0, 30.0)
@@ -163,8 +163,8 @@ def photo_looks(photos: list[LabelledPhoto]) -> Iterator[PhotoLook | RestLook]:
 def _views(photo: LabelledPhoto, part: str) -> Iterator[tuple[str, View]]:
     """Yield the name and the view of each view of a photo.
 
-    Mirrored photos are not tilted as well. Of the tuning photos, only those of whole scenes are tilted: the crops are
-    many, and those of the report part show the same.
+    Mirrored photos are not tilted as well. Of the tuning photos, only those of whole scenes are tilted, and in grey:
+    the crops are many, and those of the report part show the same. One man's, that limits are chosen on, are grey.
     """
     yield RAW, View()
     yield MIRRORED, View(flip=True)
@@ -173,6 +173,8 @@ def _views(photo: LabelledPhoto, part: str) -> Iterator[tuple[str, View]]:
     if part != "tune" or photo.person_set == _WITH_SECOND_HAND:
         for tilt in _TILTS_DEG:
             yield from ((f"tilted by {tilt:g}°", View(rotate_deg=side * tilt)) for side in (-1, 1))
+    if part == "report" or photo.person_set == _WITH_SECOND_HAND:
+        yield GREY, View(grey=True)
 
 
 def _sample(photos: list[LabelledPhoto]) -> set[LabelledPhoto]:

@@ -25,7 +25,7 @@ PEOPLE: Final = {
 }
 SIDES: Final = {"-": "", "palm": "palm", "back": "back", "thumb_out": "thumb out"}
 TILTS: Final = ("tilted by 15°", "tilted by 30°")
-VIEWS: Final = ("raw", "mirrored", *TILTS)
+VIEWS: Final = ("raw", "mirrored", *TILTS, "grey")
 THUMBS: Final = ("thumb_up", "thumb_down", "like", "dislike")
 HANDS: Final = ("right hand", "left hand")
 

@@ -36,6 +36,20 @@ def test_signs_of_strangers_are_told_and_nothing_else_moves_the_robot(data_dir: 
     assert len(moving) <= 1
 
 
+def test_a_grey_camera_shows_most_signs_of_strangers_too(data_dir: Path, recognizer: Recognizer) -> None:
+    """Without colours, the palm model by itself misses 4 of 10 turns in these photos."""
+    right, shown = 0, 0
+    with (data_dir / "photos" / "index.csv").open() as file:
+        rows = [row for row in csv.DictReader(file) if row["sign"] not in ("", NONE) and int(row["width"]) >= 400]
+    for row in rows[::3]:
+        grey = cv2.imread(str(data_dir / "photos" / row["path"]), cv2.IMREAD_GRAYSCALE)
+        assert grey is not None, row["path"]
+        shown += 1
+        right += recognizer.recognize(np.asarray(cv2.cvtColor(grey, cv2.COLOR_GRAY2BGR), np.uint8)).seen == row["sign"]
+    assert shown > 50
+    assert right >= 0.8 * shown
+
+
 def test_a_hand_that_opens_pinches_and_closes_never_moves_the_robot(data_dir: Path, recognizer: Recognizer) -> None:
     recognizer.reset()
     video = cv2.VideoCapture(str(data_dir / "videos" / "dex-retargeting_human_hand_video_1280x720.mp4"))

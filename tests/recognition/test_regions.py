@@ -120,6 +120,47 @@ class Lens:
         return np.array([np.average(each, weights=light) for each in np.meshgrid(*2 * [np.arange(192)])])
 
 
+@pytest.mark.parametrize(("colour", "is_tinted"), [((90, 90, 90), True), ((86, 90, 94), True), ((80, 90, 100), False)])
+def test_grey_pictures_are_given_a_colour_like_skin_unless_smoothed(
+    colour: tuple[int, int, int], is_tinted: bool
+) -> None:
+    picture, lens = np.full((480, 640, 3), colour, np.uint8), Lens()
+    grids = ((8, 2), (16, 6))
+    Detector(lens, grids, 0.5, tint=True).find(picture, 1)  # type: ignore[arg-type]
+    blue, green, red = lens.picture[96, 96].tolist()
+    assert (blue < green < red and red > 100) == is_tinted
+    for tint, smoothed in ((False, False), (True, True)):
+        Detector(lens, grids, 0.5, tint=tint).find(picture, 1, smoothed=smoothed)  # type: ignore[arg-type]
+        assert tuple(lens.picture[96, 96]) == colour
+
+
+class Scores:
+    """In place of a detection model: the same box of 60 pixels at each anchor; the scores are those of a test."""
+
+    side = 192
+
+    def __init__(self, scores: dict[int, float]) -> None:
+        self.scores = scores
+
+    def run(self, picture: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        logits = np.full((2016, 1), -100.0)
+        for anchor, score in self.scores.items():
+            logits[anchor] = np.log(score / (1 - score))
+        return np.tile([0.0, 0.0, 60.0, 60.0, *14 * [0.0]], (2016, 1)), logits
+
+
+def test_doubtful_detections_come_last_and_do_not_move_a_better_one_that_they_overlap() -> None:
+    # Anchors 0 and 2 are neighbours; 1100 is far away.
+    picture = np.zeros((192, 192, 3), np.uint8)
+    alone, both = (
+        Detector(Scores({0: 0.5, 2: 0.2, 1100: 0.15}), ((8, 2), (16, 6)), 0.3, doubtful).find(picture, 4)  # type: ignore[arg-type]
+        for doubtful in (None, 0.1)
+    )
+    assert [score for _, score in alone] == pytest.approx([0.5])
+    assert [score for _, score in both] == pytest.approx([0.5, 0.15])
+    np.testing.assert_array_equal(alone[0][0], both[0][0])
+
+
 @pytest.mark.parametrize("widened", [1.0, 1.25, 2.0])
 @pytest.mark.parametrize(("width", "height"), [(640, 480), (480, 640), (641, 479), (250, 180), (100, 90), (1280, 720)])
 def test_smoothing_leaves_everything_where_it_is(width: int, height: int, widened: float) -> None:

@@ -40,12 +40,12 @@ SMOOTHED, WIDENED_SMOOTHED = (PalmView(widened, smoothed=True) for widened in (1
 ALL_SIZES = [PLAIN, SMOOTHED, WIDENED, WIDENED_SMOOTHED]
 
 
-def palm(size: float, score: float = 0.9) -> Palm:
+def palm(size: float, score: float = 0.9, *, is_sure: bool = True) -> Palm:
     """Return an upright palm in the middle, of so many pixels; its hand's region is 2.6 times as large."""
     corners = np.array([[320.0, 240.0], [320.0, 240.0]]) + np.array([[-size], [size]]) / 2
     keypoints = np.tile([320.0, 240.0], (7, 1))
     keypoints[2] -= (0, size)
-    return Palm(corners, keypoints, score)
+    return Palm(corners, keypoints, score, is_sure)
 
 
 def frame_by_frame(search: Search, palms: Palms, frames: int) -> Iterator[tuple[list[PalmView], list[Roi]]]:
@@ -110,6 +110,27 @@ def test_only_near_hands_are_looked_for_in_a_frame_that_is_much_widened() -> Non
         places = Search(Palms(palm(size)), 2, wide=True).places(FRAME, beside_a_hand=False)
         next(places)
         assert len(next(places).regions) == count
+
+
+def test_doubtful_palms_come_after_the_others_and_need_a_hand_of_which_the_landmark_model_is_sure() -> None:
+    sure, doubtful = palm(100, 0.6), palm(150, 0.2, is_sure=False)
+    search = Search(Palms(doubtful, sure), 1, wide=True)
+    first, second, *_ = search.places(FRAME, beside_a_hand=False)
+    assert (first.regions, first.min_presence) == ([sure.roi] * 4, 0.0)
+    assert (second.regions, second.min_presence) == ([doubtful.roi] * 4, 0.95)
+    assert list(search.places(FRAME, beside_a_hand=True)) == [Places([sure.roi])]
+    # Nor do near palms count if they are doubtful.
+    near = Search(Palms(palm(200, 0.2, is_sure=False)), 1, wide=True).places(FRAME, beside_a_hand=False)
+    assert [len(places.regions) for places in near] == [0, 4, 0, 1, 1, 1, 1]
+
+
+@pytest.mark.parametrize("wide", [True, False])
+def test_a_hand_whose_palm_is_doubtful_is_found_by_its_landmarks_in_the_wide_search_only(wide: bool) -> None:
+    # All palms of drawn hands score less than this minimum. The hand is not in the middle, where it needs no palm.
+    config = LandmarksConfig(min_detection_confidence=0.9999, wide_search=wide)
+    hands = MediaPipeLandmarker(config).detect(draw(open_right_hand(120, 330, size=90)))
+    assert len(hands) == wide
+    assert all(hand.presence >= 0.95 for hand in hands)
 
 
 def test_beside_a_hand_and_without_the_wide_search_only_palms_are_looked_for() -> None:

@@ -24,7 +24,15 @@ from handsteer.errors import FrameError
 from handsteer.recognition.hand import Hand
 from handsteer.recognition.landmark_models import PictureModel, find_pair
 from handsteer.recognition.regions import PalmDetector, Roi, from_landmarks
-from handsteer.recognition.search import Pace, Places, Search, Stillness, cells_of_frame, cells_of_hands
+from handsteer.recognition.search import (
+    DOUBTFUL_PALM,
+    Pace,
+    Places,
+    Search,
+    Stillness,
+    cells_of_frame,
+    cells_of_hands,
+)
 
 _DEPTH_SCALE: Final = 0.4
 """Factor of the model's depth relative to its x and y."""
@@ -104,7 +112,9 @@ class MediaPipeLandmarker:
     def __init__(self, config: LandmarksConfig) -> None:
         self._config = config
         palm, landmark = find_pair(config.model)
-        palms = PalmDetector(palm, config.threads, config.min_detection_confidence)
+        least = config.min_detection_confidence
+        doubtful = min(least, DOUBTFUL_PALM) if config.wide_search else None
+        palms = PalmDetector(palm, config.threads, least, doubtful)
         self._search = Search(palms, config.max_hands, wide=config.wide_search)
         self._searched = Stillness()
         self._searched_beside = Stillness()

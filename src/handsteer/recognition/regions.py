@@ -36,6 +36,17 @@ With 0.3, a fifth of the hands that only a smoothed frame shows are not found; w
 """
 
 
+_TINT: Final = (1.5, 1.15, 0.8)
+"""Exponents that give grey levels, 0 to 1, a colour like skin: blue, green, red.
+
+The palm model was trained on colours, and misses grey hands. The landmark model reads grey hands as well untinted.
+"""
+_GREY: Final = 8
+"""Largest difference between the colours of a pixel of a grey picture, as after compression, in levels of 255."""
+_SAMPLED: Final = 5
+"""Distance between the pixels of a model's input that are examined for colours, in pixels."""
+
+
 @dataclass(frozen=True)
 class Roi:
     """A rotated square in a frame; all lengths in pixels.
@@ -147,11 +158,13 @@ class Palm:
         corners: (2, 2) top left and bottom right of its box, x and y in pixels.
         keypoints: (7, 2) in pixels: wrist, bases of index, middle, ring and little finger, two joints of the thumb.
         score: 0 to 1.
+        is_sure: Whether the score is at least the minimum; otherwise the landmark model has to confirm the hand.
     """
 
     corners: Array
     keypoints: Array
     score: float
+    is_sure: bool = True
 
     @property
     def roi(self) -> Roi:
@@ -166,11 +179,24 @@ class Detector:
         model: Gives the candidates' values and the logits of their scores, in this order.
         grids: Side of each grid's cells in pixels of the model's input, and number of anchors at a cell's centre.
         min_score: Minimum score, 0 to 1.
+        doubtful_score: Score from which doubtful detections are returned too, after all others, which they do not
+            change; at most ``min_score``, which is used if None.
+        tint: Whether to give grey pictures a colour like skin, except smoothed ones: each way finds other hands.
     """
 
-    def __init__(self, model: PictureModel, grids: Sequence[tuple[int, int]], min_score: float) -> None:
+    def __init__(
+        self,
+        model: PictureModel,
+        grids: Sequence[tuple[int, int]],
+        min_score: float,
+        doubtful_score: float | None = None,
+        *,
+        tint: bool = False,
+    ) -> None:
         self._model = model
-        self._min_logit = _logit(min_score)
+        self._tint = tint
+        self._min_score = min_score
+        self._min_logit = _logit(min_score if doubtful_score is None else doubtful_score)
         self._anchors = _anchors(model.side, grids)
 
     def find(
@@ -192,12 +218,15 @@ class Detector:
         height, width = image.shape[:2]
         square = whole_frame(width, height, widened)
         seen, region = _reduced(image, square, self._model.side) if smoothed else (image, square)
-        values, logits = self._model.run(region.crop(seen, self._model.side, cv2.BORDER_CONSTANT))
+        picture = region.crop(seen, self._model.side, cv2.BORDER_CONSTANT)
+        if self._tint and not smoothed and _is_grey(picture):
+            picture = np.asarray(cv2.LUT(picture, _TINTED), np.uint8)
+        values, logits = self._model.run(picture)
         logits = logits[:, 0]
         found = np.flatnonzero(logits >= self._min_logit)
         found = found[np.argsort(-logits[found], kind="stable")]
         points = _decoded(values[found] / self._model.side, self._anchors[found])
-        merged = _merged(points, _sigmoid(logits[found]), limit)
+        merged = _merged(points, _sigmoid(logits[found]), limit, self._min_score)
         return [(square.to_frame(each), score) for each, score in merged]
 
 
@@ -208,20 +237,32 @@ class PalmDetector:
         path: The model file.
         threads: CPU threads to run it on.
         min_score: Minimum score of a palm, 0 to 1.
+        doubtful_score: Minimum score of a doubtful palm, 0 to ``min_score``; none are returned if None.
 
     Raises:
         ModelCorrupt: The file is not a model that can be run.
     """
 
-    def __init__(self, path: Path, threads: int, min_score: float) -> None:
-        self._detector = Detector(PictureModel(path, threads), _PALM_GRIDS, min_score)
+    def __init__(self, path: Path, threads: int, min_score: float, doubtful_score: float | None = None) -> None:
+        self._min_score = min_score
+        self._detector = Detector(PictureModel(path, threads), _PALM_GRIDS, min_score, doubtful_score, tint=True)
 
     def detect(
         self, image: NDArray[np.uint8], limit: int, *, widened: float = 1.0, smoothed: bool = False
     ) -> list[Palm]:
         """Return at most ``limit`` palms, as :meth:`Detector.find` describes."""
         found = self._detector.find(image, limit, widened=widened, smoothed=smoothed)
-        return [Palm(each[:2], each[2:], score) for each, score in found]
+        return [Palm(each[:2], each[2:], score, score >= self._min_score) for each, score in found]
+
+
+def _is_grey(image: NDArray[np.uint8]) -> bool:
+    """Return whether a sample of the pixels of ``image``, (height, width, 3), has no colours."""
+    some = image[::_SAMPLED, ::_SAMPLED]
+    return bool((some.max(axis=2) - some.min(axis=2)).max() <= _GREY)
+
+
+_TINTED: Final = np.stack([255 * (np.arange(256) / 255) ** power for power in _TINT], axis=-1).astype(np.uint8)[None]
+"""(1, 256, 3) tinted colour of each grey level."""
 
 
 def _reduced(image: NDArray[np.uint8], square: Roi, side: int) -> tuple[NDArray[np.uint8], Roi]:
@@ -264,15 +305,17 @@ def _decoded(values: Array, anchors: Array) -> Array:
     return np.concatenate([corners, points[:, 2:]], axis=1) + anchors[:, None]
 
 
-def _merged(points: Array, scores: Array, limit: int) -> list[tuple[Array, float]]:
+def _merged(points: Array, scores: Array, limit: int, min_score: float) -> list[tuple[Array, float]]:
     """Return one candidate for each group that overlaps, the mean of the group weighted by score.
 
     This is MediaPipe's weighted non-maximum suppression. A candidate without an area overlaps nothing and is dropped.
+    Candidates below ``min_score`` count only in groups without a better one.
 
     Args:
         points: (n, 2 + k, 2) boxes and keypoints, by descending score.
         scores: (n,).
         limit: Maximum number of results.
+        min_score: Minimum score of a candidate that is not doubtful.
 
     Returns:
         At most ``limit`` pairs of (2 + k, 2) points and the best score of the group.
@@ -281,7 +324,8 @@ def _merged(points: Array, scores: Array, limit: int) -> list[tuple[Array, float
     while len(scores) and len(merged) < limit:
         same = _overlap(points[0, :2], points[:, :2]) > _SAME_PALM_OVERLAP
         if same[0]:
-            merged.append((np.average(points[same], axis=0, weights=scores[same]), float(scores[0])))
+            counted = same & (scores >= min(min_score, scores[0]))
+            merged.append((np.average(points[counted], axis=0, weights=scores[counted]), float(scores[0])))
         same[0] = True
         points, scores = points[~same], scores[~same]
     return merged

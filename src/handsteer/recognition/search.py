@@ -2,8 +2,9 @@
 
 Palms are detected in the plain frame as MediaPipe does. The palm model misses hands in dark, noisy pictures, so palms
 are also detected in a smoothed frame, in which it misses some small hands instead; and hands that nearly fill a frame,
-fists above all, so palms are also detected in a widened frame, where they appear smaller. While there is no hand, the
-landmark model is applied to the middle of the frame without any palm.
+fists above all, so palms are also detected in a widened frame, where they appear smaller. While there is no hand, palms
+of a low score count too if the landmark model is sure of their hands, and that model is applied to the middle of the
+frame without any palm.
 """
 
 import itertools
@@ -27,6 +28,13 @@ _NEAR_PRESENCE: Final = 0.9
 _TURNED_PRESENCE: Final = 0.95
 """Likewise of a hand that does not point upwards: faces and people sometimes resemble one."""
 _SURE_PALM: Final = 0.8
+DOUBTFUL_PALM: Final = 0.1
+"""Minimum score of a palm that counts only if the landmark model is sure of its hand.
+
+Hands that point down, dark ones, and those at the frame's edge often score less than the configured minimum.
+"""
+_DOUBTFUL_PRESENCE: Final = 0.95
+"""Minimum presence of the hand of such a palm; with 0.9, pictures of people at rest are misread."""
 _FURTHER: Final = 2
 """Palms beyond the wanted number: one that shows a sign may have a lower score than those of another person."""
 
@@ -74,8 +82,8 @@ class Palms:
     views: tuple[PalmView, ...] = (PalmView(),)
     near: bool = False
 
-    def places(self, image: NDArray[np.uint8], palms: PalmDetector, limit: int) -> Places:
-        """Return the regions of palms, those of ``limit`` hands and a few more.
+    def places(self, image: NDArray[np.uint8], palms: PalmDetector, limit: int) -> Iterator[Places]:
+        """Yield the regions of palms, those of ``limit`` hands and a few more, then those of doubtful palms, if any.
 
         A palm that is found as sampled comes before those that only smoothing shows: the landmark model reads more
         hands in its region.
@@ -85,10 +93,15 @@ class Palms:
             if sum(palm.score >= _SURE_PALM for _, palm in found) < limit:
                 seen = palms.detect(image, limit + _FURTHER, widened=view.widened, smoothed=view.smoothed)
                 found += [(view.smoothed, palm) for palm in seen]
-        regions = [palm.roi for _, palm in sorted(found, key=lambda each: (each[0], -each[1].score))]
-        if not self.near:
-            return Places(regions)
-        return Places([roi for roi in regions if roi.side >= _NEAR * max(image.shape[:2])], _NEAR_PRESENCE)
+        found.sort(key=lambda each: (each[0], -each[1].score))
+        regions = [palm.roi for _, palm in found if palm.is_sure]
+        if self.near:
+            yield Places([roi for roi in regions if roi.side >= _NEAR * max(image.shape[:2])], _NEAR_PRESENCE)
+            return
+        yield Places(regions)
+        doubtful = sorted((palm for _, palm in found if not palm.is_sure), key=lambda palm: -palm.score)
+        if doubtful:
+            yield Places([palm.roi for palm in doubtful], _DOUBTFUL_PRESENCE)
 
 
 @dataclass(frozen=True)
@@ -97,8 +110,8 @@ class Middle:
 
     turned_deg: float = 0.0
 
-    def places(self, image: NDArray[np.uint8], palms: PalmDetector, limit: int) -> Places:
-        """Return the region, with its other rotations as rivals.
+    def places(self, image: NDArray[np.uint8], palms: PalmDetector, limit: int) -> Iterator[Places]:
+        """Yield the region, with its other rotations as rivals.
 
         In a region rotated wrongly, the landmark model takes a thumb up for an index finger.
         """
@@ -107,7 +120,7 @@ class Middle:
             Roi(width / 2, height / 2, _MIDDLE * min(width, height), radians(self.turned_deg + turned))
             for turned in (0.0, 90.0, 180.0, 270.0)
         )
-        return Places([region], _TURNED_PRESENCE if self.turned_deg else _NEAR_PRESENCE, tuple(rivals))
+        yield Places([region], _TURNED_PRESENCE if self.turned_deg else _NEAR_PRESENCE, tuple(rivals))
 
 
 Turn = tuple[Palms | Middle, ...]
@@ -167,7 +180,10 @@ class Search:
             self._beside_a_hand = itertools.cycle(_BESIDE_A_HAND)
         turn = next(self._beside_a_hand if beside_a_hand else self._without_hands)
         for way in turn:
-            yield way.places(image, self._palms, self._limit)
+            for places in way.places(image, self._palms, self._limit):
+                yield places
+                if beside_a_hand:
+                    break
 
 
 @dataclass(frozen=True)

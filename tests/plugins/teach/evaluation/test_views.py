@@ -51,6 +51,15 @@ def test_what_is_shown_then(view: View, truth: Truth, expected: Truth) -> None:
     assert view.truth(*truth) == expected
 
 
+def test_a_grey_camera_sees_no_colours() -> None:
+    image = spotted() // 2 + np.array([10, 40, 90], np.uint8)
+    grey = View(grey=True, flip=True).picture(image)
+    np.testing.assert_array_equal(
+        grey, cv2.cvtColor(cv2.cvtColor(image[:, ::-1], cv2.COLOR_BGR2GRAY), cv2.COLOR_GRAY2BGR)
+    )
+    assert View(grey=True, flip=True).name == "flipped grey"
+
+
 def test_pictures_turn_the_way_that_the_truth_does() -> None:
     """White is up and grey is left at first."""
     image = spotted()

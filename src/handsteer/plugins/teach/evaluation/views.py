@@ -40,22 +40,26 @@ class View:
         flip: Mirror left to right, which also swaps left and right hands.
         rotate_deg: Rotate clockwise by so many degrees, after the flip.
         enlarge: Pad and enlarge pictures below 400 px, because a camera does not frame a hand as tightly.
+        grey: Remove the colours, as a grey camera does.
     """
 
     flip: bool = False
     rotate_deg: float = 0.0
     enlarge: bool = True
+    grey: bool = False
 
     @property
     def name(self) -> str:
-        """Its name in tables: ``raw`` or ``flipped``, with the rotation in degrees."""
+        """Its name in tables: ``raw`` or ``flipped``, with the rotation in degrees, and ``grey``."""
         turned = f" {self.rotate_deg:+g}" if self.rotate_deg else ""
-        return ("flipped" if self.flip else "raw") + turned
+        return ("flipped" if self.flip else "raw") + turned + (" grey" if self.grey else "")
 
     def picture(self, image: NDArray[np.uint8]) -> NDArray[np.uint8]:
         """Return the transformed ``image``, (height, width, 3) uint8; its size may change."""
         if self.enlarge and max(image.shape[:2]) < _SMALL_PX:
             image = _enlarged(image)
+        if self.grey:
+            image = np.asarray(cv2.cvtColor(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), cv2.COLOR_GRAY2BGR), np.uint8)
         if self.flip:
             image = np.asarray(cv2.flip(image, 1), np.uint8)
         return _turned(image, self.rotate_deg)
