@@ -34,6 +34,12 @@ def example(title: str) -> str:
     return found[1]
 
 
+def search_again() -> None:
+    """Let the doors look for what is installed now."""
+    doors._installed.cache_clear()
+    doors._entries.cache_clear()
+
+
 class Installed:
     """A folder on the path with distributions of others."""
 
@@ -48,6 +54,7 @@ class Installed:
         (about / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 1.0\n")
         lines = [f"[handsteer.{group}]\n{entry.replace('= ', f'= {name}:')}\n" for group, entry in groups.items()]
         (about / "entry_points.txt").write_text("\n".join(lines))
+        search_again()
 
     @contextmanager
     def started(self, *words: str) -> Iterator[str]:
@@ -83,8 +90,7 @@ def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Installed:
 def forget() -> Any:
     """Forget after each test what it has installed."""
     yield
-    doors._installed.cache_clear()
-    doors._entries.cache_clear()
+    search_again()
 
 
 @pytest.mark.parametrize(
