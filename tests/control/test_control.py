@@ -65,7 +65,7 @@ def test_reasons_say_why_the_robot_stands() -> None:
         "standing: no sign is seen",
         "standing: the Stop sign is shown",
         "driving: Forward",
-        "driving: steered by hand",
+        "driving: steered directly",
     ]
 
 

@@ -421,7 +421,7 @@ def test_says_that_it_is_stopped_and_then_disarmed_and_how_it_moves_again(bench:
     stop(bench, False)
     assert says() == "standing: the steering is held: release it first"
     bench.steering.release()
-    assert says() == "standing: steered by hand, at zero"
+    assert says() == "standing: steered directly, at zero"
 
 
 def test_tells_its_limits(bench: ControlBench) -> None:
@@ -637,13 +637,13 @@ def test_a_robot_that_is_let_grow_slowly_is_not_said_to_stand() -> None:
         steering.publish(twist(1.0, 0.0))
         odom.publish(odometry(twists[-1]))
         bench.run(0.05)
-    assert statuses[-1].status[0].message == "driving: steered by hand"
+    assert statuses[-1].status[0].message == "driving: steered directly"
     assert twists[-1].linear.x == pytest.approx(0.15, abs=0.02)
     for speed_mps, says in ((0.1, "stopping"), (0.01, "standing")):
         steering.publish(twist(0.0, 0.0))
         odom.publish(odometry(twist(speed_mps, 0.0)))
         bench.run(0.12)
-        assert statuses[-1].status[0].message == f"{says}: steered by hand, at zero"
+        assert statuses[-1].status[0].message == f"{says}: steered directly, at zero"
 
 
 def odometry(moving: Twist, stamp: Time | None = None) -> Odometry:

@@ -26,7 +26,7 @@ OK, WARN, ERROR = 0, 1, 2
         (RecognitionStatus(), WARN, "no frame yet"),
         (ControlStatus(Reason("sign", "Go")), OK, "driving: Go"),
         (ControlStatus(Reason("stopped"), blind=True), WARN, "standing: stopped, until it is reset"),
-        (ControlStatus(Reason("steered"), warning="two nodes publish"), WARN, "driving: steered by hand"),
+        (ControlStatus(Reason("steered"), warning="two nodes publish"), WARN, "driving: steered directly"),
         (ControlStatus(), OK, "gives no reason"),
         (RobotStatus(), OK, "moves freely"),
         (RobotStatus(touches=("crate", "ball")), WARN, "touches crate, ball"),

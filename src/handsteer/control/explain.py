@@ -35,7 +35,7 @@ ReasonCode = Literal[
 
 _SENTENCES: dict[ReasonCode, str] = {
     "sign": "{}",
-    "steered": "steered by hand",
+    "steered": "steered directly",
     "joystick": "driven by the hand as a joystick",
     "stopped": "stopped, until it is reset",
     "starting": "has just started: whether the robot was stopped before is not known yet",
@@ -47,7 +47,7 @@ _SENTENCES: dict[ReasonCode, str] = {
     "no_image": "{}",
     "no_scan": "{}",
     "obstacle": "stopped before an {}",
-    "steered_at_zero": "steered by hand, at zero",
+    "steered_at_zero": "steered directly, at zero",
     "not_held": "no hand holds the joystick: open it, then close the fist",
     "held": "the joystick is held, in the middle",
     "no_input": "no sign has come for {} s",

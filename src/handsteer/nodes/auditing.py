@@ -162,5 +162,5 @@ _SOURCES: dict[Source, str] = {
     "none": "nothing",
     "signs": "signs",
     "joystick": "the hand as a joystick",
-    "steering": "steering by hand",
+    "steering": "direct steering",
 }

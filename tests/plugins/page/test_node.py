@@ -300,7 +300,7 @@ def test_understands_what_control_really_says(bench: Bench) -> None:
         bench.clock.advance(0.1)
         node.spin_once()
     state = bench.node.state()
-    assert (state.headline, state.reason, state.control.source) == ("Driving", "steered by hand", "steering")
+    assert (state.headline, state.reason, state.control.source) == ("Driving", "steered directly", "steering")
 
 
 def test_a_node_runs_only_while_somebody_watches() -> None:

@@ -97,7 +97,7 @@ DISENGAGED = ControlStatus(Reason("disengaged", "1"), "signs", engaged=False, en
         ),
         (
             (replace(DISENGAGED, reason=Reason("steered_at_zero"), source="steering"), NO_HAND),
-            ("standing", "Standing", "steered by hand, at zero"),
+            ("standing", "Standing", "steered directly, at zero"),
         ),
         (
             (control(Reason("not_held"), source="joystick"), NO_HAND),
@@ -125,7 +125,7 @@ DISENGAGED = ControlStatus(Reason("disengaged", "1"), "signs", engaged=False, en
         ),
         (
             (control(Reason("steered_at_zero"), source="steering"), NO_HAND, UNPLUGGED),
-            ("standing", "Standing", "steered by hand, at zero"),
+            ("standing", "Standing", "steered directly, at zero"),
         ),
     ],
 )
@@ -269,7 +269,7 @@ def test_steering_past_the_control_is_said_whatever_the_control_says() -> None:
     direct = Viewers(steers="you", topic="/cmd_vel")
     standing = (control(NO_SIGN), NO_HAND)
     for statuses in (standing, ()):
-        assert explain(reporting(*statuses), direct) == ("driving", "Driving", "steered by hand, straight on /cmd_vel")
+        assert explain(reporting(*statuses), direct) == ("driving", "Driving", "steered straight on /cmd_vel")
     halted = Viewers(topic="/cmd_vel", stopped="you", stands=True)
     for statuses in (standing, ()):
         assert explain(reporting(*statuses), halted) == ("trouble", "Stopped", "stopped by you, until you reset it")
@@ -289,11 +289,11 @@ def test_a_stop_is_said_once_the_control_obeys_it_or_when_there_is_no_control() 
     [
         (False, "none", Viewers(), None),
         (False, "signs", Viewers(), "Signs"),
-        (False, "steering", Viewers(steers="you", steered="you"), "By hand: you"),
-        (False, "steering", Viewers(steered="you"), "By hand: you"),
-        (False, "steering", Viewers(steered="another viewer"), "By hand: another viewer"),
-        (False, "steering", Viewers(), "By hand: another node"),
-        (False, "signs", Viewers(steers="you", steered="you", topic="/cmd_vel"), "By hand: you"),
+        (False, "steering", Viewers(steers="you", steered="you"), "Pad and keys: you"),
+        (False, "steering", Viewers(steered="you"), "Pad and keys: you"),
+        (False, "steering", Viewers(steered="another viewer"), "Pad and keys: another viewer"),
+        (False, "steering", Viewers(), "Pad and keys: another node"),
+        (False, "signs", Viewers(steers="you", steered="you", topic="/cmd_vel"), "Pad and keys: you"),
         (True, "steering", Viewers(steers="you", stopped="another viewer"), "Stop: another viewer"),
         (True, "signs", Viewers(), "Stop"),
     ],
@@ -302,7 +302,7 @@ def test_at_most_one_source_has_the_robot(
     *, stopped: bool, source: Source, viewers: Viewers, holds: str | None
 ) -> None:
     shown = mux_inputs(compose(observed(ControlStatus(source=source, stopped=stopped)), 0.1, viewers))
-    assert [entry.name for entry in shown] == ["Stop", "By hand", "Signs"]
+    assert [entry.name for entry in shown] == ["Stop", "Pad and keys", "Signs"]
     holding = [entry.name + (f": {entry.viewer}" if entry.viewer else "") for entry in shown if entry.is_active]
     assert holding == ([holds] if holds else [])
 
@@ -316,11 +316,13 @@ def test_the_progress_of_the_gesture_is_that_of_the_recognition(
     assert (state.engaging, state.engages_by_gesture) == (engaging, by == "gesture")
 
 
-@pytest.mark.parametrize(("source", "holds"), [("joystick", ["Joystick"]), ("steering", ["By hand"]), ("none", [])])
+@pytest.mark.parametrize(
+    ("source", "holds"), [("joystick", ["Joystick"]), ("steering", ["Pad and keys"]), ("none", [])]
+)
 def test_the_hand_as_a_joystick_is_a_source_instead_of_the_signs(source: Source, holds: list[str]) -> None:
     status = ControlStatus(source=source, rule=ControlConfig(mode="joystick"))
     shown = mux_inputs(compose(observed(status), 0.1))
-    assert [entry.name for entry in shown] == ["Stop", "By hand", "Joystick"]
+    assert [entry.name for entry in shown] == ["Stop", "Pad and keys", "Joystick"]
     assert [entry.name for entry in shown if entry.is_active] == holds
 
 

@@ -91,7 +91,7 @@ def test_a_slider_drives_until_it_is_at_zero_or_the_page_is_left(visit: Visit) -
     page = visit.page
     visit.wait_until(lambda: visit.text(".banner .headline") == "Standing")
     visit.wait_until(lambda: is_kept_driving(visit))
-    visit.wait_until(lambda: steered(visit) and visit.text(".mux .holds") == "By hand: you")
+    visit.wait_until(lambda: steered(visit) and visit.text(".mux .holds") == "Pad and keys: you")
     press(page, LINEAR_TO_0)
     visit.wait_until(lambda: stands(visit))
 
@@ -156,7 +156,7 @@ def test_sliders_of_who_watches_do_nothing(visit: Visit) -> None:
     )
     second.wait_for_timeout(500)
     assert stands(visit)
-    holds = second.locator(".mux .holds", has_text="By hand: another viewer")
+    holds = second.locator(".mux .holds", has_text="Pad and keys: another viewer")
     visit.wait_until(lambda: steered(visit) and holds.count() > 0)
 
 
@@ -178,7 +178,7 @@ def test_another_topic_is_steered_past_the_control_and_stops_as_well() -> None:
             visit.wait_until(lambda: "is not a valid topic name" in visit.text(".topic .trouble"))
             choose(visit, topic.name)
             visit.wait_until(lambda: "Past the control" in visit.text(".topic-words"))
-            reason = f"Steered by hand, straight on {topic.name}"
+            reason = f"Steered straight on {topic.name}"
             visit.wait_until(lambda: steered(visit) and visit.text(".banner .reason") == reason)
             visit.wait_until(lambda: steered(visit) and speed(visit) > 0.02)
             visit.page.keyboard.press("Space")

@@ -79,7 +79,7 @@ def test_a_gamepad_steers_while_its_button_is_held(visit: Visit) -> None:
     keeps_standing(visit)  # the button was held before
 
     drive(visit)
-    assert visit.text(".mux .holds") == "By hand: you"
+    assert visit.text(".mux .holds") == "Pad and keys: you"
     page.evaluate("window.played.axes = [0.06, 0.06, 0, 0]")  # within the dead zone
     visit.wait_until(lambda: stands(visit))
     page.evaluate("window.played.axes = [-1, 0, 0, 0]")

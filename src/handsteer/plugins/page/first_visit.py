@@ -21,7 +21,7 @@ from handsteer.types import FORWARD, STOP
 
 _DEMO: Final = (
     "It shows the signs in turn, and the robot obeys. With your own camera you drive: your browser asks for it first, "
-    "choose Allow. The pictures go only to the computer that runs handsteer."
+    "choose Allow. The pictures go to the computer that runs handsteer, and all who have its page open see them."
 )
 _REFUSALS: Final = {
     "NotAllowedError": (

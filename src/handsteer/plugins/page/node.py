@@ -145,7 +145,7 @@ class DashboardNode(Node):
         if self.lease.take(viewer, self.clock.now()):
             with self._lock:
                 if self._holder is None:
-                    self._audit.say("steers", viewer, "steers by hand")
+                    self._audit.say("steers", viewer, "steers with pad or keys")
                 if viewer != self._last_holder:
                     self._last_holder = viewer
                     self._steering.lose()

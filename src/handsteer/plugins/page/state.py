@@ -269,7 +269,7 @@ def _explain_steering(reporting: Reporting, viewers: Viewers, *, is_moving: bool
     """Return what only the page's own steering knows, in place of what the control reports."""
     if viewers.waits and not is_stopped(reporting.control, viewers):
         return "standing", "Stopping" if is_moving else "Standing", Reason("steering_disarmed").explanation
-    return ("driving", "Driving", f"steered by hand, straight on {viewers.topic}") if viewers.topic else None
+    return ("driving", "Driving", f"steered straight on {viewers.topic}") if viewers.topic else None
 
 
 def _why_standing(control: ControlStatus, reporting: Reporting) -> tuple[Mood, str | None]:

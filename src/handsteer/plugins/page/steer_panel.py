@@ -49,7 +49,7 @@ def mux_inputs(state: PageState) -> tuple[MuxInput, ...]:
     by_air = not state.stopped and not by_hand and state.control.source in ("signs", "joystick")
     return (
         MuxInput("Stop", state.stopped, state.viewers.stopped),
-        MuxInput("By hand", by_hand, state.viewers.steered or "another node"),
+        MuxInput("Pad and keys", by_hand, state.viewers.steered or "another node"),
         MuxInput("Joystick" if state.is_joystick else "Signs", by_air),
     )
 
@@ -60,7 +60,7 @@ class _MuxRow:
     def __init__(self) -> None:
         with box("mux").props('role="group" aria-label="The active input; the first one overrides the others"'):
             text("name", "Active input")
-            self._chips = [text("source chip", name) for name in ("Stop", "By hand", "Signs")]
+            self._chips = [text("source chip", name) for name in ("Stop", "Pad and keys", "Signs")]
 
     def update(self, state: PageState) -> None:
         """Show ``state``."""
@@ -79,7 +79,7 @@ class SteerPanel:
     def __init__(self, page: Page) -> None:
         self._page = page
         self._input = SteeringInput()
-        with card("Steer by hand", "panel steer") as self._card:
+        with card("Pad and keys", "panel steer") as self._card:
             self._mux = _MuxRow()
             button("Hold to drive by tilt", label="Hold to drive by tilting this device").classes("tilt")
             with box("row"):

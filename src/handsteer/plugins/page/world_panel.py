@@ -15,7 +15,7 @@ from handsteer.plugins.page.world_state import WorldState
 from handsteer.types import BUMP_S, MISS_S, CourseState, stopwatch
 
 _RULES = f"score: the time, {BUMP_S:.0f} s for each bump, {MISS_S:.0f} s for each missed gate"
-_DRIVERS = {"signs": "your signs", "joystick": "your hand", "steering": "hand steering", "none": "none"}
+_DRIVERS = {"signs": "your signs", "joystick": "your hand", "steering": "pad and keys", "none": "none"}
 _VIEWS: tuple[tuple[View, str, str], ...] = (
     ("orbit", "Orbit", "drag to look around"),
     ("follow", "Follow", "drag to look around"),

@@ -74,9 +74,9 @@ const WORDS = {
   "Trouble: {}": "Störung: {}",
 
   // Why the robot drives or stands
-  "steered by hand": "von Hand gesteuert",
-  "steered by hand, straight on {}": "von Hand gesteuert, direkt auf {}",
-  "steered by hand, at zero": "von Hand gesteuert, auf null",
+  "steered directly": "direkt gesteuert",
+  "steered straight on {}": "gesteuert direkt auf {}",
+  "steered directly, at zero": "direkt gesteuert, auf null",
   "driven by the hand as a joystick": "von der Hand als Joystick gefahren",
   "stopped, until it is reset": "gestoppt, bis zurückgesetzt wird",
   "stopped, until you reset it": "gestoppt, bis du zurücksetzt",
@@ -273,7 +273,7 @@ const WORDS = {
 
   // The first visit: one's own camera, and three steps
   "This is a demo hand, not yours": "Das ist eine Demo-Hand, nicht deine",
-  "It shows the signs in turn, and the robot obeys. With your own camera you drive: your browser asks for it first, choose Allow. The pictures go only to the computer that runs handsteer.": "Sie zeigt die Zeichen der Reihe nach, und der Roboter gehorcht. Mit deiner eigenen Kamera fährst du: dein Browser fragt zuerst, wähle „Zulassen“. Die Bilder gehen nur an den Computer, auf dem handsteer läuft.",
+  "It shows the signs in turn, and the robot obeys. With your own camera you drive: your browser asks for it first, choose Allow. The pictures go to the computer that runs handsteer, and all who have its page open see them.": "Sie zeigt die Zeichen der Reihe nach, und der Roboter gehorcht. Mit deiner eigenen Kamera fährst du: dein Browser fragt zuerst, wähle „Zulassen“. Die Bilder gehen an den Computer, auf dem handsteer läuft, und alle, die seine Seite offen haben, sehen sie.",
   "Use my camera": "Meine Kamera nutzen",
   "Keep watching": "Weiter zusehen",
   "The browser refused the camera. Allow it by the camera or lock symbol next to the page's address, then press Use my camera again.": "Der Browser hat die Kamera abgelehnt. Erlaube sie über das Kamera- oder Schlosssymbol neben der Adresse der Seite, dann drücke noch einmal Meine Kamera nutzen.",
@@ -371,7 +371,7 @@ const WORDS = {
   "driven by": "Steuerung",
   "your signs": "deine Zeichen",
   "your hand": "deine Hand",
-  "hand steering": "Handsteuerung",
+  "pad and keys": "Pad und Tasten",
   "none": "keine",
   "path": "Weg",
   "bumps": "Stöße",
@@ -449,7 +449,7 @@ const WORDS = {
   "Too many open files": "zu viele offene Dateien",
 
   // Steering by hand
-  "Steer by hand": "Von Hand steuern",
+  "Pad and keys": "Pad und Tasten",
   "Hold the pad, or its arrow keys. Sliders stay, until you leave this page.": "Halte das Steuerkreuz oder seine Pfeiltasten. Regler bleiben, bis du die Seite verlässt.",
   "Hold the pad, or W A S D anywhere. Sliders stay, until you leave this page.": "Halte das Steuerkreuz oder irgendwo W A S D. Regler bleiben, bis du die Seite verlässt.",
   "You watch: request control, at the top.": "Du siehst zu: frage oben das Steuer an.",
@@ -472,7 +472,6 @@ const WORDS = {
   "min": "min",
   "Active input": "Aktive Eingabe",
   "The active input; the first one overrides the others": "Die aktive Eingabe; die erste geht den anderen vor",
-  "By hand": "Von Hand",
   "you": "du",
   "another viewer": "jemand anderes",
   "another node": "ein anderer Node",
