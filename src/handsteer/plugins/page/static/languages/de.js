@@ -371,7 +371,6 @@ const WORDS = {
   "driven by": "Steuerung",
   "your signs": "deine Zeichen",
   "your hand": "deine Hand",
-  "pad and keys": "Pad und Tasten",
   "none": "keine",
   "path": "Weg",
   "bumps": "Stöße",
