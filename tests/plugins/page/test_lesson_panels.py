@@ -1,8 +1,11 @@
 """What the page to teach on says, in words; and what it says where nothing can be taught."""
 
 import pytest
+from nicegui import Client, ui
 
 from handsteer.config import TeachConfig
+from handsteer.errors import install_command
+from handsteer.plugins.page import lesson_panels
 from handsteer.plugins.page.lesson import Lesson
 from handsteer.plugins.page.lesson_page import mistake_words
 from handsteer.plugins.page.lesson_state import LessonState, Seen, SignClass, counted, instruction, outcome
@@ -66,3 +69,17 @@ def test_where_the_graph_is_elsewhere_the_page_says_so(site: Site) -> None:
     assert b"handsteer signs collect" in answer.read()
     for name in ("signs.npz", "takes.csv", "signs.onnx"):
         assert site.get(f"/lesson/{name}?viewer=x").status == 404
+
+
+@pytest.mark.parametrize("is_installed", [True, False])
+def test_without_its_package_the_export_as_onnx_says_what_to_install(
+    is_installed: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(lesson_panels, "CAN_EXPORT", is_installed)
+    with Client(ui.page("/lesson-of-tests")):
+        shown = lesson_panels._onnx("viewer=x").props
+    assert shown.get("href", "").endswith("signs.onnx?viewer=x") == is_installed
+    assert ("disabled" in shown) == (not is_installed)
+    assert shown.get("title", "") == (
+        "" if is_installed else f"For ONNX, run {install_command('onnx')} and start handsteer again"
+    )

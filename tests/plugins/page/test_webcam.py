@@ -102,6 +102,29 @@ def wait_until_stands(graph: Graph) -> None:
     pytest.fail("the robot drives on")
 
 
+def test_ones_own_camera_begins_at_the_start_and_not_where_the_demo_left_the_robot(browser: Browser) -> None:
+    hand = {"camera": {"source": "virtual", "width": 320, "height": 240, "fps": 15}}
+    config = load(base={**hand, "virtual_hand": {"script": "Forward:4 NONE:600"}, "dashboard": {"port": 0}})
+    page = page_process()
+    try:
+        with Graph(config, steering=False) as graph:
+            url = page.serve(graph)
+            graph.start()
+            shown = show(browser, url)
+            wait_for_words(shown, ".banner", "No hand is in view")
+            wait_until_stands(graph)
+            assert graph.robot.state.truth.x > 0.2
+            shown.get_by_text("Use my camera").click()
+            waiting = threading.Event()
+            for _ in range(PATIENCE_MS // 20):
+                if graph.cameras.source == "browser" and graph.robot.state.truth.x < 0.1:
+                    return
+                waiting.wait(0.02)
+            pytest.fail(f"the robot is still at {graph.robot.state.truth.x:.2f} m")
+    finally:
+        page.stop()
+
+
 def test_only_who_drives_gives_a_camera(graph: Graph, url: str, browser: Browser) -> None:
     first, second = show(browser, url), show(browser, url)
     buttons = [page.get_by_text("Use my camera") for page in (first, second)]

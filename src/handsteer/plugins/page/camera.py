@@ -19,7 +19,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from handsteer.cameras import VIRTUAL_HAND
 from handsteer.cameras.choice import BROWSER
 from handsteer.clock import Clock
-from handsteer.errors import CameraError, FrameError
+from handsteer.errors import CameraError, FrameError, HandsteerError
 from handsteer.images import bgr_image, encode_jpeg
 from handsteer.messages import IMAGE_ANNOTATED, Image
 from handsteer.nodes.base import Node
@@ -85,7 +85,7 @@ class FrameSocket:
         try:
             while self._drives(viewer):
                 if changed:
-                    await asyncio.wrap_future(graph.choose_camera(BROWSER, is_far=is_far(socket.scope)))
+                    await self._begin(graph, is_far=is_far(socket.scope))
                 elif graph.state.camera_source != BROWSER:
                     await socket.close(_ANOTHER_CAMERA)
                     return
@@ -103,6 +103,16 @@ class FrameSocket:
             await socket.close(_NOT_A_FRAME, str(error))
         except WebSocketDisconnect:
             pass
+
+    @staticmethod
+    async def _begin(graph: RemoteGraph, *, is_far: bool) -> None:
+        """Choose the browser's camera; a robot that the demo hand has driven somewhere starts again."""
+        names = {each.source: each.name for each in graph.state.cameras}
+        was_demo = names.get(graph.state.camera_source) == VIRTUAL_HAND
+        await asyncio.wrap_future(graph.choose_camera(BROWSER, is_far=is_far))
+        if was_demo and graph.state.world is not None:
+            with suppress(HandsteerError):  # it then begins where it is
+                await asyncio.wrap_future(graph.reset())
 
 
 def _frame_of(message: Message) -> bytes:

@@ -7,7 +7,7 @@ from typing import Final, TypeVar
 
 from nicegui import ui
 
-from handsteer.errors import HandsteerError
+from handsteer.errors import HandsteerError, install_command
 from handsteer.plugins.page.elements import box, button, card, set_property, switch, text
 from handsteer.plugins.page.lesson import Lesson
 from handsteer.plugins.page.lesson_files import CAN_EXPORT, LESSON_PATH
@@ -119,7 +119,8 @@ class StartPanel:
         self._shown: object = None
         with card("Teach your own signs", "panel start") as self.element:
             text(
-                "lead", "Show a sign to the camera a few times, train for some seconds, and choose what the robot does."
+                "lead",
+                "Show a sign to the camera a few times, train for about a minute, and choose what the robot does.",
             )
             self._taught = box("taught")
             self._message = text("trouble", "").props('role="alert"')
@@ -234,7 +235,7 @@ class LessonPanel:
                     viewer = f"viewer={lesson.viewer}"
                     _download("Download", f"{LESSON_PATH}/signs.npz?{viewer}", "Download takes and model as one file")
                     _download("CSV", f"{LESSON_PATH}/takes.csv?{viewer}", "Download the takes as a table, CSV")
-                    self._onnx = _download("ONNX", f"{LESSON_PATH}/signs.onnx?{viewer}", "Download the model as ONNX")
+                    self._onnx = _onnx(viewer)
                     button("Upload", label="Upload a file of taught signs").props("data-choose")
                     file = ui.element("input").props(
                         f'type=file accept=".npz" data-upload="{LESSON_PATH}/signs?{viewer}"'
@@ -261,7 +262,7 @@ class LessonPanel:
         to_keep = state.is_fresh and state.is_changed
         switch(self._train, "primary", on=not to_keep)
         switch(self._keep, "primary", on=to_keep)
-        switch(self._onnx, "hidden", on=state.model is None or not CAN_EXPORT)
+        switch(self._onnx, "hidden", on=state.model is None)
         set_words(self._undo, state.undo)
         switch(self._undo, "hidden", on=not state.undo or not is_idle)
         self._hint.set_text("" if state.is_training else state.hint)
@@ -294,6 +295,15 @@ def set_words(element: ui.element, words: str) -> None:
     label = element.default_slot.children[0]
     if isinstance(label, ui.label):
         label.set_text(words)
+
+
+def _onnx(viewer: str) -> ui.element:
+    """Return the download as ONNX; a button that does nothing, and says what to install, if its package is missing."""
+    if CAN_EXPORT:
+        return _download("ONNX", f"{LESSON_PATH}/signs.onnx?{viewer}", "Download the model as ONNX")
+    missing = button("ONNX").props("disabled")
+    missing.props["title"] = f"For ONNX, run {install_command('onnx')} and start handsteer again"
+    return missing
 
 
 def _download(words: str, address: str, label: str) -> ui.element:

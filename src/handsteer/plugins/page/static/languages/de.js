@@ -44,6 +44,7 @@ const WORDS = {
   "Swap sides": "Seiten tauschen",
   "Swap left and right of each frame before recognition, for a camera that looks the way the driver looks, as from behind or on the head; a turn is then the one that the driver shows.": "Links und rechts jedes Bilds vor der Erkennung tauschen, für eine Kamera, die wie die fahrende Person blickt, etwa von hinten oder auf dem Kopf; gedreht wird dann, wie sie es zeigt.",
   "Download the model as ONNX": "Das Modell als ONNX herunterladen",
+  "For ONNX, run {} and start handsteer again": "Für ONNX führe {} aus und starte handsteer neu",
   "ONNX": "ONNX",
 
   // The banner: what the robot does, and the buttons
@@ -649,7 +650,7 @@ const WORDS = {
 
   // The page for teaching: its start
   "Teach your own signs": "Eigene Zeichen lehren",
-  "Show a sign to the camera a few times, train for some seconds, and choose what the robot does.": "Zeige der Kamera ein Zeichen einige Male, trainiere ein paar Sekunden, und wähle, was der Roboter tut.",
+  "Show a sign to the camera a few times, train for about a minute, and choose what the robot does.": "Zeige der Kamera ein Zeichen einige Male, trainiere etwa eine Minute, und wähle, was der Roboter tut.",
   "Who shows the signs": "Wer die Zeichen zeigt",
   "Start a lesson": "Lektion beginnen",
   "Continue the last lesson": "Letzte Lektion fortsetzen",
