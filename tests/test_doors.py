@@ -36,8 +36,9 @@ def example(title: str) -> str:
 
 def search_again() -> None:
     """Let the doors look for what is installed now."""
-    doors._installed.cache_clear()
-    doors._entries.cache_clear()
+    for cached in (doors._installed, doors._entries):
+        if hasattr(cached, "cache_clear"):
+            cached.cache_clear()
 
 
 class Installed:
@@ -247,6 +248,12 @@ def test_an_unknown_name_gets_the_nearest(installed: Installed) -> None:
     installed.add("scale", example("Robot"), robots="scale = Scale")
     with pytest.raises(PluginError, match=r"^there is no robot 'scal': did you mean scale\? installed are sim, scale$"):
         doors.ROBOTS.load("scal")
+
+
+def test_an_installation_from_before_the_doors_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(doors, "_installed", tuple)
+    with pytest.raises(PluginError, match=r"^handsteer's own entry points are missing: install it again"):
+        doors.CAMERAS.load("virtual")
 
 
 def test_ours_cannot_be_replaced(installed: Installed, caplog: pytest.LogCaptureFixture) -> None:

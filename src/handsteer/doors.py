@@ -95,6 +95,10 @@ class Door(Generic[T]):
 
     def _entry(self, name: str) -> importlib.metadata.EntryPoint:
         entries = _entries(self.group)
+        if not any(map(_is_ours, _installed())):
+            raise PluginError(
+                "handsteer's own entry points are missing: install it again, as by make run or pip install"
+            )
         if name not in entries:
             near = did_you_mean(name, entries)
             raise PluginError(f"there is no {self._what} {name!r}{near or ':'} installed are {', '.join(entries)}")
