@@ -387,6 +387,9 @@ def test_what_may_be_a_recording_is_not_followed_by_itself_and_says_how() -> Non
     bench.run(1.0)
     assert "no frame for 1." in statuses[-1].status[0].message
     assert "before: frames are stamped 3 days ago" in statuses[-1].status[0].message
+    bench.run(10.0)
+    assert statuses[-1].status[0].message.startswith("no frame for 1")
+    assert "before" not in statuses[-1].status[0].message, "it says nothing of now"
 
 
 def test_frames_of_a_clock_that_is_far_ahead_are_no_frames() -> None:

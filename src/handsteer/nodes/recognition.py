@@ -51,6 +51,8 @@ log = logging.getLogger(__name__)
 M = TypeVar("M", Image, CompressedImage)
 
 _FREEZE_EXPLAINED_S = 3.0
+# An older refusal no longer explains why there are no frames.
+_REFUSAL_SHOWN_S = 10.0
 _FROZEN = (
     "Only new pictures count, so that a camera that hangs cannot drive: start it again. To try a photo, publish it "
     "with noise that changes, as handsteer's own camera does with a folder of photos"
@@ -285,7 +287,8 @@ class HandSignRecognitionNode(Node):
         if seen is None:
             refuses_now = self._refused is not None and now - self._refused_s <= self._config.max_frame_age
             no_frame_s = None if refuses_now else round(now - max(self._last_frame_s, self._refused_s), 1)
-            signs, refused = self._pipeline.recognizer.signs, self._refused or ""
+            is_recent = now - self._refused_s <= _REFUSAL_SHOWN_S
+            signs, refused = self._pipeline.recognizer.signs, (self._refused or "") if is_recent else ""
             return RecognitionStatus(signs=signs, no_frame_s=no_frame_s, refused=refused)
         is_hand_lost = seen.hand is None and self._last_hand_s is not None
         return RecognitionStatus(
