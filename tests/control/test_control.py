@@ -298,3 +298,12 @@ def test_when_steering_is_ended_signs_start_from_standing() -> None:
         driver.step(DT, sign=FORWARD)
     driver.halt()
     assert driver.step(DT, sign=FORWARD) == Velocity(0.01, 0.0)
+
+
+def test_go_on_a_robot_that_stands_says_that_it_keeps_a_speed_of_zero() -> None:
+    driver = TwistMux(ControlConfig())
+    driver.step(0.03, sign="Go")
+    assert str(driver.reason) == "standing: Go keeps its speed, which is zero"
+    driver.step(0.03, sign="Forward")
+    driver.step(0.03, sign="Backward")
+    assert str(driver.reason) == "standing: no sign has set it in motion yet"

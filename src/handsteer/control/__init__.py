@@ -270,7 +270,10 @@ class TwistMux:
             return Reason("sign", sign)
         if sign == NONE:
             return Reason("no_sign")
-        return Reason("stop_sign", sign) if action_of(sign, self._config.actions) == "stop" else Reason("not_started")
+        action = action_of(sign, self._config.actions)
+        if action == "stop":
+            return Reason("stop_sign", sign)
+        return Reason("not_started", sign if action == "go" else "")
 
     def _follow_stick(self, stick: Stick) -> Velocity | None:
         config, self._is_held = self._config, stick.held

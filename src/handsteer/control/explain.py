@@ -98,6 +98,8 @@ class Reason:
         detail = self.detail
         if self.code == "disengaged" and detail:
             return f"hold an open palm for {detail} s to begin{robot}"
+        if self.code == "not_started" and detail:
+            return f"{detail} keeps its speed, which is zero{robot}"
         if self.code == "disarmed":
             detail = f"{robot} ({detail})" if detail else robot
             robot = ""

@@ -339,8 +339,8 @@ def test_tells_each_viewer_who_steers_and_who_stopped(bench: Bench) -> None:
     bench.node.steer("me", 0.1, 0.0)
     assert [bench.node.state(who).viewers.steers for who in ("me", "you")] == ["you", "another viewer"]
     bench.node.halt("you")
-    assert bench.node.state("you").reason == "stopped by you, until the driver resets it"
-    assert bench.node.state("me").reason == "stopped by another viewer, until you reset it"
+    assert bench.node.state("you").reason == "by you, until the driver resets it"
+    assert bench.node.state("me").reason == "by another viewer, until you reset it"
     bench.node.reset("me")
     assert bench.node.state("me").viewers.stopped == ""
 

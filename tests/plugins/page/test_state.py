@@ -254,10 +254,10 @@ STOPPED = ControlStatus(Reason("stopped"), stopped=True)
 @pytest.mark.parametrize(
     ("viewers", "says"),
     [
-        (Viewers(), "stopped, until you reset it"),
-        (Viewers(stopped="you"), "stopped by you, until you reset it"),
-        (Viewers(stopped="you", may_reset=False), "stopped by you, until the driver resets it"),
-        (Viewers(stopped="another viewer"), "stopped by another viewer, until you reset it"),
+        (Viewers(), "until you reset it"),
+        (Viewers(stopped="you"), "by you, until you reset it"),
+        (Viewers(stopped="you", may_reset=False), "by you, until the driver resets it"),
+        (Viewers(stopped="another viewer"), "by another viewer, until you reset it"),
     ],
 )
 def test_says_who_stopped_the_robot_and_who_may_reset_it(viewers: Viewers, says: str) -> None:
@@ -272,7 +272,7 @@ def test_steering_past_the_control_is_said_whatever_the_control_says() -> None:
         assert explain(reporting(*statuses), direct) == ("driving", "Driving", "steered straight on /cmd_vel")
     halted = Viewers(topic="/cmd_vel", stopped="you", stands=True)
     for statuses in (standing, ()):
-        assert explain(reporting(*statuses), halted) == ("trouble", "Stopped", "stopped by you, until you reset it")
+        assert explain(reporting(*statuses), halted) == ("trouble", "Stopped", "by you, until you reset it")
         assert compose(observed(*statuses), 0.1, halted).stopped
 
 

@@ -112,7 +112,7 @@ def test_a_slider_drives_until_it_is_at_zero_or_the_page_is_left(visit: Visit) -
     set_slider(visit)
     page.keyboard.press("Space")
     visit.wait_until(lambda: visit.text(".banner .headline") == "Stopped" and slider(page) == 0)
-    assert visit.text(".banner .reason") == "Stopped by you, until you reset it"
+    assert visit.text(".banner .reason") == "By you, until you reset it"
     assert page.get_by_role("button", name=FASTER, exact=True).is_disabled()
     visit.wait_until(lambda: stands(visit))
     assert visit.troubles == []

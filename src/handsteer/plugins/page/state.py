@@ -250,11 +250,11 @@ def explain(reporting: Reporting, viewers: Viewers = NO_VIEWERS, *, is_moving: b
     if robot.level >= ERROR:
         return "trouble", "Trouble", f"the robot {robot.message}"
     if control is None or stopped:
-        by = f"stopped by {viewers.stopped}" if viewers.stopped else "stopped"
+        by = f"by {viewers.stopped}, " if viewers.stopped else ""
         return (
             "trouble",
             "Stopping" if is_moving else "Stopped",
-            f"{by}, until {'you reset' if viewers.may_reset else 'the driver resets'} it",
+            f"{by}until {'you reset' if viewers.may_reset else 'the driver resets'} it",
         )
     reason = control.explanation
     if control.linear_mps or control.angular_radps:
