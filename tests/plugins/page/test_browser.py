@@ -23,7 +23,7 @@ def test_shows_what_is_seen_and_what_the_robot_does(visit: Visit) -> None:
     visit.wait_until(lambda: visit.text(".banner .headline") == "Driving")
     visit.wait_until(lambda: visit.number(".velocity .axis .value") > 0.05)
     visit.wait_until(lambda: path_shown(visit) > 0)
-    assert visit.text(".world .fact b") == "your signs"
+    assert visit.text(".world .fact b") == "the demo hand"
     visit.wait_until(lambda: visit.text(".legend .seen .name") == "Forward")
     visit.wait_until(lambda: "Standing" in visit.text(".banner") and "Stop sign" in visit.text(".banner"))
     assert visit.page.evaluate("document.querySelector('.camera img').naturalWidth") == 320

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from handsteer.messages import Header, LaserScan, Time
 from handsteer.plugins.page.drive_page import rows_of
+from handsteer.plugins.page.world_panel import driver_words
 from handsteer.plugins.page.world_state import (
     LEAP_M,
     PERIOD_S,
@@ -142,3 +143,19 @@ def test_two_who_sample_at_once_fill_it_no_faster() -> None:
 def test_rows_are_short_and_tell_a_gap_from_zero() -> None:
     samples = [Sample(1.23456, Velocity(0.12345, -1.0), None), Sample(1.3, None, Velocity(0.0, 0.25))]
     assert rows_of(samples) == ([(1.23, 0.123, None), (1.3, None, 0.0)], [(1.23, -1.0, None), (1.3, None, 0.25)])
+
+
+@pytest.mark.parametrize(
+    ("source", "camera", "words"),
+    [
+        ("signs", "virtual hand", "the demo hand"),
+        ("joystick", "virtual hand", "the demo hand"),
+        ("steering", "virtual hand", "pad and keys"),
+        ("signs", "webcam 0", "signs"),
+        ("joystick", "webcam 0", "the hand"),
+        ("none", "webcam 0", "none"),
+        ("other", "webcam 0", "other"),
+    ],
+)
+def test_what_drives_is_not_the_viewers_hand_while_the_demo_is_shown(source: str, camera: str, words: str) -> None:
+    assert driver_words(source, camera) == words

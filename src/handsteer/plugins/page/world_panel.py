@@ -4,6 +4,7 @@ from functools import partial
 
 from nicegui import ui
 
+from handsteer.cameras import VIRTUAL_HAND
 from handsteer.plugins.page.elements import box, button, switch, tag, text
 from handsteer.plugins.page.page import Page
 from handsteer.plugins.page.remote_graph import RemoteGraph
@@ -15,12 +16,19 @@ from handsteer.plugins.page.world_state import WorldState
 from handsteer.types import BUMP_S, MISS_S, CourseState, stopwatch
 
 _RULES = f"score: the time, {BUMP_S:.0f} s for each bump, {MISS_S:.0f} s for each missed gate"
-_DRIVERS = {"signs": "your signs", "joystick": "your hand", "steering": "pad and keys", "none": "none"}
+_DRIVERS = {"signs": "signs", "joystick": "the hand", "steering": "pad and keys", "none": "none"}
 _VIEWS: tuple[tuple[View, str, str], ...] = (
     ("orbit", "Orbit", "drag to look around"),
     ("follow", "Follow", "drag to look around"),
     ("top", "Top", "drag to move the map"),
 )
+
+
+def driver_words(source: str, camera: str) -> str:
+    """Return in words what drives: ``source`` as the control reports it; ``camera`` is the name of the camera."""
+    if camera == VIRTUAL_HAND and source in ("signs", "joystick"):
+        return "the demo hand"
+    return _DRIVERS.get(source, source)
 
 
 class WorldPanel:
@@ -52,7 +60,7 @@ class WorldPanel:
     def update(self, state: PageState, world: WorldState) -> None:
         """Show ``state`` and ``world``."""
         self._view.update(world)
-        self._driver.set_text(_DRIVERS.get(state.control.source, state.control.source))
+        self._driver.set_text(driver_words(state.control.source, state.camera))
         self._path.set_text(UNKNOWN if state.robot.path_length_m is None else f"{state.robot.path_length_m:.1f} m")
         self._bumps.set_text(UNKNOWN if state.robot.collisions is None else str(state.robot.collisions))
         self._course.update(state.robot.course)
