@@ -28,8 +28,8 @@ ConfigFile = Annotated[Path | None, Parameter(name="--config")]
 Transport = Annotated[
     str,
     Parameter(
-        help="ros2 (rclpy), dds or zenoh (ROS 2 without a ROS installation), auto (ros2 if installed, else dds), or "
-        "ros1."
+        help="ros2 (rclpy), dds or, experimentally, zenoh (ROS 2 without a ROS installation), auto (ros2 if installed, "
+        "else dds), or ros1."
     ),
 ]
 
