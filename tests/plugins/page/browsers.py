@@ -9,6 +9,9 @@ from pathlib import Path
 from playwright.sync_api import Browser, Playwright
 from scripts import chromium
 
+_stack = ExitStack()
+atexit.register(_stack.close)
+
 
 @contextmanager
 def a_browser(webcam: Path | None = None) -> Iterator[Browser]:
@@ -36,17 +39,21 @@ def a_browser(webcam: Path | None = None) -> Iterator[Browser]:
 
 
 def close_shared() -> None:
-    """End the browser that all share, if there is one; the next test that needs it starts another."""
+    """End the browser that all share, and Playwright, if there is one; the next test that needs it starts another.
+
+    Playwright keeps an event loop running, next to which other tests cannot run theirs.
+    """
     if _shared.cache_info().currsize:
         _shared().close()
         _shared.cache_clear()
+    if _playwright.cache_info().currsize:
+        _stack.close()
+        _playwright.cache_clear()
 
 
 @cache
 def _playwright() -> Playwright:
-    stack = ExitStack()
-    atexit.register(stack.close)
-    return stack.enter_context(chromium.playwright())
+    return _stack.enter_context(chromium.playwright())
 
 
 @cache

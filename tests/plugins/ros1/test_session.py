@@ -79,5 +79,5 @@ class TestRos1(SessionContract):
 
 
 def test_a_transport_that_is_not_there() -> None:
-    with pytest.raises(TransportError, match="there is no transport 'carrier_pigeon': use ros1"):
+    with pytest.raises(TransportError, match="there is no transport 'carrier_pigeon': use dds or ros1"):
         join("carrier_pigeon", "camera", [])

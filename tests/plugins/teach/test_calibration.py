@@ -90,7 +90,7 @@ def test_broken_landmarks_and_nothing_at_all_are_refused() -> None:
     for shown in ({}, {STOP: broken}, {STOP: [show_fingers("index", roll=np.pi / 2)] * 5}):
         with pytest.raises(ProfileError, match="Stop: "):
             calibrate("odd", shown, SHIPPED)
-    with pytest.raises(ProfileError, match="no name"):
+    with pytest.raises(ProfileError, match="not a valid name"):
         calibrate("../odd", {STOP: hands}, SHIPPED)
 
 
