@@ -111,7 +111,7 @@ def test_ones_own_camera_begins_at_the_start_and_not_where_the_demo_left_the_rob
             url = page.serve(graph)
             graph.start()
             shown = show(browser, url)
-            wait_for_words(shown, ".banner", "No hand is in view")
+            wait_for_words(shown, ".banner", "No hand seen for")
             wait_until_stands(graph)
             assert graph.robot.state.truth.x > 0.2
             shown.get_by_text("Use my camera").click()
