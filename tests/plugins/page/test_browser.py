@@ -40,7 +40,7 @@ def test_drives_while_the_pad_is_held_and_stops_when_it_is_let_go(visit: Visit) 
     pad.focus()
     visit.page.keyboard.down("ArrowUp")
     visit.wait_until(lambda: robot.state.linear_mps > 0.2)
-    visit.wait_until(lambda: visit.text(".banner .reason") == "Steered by hand")
+    visit.wait_until(lambda: visit.text(".banner .reason") == "Steered directly")
     visit.page.keyboard.up("ArrowUp")
     visit.wait_until(lambda: robot.state.linear_mps == pytest.approx(0, abs=0.01))
 
