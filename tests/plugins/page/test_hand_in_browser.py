@@ -118,7 +118,7 @@ def test_the_hand_drives_as_a_joystick_and_the_picture_shows_the_stick(handednes
         reason = "Driven by the hand as a joystick"
         visit.wait_until(lambda: visit.text(".banner .reason") == reason and visit.text(".mux .holds") == "Joystick")
         visit.wait_until(lambda: greens(visit) > palm + 60)
-        visit.wait_until(lambda: visit.text(".world .fact b") == "your hand")
+        visit.wait_until(lambda: visit.text(".world .fact b") == "the demo hand")
         visit.wait_until(lambda: visit.text(".sign-tile.seen .name") == "Move it")
         state = visit.graph.robot
         visit.wait_until(lambda: state.state.linear_mps > 0.1 and state.state.angular_radps < -0.3)
