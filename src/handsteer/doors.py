@@ -95,7 +95,7 @@ class Door(Generic[T]):
 
     def _entry(self, name: str) -> importlib.metadata.EntryPoint:
         entries = _entries(self.group)
-        if not any(map(_is_ours, _installed())):
+        if all(package != _OURS for package, _ in _installed()):
             raise PluginError(
                 "handsteer's own entry points are missing: install it again, as by make run or pip install"
             )
@@ -106,18 +106,22 @@ class Door(Generic[T]):
 
 
 @cache
-def _installed() -> tuple[importlib.metadata.EntryPoint, ...]:
-    """Return the entry points of all doors, our own first. All packages are searched, once."""
-    found = (entry for package in importlib.metadata.distributions() for entry in package.entry_points)
-    doors = (entry for entry in found if entry.group.startswith(f"{_OURS}."))
-    return tuple(sorted(doors, key=lambda entry: (not _is_ours(entry), entry.name)))
+def _installed() -> tuple[tuple[str, importlib.metadata.EntryPoint], ...]:
+    """Return the entry points of all doors, each with its distribution's name, our own first; searches only once."""
+    found: list[tuple[str, importlib.metadata.EntryPoint]] = []
+    for package in importlib.metadata.distributions():
+        entries = [entry for entry in package.entry_points if entry.group.startswith(f"{_OURS}.")]
+        if entries:  # to find a distribution's name, all of its metadata is parsed
+            name = package.name
+            found += [(name, entry) for entry in entries]
+    return tuple(sorted(found, key=lambda each: (each[0] != _OURS, each[1].name)))
 
 
 @cache
 def _entries(group: str) -> dict[str, importlib.metadata.EntryPoint]:
     """Return what is installed by name, our own first; of two with one name ours, or the first found, is kept."""
     entries: dict[str, importlib.metadata.EntryPoint] = {}
-    for entry in _installed():
+    for _, entry in _installed():
         if entry.group != group:
             continue
         if entry.name not in entries:
@@ -126,10 +130,6 @@ def _entries(group: str) -> dict[str, importlib.metadata.EntryPoint]:
             used = entries[entry.name].value
             log.warning("%s: %s has the name %s of %s, and is not used", group, entry.value, entry.name, used)
     return entries
-
-
-def _is_ours(entry: importlib.metadata.EntryPoint) -> bool:
-    return entry.dist is not None and entry.dist.name == _OURS
 
 
 CAMERAS: Final[Door[Callable[["Config", "Clock"], "Camera"]]] = Door("handsteer.cameras", "camera")
