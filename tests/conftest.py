@@ -1,6 +1,7 @@
 """What tests share: where the real photos and clips are, and a ROS 1 graph."""
 
 import atexit
+import faulthandler
 import importlib.util
 import os
 import shutil
@@ -10,6 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from _pytest.faulthandler import fault_handler_stderr_fd_key
 from hypothesis import settings
 
 from handsteer.clock import SteppedClock
@@ -51,6 +53,11 @@ LONG_VALUE = 100
 
 LONGEST_REASON = 3000
 """The end of a failure that is printed of a test that was run again, in characters."""
+
+HANGS_S = 960.0
+"""After so long, a process whose test hangs prints the stacks of its threads and ends; pytest-xdist says which test it
+was, and goes on with the others in another process. Longer than any timeout of pytest-timeout, which interrupts the
+function of a test, once: neither its fixtures, nor what the function does at its end."""
 
 DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 
@@ -144,20 +151,33 @@ def pytest_make_parametrize_id(val: object, argname: str) -> str | None:
     return argname if isinstance(val, bytes) or (isinstance(val, str) and len(val) > LONG_VALUE) else None
 
 
+def _end_if_it_hangs(item: pytest.Item) -> None:
+    uncaptured = item.config.stash[fault_handler_stderr_fd_key]
+    faulthandler.dump_traceback_later(HANGS_S, exit=True, file=uncaptured)
+
+
+@pytest.hookimpl(tryfirst=True)
 def pytest_runtest_setup(item: pytest.Item) -> None:
+    """Begin each try of a test with all its time, and skip what needs ROS 1 where that is not installed."""
+    _end_if_it_hangs(item)
     """Skip what needs ROS 1 where that is not installed."""
     there = importlib.util.find_spec("rospy") and shutil.which("roscore")
     if item.get_closest_marker("ros1") and not there:
         pytest.skip("ROS 1 is not installed: make ros1")
 
 
-@pytest.hookimpl(trylast=True)
-def pytest_runtest_teardown(item: pytest.Item, nextitem: pytest.Item | None) -> None:
+@pytest.hookimpl(wrapper=True, tryfirst=True)
+def pytest_runtest_teardown(item: pytest.Item, nextitem: pytest.Item | None) -> Iterator[None]:
     """Close the browser after the last test that uses it: without pages, too, it takes a good part of a processor."""
-    if item.get_closest_marker("browser") and (nextitem is None or not nextitem.get_closest_marker("browser")):
-        from tests.plugins.page.browsers import close_shared  # noqa: PLC0415 - most files need no browser
+    _end_if_it_hangs(item)
+    try:
+        yield
+        if item.get_closest_marker("browser") and (nextitem is None or not nextitem.get_closest_marker("browser")):
+            from tests.plugins.page.browsers import close_shared  # noqa: PLC0415 - most files need no browser
 
-        close_shared()
+            close_shared()
+    finally:
+        faulthandler.cancel_dump_traceback_later()
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:

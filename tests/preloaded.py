@@ -23,6 +23,9 @@ from typing import IO, Any
 
 _SET_CHILD_SUBREAPER = 36  # of prctl(2)
 _LARGEST_REQUEST = 1 << 20
+_LONGEST_FORK_S = 60.0
+"""Imports included. What takes longer never comes, and its caller would wait while it holds the lock of all others."""
+_END_S = 10.0
 _LIBRARIES = ("PYTHONPATH", "LD_LIBRARY_PATH")  # read when an interpreter starts
 
 
@@ -32,15 +35,25 @@ class _Forks:
     def __init__(self, python: str, env: dict[str, str]) -> None:
         self._channel, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         with theirs:
-            for end in (self._channel, theirs):
-                end.setblocking(True)  # rospy sets a timeout for all sockets of a process
+            # rospy sets a timeout for all sockets of a process.
+            self._channel.settimeout(_LONGEST_FORK_S)
+            theirs.setblocking(True)
             command = [python, __file__, str(theirs.fileno())]
             self._process = subprocess.Popen(command, env=env, pass_fds=[theirs.fileno()], stdin=subprocess.DEVNULL)
         atexit.register(self._end)
 
     def _end(self) -> None:
         self._channel.close()
-        self._process.wait()
+        try:
+            self._process.wait(_END_S)
+        except subprocess.TimeoutExpired:  # a process that was forked, and not ended, has the channel too
+            self._process.kill()
+            self._process.wait()
+
+    @property
+    def runs(self) -> bool:
+        """Whether it can fork."""
+        return self._process.poll() is None
 
     def fork(self, request: dict[str, Any], files: Sequence[int]) -> int:
         """Start a program as a child of this process; return its process ID."""
@@ -50,9 +63,12 @@ class _Forks:
         try:
             socket.send_fds(self._channel, [json.dumps(request).encode()], files)
             answer = self._channel.recv(64)
+        except TimeoutError:
+            self._process.kill()
+            answer = b""
         finally:
             prctl(_SET_CHILD_SUBREAPER, 0, 0, 0, 0)
-        assert answer, "the process that forks has ended"
+        assert answer, "the process that forks has ended, or does not answer"
         return int(answer)
 
 
@@ -116,7 +132,7 @@ class Preloaded:
                 self.stdout = os.fdopen(reading, "r" if text else "rb")
             files = [file if isinstance(file, int) else file.fileno() for file in (stdin, stdout, stderr)]
             with _lock:
-                if key not in _forks:
+                if key not in _forks or not _forks[key].runs:
                     _forks[key] = _Forks(python, env)
                 self.pid = _forks[key].fork(request, files)
 
@@ -172,9 +188,10 @@ def _serve(channel: socket.socket) -> list[str]:
                 return _become(request, files)
             os.write(theirs, str(child).encode())
             os._exit(0)
+        os.close(theirs)  # so that the end of the process between is seen, where it could not fork
         os.waitpid(between, 0)
         channel.send(os.read(mine, 64))
-        for file in (mine, theirs, *files):
+        for file in (mine, *files):
             os.close(file)
 
 

@@ -106,7 +106,7 @@ class Process:
         if self.running:
             self.popen.send_signal(signal.SIGCONT)
             self.popen.kill()
-        self.popen.wait()
+        self.popen.wait(START_S)
 
 
 class Peer(Process):

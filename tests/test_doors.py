@@ -19,6 +19,7 @@ from handsteer.config import Config
 from handsteer.errors import PluginError
 from handsteer.graph import Graph
 from handsteer.types import Velocity
+from tests.processes import START_S
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCUMENT = (ROOT / "docs" / "plugins.md").read_text()
@@ -68,6 +69,10 @@ class Installed:
                 yield next(filter(None, found))[1]
             finally:
                 process.terminate()
+                try:
+                    process.wait(START_S)
+                finally:
+                    process.kill()
 
     @property
     def _env(self) -> dict[str, str]:

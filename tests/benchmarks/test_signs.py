@@ -11,7 +11,7 @@ from handsteer.recognition.shipped_signs import ShippedClassifier, load_model
 from handsteer.types import BACKWARD, NONE
 
 # On a machine that is busy with other things; alone it takes a minute.
-pytestmark = [pytest.mark.slow, pytest.mark.exhaustive, pytest.mark.timeout(1800)]
+pytestmark = [pytest.mark.slow, pytest.mark.exhaustive, pytest.mark.timeout(900)]
 
 
 class NeverBackward(ShippedClassifier):

@@ -215,8 +215,7 @@ class Running:
 
     def kill(self, name: str) -> None:
         """Kill a node, and wait until it has gone."""
-        self.nodes[name].popen.kill()
-        self.nodes[name].popen.wait()
+        self.nodes[name].kill()
 
     def say_stop(self, stopped: bool) -> None:
         """Publish ``stopped`` on ``/stop``, as anybody may."""

@@ -57,7 +57,7 @@ class Launch(Process):
                 self.code(30)
             except subprocess.TimeoutExpired:
                 self.popen.kill()
-        self.popen.wait()
+        self.popen.wait(30)
 
 
 class Recorder:
