@@ -40,6 +40,7 @@ RUN_AGAIN = (
     "tests/rmw_zenoh",
     "tests/ros1",
     "tests/ros2",
+    "tests/test_doors.py",
     "tests/test_examples.py",
     "tests/test_wheel.py",
     "tests/transports",

@@ -274,18 +274,20 @@ class ChainContract:
 
     def test_a_stop_outlives_the_control(self, running: Running) -> None:
         """The hand shows Forward all the time, and the control does not wait for neutral."""
-        running.say_stop(True)
-        running.expect_rest()
-        running.kill("control")
-        running.revive()
-        stood_s = time.monotonic()
-        eventually(lambda: any(at_s > stood_s for at_s, _ in twists(running.peer)), what="the new control to speak")
-        time.sleep(1.5)
-        speeds = [speed for at_s, speed in running.speeds if at_s > stood_s]
-        assert max(map(abs, speeds)) < 0.05, "it may not have heard so for a moment"
-        assert abs(speeds[-1]) < 0.01
-        running.say_stop(False)
-        time.sleep(0.2)
+        try:
+            running.say_stop(True)
+            running.expect_rest()
+            running.kill("control")
+            running.revive()
+            stood_s = time.monotonic()
+            eventually(lambda: any(at_s > stood_s for at_s, _ in twists(running.peer)), what="the new control to speak")
+            time.sleep(1.5)
+            speeds = [speed for at_s, speed in running.speeds if at_s > stood_s]
+            assert max(map(abs, speeds)) < 0.05, "it may not have heard so for a moment"
+            assert abs(speeds[-1]) < 0.01
+        finally:
+            running.say_stop(False)
+        running.expect_full_speed()
         running.kill("control")
         running.revive().expect_full_speed()
 

@@ -64,7 +64,7 @@ def test_a_recording_ends_with_ctrl_c_and_is_whole(tmp_path: Path) -> None:
     process.signal(signal.SIGINT)
     assert process.code() == 0, process.text
     file = McapFile(path)
-    assert sum(recorded.topic == HAND_SIGN.name for recorded in file.messages()) > 5
+    assert sum(recorded.topic == HAND_SIGN.name for recorded in file.messages()) > 2
     assert file.problem is None
     check(path)
 
