@@ -99,23 +99,32 @@ def old_garbage() -> "weakref.ref[Cycle]":
 def test_garbage_waits_while_the_robot_moves(garbage: Garbage, monkeypatch: pytest.MonkeyPatch) -> None:
     lost = old_garbage()
     monkeypatch.setattr(closed_pages, "memory_mb", lambda: memory_mb() + 60.0)
-    assert not any(garbage.look(float(now_s), stands=False) for now_s in range(60))
+    assert not any(garbage.look(float(now_s), stands=False, pages=1) for now_s in range(60))
     assert lost() is not None
-    assert not garbage.look(60.0, stands=True), "it may start again"
-    assert garbage.look(61.5, stands=True)
+    assert not garbage.look(60.0, stands=True, pages=1), "it may start again"
+    assert garbage.look(61.5, stands=True, pages=1)
+    assert lost() is None
+
+
+def test_garbage_waits_while_many_pages_make_a_search_long(garbage: Garbage, monkeypatch: pytest.MonkeyPatch) -> None:
+    lost = old_garbage()
+    monkeypatch.setattr(closed_pages, "memory_mb", lambda: memory_mb() + 100.0)
+    assert not any(garbage.look(float(now_s), stands=True, pages=4) for now_s in range(60))
+    assert lost() is not None
+    assert garbage.look(60.0, stands=True, pages=3)
     assert lost() is None
 
 
 def test_garbage_stays_while_there_is_little(garbage: Garbage) -> None:
     lost = old_garbage()
-    assert not any(garbage.look(float(now_s), stands=True) for now_s in range(60))
+    assert not any(garbage.look(float(now_s), stands=True, pages=1) for now_s in range(60))
     assert lost() is not None
 
 
 def test_memory_is_bounded_even_while_the_robot_moves(garbage: Garbage, monkeypatch: pytest.MonkeyPatch) -> None:
     lost = old_garbage()
     monkeypatch.setattr(closed_pages, "memory_mb", lambda: memory_mb() + 420.0)
-    assert garbage.look(1.0, stands=False)
+    assert garbage.look(1.0, stands=False, pages=1)
     assert lost() is None
 
 

@@ -30,6 +30,8 @@ _LARGEST_GROWTH_MB: Final = 400.0
 _BLOCK_MB: Final = 75e-6
 _REST_S: Final = 1.0
 _BETWEEN_S: Final = 10.0
+_MOST_PAGES: Final = 3
+"""With more pages a search takes longer, some 75 ms each of Settings, for which a Stop would wait."""
 
 _ELEMENT_KEEPS: Final = frozenset({"id", "tag", "slots", "_client", "_deleted", "_parent_slot"})
 _PAGE_KEEPS: Final = frozenset({"_context"})
@@ -70,7 +72,7 @@ def _forget_all_but(names: frozenset[str], owner: object) -> None:
 
 
 class Garbage:
-    """Searches for all garbage only while the robot stands, unless memory has grown very much.
+    """Searches for all garbage only while the robot stands and few pages are kept, unless memory has grown very much.
 
     Searches among the young objects go on as usual.
     """
@@ -88,7 +90,7 @@ class Garbage:
         gc.enable()
         self._memory_mb, self._searched_s = memory_mb(), now_s
 
-    def look(self, now_s: float, *, stands: bool) -> bool:
+    def look(self, now_s: float, *, stands: bool, pages: int) -> bool:
         """Search if it is due, a few times a second; return whether it was."""
         if not stands:
             self._stood_since_s = None
@@ -96,7 +98,7 @@ class Garbage:
             self._stood_since_s = now_s
         grown_mb = memory_mb() - self._memory_mb
         rests = self._stood_since_s is not None and now_s - self._stood_since_s >= _REST_S
-        is_due = rests and grown_mb > _GROWTH_MB and now_s - self._searched_s >= _BETWEEN_S
+        is_due = rests and pages <= _MOST_PAGES and grown_mb > _GROWTH_MB and now_s - self._searched_s >= _BETWEEN_S
         if not (is_due or grown_mb > _LARGEST_GROWTH_MB):
             return False
         gc.collect()

@@ -110,6 +110,8 @@ def _serve(pipe: Pipe) -> None:
     """
     gc.disable()  # imports leave no garbage, and searching for it takes a fifth of their time
     # The graph's process, which imports this module too, does not load NiceGUI.
+    from nicegui import Client  # noqa: PLC0415
+
     from handsteer.plugins.page.closed_pages import Garbage  # noqa: PLC0415
     from handsteer.plugins.page.server import Dashboard  # noqa: PLC0415
 
@@ -128,7 +130,7 @@ def _serve(pipe: Pipe) -> None:
     garbage = Garbage()
     garbage.start(time.monotonic())
     while not (end.wait(_LOOK_PERIOD_S) or pipe.ended.is_set()):
-        garbage.look(time.monotonic(), stands=dashboard.robot_stands)
+        garbage.look(time.monotonic(), stands=dashboard.robot_stands, pages=len(Client.instances))
     graph.steering.stop()
     dashboard.stop()
 
