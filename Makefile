@@ -37,7 +37,7 @@ help:
 	@echo "make bench-signs  measure the signs on photos of people; fails if one is worse than in the committed table"
 	@echo "make signs-model  train the shipped sign model again, from synthetic hands; reproduces the file"
 	@echo "make landmark-model  build the 8-bit hand landmark model again from MediaPipe's; reproduces the file"
-	@echo "make faults       update the tables of docs/safety.md: the effect of every fault"
+	@echo "make faults       update the tables of docs/faults.md: the effect of every fault"
 	@echo "make soak         a million random events, then hours of driving and of the page (takes an hour or two)"
 	@echo "make docs         update docs/configuration.md from the configuration"
 	@echo "make site         build the documentation as a web site, with the API reference"

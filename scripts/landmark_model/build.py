@@ -20,11 +20,14 @@ HERE: Final = Path(__file__).parent
 RANGES: Final = HERE / "ranges.json"
 TARGET: Final = HERE.parents[1] / "src" / "handsteer" / "recognition" / "hand_landmark_fast.tflite"
 
-# docs/performance.md explains which operations stay in float.
 WHOLLY_INTEGER: Final = range(5, 42)
 """Operations on 8-bit integers, scaled by the measured ranges, from the first layer of 56x56 to the last of 14x14."""
 INTEGER_INSIDE: Final = range(42, 56)
-"""Only the convolutions are integer here, scaled for each picture; the values between them stay float."""
+"""Only the convolutions are integer here, scaled for each picture; the values between them stay float.
+
+In integers, the sums between these late layers would cost 0.5 to 0.8 mm of world landmarks each, the last convolution
+23 mm, and each of the first layers, but for the third, 0.4 to 0.6 px (medians).
+"""
 
 
 def main() -> None:

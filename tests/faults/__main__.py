@@ -1,4 +1,4 @@
-"""Writes the tables of faults in docs/safety.md: ``python -m tests.faults``, or only some parts of them by name."""
+"""Writes the tables of faults in docs/faults.md: ``python -m tests.faults``, or only some parts of them by name."""
 
 import logging
 import sys

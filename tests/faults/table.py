@@ -1,4 +1,4 @@
-"""The tables of faults in docs/safety.md: written here, and read again by the tests."""
+"""The tables of faults in docs/faults.md: written here, and read again by the tests."""
 
 import re
 from collections.abc import Iterable, Sequence
@@ -6,7 +6,7 @@ from pathlib import Path
 
 from tests.faults.stepped import Outcome
 
-DOCUMENT = Path(__file__).resolve().parents[2] / "docs" / "safety.md"
+DOCUMENT = Path(__file__).resolve().parents[2] / "docs" / "faults.md"
 LIMIT_S = 0.5
 """Of every row: from the end of the reason to drive to the last moment at which the robot was asked to move."""
 

@@ -1,4 +1,4 @@
-"""Faults of the page from which somebody drives: what docs/safety.md says of them, and a part of it seen again."""
+"""Faults of the page from which somebody drives: what docs/faults.md says of them, and a part of it seen again."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Links that are cut or slow, between machines: what docs/safety.md says of them, and a part of it seen again."""
+"""Links that are cut or slow, between machines: what docs/faults.md says of them, and a part of it seen again."""
 
 import pytest
 

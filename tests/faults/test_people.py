@@ -1,4 +1,4 @@
-"""Faces that take the place of a hand: what docs/safety.md says of them, and one of them seen again."""
+"""Faces that take the place of a hand: what docs/faults.md says of them, and one of them seen again."""
 
 from collections.abc import Callable, Iterator
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Signals to real processes: a part of the rows that ``make faults`` writes into docs/safety.md."""
+"""Signals to real processes: a part of the rows that ``make faults`` writes into docs/faults.md."""
 
 from collections.abc import Iterator
 

@@ -1,4 +1,4 @@
-"""Recordings of the faults of docs/safety.md answer why the robot drove, and why it stopped."""
+"""Recordings of the faults of docs/faults.md answer why the robot drove, and why it stopped."""
 
 from dataclasses import replace
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""What docs/safety.md says of faults is what the code does; and none of them lets a robot move without a reason."""
+"""What docs/faults.md says of faults is what the code does; and none of them lets a robot move without a reason."""
 
 import pytest
 
