@@ -1,15 +1,23 @@
+import datetime
+import importlib
+import io
 import os
 import pickle
+import subprocess
 import threading
 import time
-from collections.abc import Iterator
+from collections import deque
+from collections.abc import Callable, Iterator
+from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 from handsteer import messages
-from handsteer.errors import TransportError
+from handsteer.config import load
+from handsteer.errors import PluginError, TransportError
 from handsteer.images import image_message
 from handsteer.messages import (
     CMD_VEL,
@@ -23,7 +31,10 @@ from handsteer.messages import (
     Twist,
     twist,
 )
+from handsteer.robots.editing import edit
+from handsteer.robots.world import load_world
 from handsteer.testing.transport_contract import TransportContract, eventually
+from handsteer.transports import piped
 from handsteer.transports.base import Received, Transport
 from handsteer.transports.in_process import InProcessTransport
 from handsteer.transports.piped import Gateway, Pipe, PipedTransport
@@ -32,11 +43,11 @@ TOPICS = [value for value in vars(messages).values() if isinstance(value, Topic)
 
 
 def joined() -> tuple[Pipe, Pipe]:
-    """Return both ends of a pipe, not started."""
+    """Return both ends of a pipe, not started: the parent's, then the child's."""
     there, back = os.pipe(), os.pipe()
     return (
-        Pipe(os.fdopen(back[0], "rb"), os.fdopen(there[1], "wb")),
-        Pipe(os.fdopen(there[0], "rb"), os.fdopen(back[1], "wb")),
+        Pipe(os.fdopen(back[0], "rb"), os.fdopen(there[1], "wb"), trusts=False),
+        Pipe(os.fdopen(there[0], "rb"), os.fdopen(back[1], "wb"), trusts=True),
     )
 
 
@@ -189,7 +200,7 @@ def test_an_end_that_takes_nothing_is_not_said_more_than_a_thousand_things() -> 
 
 def test_a_message_that_is_cut_short_ends_the_pipe() -> None:
     source, sink = os.pipe()
-    pipe = Pipe(os.fdopen(source, "rb"), os.fdopen(os.open(os.devnull, os.O_WRONLY), "wb"))
+    pipe = Pipe(os.fdopen(source, "rb"), os.fdopen(os.open(os.devnull, os.O_WRONLY), "wb"), trusts=False)
     pipe.start()
     os.write(sink, b"\x00\x00\x00")
     os.close(sink)
@@ -209,6 +220,73 @@ class Unreadable:
 
     def __reduce__(self) -> tuple[Any, ...]:
         return int, ("\x1b[2Jno number",)
+
+
+class Runs:
+    """Runs code where it is read, unless only data is read."""
+
+    def __init__(self, call: Callable[..., object], *what: object) -> None:
+        self._call = (call, what)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return self._call
+
+
+@pytest.mark.parametrize(
+    "call",
+    [os.mkdir, Path.mkdir, partial(Path.mkdir), subprocess.run, eval, pickle.loads, importlib.import_module, getattr],
+    ids=lambda call: getattr(call, "__qualname__", "partial"),
+)
+def test_a_parent_runs_no_code_of_its_child(
+    call: Callable[..., object], caplog: pytest.LogCaptureFixture, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    near, far = joined()
+    heard: list[object] = []
+    near.on("number", heard.append)
+    near.start()
+    far.start()
+    far.say("number", Runs(call, "made"))
+    far.say("number", 1)
+    assert eventually(lambda: heard == [1])
+    assert "is not a class of data" in caplog.text
+    assert not Path("made").exists()
+    far.close()
+
+
+@pytest.mark.parametrize("name", ["field", "Any", "dataclass", "replace", "twist.__globals__", "builtins"])
+def test_of_a_module_of_data_its_own_parts_are_read_only(name: str) -> None:
+    with pytest.raises(pickle.UnpicklingError):
+        piped._DataUnpickler(io.BytesIO(f"chandsteer.messages\n{name}\n.".encode())).load()
+
+
+DATA = [
+    *TOPICS,
+    load(base={"camera": {"source": "virtual"}}),
+    load_world("obstacles"),
+    partial(edit, name="box", fields={"x": 1.0}, section="obstacles"),
+    np.zeros((2, 3), np.uint8),
+    np.float64(0.5),
+    np.datetime64("2026-01-01"),
+    Path("a/b"),
+    datetime.datetime.now(datetime.UTC),
+    TransportError("no"),
+    PluginError("no"),
+    deque([1, {2}, frozenset({3})]),
+]
+
+
+@pytest.mark.parametrize("data", DATA, ids=lambda data: type(data).__name__)
+def test_a_parent_reads_data_of_its_child(data: Any) -> None:
+    near, far = joined()
+    heard: list[Any] = []
+    near.on("data", heard.append)
+    near.start()
+    far.start()
+    far.say("data", data)
+    assert eventually(lambda: heard)
+    assert repr(heard[0]) == repr(data)
+    far.close()
 
 
 UNSENDABLE = {"function": lambda: None, "nested": nested(5000), "unreadable": Unreadable(), "lock": threading.Lock()}

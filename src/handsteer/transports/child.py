@@ -43,7 +43,8 @@ class Child:
         )
         assert self.process.stdout is not None
         assert self.process.stdin is not None
-        self.pipe = Pipe(self.process.stdout, self.process.stdin)
+        # It may serve a network, which must not reach this process.
+        self.pipe = Pipe(self.process.stdout, self.process.stdin, trusts=False)
         self.pipe.on("log", _log)
 
     @property
@@ -101,7 +102,7 @@ def serve_parent(serve: Callable[[Pipe], None]) -> None:
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
     # Python closes its own standard input at the end, and aborts if a thread is reading it.
     source = os.fdopen(os.dup(sys.stdin.fileno()), "rb")
-    pipe = Pipe(source, sink)
+    pipe = Pipe(source, sink, trusts=True)
     to_parent = logging.handlers.QueueHandler(_Records(pipe))  # type: ignore[arg-type] # it only puts
     logging.basicConfig(level=logging.INFO, format="%(message)s", handlers=[to_parent])
     try:
