@@ -13,7 +13,7 @@ pytestmark = NEEDS_A_BROWSER
 
 @pytest.fixture
 def visit(request: pytest.FixtureRequest) -> Iterator[Visit]:
-    with visiting(request.param) as visit:
+    with visiting(request.param, details=True) as visit:
         yield visit
 
 

@@ -71,6 +71,38 @@ def test_a_visitor_drives_by_signs_and_stops_in_few_clicks(slideshow: Path, tmp_
         assert visit.troubles == []
 
 
+PAUSE_PERMISSION = "navigator.permissions.query = async () => ({ state: 'prompt' })"
+
+
+@pytest.mark.parametrize("path", ["/", "/settings", "/world"])
+def test_ones_own_camera_stays_when_a_page_is_loaded(slideshow: Path, tmp_path: Path, path: str) -> None:
+    clip = a_first_minute(slideshow, tmp_path / "minute.mjpeg")
+    with visiting("NONE:600", webcam=clip, camera={"fps": 5}) as visit:
+        page, camera = visit.page, visit.graph.camera
+
+        def gives() -> bool:
+            frames = camera.frames
+            page.wait_for_timeout(100)
+            return visit.graph.cameras.browser.is_given and camera.frames > frames
+
+        page.context.grant_permissions(["camera"])
+        page.get_by_role("button", name=USE).first.click()
+        visit.wait_until(gives)
+        page.goto(page.url.rstrip("/") + path)
+        visit.wait_until(gives)
+
+        # Where the browser would ask again, the page does.
+        page.add_init_script(PAUSE_PERMISSION)
+        page.reload()
+        visit.wait_until(lambda: visit.text(".banner .reason") == "This browser's camera is off: Use my camera")
+        assert not page.locator(".coach").is_visible()
+        page.locator(".banner .use-camera").click()
+        visit.wait_until(gives)
+        visit.wait_until(lambda: visit.text(".banner .reason") != "This browser's camera is off: Use my camera")
+        visit.wait_until(lambda: not page.locator(".banner .use-camera").is_visible())
+        assert visit.troubles == []
+
+
 def test_a_browser_that_refuses_says_in_the_same_place_what_to_do(visit: Visit) -> None:
     page = visit.page
     visit.wait_until(lambda: intro(page))

@@ -23,7 +23,7 @@ def headline(visit: Visit) -> str:
 
 @pytest.mark.parametrize("path", ["/", "/world", "/teach", "/settings", "/study"])
 def test_all_words_of_a_page_are_in_the_language_of_the_browser_and_fit(path: str) -> None:
-    with visiting("Forward:600", path, locale="de-DE", camera={"fps": 5}) as visit:
+    with visiting("Forward:600", path, locale="de-DE", details=True, camera={"fps": 5}) as visit:
         page = visit.page
         visit.wait_until(lambda: headline(visit) == GERMAN["Driving"])
         assert page.locator("html").get_attribute("lang") == "de"
@@ -42,7 +42,7 @@ def test_all_words_of_a_page_are_in_the_language_of_the_browser_and_fit(path: st
 
 
 def test_words_change_with_the_state_and_numbers_stay_as_they_were() -> None:
-    with visiting("Forward:3 Stop:3", locale="de-DE", camera={"fps": 10}) as visit:
+    with visiting("Forward:3 Stop:3", locale="de-DE", details=True, camera={"fps": 10}) as visit:
         page = visit.page
         visit.wait_until(lambda: headline(visit) == GERMAN["Driving"])
         visit.wait_until(lambda: visit.text(".camera .sign") == "Stopp")

@@ -77,20 +77,26 @@ def test_stop_and_state_are_in_view_at_every_scroll_position_and_no_page_is_too_
             assert page.evaluate(BAR_PX) <= 64
 
 
-JOB = (".camera .stage", ".world .stage", ".banner", ".pad", ".velocity", ".timing", ".camera .foot", ".world .foot")
+JOB = (".camera .stage", ".world .stage", ".banner", ".pad", ".camera .foot", ".world .foot", ".sign-tile >> nth=-1")
+TECHNICAL = (".velocity", ".timing", ".topic", ".limit", ".sign-tile .figures")
 
 
-def test_all_that_one_drives_by_fits_a_screen_without_scrolling() -> None:
-    with visiting("Forward:600", camera={"fps": 5}) as visit:
+@pytest.mark.parametrize("locale", ["en-US", "de-DE"])
+def test_all_that_one_drives_by_fits_a_screen_without_scrolling(locale: str) -> None:
+    with visiting("Forward:600", locale=locale, camera={"fps": 5}) as visit:
         page = visit.page
+        visit.wait_until(lambda: visit.text(".banner .headline") in ("Driving", "Fahrt"))
+        for size in (DESKTOP, LAPTOPS[0]):
+            page.set_viewport_size(size)
+            page.evaluate("scrollTo(0, 0)")
+            for selector in JOB:
+                box = page.locator(selector).first.bounding_box()
+                assert box is not None, selector
+                assert box["y"] >= 0, selector
+                assert box["y"] + box["height"] <= size["height"], (size, selector)
+            assert not any(page.locator(selector).first.is_visible() for selector in TECHNICAL)
+            assert clear_of_the_picture(page)
         page.set_viewport_size(DESKTOP)
-        visit.wait_until(lambda: visit.text(".banner .headline") == "Driving")
-        page.evaluate("scrollTo(0, 0)")
-        for selector in JOB:
-            box = page.locator(selector).first.bounding_box()
-            assert box is not None, selector
-            assert box["y"] >= 0, selector
-            assert box["y"] + box["height"] <= DESKTOP["height"], selector
         # No empty band under the 3D view.
         camera, world = (page.locator(f".{name}.viewer").bounding_box() for name in ("camera", "world"))
         foot = page.locator(".world .foot").bounding_box()
@@ -100,6 +106,41 @@ def test_all_that_one_drives_by_fits_a_screen_without_scrolling() -> None:
         assert camera["height"] == pytest.approx(world["height"], abs=1)
         assert foot["y"] + foot["height"] == pytest.approx(world["y"] + world["height"], abs=2)
         assert rows_have_room(page)
+        page.locator(".details button").click()
+        assert all(page.locator(selector).first.is_visible() for selector in TECHNICAL[:-1])
+        assert rows_have_room(page)
+        page.reload()
+        page.locator(".velocity").wait_for()
+        assert page.locator(".details button").get_attribute("aria-expanded") == "true"
+
+
+def clear_of_the_picture(page: Page) -> bool:
+    """Return whether the words about the demo hand leave the picture free."""
+    picture, words = (page.locator(part).bounding_box() for part in (".camera .stage > img", ".offer.demo"))
+    assert picture is not None
+    assert words is not None
+    return picture["height"] >= 150 and picture["y"] + picture["height"] <= words["y"]
+
+
+@pytest.mark.parametrize("size", [DESKTOP, PHONE], ids=["desktop", "phone"])
+def test_nothing_jumps_while_a_page_is_loaded_and_signs_come_second_on_a_phone(size: ViewportSize) -> None:
+    with visiting("Forward:600", camera={"fps": 5}) as visit:
+        page = visit.page
+        page.add_init_script(f"({SHIFTS})()")
+        page.set_viewport_size(size)
+        page.reload()
+        visit.wait_until(lambda: visit.text(".banner .headline") == "Driving")
+        visit.wait_until(lambda: visit.text(".camera .sign") == "Forward")
+        assert page.evaluate("window.shifted") < 0.05
+        camera, signs, world = (
+            page.locator(part).bounding_box() for part in (".camera.viewer", ".legend", ".world.viewer")
+        )
+        assert camera is not None
+        assert signs is not None
+        assert world is not None
+        if size == PHONE:
+            assert camera["y"] < signs["y"] < world["y"]
+            assert clear_of_the_picture(page)
 
 
 @pytest.mark.parametrize("size", [DESKTOP, PHONE], ids=["desktop", "phone"])

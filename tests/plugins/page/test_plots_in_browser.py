@@ -20,7 +20,7 @@ def samples(visit: Visit) -> Any:
 
 
 def test_plots_can_be_paused_zoomed_and_read_by_mouse_and_keys() -> None:
-    with visiting("Forward:3 Stop:1", camera={"fps": 10}) as visit:
+    with visiting("Forward:3 Stop:1", details=True, camera={"fps": 10}) as visit:
         page = visit.page
         pause = page.locator(".velocity .key button")
         visit.wait_until(lambda: page.evaluate("uPlot.sync('velocity').plots.length") == 2 and samples(visit) > 60)
@@ -55,7 +55,7 @@ def test_plots_can_be_paused_zoomed_and_read_by_mouse_and_keys() -> None:
 
 
 def test_the_scale_grows_at_once_and_shrinks_only_well_below_the_next_step() -> None:
-    with visiting("NONE:600", camera={"fps": 5}) as visit:
+    with visiting("NONE:600", details=True, camera={"fps": 5}) as visit:
         visit.wait_until(lambda: visit.page.evaluate("uPlot.sync('velocity').plots.length") == 2)
         visit.page.get_by_role("button", name="Pause").click()  # what is sent below is all there is
         visit.page.get_by_role("button", name="Resume").wait_for()

@@ -174,6 +174,7 @@ def test_another_topic_is_steered_past_the_control_and_stops_as_well() -> None:
             visit.page.goto(url)
             graph.start()
             visit.wait_until(lambda: visit.text(".banner .headline") == "Standing")
+            press(visit.page, "Details: velocities, topic, limits and reaction time")
             choose(visit, "/cmd vel")
             visit.wait_until(lambda: "is not a valid topic name" in visit.text(".topic .trouble"))
             choose(visit, topic.name)

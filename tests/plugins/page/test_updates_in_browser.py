@@ -36,7 +36,7 @@ def test_only_what_has_changed_is_sent(path: str) -> None:
 
 
 def test_the_settings_are_complete_when_they_are_served() -> None:
-    with visiting("Stop:600", camera={"fps": 5}) as visit:
+    with visiting("Stop:600", details=True, camera={"fps": 5}) as visit:
         page, calls = visit.page, []
         page.on("websocket", lambda socket: socket.on("framereceived", lambda frame: calls.append(str(frame))))
         page.goto(page.url.rstrip("/") + "/settings")

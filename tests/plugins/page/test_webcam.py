@@ -132,7 +132,7 @@ def test_only_who_drives_gives_a_camera(graph: Graph, url: str, browser: Browser
         button.wait_for()
     buttons[0].click()
     wait_for_words(first, ".camera .sign", "Forward")
-    viewer = second.locator("[data-camera=browser]").get_attribute("data-viewer")
+    viewer = second.evaluate("window.clientId")
     second.evaluate("viewer => giveCamera(viewer)", viewer)
     wait_for_words(second, ".camera .trouble", "only the driver can share a camera")
     second.get_by_role("button", name="Ask to drive").click()

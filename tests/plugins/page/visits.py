@@ -101,6 +101,7 @@ def visiting(
     steering: bool = False,
     study: Task | None = None,
     locale: str = "en-US",
+    details: bool = False,
     **sections: dict[str, Any],
 ) -> Iterator[Visit]:
     """Show a page of a whole graph that sees the virtual hand; the hand begins once the browser shows the page.
@@ -112,6 +113,7 @@ def visiting(
         steering: Whether the graph has a node ``steering`` beside that of the page.
         study: What the page leads a participant through.
         locale: The browser's language.
+        details: Whether the browser shows the page's details.
         sections: Further configuration by section.
     """
     base = {
@@ -130,6 +132,8 @@ def visiting(
             visit.page.on("request", visit.note_request)
             # Shown with a test that fails: a page that lost its connection loads itself again, and forgets its inputs.
             visit.page.on("framenavigated", lambda frame: log.warning("loaded %s", frame.url))
+            if details:
+                visit.page.add_init_script("localStorage.setItem('handsteer-details', true)")
             visit.page.goto(url + path)
             visit.page.locator(".banner").wait_for()
             graph.start()

@@ -239,7 +239,7 @@ class CameraPanel:
     def __init__(
         self, page: Page, graph: RemoteGraph | None, *, settings: Settings | None = None, coaches: bool = False
     ) -> None:
-        self._page = page
+        self._page, self._graph = page, graph
         with ui.element("section").classes("card viewer camera"):
             with box("stage") as self.stage:
                 # Lazy, because otherwise the page would count as loaded only with its first picture.
@@ -287,9 +287,10 @@ class CameraPanel:
         if self._choices is not None:
             self._choices.update(state)
         if self._offer is not None:
-            self._offer.update(state)
+            self._offer.update()
         if self._coach is not None and (node := self._page.node):
-            self._coach.update(state, is_driver=self._page.lease(node).role == "driver")
+            can_show = self._graph is None or not self._graph.lacks_browser
+            self._coach.update(state, is_driver=can_show and self._page.lease(node).role == "driver")
 
 
 def _engage_ring() -> tuple[ui.element, ui.element, ui.label]:

@@ -33,20 +33,19 @@ class DrivePage(Page):
     """Drives the robot, and explains its behaviour."""
 
     def __init__(self, context: PageContext) -> None:
-        super().__init__(
-            context, "/", "drive.css", "steer.css", "steer.js", "sticks.js", "world.css", "webcam.js", *_PLOTS
-        )
+        super().__init__(context, "/", "drive.css", "steer.css", "steer.js", "sticks.js", "world.css", *_PLOTS)
         graph = context.graph
         self._camera = CameraPanel(self, graph, settings=context.settings, coaches=True)
+        self._legend = LegendPanel(self, context.settings)
         self._world = WorldPanel(self, graph)
         with box("panels"):
-            self._velocity = VelocityPanel()
+            self._steering = SteerPanel(self)
             self._recording = (
                 RecordPanel(self, graph, context.recordings) if graph is not None and context.recordings else None
             )
-            self._steering = SteerPanel(self)
+            _details_button()
+            self._velocity = VelocityPanel()
             self._topic = TopicPanel(self, self._steering, has_choice=graph is None)
-            self._legend = LegendPanel(self, context.settings)
         self._updates = 0
 
     def show(self, node: DashboardNode, state: PageState) -> None:
@@ -61,6 +60,12 @@ class DrivePage(Page):
         self._updates += 1
         if self._updates % _PLOT_EVERY == 0:
             self._velocity.draw(node.history, node.clock.now())
+
+
+def _details_button() -> None:
+    """Create the button that shows what is technical, and hides it again, in ``static/page.js``."""
+    with box("details"):
+        button("Details", label="Details: velocities, topic, limits and reaction time").props('aria-expanded="false"')
 
 
 Row = tuple[float, float | None, float | None]

@@ -20,8 +20,8 @@ from handsteer.plugins.page.state import PageState
 from handsteer.types import FORWARD, STOP
 
 _DEMO: Final = (
-    "It shows the signs in turn, and the robot obeys. With your own camera you drive: your browser asks for it first, "
-    "choose Allow. The pictures go to the computer that runs handsteer, and all who have its page open see them."
+    "It shows the signs, and the robot obeys. With your camera you drive: your browser asks first, choose Allow. The "
+    "computer that runs handsteer gets the pictures, and all who have its page open see them."
 )
 _REFUSALS: Final = {
     "NotAllowedError": (
@@ -73,15 +73,19 @@ class CameraOffer:
             self._refusal = text("trouble", "").props('role="alert"')
             with box("choices"):
                 self._browser = button("Use my camera").classes("primary")
-                self._browser.props(f'data-camera="browser" data-viewer="{page.client.id}"')
+                self._browser.props('data-camera="browser"')
                 self._own = button(f"Back to {graph.camera_name(OWN)}", self._use_own).props('data-camera="own"')
                 button("Keep watching").classes("keep").props('data-seen="demo"')
         ui.on("webcam", lambda event: self._refusal.set_text(refusal(event.args)))
 
-    def update(self, state: PageState) -> None:
-        """Show ``state``."""
+        self.update()  # at once, or what is below it would jump
+
+    def update(self) -> None:
+        """Show what is in use."""
         source = self._graph.state.camera_source
-        switch(self._box, "demo", on=state.camera == VIRTUAL_HAND)
+        names = {each.source: each.name for each in self._graph.state.cameras}
+        switch(self._box, "demo", on=names.get(source) == VIRTUAL_HAND)
+        switch(self._box, "off", on=self._graph.lacks_browser)
         switch(self._browser, "hidden", on=source == BROWSER and self._graph.state.has_browser)
         has_own = any(each.source == OWN for each in self._graph.state.cameras)
         switch(self._own, "hidden", on=source == OWN or not has_own)
@@ -95,7 +99,7 @@ _STEPS: Final = (
     (FORWARD, "Hold it until the robot drives"),
     (STOP, "Show Stop: open palm"),
 )
-_DONE: Final = "You can drive. The page lists all signs below."
+_DONE: Final = "You can drive. All signs are next to the picture."
 
 
 NOT_BEGUN: Final = -1
@@ -120,7 +124,7 @@ class Coach:
         self._page = page
         self._done = NOT_BEGUN
         self._steps: list[ui.element] = []
-        with box("coach") as self._box:
+        with box("coach off") as self._box:
             with ui.element("ol"):
                 for sign, words in _STEPS:
                     with ui.element("li") as step:
@@ -132,7 +136,7 @@ class Coach:
         self._mark()
 
     def update(self, state: PageState, *, is_driver: bool) -> None:
-        """Show ``state``, and tick what has been done."""
+        """Show ``state``, and tick what has been done; ``is_driver`` is of a viewer who can show signs."""
         is_live = is_driver and state.camera not in ("", VIRTUAL_HAND) and not state.is_joystick
         switch(self._box, "off", on=not is_live)
         if self._done == len(_STEPS):

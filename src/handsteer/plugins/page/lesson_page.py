@@ -42,7 +42,7 @@ class LessonPage(Page):
     title = "Teach"
 
     def __init__(self, context: PageContext) -> None:
-        super().__init__(context, "/teach", "drive.css", "teach.css", "webcam.js", "teach.js")
+        super().__init__(context, "/teach", "drive.css", "teach.css", "teach.js")
         self._lesson: ViewerLesson | None = None
         self._calibration: CalibrationPanel | None = None
         if context.lessons is None:

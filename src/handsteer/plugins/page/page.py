@@ -4,7 +4,7 @@ import copy
 import logging
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import ClassVar, Final, Protocol
 
@@ -78,6 +78,8 @@ LANGUAGES = frozenset({ENGLISH, *(file.stem for file in (STATIC / "languages").g
 
 _LONGEST_HEADER = 500
 _FIRST_LINKS: Final = ("/world", "/teach", "/settings")
+_CAMERA_OFF: Final = "this browser's camera is off: Use my camera"
+_DRIVERS_CAMERA_OFF: Final = "the camera of the driver's browser is off"
 _PERIOD_S = 0.1
 _ACK_PATIENCE_S = 5.0
 """A browser acknowledges received messages every 3 s; after this time without one, sending pauses until the next."""
@@ -136,7 +138,8 @@ class Page:
         ui.add_head_html(_INSTALLABLE)
         ui.add_body_html(_LOADING)
         self._speak(preferred_language(self.client.request.headers.get("accept-language", "")))
-        for name in ("page.css", "page.js", *assets):
+        webcam = ("webcam.js",) if context.graph is not None else ()
+        for name in ("page.css", "page.js", *webcam, *assets):
             ui.add_head_html(_ASSET[name.rpartition(".")[2]].format(f"{ASSETS_PATH}/{name}"))
         self._top(path)
         self._banner = Banner(self._halt, self._reset)
@@ -219,7 +222,17 @@ class Page:
         if node is not None and self._reads():
             if self._context.node.is_watched_only_by(self.client.id):
                 node.lease.take(self.client.id, node.clock.now())
-            self.show(node, node.state(self.client.id))
+            self.show(node, self._with_camera(node.state(self.client.id), self.lease(node)))
+
+    def _with_camera(self, state: PageState, lease: LeaseStatus) -> PageState:
+        """Return ``state`` with the browser's camera that is off as the reason why the robot stands."""
+        graph = self._context.graph
+        is_off = graph is not None and graph.lacks_browser
+        self._banner.offer_camera(on=is_off and lease.role == "driver")
+        if not is_off or state.stopped or state.mood == "driving":
+            return state
+        reason = _CAMERA_OFF if lease.role == "driver" else _DRIVERS_CAMERA_OFF
+        return replace(state, mood="trouble", reason=reason, no_picture=reason)
 
     def _reads(self) -> bool:
         """Return whether the browser acknowledges messages; otherwise they would accumulate."""

@@ -231,6 +231,11 @@ class RemoteGraph:
         future = self._request("choose_camera", source, size, is_far)
         return self._told(future, f"chose {name}", "camera_chosen", source if source in (OWN, BROWSER) else name)
 
+    @property
+    def lacks_browser(self) -> bool:
+        """Whether the camera of a browser is in use, and no browser gives one."""
+        return self.state.camera_source == BROWSER and not self.state.has_browser
+
     def camera_name(self, source: str) -> str:
         """Return the name of a camera for people, as it is used in a sentence."""
         if source == BROWSER:

@@ -102,6 +102,9 @@ class Banner:
                 self._reason = text("reason", "Waiting for the first report")
             self._warning = text("warning hidden", "")
             with box("buttons"):
+                self._camera = (
+                    button("Use my camera").classes("primary use-camera hidden").props('data-camera="browser"')
+                )
                 self._reset = button("Reset", reset, "Reset: let the robot be driven again").classes("hidden")
                 stop = button("Stop", label="Stop the robot (space key)").classes("stop")
                 stop.props('aria-keyshortcuts="Space"')
@@ -111,6 +114,11 @@ class Banner:
                     text("pressed confirmed", "Stopped")
         ui.on("space", lambda event: halt(event.args))
         self._mood = ""
+
+    def offer_camera(self, *, on: bool) -> None:
+        """Offer to use the browser's camera; ``static/webcam.js`` takes it again where it may."""
+        switch(self._banner, "camera-off", on=on)
+        switch(self._camera, "hidden", on=not on)
 
     def update(self, state: PageState) -> None:
         """Show ``state``."""

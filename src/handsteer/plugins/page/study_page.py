@@ -39,7 +39,7 @@ class StudyPage(Page):
 
     def __init__(self, context: PageContext) -> None:
         styles = ("drive.css", "steer.css", "world.css", "study.css")
-        super().__init__(context, "/study", *styles, "steer.js", "sticks.js", "webcam.js")
+        super().__init__(context, "/study", *styles, "steer.js", "sticks.js")
         self._session = context.study
         if context.study is None or context.graph is None:
             with card("Study", "study panel"):

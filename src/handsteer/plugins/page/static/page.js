@@ -53,6 +53,19 @@ document.addEventListener("click", (event) => {
   Quasar.Dark.toggle();
   localStorage.setItem("handsteer-dark", Quasar.Dark.isActive);
 });
+// data-details on the root shows what is technical; this browser remembers it.
+function showDetails(on) {
+  document.documentElement.toggleAttribute("data-details", on);
+  localStorage.setItem("handsteer-details", on);
+  for (const button of document.querySelectorAll(".details button")) button.setAttribute("aria-expanded", on);
+}
+document.addEventListener("click", (event) => {
+  if (event.target.closest?.(".details button")) showDetails(!document.documentElement.hasAttribute("data-details"));
+});
+if (localStorage.getItem("handsteer-details") === "true") {
+  showDetails(true);
+  window.addEventListener("load", () => showDetails(true)); // the button is there
+}
 // data-demo and data-coach on the root show what is new to this browser.
 for (const name of ["demo", "coach"]) {
   if (!localStorage.getItem(`handsteer-${name}`)) document.documentElement.dataset[name] = "new";

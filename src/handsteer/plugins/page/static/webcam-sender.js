@@ -19,7 +19,10 @@ function post(message) {
 function connect(address) {
   socket = new WebSocket(address);
   socket.onopen = socket.onmessage = () => postMessage({});
-  socket.onclose = (event) => postMessage({ closed: event.code === 1000 ? "" : event.reason || "the connection was lost" });
+  socket.onclose = ({ code, reason }) => postMessage({
+    closed: code === 1000 ? "" : reason || "the connection was lost",
+    isRefused: code === 1000 || code >= 4400,
+  });
 }
 
 async function send(picture, capturedMs) {

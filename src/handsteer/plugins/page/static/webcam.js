@@ -2,6 +2,10 @@
 
 const LOOK_MS = 10;
 
+// The camera stays with the person when a page is loaded again, or another: the tab remembers that it was given, and
+// which camera ({device, size}), until the person or the server takes another.
+const GIVEN = "handsteer-camera", RESUME_MS = 200;
+
 let giving = null; // {stream, video, sender, shown} while the camera is in use
 
 // The server has the sentence for each "why"; "words" are its own.
@@ -20,6 +24,7 @@ async function giveCamera(viewer) {
     await openCamera();
   } catch (problem) {
     if (giving === mine) keepCamera({ why: problem.name });
+    forgetCamera();
     return;
   }
   if (giving === mine) sendFrames(viewer);
@@ -27,8 +32,11 @@ async function giveCamera(viewer) {
 
 // Opens the chosen camera of this device, and then releases the one before; without it another is taken.
 async function openCamera() {
-  const device = document.getElementById("browser-camera")?.value;
-  const [width, height] = (document.getElementById("browser-size")?.value ?? "640x480").split("x");
+  const given = JSON.parse(sessionStorage.getItem(GIVEN) ?? "{}");
+  const select = document.getElementById("browser-camera");
+  const device = giving.stream || !given.device ? select?.value : given.device;
+  const size = (giving.stream ? undefined : given.size) ?? document.getElementById("browser-size")?.value ?? "640x480";
+  const [width, height] = size.split("x");
   const wanted = { width: { ideal: +width }, height: { ideal: +height }, frameRate: { ideal: 30 } };
   if (device) wanted.deviceId = { ideal: device };
   const mine = giving, before = mine.stream;
@@ -38,6 +46,7 @@ async function openCamera() {
     return;
   }
   mine.stream = stream;
+  sessionStorage.setItem(GIVEN, JSON.stringify({ device, size }));
   for (const track of before?.getTracks() ?? []) {
     track.onended = null;
     track.stop();
@@ -46,14 +55,28 @@ async function openCamera() {
   await mine.video.play();
   mine.sender?.postMessage({ changed: true });
   for (const track of stream.getTracks()) track.onended = () => keepCamera({ why: "ended" });
-  listCameras();
+  listCameras(device, size);
 }
 
+function forgetCamera() {
+  sessionStorage.removeItem(GIVEN);
+}
+
+// The banner says "camera-off" to the driver whose browser's camera is in use, and gives no pictures.
+async function resumeCamera() {
+  if (giving || !sessionStorage.getItem(GIVEN) || !document.querySelector(".banner.camera-off")) return;
+  const permission = await navigator.permissions?.query({ name: "camera" }).catch(() => null);
+  if (permission?.state === "granted") giveCamera(window.clientId);
+}
+setInterval(resumeCamera, RESUME_MS);
+
 // The names are known only once a camera was allowed.
-async function listCameras() {
+async function listCameras(device, size) {
+  const sizes = document.getElementById("browser-size");
+  if (sizes) sizes.value = size;
   const select = document.getElementById("browser-camera");
   if (!select || !navigator.mediaDevices?.enumerateDevices) return;
-  const chosen = select.value;
+  const chosen = device ?? select.value;
   const found = (await navigator.mediaDevices.enumerateDevices()).filter((each) => each.kind === "videoinput" && each.deviceId && each.label);
   select.replaceChildren(select.options[0], ...found.map((each) => new Option(each.label, each.deviceId)));
   select.value = found.some((each) => each.deviceId === chosen) ? chosen : "";
@@ -68,7 +91,10 @@ function sendFrames(viewer) {
   const sender = giving.sender = new Worker("/assets/webcam-sender.js");
   sender.postMessage({ address: address.href });
   sender.onmessage = ({ data }) => {
-    if (data.closed !== undefined) keepCamera({ words: data.closed });
+    if (data.closed !== undefined) {
+      keepCamera({ words: data.closed });
+      if (data.isRefused) forgetCamera();
+    }
     else whenNew(video, send);
   };
   const send = async () => {
@@ -112,10 +138,16 @@ function keepCamera(detail = {}) {
 document.addEventListener("click", (event) => {
   const button = event.target.closest?.("[data-camera]");
   if (!button) return;
-  if (button.dataset.camera === "browser") giveCamera(button.dataset.viewer);
-  else keepCamera();
+  if (button.dataset.camera === "browser") giveCamera(window.clientId);
+  else {
+    keepCamera();
+    forgetCamera();
+  }
 });
 document.addEventListener("change", (event) => {
-  if (["browser-camera", "browser-size"].includes(event.target.id) && giving) openCamera().catch((problem) => keepCamera({ why: problem.name }));
+  if (["browser-camera", "browser-size"].includes(event.target.id) && giving) openCamera().catch((problem) => {
+    keepCamera({ why: problem.name });
+    forgetCamera();
+  });
 });
 window.addEventListener("pagehide", () => keepCamera());

@@ -4,6 +4,8 @@ const WORDS = {
   "World": "Welt",
   "Teach": "Lehren",
   "Settings": "Einstellungen",
+  "Details": "Einzelheiten",
+  "Details: velocities, topic, limits and reaction time": "Einzelheiten: Geschwindigkeiten, Topic, Grenzen und Reaktionszeit",
   "Light or dark": "Hell oder dunkel",
   "A recording is being made": "Es wird aufgezeichnet",
   "you drive": "du fährst",
@@ -275,7 +277,9 @@ const WORDS = {
 
   // The first visit: one's own camera, and three steps
   "This is a demo hand, not yours": "Das ist eine Demo-Hand, nicht deine",
-  "It shows the signs in turn, and the robot obeys. With your own camera you drive: your browser asks for it first, choose Allow. The pictures go to the computer that runs handsteer, and all who have its page open see them.": "Sie zeigt die Zeichen der Reihe nach, und der Roboter gehorcht. Mit deiner eigenen Kamera fährst du: dein Browser fragt zuerst, wähle „Zulassen“. Die Bilder gehen an den Computer, auf dem handsteer läuft, und alle, die seine Seite offen haben, sehen sie.",
+  "It shows the signs, and the robot obeys. With your camera you drive: your browser asks first, choose Allow. The computer that runs handsteer gets the pictures, and all who have its page open see them.": "Sie zeigt die Zeichen, und der Roboter gehorcht. Mit deiner Kamera fährst du: dein Browser fragt zuerst, wähle „Zulassen“. Der Computer, auf dem handsteer läuft, bekommt die Bilder, und alle, die seine Seite offen haben, sehen sie.",
+  "this browser's camera is off: Use my camera": "die Kamera dieses Browsers ist aus: Meine Kamera nutzen",
+  "the camera of the driver's browser is off": "die Kamera im Browser der fahrenden Person ist aus",
   "Use my camera": "Meine Kamera nutzen",
   "Keep watching": "Weiter zusehen",
   "The browser refused the camera. Allow it by the camera or lock symbol next to the page's address, then press Use my camera again.": "Der Browser hat die Kamera abgelehnt. Erlaube sie über das Kamera- oder Schlosssymbol neben der Adresse der Seite, dann drücke noch einmal Meine Kamera nutzen.",
@@ -292,7 +296,7 @@ const WORDS = {
   "Show Forward: index finger up": "Zeige Vorwärts: Zeigefinger hoch",
   "Hold it until the robot drives": "Halte es, bis der Roboter fährt",
   "Show Stop: open palm": "Zeige Stopp: offene Hand",
-  "You can drive. The page lists all signs below.": "Du kannst fahren. Alle Zeichen stehen weiter unten.",
+  "You can drive. All signs are next to the picture.": "Du kannst fahren. Alle Zeichen stehen neben dem Bild.",
   "Skip": "Überspringen",
   "Skip these steps": "Diese Schritte überspringen",
 
