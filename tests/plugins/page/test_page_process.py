@@ -24,7 +24,7 @@ from handsteer.messages import CMD_VEL, STOP, Bool, Twist
 from handsteer.plugins.page.page_process import PageProcess
 from handsteer.plugins.page.remote_graph import RemoteGraph
 from handsteer.robots.editing import add, remove
-from handsteer.robots.world import World, load_world
+from handsteer.robots.world import load_world
 from handsteer.testing.transport_contract import eventually
 from handsteer.transports.base import Received
 from handsteer.types import Pose2D

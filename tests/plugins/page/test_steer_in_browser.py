@@ -23,7 +23,7 @@ BLUR = "window.dispatchEvent(new Event('blur'))"
 
 @pytest.fixture
 def visit() -> Iterator[Visit]:
-    with visiting("NONE:600") as visit:
+    with visiting("NONE:600", details=True) as visit:
         yield visit
 
 

@@ -76,14 +76,14 @@ def wait_for_words(page: Page, selector: str, words: str) -> None:
 def test_the_browsers_webcam_drives_until_its_page_is_closed(graph: Graph, url: str, browser: Browser) -> None:
     page = show(browser, url)
     wait_for_words(page, ".banner", "No hand is in view")
-    page.get_by_text("Use my camera").click()
+    page.get_by_role("button", name="Use my camera").click()
     wait_for_words(page, ".camera .sign", "Forward")
     wait_for_words(page, ".source", "browser's camera")
     wait_for_words(page, ".banner .headline", "Driving")
     assert page.get_by_text("Back to the virtual hand").is_visible()
 
     second = show(browser, url)
-    second.get_by_text("Use my camera").wait_for(state="hidden")
+    second.get_by_role("button", name="Use my camera").wait_for(state="hidden")
     page.close()
     wait_until_stands(graph)
     # The robot's own camera does not come back by itself, whatever it sees.
@@ -114,7 +114,7 @@ def test_ones_own_camera_begins_at_the_start_and_not_where_the_demo_left_the_rob
             wait_for_words(shown, ".banner", "No hand seen for")
             wait_until_stands(graph)
             assert graph.robot.state.truth.x > 0.2
-            shown.get_by_text("Use my camera").click()
+            shown.get_by_role("button", name="Use my camera").click()
             waiting = threading.Event()
             for _ in range(PATIENCE_MS // 20):
                 if graph.cameras.source == "browser" and graph.robot.state.truth.x < 0.1:
@@ -127,7 +127,7 @@ def test_ones_own_camera_begins_at_the_start_and_not_where_the_demo_left_the_rob
 
 def test_only_who_drives_gives_a_camera(graph: Graph, url: str, browser: Browser) -> None:
     first, second = show(browser, url), show(browser, url)
-    buttons = [page.get_by_text("Use my camera") for page in (first, second)]
+    buttons = [page.get_by_role("button", name="Use my camera") for page in (first, second)]
     for button in buttons:
         button.wait_for()
     buttons[0].click()
@@ -145,7 +145,7 @@ def test_only_who_drives_gives_a_camera(graph: Graph, url: str, browser: Browser
 def test_a_browser_without_a_webcam_says_so(url: str) -> None:
     with a_browser() as browser:
         page = show(browser, url)
-        page.get_by_text("Use my camera").click()
+        page.get_by_role("button", name="Use my camera").click()
         wait_for_words(page, ".camera .trouble", "Plug one in, or open this page on a phone")
 
 
@@ -176,9 +176,9 @@ def test_a_browser_that_does_not_tell_of_new_pictures_sends_each_once_too(url: s
         page.set_default_timeout(PATIENCE_MS)
         page.add_init_script(STILL_CAMERA)
         page.goto(url)
-        page.get_by_text("Use my camera").wait_for()
+        page.get_by_role("button", name="Use my camera").wait_for()
         page.evaluate("setInterval(() => window.sent || takePicture('red'), 100)")  # until it is listened to
-        page.get_by_text("Use my camera").click()
+        page.get_by_role("button", name="Use my camera").click()
         page.wait_for_function("window.sent > 0")
         sent = -1
         while sent != page.evaluate("window.sent"):  # until what was painted meanwhile has come
