@@ -63,7 +63,7 @@ _BUILT_IN: Final = frozenset(
 
 
 class _DataUnpickler(pickle.Unpickler):
-    """Makes objects of data only, so that whoever wrote the pickle cannot run code of their choice."""
+    """Makes objects of data only, so that the process that wrote the pickle cannot run code here."""
 
     def find_class(self, module: str, name: str) -> Any:
         return _data_class(module, name)
