@@ -113,11 +113,14 @@ class RestLook:
     def take(self, eyes: Eyes) -> Seen:
         """Recognise the hanging hand alone."""
         eyes.landmarker.reset()
-        hands = eyes.landmarker.detect(View().picture(read_photo(self.photo.path)))
+        image = View().picture(read_photo(self.photo.path))
+        hands = eyes.landmarker.detect(image)
         hands = sorted(hands, key=lambda hand: float(hand.points[:, 1].mean()))
         if len(hands) < 2 or _from_up_deg(hands[-1]) < _HANGS_DEG:
             return Seen(False, False, f"{self.photo.path}: no hanging hand found")
         guess = eyes.classifier.classify(hands[-1])
+        if guess.sign == NONE or guess.confidence < Config().signs.min_confidence:
+            guess = eyes.classifier.classify(eyes.landmarker.look_again(image, hands[-1]))
         moved = guess.sign in MOTION_SIGNS and guess.confidence >= Config().signs.min_confidence
         line = f"{self.photo.path}: hanging hand seen as {guess.sign} {guess.confidence:.2f}"
         return Seen(not moved, moved, line)

@@ -53,6 +53,9 @@ class PaintedLandmarker:
         # Grey and black, of a torn or dark picture, have no noise.
         return [self.hands[SIGNS[index]]] if row.std() > 0 and 0 <= index < len(SIGNS) else []
 
+    def look_again(self, image: NDArray[np.uint8], hand: Hand) -> Hand:
+        return hand
+
     def follow_only(self, hand: Hand) -> None:
         pass
 

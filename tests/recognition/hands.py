@@ -81,6 +81,10 @@ class RecordedLandmarker:
         self._next += 1
         return list(hands)
 
+    def look_again(self, image: np.ndarray, hand: Hand) -> Hand:
+        """Return ``hand``: there is nothing else in a recording."""
+        return hand
+
     def follow_only(self, hand: Hand) -> None:
         """Do nothing: a recording continues with all its hands."""
 

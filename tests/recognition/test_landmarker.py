@@ -14,9 +14,11 @@ from handsteer.cameras.files import read_photo
 from handsteer.config import LandmarksConfig
 from handsteer.errors import FrameError, ModelMissing
 from handsteer.plugins.teach.evaluation.views import View
+from handsteer.recognition.estimates import estimate_region
 from handsteer.recognition.hand import Hand
-from handsteer.recognition.landmark_models import PictureModel
+from handsteer.recognition.landmark_models import PictureModel, find_model
 from handsteer.recognition.landmarker import MediaPipeLandmarker
+from handsteer.recognition.regions import Roi
 from handsteer.types import Handedness
 from tests.recognition.drawn_hand import draw, open_left_hand, open_right_hand
 
@@ -281,6 +283,43 @@ def test_no_region_waits_once_a_single_hand_is_followed(
     (hand,) = two_hand_landmarker.detect(both, search=False, dt_s=DT)
     two_hand_landmarker.follow_only(hand)
     assert each_run_of([both], two_hand_landmarker, runs) == [(1, 0, 1)]
+
+
+def test_a_hand_that_is_seen_again_is_the_one_of_which_the_model_is_surer(landmarker: MediaPipeLandmarker) -> None:
+    points = open_right_hand(320, 250, size=60)
+    frame = draw(points)
+    (first,) = landmarker.detect(frame)
+    again = landmarker.look_again(frame, first)
+    assert again.presence > first.presence
+    assert again.handedness == first.handedness == "Right"
+    assert distance(again, points) < 0.1 * 60
+    assert landmarker.look_again(frame, first) is first, "another hand has replaced it"
+    landmarker.follow_only(again)
+    assert len(landmarker.detect(frame, dt_s=DT)) == 1, "the better one is followed"
+
+
+def test_no_hand_is_seen_again_after_the_first_frame_of_a_stream(
+    two_hand_landmarker: MediaPipeLandmarker, runs: list[int]
+) -> None:
+    frame = draw(open_right_hand(150, 250), open_left_hand(480, 250))
+    for number in range(12):
+        hands = two_hand_landmarker.detect(frame, dt_s=DT)
+        assert len(hands) == 2
+        runs.clear()
+        for hand in hands:
+            two_hand_landmarker.look_again(frame, hand)
+        assert len(runs) == (0 if number else 4)
+
+
+def test_a_region_that_is_seen_mirrored_shows_the_same_hand() -> None:
+    model = PictureModel(find_model("hand_landmark_fast.tflite"), 1)
+    points = open_left_hand(300, 250)
+    region = Roi(300, 250, 260, 0.2)
+    plain, mirrored = (estimate_region(model, draw(points), region, mirrored=each) for each in (False, True))
+    assert np.abs(plain.pixels - mirrored.pixels)[:, :2].max() < 0.15 * 90
+    assert np.abs(plain.world - mirrored.world).max() < 0.02
+    assert max(plain.rightness, mirrored.rightness) < 0.5
+    assert min(plain.presence, mirrored.presence) > 0.5
 
 
 @pytest.mark.parametrize(("turned", "frames"), [(0, 3), (1, 20), (2, 6), (3, 20)])

@@ -104,6 +104,35 @@ def test_further_hands_are_looked_for_only_while_no_sign_counts_or_is_about_to()
     assert landmarker.searched == (True, True, True, *[False] * 5)
 
 
+class Unsure(RecordedLandmarker):
+    """Sees ``better`` when it looks again, and notes at which hands."""
+
+    def __init__(self, frames: list[list[Hand]], better: Hand) -> None:
+        super().__init__(frames)
+        self.better = better
+        self.asked: list[Hand] = []
+
+    def look_again(self, image: np.ndarray, hand: Hand) -> Hand:
+        self.asked.append(hand)
+        return self.better
+
+
+def test_a_hand_without_a_sign_is_seen_again() -> None:
+    peace = show_fingers("index", "middle")
+    landmarker = Unsure([[peace]], HAND)
+    recognition = Recognizer(landmarker=landmarker, classifier=CLASSIFIER).recognize(IMAGE)
+    assert (recognition.sign, recognition.hand) == (FORWARD, HAND)
+    assert len(landmarker.asked) == 1
+
+
+def test_no_hand_is_seen_again_while_any_shows_a_sign() -> None:
+    peace = moved(show_fingers("index", "middle"), x_px=200)
+    for hands, sign in (([show_sign(STOP)], STOP), ([peace, show_sign(STOP)], STOP), ([HAND], FORWARD)):
+        landmarker = Unsure([hands], HAND)
+        assert Recognizer(landmarker=landmarker, classifier=CLASSIFIER).recognize(IMAGE).sign == sign
+        assert not landmarker.asked
+
+
 def test_a_sign_that_counts_goes_on_while_the_hand_moves() -> None:
     hands = [HAND] * 6 + [moved(HAND, x_px=25.0 * frame) for frame in range(8)]
     stream = reading([[hand] for hand in hands])

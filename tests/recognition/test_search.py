@@ -108,8 +108,7 @@ def test_enough_sure_palms_in_the_plain_frame_end_the_search() -> None:
 def test_only_near_hands_are_looked_for_in_a_frame_that_is_much_widened() -> None:
     for size, count in ((60, 0), (200, 1)):
         places = Search(Palms(palm(size)), 2, wide=True).places(FRAME, beside_a_hand=False)
-        next(places)
-        assert len(next(places).regions) == count
+        assert len(next(each for each in places if each.min_presence == 0.9).regions) == count
 
 
 def test_doubtful_palms_come_after_the_others_and_need_a_hand_of_which_the_landmark_model_is_sure() -> None:
@@ -121,7 +120,42 @@ def test_doubtful_palms_come_after_the_others_and_need_a_hand_of_which_the_landm
     assert list(search.places(FRAME, beside_a_hand=True)) == [Places([sure.roi])]
     # Nor do near palms count if they are doubtful.
     near = Search(Palms(palm(200, 0.2, is_sure=False)), 1, wide=True).places(FRAME, beside_a_hand=False)
-    assert [len(places.regions) for places in near] == [0, 4, 0, 1, 1, 1, 1]
+    assert [len(places.regions) for places in near if places.min_presence != 0.95][:2] == [0, 0]
+
+
+def test_larger_regions_of_palms_come_last_and_need_a_hand_of_which_the_landmark_model_is_sure() -> None:
+    sure, doubtful = palm(100, 0.6), palm(150, 0.2, is_sure=False)
+    search = Search(Palms(doubtful, sure), 1, wide=True)
+    first = list(search.places(FRAME, beside_a_hand=False))
+    assert [len(each.regions) for each in first[:2]] == [4, 4]
+    sizes = [1.3] * 4 + [1.7] * 4
+    larger = [Places([sure.roi.grown(size)], 0.95) for size in sizes] + [Places([doubtful.roi.grown(1.7)], 0.95)] * 4
+    assert first[2:14] == larger
+    second = list(search.places(FRAME, beside_a_hand=False))
+    assert [each.regions for each in second] == [[sure.roi], [doubtful.roi]], "in a stream, the next frames do as much"
+
+
+def test_larger_regions_are_not_looked_at_beside_a_hand_nor_without_the_wide_search() -> None:
+    for wide, beside_a_hand in ((True, True), (False, True), (False, False)):
+        search = Search(Palms(palm(100, 0.6)), 1, wide=wide)
+        for _ in range(6):
+            assert list(search.places(FRAME, beside_a_hand=beside_a_hand)) == [Places([palm(100).roi])]
+
+
+@pytest.mark.parametrize("wide", [True, False])
+def test_a_hand_is_found_whose_palm_is_detected_too_small_in_the_wide_search_only(
+    wide: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    frame = draw(open_right_hand(130, 300, size=100))
+    (hand,) = MediaPipeLandmarker(LandmarksConfig()).detect(frame)
+    wrist, knuckle = hand.pixels[0, :2], hand.pixels[9, :2]
+    middle = (wrist + knuckle) / 2
+    corners, keypoints = np.stack([middle - 28, middle + 28]), np.tile(wrist, (7, 1))
+    keypoints[2] = knuckle
+    small = Palm(corners, keypoints, 0.6)
+    monkeypatch.setattr(PalmDetector, "detect", lambda *_, **__: [small])
+    landmarker = MediaPipeLandmarker(LandmarksConfig(wide_search=wide, min_presence=0.9))
+    assert len(landmarker.detect(frame)) == wide
 
 
 @pytest.mark.parametrize("wide", [True, False])

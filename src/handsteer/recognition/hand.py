@@ -78,6 +78,14 @@ class Landmarker(Protocol):
         """
         ...
 
+    def look_again(self, image: NDArray[np.uint8], hand: Hand) -> Hand:
+        """Return ``hand``, one of the last frame, ``image``, or the same hand located better, if it can be.
+
+        A better one replaces it: it is tracked from then on. It is looked for only where a frame may take long: in
+        photos, and in the first frame of a stream.
+        """
+        ...
+
     def follow_only(self, hand: Hand) -> None:
         """Stop tracking all hands of the last frame except ``hand``, to save time."""
         ...

@@ -3,27 +3,36 @@
 The processing follows MediaPipe 0.10.21's graph ``hand_landmark_tracking_cpu``, used by ``mp.solutions.hands``: while
 enough hands are tracked, only the landmark model runs, on the region from the last landmarks; otherwise palms are
 detected in the whole frame first. In addition, unless configured otherwise, a new hand is processed twice, the second
-time in the region from its own landmarks, because a palm locates a hand less precisely; and hands are searched for in
-further ways than by palms in the frame, see ``search``.
+time in the region from its own landmarks, because a palm locates a hand less precisely; in a photo, a third and a
+fourth time if asked, see :meth:`MediaPipeLandmarker.look_again`; and hands are searched for in further ways than by
+palms in the frame, see ``search``.
 
 The first frame of a stream, and each frame without a time, is processed completely. In any other one the number of runs
 of the models is limited, and the next frame does what is left: its second run on a new hand, or its first on a region.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import inf
 from typing import Final
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from handsteer.config import LandmarksConfig
 from handsteer.errors import FrameError
+from handsteer.recognition.estimates import (
+    SAME_HAND_OVERLAP,
+    SECOND_LOOK,
+    Estimate,
+    distinct,
+    estimate_region,
+    hand_of,
+    of_different_hands,
+)
 from handsteer.recognition.hand import Hand
 from handsteer.recognition.landmark_models import PictureModel, find_pair
-from handsteer.recognition.regions import PalmDetector, Roi, from_landmarks
+from handsteer.recognition.regions import PalmDetector, Roi
 from handsteer.recognition.search import (
     DOUBTFUL_PALM,
     Pace,
@@ -34,19 +43,14 @@ from handsteer.recognition.search import (
     cells_of_hands,
 )
 
-_DEPTH_SCALE: Final = 0.4
-"""Factor of the model's depth relative to its x and y."""
-
-Array = NDArray[np.floating]
-
-_SAME_HAND_OVERLAP: Final = 0.5
-_PART: Final = 0.7
-_SECOND_LOOK: Final = 1.15
-"""Factor on MediaPipe's region in the second pass: of 57 misread hands of people, it corrects 12 more."""
 _RUNS: Final = 5
 """Maximum runs of the landmark model in a frame without palm detection: four rotations, one of them twice."""
 _RUNS_WITH_PALMS: Final = 2
 """Likewise in a frame with palm detection; a lost hand's count too. MediaPipe's ``full`` models take longer for one."""
+_AGAIN_PRESENCE: Final = 0.9
+"""Minimum presence in a second look: of four hands without a sign that it read as a motion, two had less."""
+_SURER: Final = 0.003
+"""Presence by which the model has to be surer in it."""
 _SEARCH: Final = Pace(change=6, settle_s=0.12, period_s=0.2)
 """How often to search without a hand: when settled, each of the four main ways has had its frame at 30 Hz."""
 _SEARCH_BESIDE_A_HAND: Final = Pace(change=6, settle_s=0.6, period_s=1.0, least_s=0.3)
@@ -55,45 +59,6 @@ _FOLLOW: Final = Pace(change=3, settle_s=0.08, period_s=0.1)
 """How often to process tracked hands: below three levels, landmarks deviate by at most 0.03 of the hand."""
 _MAX_SIDE: Final = 32766
 """Maximum side of a picture that OpenCV can sample, in pixels."""
-
-
-@dataclass(frozen=True)
-class Estimate:
-    """The model's output for a region.
-
-    Attributes:
-        pixels: (21, 3) x and y in pixels of the frame, z in the scale of x.
-        world: (21, 3) in metres relative to the hand's centre, with the axes of ``pixels``.
-        rightness: Likelihood, 0 to 1, of a person's right hand, rather than the left, in an unmirrored frame.
-        presence: Likelihood that there is a hand, 0 to 1.
-        is_rough: Whether it is the first of a new hand, whose second is due in the next frame.
-    """
-
-    pixels: Array
-    world: Array
-    rightness: float
-    presence: float
-    is_rough: bool = False
-
-    @property
-    def region(self) -> Roi:
-        """The region of the hand for the next run."""
-        region = from_landmarks(self.pixels[:, :2])
-        return region.grown(_SECOND_LOOK) if self.is_rough else region
-
-
-def _estimate(model: PictureModel, image: NDArray[np.uint8], roi: Roi) -> Estimate:
-    """Return the output of a hand landmark model for the region ``roi`` of ``image``."""
-    picture, presence, rightness, metric = model.run(roi.crop(image, model.side, cv2.BORDER_REPLICATE))
-    points = picture.reshape(21, 3) / model.side
-    world = metric.reshape(21, 3)
-    return Estimate(
-        pixels=np.column_stack([roi.to_frame(points[:, :2]), points[:, 2] * (roi.side / _DEPTH_SCALE)]),
-        world=np.column_stack([world[:, :2] @ roi.axes, world[:, 2]]),
-        # MediaPipe calls this "Left", because it assumes mirrored pictures.
-        rightness=float(rightness[0]),
-        presence=float(presence[0]),
-    )
 
 
 class MediaPipeLandmarker:
@@ -161,14 +126,32 @@ class MediaPipeLandmarker:
             return list(self._hands)
         if self._followed and not estimates:
             self._searched.reset()
-        present, self._followed = _of_different_hands(estimates)
+        present, self._followed = of_different_hands(estimates)
         self._has_rough = any(estimate.is_rough for estimate in present)
         self._has_tracked = not all(estimate.is_rough for estimate in present)
         if self._followed:
             self._looked_at = self._followed
             self._still.look(cells_of_hands(image, self._looked_at))
-        self._hands = [_hand(estimate, width, height) for estimate in present]
+        self._hands = [hand_of(estimate, width, height) for estimate in present]
         return list(self._hands)
+
+    def look_again(self, image: NDArray[np.uint8], hand: Hand) -> Hand:
+        """Return ``hand`` as seen again in its own region and, mirrored, in a larger one, if the model is surer then.
+
+        Only in photos and the first frame of a stream: in others, the next frames show as much.
+        """
+        index = next((number for number, each in enumerate(self._hands) if each is hand), None)
+        if index is None or self._runs_left < inf or not self._config.refine_new_hands:
+            return hand
+        own = self._followed[index]
+        seconds = (self._run(image, own), self._run(image, own.grown(SECOND_LOOK), mirrored=True))
+        best = max(seconds, key=lambda each: each.presence)
+        is_another = any(best.region.overlap(one) > SAME_HAND_OVERLAP for one in self._followed if one is not own)
+        if is_another or best.presence < max(_AGAIN_PRESENCE, hand.presence + _SURER):
+            return hand
+        self._hands[index] = hand_of(best, *self._image_size)
+        self._followed[index] = best.region
+        return self._hands[index]
 
     def follow_only(self, hand: Hand) -> None:
         """Stop tracking all hands of the last frame except ``hand``."""
@@ -248,12 +231,12 @@ class MediaPipeLandmarker:
         The found ones take turns, and without room they replace the last followed one. Otherwise a face that the
         palm model takes for a hand, or two hands of a person who watches, would hide the hand that shows a sign.
         """
-        new = _distinct([*followed, *found])[len(followed) :]
+        new = distinct([*followed, *found])[len(followed) :]
         if self._runs_left == inf or not new:
             return [*followed, *new]
         limit = self._config.max_hands
         room = max(limit - len(followed), min(1, limit - 1))
-        had = {region for region in new if any(region.overlap(one) > _SAME_HAND_OVERLAP for one in self._had_turn)}
+        had = {region for region in new if any(region.overlap(one) > SAME_HAND_OVERLAP for one in self._had_turn)}
         if len(had) == len(new):
             self._had_turn, had = followed[limit - room :], set()
         chosen = sorted(new, key=lambda region: region in had)[:room]
@@ -283,56 +266,12 @@ class MediaPipeLandmarker:
         rough = replace(first, is_rough=True)
         return self._run(image, rough.region) if self._runs_left >= 1 else rough
 
-    def _run(self, image: NDArray[np.uint8], region: Roi) -> Estimate:
+    def _run(self, image: NDArray[np.uint8], region: Roi, *, mirrored: bool = False) -> Estimate:
         self._runs_left -= 1
-        return _estimate(self._landmarks, image, region)
+        return estimate_region(self._landmarks, image, region, mirrored=mirrored)
 
     def _is_present(self, estimate: Estimate) -> bool:
         return estimate.presence > self._config.min_presence
-
-
-def _distinct(regions: list[Roi]) -> list[Roi]:
-    """Return ``regions`` without those of the same hand as an earlier one.
-
-    MediaPipe instead keeps the last of such regions, which is the palm with the lower score.
-    """
-    distinct: list[Roi] = []
-    for region in regions:
-        if all(region.overlap(other) <= _SAME_HAND_OVERLAP for other in distinct):
-            distinct.append(region)
-    return distinct
-
-
-def _of_different_hands(estimates: list[Estimate]) -> tuple[list[Estimate], list[Roi]]:
-    """Return ``estimates`` and their regions, without duplicates of earlier hands and parts mistaken for a hand.
-
-    Two regions may lead to the same hand, and some fingers of a hand to a smaller hand within it.
-    """
-    whole = [estimate for estimate in estimates if not any(_is_part(estimate, other) for other in estimates)]
-    regions = [estimate.region for estimate in whole]
-    kept = _distinct(regions)
-    return [each for each, region in zip(whole, regions, strict=True) if any(region is one for one in kept)], kept
-
-
-def _is_part(estimate: Estimate, other: Estimate) -> bool:
-    """Return whether ``estimate`` is much smaller than ``other`` and has its centre in its box."""
-    low, high = estimate.pixels[:, :2].min(axis=0), estimate.pixels[:, :2].max(axis=0)
-    other_low, other_high = other.pixels[:, :2].min(axis=0), other.pixels[:, :2].max(axis=0)
-    centre = (low + high) / 2
-    is_smaller = (high - low).max() < _PART * (other_high - other_low).max()
-    return bool(is_smaller and (other_low <= centre).all() and (centre <= other_high).all())
-
-
-def _hand(estimate: Estimate, width: int, height: int) -> Hand:
-    right = estimate.rightness > 0.5
-    return Hand(
-        points=(estimate.pixels / (width, height, width)).astype(np.float32),
-        world=estimate.world.astype(np.float32),
-        handedness="Right" if right else "Left",
-        handedness_score=max(estimate.rightness, 1 - estimate.rightness),
-        presence=estimate.presence,
-        image_size=(width, height),
-    )
 
 
 def _check(image: object) -> None:

@@ -175,6 +175,11 @@ class Recognizer:
         hands = self._landmarker.detect(image, search=search, dt_s=dt_s)
         classified = [self._classifier.classify(hand) for hand in hands]
         guesses = [self._seen(guess) for guess in classified]
+        if all(guess.sign == NONE for guess in guesses):
+            # The landmark model may not have followed a finger. A sign, Stop above all, does not wait for that.
+            hands = [self._landmarker.look_again(image, hand) for hand in hands]
+            classified = [self._classifier.classify(hand) for hand in hands]
+            guesses = [self._seen(guess) for guess in classified]
         if self._resting is not None:
             self._resting.next_frame(dt_s)
             guesses = self._raised(self._resting, image, hands, guesses, alone=alone, dt_s=dt_s)

@@ -35,6 +35,14 @@ Hands that point down, dark ones, and those at the frame's edge often score less
 """
 _DOUBTFUL_PRESENCE: Final = 0.95
 """Minimum presence of the hand of such a palm; with 0.9, pictures of people at rest are misread."""
+_LARGER: Final = 1.7
+_SURE_LARGER: Final = (1.3, _LARGER)
+"""Factors on the region of a palm in which the landmark model sees no hand: the palm's box may be too small.
+
+In the smaller one a doubtful palm gave ``Go`` for a person who shows nothing.
+"""
+_RETRIED: Final = 4
+"""Maximum number of sure and of doubtful palms that are tried again."""
 _FURTHER: Final = 2
 """Palms beyond the wanted number: one that shows a sign may have a lower score than those of another person."""
 
@@ -76,11 +84,13 @@ class PalmView:
 class Palms:
     """Detect palms in these ``views`` of a frame, optionally only those of ``near`` hands.
 
-    The views are tried in order, until there are enough palms with a high score.
+    The views are tried in order, until there are enough palms with a high score. Larger regions of palms come last, if
+    wanted: they are for palms in whose own the landmark model sees no hand. In a stream, the next frames do as much.
     """
 
     views: tuple[PalmView, ...] = (PalmView(),)
     near: bool = False
+    larger: bool = False
 
     def places(self, image: NDArray[np.uint8], palms: PalmDetector, limit: int) -> Iterator[Places]:
         """Yield the regions of palms, those of ``limit`` hands and a few more, then those of doubtful palms, if any.
@@ -99,9 +109,15 @@ class Palms:
             yield Places([roi for roi in regions if roi.side >= _NEAR * max(image.shape[:2])], _NEAR_PRESENCE)
             return
         yield Places(regions)
-        doubtful = sorted((palm for _, palm in found if not palm.is_sure), key=lambda palm: -palm.score)
+        palms_left = sorted((palm for _, palm in found if not palm.is_sure), key=lambda palm: -palm.score)
+        doubtful = [palm.roi for palm in palms_left]
         if doubtful:
-            yield Places([palm.roi for palm in doubtful], _DOUBTFUL_PRESENCE)
+            yield Places(doubtful, _DOUBTFUL_PRESENCE)
+        if self.larger:
+            again = [region.grown(factor) for factor in _SURE_LARGER for region in regions[:_RETRIED]]
+            again += [region.grown(_LARGER) for region in doubtful[:_RETRIED]]
+            # One by one: of several regions of one hand, only the first is used.
+            yield from (Places([region], _DOUBTFUL_PRESENCE) for region in again)
 
 
 @dataclass(frozen=True)
@@ -132,7 +148,7 @@ _VERY_WIDE: Final = Palms((PalmView(2.0),), near=True)
 _MIDDLE_UP, *_MIDDLES_TURNED = (Middle(turned_deg) for turned_deg in (0.0, 180.0, 90.0, 270.0))
 
 _AS_MEDIAPIPE: Final[Turn] = (_PLAIN,)
-_FIRST: Final[Turn] = (Palms(_VIEWS), _VERY_WIDE, _MIDDLE_UP, *_MIDDLES_TURNED)
+_FIRST: Final[Turn] = (Palms(_VIEWS, larger=True), _VERY_WIDE, _MIDDLE_UP, *_MIDDLES_TURNED)
 # Palm detection takes longest, so there is one per frame. Most hands that are shown point upwards.
 _WITHOUT_HANDS: Final[tuple[Turn, ...]] = tuple(
     turn

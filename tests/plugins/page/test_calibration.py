@@ -51,6 +51,9 @@ class Room:
         sign = node.state.sign if node is not None else ""
         return [] if self.hides or not sign else [self.hands[sign][next(self._frames) % 40]]
 
+    def look_again(self, image: np.ndarray, hand: Hand) -> Hand:
+        raise AssertionError("a calibration reads hands as they are found")
+
     def follow_only(self, hand: Hand) -> None:
         raise AssertionError("a calibration looks at all hands")
 

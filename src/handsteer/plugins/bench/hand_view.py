@@ -76,6 +76,10 @@ class HandLandmarker:
         is_inside = bool(((palm > 0.0) & (palm < 1.0)).all())
         return [hand] if is_inside and not is_missed else []
 
+    def look_again(self, image: Image, hand: Hand) -> Hand:
+        """Return ``hand``: it is located already."""
+        return hand
+
     def follow_only(self, hand: Hand) -> None:
         """Do nothing: there is one hand."""
 
