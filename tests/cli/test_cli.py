@@ -5,6 +5,7 @@ import signal
 import socket
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -12,6 +13,7 @@ from pathlib import Path
 import pytest
 
 from handsteer.cli import main
+from tests.processes import eventually
 
 VIRTUAL = ["--camera", "virtual", "--camera.width", "320", "--camera.height", "240"]
 
@@ -216,19 +218,20 @@ def test_signals_right_behind_one_another_end_it_as_one_does() -> None:
 
 def interrupted_run(*numbers: signal.Signals, through: Sequence[str] = ()) -> tuple[int, str, str, float]:
     """Send signals to a run that drives; return its exit code, its output and errors, and how long it took to end."""
-    command = [*through, sys.executable, "-m", "handsteer", "run", "--headless", *VIRTUAL, "--json"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
-        assert process.stderr
-        process.stderr.readline()  # LiteRT says that there is a model: the graph is being made
-        time.sleep(4.0)
-        began_s = time.monotonic()
-        for number in numbers:
-            process.send_signal(number)
-        try:
-            out, err = process.communicate(timeout=20)
-        finally:
-            process.kill()
-        return process.returncode, out, err, time.monotonic() - began_s
+    run = [sys.executable, "-m", "handsteer", "run", "--headless", *VIRTUAL, "--json", "--record"]
+    with tempfile.TemporaryDirectory() as folder:
+        recording = Path(folder) / "drive.mcap"
+        command = [*through, *run, str(recording)]
+        with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+            try:
+                eventually(lambda: recording.exists() and recording.stat().st_size > 300_000, what="pictures")
+                began_s = time.monotonic()
+                for number in numbers:
+                    process.send_signal(number)
+                out, err = process.communicate(timeout=20)
+            finally:
+                process.kill()
+            return process.returncode, out, err, time.monotonic() - began_s
 
 
 def test_a_reader_that_leaves_is_no_error(data_dir: Path) -> None:
