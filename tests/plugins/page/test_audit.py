@@ -1,6 +1,7 @@
 """What viewers do, on /audit."""
 
 from concurrent.futures import Future
+from functools import partial
 from pathlib import Path
 
 from handsteer.audit import AuditEvent, read_event
@@ -14,7 +15,6 @@ from handsteer.plugins.page.settings import Settings, SettingsFile
 from handsteer.plugins.page.settings_fields import FIELDS
 from handsteer.plugins.page.viewers import ANSWER_S, ControlLease, PageAudit
 from handsteer.robots.editing import add
-from handsteer.robots.world import World
 from handsteer.testing.transport_contract import eventually
 from handsteer.transports.base import Received
 from handsteer.transports.in_process import InProcessTransport
@@ -102,7 +102,7 @@ def test_changes_of_the_graph_are_told_as_the_drivers(tmp_path: Path) -> None:
         settings = Settings(lambda: page.config, page.reconfigure, file, save)
         settings.set(FIELDS["control.max_linear"], "0.3")
         settings.save()
-        changed: Future[None] = page.change_world(_with_a_box)
+        changed: Future[None] = page.change_world(partial(add, shape="box", robot=Pose2D(0.0, 0.0, 0.0)))
         changed.result(10)
         page.choose_camera("own")
         wanted = {"seat_taken", "setting_changed", "settings_saved", "world_changed", "camera_chosen"}
@@ -110,7 +110,3 @@ def test_changes_of_the_graph_are_told_as_the_drivers(tmp_path: Path) -> None:
         assert {each.name for each in told if each.function in wanted} == {"viewer 1 (192.0.2.7)"}
         (setting,) = [each.msg for each in told if each.function == "setting_changed"]
         assert setting == "changed control.max_linear from 1 to 0.3"
-
-
-def _with_a_box(world: World) -> World:
-    return add(world, shape="box", robot=Pose2D(0.0, 0.0, 0.0))

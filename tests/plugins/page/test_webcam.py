@@ -88,7 +88,7 @@ def test_the_browsers_webcam_drives_until_its_page_is_closed(graph: Graph, url: 
     wait_until_stands(graph)
     # The robot's own camera does not come back by itself, whatever it sees.
     assert graph.cameras.source == "browser"
-    wait_for_words(second, ".banner", "No frame")
+    wait_for_words(second, ".banner", "is off")
     second.get_by_text("Back to the virtual hand").click()
     wait_for_words(second, ".banner", "No hand seen for")
 
