@@ -177,8 +177,11 @@ class Recognizer:
         guesses = [self._seen(guess) for guess in classified]
         if all(guess.sign == NONE for guess in guesses):
             # The landmark model may not have followed a finger. A sign, Stop above all, does not wait for that.
-            hands = [self._landmarker.look_again(image, hand) for hand in hands]
-            classified = [self._classifier.classify(hand) for hand in hands]
+            found, hands = hands, [self._landmarker.look_again(image, hand) for hand in hands]
+            classified = [
+                guess if hand is before else self._classifier.classify(hand)
+                for hand, before, guess in zip(hands, found, classified, strict=True)
+            ]
             guesses = [self._seen(guess) for guess in classified]
         if self._resting is not None:
             self._resting.next_frame(dt_s)
