@@ -163,7 +163,6 @@ def _end_if_it_hangs(item: pytest.Item) -> None:
 def pytest_runtest_setup(item: pytest.Item) -> None:
     """Begin each try of a test with all its time, and skip what needs ROS 1 where that is not installed."""
     _end_if_it_hangs(item)
-    """Skip what needs ROS 1 where that is not installed."""
     there = importlib.util.find_spec("rospy") and shutil.which("roscore")
     if item.get_closest_marker("ros1") and not there:
         pytest.skip("ROS 1 is not installed: make ros1")
