@@ -10,7 +10,13 @@ DOCUMENT = Path(__file__).resolve().parents[2] / "docs" / "faults.md"
 LIMIT_S = 0.5
 """Of every row: from the end of the reason to drive to the last moment at which the robot was asked to move."""
 
-_HEAD = ("where", "what happens", "stop commanded after [s]", "moves before neutral was seen", "reported meanwhile")
+_HEAD = (
+    "where",
+    "what happens",
+    "stop commanded after [s]",
+    "moves before neutral was seen",
+    "reported during the fault",
+)
 
 
 def render(outcomes: Iterable[Outcome]) -> str:
